@@ -1,0 +1,25 @@
+"""The contract that every model signs: a Scene goes in, a History comes out."""
+
+from scenes.errors import InputError, ModelFailure
+from scenes.excitations import Record, Rest, Ricker, Sine
+from scenes.files import load_scene, named_scenes
+from scenes.history import Cost, Event, History
+from scenes.scene import Block, Floor, Scene, Wall
+
+__all__ = [
+    "Block",
+    "Cost",
+    "Event",
+    "Floor",
+    "History",
+    "InputError",
+    "ModelFailure",
+    "Record",
+    "Rest",
+    "Ricker",
+    "Scene",
+    "Sine",
+    "Wall",
+    "load_scene",
+    "named_scenes",
+]

@@ -1,0 +1,58 @@
+"""The one exception that means "what you gave is not usable", told in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+from pydantic import ValidationError
+
+
+class InputError(ValueError):
+    """What the user gave cannot be used; the message is one line saying where, what and what is allowed.
+
+    `key` is the dotted path of the offending setting within its object, empty where there is none.
+    """
+
+    def __init__(self, message: str, key: str = "") -> None:
+        self.key = key
+        self.reason = message
+        super().__init__(f"{key}: {message}" if key else message)
+
+
+class ModelFailure(RuntimeError):
+    """A model could not finish a scene (blow-up, unsupported physics, a cap reached); its cell fails, the run goes on."""
+
+
+def unknown_name(what: str, name: str, allowed: Iterable[str]) -> InputError:
+    """An `InputError` for a name that is not among `allowed`, suggesting the nearest one."""
+    names = sorted(allowed)
+    near = get_close_matches(name, names, n=1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    return InputError(f"unknown {what} {printable(name)!r}; {hint}allowed: {', '.join(names)}")
+
+
+def printable(value: object, limit: int = 80) -> str:
+    """`value` as one short line without control characters, safe to write to a terminal."""
+    text = "".join(c if c.isprintable() else "?" for c in str(value))
+    return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def from_validation(error: ValidationError) -> InputError:
+    """The first fault that pydantic found, as one line: key, value, what is allowed."""
+    fault = error.errors(include_url=False)[0]
+    path = [str(part) for part in fault["loc"]]
+    if path[:1] in (["excitation"], ["vertical"]):
+        del path[1:2]  # the excitation's kind, which pydantic adds
+    inner = fault.get("ctx", {}).get("error")
+    if isinstance(inner, InputError):
+        return InputError(inner.reason, ".".join([*path, inner.key] if inner.key else path))
+    message = fault["msg"].removeprefix("Value error, ")
+    key = ".".join(path)
+    if fault["type"] == "extra_forbidden":
+        return InputError("unknown key", key)
+    if fault["type"] == "missing":
+        return InputError("is missing", key)
+    if isinstance(fault["input"], int | float | str | bool):
+        message = f"{printable(fault['input'])!s} is not allowed: {message[0].lower()}{message[1:]}"
+    return InputError(message, key)

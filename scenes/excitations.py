@@ -1,0 +1,179 @@
+"""Base excitations: pulses, recorded ground motions and rest.
+
+Every excitation counts time from its own start (t = 0) and gives the acceleration of the base in m/s^2, horizontal
+motion positive to the right, vertical motion positive upward.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field, model_validator
+
+from scenes.base import Finite, Frozen, Positive
+from scenes.errors import InputError
+from scenes.records import GRAVITY_OF_RECORDS, read_record
+
+FloatArray = NDArray[np.float64]
+
+
+class Rest(Frozen):
+    """A base that does not move."""
+
+    kind: Literal["rest"] = "rest"
+
+    def acceleration(self, t: ArrayLike) -> FloatArray:
+        """Base acceleration at times `t` (s): zero."""
+        return np.zeros_like(np.asarray(t, dtype=float))
+
+    @property
+    def quiet_after(self) -> float:
+        """Time in s after which the base does not move any more."""
+        return 0.0
+
+
+class Ricker(Frozen):
+    """A Ricker pulse; antisymmetric (the paper's (34)) unless `symmetric`.
+
+    It starts 2 T_p before its centre. An antisymmetric pulse of positive amplitude has a weak negative lobe, a strong
+    positive, a strong negative and a weak positive one. `amplitude` is the peak acceleration a_p in m/s^2 (negative:
+    the mirror image), `period` is T_p = 2 pi / omega_p in s.
+    """
+
+    kind: Literal["ricker"] = "ricker"
+    amplitude: Finite
+    period: Positive
+    symmetric: bool = False
+
+    @property
+    def centre(self) -> float:
+        """Time of the pulse's centre after its start, s."""
+        return 2.0 * self.period
+
+    @property
+    def rate(self) -> float:
+        """b of the Gaussian factor exp(-b tau^2), 1/s^2; tau is the time from the centre."""
+        return 2.0 * math.pi**2 / (3.0 * self.period**2) if not self.symmetric else 2.0 * math.pi**2 / self.period**2
+
+    @property
+    def polynomial(self) -> tuple[float, float, float, float]:
+        """Coefficients of 1, tau, tau^2, tau^3 of the polynomial factor, SI units.
+
+        Antisymmetric, (34): (a_p/1.38)(2 b tau^2 - 3)(2 pi tau/(sqrt 3 T_p)). Symmetric: a_p (1 - 2 b tau^2).
+        """
+        if self.symmetric:
+            return self.amplitude, 0.0, -2.0 * self.rate * self.amplitude, 0.0
+        slope = self.amplitude / 1.38 * 2.0 * math.pi / (math.sqrt(3.0) * self.period)
+        return 0.0, -3.0 * slope, 0.0, 2.0 * self.rate * slope
+
+    def acceleration(self, t: ArrayLike) -> FloatArray:
+        """Base acceleration in m/s^2 at times `t` in s from the pulse's start; zero before it."""
+        time = np.asarray(t, dtype=float)
+        tau = time - self.centre
+        c0, c1, c2, c3 = self.polynomial
+        value = (c0 + tau * (c1 + tau * (c2 + tau * c3))) * np.exp(-self.rate * tau * tau)
+        return np.where(time >= 0.0, value, 0.0)
+
+    @property
+    def quiet_after(self) -> float:
+        """Time in s after which the pulse is below 1e-16 of its amplitude."""
+        return self.centre + math.sqrt(46.0 / self.rate)
+
+
+class Sine(Frozen):
+    """`cycles` full cycles of a sine of `amplitude` (m/s^2) and `period` (s), then rest."""
+
+    kind: Literal["sine"] = "sine"
+    amplitude: Finite
+    period: Positive
+    cycles: Annotated[int, Field(ge=1, le=1000)] = 1
+
+    def acceleration(self, t: ArrayLike) -> FloatArray:
+        """Base acceleration in m/s^2 at times `t` in s."""
+        time = np.asarray(t, dtype=float)
+        inside = (time >= 0.0) & (time <= self.quiet_after)
+        return np.where(inside, self.amplitude * np.sin(2.0 * math.pi * time / self.period), 0.0)
+
+    @property
+    def quiet_after(self) -> float:
+        """Time in s at which the last cycle ends."""
+        return self.cycles * self.period
+
+
+class Record(Frozen):
+    """A sampled ground motion: linear between its samples, zero after the last one.
+
+    Usually made by `Record.from_file` or `Record.from_samples`. `unscaled` holds the samples in m/s^2 as recorded, and
+    `scale` multiplies them. A scene longer than its record goes on with a base at rest.
+    """
+
+    kind: Literal["record"] = "record"
+    unscaled: tuple[Finite, ...] = Field(min_length=1, repr=False)
+    time_step: Positive
+    scale: Finite = 1.0
+    source: str = "samples"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_file(cls, data: Any) -> Any:
+        if isinstance(data, dict) and "file" in data:
+            extra = {"unscaled", "time_step", "source"} & data.keys()
+            if extra:
+                raise InputError("cannot be given together with file", sorted(extra)[0])
+            data = dict(data)
+            path = data.pop("file")
+            if not isinstance(path, str | Path):
+                raise InputError(f"{path!r} is not allowed: the path of a .AT2 or .csv file is asked for", "file")
+            samples, time_step = read_record(Path(path))
+            data |= {"unscaled": tuple(samples.tolist()), "time_step": time_step, "source": Path(path).name}
+        return data
+
+    @classmethod
+    def from_file(cls, path: str | Path, scale: float = 1.0) -> Self:
+        """The record in a PEER .AT2 file, or in a CSV with `time_s` and `acceleration_g` or `acceleration_m_s2`.
+
+        Raises `InputError`, naming file and line, where the file is not what it says it is.
+        """
+        settings: dict[str, Any] = {"file": path, "scale": scale}
+        return cls(**settings)
+
+    @classmethod
+    def from_samples(cls, samples: ArrayLike, time_step: float, scale: float = 1.0) -> Self:
+        """A record of `samples` (m/s^2, 1-D) taken every `time_step` s, the first at t = 0."""
+        return cls(unscaled=tuple(np.asarray(samples, dtype=float).ravel().tolist()), time_step=time_step, scale=scale)
+
+    @property
+    def samples(self) -> FloatArray:
+        """The scaled samples, m/s^2."""
+        return self.scale * np.asarray(self.unscaled)
+
+    def acceleration(self, t: ArrayLike) -> FloatArray:
+        """Base acceleration in m/s^2 at times `t` in s, linear between samples."""
+        times = self.time_step * np.arange(len(self.unscaled))
+        return np.interp(np.asarray(t, dtype=float), times, self.samples, left=0.0, right=0.0)
+
+    @property
+    def quiet_after(self) -> float:
+        """Time in s of the last sample."""
+        return self.time_step * (len(self.unscaled) - 1)
+
+    @property
+    def peak(self) -> float:
+        """Largest absolute scaled acceleration in units of standard gravity."""
+        return float(np.max(np.abs(self.samples))) / GRAVITY_OF_RECORDS
+
+
+Excitation = Annotated[Rest | Ricker | Sine | Record, Field(discriminator="kind")]
+
+
+def mirrored(excitation: Rest | Ricker | Sine | Record) -> Rest | Ricker | Sine | Record:
+    """The same excitation with left and right exchanged."""
+    if isinstance(excitation, Record):
+        return excitation.model_copy(update={"scale": -excitation.scale})
+    if isinstance(excitation, Rest):
+        return excitation
+    return excitation.model_copy(update={"amplitude": -excitation.amplitude})

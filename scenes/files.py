@@ -1,0 +1,63 @@
+"""Scene files (TOML) and the scenes that come with the package."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from scenes.errors import InputError, printable, unknown_name
+from scenes.scene import Scene
+
+DATA = Path(str(resources.files("scenes"))) / "data"
+
+
+def named_scenes() -> dict[str, Path]:
+    """Names and files of the scenes that come with the package."""
+    return {path.stem: path for path in sorted((DATA / "scenes").glob("*.toml"))}
+
+
+def load_scene(source: str | Path) -> Scene:
+    """A scene from a TOML file, or by the name of one that comes with the package.
+
+    Raises `InputError` naming the file, the key, the value and what is allowed.
+    """
+    known = named_scenes()
+    path = Path(source)
+    if str(source) in known:
+        path = known[str(source)]
+    elif path.suffix.lower() != ".toml":
+        raise InputError(f"{unknown_name('scene', str(source), known)}; or the path of a .toml file")
+    data = read_toml(path)
+    try:
+        return scene_from(data, folder=path.parent, default_name=path.stem)
+    except InputError as error:
+        raise InputError(f"{printable(path)}: {error}") from None
+
+
+def scene_from(data: dict[str, Any], *, folder: Path, default_name: str) -> Scene:
+    """A scene from the tables of a scene file; record files are looked up in `folder`, then among the package's records."""
+    data = {"name": default_name, **data}
+    for key in ("excitation", "vertical"):
+        table = data.get(key)
+        if isinstance(table, dict) and isinstance(table.get("file"), str):
+            data[key] = {**table, "file": _record_path(table["file"], folder)}
+    return Scene(**data)
+
+
+def _record_path(name: str, folder: Path) -> Path:
+    beside, shipped = folder / name, DATA / "records" / name
+    return shipped if not beside.exists() and Path(name).name == name and shipped.exists() else beside
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file, or an `InputError` that names file and line."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except UnicodeDecodeError:
+        raise InputError(f"{printable(path)}: not a text file") from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"{printable(path)}: not valid TOML: {printable(error)}") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{printable(path)}: cannot be read: {getattr(error, 'strerror', None) or error}") from None

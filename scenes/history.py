@@ -1,0 +1,232 @@
+"""A history: what any model returns, on the scene's own output grid."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.errors import InputError, printable
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COLUMNS = ("t", "x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate", "mode")
+EVENT_COLUMNS = ("t", "kind", "mode_before", "mode_after", "impulse")
+OUTCOMES = ("at rest", "moving", "overturned left", "overturned right")
+#: The modes of motion that a `mode` column may hold.
+MODES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight", "overturned")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Event:
+    """One change of contact or mode at time `t` (s); `impulse` per unit mass in m/s, 0 where nothing strikes."""
+
+    t: float
+    kind: str
+    mode_before: str = ""
+    mode_after: str = ""
+    impulse: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cost:
+    """What a run took. `set_up` and `wall_seconds` in s (set-up, such as building an engine's scene, is not in the latter)."""
+
+    wall_seconds: float = 0.0
+    cpu_seconds: float = 0.0
+    set_up: float = 0.0
+    steps: int = 0
+    evaluations: int = 0
+    #: Impacts at which the impact law added kinetic energy, and the most that one of them added, relative.
+    energy_gains: int = 0
+    largest_energy_gain: float = 0.0
+    #: Largest change of theta/alpha against the same run at a tighter tolerance, where that was asked for.
+    error_estimate: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class History:
+    """The motion of a block as one model sees it. SI units, signs as in the scene.
+
+    `channels` holds one 1-D array a name, all of one length: t, x, y, theta, x_dot, y_dot, theta_dot, slip, slip_rate, mode.
+    x and y are the centroid's, relative to the base; `slip` is how far the pivot corner stands from its first place along
+    the floor, `slip_rate` that corner's horizontal velocity. A history that ends in overturning stops there.
+    """
+
+    name: str
+    model: str
+    channels: Mapping[str, NDArray[Any]] = field(repr=False)
+    event_list: Sequence[Event] = field(repr=False)
+    outcome: str
+    cost: Cost = Cost()
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    #: Things a reader should know, one line each (for example that the record is shorter than the scene).
+    notes: tuple[str, ...] = ()
+    #: Of the block, m and rad; None for a history read from a file that does not say.
+    half_width: float | None = None
+    half_height: float | None = None
+
+    @cached_property
+    def frame(self) -> pd.DataFrame:
+        """The motion as a table, columns as in `channels`."""
+        import pandas as pd
+
+        return pd.DataFrame({name: self.channels[name] for name in COLUMNS if name in self.channels})
+
+    @cached_property
+    def events(self) -> pd.DataFrame:
+        """The events as a table: t, kind, mode_before, mode_after, impulse."""
+        import pandas as pd
+
+        rows = [(e.t, e.kind, e.mode_before, e.mode_after, e.impulse) for e in self.event_list]
+        return pd.DataFrame(rows, columns=list(EVENT_COLUMNS))
+
+    @property
+    def alpha(self) -> float | None:
+        """The block's slenderness angle in rad, where the block is known."""
+        if self.half_width is None or self.half_height is None:
+            return None
+        return math.atan2(self.half_width, self.half_height)
+
+    @property
+    def peak_rotation(self) -> float:
+        """Largest |theta| on the output grid, rad."""
+        return float(np.max(np.abs(self.channels["theta"])))
+
+    def save(self, path: str | Path) -> None:
+        """Write a CSV whose remarks (#) hold outcome, model and settings; its events go to `<stem>.events.csv` beside it."""
+        path = Path(path)
+        about = {
+            "name": self.name,
+            "model": self.model,
+            "outcome": self.outcome,
+            "half_width": self.half_width,
+            "half_height": self.half_height,
+            "settings": dict(self.settings),
+            "notes": list(self.notes),
+            "cost": {key: value for key, value in vars(self.cost).items() if value is not None},
+        }
+        text = io.StringIO()
+        text.write(f"# rockcheck history {json.dumps(about, sort_keys=True, default=str)}\n")
+        self.frame.to_csv(text, index=False, lineterminator="\n")
+        path.write_text(text.getvalue(), encoding="utf-8")
+        self.events.to_csv(_events_path(path), index=False, lineterminator="\n")
+
+    @classmethod
+    def load(cls, path: str | Path) -> History:
+        """Read what `save` wrote, or any CSV with columns `t` and `theta` (SI units) and perhaps more of `COLUMNS`.
+
+        Raises `InputError` for a file that is missing, lacks those columns, is not numeric, not finite or not ordered in time.
+        """
+        import pandas as pd
+
+        path = Path(path)
+        shown = printable(path)
+        try:
+            with path.open(encoding="utf-8") as stream:
+                first = stream.readline()
+            frame = pd.read_csv(path, comment="#")
+            events_path = _events_path(path)
+            events = pd.read_csv(events_path) if events_path.exists() else pd.DataFrame()
+        except OSError as error:
+            raise InputError(f"{shown}: cannot be read: {error.strerror}") from None
+        except (ValueError, OverflowError) as error:  # pandas' own parser errors are ValueErrors
+            raise InputError(f"{shown}: not a CSV table: {printable(error)}") from None
+        about = _header(first, shown)
+        channels = _checked_channels(frame, shown)
+        try:
+            event_list = tuple(
+                Event(t=float(t), kind=str(kind), mode_before=_text(before), mode_after=_text(after), impulse=float(impulse))
+                for t, kind, before, after, impulse in events.reindex(columns=EVENT_COLUMNS).itertuples(index=False)
+            )
+            cost = Cost(**{k: v for k, v in about.get("cost", {}).items() if k in Cost.__dataclass_fields__})
+        except (AttributeError, TypeError, ValueError):
+            raise InputError(f"{printable(_events_path(path))}: not an events table written by rockcheck") from None
+        return cls(
+            name=str(about.get("name", path.stem)),
+            model=str(about.get("model", "measured")),
+            channels=channels,
+            event_list=event_list,
+            outcome=str(about["outcome"]) if about.get("outcome") in OUTCOMES else outcome_of(channels),
+            cost=cost,
+            settings=about.get("settings", {}),
+            notes=tuple(str(note) for note in about.get("notes", ())),
+            half_width=_size(about, "half_width", shown),
+            half_height=_size(about, "half_height", shown),
+        )
+
+
+def outcome_of(channels: Mapping[str, NDArray[Any]], *, still: float = 1e-4) -> str:
+    """The outcome that a table of motion shows at its end; at rest is |theta| and |theta_dot| below `still` (rad, rad/s)."""
+    theta = channels["theta"]
+    if abs(theta[-1]) >= math.pi / 2 - 0.05:
+        return "overturned left" if theta[-1] > 0 else "overturned right"
+    quiet = abs(theta[-1]) < still and all(abs(channels[c][-1]) < still for c in ("theta_dot", "x_dot") if c in channels)
+    return "at rest" if quiet else "moving"
+
+
+def _events_path(path: Path) -> Path:
+    return path.with_name(path.stem + ".events.csv")
+
+
+def _text(value: object) -> str:
+    return value if isinstance(value, str) else ""
+
+
+def _header(line: str, shown: str) -> dict[str, Any]:
+    mark = "# rockcheck history "
+    if not line.startswith(mark):
+        return {}
+    try:
+        about = json.loads(line[len(mark) :])
+    except (ValueError, RecursionError):
+        raise InputError(f"{shown}, line 1: not a header written by rockcheck") from None
+    if not isinstance(about, dict) or not isinstance(about.get("cost", {}), dict) or not isinstance(about.get("settings", {}), dict):
+        raise InputError(f"{shown}, line 1: not a header written by rockcheck")
+    if not isinstance(about.get("notes", []), list):
+        raise InputError(f"{shown}, line 1: not a header written by rockcheck")
+    return about
+
+
+def _size(about: Mapping[str, Any], key: str, shown: str) -> float | None:
+    value = about.get(key)
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
+        raise InputError(f"{printable(value)} is not allowed: a positive length in m is asked for", f"{shown}: {key}")
+    return float(value)
+
+
+def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]]:
+    missing = [name for name in ("t", "theta") if name not in frame.columns]
+    if missing:
+        raise InputError(f"{shown}: no column {missing[0]!r}; t and theta are needed, of {', '.join(COLUMNS)}")
+    if len(frame) == 0:
+        raise InputError(f"{shown}: no rows")
+    channels: dict[str, NDArray[Any]] = {}
+    for name in COLUMNS:
+        if name not in frame.columns:
+            continue
+        if name == "mode":
+            channels[name] = frame[name].astype(str).to_numpy()
+            continue
+        try:
+            values = frame[name].to_numpy(dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"{shown}: column {name!r} is not numeric") from None
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            raise InputError(f"{shown}: column {name!r}, row {bad[0] + 1}: {values[bad[0]]} is not finite")
+        channels[name] = values
+    if np.any(np.diff(channels["t"]) <= 0.0):
+        raise InputError(f"{shown}: column 't' does not increase")
+    return channels

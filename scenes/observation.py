@@ -1,0 +1,94 @@
+"""Turns a model's states on the output grid into a History, the same way for every model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes import kinematics
+from scenes.history import Cost, Event, History, outcome_of
+from scenes.scene import Scene
+
+STATE = ("x", "y", "theta", "x_dot", "y_dot", "theta_dot")
+
+
+def observe(
+    scene: Scene,
+    model: str,
+    state: NDArray[np.float64],
+    *,
+    mode: NDArray[Any] | None = None,
+    events: Sequence[Event] = (),
+    outcome: str | None = None,
+    cost: Cost | None = None,
+    settings: Mapping[str, Any] | None = None,
+    notes: Sequence[str] = (),
+) -> History:
+    """The History of a run whose `state` has one row per output time: x, y, theta, x_dot, y_dot, theta_dot (SI).
+
+    Fewer rows than `scene.output_times` mean that the run ended early; rows from the first |theta| >= pi/2 on are left
+    out. `mode` and `outcome` are derived from the motion where the model does not know them. Adds a note where the
+    record is shorter than the scene.
+    """
+    tipped = np.flatnonzero(np.abs(state[:, 2]) >= math.pi / 2)
+    rows = int(tipped[0]) if tipped.size else len(state)
+    rows = max(rows, 1)
+    state = state[:rows]
+    channels: dict[str, NDArray[Any]] = {"t": scene.output_times[:rows]}
+    channels |= {name: state[:, column] for column, name in enumerate(STATE)}
+    channels["slip"] = kinematics.slip(scene.block, channels["x"], channels["theta"])
+    channels["slip_rate"] = kinematics.slip_rate(scene.block, channels["theta"], channels["x_dot"], channels["theta_dot"])
+    channels["mode"] = modes_of(scene, channels) if mode is None else mode[:rows]
+    if outcome is None:
+        outcome = _overturned(tipped, events) or outcome_of(channels)
+    return History(
+        name=scene.name,
+        model=model,
+        channels=channels,
+        event_list=tuple(events),
+        outcome=outcome,
+        cost=cost or Cost(),
+        settings=dict(settings or {}),
+        notes=(*scene_notes(scene), *notes),
+        half_width=scene.block.half_width,
+        half_height=scene.block.half_height,
+    )
+
+
+def scene_notes(scene: Scene) -> tuple[str, ...]:
+    """What a reader of any history of this scene should know."""
+    return tuple(
+        f"the {which} record ends at {excitation.quiet_after:g} s, before the scene's {scene.duration:g} s; the base is at rest after it"
+        for which, excitation in (("horizontal", scene.excitation), ("vertical", scene.vertical))
+        if excitation.kind == "record" and excitation.quiet_after < scene.duration
+    )
+
+
+def modes_of(scene: Scene, channels: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
+    """Modes of motion read off the kinematics, for models that have contacts instead of modes (tolerances in SI units)."""
+    block = scene.block
+    theta, sliding = channels["theta"], np.abs(channels["slip_rate"]) > 1e-3
+    flat = (np.abs(theta) < 1e-4 * block.alpha) & (np.abs(channels["theta_dot"]) < 1e-3)
+    touching = np.zeros(len(theta), dtype=bool)
+    for wall in scene.walls:
+        touching |= kinematics.wall_gap(scene, wall.side, channels["x"], theta) < 1e-5
+    hop = kinematics.pivot_height(block, channels["y"], theta) > 1e-5
+    return np.select(
+        [hop, flat & ~sliding, flat, touching & ~sliding, touching, ~sliding],
+        ["flight", "rest", "slide", "lean", "ladder", "rock"],
+        default="slide-rock",
+    )
+
+
+def _overturned(tipped: NDArray[np.intp], events: Sequence[Event]) -> str | None:
+    """The side on which the block fell, from an `overturned left|right` event that the model reported."""
+    for event in events:
+        if event.kind.startswith("overturned"):
+            return event.kind
+    if tipped.size:
+        raise ValueError("a model that lets the block overturn must report the event")
+    return None

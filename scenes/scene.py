@@ -1,0 +1,163 @@
+"""A scene: a rigid block on a shaking floor, perhaps beside walls. It knows nothing of the models that play it."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, StringConstraints, field_validator, model_validator
+
+from scenes.base import Finite, Frozen, NonNegative, Positive, Restitution
+from scenes.errors import InputError
+from scenes.excitations import Excitation, Rest, mirrored
+
+MOST_SAMPLES = 5_000_000
+#: At mu = 4/3 the pivot of a slender block can jam while it slips (Painleve); physics beyond it is not unique.
+PAINLEVE_FRICTION = 4.0 / 3.0
+
+
+class Block(Frozen):
+    """A homogeneous rectangular block 2B x 2H; lengths in m.
+
+    `mass` (kg) is optional: motion does not depend on it, forces and impulses are given per unit mass.
+    """
+
+    half_width: Positive
+    half_height: Positive
+    mass: Positive | None = None
+
+    @property
+    def alpha(self) -> float:
+        """Slenderness angle atan(B/H), rad."""
+        return math.atan2(self.half_width, self.half_height)
+
+    @property
+    def radius(self) -> float:
+        """Half diagonal R = sqrt(B^2 + H^2), m."""
+        return math.hypot(self.half_width, self.half_height)
+
+    @property
+    def frequency_parameter(self) -> float:
+        """p = sqrt(3 g / (4 R)) in rad/s at g = 9.81 m/s^2."""
+        return math.sqrt(0.75 * 9.81 / self.radius)
+
+
+class Floor(Frozen):
+    """The floor's Coulomb friction and restitution.
+
+    `friction` is the kinetic coefficient; `static_friction` None means the same. `restitution` is the normal one, e_g.
+    """
+
+    friction: NonNegative
+    static_friction: NonNegative | None = None
+    restitution: Restitution = 0.0
+
+    @model_validator(mode="after")
+    def _coulomb(self) -> Floor:
+        for key in ("friction", "static_friction"):
+            value = getattr(self, key)
+            if value is not None and value >= PAINLEVE_FRICTION:
+                raise InputError(f"{value:g} is not allowed: must be below 4/3, where a slipping pivot may jam (Painleve)", key)
+        if self.static_friction is not None and self.static_friction < self.friction:
+            raise InputError(
+                f"{self.static_friction:g} is not allowed: must be at least the kinetic friction {self.friction:g}", "static_friction"
+            )
+        return self
+
+    @property
+    def mu_s(self) -> float:
+        """Static friction coefficient."""
+        return self.friction if self.static_friction is None else self.static_friction
+
+
+class Wall(Frozen):
+    """A rigid frictionless wall; `gap` is the clear distance in m to the block's side as it stands, `restitution` is e."""
+
+    side: Literal["left", "right"]
+    gap: NonNegative
+    restitution: Restitution = 0.0
+
+
+class Scene(Frozen):
+    """All that a model needs to know; SI units, angles in rad, counterclockwise positive.
+
+    The block stands with its centroid above x = 0 unless it starts tilted: `initial_rotation` tilts it about the corner
+    it would rock on, which keeps its place. `initial_angular_velocity` (rad/s) and `initial_velocity` (m/s, of the
+    centroid as it slides, added to what the rotation about the pivot gives) complete its state; `initial_height` (m)
+    lifts it off the floor. `duration` counts from the excitation's start. `gravity` in m/s^2.
+    """
+
+    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.,+=()-]{0,99}$")]
+    block: Block
+    floor: Floor
+    walls: tuple[Wall, ...] = ()
+    excitation: Excitation = Rest()
+    vertical: Excitation = Rest()
+    duration: Positive
+    output_step: Positive = 0.005
+    initial_rotation: Annotated[Finite, Field(gt=-math.pi / 2, lt=math.pi / 2)] = 0.0
+    initial_angular_velocity: Finite = 0.0
+    initial_velocity: Finite = 0.0
+    initial_height: NonNegative = 0.0
+    gravity: Positive = 9.81
+    description: Annotated[str, StringConstraints(max_length=500)] = ""
+
+    @field_validator("walls")
+    @classmethod
+    def _one_wall_a_side(cls, walls: tuple[Wall, ...]) -> tuple[Wall, ...]:
+        if len({wall.side for wall in walls}) < len(walls):
+            raise InputError("two walls on one side; at most one wall on the left and one on the right are allowed")
+        return tuple(sorted(walls, key=lambda wall: wall.side))
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Scene:
+        if self.duration / self.output_step > MOST_SAMPLES:
+            raise InputError(f"{self.output_step:g} s gives more than {MOST_SAMPLES} samples in {self.duration:g} s", "output_step")
+        for wall in self.walls:
+            reach = self._reach(wall.side)
+            if reach > self.block.half_width + wall.gap + 1e-12 * self.block.radius:
+                raise InputError(
+                    f"{self.initial_rotation:g} is not allowed: the block would start {reach - self.block.half_width - wall.gap:.3g} m"
+                    f" inside the {wall.side} wall",
+                    "initial_rotation",
+                )
+        return self
+
+    def _reach(self, side: str) -> float:
+        """How far the initial block reaches to one side, m from the place of its upright centroid."""
+        tilt, radius, alpha = self.initial_rotation, self.block.radius, self.block.alpha
+        outward = 1.0 if side == "left" else -1.0
+        centroid = math.copysign(1.0, tilt) * (radius * math.sin(alpha - abs(tilt)) - self.block.half_width)
+        return radius * math.sin(alpha + abs(tilt)) - outward * centroid
+
+    def wall(self, side: Literal["left", "right"]) -> Wall | None:
+        """The wall on that side, or None."""
+        return next((wall for wall in self.walls if wall.side == side), None)
+
+    @property
+    def frequency_parameter(self) -> float:
+        """p = sqrt(3 g / (4 R)) in rad/s with this scene's gravity."""
+        return math.sqrt(0.75 * self.gravity / self.block.radius)
+
+    @property
+    def output_times(self) -> NDArray[np.float64]:
+        """The output grid: multiples of `output_step` from 0 up to `duration`, s."""
+        steps = math.floor(self.duration / self.output_step * (1.0 + 1e-12))
+        return self.output_step * np.arange(steps + 1, dtype=np.float64)
+
+    def mirrored(self) -> Scene:
+        """The same scene with left and right exchanged."""
+        swap: dict[str, Literal["left", "right"]] = {"left": "right", "right": "left"}
+        return self.replace(
+            walls=tuple(Wall(side=swap[w.side], gap=w.gap, restitution=w.restitution) for w in self.walls),
+            excitation=mirrored(self.excitation),
+            initial_rotation=-self.initial_rotation,
+            initial_angular_velocity=-self.initial_angular_velocity,
+            initial_velocity=-self.initial_velocity,
+        )
+
+    def replace(self, **change: object) -> Scene:
+        """A copy with some fields changed, validated like any scene."""
+        return Scene(**{name: getattr(self, name) for name in type(self).model_fields} | change)
