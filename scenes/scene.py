@@ -84,9 +84,9 @@ class Scene(Frozen):
     """All that a model needs to know; SI units, angles in rad, counterclockwise positive.
 
     The block stands with its centroid above x = 0 unless it starts tilted: `initial_rotation` tilts it about the corner
-    it would rock on, which keeps its place. `initial_angular_velocity` (rad/s) and `initial_velocity` (m/s, of the
-    centroid as it slides, added to what the rotation about the pivot gives) complete its state; `initial_height` (m)
-    lifts it off the floor. `duration` counts from the excitation's start. `gravity` in m/s^2.
+    it would rock on, which keeps its place. `initial_angular_velocity` (rad/s) and `initial_velocity` (m/s, the slip rate
+    of that corner) complete its state, see `initial_state`; `initial_height` (m) lifts it off the floor. `duration`
+    counts from the excitation's start. `gravity` in m/s^2.
     """
 
     name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.,+=()-]{0,99}$")]
@@ -146,6 +146,16 @@ class Scene(Frozen):
         """The output grid: multiples of `output_step` from 0 up to `duration`, s."""
         steps = math.floor(self.duration / self.output_step * (1.0 + 1e-12))
         return self.output_step * np.arange(steps + 1, dtype=np.float64)
+
+    @property
+    def initial_state(self) -> tuple[float, float, float, float, float, float]:
+        """x, y, theta, dx/dt, dy/dt, dtheta/dt at t = 0 (SI, relative to the base), turning about the lower corner."""
+        tilt, spin, block = self.initial_rotation, self.initial_angular_velocity, self.block
+        pivot = math.copysign(1.0, tilt if tilt != 0.0 else spin)
+        s, c = math.sin(block.alpha - abs(tilt)), math.cos(block.alpha - abs(tilt))
+        x = pivot * (block.radius * s - block.half_width) if tilt != 0.0 else 0.0
+        y = self.initial_height + (block.radius * c if tilt != 0.0 else block.half_height)
+        return x, y, tilt, self.initial_velocity - block.radius * c * spin, pivot * block.radius * s * spin, spin
 
     def mirrored(self) -> Scene:
         """The same scene with left and right exchanged."""
