@@ -1,0 +1,142 @@
+"""Events of a motion that was computed with contacts instead of modes, read off the states at the step ends."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engines.contacts import Contact
+from scenes import Event, Scene, kinematics
+from scenes.observation import STATE, modes_of
+
+FloatArray = NDArray[np.float64]
+HOLD = 2e-3  # s: shorter openings of a contact are the engine's chatter, and an impulse is summed over this time
+CLOSED = 1e-6  # m
+SLIPPING = 1e-3  # m/s
+TURNING = 1e-3  # rad/s
+
+
+def events_of(scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: FloatArray, felt: FloatArray) -> list[Event]:
+    """Events in order of time; `t` (n) and `states` (n, 6) at step ends, `felt` (n-1 or more, 2) accelerations in the steps.
+
+    "floor impact" and "wall impact": the onset of a contact that had been open for more than 2 ms, with its normal
+    impulse in the first 2 ms; "uplift": one lower corner opens after both were closed for more than 2 ms; "lift-off" and "landing": of both;
+    "release": a wall contact opens after more than 2 ms; "slip" and "stick" of the pivot; "settled"; "overturned ...".
+    """
+    motion = _Motion(scene, contacts, t, states, felt)
+    found: list[tuple[float, str, int, float]] = []
+    closed = [motion.closed(contact) for contact in contacts]
+    for contact, flags in zip(contacts, closed, strict=True):
+        for index in _rises(flags):
+            kind = "floor impact" if contact.surface == "floor" else "wall impact"
+            found.append((motion.onset(contact, index), kind, index, motion.impulse(contact, index)))
+        if contact.surface != "floor":
+            found += [(t[end], "release", end, 0.0) for end in _falls(flags) if t[end] - t[_run_start(flags, end)] > HOLD]
+    floor = [flags for contact, flags in zip(contacts, closed, strict=True) if contact.surface == "floor"]
+    flat, flight = floor[0] & floor[1], ~(floor[0] | floor[1])
+    found += [(t[i], "uplift", i, 0.0) for i in _falls(_held(flat, t, value=True)) if not flight[i]]
+    found += [(t[i], "lift-off", i, 0.0) for i in _rises(flight)]
+    found += [(t[i], "landing", i, 0.0) for i in _falls(flight)]
+    slipping = _held(_held(~flight & (np.abs(motion.slip_rate) > SLIPPING), t), t, value=True)
+    found += [(t[i], "slip", i, 0.0) for i in _rises(slipping)]
+    found += [(t[i], "stick", i, 0.0) for i in _falls(slipping) if not flight[i]]
+    resting = _held(flat & ~slipping & (np.abs(states[:, 5]) < TURNING), t, value=True)
+    found += [(t[i], "settled", i, 0.0) for i in _rises(resting)]
+    if abs(states[-1, 2]) >= math.pi / 2:
+        part = (math.pi / 2 - abs(states[-2, 2])) / (abs(states[-1, 2]) - abs(states[-2, 2]))
+        side = "left" if states[-1, 2] > 0 else "right"
+        found.append((t[-2] + part * (t[-1] - t[-2]), f"overturned {side}", len(t) - 1, 0.0))
+    found.sort(key=lambda event: event[0])
+    before = motion.modes([max(event[2] - 1, 0) for event in found])
+    after = motion.modes([motion.later(event[2]) for event in found])
+    return [
+        Event(t=float(time), kind=kind, mode_before=b, mode_after="overturned" if kind.startswith("overturned") else a, impulse=impulse)
+        for (time, kind, _, impulse), b, a in zip(found, before, after, strict=True)
+    ]
+
+
+class _Motion:
+    """The states at all step ends, and what can be told from them."""
+
+    def __init__(self, scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: FloatArray, felt: FloatArray) -> None:
+        self.scene, self.contacts, self.t, self.states, self.felt = scene, contacts, t, states, felt
+        self.slip_rate = kinematics.slip_rate(scene.block, states[:, 2], states[:, 3], states[:, 5])
+
+    def closed(self, contact: Contact) -> NDArray[np.bool_]:
+        """Whether the contact is closed at each step end, openings of less than 2 ms left out."""
+        return _held(contact.gap(self.states) < CLOSED, self.t)
+
+    def onset(self, contact: Contact, index: int) -> float:
+        """When the gap that is closed at `index` and was open before passed zero, s."""
+        if index == 0:
+            return float(self.t[0])
+        before, after = contact.gap(self.states[index - 1 : index + 1])
+        part = min(max(before / (before - after), 0.0), 1.0) if before > after else 1.0
+        return float(self.t[index - 1] + part * (self.t[index] - self.t[index - 1]))
+
+    def later(self, index: int) -> int:
+        """The first step end 2 ms after `index`, or the last one."""
+        return min(int(np.searchsorted(self.t, self.t[index] + HOLD)), len(self.t) - 1)
+
+    def impulse(self, contact: Contact, index: int) -> float:
+        """Normal impulse per unit mass of a contact in the 2 ms after its onset, m/s, from the balance of momentum.
+
+        Engines report forces differently, and some dearly; what the contacts gave is what the free fall does not explain.
+        """
+        from scipy.optimize import nnls
+
+        first, last = max(index - 1, 0), self.later(index)
+        inertia = self.scene.block.radius**2 / 3.0
+        gained = self.states[last, 3:] - self.states[first, 3:]
+        gained[:2] -= np.diff(self.t[first : last + 1]) @ self.felt[first:last]
+        theta = self.states[index, 2]
+        columns, floor = [], None
+        active = [c for c in self.contacts if c is contact or np.any(c.gap(self.states[first : last + 1]) < CLOSED)]
+        for other in active:
+            columns.append(other.normal_row(theta))
+            if other.surface == "floor":
+                floor = other
+        if floor is not None:
+            tangent = (1.0, 0.0, -floor.arm(theta)[1])
+            columns += [tangent, tuple(-part for part in tangent)]
+        matrix = np.array(columns).T
+        scale = np.array([1.0, 1.0, 1.0 / self.scene.block.radius])
+        impulses, _ = nnls(matrix * scale[:, None], gained * np.array([1.0, 1.0, inertia]) * scale)
+        return float(impulses[active.index(contact)])
+
+    def modes(self, indices: Sequence[int]) -> list[str]:
+        """Modes of motion at some step ends."""
+        chosen = self.states[list(indices)]
+        channels = {name: chosen[:, column] for column, name in enumerate(STATE)}
+        return [str(mode) for mode in modes_of(self.scene, channels | {"slip_rate": self.slip_rate[list(indices)]})]
+
+
+def _rises(flags: NDArray[np.bool_]) -> list[int]:
+    """Indices at which a flag is set that was not set one earlier."""
+    return [int(i) for i in np.flatnonzero(flags[1:] & ~flags[:-1]) + 1]
+
+
+def _falls(flags: NDArray[np.bool_]) -> list[int]:
+    """Indices at which a flag is not set that was set one earlier."""
+    return _rises(~flags)
+
+
+def _run_start(flags: NDArray[np.bool_], end: int) -> int:
+    """Where the run of set flags that ends before `end` began."""
+    unset = np.flatnonzero(~flags[:end])
+    return int(unset[-1]) + 1 if unset.size else 0
+
+
+def _held(flags: NDArray[np.bool_], t: FloatArray, *, value: bool = False) -> NDArray[np.bool_]:
+    """`flags` without those runs of `value` inside it that last for 2 ms or less."""
+    edges = np.flatnonzero(flags[1:] != flags[:-1]) + 1
+    starts, ends = edges[:-1], edges[1:]  # of runs that neither begin nor end the motion
+    short = (flags[starts] == value) & (t[ends] - t[starts] <= HOLD)
+    change = np.zeros(len(flags) + 1, dtype=np.intp)
+    np.add.at(change, starts[short], 1)
+    np.add.at(change, ends[short], -1)
+    inside = np.cumsum(change[:-1]) > 0
+    return np.where(inside, not value, flags)
