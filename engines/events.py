@@ -14,7 +14,7 @@ from scenes.observation import STATE, modes_of
 
 FloatArray = NDArray[np.float64]
 HOLD = 2e-3  # s: shorter openings of a contact are the engine's chatter, and an impulse is summed over this time
-CLOSED = 1e-6  # m
+CLOSED = 1e-6  # m; wider at fixed steps, where a resting block falls freely for a step now and then
 SLIPPING = 1e-3  # m/s
 TURNING = 1e-3  # rad/s
 
@@ -23,7 +23,7 @@ def events_of(scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: 
     """Events in order of time; `t` (n) and `states` (n, 6) at step ends, `felt` (n-1 or more, 2) accelerations in the steps.
 
     "floor impact" and "wall impact": the onset of a contact that had been open for more than 2 ms, with its normal
-    impulse in the first 2 ms; "uplift": one lower corner opens after both were closed for more than 2 ms; "lift-off" and "landing": of both;
+    impulse in the first 2 ms; "uplift": one lower corner opens after both were closed for more than 2 ms; "lift-off", "landing": of both;
     "release": a wall contact opens after more than 2 ms; "slip" and "stick" of the pivot; "settled"; "overturned ...".
     """
     motion = _Motion(scene, contacts, t, states, felt)
@@ -63,11 +63,12 @@ class _Motion:
 
     def __init__(self, scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: FloatArray, felt: FloatArray) -> None:
         self.scene, self.contacts, self.t, self.states, self.felt = scene, contacts, t, states, felt
+        self.near = CLOSED + 2.0 * scene.gravity * float(np.min(np.diff(t))) ** 2
         self.slip_rate = kinematics.slip_rate(scene.block, states[:, 2], states[:, 3], states[:, 5])
 
     def closed(self, contact: Contact) -> NDArray[np.bool_]:
         """Whether the contact is closed at each step end, openings of less than 2 ms left out."""
-        return _held(contact.gap(self.states) < CLOSED, self.t)
+        return _held(contact.gap(self.states) < self.near, self.t)
 
     def onset(self, contact: Contact, index: int) -> float:
         """When the gap that is closed at `index` and was open before passed zero, s."""
@@ -94,14 +95,14 @@ class _Motion:
         gained[:2] -= np.diff(self.t[first : last + 1]) @ self.felt[first:last]
         theta = self.states[index, 2]
         columns, floor = [], None
-        active = [c for c in self.contacts if c is contact or np.any(c.gap(self.states[first : last + 1]) < CLOSED)]
+        active = [c for c in self.contacts if c is contact or np.any(c.gap(self.states[first : last + 1]) < self.near)]
         for other in active:
             columns.append(other.normal_row(theta))
             if other.surface == "floor":
                 floor = other
         if floor is not None:
-            tangent = (1.0, 0.0, -floor.arm(theta)[1])
-            columns += [tangent, tuple(-part for part in tangent)]
+            height = -floor.arm(theta)[1]
+            columns += [(1.0, 0.0, height), (-1.0, 0.0, -height)]  # friction either way
         matrix = np.array(columns).T
         scale = np.array([1.0, 1.0, 1.0 / self.scene.block.radius])
         impulses, _ = nnls(matrix * scale[:, None], gained * np.array([1.0, 1.0, inertia]) * scale)
