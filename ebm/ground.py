@@ -1,0 +1,191 @@
+"""Ground motion for compiled code: its value, its Taylor series, its kinks, and when it next exceeds a level.
+
+Natural units throughout: acceleration in g, time in sqrt(R/g).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from scenes.excitations import Record, Rest, Ricker, Sine
+
+STILL, GAUSSIAN, SINE, SAMPLED = range(4)
+NEVER = np.inf
+
+
+class Ground(NamedTuple):
+    """One component of the base motion.
+
+    GAUSSIAN is (c0 + c1 tau + c2 tau^2 + c3 tau^3) exp(-rate tau^2), tau from `centre`; SINE is c0 sin(rate t) up to
+    `quiet`; SAMPLED is linear between `samples`, every `step`. After `quiet` there is no motion.
+    """
+
+    kind: int
+    c0: float
+    c1: float
+    c2: float
+    c3: float
+    rate: float
+    centre: float
+    quiet: float
+    step: float
+    samples: NDArray[np.float64]
+
+
+_NO_SAMPLES = np.zeros(1)
+
+
+def ground_of(excitation: Rest | Ricker | Sine | Record, gravity: float, time_unit: float) -> Ground:
+    """The compiled form of an excitation, in units of `gravity` (m/s^2) and `time_unit` (s)."""
+    quiet = excitation.quiet_after / time_unit
+    if isinstance(excitation, Ricker):
+        c0, c1, c2, c3 = (c * time_unit**k / gravity for k, c in enumerate(excitation.polynomial))
+        return Ground(GAUSSIAN, c0, c1, c2, c3, excitation.rate * time_unit**2, excitation.centre / time_unit, quiet, 0.0, _NO_SAMPLES)
+    if isinstance(excitation, Sine):
+        rate = 2.0 * math.pi * time_unit / excitation.period
+        return Ground(SINE, excitation.amplitude / gravity, 0.0, 0.0, 0.0, rate, 0.0, quiet, 0.0, _NO_SAMPLES)
+    if isinstance(excitation, Record):
+        samples = np.ascontiguousarray(excitation.samples / gravity)
+        return Ground(SAMPLED, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, quiet, excitation.time_step / time_unit, samples)
+    return Ground(STILL, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _NO_SAMPLES)
+
+
+@njit(cache=True)
+def interval(g, t):
+    """Index of the sample interval that holds t; its right end belongs to the next one."""
+    return int(math.floor(t / g.step + 1e-9))
+
+
+@njit(cache=True)
+def acceleration(g, t):
+    """Acceleration at time t."""
+    if g.kind == GAUSSIAN:
+        tau = t - g.centre
+        return (g.c0 + tau * (g.c1 + tau * (g.c2 + tau * g.c3))) * math.exp(-g.rate * tau * tau)
+    if g.kind == SINE:
+        return g.c0 * math.sin(g.rate * t) if t < g.quiet else 0.0
+    if g.kind == SAMPLED:
+        i = interval(g, t)
+        if i + 1 >= g.samples.size:
+            return g.samples[i] if i + 1 == g.samples.size and t <= g.quiet else 0.0
+        return g.samples[i] + (t / g.step - i) * (g.samples[i + 1] - g.samples[i])
+    return 0.0
+
+
+@njit(cache=True)
+def fill_series(g, t, sign, n, out):
+    """Taylor coefficients 0..n of sign * acceleration about t, to the right of t."""
+    if g.kind == GAUSSIAN:
+        tau = t - g.centre
+        bell = sign * math.exp(-g.rate * tau * tau)
+        q0 = g.c0 + tau * (g.c1 + tau * (g.c2 + tau * g.c3))
+        q1 = g.c1 + tau * (2.0 * g.c2 + 3.0 * tau * g.c3)
+        q2 = g.c2 + 3.0 * tau * g.c3
+        e1 = e2 = e3 = 0.0  # coefficients k-1, k-2, k-3 of the bell, which obeys bell' = -2 rate tau bell
+        for k in range(n + 1):
+            out[k] = q0 * bell + q1 * e1 + q2 * e2 + g.c3 * e3
+            e3 = e2
+            e2 = e1
+            e1 = bell
+            bell = -2.0 * g.rate * (tau * e1 + e2) / (k + 1)
+        return
+    for k in range(n + 1):
+        out[k] = 0.0
+    if g.kind == SINE and t < g.quiet:
+        out[0] = sign * g.c0 * math.sin(g.rate * t)
+        if n > 0:
+            out[1] = sign * g.c0 * g.rate * math.cos(g.rate * t)
+        for k in range(2, n + 1):
+            out[k] = -g.rate * g.rate * out[k - 2] / (k * (k - 1))
+    elif g.kind == SAMPLED:
+        i = interval(g, t)
+        if i + 1 < g.samples.size:
+            rise = g.samples[i + 1] - g.samples[i]
+            out[0] = sign * (g.samples[i] + (t / g.step - i) * rise)
+            if n > 0:
+                out[1] = sign * rise / g.step
+
+
+@njit(cache=True)
+def next_kink(g, t):
+    """The next time after t at which the motion is not smooth."""
+    if g.kind == SAMPLED:
+        i = interval(g, t)
+        return (i + 1) * g.step if i + 1 < g.samples.size else NEVER
+    if g.kind == SINE:
+        return g.quiet if t < g.quiet else NEVER
+    return NEVER
+
+
+@njit(cache=True)
+def _next_extremum(g, t):
+    """The next time after t up to which the motion is monotone; NEVER where it is monotone (and dying out) for good."""
+    if g.kind == SAMPLED:
+        return next_kink(g, t)
+    if g.kind == SINE:
+        quarter = 0.5 * math.pi / g.rate
+        k = math.floor((t / quarter + 1.0) / 2.0 + 1e-9)
+        return min((2.0 * k + 1.0) * quarter, g.quiet) if t < g.quiet else NEVER
+    if g.kind == STILL:
+        return NEVER
+    # Extrema within 1e-9 pulse widths of t count as passed, or rounding would find the same one for ever.
+    past = t - g.centre + 1e-9 / math.sqrt(g.rate)
+    best = NEVER
+    if g.c1 == 0.0 and g.c3 == 0.0:  # (c0 + c2 tau^2) bell: at 0 and where c2 = rate (c0 + c2 tau^2)
+        a, b, c = 0.0, -g.rate * g.c2, g.c2 - g.rate * g.c0
+        if past < 0.0:
+            best = 0.0
+    else:  # (c1 tau + c3 tau^3) bell: c1 + (3 c3 - 2 rate c1) q - 2 rate c3 q^2 = 0 with q = tau^2
+        a, b, c = -2.0 * g.rate * g.c3, 3.0 * g.c3 - 2.0 * g.rate * g.c1, g.c1
+    for branch in (-1.0, 1.0):
+        if a == 0.0:
+            square = -c / b if b != 0.0 else -1.0
+        else:
+            square = (-b + branch * math.sqrt(max(b * b - 4.0 * a * c, 0.0))) / (2.0 * a)
+        if square > 0.0:
+            for root in (-math.sqrt(square), math.sqrt(square)):
+                if root > past:
+                    best = min(best, root)
+    return best + g.centre if best < NEVER else NEVER
+
+
+@njit(cache=True)
+def next_exceedance(g, t, low, high):
+    """The first time from t on at which the acceleration is below `low` or above `high`, on that side; else NEVER."""
+    here = acceleration(g, t)
+    while True:
+        if here < low or here > high:
+            return t
+        end = _next_extremum(g, t)
+        if end == NEVER:
+            return NEVER
+        there = acceleration(g, end)
+        if there < low or there > high:
+            level = low if there < low else high
+            rising = there > level
+            a, b = t, end  # monotone in between: a is inside, b outside
+            fa, fb = here - level, there - level
+            for _ in range(200):
+                if b - a <= 4e-16 * abs(b):
+                    break
+                guess = a - fa * (b - a) / (fb - fa)
+                margin = 1e-3 * (b - a)  # regula falsi, kept away from the ends so that the bracket must shrink
+                middle = min(max(guess, a + margin), b - margin) if fb != fa else 0.5 * (a + b)
+                f = acceleration(g, middle) - level
+                if (f > 0.0) == rising and f != 0.0:
+                    if fb * f > 0.0:
+                        fa *= 0.5  # Illinois
+                    b, fb = middle, f
+                else:
+                    if fa * f > 0.0:
+                        fb *= 0.5
+                    a, fa = middle, f
+            return b
+        if end <= t:
+            return NEVER
+        t, here = end, there

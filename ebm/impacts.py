@@ -1,0 +1,112 @@
+"""The paper's impact laws, for the pivot that never leaves the floor: floor impact and the wall impact cascade of Fig. 3.
+
+Natural units (lengths in R, accelerations in g, unit mass), base frame. S is the pivot (+1 lower left), Sw the wall (+1
+left), w the angular velocity, xdot the centroid's horizontal velocity, v the pivot's slip velocity, s = sin(alpha - |theta|),
+c = cos(alpha - |theta|), c' = cos(alpha + |theta|). Index 1 is before the impact, 2 after it; P and Q are the impulses of the
+floor on the pivot.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+STICK, SLIP, FLAT_END = 0, 1, 2
+#: The wall cascade's branches, as the paper's Fig. 3 letters them.
+A_STICK, B_STICK, C_STICK, D_SLIP, E_SLIP, NO_BRANCH = range(6)
+
+
+@njit(cache=True)
+def floor_stick(s, c, S2, w1, v1):
+    """Floor impact on the other corner, which sticks (e_g = 0): w2, P, Q. With v1 = 0 this is Housner's ratio 1 - 1.5 s^2."""
+    w2 = (1.0 - 1.5 * s * s) * w1 - 0.75 * c * v1
+    return w2, S2 * s * (w1 + w2), c * (w1 - w2) - v1
+
+
+@njit(cache=True)
+def floor_slip(s, c, S2, d, mu_k, w1, v1):
+    """Floor impact on the other corner, which slips toward d (e_g = 0): w2, v2, P."""
+    share = s * s + mu_k * d * S2 * s * c
+    w2 = w1 * (1.0 - 3.0 * share) / (1.0 + 3.0 * share)
+    p = 2.0 * s * abs(w1) / (1.0 + 3.0 * share)
+    return w2, v1 + c * (w2 - w1) - mu_k * d * p, p
+
+
+@njit(cache=True)
+def floor_impact(s, c, S1, w1, v1, mu_s, mu_k):
+    """Floor impact as theta passes zero, from pivot S1 to -S1: form (STICK, SLIP, FLAT_END), w2, v2, P.
+
+    Sticks if it can, else slips against the friction; where neither lets the block turn on it stays flat (squat blocks, much
+    friction), and v2 is then the velocity with which it slides.
+    """
+    S2 = -S1
+    w2, p, q = floor_stick(s, c, S2, w1, v1)
+    if S2 * w2 >= 0.0 and p >= 0.0 and abs(q) <= mu_s * p:
+        return STICK, w2, 0.0, p
+    turns = S2 * w2 >= 0.0
+    toward = -1.0 if q > 0.0 else 1.0
+    for d in (toward, -toward):
+        w2, v2, p = floor_slip(s, c, S2, d, mu_k, w1, v1)
+        turns = turns or S2 * w2 >= 0.0
+        if S2 * w2 >= 0.0 and d * v2 >= 0.0:
+            return SLIP, w2, v2, p
+    if turns:
+        # Static friction above kinetic leaves a gap in which neither form is consistent: sticking is the nearer one.
+        w2, p, q = floor_stick(s, c, S2, w1, v1)
+        if S2 * w2 >= 0.0:
+            return STICK, w2, 0.0, p
+    p = s * abs(w1)
+    xdot = v1 - c * w1
+    return FLAT_END, 0.0, (0.0 if abs(xdot) <= mu_s * p else xdot - math.copysign(mu_k * p, xdot)), p
+
+
+@njit(cache=True)
+def wall_stick(S, Sw, s, c, C, w1, xdot1, e):
+    """(25), (26): the corner rebounds with e, the pivot sticks: w2, xdot2, P, Q."""
+    w2 = e * (xdot1 - C * w1) / (C + c)
+    xdot2 = -c * w2
+    p = S * s * (w2 - w1)
+    return w2, xdot2, p, (S * s * p + C * (xdot2 - xdot1) + (w2 - w1) / 3.0) / (c + C)
+
+
+@njit(cache=True)
+def wall_slip(S, s, c, C, w1, xdot1, e, mu_k, Sr, sy):
+    """(30): the corner rebounds with e, the pivot slips toward Sr under a P of sign sy: w2, xdot2, P, Q."""
+    k = S * s + (c + C) * mu_k * Sr * sy
+    w2 = (w1 / 3.0 + k * S * s * w1 - e * C * C * w1 + (1.0 + e) * C * xdot1) / (1.0 / 3.0 + k * S * s + C * C)
+    p = S * s * (w2 - w1)
+    return w2, C * w2 - e * (xdot1 - C * w1), p, -mu_k * Sr * sy * p
+
+
+@njit(cache=True)
+def wall_impact(S, Sw, s, c, c_prime, w1, xdot1, e, mu_s, mu_k, no_slip):
+    """A corner strikes the wall, case I (top, S = Sw) or II (bottom): branch, w2, xdot2, N, P, v2, after the cascade of Fig. 3.
+
+    N >= 0 is the wall's impulse. (31) is the identity map while the pivot is on the floor, so it does not appear.
+    """
+    C = S * Sw * c_prime
+    w2, xdot2, p, q = wall_stick(S, Sw, s, c, C, w1, xdot1, e)
+    if math.isfinite(w2) and (no_slip or abs(q) <= mu_s * abs(p)):
+        n = Sw * (xdot2 - xdot1 - q)
+        if n >= 0.0:  # (21)
+            return A_STICK, w2, xdot2, n, p, 0.0
+        w2 = 0.75 * (w1 / 3.0 - c * xdot1 + S * s * (S * s * w1))  # (27): no impulse from the wall
+        xdot2 = -c * w2
+        if Sw * (xdot2 - C * w2) >= 0.0:  # (22)
+            return B_STICK, w2, xdot2, 0.0, S * s * (w2 - w1), 0.0
+        return C_STICK, 0.0, 0.0, max(0.0, -Sw * xdot1), -S * s * w1, 0.0  # (28)
+    for Sr in (1.0, -1.0):
+        for sy in (1.0, -1.0):
+            w2, xdot2, p, q = wall_slip(S, s, c, C, w1, xdot1, e, mu_k, Sr, sy)
+            v2 = xdot2 + c * w2
+            if p * sy < 0.0 or v2 * Sr < 0.0:
+                continue
+            n = Sw * (xdot2 - xdot1 - q)
+            if n >= 0.0:
+                return D_SLIP, w2, xdot2, n, p, v2
+            k = -mu_k * Sr * sy
+            w2 = (k * S * s * w1 - xdot1) / (k * S * s - C)  # (32)
+            xdot2 = C * w2
+            return E_SLIP, w2, xdot2, 0.0, S * s * (w2 - w1), xdot2 + c * w2
+    return NO_BRANCH, 0.0, 0.0, max(0.0, -Sw * xdot1), -S * s * w1, 0.0

@@ -1,0 +1,175 @@
+"""The event-based models: `ebm`, `ebm-unilateral` and `ebm-bouc-wen`."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, Strict
+
+from scenes.base import Frozen
+from scenes.errors import InputError, ModelFailure
+from scenes.history import Cost, Event, History
+from scenes.observation import observe
+from scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from ebm.trajectory import Tally
+
+
+class EventBasedModel(Frozen):
+    """The paper's Event-Based Model and its extensions.
+
+    `tolerance` bounds the local truncation error of each Taylor step, in natural units (rotation in rad, lengths in R).
+    `pivot`: "bilateral" is the paper's model, in which the pivot never leaves the floor; "unilateral" lets the floor only
+    push, so that the block may hop. `friction`: "coulomb" switches exactly between stick and slip, "bouc-wen" is the
+    paper's regularisation (9), "no-slip" is Housner's block. `energy_cap` (unilateral) lowers the restitution of an impact that
+    would add kinetic energy to the largest that does not. `estimate_error` runs the scene again at tolerance/100 and puts the
+    largest change of theta/alpha into `cost.error_estimate`. A run that reaches `most_steps` or `most_events` is a
+    `ModelFailure`.
+    """
+
+    tolerance: Annotated[float, Strict(), Field(ge=1e-15, le=1e-2)] = 1e-10
+    pivot: Literal["bilateral", "unilateral"] = "bilateral"
+    friction: Literal["coulomb", "bouc-wen", "no-slip"] = "coulomb"
+    energy_cap: bool = False
+    estimate_error: bool = False
+    most_steps: Annotated[int, Field(ge=1)] = 20_000_000
+    most_events: Annotated[int, Field(ge=1)] = 200_000
+
+    @property
+    def name(self) -> str:
+        """`ebm`, `ebm-unilateral` or `ebm-bouc-wen`."""
+        if self.friction == "bouc-wen":
+            return "ebm-bouc-wen"
+        return "ebm" if self.pivot == "bilateral" else "ebm-unilateral"
+
+    @property
+    def order(self) -> int:
+        """Order of the Taylor series: about half the digits of the tolerance, as usual for such methods, and a few more."""
+        return min(28, math.ceil(-0.5 * math.log(self.tolerance)) + 4)
+
+    def check(self, scene: Scene) -> None:
+        """Raises `InputError` where the scene asks for physics that this model excludes."""
+        if self.pivot == "bilateral":
+            if scene.floor.restitution > 0.0:
+                raise InputError(
+                    f"{scene.floor.restitution:g} is not allowed with the bilateral pivot: a floor impact that rebounds is free flight,"
+                    ' which this model excludes; use 0, or pivot="unilateral"',
+                    "floor.restitution",
+                )
+            if scene.initial_height > 0.0:
+                raise InputError(
+                    f"{scene.initial_height:g} is not allowed with the bilateral pivot, which never leaves the floor; use 0, or"
+                    ' pivot="unilateral"',
+                    "initial_height",
+                )
+        elif scene.floor.restitution == 1.0:
+            raise InputError("1 is not allowed: a block that loses nothing at the floor never settles; use less than 1", "floor.restitution")
+
+    def simulate(self, scene: Scene) -> History:
+        """The motion of the scene on its output grid. Raises `InputError` (see `check`) or `ModelFailure`."""
+        self.check(scene)
+        history = self._simulate(scene, self.tolerance)
+        if not self.estimate_error:
+            return history
+        finer = self._simulate(scene, max(self.tolerance / 100.0, 1e-15))
+        rows = min(len(finer.channels["theta"]), len(history.channels["theta"]))
+        change = np.max(np.abs(finer.channels["theta"][:rows] - history.channels["theta"][:rows])) / scene.block.alpha
+        cost = Cost(**(vars(history.cost) | {"error_estimate": float(change)}))
+        return History(**(vars_of(history) | {"cost": cost}))
+
+    def _simulate(self, scene: Scene, tolerance: float) -> History:
+        if self.friction == "bouc-wen":
+            from ebm import bouc_wen
+
+            return bouc_wen.simulate(self, scene, tolerance)
+        start = time.perf_counter()
+        from ebm import natural, trajectory
+
+        b = natural.setting_of(
+            scene, unilateral=self.pivot == "unilateral", no_slip=self.friction == "no-slip", energy_cap=self.energy_cap
+        )
+        horizontal, vertical = natural.grounds_of(scene)
+        unit = natural.time_unit(scene)
+        state = natural.state_of(scene)
+        times = scene.output_times
+        order = type(self)(tolerance=tolerance).order
+        control = trajectory.Control(tolerance, order, self.most_steps, self.most_events, False, scene.output_step / unit)
+        out = np.empty((len(times), 6))
+        out_mode = np.zeros(len(times), dtype=np.int8)
+        log = np.empty((self.most_events, 5))
+        _compiled()
+        ready, cpu = time.perf_counter(), time.process_time()
+        tally = trajectory.run(b, horizontal, vertical, state, scene.duration / unit, control, out, out_mode, log)
+        seconds, cpu = time.perf_counter() - ready, time.process_time() - cpu
+        if tally.ending in trajectory.FAILURES:
+            raise ModelFailure(f"{self.name}: {trajectory.FAILURES[tally.ending]} at t = {tally.t * unit:.6g} s")
+        rows = max(tally.rows, 1)
+        out[0] = natural.state_of(scene) if tally.rows == 0 else out[0]
+        events = _events(log[: min(tally.events, len(log))], unit, scene.block.radius)
+        cost = Cost(
+            wall_seconds=seconds,
+            cpu_seconds=cpu,
+            set_up=ready - start,
+            steps=tally.steps,
+            evaluations=tally.series,
+            energy_gains=tally.gains,
+            largest_energy_gain=tally.largest_gain,
+        )
+        return observe(
+            scene,
+            self.name,
+            natural.to_si(scene, out[:rows]),
+            mode=np.array(trajectory.MODE_NAMES)[out_mode[:rows]],
+            events=events,
+            outcome=_outcome(tally, state[2]),
+            cost=cost,
+            settings=self.model_dump(),
+        )
+
+
+def _outcome(tally: Tally, theta: float) -> str:
+    from ebm import trajectory
+
+    if tally.ending == trajectory.OVERTURNED:
+        return "overturned left" if theta > 0 else "overturned right"
+    return "at rest" if tally.at_rest else "moving"
+
+
+def _events(log: np.ndarray, unit: float, radius: float) -> list[Event]:
+    """The event log (natural units) as events (SI)."""
+    from ebm import trajectory
+
+    modes, kinds, speed = trajectory.MODE_NAMES, trajectory.EVENT_NAMES, radius / unit
+    return [
+        Event(t=t * unit, kind=kinds[int(kind)], mode_before=modes[int(before)], mode_after=modes[int(after)], impulse=impulse * speed)
+        for t, kind, before, after, impulse in log.tolist()
+    ]
+
+
+def vars_of(history: History) -> dict[str, Any]:
+    """The fields of a history, without what it has cached."""
+    return {name: getattr(history, name) for name in History.__dataclass_fields__}
+
+
+def _compiled() -> None:
+    """Loads or compiles the event loop by a run of no steps, so that no run's time holds it."""
+    global _READY
+    if _READY:
+        return
+    from ebm import natural, trajectory
+    from scenes.excitations import Rest
+    from scenes.scene import Block, Floor
+
+    scene = Scene(name="warm-up", block=Block(half_width=1.0, half_height=4.0), floor=Floor(friction=0.5), excitation=Rest(), duration=1.0)
+    b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
+    control = trajectory.Control(1e-8, 12, 1, 1, False, 1.0)
+    gh, gv = natural.grounds_of(scene)
+    trajectory.run(b, gh, gv, natural.state_of(scene), 1.0, control, np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5)))
+    _READY = True
+
+
+_READY = False

@@ -1,0 +1,530 @@
+"""The event loop: series, first root of the guards, impact or selection, until the end. Natural units (see ebm.motion)."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ebm import impacts
+from ebm.contact_impacts import CONTACTS, FAR_BOTTOM, FAR_TOP, TIP_BOTTOM, TIP_TOP, E, F, contact_impact
+from ebm.ground import STILL, acceleration, next_exceedance, next_kink
+from ebm.motion import (
+    COS,
+    FAMILY,
+    FAR,
+    FLAT,
+    FLOOR,
+    GUARD,
+    HEIGHT,
+    MODE_SIZE,
+    OFF,
+    OMEGA,
+    PHI,
+    PULL,
+    SIN,
+    STICK,
+    THETA,
+    TILT,
+    TIP,
+    VX,
+    VY,
+    XI,
+    S,
+    W,
+    X,
+    Y,
+    flat_series,
+    flat_state,
+    tilt_series,
+    tilt_state,
+    workspace,
+)
+from ebm.series import NO_ROOT, first_root, value
+from ebm.transitions import (
+    G_CONE_MINUS,
+    G_CONE_PLUS,
+    G_FAR_GAP,
+    G_LANDING,
+    G_PHI,
+    G_PUSH,
+    G_SLIP,
+    G_TIP_GAP,
+    G_TOPPLE,
+    GUARDS,
+    closed_floor,
+    guard,
+    select,
+    slip_velocity,
+)
+
+#: Names of the mode codes that `mode_code` gives, and of the event codes.
+MODE_NAMES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight")
+EVENT_NAMES = (
+    "uplift",
+    "slip",
+    "stick",
+    "floor impact",
+    "wall impact",
+    "lift-off",
+    "landing",
+    "release",
+    "settled",
+    "overturned left",
+    "overturned right",
+)
+(UPLIFT, SLIPS, STICKS, FLOOR_IMPACT, WALL_IMPACT, LIFT_OFF, LANDS, RELEASE, SETTLED, LEFT, RIGHT) = range(11)
+
+# How a run ended.
+DONE, OVERTURNED, TOO_MANY_STEPS, TOO_MANY_EVENTS, NO_MODE, NO_IMPACT, NOT_FINITE = range(7)
+FAILURES = {
+    TOO_MANY_STEPS: "the cap on steps was reached",
+    TOO_MANY_EVENTS: "the cap on events was reached",
+    NO_MODE: "no mode of motion is consistent",
+    NO_IMPACT: "no impact is consistent",
+    NOT_FINITE: "the motion is not finite",
+}
+
+# A block that lands more slowly than this lies flat (Zeno: impacts accumulate), and a corner that rebounds from a wall more
+# slowly than this stays on it. Natural units; 5e-8 is 1e-7 rad/s for the paper's block.
+SETTLE_SPIN = 5e-8
+_REST_BILATERAL, _REST_UNILATERAL = 2.5e-8, 2.5e-7
+# Rattling: this many impacts within this time raise the settling speed tenfold, up to a bound, until it is quiet.
+_RATTLE_IMPACTS, _RATTLE_TIME, _RATTLE_BOUND, _QUIET_TIME = 100, 5e-3, 2.5e-3, 2.5e-2
+# With the bilateral pivot a block that rattles flush against a wall is settled below these.
+_FLUSH_SPIN, _FLUSH_SPEED, _FLUSH_GAP = 2e-4, 2.5e-4, 6e-7
+_TOUCH = 1e-11
+_MOST_ZERO_STEPS = 60
+
+
+class Control(NamedTuple):
+    """What a run is asked for."""
+
+    tolerance: float
+    order: int
+    most_steps: int
+    most_events: int
+    #: Stop as soon as the outcome and the peak are decided.
+    until_decided: bool
+    #: Spacing of the rows of `out`; with no rows nothing is sampled.
+    output_step: float
+
+
+class Tally(NamedTuple):
+    """What a run reports besides its samples."""
+
+    ending: int
+    t: float
+    peak: float
+    at_rest: bool
+    steps: int
+    series: int
+    events: int
+    wall_impacts: int
+    gains: int
+    largest_gain: float
+    hop: float
+    rows: int
+    t_rest: float
+
+
+@njit(cache=True)
+def mode_code(m):
+    """Index into MODE_NAMES."""
+    if m[FLOOR] == OFF:
+        return 6
+    if m[FAMILY] == FLAT:
+        return 0 if m[FLOOR] == STICK else 1
+    wall = m[TIP] != 0 or m[FAR] != 0
+    if m[FLOOR] == STICK:
+        return 4 if wall else 2
+    return 5 if wall else 3
+
+
+@njit(cache=True)
+def run(b, gh, gv, z, t_end, control, out, out_mode, log):
+    """Simulates from state z (changed in place) at t = 0 to t_end; returns a Tally.
+
+    Row i of `out` (n x 6) is the state at i * output_step, `out_mode` its mode; `log` (n x 5) takes one row an event: time,
+    kind, mode before, mode after, impulse.
+    """
+    a, stack = workspace()
+    m = np.zeros(MODE_SIZE, dtype=np.int64)
+    left = np.full(MODE_SIZE, -9, dtype=np.int64)
+    gains = np.zeros(2)
+    impulse = np.zeros(2)
+    still = gv.kind == STILL
+    quiet = max(gh.quiet, gv.quiet)
+    base_rest = _REST_UNILATERAL if b.unilateral else _REST_BILATERAL
+    resting, window_start, last_impact, in_window = base_rest, -1.0, -1.0, 0
+    t = 0.0
+    rows = steps = series = events = wall_impacts = zero_steps = 0
+    peak, hop, t_rest = abs(z[THETA]), 0.0, np.nan
+    ending = DONE
+    if not select(b, z, gh, gv, t, left, m, a):
+        return Tally(NO_MODE, t, peak, False, 0, 0, 0, 0, 0, 0.0, 0.0, 0, t_rest)
+    while True:
+        # --- rest: straight to the next uplift or slip
+        if m[FAMILY] == FLAT and m[FLOOR] == STICK and still:
+            limit = b.sin_alpha / b.cos_alpha
+            if not b.no_slip:
+                limit = min(limit, b.mu_s)
+            until = next_exceedance(gh, t, -np.inf if m[FAR] != 0 else -limit, np.inf if m[TIP] != 0 else limit)
+            if math.isnan(t_rest):
+                t_rest = t
+            stop = min(until, t_end)
+            while rows < out.shape[0] and (rows * control.output_step <= stop):
+                out[rows] = z
+                out_mode[rows] = 0
+                rows += 1
+            if until >= t_end:
+                t = t_end if not control.until_decided else t
+                break
+            if until == t and zero_steps > _MOST_ZERO_STEPS:
+                ending = NO_MODE
+                break
+            zero_steps = zero_steps + 1 if until == t else 0
+            t = until
+            left[:] = m
+            if not select(b, z, gh, gv, t, left, m, a):
+                ending = NO_MODE
+                break
+            t_rest = np.nan
+            events += 1
+            if log.shape[0] >= events:
+                _note(log, events, t, SLIPS if m[FAMILY] == FLAT else UPLIFT, 0, mode_code(m), 0.0)
+            continue
+        if t >= t_end:
+            break
+        if control.until_decided and t >= quiet:
+            verdict = _decided(b, m, z, gh, gv, peak)
+            if verdict > 0.0:
+                peak = verdict
+                if peak >= 0.5 * math.pi:
+                    ending = OVERTURNED
+                    z[THETA] = math.copysign(peak, z[THETA])
+                break
+        if steps >= control.most_steps:
+            ending = TOO_MANY_STEPS
+            break
+        # --- one step of the series
+        steps += 1
+        series += 1
+        reach = min(min(next_kink(gh, t), next_kink(gv, t)), t_end) - t
+        pivot = 0.0
+        if m[FAMILY] == FLAT:
+            order = flat_series(b, m, z, gh, gv, t, control.order, a)
+            h = _step_size(a[XI], a[Y], order, control.tolerance, reach)
+        else:
+            order = tilt_series(b, m, z, gh, gv, t, control.order, 1e-2 * control.tolerance, reach, not b.no_slip or b.unilateral, a)
+            pivot = m[S] * z[X] - a[SIN, 0]
+            if order < control.order:
+                h = reach
+            elif m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0:
+                h = _step_size(a[PHI], a[COS], order, control.tolerance, reach)
+            else:
+                h = min(
+                    _step_size(a[PHI], a[COS], order, control.tolerance, reach), _step_size(a[XI], a[Y], order, control.tolerance, reach)
+                )
+        tau, which = h, -1
+        for k in range(GUARDS):
+            degree = guard(b, m, k, order, pivot, a)
+            if degree >= 0:
+                root = first_root(a[GUARD], degree, tau, stack)
+                if root != NO_ROOT:
+                    tau, which = root, k
+        if not math.isfinite(tau):
+            ending = NOT_FINITE
+            break
+        end = t + tau if which >= 0 or tau < reach else t + reach
+        while rows < out.shape[0] and rows * control.output_step < end:
+            if m[FAMILY] == FLAT:
+                flat_state(b, m, order, rows * control.output_step - t, a, out[rows])
+            else:
+                tilt_state(b, m, order, rows * control.output_step - t, pivot, a, out[rows])
+            out_mode[rows] = mode_code(m)
+            rows += 1
+        if m[FAMILY] == FLAT:
+            flat_state(b, m, order, tau, a, z)
+        else:
+            if a[OMEGA, 0] > 0.0 and value(a[OMEGA], order - 1, tau) < 0.0:
+                top = first_root(a[OMEGA], order - 1, tau, stack)
+                if top > 0.0:
+                    peak = max(peak, value(a[PHI], order, top))
+            if m[FLOOR] == OFF:
+                hop = max(hop, _highest(a, order, tau))
+            tilt_state(b, m, order, tau, pivot, a, z)
+        if which < 0 and tau >= reach:
+            kink = min(next_kink(gh, t), next_kink(gv, t))
+            t = kink if kink <= t_end else t_end
+        else:
+            t += tau
+        peak = max(peak, abs(z[THETA]))
+        if which < 0:
+            continue
+        # --- an event
+        zero_steps = zero_steps + 1 if tau <= 0.0 else 0
+        events += 1
+        if zero_steps > _MOST_ZERO_STEPS:
+            ending = NO_MODE
+            break
+        if events >= control.most_events:
+            ending = TOO_MANY_EVENTS
+            break
+        if which == G_TOPPLE:
+            ending = OVERTURNED
+            z[THETA] = math.copysign(0.5 * math.pi, z[THETA])
+            peak = 0.5 * math.pi
+            if log.shape[0] >= events:
+                _note(log, events, t, LEFT if m[S] > 0 else RIGHT, mode_code(m), mode_code(m), 0.0)
+            break
+        before = mode_code(m)
+        left[:] = m
+        impulse[:] = 0.0
+        kind = RELEASE
+        found = True
+        strikes = which == G_TIP_GAP or which == G_FAR_GAP or which == G_LANDING or which == G_PHI
+        if strikes:
+            if t - last_impact > _QUIET_TIME:
+                resting = base_rest
+            if t - window_start > _RATTLE_TIME:
+                window_start, in_window = t, 0
+            in_window += 1
+            if in_window >= _RATTLE_IMPACTS:
+                resting, in_window = min(10.0 * resting, _RATTLE_BOUND), 0
+            last_impact = t
+            wall = which == G_TIP_GAP or which == G_FAR_GAP
+            if which == G_PHI:
+                z[THETA] = 0.0
+            elif wall and m[FAMILY] == TILT and abs(z[THETA]) < 1e-9 and m[S] * z[W] < 0.0 and closed_floor(b, z):
+                z[THETA], wall = 0.0, False  # the corner meets the wall as the block lands: a floor event
+            if b.unilateral:
+                found = _strike(b, m, z, resting, impulse, gains)
+                known = False
+            elif wall:
+                known = _wall_impact(b, m, z, which == G_TIP_GAP, gh, t, resting, impulse, gains)
+            else:
+                known = _floor_impact(b, m, z, impulse)
+            if z[THETA] == 0.0 and abs(z[W]) < SETTLE_SPIN:
+                z[VX] += (z[W] * b.cos_alpha) if slip_velocity(b, z) != 0.0 else -z[VX]
+                z[W] = 0.0
+                z[VY] = 0.0 if closed_floor(b, z) else z[VY]
+                known = False
+            wall_impacts += wall
+            kind = WALL_IMPACT if wall else (LANDS if which == G_LANDING else FLOOR_IMPACT)
+            if not known:
+                left[:] = -9
+                found = found and select(b, z, gh, gv, t, left, m, a)
+        else:
+            if which == G_SLIP:
+                kind = STICKS
+                if m[TIP] != 0 or m[FAR] != 0:
+                    z[W] = z[VX] = z[VY] = 0.0
+                z[VX] = -math.cos(b.alpha - abs(z[THETA])) * z[W]
+                if m[FAMILY] == FLAT:
+                    z[VX] = 0.0
+            elif which == G_CONE_PLUS or which == G_CONE_MINUS:
+                kind = SLIPS
+            elif which == G_PUSH and b.unilateral:
+                kind = LIFT_OFF
+            found = select(b, z, gh, gv, t, left, m, a)
+        if not found:
+            ending = NO_IMPACT if strikes else NO_MODE
+            break
+        if log.shape[0] >= events:
+            _note(log, events, t, kind, before, mode_code(m), impulse[0] + impulse[1])
+    at_rest = m[FAMILY] == FLAT and m[FLOOR] == STICK
+    if ending == DONE and not math.isfinite(z[THETA]):
+        ending = NOT_FINITE
+    if ending == DONE and not control.until_decided:
+        while rows < out.shape[0]:
+            out[rows] = z
+            out_mode[rows] = mode_code(m)
+            rows += 1
+    return Tally(ending, t, peak, at_rest, steps, series, events, wall_impacts, int(gains[0]), gains[1], hop, rows, t_rest)
+
+
+@njit(cache=True)
+def _note(log, count, t, kind, before, after, impulse):
+    row = log[count - 1]
+    row[0], row[1], row[2], row[3], row[4] = t, kind, before, after, impulse
+
+
+@njit(cache=True)
+def _step_size(first, second, order, tolerance, reach):
+    """The step at which the last two terms of the series stay below the tolerance, at most `reach`."""
+    last = abs(first[order]) + abs(second[order])
+    before = abs(first[order - 1]) + abs(second[order - 1])
+    h = reach
+    if last > 0.0:
+        h = min(h, math.exp(math.log(tolerance / last) / order))
+    if before > 0.0:
+        h = min(h, math.exp(math.log(tolerance / before) / (order - 1)))
+    return h
+
+
+@njit(cache=True)
+def _highest(a, order, tau):
+    """The highest lift of the pivot among 5 instants of the step."""
+    top = 0.0
+    for k in range(1, 6):
+        x = 0.2 * k * tau
+        top = max(top, value(a[Y], order, x) - value(a[COS], order, x))
+    return top
+
+
+@njit(cache=True)
+def _floor_impact(b, m, z, impulse):
+    """Bilateral pivot: the block lands at theta = 0. Returns whether it is already known to rock on in m."""
+    w1, v1 = z[W], slip_velocity(b, z)
+    s, c = b.sin_alpha, b.cos_alpha
+    S1 = m[S]
+    if m[TIP] != 0 or m[FAR] != 0:  # from LADDER: every contact plastic, flush rest
+        z[W] = z[VX] = z[VY] = 0.0
+        return False
+    ahead = b.gap_right if S1 > 0 else b.gap_left
+    e = b.e_right if S1 > 0 else b.e_left
+    if ahead < np.inf and -S1 * z[X] + ahead < 1e-9:
+        # Flush with the wall toward which it would rock: it keeps its pivot (the paper is silent).
+        z[W] = -e * (1.0 - 1.5 * s * s) * w1
+        v2 = -e * v1 if -S1 * v1 < 0.0 else v1
+        z[VX] = v2 - c * z[W]
+        z[VY] = S1 * s * z[W]
+        return False
+    form, w2, v2, p = impacts.floor_impact(s, c, S1, w1, v1, b.mu_s if not b.no_slip else np.inf, b.mu_k)
+    impulse[0] = p
+    z[W] = w2
+    z[VX] = v2 - c * w2
+    z[VY] = -S1 * s * w2
+    if form == impacts.STICK and abs(w2) > SETTLE_SPIN:
+        m[:] = 0
+        m[FAMILY], m[S], m[FLOOR], m[PULL] = TILT, -S1, STICK, 1
+        return True
+    return False
+
+
+@njit(cache=True)
+def _wall_impact(b, m, z, tip, gh, t, resting, impulse, gains):
+    """Bilateral pivot: a corner (case I, II) or the side (case III) strikes a wall. Returns whether m is already right."""
+    if m[FAMILY] == FLAT:
+        e = b.e_left if tip else b.e_right
+        impulse[1] = (1.0 + e) * abs(z[VX])
+        z[VX] = -e * z[VX] if e * abs(z[VX]) > resting else 0.0
+        return False
+    sign = float(m[S])
+    e = b.e_left if (m[S] > 0) == tip else b.e_right
+    sw = 1.0 if tip else -1.0
+    phi = abs(z[THETA])
+    s, c, cp = math.sin(b.alpha - phi), math.cos(b.alpha - phi), math.cos(b.alpha + phi)
+    w1, xdot1 = sign * z[W], sign * z[VX]
+    if m[TIP] != 0 or m[FAR] != 0:  # sliding down one wall it meets the other: wedged
+        z[W] = z[VX] = z[VY] = 0.0
+        return False
+    before = xdot1 * xdot1 + (s * w1) ** 2 + w1 * w1 / 3.0
+    branch, w2, xdot2, n, p, v2 = impacts.wall_impact(1.0, sw, s, c, cp, w1, xdot1, e, b.mu_s, b.mu_k, b.no_slip)
+    after = xdot2 * xdot2 + (s * w2) ** 2 + w2 * w2 / 3.0
+    if after > before * (1.0 + 1e-12) + 1e-18:
+        gains[0] += 1.0
+        gains[1] = max(gains[1], after / before - 1.0)
+    impulse[0], impulse[1] = abs(p), n
+    C = sw * cp
+    rebound = sw * (xdot2 - C * w2)
+    stays = e == 0.0 and branch != impacts.B_STICK and branch != impacts.E_SLIP
+    stays = stays or rebound < resting
+    if stays:
+        xdot2 = C * w2
+    if v2 == 0.0 and not stays:
+        xdot2 = -c * w2
+    z[W], z[VX], z[VY] = sign * w2, sign * xdot2, s * w2
+    if b.no_slip and stays:
+        z[W] = z[VX] = z[VY] = 0.0
+    flush = sign * sw * z[X] + (b.gap_left if sign * sw > 0 else b.gap_right)
+    if abs(w2) < _FLUSH_SPIN and abs(v2) < _FLUSH_SPEED and abs(flush) < _FLUSH_GAP and _presses(b, gh, t, sign * sw):
+        z[THETA] = z[W] = z[VX] = z[VY] = 0.0
+        z[HEIGHT] = b.cos_alpha
+        z[X] = -b.gap_left if sign * sw > 0 else b.gap_right
+        return False
+    if not stays and v2 == 0.0:
+        m[:] = 0
+        m[FAMILY], m[S], m[FLOOR], m[PULL] = TILT, int(sign), STICK, 1
+        return True
+    return False
+
+
+@njit(cache=True)
+def _presses(b, gh, t, side):
+    """Whether the base acceleration holds a flush block against the wall on `side` beyond what would lift or slide it."""
+    level = side * acceleration(gh, t)
+    return level > min(b.sin_alpha / b.cos_alpha, b.mu_s)
+
+
+@njit(cache=True)
+def _strike(b, m, z, resting, impulse, gains):
+    """Unilateral: resolves all contacts touched at this instant. Returns False where no impact law fits."""
+    sign = float(m[S])
+    if m[FAMILY] == FLAT:
+        sign = 1.0
+    phi = abs(z[THETA])
+    c, reach = math.cos(b.alpha - phi), math.sin(b.alpha + phi)
+    flat = z[THETA] == 0.0
+    touching = np.zeros(CONTACTS, dtype=np.bool_)
+    touching[F] = abs(z[HEIGHT] - c) < _TOUCH
+    touching[E] = flat and touching[F]
+    tip = b.gap_left if sign > 0 else b.gap_right
+    far = b.gap_right if sign > 0 else b.gap_left
+    touching[TIP_TOP] = tip < np.inf and abs(sign * z[X] + b.sin_alpha + tip - reach) < _TOUCH
+    touching[TIP_BOTTOM] = flat and touching[TIP_TOP]
+    touching[FAR_BOTTOM] = far < np.inf and abs(b.sin_alpha + far - sign * z[X] - reach) < _TOUCH
+    touching[FAR_TOP] = flat and touching[FAR_BOTTOM]
+    v = np.zeros(3)
+    v[0], v[1], v[2] = sign * z[VX], z[VY], sign * z[W]
+    e_tip = b.e_left if sign > 0 else b.e_right
+    e_far = b.e_right if sign > 0 else b.e_left
+    found = contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, gains)
+    z[VX], z[VY], z[W] = sign * v[0], v[1], sign * v[2]
+    if touching[F] and abs(slip_velocity(b, z)) < 1e-13:
+        z[VX] = -c * z[W]
+    return found
+
+
+@njit(cache=True)
+def _decided(b, m, z, gh, gv, peak):
+    """After the excitation: the final peak rotation (>= pi/2: overturns) if the rest of the motion is certain, else -1.
+
+    Without excitation the energy of block and floor cannot grow, and a block whose energy is below that of standing on its
+    corner cannot overturn: it is safe once that energy cannot lift it above the peak it has had. A block that only rocks
+    conserves its energy up to its next impact, so that its peak is known at once.
+    """
+    phi = abs(z[THETA])
+    energy = 0.5 * (z[VX] * z[VX] + z[VY] * z[VY] + z[W] * z[W] / 3.0) + z[HEIGHT]
+    rocks = m[FAMILY] == TILT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0 and not b.walls
+    rocks = rocks and (b.no_slip or _sticks_for_good(b, energy))
+    if energy < 1.0 and phi < b.alpha:
+        highest = b.alpha - math.acos(min(energy, 1.0))
+        margin = 0.9 if b.walls else 1.0  # the wall cascade may add a little energy
+        if rocks:
+            return max(peak, highest if m[S] * z[W] > 0.0 else phi)
+        if highest <= peak and energy - b.cos_alpha < margin * (1.0 - b.cos_alpha):
+            return max(peak, 1e-300)
+        return -1.0
+    if rocks and m[S] * z[W] >= 0.0 and (phi > b.alpha or energy > 1.0):
+        return 0.5 * math.pi
+    return -1.0
+
+
+@njit(cache=True)
+def _sticks_for_good(b, energy):
+    """Whether a pivot cannot slip in free rocking of this energy (up to its balance point), impacts included.
+
+    |Q| <= max(3/4 s c, s w^2) and P >= 1 - 3/4 s^2 - w^2, with w^2 <= 3/2 (energy - cos alpha); the landing sticks if
+    mu >= 3 t/(4 + t^2), t = tan alpha.
+    """
+    s, c = b.sin_alpha, b.cos_alpha
+    square = 1.5 * (energy - c)
+    push = 1.0 - 0.75 * s * s - square
+    # s c rises with s only up to 45 degrees.
+    pull = 0.75 * (s * c if b.alpha < 0.25 * math.pi else 0.5)
+    t = s / c
+    return push > 0.0 and b.mu_s * push >= max(pull, s * square) and b.mu_s >= 3.0 * t / (4.0 + t * t)

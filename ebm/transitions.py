@@ -1,0 +1,339 @@
+"""When a mode ends, and which mode follows.
+
+A mode is consistent as long as its *guards* are not negative: contact forces that push, friction inside the cone, slip
+that keeps its direction, open contacts that stay open. The same guards, as Taylor polynomials, are the events of a step
+(their first root) and the test that selects the next mode (the sign with which they leave zero), so that a selected mode
+can never end at once. Applied to the bilateral pivot this selection is the paper's: its rules for uplift and slip
+(Shenton's map among them), for the tilted block and for the corner that stays on the wall come out as the one consistent
+candidate; tests hold the closed forms against it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ebm.ground import acceleration
+from ebm.motion import (
+    COS,
+    FAMILY,
+    FAR,
+    FLAT,
+    FLOOR,
+    GUARD,
+    HEIGHT,
+    NA,
+    NB,
+    OFF,
+    PHI,
+    PULL,
+    SIN,
+    SLIP,
+    SLIPPING,
+    STICK,
+    THETA,
+    TILT,
+    TIP,
+    VX,
+    VY,
+    XI,
+    P,
+    Q,
+    S,
+    W,
+    X,
+    Y,
+    delta,
+    flat_series,
+    tilt_series,
+)
+from ebm.series import leading
+
+# The guards, in the order in which ties are decided: floor before walls, contacts before friction.
+(
+    G_PHI,
+    G_TOPPLE,
+    G_LANDING,
+    G_TIP_GAP,
+    G_FAR_GAP,
+    G_PUSH,
+    G_TIP_PUSH,
+    G_FAR_PUSH,
+    G_CONE_PLUS,
+    G_CONE_MINUS,
+    G_SLIP,
+    G_UPLIFT_PLUS,
+    G_UPLIFT_MINUS,
+) = range(13)
+GUARDS = 13
+
+# A contact is closed if its gap and its gap's rate are below these (natural units).
+CLOSED_GAP = 1e-10
+CLOSED_RATE = 1e-9
+
+
+@njit(cache=True)
+def guard(b, m, which, order, pivot, a):
+    """Writes guard `which` of mode m into the workspace and returns its degree, or -1 where the mode has no such guard."""
+    out = a[GUARD]
+    if m[FAMILY] == FLAT:
+        return _flat_guard(b, m, which, order, a, out)
+    if which == G_PHI:
+        out[: order + 1] = a[PHI, : order + 1]
+        return order
+    if which == G_TOPPLE:
+        if a[PHI, 0] < 0.5:  # no step is long enough to turn the block over from here unseen: see largest_step
+            return -1
+        for k in range(order + 1):
+            out[k] = -a[PHI, k]
+        out[0] += 0.5 * math.pi
+        return order
+    if which == G_LANDING:
+        if m[FLOOR] != OFF:
+            return -1
+        for k in range(order + 1):
+            out[k] = a[Y, k] - a[COS, k]
+        return order
+    if which == G_TIP_GAP or which == G_FAR_GAP:
+        return _gap(b, m, which == G_TIP_GAP, order, pivot, a, out)
+    if which == G_PUSH:
+        if m[FLOOR] == OFF or not (b.unilateral or m[FLOOR] == SLIPPING):
+            return -1
+        for k in range(order - 1):
+            out[k] = m[PULL] * a[P, k]
+        return order - 2
+    if which == G_TIP_PUSH or which == G_FAR_PUSH:
+        if m[TIP if which == G_TIP_PUSH else FAR] == 0:
+            return -1
+        out[: order - 1] = a[NA if which == G_TIP_PUSH else NB, : order - 1]
+        return order - 2
+    if which == G_CONE_PLUS or which == G_CONE_MINUS:
+        if m[FLOOR] != STICK or b.no_slip:
+            return -1
+        sense = 1.0 if which == G_CONE_PLUS else -1.0
+        for k in range(order - 1):
+            out[k] = b.mu_s * m[PULL] * a[P, k] - sense * a[Q, k]
+        return order - 2
+    if which == G_SLIP:
+        if m[FLOOR] != SLIPPING:
+            return -1
+        for k in range(order):
+            out[k] = m[SLIP] * (k + 1) * (a[XI, k + 1] - a[SIN, k + 1])
+        return order - 1
+    return -1
+
+
+@njit(cache=True)
+def _gap(b, m, tip, order, pivot, a, out):
+    """The clear gap of the corner that faces the tip wall, or the far wall."""
+    if m[TIP if tip else FAR] != 0:
+        return -1
+    distance = delta(b, m, tip)
+    if distance == np.inf:
+        return -1
+    sense = 1.0 if tip else -1.0
+    rock = m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
+    xi = a[SIN] if rock else a[XI]
+    for k in range(order + 1):
+        out[k] = sense * xi[k] - (b.sin_2alpha * a[COS, k] - b.cos_2alpha * a[SIN, k])
+    out[0] += distance + (sense * pivot if rock else 0.0)
+    return order
+
+
+@njit(cache=True)
+def _flat_guard(b, m, which, order, a, out):
+    """The guards of a translating block; the tip wall is the left one, the far wall the right one."""
+    if which == G_LANDING:
+        if m[FLOOR] != OFF:
+            return -1
+        out[: order + 1] = a[Y, : order + 1]
+        out[0] -= b.cos_alpha
+        return order
+    if which == G_TIP_GAP or which == G_FAR_GAP:
+        gap = b.gap_left if which == G_TIP_GAP else b.gap_right
+        if gap == np.inf or m[TIP if which == G_TIP_GAP else FAR] != 0:
+            return -1
+        sense = 1.0 if which == G_TIP_GAP else -1.0
+        for k in range(order + 1):
+            out[k] = sense * a[XI, k]
+        out[0] += gap
+        return order
+    if which == G_TIP_PUSH:
+        if m[FLOOR] != OFF or m[TIP] == m[FAR]:
+            return -1
+        out[: order - 1] = a[NA, : order - 1]
+        return order - 2
+    if m[FLOOR] == OFF:
+        return -1
+    if which == G_PUSH:
+        if not b.unilateral:
+            return -1
+        out[: order - 1] = a[P, : order - 1]
+        return order - 2
+    if which == G_CONE_PLUS or which == G_CONE_MINUS:
+        if m[FLOOR] != STICK or b.no_slip or m[TIP if which == G_CONE_PLUS else FAR] != 0:
+            return -1
+        sense = 1.0 if which == G_CONE_PLUS else -1.0
+        for k in range(order - 1):
+            out[k] = b.mu_s * a[P, k] - sense * a[Q, k]
+        return order - 2
+    if which == G_UPLIFT_PLUS or which == G_UPLIFT_MINUS:
+        if m[FLOOR] == STICK and m[TIP if which == G_UPLIFT_PLUS else FAR] != 0:
+            return -1
+        sense = 1.0 if which == G_UPLIFT_PLUS else -1.0
+        for k in range(order - 1):
+            out[k] = b.sin_alpha * a[P, k] - sense * b.cos_alpha * a[Q, k]
+        return order - 2
+    if which == G_SLIP:
+        if m[FLOOR] != SLIPPING:
+            return -1
+        for k in range(order):
+            out[k] = m[SLIP] * (k + 1) * a[XI, k + 1]
+        return order - 1
+    return -1
+
+
+_LOOK = 6  # order of the series that a selection looks at
+_AHEAD = 1e-2  # natural time over which it weighs their terms
+
+
+@njit(cache=True)
+def consistent(b, m, z, gh, gv, t, a):
+    """Whether mode m can begin at state z: every guard leaves zero upward, and what must begin to move does."""
+    if m[FAMILY] == FLAT:
+        order = flat_series(b, m, z, gh, gv, t, _LOOK, a)
+        pivot = 0.0
+    else:
+        order = tilt_series(b, m, z, gh, gv, t, _LOOK, 0.0, 0.0, True, a)
+        pivot = m[S] * z[X] - a[SIN, 0]
+    for which in range(GUARDS):
+        degree = guard(b, m, which, order, pivot, a)
+        if degree < 0:
+            continue
+        sign = leading(a[GUARD], degree, _AHEAD)
+        if sign < 0 or not math.isfinite(a[GUARD, 0]):
+            return False
+        if sign == 0 and (which == G_SLIP or (which == G_PHI and m[FLOOR] != OFF)):
+            return False
+    return True
+
+
+@njit(cache=True)
+def slip_velocity(b, z):
+    """V of the lower corner."""
+    return z[VX] + math.cos(b.alpha - abs(z[THETA])) * z[W]
+
+
+@njit(cache=True)
+def closed_wall(b, z, side, lower):
+    """Whether the corner facing the wall on `side` (+1 left, -1 right) rests on it.
+
+    A tilted block has one such corner; `lower` picks, at theta = 0, the corner that keeps touching while it tilts away.
+    """
+    gap = b.gap_left if side > 0 else b.gap_right
+    if gap == np.inf:
+        return False
+    phi = side * z[THETA]  # positive: tips toward that wall, top corner
+    clear = side * z[X] + b.sin_alpha + gap - math.sin(b.alpha + abs(phi))
+    arm = math.cos(b.alpha + abs(phi))
+    if phi < 0.0 or (phi == 0.0 and lower):
+        arm = -arm
+    rate = side * z[VX] - arm * z[W]
+    return abs(clear) < CLOSED_GAP and abs(rate) < CLOSED_RATE
+
+
+@njit(cache=True)
+def closed_floor(b, z):
+    """Whether the lower corner rests on the floor."""
+    phi = abs(z[THETA])
+    rate = z[VY] - math.sin(b.alpha - phi) * (z[W] if z[THETA] > 0.0 or (z[THETA] == 0.0 and z[W] > 0.0) else -z[W])
+    return abs(z[HEIGHT] - math.cos(b.alpha - phi)) < CLOSED_GAP and abs(rate) < CLOSED_RATE
+
+
+@njit(cache=True)
+def select(b, z, gh, gv, t, left, m, a):
+    """Writes into m the mode that is consistent at state z, and returns whether there is one.
+
+    `left` is the mode that has just ended; it is taken again only where no other one fits. Larger contact sets come first,
+    sticking before slipping.
+    """
+    flat = z[THETA] == 0.0 and z[W] == 0.0
+    floor = closed_floor(b, z) or not b.unilateral
+    for attempt in range(2):
+        if flat:
+            if _select_flat(b, z, gh, gv, t, floor, left, m, a, attempt == 1):
+                return True
+            # Both senses of tilting; where both fit (they do not, but for rounding) the base acceleration decides.
+            first = 1 if acceleration(gh, t) >= 0.0 else -1
+            for sense in (first, -first):
+                if _select_tilt(b, z, gh, gv, t, sense, floor, left, m, a, attempt == 1):
+                    return True
+        else:
+            lean = z[THETA] if z[THETA] != 0.0 else z[W]
+            if _select_tilt(b, z, gh, gv, t, 1 if lean > 0.0 else -1, floor, left, m, a, attempt == 1):
+                return True
+    return False
+
+
+@njit(cache=True)
+def _accept(b, m, z, gh, gv, t, left, a, again):
+    same = True
+    for k in range(m.size):
+        same = same and m[k] == left[k]
+    return same == again and consistent(b, m, z, gh, gv, t, a)
+
+
+@njit(cache=True)
+def _select_flat(b, z, gh, gv, t, floor, left, m, a, again):
+    m[:] = 0
+    m[FAMILY], m[S], m[PULL] = FLAT, 1, 1
+    at_left = b.walls and closed_wall(b, z, 1, False)
+    at_right = b.walls and closed_wall(b, z, -1, False)
+    if floor:
+        for slip in (0, 1, -1):
+            if (slip == 0 and z[VX] != 0.0) or slip * z[VX] < 0.0 or (slip != 0 and b.no_slip):
+                continue
+            m[FLOOR], m[SLIP] = STICK if slip == 0 else SLIPPING, slip
+            m[TIP], m[FAR] = at_left and slip == 0, at_right and slip == 0
+            if _accept(b, m, z, gh, gv, t, left, a, again):
+                return True
+    if b.unilateral or not floor:
+        m[FLOOR], m[SLIP] = OFF, 0
+        for press in (1, -1, 0):
+            m[TIP], m[FAR] = press == 1, press == -1
+            if (press == 1 and not at_left) or (press == -1 and not at_right):
+                continue
+            if _accept(b, m, z, gh, gv, t, left, a, again):
+                return True
+    return False
+
+
+@njit(cache=True)
+def _select_tilt(b, z, gh, gv, t, sense, floor, left, m, a, again):
+    m[:] = 0
+    m[FAMILY], m[S] = TILT, sense
+    tip_closed = b.walls and closed_wall(b, z, sense, False)
+    far_closed = b.walls and closed_wall(b, z, -sense, True)
+    v = sense * slip_velocity(b, z)
+    for walls in (3, 1, 2, 0):
+        if (walls & 1 and not tip_closed) or (walls & 2 and not far_closed):
+            continue
+        m[TIP], m[FAR] = walls & 1, walls >> 1
+        for slip in (0, 1, -1):
+            if not floor or (slip == 0 and v != 0.0) or slip * v < 0.0 or (slip != 0 and b.no_slip):
+                continue
+            m[FLOOR] = STICK if slip == 0 else SLIPPING
+            m[SLIP] = slip
+            for pull in (1, -1):
+                if pull < 0 and (b.unilateral or walls == 3 or (b.no_slip and slip == 0)):
+                    continue
+                m[PULL] = pull
+                if _accept(b, m, z, gh, gv, t, left, a, again):
+                    return True
+        if b.unilateral or not floor:
+            m[FLOOR], m[SLIP], m[PULL] = OFF, 0, 1
+            if _accept(b, m, z, gh, gv, t, left, a, again):
+                return True
+    return False
