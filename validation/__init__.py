@@ -1,1 +1,5 @@
-"""Placeholder."""
+"""Discrepancy measures, tolerances, suites, the runner and the command line."""
+
+from validation.discrepancy import Discrepancy, compare
+
+__all__ = ["Discrepancy", "compare"]

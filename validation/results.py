@@ -27,6 +27,7 @@ from scenes.errors import from_validation, printable
 RUN_FILE = "run.json"
 SCHEMA_FILE = "run.schema.json"
 HISTORIES = "histories"
+COMPARISONS = "comparisons"
 FORMAT = 1
 
 #: Verdict on one check: inside the limit; inside, but outside the drift band; outside the limit or not to be judged.
@@ -93,7 +94,7 @@ class Check(Stored):
 
 
 class CostRecord(Stored):
-    """What the cell's run took: `scenes.Cost`, and the worker's own wall time and peak memory (MB)."""
+    """What the cell's run took: `scenes.Cost`, and all of the worker's wall time (set-up, simulation, writing)."""
 
     wall_seconds: float = 0.0
     cpu_seconds: float = 0.0
@@ -104,7 +105,6 @@ class CostRecord(Stored):
     largest_energy_gain: float = 0.0
     error_estimate: float | None = None
     worker_seconds: float = 0.0
-    peak_memory_mb: float | None = None
 
 
 class Cell(Stored):

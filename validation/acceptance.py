@@ -1,0 +1,112 @@
+"""`accept`: the figures of a run become the expected ones of the suite's tolerance file, which keeps its remarks and order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import MutableMapping
+from typing import Any
+
+import tomlkit
+
+from scenes import InputError
+from scenes.errors import printable
+from validation.results import Check, Run, write_whole
+from validation.suites import Suite
+from validation.tolerances import OWN_FIGURES, Windowed
+
+#: New limits and drift bands, as multiples of the figure's distance from perfection and of the figure.
+ROOM, DRIFT = 2.0, 0.2
+
+
+def accept(suite: Suite, run: Run, reason: str | None) -> tuple[list[str], list[str]]:
+    """Write the figures of `run` into the tolerance file of `suite`.
+
+    Returns the changes and what was refused, a line each. A limit that the figure is outside of is loosened only with a
+    `reason`, which goes into the file; a check without a figure is always refused. A limit is never tightened.
+    """
+    changes: list[str] = []
+    refused: list[str] = []
+    for part in suite.parts or (suite,):
+        _accept(part, run, reason, changes, refused)
+    return changes, refused
+
+
+def _accept(suite: Suite, run: Run, reason: str | None, changes: list[str], refused: list[str]) -> None:
+    path = suite.tolerances_path
+    document = tomlkit.parse(path.read_text(encoding="utf-8")) if path.exists() else tomlkit.document()
+    tables: Any = document.setdefault("tolerances", tomlkit.table()) if path == suite.path else document
+    before = len(changes)
+    for cell, check in run.checks():
+        if cell.scene not in suite.scenes:
+            continue
+        figure = check.figure
+        against, key = figure.against or OWN_FIGURES, str(Windowed(figure.measure, figure.window))
+        where = f"[{cell.scene}.{cell.model}.{against}] {key}"
+        line = _accepted(check, reason)
+        if isinstance(line, str):
+            refused.append(f"{where}: {line}")
+            continue
+        table = _table(tables, (cell.scene, cell.model, against))
+        old = table.get(key)
+        if old is None or any(old.get(name) != value for name, value in line.items()):
+            changes.append(f"{where}: {_shown(old)} -> {_shown(line)}")
+            entry = tomlkit.inline_table()
+            entry.update(line)
+            table[key] = entry
+    if len(changes) > before:
+        try:
+            write_whole(path, tomlkit.dumps(document))
+        except OSError as error:
+            raise InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
+
+
+def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
+    """The new line of a check, or why there is none."""
+    value = check.figure.value
+    if value is None:
+        return check.reason
+    at_least = check.figure.measure == "events_agree_until"
+    ideal = check.ideal if check.ideal is not None else value
+    distance = value if at_least else abs(value - ideal)
+    outside = check.limit is not None and (value < check.limit if at_least else distance > check.limit)
+    if check.verdict == "fail" and not outside and check.limit is not None:
+        return check.reason  # such as a window that was not compared whole
+    if outside and not reason:
+        return f"{check.reason}; loosening a limit needs --reason"
+    limit, why, drift = check.limit, check.why, check.drift
+    if limit is None or outside:
+        limit = _round(value * 0.9, down=True) if at_least else _round(ROOM * distance)
+        why = reason or "first accepted figure"
+    if check.kind == "absolute" and check.limit is None and check.ideal is None:
+        limit = _round(DRIFT * abs(value))
+    if drift is None:
+        drift = _round(DRIFT * abs(value))
+    expected = value if check.verdict != "pass" or check.expected is None else check.expected
+    return {"expected": _short(expected), "limit": limit, "drift": drift, "why": why}
+
+
+def _table(tables: MutableMapping[str, Any], path: tuple[str, ...]) -> Any:
+    for depth, name in enumerate(path):
+        if name not in tables:
+            tables[name] = tomlkit.table(is_super_table=depth < len(path) - 1)
+        tables = tables[name]
+    return tables
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.6g}")
+
+
+def _round(value: float, down: bool = False) -> float:
+    """`value` with two digits, rounded up (or down)."""
+    if value == 0.0:
+        return 0.0
+    unit = 10.0 ** (math.floor(math.log10(abs(value))) - 1)
+    steps = math.floor(value / unit) if down else math.ceil(value / unit * (1.0 - 1e-12))
+    return float(f"{steps * unit:.2g}")
+
+
+def _shown(line: Any) -> str:
+    if line is None:
+        return "none"
+    return f"expected {line.get('expected', '-')}, limit {line['limit']}, drift {line.get('drift', '-')}"

@@ -1,0 +1,34 @@
+"""`rockcheck accept`: today's figures become the expected ones."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from validation.acceptance import accept
+from validation.commands import OUT, JobsOption, OutOption, SchedulerOption, console, usable_folder
+from validation.commands.validate import ForceOption, SuiteArgument, play_suite
+from validation.suites import load_suite
+
+
+def run(
+    suite: SuiteArgument = None,
+    reason: Annotated[str | None, typer.Option("--reason", help="Why limits may be loosened; it is written into the file.")] = None,
+    out: OutOption = OUT,
+    jobs: JobsOption = None,
+    force: ForceOption = False,
+    scheduler: SchedulerOption = None,
+) -> None:
+    """Write today's figures into the suite's tolerances, showing each change. Limits are loosened only with --reason."""
+    name = suite or "paper"
+    finished = play_suite(name, usable_folder(out), jobs, force, False, scheduler)
+    changes, refused = accept(load_suite(name), finished, reason)
+    screen = console()
+    for line in changes:
+        screen.print(line, soft_wrap=True)
+    screen.print(f"{len(changes)} changes in {finished.tolerances_file}", soft_wrap=True)
+    for line in refused:
+        screen.print(f"not accepted: {line}", style="red", soft_wrap=True)
+    failed = any(cell.status == "failed" for cell in finished.cells)
+    raise typer.Exit(3 if failed else int(bool(refused)))

@@ -1,0 +1,34 @@
+"""`rockcheck compare`: any two histories."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from scenes import History, load_scene
+from validation.commands import console
+from validation.discrepancy import compare
+
+
+def run(
+    reference: Annotated[Path, typer.Argument(help="History of the reference, CSV.")],
+    candidate: Annotated[Path, typer.Argument(help="History of the candidate, CSV.")],
+    until: Annotated[float | None, typer.Option("--until", help="End of the window, s (default: the whole common time).")] = None,
+    scene: Annotated[str | None, typer.Option("--scene", help="Scene of both: its block and gravity.")] = None,
+) -> None:
+    """Compare two histories, measure by measure."""
+    what = load_scene(scene) if scene else None
+    found = compare(History.load(reference), History.load(candidate), until=until, scene=what)
+    out = console()
+    table = Table(box=None, pad_edge=False)
+    for name, justify in (("measure", "left"), ("value", "right"), ("unit", "left"), ("", "left")):
+        table.add_column(name, justify=justify)  # type: ignore[arg-type]
+    for figure in found.figures:
+        table.add_row(figure.label, "-" if figure.value is None else f"{figure.value:.6g}", figure.unit, figure.note)
+    out.print(f"{found.candidate} against {found.reference}, {found.start:g} to {found.end:g} s")
+    out.print(table)
+    if found.gap:
+        out.print(f"not the whole time: {found.gap}")

@@ -1,0 +1,29 @@
+"""`rockcheck scenes`: what there is to run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rich.table import Table
+
+from scenes import load_scene, named_scenes
+from validation.commands import console
+from validation.models import FAMILIES
+from validation.suites import describe_suite, named_suites
+
+
+def run() -> None:
+    """List the named scenes, suites and models, with a line each."""
+    out = console()
+    out.print(_listing("scene", ((name, load_scene(name).description) for name in named_scenes())))
+    out.print(_listing("suite", ((name, describe_suite(path)) for name, path in named_suites().items())))
+    out.print(_listing("model", ((name, family.summary) for name, family in FAMILIES.items())))
+
+
+def _listing(title: str, rows: Iterable[tuple[str, str]]) -> Table:
+    table = Table(box=None, pad_edge=False, title_justify="left")
+    table.add_column(title, no_wrap=True, style="bold")
+    table.add_column("")
+    for name, description in rows:
+        table.add_row(name, description)
+    return table

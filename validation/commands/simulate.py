@@ -1,0 +1,46 @@
+"""`rockcheck simulate`: one history."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from scenes import InputError, load_scene
+from scenes.errors import printable
+from validation.commands import console
+from validation.models import FAMILIES, build
+
+
+def run(
+    scene: Annotated[str, typer.Argument(help="A named scene or a .toml file.")],
+    model: Annotated[str, typer.Option("--model", help=f"One of {', '.join(FAMILIES)}.")],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="CSV to write (default: SCENE--MODEL.csv).")] = None,
+    settings: Annotated[list[str] | None, typer.Option("--set", help="A setting of the model, such as time_step=1e-4; repeatable.")] = None,
+) -> None:
+    """Simulate one scene with one model and write its history (CSV; events go to a second file beside it)."""
+    player = build(model, dict(_setting(text) for text in settings or []))
+    what = load_scene(scene)
+    path = output or Path(f"{what.name}--{model}.csv")
+    if not path.parent.is_dir():
+        raise InputError(f"{printable(path.parent)}: no such folder", "--output")
+    history = player.simulate(what)
+    try:
+        history.save(path)
+    except OSError as error:
+        raise InputError(f"{printable(path)}: cannot be written: {error.strerror}", "--output") from None
+    peak = history.peak_rotation / what.block.alpha
+    console().print(f"{what.name}, {model}: {history.outcome}, peak rotation {peak:.4g} alpha, {history.cost.wall_seconds:.2g} s -> {path}")
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    """key=value, the value as in TOML; a bare word is a string."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.isidentifier():
+        raise InputError(f"{printable(text)!r}: key=value is asked for", "--set")
+    try:
+        return key, tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key, value

@@ -1,0 +1,133 @@
+"""What a result depends on: code, libraries, scene and settings, as one key; and what the run's machine was."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.util
+import json
+import os
+import platform
+from collections.abc import Iterable, Mapping
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from scenes import Scene
+from validation.models import FAMILIES, family
+
+#: Packages whose code counts where it can be reached; the package of the model itself always does.
+OWN_PACKAGES = ("scenes", "ebm", "cm", "engines", "validation")
+
+
+def cell_key(scene: Scene, name: str, settings: Mapping[str, Any]) -> str:
+    """Hash of all that a cell's history depends on: scene, settings, the code it can reach, and the libraries' versions."""
+    depends = {
+        "scene": scene.model_dump(mode="json"),
+        "model": name,
+        "settings": dict(settings),
+        "code": code_digest(family(name).module),
+        "libraries": {library: version_of(library) for library in family(name).libraries},
+        "python": platform.python_version(),
+        "machine": platform.machine(),
+    }
+    return digest(json.dumps(depends, sort_keys=True, default=str))
+
+
+def digest(text: str) -> str:
+    """A short hash of a text, 16 hex digits."""
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+@cache
+def code_digest(module: str) -> str:
+    """Hash of the code of a module and of all project modules that it imports, at its top or inside functions.
+
+    Of the syntax trees without docstrings: comments, layout and documentation do not count.
+    """
+    return digest("".join(f"{name}\n{_essence(path)}\n" for name, path in sorted(reachable(module).items())))
+
+
+def reachable(module: str) -> dict[str, Path]:
+    """Names and files of the project modules that `module` can import, itself included."""
+    found: dict[str, Path] = {}
+    packages = {*OWN_PACKAGES, module.split(".")[0]}
+    waiting = [module]
+    while waiting:
+        name = waiting.pop()
+        path = _source(name) if name.split(".")[0] in packages else None
+        if path is None or name in found:
+            continue
+        found[name] = path
+        waiting += _imports(path, name if path.name == "__init__.py" else name.rpartition(".")[0])
+        waiting.append(name.rpartition(".")[0])
+    return found
+
+
+def _source(name: str) -> Path | None:
+    """The file of a module, None where there is none (a name inside a module)."""
+    top, *rest = name.split(".")
+    spec = importlib.util.find_spec(top)
+    if spec is None or spec.origin is None:
+        return None
+    if not rest:
+        return Path(spec.origin)
+    base = Path(spec.origin).parent.joinpath(*rest)
+    return next((path for path in (base / "__init__.py", base.with_suffix(".py")) if path.is_file()), None)
+
+
+def _imports(path: Path, package: str) -> Iterable[str]:
+    for node in ast.walk(_tree(path)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                base = ".".join(filter(None, [*package.split(".")[: len(package.split(".")) - node.level + 1], base]))
+            yield base
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+
+
+@cache
+def _tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def _essence(path: Path) -> str:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and ast.get_docstring(node, clean=False):
+            node.body = node.body[1:] or [ast.Pass()]
+    return ast.dump(tree)
+
+
+def version_of(library: str) -> str:
+    """A distribution's version, "absent" where it is not installed."""
+    try:
+        return metadata.version(library)
+    except metadata.PackageNotFoundError:
+        return "absent"
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything that a run's figures may depend on."""
+    libraries = sorted({library for known in FAMILIES.values() for library in known.libraries} | {"pandas"})
+    return {"rockcheck": version_of("rockcheck"), "python": platform.python_version()} | {name: version_of(name) for name in libraries}
+
+
+def hardware() -> dict[str, str]:
+    """What ran it: processor, cores, memory, system."""
+    facts = {"system": f"{platform.system()} {platform.release()}", "processor": _processor(), "cores": str(os.cpu_count() or 1)}
+    if hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names:
+        facts["memory"] = f"{os.sysconf('SC_PHYS_PAGES') * os.sysconf('SC_PAGE_SIZE') / 2**30:.0f} GiB"
+    return facts
+
+
+def _processor() -> str:
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        for line in cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()

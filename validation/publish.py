@@ -1,0 +1,41 @@
+"""Writes a finished run into its folder: run.json, tables, and the report's pages."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from filelock import FileLock
+
+from validation import provenance
+from validation.results import Run, write_whole
+from validation.tables import checks_csv, figures_csv
+
+LOCK, STAMP = ".lock", ".rendered"
+
+
+def publish(run: Run, folder: Path) -> Path:
+    """Write everything but the histories, which are there already; returns the page to open.
+
+    Two runs on one folder take turns. Pages are rendered only if anything that they show has changed.
+    """
+    with FileLock(folder / LOCK):
+        run.save(folder)
+        write_whole(folder / "checks.csv", checks_csv(run))
+        write_whole(folder / "figures.csv", figures_csv(run))
+        cells = tuple(cell.model_copy(update={"read_back": False}) for cell in run.cells)
+        same = run.model_copy(update={"created": "", "wall_seconds": 0.0, "cells": cells})
+        stamp = provenance.digest(same.model_dump_json() + provenance.code_digest("reports"))
+        index, stamped = folder / "index.html", folder / STAMP
+        if index.exists() and stamped.exists() and stamped.read_text(encoding="utf-8") == stamp:
+            return index
+        stamped.unlink(missing_ok=True)
+        index = render(folder)
+        write_whole(stamped, stamp)
+        return index
+
+
+def render(folder: Path) -> Path:
+    """Write the pages of the finished run in `folder`; returns the page to open."""
+    import reports
+
+    return Path(reports.write_site(folder))

@@ -1,0 +1,206 @@
+"""Runs a suite: plays the cells that are not up to date, compares, judges, and returns the `Run`."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from scenes import History, InputError, Scene
+from validation import provenance, workers
+from validation.discrepancy import compare, describe, too_short
+from validation.measures import DIFFERENCES, FIGURES
+from validation.results import HISTORIES, Cell, CostRecord, Figure, MeasureRecord, Run
+from validation.store import Store, name_of
+from validation.suites import Part, Suite
+from validation.tolerances import OWN_FIGURES, Place, Windowed, judge
+
+#: Told after each cell: cells done, cells in all, and a few words on what was last.
+Progress = Callable[[int, int, str], None]
+#: Plays tasks somewhere: yields (index, result) as they end.
+Executor = Callable[..., Iterator[tuple[int, workers.Played]]]
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A cell of the suite before it is played: scene, model, and the key of all that it depends on."""
+
+    scene: Scene
+    part: Part
+    key: str
+
+    @property
+    def name(self) -> str:
+        """Name of its files."""
+        return name_of(self.scene.name, self.part.label, self.key)
+
+
+def run_suite(
+    suite: Suite,
+    folder: Path,
+    *,
+    jobs: int | None = None,
+    force: bool = False,
+    strict: bool = False,
+    play: Executor = workers.local,
+    progress: Progress | None = None,
+) -> Run:
+    """Play, compare and judge every cell of a suite; results are kept in `folder` and read back while up to date.
+
+    A cell that fails is a failed cell of the run, never an exception. Raises `InputError` where `folder` cannot be used.
+    """
+    began = time.perf_counter()
+    report = progress or (lambda done, of, what: None)
+    try:
+        store = Store(folder)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be used as the output folder: {error.strerror}") from None
+    spots = [Spot(scene, part, provenance.cell_key(scene, part.family_name, part.settings)) for scene, part in suite.cells()]
+    records: dict[Spot, dict[str, Any]] = {}
+    failures: dict[Spot, str] = {}
+    if not force:
+        records = {spot: found for spot in spots if (found := store.get(spot.name)) is not None}
+    read_back = set(records)
+    waiting = [spot for spot in spots if spot not in records]
+    report(len(records), len(spots), f"{len(records)} up to date")
+    tasks = [workers.Task(s.scene, s.part.label, s.part.family_name, dict(s.part.settings), (str(suite.path.parent),)) for s in waiting]
+    limits = [suite.part_of(spot.scene.name).limits for spot in waiting]
+    for index, result in play(
+        tasks,
+        jobs=jobs or os.cpu_count() or 1,
+        seconds=[limit.seconds for limit in limits],
+        memory_mb=max((limit.memory_mb for limit in limits), default=0.0),
+    ):
+        spot = waiting[index]
+        if result.failure:
+            failures[spot] = result.failure
+        else:
+            store.put(spot.name, result.files, result.record)
+            records[spot] = result.record
+        report(len(records) + len(failures), len(spots), f"{spot.scene.name}, {spot.part.label}")
+    by_place = {(spot.scene.name, spot.part.label): spot for spot in spots}
+    cells = tuple(_cell(suite, spot, by_place, records, failures, store, spot in read_back) for spot in spots)
+    store.prune()
+    return Run(
+        suite=suite.name,
+        description=suite.description,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        reference=suite.reference,
+        model_form=suite.model_form,
+        scenes={name: scene.model_dump(mode="json") for name, scene in suite.scenes.items()},
+        models=tuple(suite.models),
+        cells=cells,
+        faults=_without_cell(suite, by_place),
+        measures=tuple(
+            MeasureRecord(name=m.name, label=m.label, unit=m.unit, formula=m.formula) for m in (*DIFFERENCES.values(), *FIGURES.values())
+        ),
+        versions=provenance.versions(),
+        hardware=provenance.hardware(),
+        wall_seconds=time.perf_counter() - began,
+        strict=strict,
+        tolerances_file=str(suite.tolerances_path),
+    )
+
+
+def _without_cell(suite: Suite, cells: Mapping[tuple[str, str], Spot]) -> tuple[str, ...]:
+    """Tolerances that nothing in the suite can meet."""
+    return tuple(f"tolerance [{place}] has no cell in the suite" for place in suite.tolerances if (place.scene, place.model) not in cells)
+
+
+def _cell(
+    suite: Suite,
+    spot: Spot,
+    spots: Mapping[tuple[str, str], Spot],
+    records: Mapping[Spot, Mapping[str, Any]],
+    failures: Mapping[Spot, str],
+    store: Store,
+    read_back: bool,
+) -> Cell:
+    """The finished cell: its figures, compared with each reference, and the verdicts on them."""
+    scene, label = spot.scene, spot.part.label
+    about: dict[str, Any] = {"scene": scene.name, "model": label, "key": spot.key, "read_back": read_back}
+    if spot in failures:
+        return Cell(**about, status="failed", reason=failures[spot], settings=dict(spot.part.settings))
+    record = records[spot]
+    asked = suite.asked(scene.name, label)
+    own = suite.part_of(scene.name)
+    figures: list[Figure] = []
+    gaps: dict[tuple[str, str], str] = {}
+    for name in dict.fromkeys([OWN_FIGURES, own.reference, own.model_form, *(place.against for place in asked)]):
+        reference = spots.get((scene.name, name))
+        if name != OWN_FIGURES and (reference is None or reference is spot or reference not in records):
+            continue
+        found = _compared(
+            store, scene, spot, reference, sorted(place.what for place in asked if place.against == name and place.what.window)
+        )
+        figures += [Figure(**figure) for figure in found["figures"]]
+        gaps |= {(name, window): gap for window, gap in found["gaps"].items()}
+    checks = []
+    for place, kind in asked.items():
+        figure = _figure(figures, place)
+        gap = gaps.get((place.against, place.what.window), "")
+        checks.append(judge(figure, own.tolerances.get(place), kind=kind, measure=place.what.definition, gap=gap))
+    return Cell(
+        **about,
+        status="done",
+        settings=record["settings"],
+        history=f"{HISTORIES}/{spot.name}.csv",
+        outcome=record["outcome"],
+        notes=tuple(record["notes"]),
+        cost=CostRecord(**record["cost"]),
+        figures=tuple(figures),
+        checks=tuple(checks),
+    )
+
+
+def _figure(figures: Sequence[Figure], place: Place) -> Figure:
+    """The figure that a check is about; one without value where it is missing, so that the check cannot pass."""
+    against = "" if place.against == OWN_FIGURES else place.against
+    for figure in figures:
+        if (figure.measure, figure.against, figure.window) == (place.what.measure, against, place.what.window):
+            return figure
+    measure = place.what.definition
+    reason = f"{place.against} failed in this scene" if against else "not computed"
+    return Figure(
+        measure=measure.name, label=measure.label, unit=measure.unit, value=None, against=against, window=place.what.window, note=reason
+    )
+
+
+def _compared(store: Store, scene: Scene, spot: Spot, reference: Spot | None, windowed: Sequence[Windowed]) -> dict[str, Any]:
+    """All figures over the whole time, and those asked for over a window; kept in the store.
+
+    Figures of the cell itself where `reference` is None. "gaps" says by window what could not be compared.
+    """
+    code = provenance.code_digest("validation.discrepancy")
+    key = provenance.digest(json.dumps([spot.key, reference.key if reference else "", list(map(str, windowed)), code]))
+    name = name_of(scene.name, spot.part.label, reference.part.label if reference else OWN_FIGURES, key)
+    found = store.get_comparison(name)
+    if found is None:
+        found = _compute(store, scene, spot, reference, windowed)
+        store.put_comparison(name, found)
+    return found
+
+
+def _compute(store: Store, scene: Scene, spot: Spot, reference: Spot | None, windowed: Sequence[Windowed]) -> dict[str, Any]:
+    candidate = History.load(store.history(spot.name))
+    yardstick = History.load(store.history(reference.name)) if reference else None
+    figures: list[Figure] = []
+    gaps: dict[str, str] = {}
+    asked: dict[str, list[str]] = {"": list(DIFFERENCES if reference else FIGURES)}
+    for what in windowed:
+        asked.setdefault(what.window, []).append(what.measure)
+    for window, measures in asked.items():
+        until = float(window[:-1]) if window else None
+        if yardstick is None:
+            figures += describe(candidate, until=until, scene=scene, measures=measures)
+            gaps[window] = too_short(candidate, until)
+        else:
+            discrepancy = compare(yardstick, candidate, until=until, scene=scene, measures=measures)
+            figures += discrepancy.figures
+            gaps[window] = discrepancy.gap
+    return {"figures": [figure.model_dump(mode="json") for figure in figures], "gaps": gaps}

@@ -1,0 +1,157 @@
+"""Cells in processes of their own: what a worker does, and the local pool with its limits of time and memory.
+
+A worker that crashes, hangs or runs out of memory costs its own cell and nothing else.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import multiprocessing
+import os
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import as_completed
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenes import History, InputError, ModelFailure, Scene
+from scenes.errors import printable
+from validation.models import build
+
+#: One thread a worker: the cells are what runs in parallel.
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+
+
+@dataclass(frozen=True)
+class Task:
+    """One cell to be played: everything that a worker on any machine needs."""
+
+    scene: Scene
+    label: str
+    family: str
+    settings: dict[str, Any]
+    search_path: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Played:
+    """What a worker gives back: the history's files by suffix and the cell's record, or the reason of its failure."""
+
+    files: dict[str, str] = field(default_factory=dict, repr=False)
+    record: dict[str, Any] = field(default_factory=dict)
+    failure: str = ""
+
+
+def play(task: Task) -> Played:
+    """Simulate one cell. Whatever goes wrong in the model is this cell's failure, told in one line."""
+    began = time.perf_counter()
+    sys.path.extend(path for path in task.search_path if path not in sys.path)
+    try:
+        history = dataclasses.replace(build(task.family, task.settings).simulate(task.scene), model=task.label)
+    except (ModelFailure, InputError) as error:
+        return Played(failure=printable(error, 300))
+    except MemoryError:
+        return Played(failure="out of memory")
+    except Exception as error:  # a model of whatever kind must not end the run
+        return Played(failure=printable(f"{type(error).__name__}: {error}", 300))
+    fault = _not_finite(history)
+    if fault:
+        return Played(failure=fault)
+    with tempfile.TemporaryDirectory() as folder:
+        history.save(Path(folder) / "history.csv")
+        files = {path.name.removeprefix("history"): path.read_text(encoding="utf-8") for path in Path(folder).iterdir()}
+    cost = {key: value for key, value in vars(history.cost).items() if value is not None}
+    record = {
+        "outcome": history.outcome,
+        "notes": list(history.notes),
+        "settings": _plain(history.settings),
+        "cost": {**cost, "worker_seconds": time.perf_counter() - began},
+    }
+    return Played(files=files, record=record)
+
+
+def _not_finite(history: History) -> str:
+    for name, column in history.channels.items():
+        if column.dtype.kind == "f" and not np.all(np.isfinite(column)):
+            row = int(np.flatnonzero(~np.isfinite(column))[0])
+            return f"{name} is {column[row]} at t = {history.channels['t'][row]:g} s"
+    if len(history.channels["t"]) == 0:
+        return "the history is empty"
+    return ""
+
+
+def _plain(settings: Any) -> dict[str, Any]:
+    return {str(key): value if isinstance(value, str | int | float | bool | None) else str(value) for key, value in settings.items()}
+
+
+def local(tasks: Sequence[Task], *, jobs: int, seconds: Sequence[float], memory_mb: float) -> Iterator[tuple[int, Played]]:
+    """Play tasks in `jobs` processes; yields (index, result) as they end. `seconds` limits each task's wall time."""
+    from pebble import ProcessPool
+
+    if not tasks:
+        return
+    before = {key: os.environ.get(key) for key in ONE_THREAD}
+    os.environ.update(ONE_THREAD)
+    try:
+        with ProcessPool(
+            max_workers=max(1, min(jobs, len(tasks))),
+            context=multiprocessing.get_context("spawn"),
+            initializer=_prepare,
+            initargs=(memory_mb,),
+        ) as pool:
+            try:
+                futures: dict[Any, int] = {}
+                for n, task in enumerate(tasks):
+                    futures[pool.schedule(play, args=(task,), timeout=seconds[n])] = n
+                for future in as_completed(futures):
+                    yield futures[future], _outcome(future, seconds[futures[future]])
+            except BaseException:
+                pool.stop()
+                raise
+    finally:
+        for key, value in before.items():
+            os.environ.pop(key, None) if value is None else os.environ.update({key: value})
+
+
+def _prepare(memory_mb: float) -> None:
+    """Make this worker die with the run, and fail where it takes more memory than it may (where the system can say so)."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run itself ends its workers
+    try:
+        import resource
+
+        most = int(memory_mb * 2**20)
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    except (ImportError, ValueError, OSError):
+        pass
+
+
+def _outcome(future: Any, seconds: float) -> Played:
+    from pebble import ProcessExpired
+
+    try:
+        result: Played = future.result()
+    except TimeoutError:
+        return Played(failure=f"did not end within {seconds:g} s")
+    except ProcessExpired as error:
+        return Played(failure=_death(int(error.exitcode or 0)))
+    except MemoryError:
+        return Played(failure="out of memory")
+    except Exception as error:  # such as a result that cannot be sent back
+        return Played(failure=printable(f"{type(error).__name__}: {error}", 300))
+    return result
+
+
+def _death(code: int) -> str:
+    if code < 0:
+        try:
+            return f"crashed: {signal.Signals(-code).name}"
+        except ValueError:
+            return f"crashed: signal {-code}"
+    return f"the process ended with code {code}"
