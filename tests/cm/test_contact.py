@@ -1,0 +1,71 @@
+"""The contact law: closed forms against the integrated contact."""
+
+import math
+
+import pytest
+from scipy.integrate import solve_ivp
+
+from cm.contact import LEAST_RESTITUTION, damping_ratio, damping_ratio_of_paper, friction_force, normal_force, restitution_of
+
+
+def integrated_restitution(xi: float) -> float:
+    """Rebound over impact speed of a unit mass on a clamped unit spring with damping ratio xi."""
+
+    def force_gone(_t, q):
+        return q[0] + 2.0 * xi * q[1]
+
+    force_gone.terminal, force_gone.direction = True, -1
+    run = solve_ivp(lambda _t, q: [q[1], -q[0] - 2.0 * xi * q[1]], (0.0, 50.0), [0.0, 1.0], events=force_gone, rtol=1e-11, atol=1e-13)
+    return -run.y_events[0][0][1]
+
+
+@pytest.mark.parametrize("xi", [0.05, 0.3, 0.7072, 0.95, 1.0, 1.05, 3.0, 6.9])
+def test_restitution_of_clamped_contact_is_the_integrated_one(xi):
+    assert restitution_of(xi) == pytest.approx(integrated_restitution(xi), rel=1e-8)
+
+
+def test_restitution_is_smooth_through_critical_damping():
+    assert restitution_of(1.0) == pytest.approx(math.exp(-2.0), rel=1e-12)
+    assert restitution_of(1.0 - 2e-6) == pytest.approx(restitution_of(1.0 - 0.5e-6), rel=2e-6)
+
+
+@pytest.mark.parametrize("e", [0.005, 0.05, 0.25, 0.5, 0.75, 0.99, 1.0])
+def test_damping_ratio_inverts_restitution(e):
+    assert restitution_of(damping_ratio(e)) == pytest.approx(e, abs=1e-10)
+
+
+def test_no_restitution_gets_the_least():
+    assert restitution_of(damping_ratio(0.0)) == pytest.approx(LEAST_RESTITUTION, abs=1e-10)
+
+
+@pytest.mark.parametrize("e", [0.25, 0.5, 0.75, 1.0])
+def test_damping_ratio_of_paper_suits_the_contact_that_may_pull(e):
+    xi = damping_ratio_of_paper(e)
+    assert math.exp(-math.pi * xi / math.sqrt(1.0 - xi * xi)) == pytest.approx(e, rel=1e-12)  # after half a damped wave
+    assert restitution_of(xi) >= e  # so the clamped contact rebounds faster
+
+
+def test_damping_ratio_of_paper_is_critical_without_restitution():
+    assert damping_ratio_of_paper(0.0) == 1.0
+    assert restitution_of(1.0) == pytest.approx(0.135335, abs=1e-6)
+
+
+def test_normal_force_only_pushes():
+    assert normal_force(100.0, 5.0, 0.02, 0.1) == pytest.approx(2.5)
+    assert normal_force(100.0, 5.0, 0.02, -1.0) == 0.0
+    assert normal_force(100.0, 5.0, -1e-9, 1.0) == 0.0
+
+
+def test_friction_sticks_up_to_static_and_slips_at_kinetic_friction():
+    law = {"stiffness": 100.0, "damping": 0.0, "mobility": 0.0, "mu_s": 0.5, "mu_k": 0.3, "normal": 10.0, "rate": 0.0}
+    assert friction_force(stretch=0.04, slipping=False, **law) == (pytest.approx(-4.0), False)
+    assert friction_force(stretch=0.04, slipping=True, **law) == (pytest.approx(-3.0), True)
+    assert friction_force(stretch=-0.06, slipping=False, **law) == (pytest.approx(3.0), True)
+    assert friction_force(stretch=0.02, slipping=True, **law) == (pytest.approx(-2.0), False)
+
+
+def test_stiff_friction_stops_the_corner_at_once():
+    mobility, rate = 1e-5, 0.2
+    force, slipping = friction_force(0.0, 1e12, mobility, 1.0, 1.0, 1e9, 0.0, rate, False)
+    assert not slipping
+    assert rate + mobility * force == pytest.approx(0.0, abs=1e-7)
