@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import MutableMapping
 from typing import Any
 
@@ -14,8 +15,9 @@ from validation.results import Check, Run, write_whole
 from validation.suites import Suite
 from validation.tolerances import OWN_FIGURES, Windowed
 
-#: New limits and drift bands, as multiples of the figure's distance from perfection and of the figure.
+#: New lines: the limit and the drift band as shares of a difference from perfection, and of a figure of the cell itself.
 ROOM, DRIFT = 2.0, 0.2
+OWN_ROOM, OWN_DRIFT = 0.02, 0.002
 
 
 def accept(suite: Suite, run: Run, reason: str | None) -> tuple[list[str], list[str]]:
@@ -55,7 +57,7 @@ def _accept(suite: Suite, run: Run, reason: str | None, changes: list[str], refu
             table[key] = entry
     if len(changes) > before:
         try:
-            write_whole(path, tomlkit.dumps(document))
+            write_whole(path, re.sub(r"}\n+\[", "}\n\n[", tomlkit.dumps(document)))
         except OSError as error:
             raise InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
 
@@ -65,22 +67,20 @@ def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
     value = check.figure.value
     if value is None:
         return check.reason
-    at_least = check.figure.measure == "events_agree_until"
-    ideal = check.ideal if check.ideal is not None else value
-    distance = value if at_least else abs(value - ideal)
-    outside = check.limit is not None and (value < check.limit if at_least else distance > check.limit)
-    if check.verdict == "fail" and not outside and check.limit is not None:
+    measure = Windowed.parse(check.figure.measure).definition
+    at_least = measure.sense == "at least"
+    outside = check.limit is not None and (value < check.limit if at_least else abs(value - (check.ideal or 0.0)) > check.limit)
+    if check.verdict == "fail" and check.limit is not None and not outside:
         return check.reason  # such as a window that was not compared whole
     if outside and not reason:
         return f"{check.reason}; loosening a limit needs --reason"
-    limit, why, drift = check.limit, check.why, check.drift
+    own = measure.ideal is None
+    size = abs(value) if own else abs(value - (measure.ideal or 0.0))
+    limit, why = check.limit, check.why
     if limit is None or outside:
-        limit = _round(value * 0.9, down=True) if at_least else _round(ROOM * distance)
+        limit = _round(0.9 * value, down=True) if at_least else _round((OWN_ROOM if own else ROOM) * size)
         why = reason or "first accepted figure"
-    if check.kind == "absolute" and check.limit is None and check.ideal is None:
-        limit = _round(DRIFT * abs(value))
-    if drift is None:
-        drift = _round(DRIFT * abs(value))
+    drift = check.drift if check.drift is not None else _round((OWN_DRIFT if own else DRIFT) * size)
     expected = value if check.verdict != "pass" or check.expected is None else check.expected
     return {"expected": _short(expected), "limit": limit, "drift": drift, "why": why}
 

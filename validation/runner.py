@@ -26,7 +26,7 @@ Progress = Callable[[int, int, str], None]
 Executor = Callable[..., Iterator[tuple[int, workers.Played]]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Spot:
     """A cell of the suite before it is played: scene, model, and the key of all that it depends on."""
 

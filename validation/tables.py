@@ -67,7 +67,7 @@ def nearest(cell: Cell) -> Check | None:
 def share(check: Check) -> str:
     """A check in a few words: name, figure, limit."""
     figure = check.figure
-    value = "-" if figure.value is None else f"{figure.value:.3g}"
+    value = "-" if figure.value is None else f"off {abs(figure.value - check.ideal):.1e}" if check.ideal else f"{figure.value:.2e}"
     limit = "none" if check.limit is None else f"{check.limit:.2g}"
     return f"{figure.measure}{'@' if figure.window else ''}{figure.window} {value} / {limit}"
 

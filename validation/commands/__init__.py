@@ -23,7 +23,7 @@ SchedulerOption = Annotated[
 
 def console() -> Console:
     """Where tables go: stdout, at most as wide as the terminal, 80 columns where there is none."""
-    return Console(soft_wrap=False, highlight=False)
+    return Console(markup=False, highlight=False)
 
 
 def usable_folder(path: Path) -> Path:

@@ -38,9 +38,8 @@ def run(
         raise InputError(f"cannot be given together with the suite {suite!r}", "--quick")
     folder = usable_folder(out)
     finished = play_suite(suite or ("smoke" if quick else "paper"), folder, jobs, force, strict, scheduler)
-    index = publish(finished, folder)
     show(finished, console())
-    console().print(f"report: {index}", soft_wrap=True)
+    console().print(f"report: {publish(finished, folder)}", soft_wrap=True)
     raise typer.Exit(finished.exit_code)
 
 

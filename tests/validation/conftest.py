@@ -1,0 +1,48 @@
+"""Synthetic histories: motions whose discrepancies are known by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenes import Event, History
+
+HALF_WIDTH, HALF_HEIGHT = 0.397, 1.555
+ALPHA = float(np.arctan2(HALF_WIDTH, HALF_HEIGHT))
+RADIUS = float(np.hypot(HALF_WIDTH, HALF_HEIGHT))
+
+
+def synthetic(
+    theta: Any,
+    t: Any = None,
+    *,
+    model: str = "made",
+    events: Sequence[Event] = (),
+    outcome: str = "moving",
+    **columns: Any,
+) -> History:
+    """A history with theta in alpha; x, y and velocities are zero unless given, y touches the floor."""
+    theta = ALPHA * np.asarray(theta, dtype=float)
+    time = np.asarray(t if t is not None else 0.01 * np.arange(len(theta)), dtype=float)
+    zero = np.zeros(len(theta))
+    channels = {"t": time, "x": zero, "y": RADIUS * np.cos(ALPHA - np.abs(theta)), "theta": theta}
+    channels |= {name: zero for name in ("x_dot", "y_dot", "theta_dot", "slip", "slip_rate")}
+    channels |= {name: np.asarray(column, dtype=float) for name, column in columns.items()}
+    return History(
+        name="made",
+        model=model,
+        channels=channels,
+        event_list=tuple(events),
+        outcome=outcome,
+        half_width=HALF_WIDTH,
+        half_height=HALF_HEIGHT,
+    )
+
+
+@pytest.fixture
+def made() -> Callable[..., History]:
+    """`synthetic`, for tests."""
+    return synthetic

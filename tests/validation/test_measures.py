@@ -1,0 +1,176 @@
+"""Each measure against a case that can be worked out by hand."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from scenes import Event, InputError
+from validation import compare
+from validation.discrepancy import describe
+from validation.measures import DIFFERENCES, FIGURES, match_impacts
+
+T = np.linspace(0.0, 10.0, 4001)
+WAVE = 0.3 * np.sin(2 * np.pi * T)
+
+
+def impact(t, impulse=1.0, kind="floor impact"):
+    return Event(t=t, kind=kind, impulse=impulse)
+
+
+def test_a_history_agrees_with_itself(made):
+    history = made(WAVE, T, events=[impact(0.5), impact(1.5)], slip_rate=np.cos(T), x=0.01 * T)
+    found = compare(history, history)
+    assert found.gap == ""
+    for measure in DIFFERENCES.values():
+        expected = 10.0 if measure.sense == "at least" else measure.ideal
+        assert found[measure.name] == pytest.approx(expected, abs=1e-7), measure.name
+
+
+def test_rms_and_peak_of_an_offset(made):
+    found = compare(made(WAVE, T), made(WAVE + 0.02, T, x=np.full(len(T), 0.003), slip_rate=0.1 * np.sin(2 * np.pi * T)))
+    assert found["theta_rms"] == pytest.approx(0.02, rel=1e-9)
+    assert found["theta_peak"] == pytest.approx(0.02, rel=1e-9)
+    assert found["x_rms"] == pytest.approx(0.003, rel=1e-9)
+    assert found["slip_rate_rms"] == pytest.approx(0.1 / math.sqrt(2), rel=1e-6)
+    assert found["slip_rate_peak"] == pytest.approx(0.1, rel=1e-5)
+
+
+def test_sprague_geers_parts_magnitude_from_phase(made):
+    louder = compare(made(WAVE, T), made(1.2 * WAVE, T))
+    assert louder["sprague_geers_m"] == pytest.approx(0.2, abs=1e-9)
+    assert louder["sprague_geers_p"] == pytest.approx(0.0, abs=1e-6)
+    late = compare(made(WAVE, T), made(0.3 * np.sin(2 * np.pi * T - 0.25 * np.pi), T))
+    assert late["sprague_geers_m"] == pytest.approx(0.0, abs=1e-9)
+    assert late["sprague_geers_p"] == pytest.approx(0.25, abs=1e-6)
+    assert late["sprague_geers_c"] == pytest.approx(0.25, abs=1e-6)
+    assert louder["peak_ratio"] == pytest.approx(1.2)
+
+
+def test_energy_is_kinetic_plus_potential(made):
+    still = made(np.zeros(101))
+    moving = made(np.zeros(101), x_dot=np.full(101, 2.0))
+    assert compare(still, moving)["energy_rms"] == pytest.approx(2.0)
+
+
+def test_grids_may_differ_and_until_cuts(made):
+    coarse_time = np.linspace(0.0, 10.0, 1501)
+    drifting = np.where(coarse_time > 5.0, 0.1 * (coarse_time - 5.0), 0.0)
+    found = compare(made(WAVE, T), made(0.3 * np.sin(2 * np.pi * coarse_time) + drifting, coarse_time), until=5.0)
+    assert found["theta_peak"] < 1e-4
+    assert found.end == 5.0
+    assert found.figures[0].window == "5s"
+
+
+def test_hausdorff_counts_a_late_jump_as_lateness(made):
+    step = np.where(T < 5.0, 0.0, 1.0)
+    late = np.where(T < 5.01, 0.0, 1.0)
+    found = compare(made(step, T), made(late, T))
+    assert found["theta_peak"] == pytest.approx(1.0)
+    assert found["theta_hausdorff"] == pytest.approx(0.01 * 2.14, rel=0.02)
+
+
+@pytest.mark.parametrize("column", ["theta", "x", "slip_rate", "y_dot"])
+def test_nan_is_never_a_number(made, column):
+    values = WAVE.copy()
+    values[-1] = math.nan
+    broken = made(values if column == "theta" else WAVE, T, **({} if column == "theta" else {column: values}))
+    touched = {"theta": "theta_rms", "x": "x_rms", "slip_rate": "slip_rate_rms", "y_dot": "energy_rms"}[column]
+    for pair in ((made(WAVE, T), broken), (broken, made(WAVE, T))):
+        found = compare(*pair)
+        assert math.isnan(found[touched])
+        assert math.isnan(found[touched.replace("rms", "peak")])
+        if column == "theta":
+            for name in ("theta_hausdorff", "peak_ratio", "sprague_geers_m", "sprague_geers_p", "sprague_geers_c"):
+                assert math.isnan(found[name]), name
+
+
+def test_nan_in_a_figure_of_the_cell_itself(made):
+    values = WAVE.copy()
+    values[7] = math.nan
+    by_name = {figure.measure: figure.value for figure in describe(made(values, T))}
+    assert by_name["peak_rotation"] is None
+    assert by_name["highest_hop"] is None
+    assert by_name["deepest_penetration"] is None
+
+
+def test_what_was_not_compared_is_a_gap(made):
+    whole, short = made(WAVE, T, model="whole"), made(WAVE[:2001], T[:2001], model="short")
+    assert compare(whole, short).gap == "short ends at 5 s, before 10 s"
+    assert compare(short, whole).gap == "short ends at 5 s, before 10 s"
+    assert compare(whole, short, until=5.0).gap == ""
+    assert compare(whole, short, until=8.0).gap == "short ends at 5 s, before 8 s"
+    assert "starts only" in compare(whole, made(WAVE[2000:], T[2000:])).gap
+
+
+def test_both_fell_the_same_way_is_whole(made):
+    fallen = [
+        made(WAVE[:n], T[:n], outcome="overturned left", events=[Event(t=T[n], kind="overturned left")]) for n in (2000, 2004)
+    ]
+    found = compare(*fallen)
+    assert found.gap == ""
+    assert found["overturning_time"] == pytest.approx(0.01)
+    assert found["outcome_agrees"] == 1.0
+    other = dataclasses.replace(fallen[1], outcome="overturned right")
+    assert compare(fallen[0], other).gap
+    assert compare(fallen[0], other)["outcome_agrees"] == 0.0
+
+
+def test_events_agree_until_the_first_without_counterpart(made):
+    reference = made(WAVE, T, model="r", events=[impact(1.0), impact(2.0), impact(3.0), impact(4.0, 0.001)])
+    candidate = made(WAVE, T, model="c", events=[impact(1.004), impact(2.0), impact(3.1), impact(5.0, 0.001)])
+    found = compare(reference, candidate)
+    assert found["events_agree_until"] == 3.0
+    assert found.figure("events_agree_until").note == "floor impact only in r"
+    assert found["unmatched_impacts"] == 2.0
+    assert found["impact_time"] == pytest.approx(0.004)
+
+
+def test_matching_takes_the_nearest_and_each_once():
+    matched = match_impacts([impact(1.0), impact(1.012)], [impact(1.011), impact(1.03, kind="wall impact")])
+    assert [(a.t, b.t) for a, b in matched.pairs] == [(1.012, 1.011)]
+    assert [e.t for e in matched.only_reference] == [1.0]
+    assert [e.kind for e in matched.only_candidate] == ["wall impact"]
+
+
+def test_figures_of_one_history(made):
+    theta = 0.5 * np.sin(np.pi * T)
+    history = made(theta, T, x=np.linspace(0, 0.1, len(T)), events=[impact(1.0), impact(2.0, 0.001), impact(3.0)])
+    values = {figure.measure: figure.value for figure in describe(history)}
+    assert set(values) == set(FIGURES)
+    assert values["peak_rotation"] == pytest.approx(0.5, rel=1e-6)
+    assert values["last_x"] == pytest.approx(0.1)
+    assert values["floor_impacts"] == 2
+    assert values["highest_hop"] == pytest.approx(0.0, abs=1e-12)
+    hop = made(theta, T, y=history.channels["y"] + 0.004)
+    assert {f.measure: f.value for f in describe(hop)}["highest_hop"] == pytest.approx(0.004)
+    sunk = made(theta, T, y=history.channels["y"] - 0.002)
+    assert {f.measure: f.value for f in describe(sunk)}["deepest_penetration"] == pytest.approx(0.002)
+
+
+def test_a_measured_history_may_lack_columns(made):
+    bare = dataclasses.replace(made(WAVE, T), channels={"t": T, "theta": made(WAVE, T).channels["theta"]}, half_width=None)
+    found = compare(made(WAVE, T), bare)
+    assert found["theta_rms"] == 0.0
+    assert math.isnan(found["x_rms"])
+    assert "no column x" in found.figure("x_rms").note
+    assert set(found.table.columns) == {"measure", "value", "unit", "note"}
+    in_radians = compare(bare, bare)
+    assert in_radians.figure("theta_rms").unit == "rad"
+
+
+def test_nothing_in_common_is_bad_input(made):
+    with pytest.raises(InputError, match="no time in common"):
+        compare(made(WAVE, T), made(WAVE, T + 100.0))
+    with pytest.raises(InputError, match="until"):
+        compare(made(WAVE, T), made(WAVE, T), until=-1.0)
+
+
+def test_every_measure_says_what_it_is():
+    for measure in (*DIFFERENCES.values(), *FIGURES.values()):
+        assert len(measure.formula) > 20, measure.name
+        assert measure.label
+        assert measure.unit
