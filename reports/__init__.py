@@ -1,1 +1,18 @@
-"""Placeholder."""
+"""Figures and pages of a finished run; see `reports.site.write_site`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+def write_site(folder: str | Path) -> Path:
+    """Write `index.html` and a page a scene for the finished run in `folder` (`run.json`, `histories/`); returns the index.
+
+    The pages open from the file system and ask nothing of any other place. Raises `InputError` where there is no run.
+    """
+    from reports.site import write_site as write
+
+    return write(Path(folder))
+
+
+__all__ = ["write_site"]

@@ -1,0 +1,130 @@
+"""How a model looks, the same in every figure and on every page, and how figures are saved.
+
+Hues are from Okabe & Ito's palette for colour-blind readers ("Color universal design", 2008), darkened where a line on
+white would fall below a contrast of 3:1. A dash pattern says the same once more for print without colour.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Widths of a text column and of a page of text in common journals, inches.
+COLUMN, PAGE = 3.5, 7.1
+FORMATS = ("svg", "png", "pdf")
+
+
+@dataclass(frozen=True)
+class Look:
+    """A model's label, its colour on white and on black (hex), its dash pattern (line widths on, off) and its marker."""
+
+    label: str
+    light: str
+    dark: str
+    dash: tuple[float, ...] = ()
+    marker: str = "o"
+
+    @property
+    def line(self) -> dict[str, Any]:
+        """Keywords for `Axes.plot`."""
+        return {"color": self.light, "linestyle": (0, self.dash) if self.dash else "-", "label": self.label}
+
+
+LOOKS = {
+    "ebm": Look("EBM", "#1b1b1b", "#f2f2f2", (), "o"),
+    "ebm-unilateral": Look("EBM, unilateral", "#0072b2", "#3d9fdc", (), "s"),
+    "ebm-bouc-wen": Look("EBM, Bouc-Wen", "#a87900", "#d19a10", (3.0, 1.0, 1.0, 1.0), "P"),
+    "cm": Look("CM", "#009168", "#00b583", (5.0, 1.5), "D"),
+    "mujoco": Look("MuJoCo", "#d55e00", "#e8762a", (2.0, 1.0), "^"),
+    "pybullet": Look("PyBullet", "#bf5f92", "#d98ab4", (4.0, 1.0, 1.0, 1.0), "v"),
+    "measured": Look("measured", "#6e6e6e", "#a0a0a0", (), "x"),
+}
+#: For models that have no look of their own, in the order in which a run names them.
+SPARE = (
+    ("#5b4db3", "#978be8", (6.0, 2.0)),
+    ("#7d5a3c", "#b98f6b", (1.0, 1.0)),
+    ("#33798c", "#5fb3c9", (3.0, 2.0)),
+    ("#8a1f4b", "#e0719e", (8.0, 2.0, 2.0, 2.0)),
+    ("#4f6f1f", "#94bb57", (1.0, 2.0)),
+)
+
+
+def looks(models: Iterable[str]) -> dict[str, Look]:
+    """The look of each of a run's models; a model without one of its own gets a spare colour, by its place among such."""
+    found: dict[str, Look] = {}
+    for model in models:
+        if model in LOOKS:
+            found[model] = LOOKS[model]
+        else:
+            light, dark, dash = SPARE[sum(name not in LOOKS for name in found) % len(SPARE)]
+            found[model] = Look(model, light, dark, dash)
+    return found
+
+
+@contextmanager
+def figure_style() -> Iterator[None]:
+    """The common style of all figures, for a `with` block: sizes for a journal's page, light grid, reproducible SVG.
+
+    Figures made inside need no display: build them with `matplotlib.figure.Figure`.
+    """
+    import matplotlib as mpl
+
+    settings = {
+        "font.family": "sans-serif",
+        "font.sans-serif": ["DejaVu Sans"],
+        "font.size": 7.5,
+        "axes.titlesize": 8.5,
+        "axes.titleweight": "bold",
+        "axes.titlelocation": "left",
+        "axes.labelsize": 7.5,
+        "axes.linewidth": 0.6,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.grid": True,
+        "axes.axisbelow": True,
+        "axes.formatter.limits": (-3, 4),
+        "axes.formatter.use_mathtext": True,
+        "grid.color": "#e4e4e4",
+        "grid.linewidth": 0.5,
+        "lines.linewidth": 0.9,
+        "lines.markersize": 4.0,
+        "xtick.direction": "out",
+        "xtick.major.width": 0.6,
+        "ytick.major.width": 0.6,
+        "legend.frameon": False,
+        "legend.fontsize": 7.5,
+        "legend.handlelength": 2.6,
+        "mathtext.fontset": "dejavusans",
+        "path.simplify": True,
+        "path.simplify_threshold": 0.5,
+        "svg.fonttype": "path",
+        "svg.hashsalt": "rockcheck",
+        "pdf.fonttype": 42,
+        "savefig.dpi": 200,
+        "figure.dpi": 100,
+    }
+    with mpl.rc_context(settings):
+        yield
+
+
+def save(figure: Figure, stem: Path, formats: Iterable[str] = FORMATS) -> list[Path]:
+    """Write a figure as `<stem>.svg`, `.png` and `.pdf`; the same figure gives the same bytes, for no date is written."""
+    stem.parent.mkdir(parents=True, exist_ok=True)
+    undated: dict[str, dict[str, Any]] = {
+        "svg": {"Date": None, "Creator": "rockcheck"},
+        "pdf": {"CreationDate": None, "Creator": "rockcheck"},
+        "png": {"Software": "rockcheck"},
+    }
+    written = []
+    with figure_style():
+        for kind in formats:
+            path = stem.with_name(f"{stem.name}.{kind}")
+            figure.savefig(path, metadata=undated[kind])
+            written.append(path)
+    return written

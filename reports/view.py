@@ -1,0 +1,250 @@
+"""What is shown of one scene: all histories on one time axis, their differences, tolerances and horizon."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes import History, InputError, Scene, kinematics
+from validation.results import Cell, Run
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A quantity over time: name, label, symbol (mathtext), unit, and the stem of the measures that limit its difference.
+
+    `scale` turns the unit of its measures into `unit` (1000: from m to mm).
+    """
+
+    name: str
+    label: str
+    symbol: str
+    unit: str
+    measured_by: str = ""
+    scale: float = 1.0
+
+    @property
+    def axis(self) -> str:
+        """Label of an axis, plain text."""
+        return f"{self.label} ({self.unit})" if self.unit != "1" else self.label
+
+
+#: The quantities of the paper's Figs. 4 and 5, then energy and hop.
+CHANNELS = (
+    Channel("theta", "rotation θ/α", r"$\theta/\alpha$", "1", "theta"),
+    Channel("theta_dot", "rotation rate", r"$\dot\theta$ (rad/s)", "rad/s", "theta_dot"),
+    Channel("slip", "pivot position", "pivot position\n(mm)", "mm", "slip", 1e3),
+    Channel("slip_rate", "pivot velocity", "pivot velocity\n(m/s)", "m/s", "slip_rate"),
+    Channel("energy", "energy per mass", "energy\n(J/kg)", "J/kg", "energy"),
+    Channel("hop", "height of the lowest corner", "lowest corner\n(mm)", "mm", "hop", 1e3),
+)
+PAPER_CHANNELS = CHANNELS[:4]
+
+
+@dataclass(frozen=True)
+class Band:
+    """A tolerance on the difference of one channel of one model: |d| (or its RMS) at most `limit` from 0 to `until` s."""
+
+    channel: str
+    model: str
+    against: str
+    kind: str
+    limit: float
+    until: float
+
+
+@dataclass(frozen=True)
+class SceneView:
+    """One scene of a finished run, ready to be drawn.
+
+    `t` is every `stride`-th output time (s); `histories` those that could be read, in the run's order, and `missing` says
+    by model why one could not.
+    """
+
+    run: Run
+    name: str
+    slug: str
+    scene: Scene
+    histories: dict[str, History]
+    missing: dict[str, str]
+    stride: int
+
+    @property
+    def cells(self) -> tuple[Cell, ...]:
+        """The scene's cells, in the models' order."""
+        return self.run.of_scene(self.name)
+
+    @cached_property
+    def t(self) -> Array:
+        """The common time axis, s."""
+        return self.scene.output_times[:: self.stride]
+
+    @cached_property
+    def ground(self) -> Array:
+        """Horizontal base acceleration on `t`, m/s^2."""
+        return np.asarray(self.scene.excitation.acceleration(self.t))
+
+    @cached_property
+    def values(self) -> dict[str, dict[str, Array]]:
+        """By model and channel (also x and y, m): values on `t`, NaN where the history has none."""
+        return {model: self._channels(history) for model, history in self.histories.items()}
+
+    def _channels(self, history: History) -> dict[str, Array]:
+        block = self.scene.block
+        column = {name: self._on_axis(history, name) for name in ("x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate")}
+        x, y, theta = column["x"], column["y"], column["theta"]
+        motion = (column[name] for name in ("y", "x_dot", "y_dot", "theta_dot"))
+        found = {
+            "theta": theta / block.alpha,
+            "theta_dot": column["theta_dot"],
+            "slip": column["slip"],
+            "slip_rate": column["slip_rate"],
+            "energy": np.asarray(kinematics.energy(block, self.scene.gravity, *motion)),
+            "hop": np.asarray(kinematics.pivot_height(block, y, theta)),
+        }
+        return {c.name: c.scale * found[c.name] for c in CHANNELS} | {"x": x, "y": y}
+
+    def _on_axis(self, history: History, name: str) -> Array:
+        """A column on `t`, linear between its rows, NaN outside them and where there is no such column."""
+        if name not in history.channels:
+            return np.full(len(self.t), math.nan)
+        times = np.asarray(history.channels["t"], dtype=float)
+        values = np.asarray(history.channels[name], dtype=float)
+        inside = (self.t >= times[0] - 1e-9) & (self.t <= times[-1] + 1e-9)
+        return np.where(inside, np.interp(self.t, times, values), math.nan)
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """Models that others are held against here and that have a history; the run's own reference first."""
+        named = [self.run.reference, self.run.model_form, *(f.against for cell in self.cells for f in cell.figures)]
+        return tuple(model for model in dict.fromkeys(named) if model in self.histories)
+
+    def differences(self, channel: str, against: str) -> dict[str, Array]:
+        """Candidate minus reference by model, in the channel's unit."""
+        reference = self.values[against][channel]
+        return {model: columns[channel] - reference for model, columns in self.values.items() if model != against}
+
+    def bands(self, against: str | None = None) -> tuple[Band, ...]:
+        """The tolerances that can be drawn over time; of one reference, or of all."""
+        found = []
+        for cell in self.cells:
+            for check in cell.checks:
+                figure = check.figure
+                stem, _, kind = figure.measure.rpartition("_")
+                channel = next((c for c in CHANNELS if c.measured_by == stem), None)
+                if channel is None or kind not in ("rms", "peak") or check.limit is None or against not in (None, figure.against):
+                    continue
+                until = min(figure.until or self.scene.duration, self.scene.duration)
+                found.append(Band(channel.name, cell.model, figure.against, kind, channel.scale * check.limit, until))
+        return tuple(found)
+
+    @property
+    def horizon(self) -> float | None:
+        """Horizon of predictability, s, where the run gives one: the end of a window of that name."""
+        ends = [f.until for cell in self.cells for f in _all_figures(cell) if f.window == "horizon" and f.until is not None]
+        return min(ends, default=None)
+
+    @property
+    def agreement(self) -> dict[str, tuple[float, str, str]]:
+        """By model: the time up to which its events agree with those of its first reference, what comes then, and that reference."""
+        found: dict[str, tuple[float, str, str]] = {}
+        for against in self.references:
+            for cell in self.cells:
+                for figure in cell.figures:
+                    wanted = figure.measure == "events_agree_until" and figure.against == against and not figure.window
+                    if wanted and figure.value is not None:
+                        found.setdefault(cell.model, (figure.value, figure.note, against))
+        return found
+
+    @property
+    def bilateral(self) -> tuple[str, ...]:
+        """Models here whose pivot cannot leave the floor."""
+        return tuple(cell.model for cell in self.cells if cell.settings.get("pivot") == "bilateral")
+
+    @property
+    def unilateral(self) -> tuple[str, ...]:
+        """Event-based models here whose floor can only push."""
+        return tuple(cell.model for cell in self.cells if cell.settings.get("pivot") == "unilateral")
+
+    @property
+    def model_form_matters(self) -> bool:
+        """Whether a wall can throw the block into the free flight that one of the models forbids."""
+        return bool(self.scene.walls) and bool(self.bilateral)
+
+    @cached_property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom and top of everything that the block and the walls reach, m."""
+        block = self.scene.block
+        wide = [-block.half_width, block.half_width]
+        tall = [0.0, 2.0 * block.half_height]
+        for columns in self.values.values():
+            theta, x, y = columns["theta"] * block.alpha, columns["x"], columns["y"]
+            across = block.radius * np.sin(np.abs(theta) + block.alpha)
+            up = block.radius * np.cos(block.alpha - np.abs(theta))
+            with np.errstate(invalid="ignore"):
+                wide += [_least(x - across), -_least(-x - across)]
+                tall += [_least(y - up), -_least(-y - up)]
+        for wall in self.scene.walls:
+            face = (block.half_width + wall.gap) * (-1.0 if wall.side == "left" else 1.0)
+            wide.append(face)
+        return min(wide), max(wide), min(tall), max(tall)
+
+
+def scene_views(run: Run, folder: Path, most_values: int = 2_000_000) -> list[SceneView]:
+    """The views of all scenes of a run. Where the run holds more than `most_values` values, each scene shows every n-th row."""
+    slugs = slugs_of(run.scenes)
+    share = most_values / max(1, len(run.scenes))
+    views = []
+    for name in run.scenes:
+        scene = run.load_scene(name)
+        histories, missing = _read(run.of_scene(name), folder)
+        values = len(scene.output_times) * (len(CHANNELS) + 2) * max(1, len(histories))
+        views.append(SceneView(run, name, slugs[name], scene, histories, missing, max(1, math.ceil(values / max(share, 20_000.0)))))
+    return views
+
+
+def slugs_of(names: Iterable[str]) -> dict[str, str]:
+    """A file name for each scene: safe on any system, different for different scenes also where case does not count."""
+    slugs: dict[str, str] = {}
+    for name in names:
+        base = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or "scene"
+        slug, n = base, 2
+        while slug.lower() in {other.lower() for other in slugs.values()}:
+            slug, n = f"{base}-{n}", n + 1
+        slugs[name] = slug
+    return slugs
+
+
+def _read(cells: Iterable[Cell], folder: Path) -> tuple[dict[str, History], dict[str, str]]:
+    histories, missing = {}, {}
+    for cell in cells:
+        if cell.status == "failed" or cell.history is None:
+            missing[cell.model] = cell.reason or "no history"
+            continue
+        path = folder / cell.history
+        try:
+            if not path.resolve().is_relative_to(folder.resolve()):
+                raise InputError("its history lies outside the run's folder")
+            histories[cell.model] = History.load(path)
+        except InputError as error:
+            missing[cell.model] = str(error)
+    return histories, missing
+
+
+def _all_figures(cell: Cell) -> list[Any]:
+    return [*cell.figures, *(check.figure for check in cell.checks)]
+
+
+def _least(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.min(known)) if len(known) else 0.0

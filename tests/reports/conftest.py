@@ -1,0 +1,143 @@
+"""A finished run made up without any model: closed-form motions, checks of every verdict, a failed cell, hostile names."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenes import Block, Cost, Event, Floor, Ricker, Scene, Wall
+from scenes.observation import observe
+from validation.results import HISTORIES, Cell, Check, CostRecord, Figure, MeasureRecord, Run
+
+NASTY = "<img src=x onerror=alert(1)>&\"'</script>"
+MODELS: Mapping[str, dict[str, Any]] = {
+    "ebm-unilateral": {"pivot": "unilateral", "tolerance": 1e-10},
+    "ebm": {"pivot": "bilateral", "tolerance": 1e-10},
+    "cm": {"stiffness": 9e6},
+    "mujoco": {"time_step": 1e-4},
+    "pybullet": {"time_step": 1e-4},
+    "mine:Model": {"note": NASTY},
+}
+
+
+def scene(name: str, wall: bool, duration: float = 12.0) -> Scene:
+    """The paper's block under a pulse."""
+    return Scene(
+        name=name,
+        block=Block(half_width=0.397, half_height=1.555),
+        floor=Floor(friction=0.3),
+        walls=(Wall(side="left", gap=0.053, restitution=0.5),) if wall else (),
+        excitation=Ricker(amplitude=6.0, period=1.0),
+        duration=duration,
+        description=f"a made-up scene {NASTY}",
+    )
+
+
+def motion(scene: Scene, model: str, delay: float, *, falls: bool = False) -> Any:
+    """A decaying rocking motion about pivots that stand still, `delay` s late; hops a little beside a wall."""
+    block, t = scene.block, scene.output_times
+    late = np.maximum(t - delay, 0.0)
+    if falls:
+        late = late[late < 6.0]
+        theta = 0.02 * np.sinh(0.78 * late)
+        rate = 0.02 * 0.78 * np.cosh(0.78 * late)
+    else:
+        size, decay, omega = 0.3 * block.alpha, 0.15, 3.0
+        theta = size * np.exp(-decay * late) * np.sin(omega * late)
+        rate = size * np.exp(-decay * late) * (omega * np.cos(omega * late) - decay * np.sin(omega * late))
+    pivot = np.where(theta < 0, -1.0, 1.0)
+    s, c = np.sin(block.alpha - np.abs(theta)), np.cos(block.alpha - np.abs(theta))
+    slip_rate = 0.004 * np.exp(-0.2 * late) * np.sin(0.7 * late)
+    x = pivot * (block.radius * s - block.half_width) + np.cumsum(slip_rate) * scene.output_step
+    hop = 0.004 * np.maximum(0.0, np.sin(3.0 * late)) ** 8 if scene.walls and model != "ebm" else 0.0
+    state = np.column_stack([x, block.radius * c + hop, theta, slip_rate - block.radius * c * rate, pivot * block.radius * s * rate, rate])
+    zeros = [k * math.pi / 3.0 + delay for k in range(1, 11)]
+    events = [Event(t=zero, kind="floor impact", mode_before="rock", mode_after="rock", impulse=0.4 / (1 + zero)) for zero in zeros]
+    if scene.walls:
+        events += [Event(t=zero + 0.4, kind="wall impact", mode_before="rock", mode_after="slide-rock", impulse=0.2) for zero in zeros[1::2]]
+    if falls:
+        events.append(Event(t=float(late[-1]), kind="overturned left"))
+    cost = Cost(wall_seconds=0.01 * (1 + 10 * delay), set_up=0.1, steps=1000, evaluations=4000)
+    return observe(scene, model, state, events=sorted(events, key=lambda e: e.t), cost=cost, settings=MODELS[model])
+
+
+def figure(measure: str, value: float | None, unit: str = "alpha", **more: Any) -> Figure:
+    """A figure with its name as label."""
+    return Figure(measure=measure, label=measure.replace("_", " "), unit=unit, value=value, **more)
+
+
+def cell_of(folder: Path, scene: Scene, model: str, delay: float, falls: bool = False) -> Cell:
+    """Play, save and judge a cell: the limits are such that late models fail or change."""
+    history = motion(scene, model, delay, falls=falls)
+    path = f"{HISTORIES}/{scene.name.replace(' ', '_')}--{model.replace(':', '_')}--0.csv"
+    (folder / HISTORIES).mkdir(parents=True, exist_ok=True)
+    history.save(folder / path)
+    checks = [Check(figure=figure("peak_rotation", history.peak_rotation, until=8.0, window="8s"), kind="absolute", verdict="pass",
+                    ideal=history.peak_rotation, expected=history.peak_rotation, limit=1e-3, why="as accepted")]  # fmt: skip
+    figures = [figure("highest_hop", 0.004, "m")]
+    for against in ("ebm-unilateral", "ebm"):
+        if model == against:
+            continue
+        form = against == "ebm" and bool(scene.walls)
+        value = 0.3 * delay
+        verdict: Any = "pass" if value < 0.8e-3 else "changed" if value < 2e-3 else "fail"
+        checks.append(Check(figure=figure("theta_rms", value, against=against, window="8s", until=8.0), kind="model form" if form else "numerical",
+                            verdict=verdict, reason={"pass": "", "changed": "0.0015 was 0.0001"}.get(verdict, f"{value:.3g} is more than 0.002 {NASTY}"),
+                            ideal=0.0, expected=1e-4, limit=2e-3, drift=5e-4, why="first-order step error"))  # fmt: skip
+        figures += [checks[-1].figure, figure("events_agree_until", 12.0 - 100 * delay, "s", against=against, note="floor impact only in " + model),
+                    figure("theta_rms", value, against=against, window="horizon", until=10.0)]  # fmt: skip
+    return Cell(scene=scene.name, model=model, settings=MODELS[model], key="0", status="done", history=path, outcome=history.outcome,
+                notes=history.notes, cost=CostRecord(**vars(history.cost), worker_seconds=0.5), figures=tuple(figures), checks=tuple(checks))  # fmt: skip
+
+
+DELAYS = {"ebm-unilateral": 0.0, "ebm": 0.0005, "cm": 0.001, "mujoco": 0.002, "pybullet": 0.005, "mine:Model": 0.02}
+
+
+def make_run(folder: Path, duration: float = 12.0) -> Run:
+    """Write a finished run of three scenes into `folder`: one passes, one fails, one has failed cells and a falling block."""
+    scenes = [scene("free", False, duration), scene("beside a wall", True, duration), scene("Free", False, duration)]
+    cells = [cell_of(folder, scenes[0], model, 0.5 * DELAYS[model] if model in ("cm", "mujoco") else 0.0) for model in list(MODELS)[:5]]
+    cells += [cell_of(folder, scenes[1], model, delay) for model, delay in DELAYS.items()]
+    cells += [cell_of(folder, scenes[2], model, DELAYS[model], falls=True) for model in ("ebm-unilateral", "ebm")]
+    cells.append(Cell(scene="Free", model="mujoco", status="failed", reason=f"blew up at 3.2 s {NASTY}"))
+    run = Run(
+        suite="made-up",
+        description=f"for the tests {NASTY}",
+        created="2026-01-01T00:00:00+00:00",
+        reference="ebm-unilateral",
+        model_form="ebm",
+        scenes={s.name: s.model_dump(mode="json") for s in scenes},
+        models=tuple(MODELS),
+        cells=tuple(cells),
+        faults=("tolerance [old.cm.ebm: theta_rms] has no cell in the suite",),
+        measures=(MeasureRecord(name="theta_rms", label="RMS difference of rotation", unit="angle", formula="sqrt <d^2> of theta, in alpha."),),
+        versions={"rockcheck": "0.1.0", "python": "3.11", "mujoco": "4.0.0"},
+        hardware={"processor": f"made up {NASTY}", "cores": "2"},
+        wall_seconds=3.0,
+    )
+    run.save(folder)
+    return run
+
+
+@pytest.fixture(scope="session")
+def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a finished run and no pages yet."""
+    folder = tmp_path_factory.mktemp("run")
+    make_run(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a finished run and its pages."""
+    from reports import write_site
+
+    folder = tmp_path_factory.mktemp("site")
+    make_run(folder)
+    write_site(folder)
+    return folder
