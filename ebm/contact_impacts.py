@@ -15,9 +15,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from ebm.motion import inverse_of
+from scenes.compiled import kernel
 
 F, E, TIP_TOP, TIP_BOTTOM, FAR_BOTTOM, FAR_TOP = range(6)
 CONTACTS = 6
@@ -26,7 +26,7 @@ _TINY = 1e-13
 _MOST_STAGES = 40
 
 
-@njit(cache=True)
+@kernel
 def contact_rows(alpha, phi):
     """Rows (xi, y, phi) of the six normal contacts and, last, of the floor's tangent."""
     s, c = math.sin(alpha - phi), math.cos(alpha - phi)
@@ -42,18 +42,18 @@ def contact_rows(alpha, phi):
     return rows
 
 
-@njit(cache=True)
+@kernel
 def _dot(row, v):
     return row[0] * v[0] + row[1] * v[1] + row[2] * v[2]
 
 
-@njit(cache=True)
+@kernel
 def kinetic_energy(v):
     """Kinetic energy of velocities (xi, y, phi), per unit mass."""
     return 0.5 * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] / 3.0)
 
 
-@njit(cache=True)
+@kernel
 def _strike(rows, taking, target, mu_s, mu_k, v, after, impulse):
     """One simultaneous impact over the contacts in `taking`: writes the velocities after it and the impulses; True if feasible."""
     best = np.inf
@@ -76,7 +76,7 @@ def _strike(rows, taking, target, mu_s, mu_k, v, after, impulse):
             continue
         on_floor = (mask & 3) != 0
         for friction in range(4):
-            if friction != _NONE and not on_floor or friction == _NONE and on_floor and mu_s > 0.0:
+            if (friction != _NONE and not on_floor) or (friction == _NONE and on_floor and mu_s > 0.0):
                 continue
             unknowns = count + (1 if friction == _STICK else 0)
             if unknowns > 3:
@@ -135,7 +135,7 @@ def _strike(rows, taking, target, mu_s, mu_k, v, after, impulse):
     return best < np.inf
 
 
-@njit(cache=True)
+@kernel
 def _well_posed(matrix, inverse, n):
     """Whether the inverse of the small matrix is finite and not mere rounding (parallel contacts give none)."""
     size = 0.0
@@ -147,7 +147,7 @@ def _well_posed(matrix, inverse, n):
     return size < 1e10
 
 
-@njit(cache=True)
+@kernel
 def contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, tally):
     """The whole cascade at one instant; v (xi, y, phi rates) becomes the velocities after it. Returns False where none was found.
 
@@ -197,7 +197,7 @@ def contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, tally):
     return False
 
 
-@njit(cache=True)
+@kernel
 def _close(rows, touching, resting, v):
     """Contacts that part more slowly than `resting` are closed: the velocity is projected onto them, mass-orthogonally."""
     members = np.zeros(3, dtype=np.int64)

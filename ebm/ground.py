@@ -9,9 +9,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from scenes.compiled import kernel
 from scenes.excitations import Record, Rest, Ricker, Sine
 
 STILL, GAUSSIAN, SINE, SAMPLED = range(4)
@@ -55,13 +55,13 @@ def ground_of(excitation: Rest | Ricker | Sine | Record, gravity: float, time_un
     return Ground(STILL, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _NO_SAMPLES)
 
 
-@njit(cache=True)
+@kernel
 def interval(g, t):
     """Index of the sample interval that holds t; its right end belongs to the next one."""
     return int(math.floor(t / g.step + 1e-9))
 
 
-@njit(cache=True)
+@kernel
 def acceleration(g, t):
     """Acceleration at time t."""
     if g.kind == GAUSSIAN:
@@ -77,7 +77,7 @@ def acceleration(g, t):
     return 0.0
 
 
-@njit(cache=True)
+@kernel
 def fill_series(g, t, sign, n, out):
     """Taylor coefficients 0..n of sign * acceleration about t, to the right of t."""
     if g.kind == GAUSSIAN:
@@ -111,7 +111,7 @@ def fill_series(g, t, sign, n, out):
                 out[1] = sign * rise / g.step
 
 
-@njit(cache=True)
+@kernel
 def next_kink(g, t):
     """The next time after t at which the motion is not smooth."""
     if g.kind == SAMPLED:
@@ -122,7 +122,7 @@ def next_kink(g, t):
     return NEVER
 
 
-@njit(cache=True)
+@kernel
 def _next_extremum(g, t):
     """The next time after t up to which the motion is monotone; NEVER where it is monotone (and dying out) for good."""
     if g.kind == SAMPLED:
@@ -154,7 +154,7 @@ def _next_extremum(g, t):
     return best + g.centre if best < NEVER else NEVER
 
 
-@njit(cache=True)
+@kernel
 def next_exceedance(g, t, low, high):
     """The first time from t on at which the acceleration is below `low` or above `high`, on that side; else NEVER."""
     here = acceleration(g, t)

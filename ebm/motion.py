@@ -24,10 +24,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ebm.ground import fill_series
 from ebm.series import MOST_TERMS, slope, value
+from scenes.compiled import kernel
 
 
 class Setting(NamedTuple):
@@ -73,20 +73,20 @@ ROWS = 13
 X, HEIGHT, THETA, VX, VY, W = range(6)
 
 
-@njit(cache=True)
+@kernel
 def workspace():
     """Scratch for one trajectory: the series, and the stack of the root search."""
     return np.zeros((ROWS, MOST_TERMS)), np.zeros((48, MOST_TERMS))
 
 
-@njit(cache=True)
+@kernel
 def delta(b, m, tip):
     """Distance from the initial centroid to the wall on the tip side (or the far side), R."""
     left = (m[S] > 0) == tip
     return b.sin_alpha + (b.gap_left if left else b.gap_right)
 
 
-@njit(cache=True)
+@kernel
 def tilt_series(b, m, z, gh, gv, t, order, enough, reach, need_forces, a):
     """Fills the workspace with the series of a tilted block's motion about time t; returns their order.
 
@@ -112,7 +112,7 @@ def tilt_series(b, m, z, gh, gv, t, order, enough, reach, need_forces, a):
     return _contact_series(b, m, order, enough, reach, a)
 
 
-@njit(cache=True)
+@kernel
 def _rock_series(still_vertical, order, enough, reach, need_forces, a):
     """ROCK, (3): theta'' = (3/4)(u c - S s G0), the pivot sticking; xi and y are s and c up to a constant."""
     phi, omega, sn, cs, u, g = a[PHI], a[OMEGA], a[SIN], a[COS], a[U], a[G]
@@ -149,7 +149,7 @@ def _rock_series(still_vertical, order, enough, reach, need_forces, a):
     return order
 
 
-@njit(cache=True)
+@kernel
 def _contact_series(b, m, order, enough, reach, a):
     """Newton-Euler with the mode's constraints, solved term by term: the matrix of the unknown forces is the same each time."""
     phi, omega, sn, cs, u, g, xi, y = a[PHI], a[OMEGA], a[SIN], a[COS], a[U], a[G], a[XI], a[Y]
@@ -276,7 +276,7 @@ def _contact_series(b, m, order, enough, reach, a):
     return order
 
 
-@njit(cache=True)
+@kernel
 def inverse_of(matrix, n):
     """Inverse of the leading n x n part (n <= 3), by cofactors; infinite entries where it is singular."""
     out = np.zeros((3, 3))
@@ -301,7 +301,7 @@ def inverse_of(matrix, n):
     return out
 
 
-@njit(cache=True)
+@kernel
 def flat_series(b, m, z, gh, gv, t, order, a):
     """Fills the workspace with the series of a block that only translates (world frame); returns their order.
 
@@ -329,7 +329,7 @@ def flat_series(b, m, z, gh, gv, t, order, a):
     return order
 
 
-@njit(cache=True)
+@kernel
 def tilt_state(b, m, order, tau, pivot, a, z):
     """Writes the state at tau after the start of the series into z, on the contacts to rounding.
 
@@ -356,7 +356,7 @@ def tilt_state(b, m, order, tau, pivot, a, z):
     z[X], z[HEIGHT], z[THETA], z[VX], z[VY], z[W] = sign * xi, y, sign * phi, sign * v, vy, sign * w
 
 
-@njit(cache=True)
+@kernel
 def flat_state(b, m, order, tau, a, z):
     """Writes the state of a translating block at tau after the start of the series into z."""
     if m[TIP] == 0 and m[FAR] == 0 and m[FLOOR] != STICK:

@@ -7,17 +7,20 @@ step, so an event is the root of a polynomial and can be located to rounding, wi
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from scenes.compiled import kernel
 
 #: Longest polynomial: orders above this are not used.
 MOST_TERMS = 32
-#: A coefficient below this (in natural units, scaled to the step) is rounding noise.
+#: A coefficient below this (in natural units, scaled to the step) is rounding noise; forces and gaps.
 NOISE = 1e-14
+#: The same for slip velocities, which start from friction forces that cancel.
+SLIP_NOISE = 1e-12
 NO_ROOT = -1.0
 _DEEPEST = 44
 
 
-@njit(cache=True)
+@kernel
 def value(c, n, tau):
     """c(tau) for a polynomial of degree n."""
     total = c[n]
@@ -26,7 +29,7 @@ def value(c, n, tau):
     return total
 
 
-@njit(cache=True)
+@kernel
 def slope(c, n, tau):
     """dc/dtau at tau for a polynomial of degree n >= 1."""
     total = n * c[n]
@@ -35,11 +38,11 @@ def slope(c, n, tau):
     return total
 
 
-@njit(cache=True)
-def leading(c, n, h):
+@kernel
+def leading(c, n, h, floor):
     """The sign with which c leaves tau = 0 on a step h: +1, -1, or 0 where it is zero throughout.
 
-    Coefficients that are rounding noise on the scale of the step are taken as zero, so that a guard that has just fired
+    Coefficients that are rounding noise on the scale of the step (below `floor`, see NOISE) are taken as zero, so that a guard that has just fired
     (and is zero by construction) does not fire again.
     """
     largest = 0.0
@@ -47,7 +50,7 @@ def leading(c, n, h):
     for k in range(n + 1):
         largest = max(largest, abs(c[k]) * scale)
         scale *= h
-    noise = max(NOISE, 1e-13 * largest)
+    noise = max(floor, 1e-13 * largest)
     scale = 1.0
     for k in range(n + 1):
         if abs(c[k]) * scale > noise:
@@ -56,11 +59,11 @@ def leading(c, n, h):
     return 0
 
 
-@njit(cache=True)
-def first_root(c, n, h, stack):
+@kernel
+def first_root(c, n, h, floor, stack):
     """The first tau in [0, h] at which c turns negative, or NO_ROOT.
 
-    A zero at tau = 0 is divided out: 0.0 comes back only where c leaves it downward. `stack` is scratch of shape
+    A zero at tau = 0 (within `floor`) is divided out: 0.0 comes back only where c leaves it downward. `stack` is scratch of shape
     (>= 48, MOST_TERMS). The search is complete: an interval is dropped only where a bound on the polynomial, or on its
     slope and end value, shows that it holds no root. Touching zero without crossing is no root.
     """
@@ -73,7 +76,7 @@ def first_root(c, n, h, stack):
         scale *= h
         low += min(q[k], 0.0)
         largest = max(largest, abs(q[k]))
-    noise = max(NOISE, 1e-13 * largest)
+    noise = max(floor, 1e-13 * largest)
     if q[0] > noise and low + q[0] > 0.0:
         return NO_ROOT
     zeros = 0
@@ -89,7 +92,7 @@ def first_root(c, n, h, stack):
     return NO_ROOT if z < 0.0 else z * h
 
 
-@njit(cache=True)
+@kernel
 def _isolate(stack, n):
     """First root on [0, 1] of the polynomial in stack[0], positive at 0; halves intervals, left ones first."""
     depth = np.zeros(stack.shape[0], dtype=np.int64)
@@ -136,7 +139,7 @@ def _isolate(stack, n):
     return NO_ROOT
 
 
-@njit(cache=True)
+@kernel
 def _falling_root(q, n):
     """The root in [0, 1] of a polynomial that falls from positive to not positive: Newton, kept inside its bracket."""
     a, b = 0.0, 1.0

@@ -6,7 +6,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ebm import impacts
 from ebm.contact_impacts import CONTACTS, FAR_BOTTOM, FAR_TOP, TIP_BOTTOM, TIP_TOP, E, F, contact_impact
@@ -32,7 +31,9 @@ from ebm.motion import (
     VX,
     VY,
     XI,
+    G,
     S,
+    U,
     W,
     X,
     Y,
@@ -42,7 +43,7 @@ from ebm.motion import (
     tilt_state,
     workspace,
 )
-from ebm.series import NO_ROOT, first_root, value
+from ebm.series import NO_ROOT, NOISE, SLIP_NOISE, first_root, value
 from ebm.transitions import (
     G_CONE_MINUS,
     G_CONE_PLUS,
@@ -59,6 +60,7 @@ from ebm.transitions import (
     select,
     slip_velocity,
 )
+from scenes.compiled import kernel
 
 #: Names of the mode codes that `mode_code` gives, and of the event codes.
 MODE_NAMES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight")
@@ -96,6 +98,8 @@ _RATTLE_IMPACTS, _RATTLE_TIME, _RATTLE_BOUND, _QUIET_TIME = 100, 5e-3, 2.5e-3, 2
 # With the bilateral pivot a block that rattles flush against a wall is settled below these.
 _FLUSH_SPIN, _FLUSH_SPEED, _FLUSH_GAP = 2e-4, 2.5e-4, 6e-7
 _TOUCH = 1e-11
+# A pivot that slips more slowly than this after an impact stands: the impact law says so up to rounding.
+_STOPPED = 1e-10
 _MOST_ZERO_STEPS = 60
 
 
@@ -130,7 +134,7 @@ class Tally(NamedTuple):
     t_rest: float
 
 
-@njit(cache=True)
+@kernel
 def mode_code(m):
     """Index into MODE_NAMES."""
     if m[FLOOR] == OFF:
@@ -143,7 +147,7 @@ def mode_code(m):
     return 5 if wall else 3
 
 
-@njit(cache=True)
+@kernel
 def run(b, gh, gv, z, t_end, control, out, out_mode, log):
     """Simulates from state z (changed in place) at t = 0 to t_end; returns a Tally.
 
@@ -216,25 +220,26 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log):
         pivot = 0.0
         if m[FAMILY] == FLAT:
             order = flat_series(b, m, z, gh, gv, t, control.order, a)
-            h = _step_size(a[XI], a[Y], order, control.tolerance, reach)
+            h = _step_size(a[U], a[G], order, control.tolerance, reach)
         else:
             order = tilt_series(b, m, z, gh, gv, t, control.order, 1e-2 * control.tolerance, reach, not b.no_slip or b.unilateral, a)
             pivot = m[S] * z[X] - a[SIN, 0]
-            if order < control.order:
-                h = reach
-            elif m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0:
+            h = reach
+            if order == control.order:
                 h = _step_size(a[PHI], a[COS], order, control.tolerance, reach)
-            else:
-                h = min(
-                    _step_size(a[PHI], a[COS], order, control.tolerance, reach), _step_size(a[XI], a[Y], order, control.tolerance, reach)
-                )
+                if m[FLOOR] != STICK or m[TIP] != 0 or m[FAR] != 0:
+                    h = _step_size(a[XI], a[Y], order, control.tolerance, h)
+                    h = _step_size(a[U], a[G], order, control.tolerance, h)  # forces follow the base acceleration
         tau, which = h, -1
         for k in range(GUARDS):
             degree = guard(b, m, k, order, pivot, a)
             if degree >= 0:
-                root = first_root(a[GUARD], degree, tau, stack)
+                root = first_root(a[GUARD], degree, tau, SLIP_NOISE if k == G_SLIP else NOISE, stack)
                 if root != NO_ROOT:
                     tau, which = root, k
+        if G_PUSH <= which <= G_CONE_MINUS and tau > 0.25 * h:
+            # A force is the second derivative of a truncated series: its zero is found to rounding from nearby only.
+            tau, which = 0.9 * tau, -1
         if not math.isfinite(tau):
             ending = NOT_FINITE
             break
@@ -250,7 +255,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log):
             flat_state(b, m, order, tau, a, z)
         else:
             if a[OMEGA, 0] > 0.0 and value(a[OMEGA], order - 1, tau) < 0.0:
-                top = first_root(a[OMEGA], order - 1, tau, stack)
+                top = first_root(a[OMEGA], order - 1, tau, NOISE, stack)
                 if top > 0.0:
                     peak = max(peak, value(a[PHI], order, top))
             if m[FLOOR] == OFF:
@@ -280,6 +285,8 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log):
             if log.shape[0] >= events:
                 _note(log, events, t, LEFT if m[S] > 0 else RIGHT, mode_code(m), mode_code(m), 0.0)
             break
+        if which == G_SLIP and m[FAR] != 0 and abs(z[THETA]) < 1e-9:
+            which = G_PHI  # a corner that slides down the far wall lands as its pivot comes to rest
         before = mode_code(m)
         left[:] = m
         impulse[:] = 0.0
@@ -308,9 +315,11 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log):
             else:
                 known = _floor_impact(b, m, z, impulse)
             if z[THETA] == 0.0 and abs(z[W]) < SETTLE_SPIN:
-                z[VX] += (z[W] * b.cos_alpha) if slip_velocity(b, z) != 0.0 else -z[VX]
+                v = slip_velocity(b, z)
+                z[VX] = v if abs(v) > resting else 0.0
                 z[W] = 0.0
-                z[VY] = 0.0 if closed_floor(b, z) else z[VY]
+                if abs(z[HEIGHT] - b.cos_alpha) < _TOUCH and z[VY] < resting:
+                    z[VY] = 0.0
                 known = False
             wall_impacts += wall
             kind = WALL_IMPACT if wall else (LANDS if which == G_LANDING else FLOOR_IMPACT)
@@ -346,13 +355,13 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log):
     return Tally(ending, t, peak, at_rest, steps, series, events, wall_impacts, int(gains[0]), gains[1], hop, rows, t_rest)
 
 
-@njit(cache=True)
+@kernel
 def _note(log, count, t, kind, before, after, impulse):
     row = log[count - 1]
     row[0], row[1], row[2], row[3], row[4] = t, kind, before, after, impulse
 
 
-@njit(cache=True)
+@kernel
 def _step_size(first, second, order, tolerance, reach):
     """The step at which the last two terms of the series stay below the tolerance, at most `reach`."""
     last = abs(first[order]) + abs(second[order])
@@ -365,7 +374,7 @@ def _step_size(first, second, order, tolerance, reach):
     return h
 
 
-@njit(cache=True)
+@kernel
 def _highest(a, order, tau):
     """The highest lift of the pivot among 5 instants of the step."""
     top = 0.0
@@ -375,7 +384,7 @@ def _highest(a, order, tau):
     return top
 
 
-@njit(cache=True)
+@kernel
 def _floor_impact(b, m, z, impulse):
     """Bilateral pivot: the block lands at theta = 0. Returns whether it is already known to rock on in m."""
     w1, v1 = z[W], slip_velocity(b, z)
@@ -405,7 +414,7 @@ def _floor_impact(b, m, z, impulse):
     return False
 
 
-@njit(cache=True)
+@kernel
 def _wall_impact(b, m, z, tip, gh, t, resting, impulse, gains):
     """Bilateral pivot: a corner (case I, II) or the side (case III) strikes a wall. Returns whether m is already right."""
     if m[FAMILY] == FLAT:
@@ -453,14 +462,14 @@ def _wall_impact(b, m, z, tip, gh, t, resting, impulse, gains):
     return False
 
 
-@njit(cache=True)
+@kernel
 def _presses(b, gh, t, side):
     """Whether the base acceleration holds a flush block against the wall on `side` beyond what would lift or slide it."""
     level = side * acceleration(gh, t)
     return level > min(b.sin_alpha / b.cos_alpha, b.mu_s)
 
 
-@njit(cache=True)
+@kernel
 def _strike(b, m, z, resting, impulse, gains):
     """Unilateral: resolves all contacts touched at this instant. Returns False where no impact law fits."""
     sign = float(m[S])
@@ -484,12 +493,12 @@ def _strike(b, m, z, resting, impulse, gains):
     e_far = b.e_right if sign > 0 else b.e_left
     found = contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, gains)
     z[VX], z[VY], z[W] = sign * v[0], v[1], sign * v[2]
-    if touching[F] and abs(slip_velocity(b, z)) < 1e-13:
+    if touching[F] and abs(slip_velocity(b, z)) < _STOPPED:
         z[VX] = -c * z[W]
     return found
 
 
-@njit(cache=True)
+@kernel
 def _decided(b, m, z, gh, gv, peak):
     """After the excitation: the final peak rotation (>= pi/2: overturns) if the rest of the motion is certain, else -1.
 
@@ -514,7 +523,7 @@ def _decided(b, m, z, gh, gv, peak):
     return -1.0
 
 
-@njit(cache=True)
+@kernel
 def _sticks_for_good(b, energy):
     """Whether a pivot cannot slip in free rocking of this energy (up to its balance point), impacts included.
 

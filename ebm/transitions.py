@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from ebm.ground import acceleration
 from ebm.motion import (
@@ -49,7 +48,8 @@ from ebm.motion import (
     flat_series,
     tilt_series,
 )
-from ebm.series import leading
+from ebm.series import NOISE, SLIP_NOISE, leading
+from scenes.compiled import kernel
 
 # The guards, in the order in which ties are decided: floor before walls, contacts before friction.
 (
@@ -74,7 +74,7 @@ CLOSED_GAP = 1e-10
 CLOSED_RATE = 1e-9
 
 
-@njit(cache=True)
+@kernel
 def guard(b, m, which, order, pivot, a):
     """Writes guard `which` of mode m into the workspace and returns its degree, or -1 where the mode has no such guard."""
     out = a[GUARD]
@@ -125,7 +125,7 @@ def guard(b, m, which, order, pivot, a):
     return -1
 
 
-@njit(cache=True)
+@kernel
 def _gap(b, m, tip, order, pivot, a, out):
     """The clear gap of the corner that faces the tip wall, or the far wall."""
     if m[TIP if tip else FAR] != 0:
@@ -142,7 +142,7 @@ def _gap(b, m, tip, order, pivot, a, out):
     return order
 
 
-@njit(cache=True)
+@kernel
 def _flat_guard(b, m, which, order, a, out):
     """The guards of a translating block; the tip wall is the left one, the far wall the right one."""
     if which == G_LANDING:
@@ -199,7 +199,7 @@ _LOOK = 6  # order of the series that a selection looks at
 _AHEAD = 1e-2  # natural time over which it weighs their terms
 
 
-@njit(cache=True)
+@kernel
 def consistent(b, m, z, gh, gv, t, a):
     """Whether mode m can begin at state z: every guard leaves zero upward, and what must begin to move does."""
     if m[FAMILY] == FLAT:
@@ -212,7 +212,9 @@ def consistent(b, m, z, gh, gv, t, a):
         degree = guard(b, m, which, order, pivot, a)
         if degree < 0:
             continue
-        sign = leading(a[GUARD], degree, _AHEAD)
+        if G_LANDING <= which <= G_FAR_GAP and a[GUARD, 1] < -CLOSED_RATE:
+            continue  # not this mode's fault: an impact comes next
+        sign = leading(a[GUARD], degree, _AHEAD, SLIP_NOISE if which == G_SLIP else NOISE)
         if sign < 0 or not math.isfinite(a[GUARD, 0]):
             return False
         if sign == 0 and (which == G_SLIP or (which == G_PHI and m[FLOOR] != OFF)):
@@ -220,13 +222,13 @@ def consistent(b, m, z, gh, gv, t, a):
     return True
 
 
-@njit(cache=True)
+@kernel
 def slip_velocity(b, z):
     """V of the lower corner."""
     return z[VX] + math.cos(b.alpha - abs(z[THETA])) * z[W]
 
 
-@njit(cache=True)
+@kernel
 def closed_wall(b, z, side, lower):
     """Whether the corner facing the wall on `side` (+1 left, -1 right) rests on it.
 
@@ -240,11 +242,11 @@ def closed_wall(b, z, side, lower):
     arm = math.cos(b.alpha + abs(phi))
     if phi < 0.0 or (phi == 0.0 and lower):
         arm = -arm
-    rate = side * z[VX] - arm * z[W]
+    rate = side * (z[VX] - arm * z[W])
     return abs(clear) < CLOSED_GAP and abs(rate) < CLOSED_RATE
 
 
-@njit(cache=True)
+@kernel
 def closed_floor(b, z):
     """Whether the lower corner rests on the floor."""
     phi = abs(z[THETA])
@@ -252,7 +254,7 @@ def closed_floor(b, z):
     return abs(z[HEIGHT] - math.cos(b.alpha - phi)) < CLOSED_GAP and abs(rate) < CLOSED_RATE
 
 
-@njit(cache=True)
+@kernel
 def select(b, z, gh, gv, t, left, m, a):
     """Writes into m the mode that is consistent at state z, and returns whether there is one.
 
@@ -277,7 +279,7 @@ def select(b, z, gh, gv, t, left, m, a):
     return False
 
 
-@njit(cache=True)
+@kernel
 def _accept(b, m, z, gh, gv, t, left, a, again):
     same = True
     for k in range(m.size):
@@ -285,7 +287,7 @@ def _accept(b, m, z, gh, gv, t, left, a, again):
     return same == again and consistent(b, m, z, gh, gv, t, a)
 
 
-@njit(cache=True)
+@kernel
 def _select_flat(b, z, gh, gv, t, floor, left, m, a, again):
     m[:] = 0
     m[FAMILY], m[S], m[PULL] = FLAT, 1, 1
@@ -310,7 +312,7 @@ def _select_flat(b, z, gh, gv, t, floor, left, m, a, again):
     return False
 
 
-@njit(cache=True)
+@kernel
 def _select_tilt(b, z, gh, gv, t, sense, floor, left, m, a, again):
     m[:] = 0
     m[FAMILY], m[S] = TILT, sense

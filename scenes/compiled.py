@@ -1,0 +1,51 @@
+"""Compiled functions whose cache can be trusted.
+
+numba's own cache looks at a function's own file only: after a change in a function that it calls, the old machine code would
+be used silently. Here the cache folder is named after the content of all source files of the function's package.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import config
+
+
+@cache
+def _cache_folder(package: Path) -> str:
+    digest = hashlib.sha256()
+    for source in sorted(package.glob("*.py")):
+        digest.update(source.name.encode() + b"\0" + source.read_bytes())
+    name = f"{package.name}-kernels-{digest.hexdigest()[:16]}"
+    base = Path(config.CACHE_DIR) if config.CACHE_DIR else package / "__pycache__"
+    try:
+        folder = base / name
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+        for old in base.glob(f"{package.name}-kernels-*"):
+            if old != folder:
+                shutil.rmtree(old, ignore_errors=True)
+    except OSError:  # installed where we may not write
+        folder = Path(tempfile.gettempdir()) / f"rockcheck-{os.getuid() if hasattr(os, 'getuid') else 'user'}" / name
+    return str(folder)
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compiles `function` with numba on its first call, cached on disk until any source of its package changes."""
+    compiled = numba.njit(function)
+    before = config.CACHE_DIR
+    config.CACHE_DIR = _cache_folder(Path(function.__code__.co_filename).parent)
+    try:
+        compiled.enable_caching()
+    finally:
+        config.CACHE_DIR = before
+    return compiled
