@@ -78,7 +78,7 @@ def _source(name: str) -> Path | None:
 
 
 def _imports(path: Path, package: str) -> Iterable[str]:
-    for node in ast.walk(_tree(path)):
+    for node in ast.walk(syntax(path)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -90,7 +90,8 @@ def _imports(path: Path, package: str) -> Iterable[str]:
 
 
 @cache
-def _tree(path: Path) -> ast.Module:
+def syntax(path: Path) -> ast.Module:
+    """The syntax tree of a source file."""
     return ast.parse(path.read_text(encoding="utf-8"))
 
 

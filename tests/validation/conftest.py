@@ -29,7 +29,7 @@ def synthetic(
     time = np.asarray(t if t is not None else 0.01 * np.arange(len(theta)), dtype=float)
     zero = np.zeros(len(theta))
     channels = {"t": time, "x": zero, "y": RADIUS * np.cos(ALPHA - np.abs(theta)), "theta": theta}
-    channels |= {name: zero for name in ("x_dot", "y_dot", "theta_dot", "slip", "slip_rate")}
+    channels |= dict.fromkeys(("x_dot", "y_dot", "theta_dot", "slip", "slip_rate"), zero)
     channels |= {name: np.asarray(column, dtype=float) for name, column in columns.items()}
     return History(
         name="made",

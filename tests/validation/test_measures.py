@@ -107,9 +107,7 @@ def test_what_was_not_compared_is_a_gap(made):
 
 
 def test_both_fell_the_same_way_is_whole(made):
-    fallen = [
-        made(WAVE[:n], T[:n], outcome="overturned left", events=[Event(t=T[n], kind="overturned left")]) for n in (2000, 2004)
-    ]
+    fallen = [made(WAVE[:n], T[:n], outcome="overturned left", events=[Event(t=T[n], kind="overturned left")]) for n in (2000, 2004)]
     found = compare(*fallen)
     assert found.gap == ""
     assert found["overturning_time"] == pytest.approx(0.01)

@@ -1,0 +1,64 @@
+"""Models that go wrong in every way that a worker must survive, and one that is exact. Copied beside a test's suite."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+
+import numpy as np
+
+from scenes import History, ModelFailure, Scene
+from scenes.base import Frozen
+from scenes.observation import observe
+
+
+class Still(Frozen):
+    """A block that stands; `offset` shifts its theta (rad)."""
+
+    offset: float = 0.0
+
+    def simulate(self, scene: Scene) -> History:
+        state = np.zeros((len(scene.output_times), 6))
+        state[:, 1] = scene.block.half_height
+        state[:, 2] = self.offset
+        return observe(scene, "still", state)
+
+
+class NotFinite(Frozen):
+    """NaN in the last row."""
+
+    def simulate(self, scene: Scene) -> History:
+        history = Still().simulate(scene)
+        history.channels["theta"][-1] = np.nan
+        return history
+
+
+class Fails(Frozen):
+    def simulate(self, scene: Scene) -> History:
+        raise ModelFailure("more than 10 events")
+
+
+class Bug(Frozen):
+    def simulate(self, scene: Scene) -> History:
+        raise ZeroDivisionError("a bug\nof two lines")
+
+
+class Segfault(Frozen):
+    def simulate(self, scene: Scene) -> History:
+        os.kill(os.getpid(), signal.SIGSEGV)
+        raise AssertionError
+
+
+class Hang(Frozen):
+    def simulate(self, scene: Scene) -> History:
+        while True:
+            time.sleep(1.0)
+
+
+class Hog(Frozen):
+    """Takes 100 MB after 100 MB, at most 8 GB."""
+
+    def simulate(self, scene: Scene) -> History:
+        taken = [np.ones(100 * 2**17) for _ in range(80)]
+        return Still(offset=float(taken[0][0])).simulate(scene)

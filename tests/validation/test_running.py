@@ -1,0 +1,143 @@
+"""Suites end to end: cells in workers that crash, hang and eat memory; results kept and read back."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+from validation import provenance, workers
+from validation.results import Run
+from validation.runner import Executor, run_suite
+from validation.suites import load_suite
+
+SUITE = """
+reference = "still"
+[limits]
+seconds = {seconds}
+memory_mb = 500
+[models.still]
+model = "faulty:Still"
+{models}
+[require]
+difference = ["theta_rms"]
+[[scene]]
+name = "short"
+duration = 0.5
+block = {{ half_width = 0.4, half_height = 1.5 }}
+floor = {{ friction = 0.5 }}
+{tolerances}
+"""
+FINE = '[tolerances.short.{model}.still]\ntheta_rms = {{ expected = 0.0, limit = 1e-9, drift = 0.0, why = "the same" }}\n'
+
+
+def write_suite(folder: Path, models: dict[str, str], tolerances: str = "", seconds: float = 60.0) -> Path:
+    shutil.copy(Path(__file__).parent / "models" / "faulty.py", folder / "faulty.py")
+    tables = "\n".join(f"[models.{label}]\n{lines}" for label, lines in models.items())
+    path = folder / "mine.toml"
+    path.write_text(SUITE.format(models=tables, tolerances=tolerances, seconds=seconds), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.delitem(sys.modules, "faulty", raising=False)
+
+    def run(path: Path, play: Executor = in_this_process, **options: object) -> Run:
+        return run_suite(load_suite(path), tmp_path / "out", jobs=2, play=play, **options)
+
+    return run
+
+
+def in_this_process(tasks, **limits):
+    """Cells that cannot go wrong need no worker."""
+    return enumerate(map(workers.play, tasks))
+
+
+def test_every_kind_of_failure_fails_its_cell_alone(tmp_path, run):
+    faults = {name: f'model = "faulty:{name}"' for name in ("Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")}
+    path = write_suite(tmp_path, {**faults, "again": 'model = "faulty:Still"'}, FINE.format(model="again"), seconds=6.0)
+    done = run(path, play=workers.local)
+    reasons = {cell.model: cell.reason for cell in done.cells}
+    assert reasons["Segfault"] == "crashed: SIGSEGV"
+    assert reasons["Hang"] == "did not end within 6 s"
+    assert "memory" in reasons["Hog"].lower()
+    assert reasons["Fails"] == "more than 10 events"
+    assert reasons["Bug"] == "ZeroDivisionError: a bug?of two lines"
+    assert reasons["NotFinite"] == "theta is nan at t = 0.5 s"
+    assert {cell.model for cell in done.cells if cell.status == "done"} == {"still", "again"}
+    assert done.cell("short", "again").verdict == "pass"
+    assert done.exit_code == 3
+
+
+def test_only_what_changed_runs_again(tmp_path, run):
+    path = write_suite(tmp_path, {"a": 'model = "faulty:Still"', "b": 'model = "faulty:Still"\noffset = 1e-12'}, FINE.format(model="a"))
+    assert run(path).up_to_date == 0
+    again = run(path)
+    assert again.up_to_date == 3
+    path.write_text(path.read_text().replace("1e-12", "2e-12"))
+    changed = run(path)
+    assert [cell.model for cell in changed.cells if not cell.read_back] == ["b"]
+    assert run(path, force=True).up_to_date == 0
+    code = tmp_path / "faulty.py"
+    code.write_text(code.read_text().replace('"""A block that stands', '"""A block that stays') + "\n# a remark\n")
+    assert _reread(run, path).up_to_date == 3, "documentation is not code"
+    code.write_text(code.read_text().replace("= self.offset", "= 1.0 * self.offset"))
+    assert _reread(run, path).up_to_date == 0
+
+
+def _reread(run, path):
+    """Run as a new process would, which has not read the code before."""
+    sys.modules.pop("faulty", None)
+    provenance.code_digest.cache_clear()
+    provenance.syntax.cache_clear()
+    return run(path)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".events.csv", ".json"])
+@pytest.mark.parametrize("damage", ["gone", "cut short", "empty"])
+def test_a_damaged_result_is_not_read(tmp_path, run, suffix, damage):
+    path = write_suite(tmp_path, {})
+    run(path)
+    (target,) = (file for file in (tmp_path / "out" / "histories").iterdir() if file.name.partition(".")[2] == suffix[1:])
+    content = target.read_text()
+    target.unlink() if damage == "gone" else target.write_text(content[: len(content) // 2] if damage == "cut short" else "")
+    assert run(path).up_to_date == 0
+    assert target.read_text().splitlines()[1:] == content.splitlines()[1:]
+    assert run(path).up_to_date == 1
+
+
+def test_a_failed_reference_fails_what_needs_it(tmp_path, run):
+    path = write_suite(tmp_path, {"a": 'model = "faulty:Still"'}, FINE.format(model="a"))
+    path.write_text(path.read_text().replace('model = "faulty:Still"', 'model = "faulty:Fails"', 1))
+    cell = run(path).cell("short", "a")
+    assert cell.verdict == "fail"
+    assert cell.checks[0].reason == "still failed in this scene"
+
+
+def test_missing_tolerance_missing_cell_and_nothing_judged_do_not_pass(tmp_path, run):
+    missing = run(write_suite(tmp_path, {"a": 'model = "faulty:Still"'}))
+    assert missing.cell("short", "a").checks[0].reason == "no tolerance is written down"
+    assert missing.exit_code == 1
+    alone = run(write_suite(tmp_path, {}))
+    assert not any(cell.checks for cell in alone.cells)
+    assert alone.exit_code == 1
+    absent = FINE.format(model="a") + FINE.format(model="a").replace("short", "long")
+    faulty = run(write_suite(tmp_path, {"a": 'model = "faulty:Still"'}, absent))
+    assert faulty.faults == ("tolerance [long.a.still: theta_rms] has no cell in the suite",)
+    assert faulty.cell("short", "a").verdict == "pass"
+    assert faulty.exit_code == 1
+
+
+def test_a_run_is_saved_whole_and_says_what_it_is(tmp_path, run):
+    done = run(write_suite(tmp_path, {"a": 'model = "faulty:Still"'}, FINE.format(model="a")))
+    done.save(tmp_path / "out")
+    assert Run.load(tmp_path / "out") == done
+    schema = json.loads((tmp_path / "out" / "run.schema.json").read_text())
+    assert set(json.loads((tmp_path / "out" / "run.json").read_text())) == set(schema["properties"])
+    assert done.exit_code == 0
+    assert not list((tmp_path / "out").glob("**/*.part"))

@@ -1,0 +1,94 @@
+"""Suite files: combinations of scenes, variants of models, and faults told in one line."""
+
+from __future__ import annotations
+
+import pytest
+
+from scenes import InputError
+from validation.suites import load_suite
+
+MODELS = 'reference = "ebm"\n[models.ebm]\n'
+SHELF = '[[scene]]\nname = "shelf"\nduration = 1.0\nblock = { half_width = 0.1, half_height = 0.4 }\nfloor = { friction = 0.5 }\n'
+
+
+def suite(tmp_path, text):
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_suite(path)
+
+
+def test_scenes_by_name_by_table_and_by_file(tmp_path):
+    (tmp_path / "own.toml").write_text(SHELF.replace("[[scene]]\n", "").replace("shelf", "own"), encoding="utf-8")
+    found = suite(tmp_path, 'scenes = ["fig4a", "own.toml"]\n' + MODELS + SHELF)
+    assert list(found.scenes) == ["fig4a", "own", "shelf"]
+    assert found.scenes["shelf"].block.half_width == 0.1
+
+
+def test_a_grid_is_every_combination(tmp_path):
+    text = (
+        MODELS
+        + """
+[[grid]]
+axes = [
+    [{ name = "left", walls = [{ side = "left" }] }, { name = "right", walls = [{ side = "right" }] }],
+    [
+        { name = "3mm", walls = [{ gap = 0.003 }] },
+        { name = "53mm", walls = [{ gap = 0.053 }] },
+        { name = "mu09", walls = [{ gap = 0.1 }], floor = { friction = 0.9 } },
+    ],
+]
+[grid.scene]
+name = "w"
+duration = 1.0
+block = { half_width = 0.1, half_height = 0.4 }
+floor = { friction = 0.5 }
+walls = [{ restitution = 0.5 }]
+"""
+    )
+    found = suite(tmp_path, text)
+    assert list(found.scenes) == [f"w-{side}-{rest}" for side in ("left", "right") for rest in ("3mm", "53mm", "mu09")]
+    scene = found.scenes["w-right-mu09"]
+    assert (scene.walls[0].side, scene.walls[0].gap, scene.walls[0].restitution, scene.floor.friction) == ("right", 0.1, 0.5, 0.9)
+
+
+def test_variants_of_a_model_have_labels_of_their_own(tmp_path):
+    found = suite(tmp_path, SHELF.replace("[[scene]]", MODELS + '[models.coarse]\nmodel = "mujoco"\ntime_step = 1e-3\n[[scene]]'))
+    assert [(scene.name, part.label, part.family_name) for scene, part in found.cells()] == [
+        ("shelf", "ebm", "ebm"),
+        ("shelf", "coarse", "mujoco"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        (SHELF, "reference: 'ebm-unilateral' is not among the suite's models"),
+        ('reference = "x"\n' + SHELF, "reference: 'x' is not among"),
+        (MODELS, "scenes: no scene"),
+        ('scenes = ["fig4"]\n' + MODELS, "did you mean 'fig4b'"),
+        ('scenes = ["fig4a", "fig4a"]\n' + MODELS, "scene 'fig4a' is named twice"),
+        ('scenes = ["gone.toml"]\n' + MODELS, "gone.toml: cannot be read"),
+        (MODELS + "tollerance = 1e-9\n" + SHELF, "ebm.tollerance: unknown key"),
+        (MODELS + 'pivot = "unilateral"\n' + SHELF, "ebm.pivot: is fixed by the name"),
+        (MODELS + "[models.mujcoo]\n" + SHELF, "did you mean 'mujoco'"),
+        (MODELS + '[models.own]\nmodel = "nowhere:Model"\n' + SHELF, "not available in this installation"),
+        (MODELS + "[require]\ndifference = ['theta_rsm']\n" + SHELF, "did you mean 'theta_rms'"),
+        (MODELS + "[require]\ndifference = ['peak_rotation']\n" + SHELF, "require.difference"),
+        (MODELS + SHELF.replace("0.1", "-0.1"), "block.half_width: -0.1 is not allowed"),
+        (MODELS + SHELF + "[tolerances.shelf.ebm.nobody]\ntheta_rms = { limit = 1.0 }\n", "unknown reference"),
+        ("reference = [\n", "not valid TOML"),
+        ('include = ["paper", "paper"]\n', "is in two of the suites"),
+        ("unknown = 1\n" + MODELS, "unknown: unknown key"),
+    ],
+)
+def test_faults_are_one_line_with_the_file(tmp_path, text, fault):
+    with pytest.raises(InputError, match=fault) as caught:
+        suite(tmp_path, text)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.count("mine.toml") == 1 or "gone.toml" in message
+
+
+def test_an_unknown_suite_suggests_the_nearest():
+    with pytest.raises(InputError, match="did you mean 'paper'"):
+        load_suite("papre")

@@ -1,0 +1,182 @@
+"""Tolerances: what passes, what has changed, what fails; and how `accept` may rewrite them."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from scenes import InputError
+from validation.acceptance import accept
+from validation.measures import DIFFERENCES, FIGURES
+from validation.results import Cell, Figure, Run
+from validation.suites import load_suite, named_suites
+from validation.tolerances import Tolerance, Windowed, judge, parse_tolerances
+
+LINE = Tolerance(expected=1.0e-3, limit=2.0e-3, drift=1.0e-4, why="a test")
+
+
+def figure(value, measure="theta_rms", **more):
+    return Figure(measure=measure, label=measure, unit="alpha", value=value, **more)
+
+
+def verdict(value, line=LINE, measure="theta_rms", **more):
+    known = DIFFERENCES.get(measure) or FIGURES[measure]
+    return judge(figure(value, measure), line, kind="numerical", measure=known, **more).verdict
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        (1.0e-3, "pass"),
+        (1.09e-3, "pass"),
+        (1.2e-3, "changed"),
+        (0.5e-3, "changed"),
+        (2.0e-3, "changed"),
+        (2.1e-3, "fail"),
+        (-2.1e-3, "fail"),
+    ],
+)
+def test_limit_and_drift(value, expected):
+    assert verdict(value) == expected
+
+
+@pytest.mark.parametrize("value", [None, math.nan, math.inf, -math.inf])
+def test_what_is_not_a_number_fails(value):
+    assert verdict(value) == "fail"
+    assert verdict(value, measure="events_agree_until") == "fail"
+    assert verdict(value, measure="peak_rotation") == "fail"
+
+
+def test_no_tolerance_and_a_gap_fail():
+    assert verdict(0.0, line=None) == "fail"
+    assert verdict(1.0e-3, gap="mujoco ends at 3 s") == "fail"
+
+
+def test_ratios_are_held_against_one_and_figures_against_what_was_expected():
+    band = Tolerance(expected=1.0, limit=0.1, drift=0.05)
+    assert [verdict(v, band, "peak_ratio") for v in (1.0, 0.94, 0.89, 1.11)] == ["pass", "changed", "fail", "fail"]
+    own = Tolerance(expected=0.33, limit=0.01, drift=0.001)
+    assert [verdict(v, own, "peak_rotation") for v in (0.33, 0.335, 0.345)] == ["pass", "changed", "fail"]
+    until = Tolerance(limit=8.0)
+    assert [verdict(v, until, "events_agree_until") for v in (8.0, 12.0, 7.9)] == ["pass", "pass", "fail"]
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ('[a.b.c]\ntheta_rsm = {limit = 1.0}', "did you mean 'theta_rms'"),
+        ('[a.b.c]\n"theta_rms@8" = {limit = 1.0}', "window '8'"),
+        ('[a.b.c]\ntheta_rms = {limit = nan}', "limit"),
+        ('[a.b.c]\ntheta_rms = {limit = -1.0}', "limit"),
+        ('[a.b.c]\ntheta_rms = {expected = 1.0}', "limit: is missing"),
+        ('[a.b.c]\ntheta_rms = {limit = 1.0, dirft = 1.0}', "dirft: unknown key"),
+        ('[a.b.c]\ntheta_rms = 1.0', "a table"),
+        ('[a.b.c]\npeak_rotation = {limit = 1.0, expected = 1.0}', "figures"),
+        ('[a.b.figures]\npeak_rotation = {limit = 1.0}', "expected: is missing"),
+        ('a = 1', "tables"),
+    ],
+)  # fmt: skip
+def test_faults_in_a_file_are_named(text, fault):
+    with pytest.raises(InputError, match=fault) as caught:
+        parse_tolerances(tomllib.loads(text))
+    assert "\n" not in str(caught.value)
+
+
+def made_run(*checks):
+    cell = Cell(scene="s", model="m", status="done", checks=checks)
+    return Run(suite="mine", created="", reference="r", scenes={"s": {}}, models=("r", "m"), cells=(cell,))
+
+
+def check(value, line=LINE, measure="theta_rms"):
+    return judge(figure(value, measure, against="r"), line, kind="numerical", measure=DIFFERENCES[measure])
+
+
+def accepted(path: Path, run: Run, reason: str | None = None):
+    suite = SimpleNamespace(parts=(), path=Path("mine.toml"), tolerances_path=path, scenes={"s": None})
+    return accept(suite, run, reason)
+
+
+FILE = '# by hand\n\n[s.m.r]\n# the main one\ntheta_rms = { expected = 0.001, limit = 0.002, drift = 0.0001, why = "a test" }\n'
+
+
+@pytest.fixture
+def tolerance_file(tmp_path):
+    path = tmp_path / "mine.tolerances.toml"
+    path.write_text(FILE, encoding="utf-8")
+    return path
+
+
+def test_accept_leaves_what_passes(tolerance_file):
+    assert accepted(tolerance_file, made_run(check(1.05e-3))) == ([], [])
+    assert tolerance_file.read_text() == FILE
+
+
+def test_accept_moves_the_expected_figure_and_keeps_the_limit(tolerance_file):
+    changes, refused = accepted(tolerance_file, made_run(check(1.5e-3)))
+    assert refused == []
+    assert changes == ["[s.m.r] theta_rms: expected 0.001, limit 0.002, drift 0.0001 -> expected 0.0015, limit 0.002, drift 0.0001"]
+    text = tolerance_file.read_text()
+    assert text.startswith("# by hand\n\n[s.m.r]\n# the main one\n")
+    assert tomllib.loads(text)["s"]["m"]["r"]["theta_rms"] == {"expected": 0.0015, "limit": 0.002, "drift": 0.0001, "why": "a test"}
+
+
+def test_accept_loosens_only_with_a_reason(tolerance_file):
+    run = made_run(check(5.0e-3))
+    changes, refused = accepted(tolerance_file, run)
+    assert changes == []
+    assert "--reason" in refused[0]
+    assert tolerance_file.read_text() == FILE
+    changes, refused = accepted(tolerance_file, run, "coarser step since 1.2")
+    assert refused == []
+    line = tomllib.loads(tolerance_file.read_text())["s"]["m"]["r"]["theta_rms"]
+    assert line == {"expected": 0.005, "limit": 0.01, "drift": 0.0001, "why": "coarser step since 1.2"}
+
+
+def test_accept_refuses_what_is_not_a_figure(tolerance_file):
+    changes, refused = accepted(tolerance_file, made_run(check(math.nan)), "because")
+    assert (changes, len(refused)) == ([], 1)
+    gap = judge(figure(1e-3, against="r"), LINE, kind="numerical", measure=DIFFERENCES["theta_rms"], gap="m ends at 3 s")
+    assert accepted(tolerance_file, made_run(gap), "because")[1] == ["[s.m.r] theta_rms: m ends at 3 s"]
+    assert tolerance_file.read_text() == FILE
+
+
+def test_accept_writes_a_line_that_was_missing(tmp_path):
+    path = tmp_path / "new.toml"
+    accepted(path, made_run(check(1.23456789e-3, None), check(0.99, None, "peak_ratio")))
+    lines = parse_tolerances(tomllib.loads(path.read_text()))
+    assert {str(place.what): (line.expected, line.limit) for place, line in lines.items()} == {
+        "theta_rms": (0.00123457, 0.0025),
+        "peak_ratio": (0.99, 0.02),
+    }
+    for place, line in lines.items():
+        assert judge(figure(line.expected), line, kind="numerical", measure=place.what.definition).verdict == "pass"
+
+
+def test_a_new_line_holds_what_it_was_made_from(tmp_path):
+    for number, value in enumerate((0.0, 1e-12, 3.3e-7, 0.123, 17.0)):
+        path = tmp_path / f"{number}.toml"
+        accepted(path, made_run(check(value, None)))
+        ((place, line),) = parse_tolerances(tomllib.loads(path.read_text())).items()
+        assert judge(figure(value), line, kind="numerical", measure=place.what.definition).verdict == "pass"
+
+
+def test_shipped_suites_load_and_their_tolerances_have_cells():
+    for name in named_suites():
+        suite = load_suite(name)
+        cells = {(scene.name, part.label) for scene, part in suite.cells()}
+        assert cells, name
+        for place, line in suite.tolerances.items():
+            assert (place.scene, place.model) in cells, str(place)
+            assert line.why, str(place)
+            assert line.expected is not None, str(place)
+            assert line.drift is not None, str(place)
+
+
+def test_windows():
+    assert str(Windowed.parse("theta_rms@8s")) == "theta_rms@8s"
+    assert Windowed.parse("theta_rms@1.5s").seconds == 1.5
+    assert Windowed.parse("theta_rms").seconds is None
