@@ -9,6 +9,7 @@ from filelock import FileLock
 from validation import provenance
 from validation.results import Run, write_whole
 from validation.tables import checks_csv, figures_csv
+from validation.verdicts import junit, markdown
 
 LOCK, STAMP = ".lock", ".rendered"
 
@@ -22,6 +23,8 @@ def publish(run: Run, folder: Path) -> Path:
         run.save(folder)
         write_whole(folder / "checks.csv", checks_csv(run))
         write_whole(folder / "figures.csv", figures_csv(run))
+        write_whole(folder / "junit.xml", junit(run))
+        write_whole(folder / "summary.md", markdown(run))
         cells = tuple(cell.model_copy(update={"read_back": False}) for cell in run.cells)
         same = run.model_copy(update={"created": "", "wall_seconds": 0.0, "cells": cells})
         stamp = provenance.digest(same.model_dump_json() + provenance.code_digest("reports"))

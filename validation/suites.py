@@ -36,7 +36,7 @@ from __future__ import annotations
 import itertools
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
@@ -139,6 +139,22 @@ class Suite:
             for scene in part.scenes.values():
                 for model in part.models.values():
                     yield scene, model
+
+    def only(self, scene: str, model: str) -> Suite:
+        """The suite with one cell, and the references that it is held against."""
+        own = self.part_of(scene)
+        if scene not in own.scenes:
+            raise unknown_name("scene of the suite", scene, self.scenes)
+        if model not in own.models:
+            raise unknown_name("model of the suite", model, own.models)
+        tolerances = {place: line for place, line in own.tolerances.items() if (place.scene, place.model) == (scene, model)}
+        needed = {model, own.reference, own.model_form, *(place.against for place in tolerances)}
+        return replace(
+            own,
+            scenes={scene: own.scenes[scene]},
+            models={label: part for label, part in own.models.items() if label in needed},
+            tolerances=tolerances,
+        )
 
     def asked(self, scene: str, model: str) -> dict[Place, Kind]:
         """What must be judged in a cell, and as what: what the suite requires and whatever has a tolerance."""

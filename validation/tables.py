@@ -35,11 +35,16 @@ def verdict_lines(run: Run) -> Iterator[str]:
     """Why anything is not a pass, a line each."""
     yield from run.faults
     for cell in run.cells:
-        if cell.status == "failed":
-            yield f"{cell.scene}, {cell.model}: {cell.reason}"
-        for check in cell.checks:
-            if check.verdict != "pass":
-                yield f"{cell.scene}, {cell.model}: {title(check)}: {check.reason}"
+        yield from cell_lines(cell)
+
+
+def cell_lines(cell: Cell) -> Iterator[str]:
+    """Why a cell is not a pass, a line each."""
+    if cell.status == "failed":
+        yield f"{cell.scene}, {cell.model}: {cell.reason}"
+    for check in cell.checks:
+        if check.verdict != "pass":
+            yield f"{cell.scene}, {cell.model}: {title(check)}: {check.reason}"
 
 
 def title(check: Check) -> str:

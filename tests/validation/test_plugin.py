@@ -1,0 +1,57 @@
+"""The pytest plugin, in a pytest of its own."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+pytest_plugins = ["pytester"]
+
+SUITE = """
+reference = "still"
+[models.still]
+model = "faulty:Still"
+[models.near]
+model = "faulty:Still"
+offset = 1e-3
+[models.broken]
+model = "faulty:Fails"
+[[scene]]
+name = "my-scene"
+duration = 0.5
+block = { half_width = 0.4, half_height = 1.5 }
+floor = { friction = 0.5 }
+[tolerances.my-scene.near.still]
+theta_peak = { expected = 0.0038, limit = 0.01, drift = 0.001, why = "a test" }
+theta_rms = { expected = 0.001, limit = 0.01, drift = 0.001, why = "a test" }
+[tolerances.my-scene.broken.still]
+theta_peak = { expected = 0.0, limit = 0.01, drift = 0.001, why = "a test" }
+"""
+TESTS = """
+def test_near(check):
+    assert check("my-scene", model="near").figures
+def test_strict(check):
+    check("my-scene", model="near", strict=True)
+def test_broken(check):
+    check("my-scene", model="broken")
+def test_reference(check):
+    check("my-scene", model="still")
+def test_unknown(check):
+    check("my-scene", model="nera")
+"""
+
+
+def test_check_holds_a_cell_against_its_suite(pytester):
+    shutil.copy(Path(__file__).parent / "models" / "faulty.py", pytester.path / "faulty.py")
+    (pytester.path / "rockcheck.toml").write_text(SUITE, encoding="utf-8")
+    pytester.makepyfile(TESTS)
+    result = pytester.runpytest_subprocess("-p", "no:randomly", "-rf")
+    result.assert_outcomes(passed=1, failed=4)
+    result.stdout.fnmatch_lines(
+        [
+            "*my-scene, near: theta_rms against still: 0.003* was 0.001 (drift allowed 0.001)*",
+            "*my-scene, broken: more than 10 events*",
+            "*nothing is judged*",
+            "*did you mean 'near'*",
+        ]
+    )
