@@ -67,7 +67,9 @@ class EventBasedModel(Frozen):
                     "initial_height",
                 )
         elif scene.floor.restitution == 1.0:
-            raise InputError("1 is not allowed: a block that loses nothing at the floor never settles; use less than 1", "floor.restitution")
+            raise InputError(
+                "1 is not allowed: a block that loses nothing at the floor never settles; use less than 1", "floor.restitution"
+            )
 
     def simulate(self, scene: Scene) -> History:
         """The motion of the scene on its output grid. Raises `InputError` (see `check`) or `ModelFailure`."""
@@ -89,9 +91,7 @@ class EventBasedModel(Frozen):
         start = time.perf_counter()
         from ebm import natural, trajectory
 
-        b = natural.setting_of(
-            scene, unilateral=self.pivot == "unilateral", no_slip=self.friction == "no-slip", energy_cap=self.energy_cap
-        )
+        b = natural.setting_of(scene, unilateral=self.pivot == "unilateral", no_slip=self.friction == "no-slip", energy_cap=self.energy_cap)
         horizontal, vertical = natural.grounds_of(scene)
         unit = natural.time_unit(scene)
         state = natural.state_of(scene)

@@ -371,4 +371,3 @@ def flat_state(b, m, order, tau, a, z):
         z[HEIGHT] = b.cos_alpha
         z[VY] = 0.0
     z[THETA] = z[W] = 0.0
-

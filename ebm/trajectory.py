@@ -100,6 +100,8 @@ _FLUSH_SPIN, _FLUSH_SPEED, _FLUSH_GAP = 2e-4, 2.5e-4, 6e-7
 _TOUCH = 1e-11
 # A pivot that slips more slowly than this after an impact stands: the impact law says so up to rounding.
 _STOPPED = 1e-10
+# Near phi = 0 the far gap goes with phi^2, so that its root says phi to the square root of rounding only.
+_LANDED = 1e-7
 _MOST_ZERO_STEPS = 60
 
 
@@ -285,7 +287,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log):
             if log.shape[0] >= events:
                 _note(log, events, t, LEFT if m[S] > 0 else RIGHT, mode_code(m), mode_code(m), 0.0)
             break
-        if which == G_SLIP and m[FAR] != 0 and abs(z[THETA]) < 1e-9:
+        if which == G_SLIP and m[FAR] != 0 and abs(z[THETA]) < _LANDED:
             which = G_PHI  # a corner that slides down the far wall lands as its pivot comes to rest
         before = mode_code(m)
         left[:] = m
@@ -305,7 +307,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log):
             wall = which == G_TIP_GAP or which == G_FAR_GAP
             if which == G_PHI:
                 z[THETA] = 0.0
-            elif wall and m[FAMILY] == TILT and abs(z[THETA]) < 1e-9 and m[S] * z[W] < 0.0 and closed_floor(b, z):
+            elif which == G_FAR_GAP and m[FAMILY] == TILT and abs(z[THETA]) < _LANDED and m[S] * z[W] < 0.0 and closed_floor(b, z):
                 z[THETA], wall = 0.0, False  # the corner meets the wall as the block lands: a floor event
             if b.unilateral:
                 found = _strike(b, m, z, resting, impulse, gains)

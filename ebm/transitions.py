@@ -95,6 +95,7 @@ def guard(b, m, which, order, pivot, a):
             return -1
         for k in range(order + 1):
             out[k] = a[Y, k] - a[COS, k]
+        _settle_touch(out)
         return order
     if which == G_TIP_GAP or which == G_FAR_GAP:
         return _gap(b, m, which == G_TIP_GAP, order, pivot, a, out)
@@ -135,11 +136,22 @@ def _gap(b, m, tip, order, pivot, a, out):
         return -1
     sense = 1.0 if tip else -1.0
     rock = m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
+    if rock and not tip and distance - pivot - 2.0 * b.sin_alpha > -1e-13:
+        # About a fixed pivot the far gap shrinks with phi, down to this value as the block lands: it cannot close before.
+        return -1
     xi = a[SIN] if rock else a[XI]
     for k in range(order + 1):
         out[k] = sense * xi[k] - (b.sin_2alpha * a[COS, k] - b.cos_2alpha * a[SIN, k])
     out[0] += distance + (sense * pivot if rock else 0.0)
+    _settle_touch(out)
     return order
+
+
+@kernel
+def _settle_touch(gap):
+    """A contact that touches and parts or closes more slowly than CLOSED_RATE counts as resting: its acceleration decides."""
+    if abs(gap[0]) < 1e-12 and abs(gap[1]) < CLOSED_RATE:
+        gap[0] = gap[1] = 0.0
 
 
 @kernel
