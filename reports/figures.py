@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,11 +16,15 @@ from scenes.excitations import GRAVITY_OF_RECORDS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
 
 #: How an event is drawn on a model's track: kind, marker, size.
 TRACKED = (("floor impact", "|", 5.0), ("wall impact", "D", 2.6))
 #: Below this share of a channel's largest value differences are drawn on a linear scale where no tolerance says better.
 FINE = 1e-3
+LEGEND_COLUMNS = 6
+TOLERANCE = "#009168"
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def histories_figure(view: SceneView, against: str | None = None, channels: Sequence[Channel] = PAPER_CHANNELS) -> Figure:
@@ -33,9 +38,14 @@ def histories_figure(view: SceneView, against: str | None = None, channels: Sequ
         against = next(iter(view.references), None)
     with figure_style():
         heights = [0.55] + [h for _ in channels for h in ([1.0, 0.62] if against else [1.0])] + [0.16 * len(view.histories) + 0.15]
-        figure = Figure(figsize=(PAGE, 1.0 + 0.98 * sum(heights)), layout="constrained")
-        figure.get_layout_engine().set(h_pad=0.015, hspace=0.0)  # type: ignore[union-attr]
+        shades = _shades(view, against, channels)
+        legend_rows = -(-(len(view.histories) + len(shades)) // LEGEND_COLUMNS)
+        # Margins in inches: a layout engine would need several times the drawing's own time.
+        top, bottom, space = 0.25 + 0.16 * legend_rows, 0.42, 0.09
+        height = top + bottom + 0.92 * sum(heights) + space * len(heights)
+        figure = Figure(figsize=(PAGE, height))
         axes = list(figure.subplots(len(heights), 1, sharex=True, height_ratios=heights))
+        figure.subplots_adjust(0.95 / PAGE, bottom / height, 1.0 - 0.08 / PAGE, 1.0 - top / height, hspace=space / 0.7)
         _ground(axes[0], view)
         below = iter(axes[1:])
         for channel in channels:
@@ -45,13 +55,21 @@ def histories_figure(view: SceneView, against: str | None = None, channels: Sequ
         _tracks(next(below), view)
         for ax in axes:
             _mark_horizon(ax, view)
+            ax.yaxis.set_label_coords(-0.6 / (PAGE - 1.03), 0.5)
         axes[-1].set_xlabel("time (s)")
         axes[-1].set_xlim(float(view.t[0]), float(view.t[-1]) or 1.0)
-        figure.align_ylabels(axes)
+        edge = 0.08 / PAGE
+        figure.text(edge, 1.0 - 0.06 / height, _title(view, against), va="top", weight="bold", fontsize=8.5)
         handles, labels = axes[1].get_legend_handles_labels()
-        if handles:
-            figure.legend(handles, labels, loc="outside upper left", ncols=6, title=_title(view, against), alignment="left")
-        figure.text(0.999, 0.001, _stamp(view), ha="right", va="bottom", fontsize=4.5, color="#777777")
+        figure.legend(
+            handles + shades,
+            [_short(label, 24) for label in labels + [str(shade.get_label()) for shade in shades]],
+            ncols=LEGEND_COLUMNS,
+            loc="upper left",
+            bbox_to_anchor=(0.0, 1.0 - 0.2 / height),
+            borderaxespad=0.0,
+        )
+        figure.text(1.0 - edge, 0.03 / height, _stamp(view), ha="right", va="bottom", fontsize=4.5, color="#777777")
     return figure
 
 
@@ -128,34 +146,31 @@ def _values(ax: Axes, view: SceneView, channel: Channel) -> None:
 def _differences(ax: Axes, view: SceneView, channel: Channel, against: str) -> None:
     bands = [band for band in view.bands(against) if band.channel == channel.name]
     for limit, until in sorted({(band.limit, band.until) for band in bands}, reverse=True):
-        ax.fill_between([0.0, until], -limit, limit, color="#009168", alpha=0.13, linewidth=0)
+        ax.fill_between([0.0, until], -limit, limit, color=TOLERANCE, alpha=0.13, linewidth=0)
     known = looks(view.run.models)
+    fine = largest = fineness(view, channel, bands)
     for model, difference in view.differences(channel.name, against).items():
+        largest = max(largest, _largest(difference))
         ax.plot(view.t, difference, **known[model].line | {"linewidth": 0.6})
     ax.axhline(0.0, color="#888888", linewidth=0.4, zorder=1)
-    ax.set_yscale("asinh", linear_width=fineness(view, channel, bands))
-    ax.yaxis.set_major_locator(_asinh_ticks(fineness(view, channel, bands)))
+    ax.set_yscale("asinh", linear_width=fine)
+    ticks = _decades(fine, largest)
+    ax.set_yticks(list(ticks), list(ticks.values()))
     ax.minorticks_off()
+    ax.set_ylim(-1.3 * largest, 1.3 * largest)
     ax.set_ylabel("difference", color="#555555", fontsize=6.5)
     ax.tick_params(axis="y", labelsize=5.5, colors="#555555")
 
 
-def _asinh_ticks(fine: float) -> object:
-    """At most five ticks: zero, and plus and minus the decades that show both ends."""
-    from matplotlib.ticker import Locator
-
-    class Decades(Locator):
-        def __call__(self) -> list[float]:
-            return self.tick_values(*self.axis.get_view_interval())  # type: ignore[union-attr]
-
-        def tick_values(self, vmin: float, vmax: float) -> list[float]:
-            top = max(abs(vmin), abs(vmax), fine)
-            high = 10.0 ** np.floor(np.log10(top))
-            low = max(10.0 ** np.ceil(np.log10(fine)), high / 1e2)
-            steps = [low, high] if low < 0.5 * high else [high]
-            return [sign * step for sign in (-1.0, 1.0) for step in steps] + [0.0]
-
-    return Decades()
+def _decades(fine: float, largest: float) -> dict[float, str]:
+    """Places and words of at most five ticks of an asinh axis: zero, and plus and minus two decades."""
+    top = math.floor(math.log10(max(largest, fine)))
+    low = max(math.ceil(math.log10(fine)), top - 2)
+    ticks = {0.0: "0"}
+    for power in {low, top} if low < top else {top}:
+        words = f"10{str(power).translate(SUPERSCRIPT)}"
+        ticks |= {10.0**power: words, -(10.0**power): f"−{words}"}
+    return ticks
 
 
 def _tracks(ax: Axes, view: SceneView) -> None:
@@ -166,10 +181,27 @@ def _tracks(ax: Axes, view: SceneView) -> None:
         for kind, marker, size in TRACKED:
             times = [e.t for e in view.histories[model].event_list if e.kind == kind]
             ax.plot(times, [row] * len(times), marker=marker, markersize=size, markeredgewidth=0.5, color=known[model].light, linestyle="")
-    ax.set_yticks(range(len(shown)), [known[model].label for model in shown], fontsize=6)
+    ax.set_yticks(range(len(shown)), [_short(known[model].label) for model in shown], fontsize=6)
     ax.set_ylim(len(shown) - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
-    ax.set_ylabel("impacts")
+    ax.text(0.995, 1.0, "impacts: | floor, ◆ wall", transform=ax.transAxes, ha="right", va="bottom", fontsize=6, color="#555555")
+
+
+def _short(label: str, most: int = 17) -> str:
+    return label if len(label) <= most else label[: most - 1] + "…"
+
+
+def _shades(view: SceneView, against: str | None, channels: Sequence[Channel]) -> list[Patch]:
+    """Legend entries for the shaded areas that the figure has."""
+    from matplotlib.patches import Patch
+
+    names = [channel.name for channel in channels]
+    found = []
+    if against and any(band.channel in names for band in view.bands(against)):
+        found.append(Patch(color=TOLERANCE, alpha=0.25, label="tolerance"))
+    if view.horizon is not None and view.horizon < view.t[-1]:
+        found.append(Patch(color="#000000", alpha=0.08, label="beyond the horizon"))
+    return found
 
 
 def _mark_horizon(ax: Axes, view: SceneView) -> None:
@@ -178,9 +210,9 @@ def _mark_horizon(ax: Axes, view: SceneView) -> None:
 
 
 def _title(view: SceneView, against: str | None) -> str:
-    """What the figure shows, in one line; a dollar sign in a name is no mathematics."""
+    """What the figure shows, in one line."""
     words = f"{view.name}: all models" + (f"; below each the difference from {looks(view.run.models)[against].label}" if against else "")
-    return words.replace("$", r"\$")
+    return words
 
 
 def _stamp(view: SceneView) -> str:

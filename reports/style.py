@@ -75,7 +75,7 @@ def figure_style() -> Iterator[None]:
     """
     import matplotlib as mpl
 
-    settings = {
+    settings: dict[Any, Any] = {
         "font.family": "sans-serif",
         "font.sans-serif": ["DejaVu Sans"],
         "font.size": 7.5,
@@ -88,8 +88,8 @@ def figure_style() -> Iterator[None]:
         "axes.spines.right": False,
         "axes.grid": True,
         "axes.axisbelow": True,
-        "axes.formatter.limits": (-3, 4),
-        "axes.formatter.use_mathtext": True,
+        "axes.formatter.limits": (-4, 5),
+        "text.parse_math": False,
         "grid.color": "#e4e4e4",
         "grid.linewidth": 0.5,
         "lines.linewidth": 0.9,
@@ -100,7 +100,6 @@ def figure_style() -> Iterator[None]:
         "legend.frameon": False,
         "legend.fontsize": 7.5,
         "legend.handlelength": 2.6,
-        "mathtext.fontset": "dejavusans",
         "path.simplify": True,
         "path.simplify_threshold": 0.5,
         "svg.fonttype": "path",

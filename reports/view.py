@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Channel:
-    """A quantity over time: name, label, symbol (mathtext), unit, and the stem of the measures that limit its difference.
+    """A quantity over time: name, label, symbol (for an axis), unit, and the stem of the measures that limit its difference.
 
     `scale` turns the unit of its measures into `unit` (1000: from m to mm).
     """
@@ -41,8 +41,8 @@ class Channel:
 
 #: The quantities of the paper's Figs. 4 and 5, then energy and hop.
 CHANNELS = (
-    Channel("theta", "rotation θ/α", r"$\theta/\alpha$", "1", "theta"),
-    Channel("theta_dot", "rotation rate", r"$\dot\theta$ (rad/s)", "rad/s", "theta_dot"),
+    Channel("theta", "rotation θ/α", "θ/α", "1", "theta"),
+    Channel("theta_dot", "rotation rate", "dθ/dt\n(rad/s)", "rad/s", "theta_dot"),
     Channel("slip", "pivot position", "pivot position\n(mm)", "mm", "slip", 1e3),
     Channel("slip_rate", "pivot velocity", "pivot velocity\n(m/s)", "m/s", "slip_rate"),
     Channel("energy", "energy per mass", "energy\n(J/kg)", "J/kg", "energy"),

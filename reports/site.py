@@ -1,0 +1,106 @@
+"""The pages of a finished run: one folder that opens from the file system and asks nothing of any other place."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from reports import tables, words
+from reports.figures import figure_stem, write_figures
+from reports.payload import script
+from reports.scene_file import write_scene_file
+from reports.style import Look, looks
+from reports.view import CHANNELS, scene_views
+from validation.results import Run, write_whole
+
+DATA = Path(str(resources.files("reports"))) / "data"
+#: What a verdict is called and the sign that goes with its colour.
+VERDICTS = {"pass": ("within tolerance", "✓"), "changed": ("changed", "△"), "fail": ("out of tolerance", "✕"), "error": ("failed", "!")}
+
+
+@dataclass(frozen=True)
+class Site:
+    """A folder of pages with one look; `links` are its parts for the navigation, (title, address from the index)."""
+
+    folder: Path
+    name: str
+    links: tuple[tuple[str, str], ...] = ()
+
+    def page(self, address: str, template: str, **context: Any) -> Path:
+        """Write the page `address` (relative to the folder, with slashes) from a template of `data/templates/`."""
+        root = "../" * address.count("/")
+        text = _environment().get_template(template).render(site=self, root=root, address=address, **context)
+        path = self.folder / address
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return write_whole(path, text)
+
+    def assets(self, models: Iterable[str]) -> None:
+        """Write style sheets, scripts and the plotting library, once for all pages, and the colours of these models."""
+        target = self.folder / "assets"
+        target.mkdir(exist_ok=True)
+        for source in sorted((DATA / "assets").iterdir()):
+            shutil.copyfile(source, target / source.name)
+        for source in sorted((DATA / "vendor").glob("*/*")):
+            name = source.name if source.name != "LICENSE" else f"LICENSE.{source.parent.name}.txt"
+            shutil.copyfile(source, target / name)
+        write_whole(target / "models.css", model_styles(looks(models).values()))
+
+
+def write_site(folder: Path) -> Path:
+    """Write `index.html`, a page a scene, their figures and data into the folder of a finished run; returns the index."""
+    run = Run.load(folder)
+    views = scene_views(run, folder)
+    site = Site(folder, f"rockcheck: {run.suite}", tuple((view.name, f"scenes/{view.slug}.html") for view in views))
+    site.assets(run.models)
+    for n, view in enumerate(views):
+        write_figures(view, folder / "figures")
+        write_whole(_made(folder / "data") / f"{view.slug}.js", script(view))
+        files = write_scene_file(view.scene, _made(folder / "scenes"), view.slug)
+        site.page(
+            f"scenes/{view.slug}.html",
+            "scene.html",
+            view=view,
+            files=files,
+            previous=views[n - 1] if n else None,
+            following=views[n + 1] if n + 1 < len(views) else None,
+            **_common(run),
+        )
+    return site.page("index.html", "index.html", views=views, worst=tables.worst_first(run), times=tables.run_times(run), **_common(run))
+
+
+def _common(run: Run) -> dict[str, Any]:
+    return {
+        "run": run,
+        "looks": looks(run.models),
+        "channels": CHANNELS,
+        "measures": {measure.name: measure for measure in run.measures},
+    }
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def model_styles(models: Iterable[Look]) -> str:
+    """A style sheet with a class `look-<n>` for each model that sets its colour, by day and by night."""
+    rows = (f".look-{n} {{ --look: light-dark({look.light}, {look.dark}); }}" for n, look in enumerate(models))
+    return "\n".join(rows) + "\n"
+
+
+def _environment() -> Environment:
+    environment = Environment(
+        loader=FileSystemLoader(DATA / "templates"), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    for filter in (words.number, words.unit, words.duration, words.ratio, words.window, words.dash_array):
+        environment.filters[filter.__name__] = filter
+    for function in (words.share, words.formula, tables.overrun, tables.measure_table, tables.scene_facts, tables.summary, figure_stem):
+        environment.globals[function.__name__] = function
+    environment.globals["VERDICTS"] = VERDICTS
+    return environment

@@ -1,0 +1,136 @@
+"""What the pages list: checks by how far they are out, run times as ratios, all measures of a scene, a scene in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from statistics import geometric_mean
+
+from reports.view import SceneView
+from reports.words import number
+from scenes.excitations import Record, Ricker, Sine
+from validation.results import Cell, Check, Figure, Run
+
+
+def worst_first(run: Run) -> list[tuple[Cell, Check | None]]:
+    """What is not within tolerance: failed cells, then checks by how far they are out, then those that changed."""
+    failed: list[tuple[Cell, Check | None]] = [(cell, None) for cell in run.cells if cell.status == "failed"]
+    checks = [(cell, check) for cell, check in run.checks() if check.verdict != "pass"]
+    return failed + sorted(checks, key=lambda pair: (pair[1].verdict != "fail", -overrun(pair[1])))
+
+
+def overrun(check: Check) -> float:
+    """How many times its limit a check uses, infinite where that cannot be said."""
+    value, limit = check.figure.value, check.limit
+    if value is None or not limit:
+        return float("inf") if check.verdict == "fail" else 0.0
+    if check.ideal is None:
+        return limit / value if value > 0.0 else float("inf")
+    return abs(value - check.ideal) / limit
+
+
+@dataclass(frozen=True)
+class RunTime:
+    """A model's run times: by scene, s, and relative to the reference of the run; `ratio` is the geometric mean of these."""
+
+    model: str
+    seconds: Mapping[str, float]
+    ratios: Mapping[str, float]
+    ratio: float | None
+
+
+def run_times(run: Run) -> list[RunTime]:
+    """Run times of all models; a ratio needs the reference to have run in the same scene."""
+    base = {cell.scene: cell.cost.wall_seconds for cell in run.cells if cell.model == run.reference and cell.status == "done"}
+    found = []
+    for model in run.models:
+        seconds = {cell.scene: cell.cost.wall_seconds for cell in run.cells if cell.model == model and cell.status == "done"}
+        ratios = {scene: taken / base[scene] for scene, taken in seconds.items() if base.get(scene, 0.0) > 0.0 and taken > 0.0}
+        found.append(RunTime(model, seconds, ratios, geometric_mean(ratios.values()) if ratios else None))
+    return found
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One figure of one model, with the check that it was held to, if any."""
+
+    figure: Figure
+    check: Check | None
+
+
+@dataclass(frozen=True)
+class MeasureRow:
+    """A measure of all models: one that stands for its name and window, and what each model gave."""
+
+    figure: Figure
+    cells: tuple[Measured | None, ...]
+
+
+@dataclass(frozen=True)
+class MeasureTable:
+    """All measures of a scene against one reference."""
+
+    models: tuple[str, ...]
+    rows: tuple[MeasureRow, ...]
+
+
+def measure_table(view: SceneView, against: str) -> MeasureTable:
+    """All figures of a scene that are held against `against`, a row a measure and window, a column a model."""
+    found: dict[tuple[str, str], dict[str, Measured]] = {}
+    for cell in view.cells:
+        for check in cell.checks:
+            _enter(found, cell.model, check.figure, check, against)
+        for figure in cell.figures:
+            _enter(found, cell.model, figure, None, against)
+    models = tuple(cell.model for cell in view.cells if any(cell.model in row for row in found.values()))
+    rows = (MeasureRow(next(iter(row.values())).figure, tuple(row.get(model) for model in models)) for row in found.values())
+    return MeasureTable(models, tuple(sorted(rows, key=lambda row: (row.figure.measure, row.figure.until or float("inf")))))
+
+
+def _enter(found: dict[tuple[str, str], dict[str, Measured]], model: str, figure: Figure, check: Check | None, against: str) -> None:
+    if figure.against == against:
+        found.setdefault((figure.measure, figure.window), {}).setdefault(model, Measured(figure, check))
+
+
+def scene_facts(view: SceneView) -> list[tuple[str, str]]:
+    """A scene in a few words: block, floor, walls, excitation, duration."""
+    scene, block = view.scene, view.scene.block
+    floor = f"μ {number(scene.floor.friction)}"
+    if scene.floor.mu_s != scene.floor.friction:
+        floor += f" (static {number(scene.floor.mu_s)})"
+    if scene.floor.restitution:
+        floor += f", restitution {number(scene.floor.restitution)}"
+    walls = ", ".join(f"{wall.side}, gap {number(1e3 * wall.gap)} mm, restitution {number(wall.restitution)}" for wall in scene.walls)
+    facts = [
+        ("block", f"{number(2 * block.half_width, 4)} m × {number(2 * block.half_height, 4)} m, α = {number(block.alpha)} rad"),
+        ("p", f"{number(scene.frequency_parameter)} rad/s"),
+        ("floor", floor),
+        ("wall" if len(scene.walls) < 2 else "walls", walls or "none"),
+        ("base", _excitation(scene.excitation)),
+        ("duration", f"{number(scene.duration)} s, a row each {number(1e3 * scene.output_step)} ms"),
+    ]
+    if scene.vertical.kind != "rest":
+        facts.insert(5, ("vertical", _excitation(scene.vertical)))
+    if scene.initial_rotation:
+        facts.append(("starts at", f"θ = {number(scene.initial_rotation / block.alpha)} α"))
+    return facts
+
+
+def _excitation(excitation: object) -> str:
+    if isinstance(excitation, Record):
+        return f"{excitation.source} × {number(excitation.scale)}, peak {number(excitation.peak)} g"
+    if isinstance(excitation, Ricker):
+        shape = "symmetric" if excitation.symmetric else "antisymmetric"
+        return f"{shape} Ricker pulse, {number(excitation.amplitude)} m/s², period {number(excitation.period)} s"
+    if isinstance(excitation, Sine):
+        return f"sine, {number(excitation.amplitude)} m/s², period {number(excitation.period)} s, {excitation.cycles} cycles"
+    return "at rest"
+
+
+def summary(view: SceneView) -> str:
+    """The figure of a scene in words: each model's peak rotation, impacts and outcome."""
+    said = []
+    for model, history in view.histories.items():
+        impacts = sum(event.kind in ("floor impact", "wall impact") for event in history.event_list)
+        said.append(f"{model}: peak {number(history.peak_rotation / view.scene.block.alpha)} α, {impacts} impacts, {history.outcome}")
+    return "; ".join(said) + "."

@@ -1,0 +1,57 @@
+"""Numbers and names as people read them, for the templates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from reports.style import Look
+from validation.results import Check, Figure, MeasureRecord
+from validation.tables import used
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number for people: a few digits, a true minus sign, powers of ten where it is very large or small."""
+    if value is None:
+        return "–"
+    text = f"{value:.{digits}g}"
+    if "e" in text:
+        mantissa, power = text.split("e")
+        return f"{mantissa}·10{str(int(power)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}".replace("-", "−")
+    return text.replace("-", "−")
+
+
+def unit(name: str) -> str:
+    """A unit for people."""
+    return {"alpha": "α", "1": ""}.get(name, name)
+
+
+def duration(seconds: float) -> str:
+    """A time in s or ms."""
+    return f"{seconds:.1f} s" if seconds >= 1.0 else f"{1e3 * seconds:.3g} ms"
+
+
+def ratio(value: float | None) -> str:
+    """A ratio with its sign of multiplication."""
+    return "–" if value is None else f"{number(value, 2 if value < 100 else 3)}×"
+
+
+def window(figure: Figure) -> str:
+    """The window of a figure in words."""
+    if figure.window == "horizon":
+        return "to the horizon" + (f" ({number(figure.until)} s)" if figure.until is not None else "")
+    return f"first {number(figure.until)} s" if figure.until is not None else "whole run"
+
+
+def share(check: Check) -> float:
+    """How much of its limit a check uses, 0 to 1; 1 where it is out."""
+    return min(1.0, used(check))
+
+
+def formula(measures: Mapping[str, MeasureRecord], name: str) -> str:
+    """How a measure is defined, empty where the run does not say."""
+    return measures[name].formula if name in measures else ""
+
+
+def dash_array(look: Look) -> str:
+    """The dash pattern of a model as SVG has it."""
+    return " ".join(f"{2.0 * length:g}" for length in look.dash) or "none"
