@@ -18,6 +18,8 @@ from validation.tolerances import OWN_FIGURES, Windowed
 #: New lines: the limit and the drift band as shares of a difference from perfection, and of a figure of the cell itself.
 ROOM, DRIFT = 2.0, 0.2
 OWN_ROOM, OWN_DRIFT = 0.02, 0.002
+#: What is small against the limit need not be looked at.
+LEAST_DRIFT = 0.01
 
 
 def accept(suite: Suite, run: Run, reason: str | None) -> tuple[list[str], list[str]]:
@@ -80,7 +82,7 @@ def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
     if limit is None or outside:
         limit = _round(0.9 * value, down=True) if at_least else _round((OWN_ROOM if own else ROOM) * size)
         why = reason or "first accepted figure"
-    drift = check.drift if check.drift is not None else _round((OWN_DRIFT if own else DRIFT) * size)
+    drift = check.drift if check.drift is not None else _round(max((OWN_DRIFT if own else DRIFT) * size, LEAST_DRIFT * limit))
     expected = value if check.verdict != "pass" or check.expected is None else check.expected
     return {"expected": _short(expected), "limit": limit, "drift": drift, "why": why}
 

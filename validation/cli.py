@@ -28,7 +28,7 @@ for module in (scenes, simulate, compare, validate, accept, spectrum, benchmark,
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     try:
-        code = app(args=list(sys.argv[1:] if arguments is None else arguments), standalone_mode=False)
+        code = app(args=list(sys.argv[1:] if arguments is None else arguments), prog_name="rockcheck", standalone_mode=False)
     except (typer.TyperException, InputError) as error:
         return _told(error.format_message() if isinstance(error, typer.TyperException) else str(error), 2)
     except ModelFailure as error:

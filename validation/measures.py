@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from inspect import cleandoc
 from operator import attrgetter
@@ -122,7 +122,7 @@ class Motion:
 
     def events(self, *kinds: str) -> list[Event]:
         """Events of these kinds within the window."""
-        return [event for event in self.history.event_list if event.kind in kinds and event.t <= self.until + 1e-9]
+        return [event for event in _as_impacts(self.history.event_list) if event.kind in kinds and event.t <= self.until + 1e-9]
 
 
 @dataclass(frozen=True)
@@ -207,7 +207,7 @@ class Pair:
         return match_impacts(*(self._within(h) for h in (self.reference, self.candidate)))
 
     def _within(self, history: History) -> list[Event]:
-        return [e for e in history.event_list if e.kind in IMPACTS + TURNS and self.start - 1e-9 <= e.t <= self.end + 1e-9]
+        return [e for e in _as_impacts(history.event_list) if e.kind in IMPACTS + TURNS and self.start - 1e-9 <= e.t <= self.end + 1e-9]
 
 
 @dataclass(frozen=True)
@@ -246,6 +246,11 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
         right += [e for j, e in enumerate(second) if j not in taken_second and _strong(e, second)]
     in_time = attrgetter("t")
     return MatchedImpacts(sorted(pairs, key=lambda two: two[0].t), sorted(left, key=in_time), sorted(right, key=in_time))
+
+
+def _as_impacts(events: Sequence[Event]) -> list[Event]:
+    """A landing that strikes is a floor impact, whichever name the model has for it."""
+    return [replace(event, kind="floor impact") if event.kind == "landing" and event.impulse != 0.0 else event for event in events]
 
 
 def _strong(event: Event, others: Sequence[Event]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +13,7 @@ from scenes import InputError, load_scene
 from scenes.errors import printable
 from validation.commands import console
 from validation.models import FAMILIES, build
+from validation.store import name_of
 
 
 def run(
@@ -21,9 +23,10 @@ def run(
     settings: Annotated[list[str] | None, typer.Option("--set", help="A setting of the model, such as time_step=1e-4; repeatable.")] = None,
 ) -> None:
     """Simulate one scene with one model and write its history (CSV; events go to a second file beside it)."""
+    sys.path.append(str(Path.cwd()))  # where a model of the user's own ("module:Class") may lie
     player = build(model, dict(_setting(text) for text in settings or []))
     what = load_scene(scene)
-    path = output or Path(f"{what.name}--{model}.csv")
+    path = output or Path(f"{name_of(what.name, model)}.csv")
     if not path.parent.is_dir():
         raise InputError(f"{printable(path.parent)}: no such folder", "--output")
     history = player.simulate(what)

@@ -1,0 +1,100 @@
+"""The command line: exit codes, and errors of the user as one line without a traceback."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+from scenes import History
+from validation.cli import main
+
+COMMANDS = ("scenes", "simulate", "compare", "validate", "accept", "spectrum", "benchmark", "stress", "report")
+SCENE = "duration = 0.2\nblock = { half_width = 0.4, half_height = 1.5 }\nfloor = { friction = 0.5 }\n"
+
+
+@pytest.fixture(autouse=True)
+def in_an_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(Path(__file__).parent / "models" / "faulty.py", tmp_path / "faulty.py")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "faulty", raising=False)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(command, capsys):
+    assert main([command, "--help"]) == 0
+    assert "Usage: rockcheck" in capsys.readouterr().out
+
+
+def write(name, text):
+    Path(name).write_text(text, encoding="utf-8")
+    return name
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["validat"], "Did you mean 'validate'"),
+        (["validate", "papre"], "did you mean 'paper'"),
+        (["validate", "--jobs", "0"], "--jobs"),
+        (["validate", "--job", "2"], "--jobs"),
+        (["validate", "paper", "--quick"], "--quick"),
+        (["validate", "paper", "--out", "scene.toml"], "scene.toml: cannot be used as a folder"),
+        (["simulate", "fig4", "--model", "ebm"], "did you mean 'fig4b'"),
+        (["simulate", "fig4a", "--model", "mujcoo"], "did you mean 'mujoco'"),
+        (["simulate", "fig4a"], "--model"),
+        (["simulate", "scene.toml", "--model", "ebm", "--set", "tolerance"], "key=value"),
+        (["simulate", "scene.toml", "--model", "ebm", "--set", "tolerance=tight"], "ebm.tolerance"),
+        (["simulate", "scene.toml", "--model", "ebm", "-o", "no/such/out.csv"], "no such folder"),
+        (["simulate", "negative.toml", "--model", "ebm"], "negative.toml: block.half_width: -0.4 is not allowed"),
+        (["simulate", "unknown.toml", "--model", "ebm"], "unknown.toml: colour: unknown key"),
+        (["simulate", "slippery.toml", "--model", "ebm"], "must be below 4/3"),
+        (["simulate", "gone.toml", "--model", "ebm"], "gone.toml: cannot be read"),
+        (["simulate", "record.toml", "--model", "ebm"], "NPTS says 3, the file has 2 samples"),
+        (["compare", "gone.csv", "gone.csv"], "gone.csv: cannot be read"),
+        (["compare", "scene.toml", "scene.toml"], "scene.toml"),
+        (["report", "."], "no finished run here"),
+        ([], "Missing command"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(words, said, capsys):
+    write("scene.toml", SCENE)
+    write("negative.toml", SCENE.replace("0.4", "-0.4"))
+    write("unknown.toml", "colour = 1\n" + SCENE)
+    write("slippery.toml", SCENE.replace("0.5", "1.4"))
+    write("record.toml", SCENE + '[excitation]\nkind = "record"\nfile = "short.AT2"\n')
+    write("short.AT2", "PEER\nNAME\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 3, DT= .01 SEC\n 0.1 0.2\n")
+    assert main(words) == 2
+    captured = capsys.readouterr()
+    assert said in captured.err
+    assert captured.err.count("\n") == 1
+    assert captured.err.startswith("rockcheck: ")
+
+
+def test_simulate_writes_a_history(capsys):
+    write("scene.toml", SCENE)
+    assert main(["simulate", "scene.toml", "--model", "faulty:Still", "--set", "offset=0.001", "-o", "out.csv"]) == 0
+    assert History.load("out.csv").channels["theta"][0] == 0.001
+    assert "out.csv" in capsys.readouterr().out
+
+
+def test_a_model_that_fails_is_exit_3(capsys):
+    write("scene.toml", SCENE)
+    assert main(["simulate", "scene.toml", "--model", "faulty:Fails"]) == 3
+    assert capsys.readouterr().err == "rockcheck: more than 10 events\n"
+    assert not Path("scene--faulty_Fails.csv").exists()
+
+
+def test_compare_two_histories(capsys):
+    write("scene.toml", SCENE)
+    for offset in ("0.0", "0.001"):
+        main(["simulate", "scene.toml", "--model", "faulty:Still", "--set", f"offset={offset}", "-o", f"{offset}.csv"])
+    assert main(["compare", "0.0.csv", "0.001.csv"]) == 0
+    out = capsys.readouterr().out
+    assert "RMS difference of rotation" in out
+    assert f"{0.001 / math.atan2(0.4, 1.5):.6g}" in out
+    assert max(map(len, out.splitlines())) <= 80
