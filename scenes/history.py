@@ -122,9 +122,10 @@ class History:
         self.events.to_csv(_events_path(path), index=False, lineterminator="\n")
 
     @classmethod
-    def load(cls, path: str | Path) -> History:
+    def load(cls, path: str | Path, *, columns: Mapping[str, str] | None = None) -> History:
         """Read what `save` wrote, or any CSV with columns `t` and `theta` (SI units) and perhaps more of `COLUMNS`.
 
+        `columns` maps the file's names of columns to those of a history, where they differ.
         Raises `InputError` for a file that is missing, lacks those columns, is not numeric, not finite or not ordered in time.
         """
         import pandas as pd
@@ -134,7 +135,7 @@ class History:
         try:
             with path.open(encoding="utf-8") as stream:
                 first = stream.readline()
-            frame = pd.read_csv(path, comment="#")
+            frame = pd.read_csv(path, comment="#").rename(columns=str.strip).rename(columns=dict(columns or {}))
             events_path = _events_path(path)
             events = pd.read_csv(events_path) if events_path.exists() else pd.DataFrame()
         except OSError as error:

@@ -58,12 +58,13 @@ def compare(
     *,
     until: float | None = None,
     scene: Scene | None = None,
-    measures: Collection[str] = tuple(DIFFERENCES),
+    measures: Collection[str] | None = None,
 ) -> Discrepancy:
     """Compare two histories over their common time, up to `until` (s), by the `measures` of `validation.measures`.
 
+        By default by all but the costly ones.
     The candidate is interpolated linearly onto the reference's times. `scene` adds its gravity (9.81 m/s^2 otherwise).
-    A measure that cannot be computed is NaN and says why. Raises `InputError` if the histories have no time in common.
+        A measure that cannot be computed is NaN and says why. Raises `InputError` if the histories have no time in common.
     """
     if until is not None and not until > 0.0:
         raise InputError(f"{until:g} is not allowed: a positive time in s is asked for", "until")
@@ -71,9 +72,10 @@ def compare(
     if len(pair.time) == 0:
         raise InputError(f"{reference.model} and {candidate.model} have no time in common")
     window = "" if until is None else f"{until:g}s"
+    chosen = [m for m in DIFFERENCES.values() if not m.costly] if measures is None else [DIFFERENCES[name] for name in measures]
     figures = tuple(
         evaluate(measure, pair, "rad" if pair.alpha is None else "alpha", against=reference.model, window=window, until=until)
-        for measure in map(DIFFERENCES.__getitem__, measures)
+        for measure in chosen
     )
     return Discrepancy(reference.model, candidate.model, figures, pair.start, pair.end, _gap(pair, until))
 

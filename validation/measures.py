@@ -27,6 +27,7 @@ STANDARD_GRAVITY = 9.81
 SAME_IMPACT = 0.020
 #: Impacts weaker than this share of the history's strongest of their kind need no counterpart.
 WEAK_IMPACT = 0.01
+ISO_MOST_SAMPLES = 4000
 IMPACTS = ("floor impact", "wall impact")
 TURNS = ("overturned left", "overturned right")
 
@@ -49,6 +50,8 @@ class Measure:
     evaluate: Callable[[Any], Value]
     ideal: float | None = 0.0
     sense: Literal["at most", "at least"] = "at most"
+    #: Computed only where it is asked for by name.
+    costly: bool = False
 
     @property
     def formula(self) -> str:
@@ -203,7 +206,10 @@ class Pair:
 
     @cached_property
     def impacts(self) -> MatchedImpacts:
-        """The impacts of both within the common time, matched."""
+        """The impacts of both within the common time, matched; a history that moves without any event does not know them."""
+        for history in (self.reference, self.candidate):
+            if not history.event_list and np.ptp(history.channels["theta"]) > 0.0:
+                raise Unavailable(f"{history.model} has no events")
         return match_impacts(*(self._within(h) for h in (self.reference, self.candidate)))
 
     def _within(self, history: History) -> list[Event]:
@@ -400,6 +406,27 @@ def outcome_agrees(pair: Pair) -> tuple[float, str]:
     first, second = pair.reference.outcome, pair.candidate.outcome
     fates = {outcome if outcome in TURNS else "stays" for outcome in (first, second)}
     return float(len(fates) == 1), first if first == second else f"{first} / {second}"
+
+
+@difference("ISO/TS 18571 rating", "1", ideal=1.0, costly=True)
+def iso_18571(pair: Pair) -> float:
+    """ISO/TS 18571 overall rating of theta, 0 to 1 (corridor 0.4, phase 0.2, magnitude 0.2, slope 0.2), not rounded.
+
+    By the package objective-rating-metrics (extra "iso"), which takes the square of the samples in time and memory, does
+    not look at their times and answers NaN where it has no answer; so both curves are put on one uniform grid of at most
+    4,000 samples, and curves that are constant or shorter than 20 samples have no rating.
+    """
+    try:
+        from objective_rating_metrics.rating import ISO18571
+    except ImportError:
+        raise Unavailable('the extra "iso" is not installed') from None
+    curves = pair.theta
+    if len(pair.time) < 20 or not all(np.all(np.isfinite(curve)) and np.ptp(curve) > 0.0 for curve in curves):
+        raise Unavailable("too short, constant or not finite")
+    grid = np.linspace(pair.time[0], pair.time[-1], min(len(pair.time), ISO_MOST_SAMPLES))
+    reference, candidate = (np.column_stack([grid, np.interp(grid, pair.time, curve)]) for curve in curves)
+    rating = ISO18571(reference, candidate, dt=float(grid[1] - grid[0]))
+    return float(rating.overall_rating(ndigits=-1))
 
 
 def _largest(columns: tuple[Array, Array]) -> float:

@@ -60,6 +60,7 @@ FAMILIES: dict[str, Family] = {
     "cm": Family("cm", "ContinuousModel", "the paper's penalty-based continuous model", {}, COMPILED),
     "mujoco": Family("engines", "MuJoCo", "the physics engine MuJoCo", {}, ("mujoco", "numpy")),
     "pybullet": Family("engines", "PyBullet", "the physics engine PyBullet", {}, ("pybullet", "numpy")),
+    "measured": Family("validation.measured", "Measured", "a CSV history from a shake table, or from any other program"),
 }
 
 

@@ -27,12 +27,18 @@ def cell_key(scene: Scene, name: str, settings: Mapping[str, Any]) -> str:
         "scene": scene.model_dump(mode="json"),
         "model": name,
         "settings": dict(settings),
+        "files": {name: hashlib.sha256(Path(file).read_bytes()).hexdigest() for name, file in _files(settings, scene).items()},
         "code": code_digest(family(name).module),
         "libraries": {library: version_of(library) for library in family(name).libraries},
         "python": platform.python_version(),
         "machine": platform.machine(),
     }
     return digest(json.dumps(depends, sort_keys=True, default=str))
+
+
+def _files(settings: Mapping[str, Any], scene: Scene) -> dict[str, str]:
+    """The file that a measured history of this scene is read from, where it can be."""
+    return {name: file for name, file in settings.get("files", {}).items() if name == scene.name and Path(file).is_file()}
 
 
 def digest(text: str) -> str:

@@ -36,8 +36,9 @@ CheckVerdict = Literal["pass", "changed", "fail"]
 Verdict = Literal["pass", "changed", "fail", "error"]
 SEVERITY: tuple[Verdict, ...] = ("pass", "changed", "fail", "error")
 #: "numerical": two solutions of the same equations. "model form": the reference forbids free flight, the candidate does not.
-#: "exact": against a closed form. "absolute": a figure of the cell itself against its expected value.
-Kind = Literal["numerical", "model form", "exact", "absolute"]
+#: "measured": one of the two was measured. "exact": against a closed form. "absolute": a figure of the cell itself against
+#: its expected value.
+Kind = Literal["numerical", "model form", "measured", "exact", "absolute"]
 
 
 class Stored(Frozen):

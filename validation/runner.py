@@ -136,7 +136,11 @@ def _cell(
         if name != OWN_FIGURES and (reference is None or reference is spot or reference not in records):
             continue
         found = _compared(
-            store, scene, spot, reference, sorted(place.what for place in asked if place.against == name and place.what.window)
+            store,
+            scene,
+            spot,
+            reference,
+            sorted(p.what for p in asked if p.against == name and (p.what.window or p.what.definition.costly)),
         )
         figures += [Figure(**figure) for figure in found["figures"]]
         gaps |= {(name, window): gap for window, gap in found["gaps"].items()}
@@ -191,7 +195,7 @@ def _compute(store: Store, scene: Scene, spot: Spot, reference: Spot | None, win
     yardstick = History.load(store.history(reference.name)) if reference else None
     figures: list[Figure] = []
     gaps: dict[str, str] = {}
-    asked: dict[str, list[str]] = {"": list(DIFFERENCES if reference else FIGURES)}
+    asked: dict[str, list[str]] = {"": [m.name for m in (DIFFERENCES if reference else FIGURES).values() if not m.costly]}
     for what in windowed:
         asked.setdefault(what.window, []).append(what.measure)
     for window, measures in asked.items():

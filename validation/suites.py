@@ -14,6 +14,10 @@ A suite is a TOML file that a user can write:
     [models.mujoco-coarse]                       # a second variant of a model; "my_module:MyModel" is one of your own
     model = "mujoco"
     time_step = 1e-3
+    [models.table]                               # a measured history, for the scenes that it names (validation.measured)
+    model = "measured"
+    files = { shelf = "run7.csv" }
+    offset = -0.35                               # s, added to its times
 
     [require]                                    # what must have a tolerance, for every scene and model
     difference = ["theta_rms@8s", "outcome_agrees"]
@@ -138,7 +142,8 @@ class Suite:
         for part in self.parts or (self,):
             for scene in part.scenes.values():
                 for model in part.models.values():
-                    yield scene, model
+                    if scene.name in model.settings.get("files", {scene.name: ""}):
+                        yield scene, model
 
     def only(self, scene: str, model: str) -> Suite:
         """The suite with one cell, and the references that it is held against."""
@@ -172,6 +177,8 @@ class Suite:
             return "absolute"
         if place.against == EXACT:
             return "exact"
+        if "measured" in (self.models[place.model].family_name, self.models[place.against].family_name):
+            return "measured"
         scene = self.scenes[place.scene]
         may_hop = bool(scene.walls) or scene.floor.restitution > 0.0 or scene.initial_height > 0.0
         differ = self.models[place.model].family.flies != self.models[place.against].family.flies
@@ -211,7 +218,7 @@ def _suite(given: SuiteFile, path: Path, shipped: bool) -> Suite:
         return _joined(given, path)
     if str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))  # a suite's own models ("module:Class") may lie beside it
-    models = {label: _part(label, settings) for label, settings in given.models.items()}
+    models = {label: _part(label, settings, path.parent) for label, settings in given.models.items()}
     for key, label in (("reference", given.reference), ("model_form", given.model_form)):
         if label and label not in models:
             raise InputError(f"{label!r} is not among the suite's models: {', '.join(models) or 'none'}", key)
@@ -274,9 +281,11 @@ def _joined(given: SuiteFile, path: Path) -> Suite:
     )
 
 
-def _part(label: str, settings: Mapping[str, Any]) -> Part:
+def _part(label: str, settings: Mapping[str, Any], folder: Path) -> Part:
     settings = dict(settings)
     name = str(settings.pop("model", label))
+    if name == "measured" and isinstance(settings.get("files"), dict):
+        settings["files"] = {scene: str(folder / str(file)) for scene, file in settings["files"].items()}
     build(name, settings)
     return Part(label, name, settings)
 

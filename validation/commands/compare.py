@@ -8,20 +8,25 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from scenes import History, load_scene
+from scenes import load_scene
 from validation.commands import console
 from validation.discrepancy import compare
+from validation.measured import read_measured
 
 
 def run(
     reference: Annotated[Path, typer.Argument(help="History of the reference, CSV.")],
     candidate: Annotated[Path, typer.Argument(help="History of the candidate, CSV.")],
+    offset: Annotated[float, typer.Option("--offset", help="Added to the candidate's times, s, to align a measured history.")] = 0.0,
     until: Annotated[float | None, typer.Option("--until", help="End of the window, s (default: the whole common time).")] = None,
     scene: Annotated[str | None, typer.Option("--scene", help="Scene of both: its block and gravity.")] = None,
 ) -> None:
-    """Compare two histories, measure by measure."""
+    """Compare two histories, measure by measure.
+
+    Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg, time_ms, x_mm, ...).
+    """
     what = load_scene(scene) if scene else None
-    found = compare(History.load(reference), History.load(candidate), until=until, scene=what)
+    found = compare(read_measured(reference), read_measured(candidate, offset=offset), until=until, scene=what)
     out = console()
     table = Table(box=None, pad_edge=False)
     for name, justify in (("measure", "left"), ("value", "right"), ("unit", "left"), ("", "left")):

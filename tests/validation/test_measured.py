@@ -1,0 +1,107 @@
+"""Measured histories: units by column, an offset in time, judged like a model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenes import InputError
+from validation.cli import main
+from validation.measured import Measured, read_measured
+from validation.runner import run_suite
+from validation.suites import load_suite
+
+SUITE = """
+reference = "ebm"
+[models.ebm]
+[models.table]
+model = "measured"
+files = { tilt = "table.csv" }
+offset = -0.4
+[[scene]]
+name = "tilt"
+duration = 2.0
+initial_rotation = 0.1
+block = { half_width = 0.4, half_height = 1.5 }
+floor = { friction = 0.9 }
+[[scene]]
+name = "other"
+duration = 0.1
+block = { half_width = 0.4, half_height = 1.5 }
+floor = { friction = 0.9 }
+[tolerances.tilt.table.ebm]
+"theta_rms@1.5s" = { expected = 0.0, limit = 1e-3, drift = 1e-3, why = "a test" }
+theta_rms = { expected = 0.0, limit = 1e-3, drift = 1e-3, why = "a test" }
+[tolerances.other.ebm.figures]
+last_x = { expected = 0.0, limit = 0.0, drift = 0.0, why = "it stands" }
+"""
+
+
+def write(path: Path, head: str, *columns: object) -> Path:
+    path.write_text(
+        head + "\n" + "\n".join(",".join(map(repr, map(float, row))) for row in zip(*columns, strict=True)) + "\n", encoding="utf-8"
+    )
+    return path
+
+
+def test_units_of_columns(tmp_path):
+    t = np.arange(5.0)
+    history = read_measured(write(tmp_path / "a.csv", "time_ms, theta_deg, x_mm, slip_rate_cm_s, y, strain", t, t, t, t, t, t), offset=0.25)
+    np.testing.assert_allclose(history.channels["t"], 1e-3 * t + 0.25)
+    np.testing.assert_allclose(history.channels["theta"], np.deg2rad(t))
+    np.testing.assert_allclose(history.channels["x"], 1e-3 * t)
+    np.testing.assert_allclose(history.channels["slip_rate"], 1e-2 * t)
+    np.testing.assert_allclose(history.channels["y"], t)
+    assert history.model == "measured"
+    assert "strain" not in history.channels
+
+
+@pytest.mark.parametrize(
+    ("head", "fault"),
+    [
+        ("t_s,theta_gon,x", "'theta_gon': a unit of theta is asked for: rad, mrad, deg"),
+        ("t_s,theta_deg,theta_rad", "gives theta a second time"),
+        ("time,t_s,theta", "gives t a second time"),
+        ("t_s,x_mm,y_mm", "no column 'theta'"),
+    ],
+)
+def test_faults_are_named(tmp_path, head, fault):
+    with pytest.raises(InputError, match=fault):
+        read_measured(write(tmp_path / "a.csv", head, *[np.arange(3.0)] * 3))
+    with pytest.raises(InputError, match="cannot be read"):
+        read_measured(tmp_path / "gone.csv")
+    with pytest.raises(InputError, match="is not finite"):
+        read_measured(write(tmp_path / "a.csv", "t_s,theta_deg", np.arange(3.0), [0.0, np.nan, 0.0]))
+
+
+def test_a_measured_history_is_judged_like_a_model(tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    path.write_text(SUITE, encoding="utf-8")
+    scene = load_suite(path).scenes["tilt"]
+    from ebm import EventBasedModel
+
+    truth = EventBasedModel().simulate(scene)
+    rows = truth.channels["t"] <= 1.6
+    write(tmp_path / "table.csv", "time_s,theta_deg", truth.channels["t"][rows] + 0.4, np.rad2deg(truth.channels["theta"][rows]))
+    run = run_suite(load_suite(path), tmp_path / "out", jobs=1)
+    cell = run.cell("tilt", "table")
+    assert run.cell("other", "table") is None
+    assert [(check.figure.window, check.kind, check.verdict) for check in cell.checks] == [
+        ("1.5s", "measured", "pass"),
+        ("", "measured", "fail"),
+    ]
+    assert cell.checks[1].reason == "table ends at 1.6 s, before 2 s"
+    write(tmp_path / "table.csv", "time_s,theta_deg", [0.3, 0.9], [0.0, 0.0])
+    assert run_suite(load_suite(path), tmp_path / "out", jobs=1).cell("tilt", "table").read_back is False
+    truth.save(tmp_path / "truth.csv")
+    assert main(["compare", str(tmp_path / "truth.csv"), str(tmp_path / "table.csv"), "--offset", "-0.4"]) == 0
+    assert "measured against ebm, 0 to 0.5 s" in capsys.readouterr().out
+
+
+def test_a_scene_without_a_file_is_bad_input(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(SUITE, encoding="utf-8")
+    with pytest.raises(InputError, match="no measured history of scene 'other'"):
+        Measured(files={}).simulate(load_suite(path).scenes["other"])
