@@ -1,4 +1,4 @@
-"""The acceleration that the block feels in the frame of its shaking base, as a mean over each step of an engine."""
+"""The shaking base as its velocity: a difference of velocities is the exact mean of an acceleration over a step."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SAMPLES_A_PERIOD = 4000  # of a pulse: its integral is then good to 2e-7 of itse
 
 
 class BaseVelocity:
-    """The time integral of one excitation, exact for a record: linear acceleration between samples."""
+    """The time integral of one excitation whose acceleration is linear between samples, as that of a record is."""
 
     def __init__(self, excitation: Rest | Ricker | Sine | Record) -> None:
         if isinstance(excitation, Record):
@@ -24,25 +24,42 @@ class BaseVelocity:
             self.interval = 1.0
         else:
             self.interval = excitation.period / SAMPLES_A_PERIOD
-        count = math.ceil(excitation.quiet_after / self.interval - 1e-9) + 1
-        self.samples = excitation.acceleration(self.interval * np.arange(count))
-        steps = 0.5 * self.interval * (self.samples[1:] + self.samples[:-1])
-        self.sums = np.concatenate([[0.0], np.cumsum(steps)])
+        self.times = self.interval * np.arange(math.ceil(excitation.quiet_after / self.interval - 1e-9) + 1)
+        samples = excitation.acceleration(self.times)
+        # Lists: an engine's loop asks for one time after another.
+        self.sums: list[float] = [0.0, *np.cumsum(0.5 * self.interval * (samples[1:] + samples[:-1])).tolist()]
+        self.samples: list[float] = samples.tolist()
 
-    def __call__(self, t: FloatArray) -> FloatArray:
-        """Velocity of the base in m/s at times `t` >= 0 in s, zero at t = 0."""
-        if len(self.samples) == 1:
-            return np.zeros_like(t)
-        place = np.minimum(t / self.interval, len(self.samples) - 1.0)
-        index = np.minimum(place.astype(np.intp), len(self.samples) - 2)
+    def __call__(self, t: float) -> float:
+        """Velocity of the base in m/s at the time `t` >= 0 in s, zero at t = 0."""
+        place = t / self.interval
+        index = int(place)
+        if index >= len(self.samples) - 1:
+            return self.sums[-1]
         part = place - index
-        here, following = self.samples[index], self.samples[index + 1]
-        velocity: FloatArray = self.sums[index] + self.interval * part * (here + 0.5 * part * (following - here))
-        return velocity
+        here = self.samples[index]
+        return self.sums[index] + self.interval * part * (here + 0.5 * part * (self.samples[index + 1] - here))
 
 
 def felt_acceleration(scene: Scene, edges: FloatArray) -> FloatArray:
     """What the block feels, -u and -(g + vg) in m/s^2, as means over the steps between the times `edges`; shape (steps, 2)."""
-    lengths = np.diff(edges)
-    means = [np.diff(BaseVelocity(excitation)(edges)) / lengths for excitation in (scene.excitation, scene.vertical)]
-    return -np.column_stack([means[0], scene.gravity + means[1]])
+    lengths, times = np.diff(edges), edges.tolist()
+    across, up = (np.diff([*map(BaseVelocity(e), times)]) / lengths for e in (scene.excitation, scene.vertical))
+    return -np.column_stack([across, scene.gravity + up])
+
+
+def starts_of_motion(scene: Scene) -> list[float]:
+    """Times in order at which a block at rest, flat on the floor, may start or stop to slide or to tip, s.
+
+    There |u| passes mu (g + vg) or tan(alpha) (g + vg).
+    """
+    times = np.unique(np.concatenate([BaseVelocity(e).times for e in (scene.excitation, scene.vertical)]))
+    pushing = np.abs(scene.excitation.acceleration(times))
+    holding = scene.gravity + scene.vertical.acceleration(times)
+    found = []
+    for limit in (scene.floor.friction, scene.block.half_width / scene.block.half_height):
+        excess = pushing - limit * holding
+        change = np.flatnonzero((excess[1:] > 0.0) != (excess[:-1] > 0.0))
+        part = excess[change] / (excess[change] - excess[change + 1])
+        found += (times[change] + part * (times[change + 1] - times[change])).tolist()
+    return sorted(found)

@@ -1,6 +1,6 @@
 """Which corners of the block can touch which surface of a scene, and the kinematics of those contacts.
 
-A state is x, y, theta, dx/dt, dy/dt, dtheta/dt (SI, relative to the base, counterclockwise positive).
+All methods take scalars or arrays, SI units, relative to the base, counterclockwise positive.
 """
 
 from __future__ import annotations
@@ -8,35 +8,41 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import numpy as np
-
 from scenes import Scene
 
+Arm = tuple[Any, Any]
 
-@dataclass(frozen=True, kw_only=True)
+
+@dataclass(frozen=True, kw_only=True, slots=True)
 class Contact:
     """One corner of the block and one surface that it can touch."""
 
     surface: Literal["floor", "left", "right"]
     corner: tuple[float, float]  # from the centroid, in the block's own frame, m
     normal: tuple[float, float]  # out of the surface
-    distance: float  # of the surface from the place of the upright centroid's foot, along -normal, m
+    distance: float  # from the surface to the point of the floor below the upright centroid, m
     restitution: float
 
-    def arm(self, theta: Any) -> tuple[Any, Any]:
-        """From the centroid to the corner of the block turned by `theta`, m (right, up)."""
-        (bx, bz), cos, sin = self.corner, np.cos(theta), np.sin(theta)
+    def arm(self, cos: Any, sin: Any) -> Arm:
+        """From the centroid to the corner of the block turned by theta, given its cosine and sine: right, up, m."""
+        bx, bz = self.corner
         return bx * cos - bz * sin, bx * sin + bz * cos
 
-    def gap(self, state: Any) -> Any:
-        """Clear distance in m between corner and surface for states of shape (..., 6); negative is a penetration."""
-        rx, ry = self.arm(state[..., 2])
-        return self.normal[0] * (state[..., 0] + rx) + self.normal[1] * (state[..., 1] + ry) + self.distance
+    def gap(self, x: Any, y: Any, arm: Arm) -> Any:
+        """Clear distance between corner and surface, m; negative is a penetration."""
+        nx, nz = self.normal
+        return nx * (x + arm[0]) + nz * (y + arm[1]) + self.distance
 
-    def normal_row(self, theta: Any) -> tuple[Any, Any, Any]:
-        """J of the gap's rate J . (dx/dt, dy/dt, dtheta/dt)."""
-        rx, ry = self.arm(theta)
-        return self.normal[0], self.normal[1], self.normal[1] * rx - self.normal[0] * ry
+    def rate(self, x_dot: Any, y_dot: Any, theta_dot: Any, arm: Arm) -> Any:
+        """The gap's rate, m/s."""
+        nx, nz = self.normal
+        return nx * (x_dot - theta_dot * arm[1]) + nz * (y_dot + theta_dot * arm[0])
+
+    def acceleration(self, x_ddot: Any, y_ddot: Any, theta_ddot: Any, theta_dot: Any, arm: Arm) -> Any:
+        """The gap's acceleration, m/s^2."""
+        nx, nz = self.normal
+        turning = theta_dot * theta_dot
+        return nx * (x_ddot - theta_ddot * arm[1] - turning * arm[0]) + nz * (y_ddot + theta_ddot * arm[0] - turning * arm[1])
 
 
 def contacts_of(scene: Scene) -> tuple[Contact, ...]:
@@ -46,12 +52,12 @@ def contacts_of(scene: Scene) -> tuple[Contact, ...]:
         Contact(surface="floor", corner=(bx, -h), normal=(0.0, 1.0), distance=0.0, restitution=scene.floor.restitution) for bx in (-b, b)
     ]
     for wall in scene.walls:
-        outward = -1.0 if wall.side == "left" else 1.0
+        inward = 1.0 if wall.side == "left" else -1.0
         found += [
             Contact(
                 surface=wall.side,
-                corner=(outward * b, bz),
-                normal=(-outward, 0.0),
+                corner=(-inward * b, bz),
+                normal=(inward, 0.0),
                 distance=b + wall.gap,
                 restitution=wall.restitution,
             )

@@ -5,11 +5,16 @@ from __future__ import annotations
 import math
 import time
 from abc import abstractmethod
-from typing import ClassVar, Literal, Protocol
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
+from typing import ClassVar, Literal, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import model_validator
 
+from engines.adaptive import Push, march_adaptively
 from engines.base_motion import felt_acceleration
 from engines.contacts import contacts_of
 from engines.events import events_of
@@ -18,6 +23,7 @@ from scenes.base import Frozen, Positive
 from scenes.observation import observe
 
 FloatArray = NDArray[np.float64]
+Marched = tuple[FloatArray, FloatArray, FloatArray]  # times (n) and states (n, 6) at step ends, felt accelerations (n-1, 2)
 MOST_STEPS = 5_000_000
 STEPS_AT_ONCE = 2048
 BLOWN_UP = 1e6  # m, rad, m/s or rad/s: no scene comes near it
@@ -29,27 +35,48 @@ class World(Protocol):
     def place(self, state: FloatArray) -> None:
         """Put the block where `state` (6) says."""
 
-    def march(self, accelerations: FloatArray) -> FloatArray:
-        """States (n, 6) after each of n steps, with the felt `accelerations` (n, 2) in m/s^2."""
+    def march(self, felt: FloatArray, dt: float) -> FloatArray:
+        """States (n, 6) after each of n steps of `dt` s, with the `felt` accelerations (n, 2) in m/s^2."""
 
     def close(self) -> None:
         """Give back what the engine holds."""
 
 
+class RigidWorld(World, Protocol):
+    """A world whose contacts stop or bounce within one step, whatever the step, so that steps can vary."""
+
+    @property
+    def push(self) -> Push:
+        """The engine as a map of velocities."""
+
+
 class Engine(Frozen):
     """A physics engine as a model of the block.
 
-    `time_step` in s. `settings` "best" is the set-up that converges to rigid contact with Coulomb friction and Newton's
-    restitution; "default" is the engine as it comes: a box on a floor, with the engine's own contact parameters.
+    `time_step` in s, or "adaptive": then steps end at the events and are at most `largest_step` s long, which has no
+    meaning otherwise. `settings` "best" is the set-up that converges to rigid contact with Coulomb friction and Newton's
+    restitution; "default" is the engine as it comes, a box on a floor with the engine's own contact parameters, which
+    cannot step adaptively.
     """
 
     name: ClassVar[str]
-    time_step: Positive = 1e-4
+    time_step: Positive | Literal["adaptive"] = 1e-4
+    largest_step: Positive = 1e-3
     settings: Literal["best", "default"] = "best"
 
+    @model_validator(mode="after")
+    def _rigid_if_adaptive(self) -> Self:
+        if self.settings == "default" and self.time_step == "adaptive":
+            raise InputError('"adaptive" is not allowed with settings = "default": give a step in s', "time_step")
+        return self
+
     @abstractmethod
-    def world(self, scene: Scene) -> World:
-        """The scene as this engine holds it."""
+    def rigid_world(self, scene: Scene) -> RigidWorld:
+        """The scene as this engine holds it at its best."""
+
+    @abstractmethod
+    def stock_world(self, scene: Scene) -> World:
+        """The scene as this engine holds it with its own contact parameters."""
 
     def notes(self, scene: Scene) -> list[str]:
         """What this engine cannot do of the scene, a line each."""
@@ -60,30 +87,33 @@ class Engine(Frozen):
     def simulate(self, scene: Scene) -> History:
         """The history of the scene as the engine plays it.
 
-        Its cost's `wall_seconds` and `cpu_seconds` are those of the march alone. Raises `InputError` if the scene needs
-        more than five million steps, `ModelFailure` if the motion blows up.
+        The cost's `wall_seconds` and `cpu_seconds` are those of the march alone. Raises `InputError` if the scene needs
+        more than five million steps, `ModelFailure` if the motion blows up or its events do not end.
         """
-        if scene.duration / self.time_step > MOST_STEPS:
-            raise InputError(
-                f"{self.time_step:g} is not allowed: {scene.duration:g} s would need more than {MOST_STEPS} steps", "time_step"
-            )
+        step = self.largest_step if self.time_step == "adaptive" else self.time_step
+        if scene.duration / step > MOST_STEPS:
+            key = "largest_step" if self.time_step == "adaptive" else "time_step"
+            raise InputError(f"{step:g} is not allowed: {scene.duration:g} s would need more than {MOST_STEPS} steps", key)
         start = time.perf_counter()
-        world = self.world(scene)
-        try:
-            steps = math.ceil(scene.output_times[-1] / self.time_step - 1e-9)
-            times = self.time_step * np.arange(steps + 1)
-            felt = felt_acceleration(scene, times)
+        march: Callable[[], Marched]
+        with ExitStack() as stack:
+            if self.time_step == "adaptive":
+                rigid = self.rigid_world(scene)
+                stack.callback(rigid.close)
+                march = partial(march_adaptively, scene, rigid.push, step)
+            else:
+                world = self.rigid_world(scene) if self.settings == "best" else self.stock_world(scene)
+                stack.callback(world.close)
+                times = step * np.arange(math.ceil(scene.output_times[-1] / step - 1e-9) + 1)
+                march = partial(_march, world, scene, times, felt_acceleration(scene, times))
             begin, begin_cpu = time.perf_counter(), time.process_time()
-            states = _march(world, np.array(scene.initial_state), felt)
+            times, states, felt = march()
             cost = Cost(
                 wall_seconds=time.perf_counter() - begin,
                 cpu_seconds=time.process_time() - begin_cpu,
                 set_up=begin - start,
                 steps=len(states) - 1,
             )
-        finally:
-            world.close()
-        times = times[: len(states)]
         return observe(
             scene,
             self.name,
@@ -95,20 +125,22 @@ class Engine(Frozen):
         )
 
 
-def _march(world: World, initial: FloatArray, felt: FloatArray) -> FloatArray:
-    """States at all step ends, the initial one first, up to the first one with |theta| >= pi/2."""
-    world.place(initial)
-    pieces = [initial[None, :]]
+def _march(world: World, scene: Scene, times: FloatArray, felt: FloatArray) -> Marched:
+    """Times, states at all step ends and felt accelerations, up to the first state with |theta| >= pi/2."""
+    dt = float(times[1]) if len(times) > 1 else 0.0
+    pieces = [np.array(scene.initial_state)[None, :]]
+    world.place(pieces[0][0])
     for first in range(0, len(felt), STEPS_AT_ONCE):
-        states = world.march(felt[first : first + STEPS_AT_ONCE])
+        states = world.march(felt[first : first + STEPS_AT_ONCE], dt)
         if not np.all(np.abs(states) < BLOWN_UP):  # catches nan, too
-            raise ModelFailure(f"the motion blew up between steps {first} and {first + len(states)}")
+            raise ModelFailure(f"the motion blew up between t = {times[first]:g} and {times[first + len(states)]:g} s")
         pieces.append(states)
         tipped = np.flatnonzero(np.abs(states[:, 2]) >= math.pi / 2)
         if tipped.size:
             pieces[-1] = states[: tipped[0] + 1]
             break
-    return np.concatenate(pieces)
+    marched = np.concatenate(pieces)
+    return times[: len(marched)], marched, felt
 
 
 def at_output_times(scene: Scene, times: FloatArray, states: FloatArray) -> FloatArray:

@@ -63,18 +63,24 @@ class _Motion:
 
     def __init__(self, scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: FloatArray, felt: FloatArray) -> None:
         self.scene, self.contacts, self.t, self.states, self.felt = scene, contacts, t, states, felt
-        self.near = CLOSED + 2.0 * scene.gravity * float(np.min(np.diff(t))) ** 2
+        self.near = CLOSED + 2.0 * scene.gravity * float(np.min(np.diff(t), initial=1e-3)) ** 2
         self.slip_rate = kinematics.slip_rate(scene.block, states[:, 2], states[:, 3], states[:, 5])
+
+    def gap(self, contact: Contact, rows: slice = slice(None)) -> FloatArray:
+        """Gaps of a contact at step ends, m."""
+        x, y, theta = self.states[rows, :3].T
+        gap: FloatArray = contact.gap(x, y, contact.arm(np.cos(theta), np.sin(theta)))
+        return gap
 
     def closed(self, contact: Contact) -> NDArray[np.bool_]:
         """Whether the contact is closed at each step end, openings of less than 2 ms left out."""
-        return _held(contact.gap(self.states) < self.near, self.t)
+        return _held(self.gap(contact) < self.near, self.t)
 
     def onset(self, contact: Contact, index: int) -> float:
         """When the gap that is closed at `index` and was open before passed zero, s."""
         if index == 0:
             return float(self.t[0])
-        before, after = contact.gap(self.states[index - 1 : index + 1])
+        before, after = self.gap(contact, slice(index - 1, index + 1))
         part = min(max(before / (before - after), 0.0), 1.0) if before > after else 1.0
         return float(self.t[index - 1] + part * (self.t[index] - self.t[index - 1]))
 
@@ -94,19 +100,19 @@ class _Motion:
         gained = self.states[last, 3:] - self.states[first, 3:]
         gained[:2] -= np.diff(self.t[first : last + 1]) @ self.felt[first:last]
         theta = self.states[index, 2]
-        columns, floor = [], None
-        active = [c for c in self.contacts if c is contact or np.any(c.gap(self.states[first : last + 1]) < self.near)]
-        for other in active:
-            columns.append(other.normal_row(theta))
-            if other.surface == "floor":
-                floor = other
-        if floor is not None:
-            height = -floor.arm(theta)[1]
-            columns += [(1.0, 0.0, height), (-1.0, 0.0, -height)]  # friction either way
-        matrix = np.array(columns).T
+        cos, sin = math.cos(theta), math.sin(theta)
+        along_x, along_y, turning = np.eye(3)  # an impulse acts on what a contact sees move
+        columns, owners = [], []
+        for other in self.contacts:
+            if other is contact or np.any(self.gap(other, slice(first, last + 1)) < self.near):
+                arm = other.arm(cos, sin)
+                normal = other.rate(along_x, along_y, turning, arm)
+                friction = self.scene.floor.friction * (along_x - arm[1] * turning) if other.surface == "floor" else 0.0 * normal
+                columns += [normal + friction, normal - friction]  # the edges of its cone
+                owners += [other, other]
         scale = np.array([1.0, 1.0, 1.0 / self.scene.block.radius])
-        impulses, _ = nnls(matrix * scale[:, None], gained * np.array([1.0, 1.0, inertia]) * scale)
-        return float(impulses[active.index(contact)])
+        impulses, _ = nnls(np.array(columns).T * scale[:, None], gained * np.array([1.0, 1.0, inertia]) * scale)
+        return float(sum(part for part, owner in zip(impulses, owners, strict=True) if owner is contact))
 
     def modes(self, indices: Sequence[int]) -> list[str]:
         """Modes of motion at some step ends."""

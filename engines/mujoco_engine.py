@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.contacts import contacts_of
-from engines.engine import Engine, World
+from engines.adaptive import Vector
+from engines.contacts import Contact, contacts_of
+from engines.engine import Engine, RigidWorld, World
 from scenes import Scene
 
 FloatArray = NDArray[np.float64]
 CORNER_RADIUS = 1e-6  # m; contacts are points, and MuJoCo has no contact of a point with a plane
-STIFFNESS = 0.01  # share of a penetration that one step removes
+PUSHED_OUT = 0.01  # share of a penetration that one step removes
 IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 1.0)
-SLIDING = 1e-6  # m/s: slower slip needs no correction of the cone, and it need not be known better
+RIGID = 1e7  # inverse regularisation of a contact, kg, where MuJoCo gives at most 1.5e4 to a block of 1 kg
+SLIDING = 1e-7  # m/s: how well a slip rate has to be known for the correction of the cone
 MOST_CORRECTIONS = 20
 
 
@@ -30,13 +33,14 @@ class MuJoCo(Engine):
     name: ClassVar[str] = "mujoco"
     cone_correction: bool = True
 
-    def world(self, scene: Scene) -> World:
-        """The scene as MuJoCo holds it."""
-        if self.settings == "default":
-            return _MuJoCoWorld(_stock_model(scene), self.time_step)
-        world = _MuJoCoWorld(_point_contact_model(scene), self.time_step, scene.floor.friction if self.cone_correction else 0.0)
-        world.set_one_step_contacts([contact.restitution for contact in contacts_of(scene)])
-        return world
+    def rigid_world(self, scene: Scene) -> RigidWorld:
+        """The scene as MuJoCo holds it: point contacts of the corners."""
+        friction = scene.floor.friction if self.cone_correction else 0.0
+        return _RigidMuJoCoWorld(_point_contact_model(scene), contacts_of(scene), friction)
+
+    def stock_world(self, scene: Scene) -> World:
+        """The scene as MuJoCo holds it: a box among planes."""
+        return _MuJoCoWorld(_stock_model(scene))
 
     def notes(self, scene: Scene) -> list[str]:
         """What MuJoCo cannot do of the scene, a line each."""
@@ -49,87 +53,120 @@ class MuJoCo(Engine):
 class _MuJoCoWorld:
     """A compiled model with its data, stepped by Euler's method."""
 
-    def __init__(self, model_text: str, time_step: float, corrected_friction: float = 0.0) -> None:
+    def __init__(self, model_text: str) -> None:
         import mujoco
 
         self.model: Any = mujoco.MjModel.from_xml_string(model_text)
-        self.model.opt.timestep = time_step
         self.data: Any = mujoco.MjData(self.model)
-        self.friction = corrected_friction
-
-    def set_one_step_contacts(self, restitutions: list[float]) -> None:
-        """Contacts that end a step with -e times the normal velocity they began it with.
-
-        Reference acceleration -(1+e)/dt times the velocity, less a share of the penetration; not that for a bouncing wall,
-        which would gain energy.
-        """
-        dt = self.model.opt.timestep
-        for pair, e in enumerate(restitutions):
-            self.model.pair_solref[pair] = [-(STIFFNESS if e == 0.0 else 0.0) / dt**2, -(1.0 + e) / dt]
+        self.mujoco: Any = mujoco
 
     def place(self, state: FloatArray) -> None:
         """Put the block where `state` says."""
         self.data.qpos[:] = state[:3]
         self.data.qvel[:] = state[3:]
 
-    def march(self, accelerations: FloatArray) -> FloatArray:
+    def march(self, felt: FloatArray, dt: float) -> FloatArray:
         """States after each step."""
-        import mujoco
-
-        model, data, step = self.model, self.data, mujoco.mj_step if self.friction == 0.0 else self._corrected_step
-        qpos, qvel, ctrl = data.qpos, data.qvel, data.ctrl
-        states = np.empty((len(accelerations), 6))
-        for state, acceleration in zip(states, accelerations, strict=True):
-            ctrl[:] = acceleration
-            step(model, data)
+        self.model.opt.timestep = dt
+        qpos, qvel, force = self.data.qpos, self.data.qvel, self.data.qfrc_applied[:2]
+        states = np.empty((len(felt), 6))
+        for state, acceleration in zip(states, felt, strict=True):
+            force[:] = acceleration
+            self.step()
             state[:3] = qpos
             state[3:] = qvel
         return states
 
-    def _corrected_step(self, model: Any, data: Any) -> None:
-        """One Euler step with De Saxce's correction of the friction cone."""
-        import mujoco
-
-        mujoco.mj_step1(model, data)
-        mujoco.mj_fwdActuation(model, data)
-        mujoco.mj_fwdAcceleration(model, data)
-        mujoco.mj_fwdConstraint(model, data)
-        forces = data.efc_force.tolist()
-        # Three rows for each contact with friction, which come first, and one for each without.
-        rows = range(0, 3 * ((len(forces) - data.ncon) // 2), 3)
-        if any(abs(forces[row + 2]) > 0.999 * self.friction * forces[row] > 0.0 for row in rows):
-            self._correct_cone(list(rows))
-        mujoco.mj_Euler(model, data)
-
-    def _correct_cone(self, rows: list[int]) -> None:
-        """Solve again with the normal target of each floor contact lowered by mu times its slip rate, until that is consistent.
-
-        The fixed point obeys Coulomb's law with the contact neither parting nor closing (De Saxce & Feng 1998).
-        """
-        import mujoco
-
-        model, data, dt = self.model, self.data, self.model.opt.timestep
-        original = data.efc_aref.copy()
-        tangents = data.efc_J.reshape(-1, 3)[[row + 2 for row in rows]]
-        before = np.full(len(rows), np.inf)
-        for _ in range(MOST_CORRECTIONS):
-            slip_rate = np.abs(tangents @ (data.qvel + dt * data.qacc))
-            if np.all(np.abs(slip_rate - before) < SLIDING):
-                return
-            data.efc_aref[rows] = original[rows] - self.friction * slip_rate / dt
-            mujoco.mj_fwdConstraint(model, data)
-            before = slip_rate
+    def step(self) -> None:
+        """One step."""
+        self.mujoco.mj_step(self.model, self.data)
 
     def close(self) -> None:
         """Nothing to give back: the model goes with its last reference."""
 
 
+class _RigidMuJoCoWorld(_MuJoCoWorld):
+    """Contacts that end a step with -e times the normal velocity they began it with, and Coulomb's cone if corrected."""
+
+    def __init__(self, model_text: str, contacts: Sequence[Contact], corrected_friction: float) -> None:
+        super().__init__(model_text)
+        self.friction = corrected_friction
+        self.model.pair_solref[:, 0] = 0.0
+        restitutions = np.array([contact.restitution for contact in contacts])
+        self.stopping, self.bouncing = np.full(len(contacts), -1.0), -1.0 - restitutions
+        # Not of a penetration that would come back as a bounce: no weight presses the block on a wall.
+        self.pushing_out = np.where([contact.surface == "floor" for contact in contacts] & (restitutions == 0.0), -PUSHED_OUT, 0.0)
+
+    def march(self, felt: FloatArray, dt: float) -> FloatArray:
+        """States after each step."""
+        # Reference acceleration: -(1+e)/dt times the velocity, less a share of the penetration.
+        self.model.pair_solref[:, 0] = self.pushing_out / dt**2
+        self.model.pair_solref[:, 1] = self.bouncing / dt
+        return super().march(felt, dt)
+
+    def step(self) -> None:
+        """One step, with the correction of the cone."""
+        if self.friction == 0.0:
+            super().step()
+            return
+        self.mujoco.mj_step1(self.model, self.data)
+        self._accelerate(self.model.opt.timestep)
+        self.mujoco.mj_Euler(self.model, self.data)
+
+    def push(self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool) -> Vector:
+        """Velocity after `dt` s with the contacts closed at `pose`."""
+        model, data = self.model, self.data
+        data.qpos[:] = pose
+        data.qvel[:] = velocity
+        data.qfrc_applied[:2] = felt
+        model.pair_solref[:, 1] = (self.bouncing if bouncing else self.stopping) * (IMPEDANCE[0] / dt)
+        self.mujoco.mj_step1(model, data)
+        data.efc_D[:] = RIGID  # MuJoCo caps the impedance, and with it the share of an impact that its contacts take up
+        self._accelerate(dt)
+        ax, ay, spin = data.qacc.tolist()
+        return velocity[0] + dt * ax, velocity[1] + dt * ay, velocity[2] + dt * spin
+
+    def _accelerate(self, dt: float) -> None:
+        """Solve for accelerations and contact forces."""
+        model, data = self.model, self.data
+        self.mujoco.mj_fwdAcceleration(model, data)
+        self.mujoco.mj_fwdConstraint(model, data)
+        if self.friction > 0.0:
+            forces = data.efc_force.tolist()
+            # Three rows for each contact with friction, which come first, and one for each without.
+            rows = range(0, 3 * ((len(forces) - data.ncon) // 2), 3)
+            if any(abs(forces[row + 2]) > 0.999 * self.friction * forces[row] > 0.0 for row in rows):
+                self._correct_cone(list(rows), dt)
+
+    def _correct_cone(self, rows: list[int], dt: float) -> None:
+        """Solve again with the normal target of each floor contact lowered by mu times its slip rate, until that is consistent.
+
+        The fixed point obeys Coulomb's law with the contact neither parting nor closing (De Saxce & Feng 1998). Found by
+        the secant method, from the slip rate before the step.
+        """
+        model, data = self.model, self.data
+        original, tangents = data.efc_aref.copy(), data.efc_J.reshape(-1, 3)[[row + 2 for row in rows]]
+        guess = np.abs(tangents @ data.qvel)
+        last_guess = last_excess = np.full(len(rows), np.nan)
+        for _ in range(MOST_CORRECTIONS):
+            data.efc_aref[rows] = original[rows] - self.friction * guess / dt
+            self.mujoco.mj_fwdConstraint(model, data)
+            excess = np.abs(tangents @ (data.qvel + dt * data.qacc)) - guess
+            if np.all(np.abs(excess) < SLIDING):
+                return
+            with np.errstate(divide="ignore", invalid="ignore"):
+                slope = (excess - last_excess) / (guess - last_guess)
+            last_guess, last_excess = guess, excess
+            # The slip rate falls as its guess grows, or hardly depends on it: the slope is at most about -1.
+            guess = np.maximum(guess - excess / np.where(slope < -0.5, slope, -1.0), 0.0)
+
+
 def _planar_body(scene: Scene, geoms: str) -> str:
-    """A body of unit mass that moves in the plane x, z and turns counterclockwise; motors give the inertia force."""
+    """A body of unit mass that moves in the plane x, z and turns counterclockwise."""
     inertia = scene.block.radius**2 / 3.0
     return f"""
 <body>
-  <joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/><joint type="hinge" axis="0 -1 0"/>
+  <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/><joint type="hinge" axis="0 -1 0"/>
   <inertial pos="0 0 0" mass="1" diaginertia="{inertia!r} {inertia!r} {inertia!r}"/>
   {geoms}
 </body>"""
@@ -137,10 +174,9 @@ def _planar_body(scene: Scene, geoms: str) -> str:
 
 def _model(option: str, world: str, contact: str = "") -> str:
     return f"""<mujoco>
-<option gravity="0 0 0" {option}><flag autoreset="disable"/></option>
+<option gravity="0 0 0" {option}</option>
 <worldbody>{world}</worldbody>
 {contact}
-<actuator><motor joint="x"/><motor joint="z"/></actuator>
 </mujoco>"""
 
 
@@ -173,7 +209,9 @@ def _point_contact_model(scene: Scene) -> str:
         f'<pair geom1="{contact.surface}" geom2="{corners[contact.corner]}" solimp="{impedance}" {kinds[contact.surface]}/>'
         for contact in contacts
     )
-    option = 'integrator="Euler" cone="elliptic" solver="Newton" iterations="10" tolerance="0" jacobian="dense" impratio="1"'
+    # Without warm start Newton's method needs fewer iterations, and it does not get stuck on the edge of a stiff cone.
+    option = """integrator="Euler" cone="elliptic" impratio="1" solver="Newton" iterations="100" tolerance="1e-15" ls_tolerance="1e-6"
+  jacobian="dense"><flag autoreset="disable" island="disable" warmstart="disable"/>"""
     return _model(option, planes + _planar_body(scene, spheres), f"<contact>{pairs}</contact>")
 
 
@@ -183,4 +221,6 @@ def _stock_model(scene: Scene) -> str:
     planes = _plane("floor", scene, 0.0, f'condim="3" friction="{mu!r} 0 0"')
     planes += "".join(_plane(wall.side, scene, 0.0, 'condim="1"') for wall in scene.walls)
     size = f"{block.half_width!r} {block.half_width!r} {block.half_height!r}"
-    return _model("", planes + _planar_body(scene, f'<geom type="box" size="{size}" condim="1" friction="0 0 0"/>'))
+    return _model(
+        "><flag autoreset='disable'/>", planes + _planar_body(scene, f'<geom type="box" size="{size}" condim="1" friction="0 0 0"/>')
+    )

@@ -3,66 +3,112 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from engines.adaptive import Vector
 from engines.contacts import contacts_of
-from engines.engine import Engine, World
+from engines.engine import Engine, RigidWorld, World
 from scenes import Scene
 
 FloatArray = NDArray[np.float64]
-CORNER_RADIUS = 1e-5  # m
+CORNER_RADIUS = 1e-6  # m
 SLAB = 1.0  # m, half the thickness of floor and walls
 REACH = 100.0  # m, half their extent
 FLOOR_ERP = 0.02  # share of a penetration that one step removes; none where it would add to a bounce or make one
 
 
 class PyBullet(Engine):
-    """PyBullet in double precision, its default solver iterated further, without slop, damping and sleeping."""
+    """PyBullet, with its default solver iterated until it has converged, without slop, damping and sleeping."""
 
     name: ClassVar[str] = "pybullet"
 
-    def world(self, scene: Scene) -> World:
-        """The scene as PyBullet holds it."""
-        return _PyBulletWorld(scene, self.time_step, stock=self.settings == "default")
+    def rigid_world(self, scene: Scene) -> RigidWorld:
+        """The scene as PyBullet holds it: point contacts of the corners."""
+        return _RigidPyBulletWorld(scene)
+
+    def stock_world(self, scene: Scene) -> World:
+        """The scene as PyBullet holds it: a box among boxes."""
+        return _PyBulletWorld(scene)
 
 
 class _PyBulletWorld:
-    """A physics server of its own with block, floor and walls."""
+    """A physics server of its own with block, floor and walls, and PyBullet's default parameters."""
 
-    def __init__(self, scene: Scene, time_step: float, *, stock: bool) -> None:
+    inset = 0.0  # m: how far behind their surfaces floor and walls stand
+
+    def __init__(self, scene: Scene) -> None:
         import pybullet
 
         self.bullet: Any = pybullet
         self.client: int = pybullet.connect(pybullet.DIRECT)
         self.options: dict[str, Any] = {"physicsClientId": self.client}
-        pybullet.setPhysicsEngineParameter(fixedTimeStep=time_step, **self.options)
-        self.body = self._box(scene) if stock else self._corners(scene)
-        if not stock:
-            pybullet.setPhysicsEngineParameter(
-                numSolverIterations=50,
-                solverResidualThreshold=0.0,
-                contactSlop=0.0,
-                restitutionVelocityThreshold=0.0,
-                contactERP=0.0 if scene.walls or scene.floor.restitution else FLOOR_ERP,
-                **self.options,
-            )
-        self._slab(0.0, 1.0, 0.0, 0.0 if stock else CORNER_RADIUS, scene.floor.friction, scene.floor.restitution)
+        self.body = self.make_block(scene)
+        self._make_slab(0.0, 1.0, 0.0, scene.floor.friction, scene.floor.restitution)
         for wall in scene.walls:
             inward = 1.0 if wall.side == "left" else -1.0
-            self._slab(inward, 0.0, scene.block.half_width + wall.gap, 0.0 if stock else CORNER_RADIUS, 0.0, wall.restitution)
+            self._make_slab(inward, 0.0, scene.block.half_width + wall.gap, 0.0, wall.restitution)
 
-    def _box(self, scene: Scene) -> int:
+    def make_block(self, scene: Scene) -> int:
+        """A box. Friction and restitution of two bodies multiply: the block's are 1, so that those of floor and walls count."""
         half = [scene.block.half_width, scene.block.half_width, scene.block.half_height]
         shape = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=half, **self.options)
-        body = self.bullet.createMultiBody(1.0, shape, **self.options)
-        # Friction and restitution of two bodies multiply: the block's are 1, so that those of floor and walls count.
+        body: int = self.bullet.createMultiBody(1.0, shape, **self.options)
         self.bullet.changeDynamics(body, -1, lateralFriction=1.0, restitution=1.0, **self.options)
-        return int(body)
+        return body
 
-    def _corners(self, scene: Scene) -> int:
+    def _make_slab(self, normal_x: float, normal_z: float, distance: float, friction: float, restitution: float) -> None:
+        """A thick box whose face looks along the normal."""
+        depth = distance + self.inset + SLAB
+        extent = [SLAB if normal_x else REACH, REACH, SLAB if normal_z else REACH]
+        shape = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=extent, **self.options)
+        body = self.bullet.createMultiBody(0.0, shape, basePosition=[-normal_x * depth, 0.0, -normal_z * depth], **self.options)
+        self.bullet.changeDynamics(body, -1, lateralFriction=friction, restitution=restitution, **self.options)
+
+    def place(self, state: Iterable[float]) -> None:
+        """Put the block where `state` says. Bullet's y axis points into the plane: its angles are clockwise."""
+        x, z, theta, vx, vz, w = map(float, state)
+        turn = (0.0, -math.sin(0.5 * theta), 0.0, math.cos(0.5 * theta))
+        self.bullet.resetBasePositionAndOrientation(self.body, (x, 0.0, z), turn, physicsClientId=self.client)
+        self.bullet.resetBaseVelocity(self.body, (vx, 0.0, vz), (0.0, -w, 0.0), physicsClientId=self.client)
+
+    def march(self, felt: FloatArray, dt: float) -> FloatArray:
+        """States after each step."""
+        bullet, body, client = self.bullet, self.body, self.client
+        bullet.setTimeStep(dt, physicsClientId=client)
+        states = np.empty((len(felt), 6))
+        for row, (ax, az) in enumerate(felt.tolist()):
+            bullet.setGravity(ax, 0.0, az, physicsClientId=client)
+            bullet.stepSimulation(physicsClientId=client)
+            (x, _, z), (_, turn, _, whole) = bullet.getBasePositionAndOrientation(body, physicsClientId=client)
+            (vx, _, vz), (_, w, _) = bullet.getBaseVelocity(body, physicsClientId=client)
+            states[row] = x, z, -2.0 * math.atan2(turn, whole), vx, vz, -w
+        return states
+
+    def close(self) -> None:
+        """End the physics server."""
+        self.bullet.disconnect(**self.options)
+
+
+class _RigidPyBulletWorld(_PyBulletWorld):
+    """Contacts of points, solved to convergence."""
+
+    inset = CORNER_RADIUS
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene)
+        self.bounces = any(contact.restitution > 0.0 for contact in contacts_of(scene))
+        # Where it would add to a bounce or make one, a penetration is left as it is.
+        self.erp = 0.0 if self.bounces or scene.walls else FLOOR_ERP
+        self.bouncing: bool | None = None
+        self.bullet.setPhysicsEngineParameter(
+            numSolverIterations=1000, solverResidualThreshold=1e-20, contactSlop=0.0, contactERP=0.0, **self.options
+        )
+
+    def make_block(self, scene: Scene) -> int:
         """The block as tiny spheres at its corners; a huge inertia about the other axes keeps it in its plane."""
         places = [[bx, 0.0, bz] for bx, bz in dict.fromkeys(contact.corner for contact in contacts_of(scene))]
         shape = self.bullet.createCollisionShapeArray(
@@ -71,7 +117,7 @@ class _PyBulletWorld:
             collisionFramePositions=places,
             **self.options,
         )
-        body = self.bullet.createMultiBody(1.0, shape, useMaximalCoordinates=1, **self.options)
+        body: int = self.bullet.createMultiBody(1.0, shape, useMaximalCoordinates=1, **self.options)
         inertia = scene.block.radius**2 / 3.0
         self.bullet.changeDynamics(
             body,
@@ -86,35 +132,27 @@ class _PyBulletWorld:
             restitution=1.0,
             **self.options,
         )
-        return int(body)
+        return body
 
-    def _slab(self, normal_x: float, normal_z: float, distance: float, inset: float, friction: float, restitution: float) -> None:
-        """A thick box whose face looks along the normal, `inset` m behind the surface at -distance."""
-        depth = distance + inset + SLAB
-        extent = [SLAB if normal_x else REACH, REACH, SLAB if normal_z else REACH]
-        shape = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=extent, **self.options)
-        body = self.bullet.createMultiBody(0.0, shape, basePosition=[-normal_x * depth, 0.0, -normal_z * depth], **self.options)
-        self.bullet.changeDynamics(body, -1, lateralFriction=friction, restitution=restitution, **self.options)
-
-    def place(self, state: FloatArray) -> None:
-        """Put the block where `state` says; Bullet's y axis points into the plane, so that angles change sign."""
-        x, z, theta, vx, vz, w = map(float, state)
-        turn = [0.0, -math.sin(0.5 * theta), 0.0, math.cos(0.5 * theta)]
-        self.bullet.resetBasePositionAndOrientation(self.body, [x, 0.0, z], turn, **self.options)
-        self.bullet.resetBaseVelocity(self.body, [vx, 0.0, vz], [0.0, -w, 0.0], **self.options)
-
-    def march(self, accelerations: FloatArray) -> FloatArray:
+    def march(self, felt: FloatArray, dt: float) -> FloatArray:
         """States after each step."""
-        bullet, body, client = self.bullet, self.body, self.client
-        states = np.empty((len(accelerations), 6))
-        for row, (ax, az) in enumerate(accelerations.tolist()):
-            bullet.setGravity(ax, 0.0, az, physicsClientId=client)
-            bullet.stepSimulation(physicsClientId=client)
-            (x, _, z), (_, turn, _, whole) = bullet.getBasePositionAndOrientation(body, physicsClientId=client)
-            (vx, _, vz), (_, w, _) = bullet.getBaseVelocity(body, physicsClientId=client)
-            states[row] = x, z, -2.0 * math.atan2(turn, whole), vx, vz, -w
-        return states
+        self._bounce(True)
+        self.bullet.setPhysicsEngineParameter(contactERP=self.erp, **self.options)
+        return super().march(felt, dt)
 
-    def close(self) -> None:
-        """End the physics server."""
-        self.bullet.disconnect(**self.options)
+    def push(self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool) -> Vector:
+        """Velocity after `dt` s with the contacts closed at `pose`."""
+        bullet, client = self.bullet, self.client
+        if self.bounces and bouncing is not self.bouncing:
+            self._bounce(bouncing)
+        self.place((*pose, *velocity))
+        bullet.setTimeStep(dt, physicsClientId=client)
+        bullet.setGravity(felt[0], 0.0, felt[1], physicsClientId=client)
+        bullet.stepSimulation(physicsClientId=client)
+        (vx, _, vz), (_, w, _) = bullet.getBaseVelocity(self.body, physicsClientId=client)
+        return vx, vz, -w
+
+    def _bounce(self, bouncing: bool) -> None:
+        """Let all contacts have their restitution, or none."""
+        self.bullet.setPhysicsEngineParameter(restitutionVelocityThreshold=0.0 if bouncing else 1e30, **self.options)
+        self.bouncing = bouncing
