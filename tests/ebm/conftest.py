@@ -1,0 +1,77 @@
+"""What the tests of the event-based models share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from ebm import EventBasedModel
+from scenes import Block, Scene
+
+PAPER_BLOCK = Block(half_width=0.397, half_height=1.555)
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run to its end, with what a History does not hold. SI units."""
+
+    ending: int
+    t: float
+    x: float
+    theta: float
+    #: Largest |theta|/alpha, located between the rows of a history.
+    peak: float
+    #: Highest lift of the lower bottom corner that the compiled loop saw, m.
+    hop: float
+    wall_impacts: int
+    steps: int
+    energy_gains: int
+
+    @property
+    def outcome(self) -> str:
+        """As the reference tables name it."""
+        if self.ending == 0:
+            return "safe"
+        return ("ccw" if self.theta > 0.0 else "cw") if self.ending == 1 else f"failed ({self.ending})"
+
+
+Runner = Callable[..., Run]
+
+
+@pytest.fixture(scope="session")
+def block() -> Block:
+    """The paper's block, alpha = 0.25."""
+    return PAPER_BLOCK
+
+
+@pytest.fixture(scope="session")
+def run_to_end() -> Runner:
+    """Runs a scene to its end without sampling it; the compiled loop is called as the model calls it."""
+    from ebm import motion, natural, trajectory
+
+    scratch = motion.workspace()
+
+    def run(scene: Scene, *, pivot: str = "bilateral", tolerance: float = 1e-12) -> Run:
+        setting = natural.setting_of(scene, unilateral=pivot == "unilateral", no_slip=False, energy_cap=False)
+        state = natural.state_of(scene)
+        order = EventBasedModel(tolerance=tolerance).order
+        control = trajectory.Control(tolerance, order, 1_000_000, 200_000, False, 1.0)
+        unit, radius = natural.time_unit(scene), scene.block.radius
+        nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
+        tally = trajectory.run(setting, *natural.grounds_of(scene), state, scene.duration / unit, control, *nothing, *scratch)
+        return Run(
+            ending=tally.ending,
+            t=tally.t * unit,
+            x=state[0] * radius,
+            theta=state[2],
+            peak=tally.peak / scene.block.alpha,
+            hop=tally.hop * radius,
+            wall_impacts=tally.wall_impacts,
+            steps=tally.steps,
+            energy_gains=tally.gains,
+        )
+
+    return run
