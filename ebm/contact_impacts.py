@@ -59,7 +59,7 @@ def _strike(rows, taking, target, mu_s, mu_k, v, after, impulse):
     best = np.inf
     lam = np.zeros(4)
     members = np.zeros(3, dtype=np.int64)
-    matrix = np.zeros((3, 3))
+    matrix = np.zeros((6, 3))  # and its inverse
     column = np.zeros((3, 3))
     trial = np.zeros(3)
     for mask in range(1 << CONTACTS):
@@ -90,8 +90,8 @@ def _strike(rows, taking, target, mu_s, mu_k, v, after, impulse):
                 row = rows[members[i]] if i < count else rows[6]
                 for j in range(unknowns):
                     matrix[i, j] = row[0] * column[j, 0] + row[1] * column[j, 1] + 3.0 * row[2] * column[j, 2]
-            inverse = inverse_of(matrix, unknowns)
-            if unknowns > 0 and not _well_posed(matrix, inverse, unknowns):
+            inverse_of(matrix, 0, 3, unknowns)
+            if unknowns > 0 and not _well_posed(matrix, unknowns):
                 continue
             feasible = True
             for k in range(3):
@@ -101,7 +101,7 @@ def _strike(rows, taking, target, mu_s, mu_k, v, after, impulse):
                 lam[i] = 0.0
                 for j in range(unknowns):
                     want = target[members[j]] - _dot(rows[members[j]], v) if j < count else -_dot(rows[6], v)
-                    lam[i] += inverse[i, j] * want
+                    lam[i] += matrix[3 + i, j] * want
                 if i < count and lam[i] < -_TINY:
                     feasible = False
                 if i < count and members[i] <= E:
@@ -136,14 +136,14 @@ def _strike(rows, taking, target, mu_s, mu_k, v, after, impulse):
 
 
 @kernel
-def _well_posed(matrix, inverse, n):
-    """Whether the inverse of the small matrix is finite and not mere rounding (parallel contacts give none)."""
+def _well_posed(matrix, n):
+    """Whether the inverse (rows 3 to 5) of the small matrix is finite and not mere rounding (parallel contacts give none)."""
     size = 0.0
     for i in range(n):
         for j in range(n):
-            if not math.isfinite(inverse[i, j]):
+            if not math.isfinite(matrix[3 + i, j]):
                 return False
-            size = max(size, abs(inverse[i, j]) * abs(matrix[j, i]))
+            size = max(size, abs(matrix[3 + i, j]) * abs(matrix[j, i]))
     return size < 1e10
 
 
@@ -207,17 +207,17 @@ def _close(rows, touching, resting, v):
             members[count] = j
             count += 1
     while count > 0:
-        matrix = np.zeros((3, 3))
+        matrix = np.zeros((6, 3))
         for i in range(count):
             for j in range(count):
                 r, q = rows[members[i]], rows[members[j]]
                 matrix[i, j] = r[0] * q[0] + r[1] * q[1] + 3.0 * r[2] * q[2]
-        inverse = inverse_of(matrix, count)
-        if _well_posed(matrix, inverse, count):
+        inverse_of(matrix, 0, 3, count)
+        if _well_posed(matrix, count):
             change = np.zeros(3)
             for i in range(count):
                 for j in range(count):
-                    share = -inverse[i, j] * _dot(rows[members[j]], v)
+                    share = -matrix[3 + i, j] * _dot(rows[members[j]], v)
                     change[0] += rows[members[i], 0] * share
                     change[1] += rows[members[i], 1] * share
                     change[2] += 3.0 * rows[members[i], 2] * share

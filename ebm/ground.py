@@ -38,6 +38,7 @@ class Ground(NamedTuple):
 
 
 _NO_SAMPLES = np.zeros(1)
+_RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, 40)])
 
 
 def ground_of(excitation: Rest | Ricker | Sine | Record, gravity: float, time_unit: float) -> Ground:
@@ -78,8 +79,8 @@ def acceleration(g, t):
 
 
 @kernel
-def fill_series(g, t, sign, n, out):
-    """Taylor coefficients 0..n of sign * acceleration about t, to the right of t."""
+def fill_series(g, t, sign, n, a, row):
+    """Taylor coefficients 0..n of sign * acceleration about t, to the right of t, into a[row]."""
     if g.kind == GAUSSIAN:
         tau = t - g.centre
         bell = sign * math.exp(-g.rate * tau * tau)
@@ -88,27 +89,27 @@ def fill_series(g, t, sign, n, out):
         q2 = g.c2 + 3.0 * tau * g.c3
         e1 = e2 = e3 = 0.0  # coefficients k-1, k-2, k-3 of the bell, which obeys bell' = -2 rate tau bell
         for k in range(n + 1):
-            out[k] = q0 * bell + q1 * e1 + q2 * e2 + g.c3 * e3
+            a[row, k] = q0 * bell + q1 * e1 + q2 * e2 + g.c3 * e3
             e3 = e2
             e2 = e1
             e1 = bell
-            bell = -2.0 * g.rate * (tau * e1 + e2) / (k + 1)
+            bell = -2.0 * g.rate * (tau * e1 + e2) * _RECIPROCAL[k + 1]
         return
     for k in range(n + 1):
-        out[k] = 0.0
+        a[row, k] = 0.0
     if g.kind == SINE and t < g.quiet:
-        out[0] = sign * g.c0 * math.sin(g.rate * t)
+        a[row, 0] = sign * g.c0 * math.sin(g.rate * t)
         if n > 0:
-            out[1] = sign * g.c0 * g.rate * math.cos(g.rate * t)
+            a[row, 1] = sign * g.c0 * g.rate * math.cos(g.rate * t)
         for k in range(2, n + 1):
-            out[k] = -g.rate * g.rate * out[k - 2] / (k * (k - 1))
+            a[row, k] = -g.rate * g.rate * a[row, k - 2] / (k * (k - 1))
     elif g.kind == SAMPLED:
         i = interval(g, t)
         if i + 1 < g.samples.size:
             rise = g.samples[i + 1] - g.samples[i]
-            out[0] = sign * (g.samples[i] + (t / g.step - i) * rise)
+            a[row, 0] = sign * (g.samples[i] + (t / g.step - i) * rise)
             if n > 0:
-                out[1] = sign * rise / g.step
+                a[row, 1] = sign * rise / g.step
 
 
 @kernel
@@ -170,16 +171,21 @@ def next_exceedance(g, t, low, high):
             rising = there > level
             a, b = t, end  # monotone in between: a is inside, b outside
             fa, fb = here - level, there - level
+            close = 4e-16 * abs(b)
             for _ in range(200):
-                if b - a <= 4e-16 * abs(b):
+                if b - a <= close:
                     break
+                # Regula falsi (Illinois), never nearer to an end than rounding, so that the bracket closes on the root.
                 guess = a - fa * (b - a) / (fb - fa)
-                margin = 1e-3 * (b - a)  # regula falsi, kept away from the ends so that the bracket must shrink
-                middle = min(max(guess, a + margin), b - margin) if fb != fa else 0.5 * (a + b)
+                middle = min(max(guess, a + close), b - close)
+                if not a < middle < b:
+                    middle = 0.5 * (a + b)
+                    if not a < middle < b:
+                        break
                 f = acceleration(g, middle) - level
                 if (f > 0.0) == rising and f != 0.0:
                     if fb * f > 0.0:
-                        fa *= 0.5  # Illinois
+                        fa *= 0.5
                     b, fb = middle, f
                 else:
                     if fa * f > 0.0:

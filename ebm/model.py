@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, Strict
 
-from scenes.base import Frozen
+from scenes.base import Frozen, Positive
 from scenes.errors import InputError, ModelFailure
 from scenes.history import Cost, Event, History
 from scenes.observation import observe
@@ -24,17 +24,18 @@ class EventBasedModel(Frozen):
 
     `tolerance` bounds the local truncation error of each Taylor step, in natural units (rotation in rad, lengths in R).
     `pivot`: "bilateral" is the paper's model, in which the pivot never leaves the floor; "unilateral" lets the floor only
-    push, so that the block may hop. `friction`: "coulomb" switches exactly between stick and slip, "bouc-wen" is the
-    paper's regularisation (9), "no-slip" is Housner's block. `energy_cap` (unilateral) lowers the restitution of an impact that
-    would add kinetic energy to the largest that does not. `estimate_error` runs the scene again at tolerance/100 and puts the
-    largest change of theta/alpha into `cost.error_estimate`. A run that reaches `most_steps` or `most_events` is a
-    `ModelFailure`.
+    push, so that the block may hop. `friction`: "coulomb" switches exactly between stick and slip, "bouc-wen" is the paper's
+    regularisation (9) with the `yield_displacement` u_y in m, "no-slip" is Housner's block. `energy_cap` (unilateral) lowers
+    the restitution of an impact that would add kinetic energy to the largest that does not. `estimate_error` runs the scene
+    again at tolerance/100 and puts the largest change of theta/alpha into `cost.error_estimate`. A run that reaches
+    `most_steps` or `most_events` is a `ModelFailure`.
     """
 
     tolerance: Annotated[float, Strict(), Field(ge=1e-15, le=1e-2)] = 1e-10
     pivot: Literal["bilateral", "unilateral"] = "bilateral"
     friction: Literal["coulomb", "bouc-wen", "no-slip"] = "coulomb"
     energy_cap: bool = False
+    yield_displacement: Positive = 1e-5
     estimate_error: bool = False
     most_steps: Annotated[int, Field(ge=1)] = 20_000_000
     most_events: Annotated[int, Field(ge=1)] = 200_000
@@ -49,7 +50,7 @@ class EventBasedModel(Frozen):
     @property
     def order(self) -> int:
         """Order of the Taylor series: about half the digits of the tolerance, as usual for such methods, and a few more."""
-        return min(28, math.ceil(-0.5 * math.log(self.tolerance)) + 4)
+        return min(HIGHEST_ORDER, math.ceil(-0.5 * math.log(self.tolerance)) + 4)
 
     def check(self, scene: Scene) -> None:
         """Raises `InputError` where the scene asks for physics that this model excludes."""
@@ -89,7 +90,7 @@ class EventBasedModel(Frozen):
 
             return bouc_wen.simulate(self, scene, tolerance)
         start = time.perf_counter()
-        from ebm import natural, trajectory
+        from ebm import motion, natural, trajectory
 
         b = natural.setting_of(scene, unilateral=self.pivot == "unilateral", no_slip=self.friction == "no-slip", energy_cap=self.energy_cap)
         horizontal, vertical = natural.grounds_of(scene)
@@ -103,7 +104,7 @@ class EventBasedModel(Frozen):
         log = np.empty((self.most_events, 5))
         _compiled()
         ready, cpu = time.perf_counter(), time.process_time()
-        tally = trajectory.run(b, horizontal, vertical, state, scene.duration / unit, control, out, out_mode, log)
+        tally = trajectory.run(b, horizontal, vertical, state, scene.duration / unit, control, out, out_mode, log, *motion.workspace())
         seconds, cpu = time.perf_counter() - ready, time.process_time() - cpu
         if tally.ending in trajectory.FAILURES:
             raise ModelFailure(f"{self.name}: {trajectory.FAILURES[tally.ending]} at t = {tally.t * unit:.6g} s")
@@ -160,7 +161,7 @@ def _compiled() -> None:
     global _READY
     if _READY:
         return
-    from ebm import natural, trajectory
+    from ebm import motion, natural, trajectory
     from scenes.excitations import Rest
     from scenes.scene import Block, Floor
 
@@ -168,8 +169,21 @@ def _compiled() -> None:
     b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
     control = trajectory.Control(1e-8, 12, 1, 1, False, 1.0)
     gh, gv = natural.grounds_of(scene)
-    trajectory.run(b, gh, gv, natural.state_of(scene), 1.0, control, np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5)))
+    trajectory.run(
+        b,
+        gh,
+        gv,
+        natural.state_of(scene),
+        1.0,
+        control,
+        np.empty((0, 6)),
+        np.empty(0, dtype=np.int8),
+        np.empty((0, 5)),
+        *motion.workspace(),
+    )
     _READY = True
 
 
 _READY = False
+#: Highest order of a Taylor step (see ebm.series, which is not imported here because it needs the compiler).
+HIGHEST_ORDER = 28

@@ -66,8 +66,12 @@ OFF, STICK, SLIPPING = 0, 1, 2
 # the right wall; on the floor a block at rest is then held on that side, whatever the base does.
 
 # Rows of the workspace that hold series.
-PHI, OMEGA, SIN, COS, U, G, XI, Y, P, Q, NA, NB, GUARD = range(13)
-ROWS = 13
+PHI, OMEGA, SIN, COS, U, G, XI, Y, P, Q, NA, NB, GUARD, KNOWN, FORCE = range(15)
+# Rows in which the small linear system of the contacts is put together, three each.
+ROW, COLUMN, MATRIX, INVERSE = range(15, 27, 3)
+ROWS = 27
+
+RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, MOST_TERMS + 2)])
 
 # The state vector: world frame.
 X, HEIGHT, THETA, VX, VY, W = range(6)
@@ -94,211 +98,216 @@ def tilt_series(b, m, z, gh, gv, t, order, enough, reach, need_forces, a):
     `need_forces` asks for P and Q also in ROCK, where motion does not depend on them.
     """
     sign = float(m[S])
-    phi, omega, sn, cs, u, g = a[PHI], a[OMEGA], a[SIN], a[COS], a[U], a[G]
-    fill_series(gh, t, sign, order, u)
-    fill_series(gv, t, 1.0, order, g)
-    g[0] += 1.0
-    phi[0] = sign * z[THETA]
-    omega[0] = sign * z[W]
-    sn[0] = np.sin(b.alpha - phi[0])
-    cs[0] = np.cos(b.alpha - phi[0])
+    fill_series(gh, t, sign, order, a, U)
+    fill_series(gv, t, 1.0, order, a, G)
+    a[G, 0] += 1.0
+    a[PHI, 0] = sign * z[THETA]
+    a[OMEGA, 0] = sign * z[W]
+    a[SIN, 0] = np.sin(b.alpha - a[PHI, 0])
+    a[COS, 0] = np.cos(b.alpha - a[PHI, 0])
     if m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0:
         return _rock_series(gv.kind == 0, order, enough, reach, need_forces, a)
-    xi, y = a[XI], a[Y]
-    xi[0] = sign * z[X]
-    xi[1] = sign * z[VX]
-    y[0] = z[HEIGHT]
-    y[1] = z[VY]
+    a[XI, 0] = sign * z[X]
+    a[XI, 1] = sign * z[VX]
+    a[Y, 0] = z[HEIGHT]
+    a[Y, 1] = z[VY]
     return _contact_series(b, m, order, enough, reach, a)
 
 
 @kernel
 def _rock_series(still_vertical, order, enough, reach, need_forces, a):
     """ROCK, (3): theta'' = (3/4)(u c - S s G0), the pivot sticking; xi and y are s and c up to a constant."""
-    phi, omega, sn, cs, u, g = a[PHI], a[OMEGA], a[SIN], a[COS], a[U], a[G]
     scale = 1.0
     small = 0
     for k in range(order):
         ds = 0.0
         dc = 0.0
         push = 0.0
+        i = k
         for j in range(k + 1):
-            ds += omega[j] * cs[k - j]
-            dc += omega[j] * sn[k - j]
-            push += u[j] * cs[k - j]
-        weight = sn[k]
+            ds += a[OMEGA, j] * a[COS, i]
+            dc += a[OMEGA, j] * a[SIN, i]
+            push += a[U, j] * a[COS, i]
+            i -= 1
+        weight = a[SIN, k]
         if not still_vertical:
             weight = 0.0
             for j in range(k + 1):
-                weight += g[j] * sn[k - j]
-        phi[k + 1] = omega[k] / (k + 1)
-        sn[k + 1] = -ds / (k + 1)
-        cs[k + 1] = dc / (k + 1)
-        omega[k + 1] = 0.75 * (push - weight) / (k + 1)
+                weight += a[G, j] * a[SIN, k - j]
+        r = RECIPROCAL[k + 1]
+        a[PHI, k + 1] = a[OMEGA, k] * r
+        a[SIN, k + 1] = -ds * r
+        a[COS, k + 1] = dc * r
+        a[OMEGA, k + 1] = 0.75 * (push - weight) * r
         scale *= reach
-        small = small + 1 if abs(omega[k + 1]) * scale < enough else 0
+        small = small + 1 if abs(a[OMEGA, k + 1]) * scale < enough else 0
         if small == 3:
             order = k + 1
             break
     if need_forces:
-        p, q = a[P], a[Q]
         for k in range(order - 1):
-            p[k] = (k + 2) * (k + 1) * cs[k + 2] + g[k]
-            q[k] = (k + 2) * (k + 1) * sn[k + 2] + u[k]
-        p[order - 1] = p[order] = q[order - 1] = q[order] = 0.0
+            a[P, k] = (k + 2) * (k + 1) * a[COS, k + 2] + a[G, k]
+            a[Q, k] = (k + 2) * (k + 1) * a[SIN, k + 2] + a[U, k]
+        a[P, order - 1] = a[P, order] = a[Q, order - 1] = a[Q, order] = 0.0
     return order
+
+
+@kernel
+def _turn(a, k):
+    """Order k + 1 of phi and of the sine and cosine of alpha - phi, from the orders up to k of its rate."""
+    ds = 0.0
+    dc = 0.0
+    i = k
+    for j in range(k + 1):
+        ds += a[OMEGA, j] * a[COS, i]
+        dc += a[OMEGA, j] * a[SIN, i]
+        i -= 1
+    a[PHI, k + 1] = a[OMEGA, k] * RECIPROCAL[k + 1]
+    a[SIN, k + 1] = -ds * RECIPROCAL[k + 1]
+    a[COS, k + 1] = dc * RECIPROCAL[k + 1]
+
+
+@kernel
+def _contact_rows(b, kappa, floor, stick, tip, far, a):
+    """Constraint rows, force columns (xi, y, moment) and the inverse of their matrix at the start; returns their number."""
+    s, c = a[SIN, 0], a[COS, 0]
+    cp = b.sin_2alpha * s + b.cos_2alpha * c
+    n = 0
+    for which in range(4):
+        if not (floor, stick, tip, far)[which]:
+            continue
+        for k in range(3):
+            a[ROW + n, k] = a[COLUMN + n, k] = 0.0
+        if which == 0:
+            a[ROW + n, 1], a[ROW + n, 2] = 1.0, -s
+            a[COLUMN + n, 0], a[COLUMN + n, 1], a[COLUMN + n, 2] = -kappa, 1.0, -s - kappa * c
+        else:
+            along = 1.0 if which < 3 else -1.0
+            a[ROW + n, 0] = a[COLUMN + n, 0] = along
+            a[ROW + n, 2] = a[COLUMN + n, 2] = c if which == 1 else -cp
+        n += 1
+    for i in range(n):
+        for j in range(n):
+            a[MATRIX + i, j] = a[ROW + i, 0] * a[COLUMN + j, 0] + a[ROW + i, 1] * a[COLUMN + j, 1] + 3.0 * a[ROW + i, 2] * a[COLUMN + j, 2]
+    inverse_of(a, MATRIX, INVERSE, n)
+    return n
 
 
 @kernel
 def _contact_series(b, m, order, enough, reach, a):
     """Newton-Euler with the mode's constraints, solved term by term: the matrix of the unknown forces is the same each time."""
-    phi, omega, sn, cs, u, g, xi, y = a[PHI], a[OMEGA], a[SIN], a[COS], a[U], a[G], a[XI], a[Y]
-    p, q, na, nb = a[P], a[Q], a[NA], a[NB]
-    floor, stick, tip, far = m[FLOOR] != OFF, m[FLOOR] == STICK, m[TIP] != 0, m[FAR] != 0
+    floor, tip, far = m[FLOOR] != OFF, m[TIP] != 0, m[FAR] != 0
+    stick = m[FLOOR] == STICK and not (tip and far)  # wedged between two walls the block needs no friction
+    static = (m[FLOOR] == STICK and (tip or far)) or (tip and far)
     kappa = b.mu_k * m[SLIP] * m[PULL] if m[FLOOR] == SLIPPING else 0.0  # Q = -kappa P
-    s0, c0 = sn[0], cs[0]
+    n = _contact_rows(b, kappa, floor, stick, tip, far, a)
+    s0, c0 = a[SIN, 0], a[COS, 0]
     cp0 = b.sin_2alpha * s0 + b.cos_2alpha * c0
-    static = (stick and (tip or far)) or (tip and far)
-    matrix = np.zeros((3, 3))
-    rows = np.zeros((3, 3))
-    columns = np.zeros((3, 3))
-    known = np.zeros(3)
-    n = 0
-    if floor:
-        rows[n, 1], rows[n, 2] = 1.0, -s0
-        columns[n, 0], columns[n, 1], columns[n, 2] = -kappa, 1.0, -s0 - kappa * c0
-        n += 1
-    if stick and not (tip and far):  # wedged between two walls the block needs no friction
-        rows[n, 0], rows[n, 2] = 1.0, c0
-        columns[n, 0], columns[n, 2] = 1.0, c0
-        n += 1
-    if tip:
-        rows[n, 0], rows[n, 2] = 1.0, -cp0
-        columns[n, 0], columns[n, 2] = 1.0, -cp0
-        n += 1
-    if far:
-        rows[n, 0], rows[n, 2] = -1.0, -cp0
-        columns[n, 0], columns[n, 2] = -1.0, -cp0
-        n += 1
-    for i in range(n):
-        for j in range(n):
-            matrix[i, j] = rows[i, 0] * columns[j, 0] + rows[i, 1] * columns[j, 1] + 3.0 * rows[i, 2] * columns[j, 2]
-    inverse = inverse_of(matrix, n)
     scale = 1.0
     small = 0
     for k in range(order + 1):
-        p[k] = q[k] = na[k] = nb[k] = 0.0
-    forces = np.zeros(3)
+        a[P, k] = a[Q, k] = a[NA, k] = a[NB, k] = 0.0
     for k in range(order - 1):
         i = k + 2
         per = float(i * (i - 1))
-        # sin and cos of alpha - phi at order k + 1 are complete; at order i they lack the term of phi[i], still unknown.
+        _turn(a, k)
+        # The sine and cosine at order i lack only the term of phi's acceleration at order k, the unknown.
         ks = 0.0
         kc = 0.0
-        phi[k + 1] = omega[k] / (k + 1)
         for j in range(k + 1):
-            ks -= omega[j] * cs[k - j]
-            kc += omega[j] * sn[k - j]
-        sn[k + 1] = ks / (k + 1)
-        cs[k + 1] = kc / (k + 1)
-        ks = 0.0
-        kc = 0.0
-        moment = 0.0
-        for j in range(1, k + 2):
-            if j <= k:
-                moment -= (sn[j] + kappa * cs[j]) * p[k - j]
-                moment += cs[j] * q[k - j] if stick else 0.0
-                moment -= (b.sin_2alpha * sn[j] + b.cos_2alpha * cs[j]) * (na[k - j] + nb[k - j])
-            ks -= omega[j - 1] * cs[i - j]
-            kc += omega[j - 1] * sn[i - j]
+            ks -= a[OMEGA, j] * a[COS, k + 1 - j]
+            kc += a[OMEGA, j] * a[SIN, k + 1 - j]
         ks *= i - 1.0
         kc *= i - 1.0
         kp = b.sin_2alpha * kc - b.cos_2alpha * ks  # of s' = sin(alpha + phi)
-        free_x, free_y, free_phi = -u[k], -g[k], 3.0 * moment
+        # Moments of the forces' lower orders.
+        moment = 0.0
+        if floor:
+            for j in range(1, k + 1):
+                moment -= (a[SIN, j] + kappa * a[COS, j]) * a[P, k - j]
+        if stick:
+            for j in range(1, k + 1):
+                moment += a[COS, j] * a[Q, k - j]
+        if tip or far:
+            for j in range(1, k + 1):
+                moment -= (b.sin_2alpha * a[SIN, j] + b.cos_2alpha * a[COS, j]) * (a[NA, k - j] + a[NB, k - j])
+        ax, ay, aphi = -a[U, k], -a[G, k], 3.0 * moment
         r = 0
         if floor:
-            known[r] = kc - free_y + s0 * free_phi
+            a[KNOWN, r] = kc - ay + s0 * aphi
             r += 1
-        if stick and not (tip and far):
-            known[r] = ks - free_x - c0 * free_phi
+        if stick:
+            a[KNOWN, r] = ks - ax - c0 * aphi
             r += 1
         if tip:
-            known[r] = kp - free_x + cp0 * free_phi
+            a[KNOWN, r] = kp - ax + cp0 * aphi
             r += 1
         if far:
-            known[r] = kp + free_x + cp0 * free_phi
+            a[KNOWN, r] = kp + ax + cp0 * aphi
             r += 1
         for r in range(n):
-            forces[r] = 0.0
+            force = 0.0
             for j in range(n):
-                forces[r] += inverse[r, j] * known[j]
-        ax, ay, aphi = free_x, free_y, free_phi
-        for r in range(n):
-            ax += columns[r, 0] * forces[r]
-            ay += columns[r, 1] * forces[r]
-            aphi += 3.0 * columns[r, 2] * forces[r]
+                force += a[INVERSE + r, j] * a[KNOWN, j]
+            a[FORCE, r] = force
+            ax += a[COLUMN + r, 0] * force
+            ay += a[COLUMN + r, 1] * force
+            aphi += 3.0 * a[COLUMN + r, 2] * force
         r = 0
         if floor:
-            p[k] = forces[r]
-            q[k] = -kappa * p[k]
+            a[P, k] = a[FORCE, r]
+            a[Q, k] = -kappa * a[P, k]
             r += 1
-        if stick and not (tip and far):
-            q[k] = forces[r]
+        if stick:
+            a[Q, k] = a[FORCE, r]
             r += 1
         if tip:
-            na[k] = forces[r]
+            a[NA, k] = a[FORCE, r]
             r += 1
         if far:
-            nb[k] = forces[r]
+            a[NB, k] = a[FORCE, r]
         if static:
             ax = aphi = 0.0
             ay = 0.0 if floor else ay
-        xi[i] = ax / per
-        y[i] = ay / per
-        omega[k + 1] = aphi / (k + 1)
+        a[XI, i] = ax / per
+        a[Y, i] = ay / per
+        a[OMEGA, k + 1] = aphi * RECIPROCAL[k + 1]
         scale *= reach
-        size = abs(aphi) + abs(ax) + abs(ay) + abs(sn[k + 1]) + abs(cs[k + 1]) + abs(p[k]) + abs(q[k]) + abs(na[k]) + abs(nb[k])
+        size = abs(aphi) + abs(ax) + abs(ay) + abs(a[SIN, k + 1]) + abs(a[COS, k + 1])
+        size += abs(a[P, k]) + abs(a[Q, k]) + abs(a[NA, k]) + abs(a[NB, k])
         small = small + 1 if size * scale < enough else 0
         if small == 3:
             order = i
             break
     i = order
-    phi[i] = omega[i - 1] / i
-    ks = 0.0
-    kc = 0.0
-    for j in range(i):
-        ks -= omega[j] * cs[i - 1 - j]
-        kc += omega[j] * sn[i - 1 - j]
-    sn[i] = ks / i
-    cs[i] = kc / i
-    omega[i] = 0.0
-    p[i] = p[i - 1] = q[i] = q[i - 1] = na[i] = na[i - 1] = nb[i] = nb[i - 1] = 0.0
+    _turn(a, i - 1)
+    a[OMEGA, i] = 0.0
+    a[P, i] = a[P, i - 1] = a[Q, i] = a[Q, i - 1] = a[NA, i] = a[NA, i - 1] = a[NB, i] = a[NB, i - 1] = 0.0
     return order
 
 
 @kernel
-def inverse_of(matrix, n):
-    """Inverse of the leading n x n part (n <= 3), by cofactors; infinite entries where it is singular."""
-    out = np.zeros((3, 3))
-    m = matrix
+def inverse_of(a, matrix, inverse, n):
+    """Inverse of the n x n matrix (n <= 3) in the rows from `matrix` on, by cofactors, into the rows from `inverse` on.
+
+    Its entries are infinite or NaN where the matrix is singular.
+    """
     if n == 1:
-        out[0, 0] = 1.0 / m[0, 0] if m[0, 0] != 0.0 else np.inf
+        a[inverse, 0] = 1.0 / a[matrix, 0]
     elif n == 2:
-        d = m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
-        r = 1.0 / d if d != 0.0 else np.inf
-        out[0, 0], out[0, 1], out[1, 0], out[1, 1] = m[1, 1] * r, -m[0, 1] * r, -m[1, 0] * r, m[0, 0] * r
+        r = 1.0 / (a[matrix, 0] * a[matrix + 1, 1] - a[matrix, 1] * a[matrix + 1, 0])
+        a[inverse, 0], a[inverse, 1] = a[matrix + 1, 1] * r, -a[matrix, 1] * r
+        a[inverse + 1, 0], a[inverse + 1, 1] = -a[matrix + 1, 0] * r, a[matrix, 0] * r
     elif n == 3:
         for i in range(3):
-            i1, i2 = (i + 1) % 3, (i + 2) % 3
+            i1, i2 = matrix + (i + 1) % 3, matrix + (i + 2) % 3
             for j in range(3):
                 j1, j2 = (j + 1) % 3, (j + 2) % 3
-                out[j, i] = m[i1, j1] * m[i2, j2] - m[i1, j2] * m[i2, j1]
-        d = m[0, 0] * out[0, 0] + m[0, 1] * out[1, 0] + m[0, 2] * out[2, 0]
-        r = 1.0 / d if d != 0.0 else np.inf
+                a[inverse + j, i] = a[i1, j1] * a[i2, j2] - a[i1, j2] * a[i2, j1]
+        d = a[matrix, 0] * a[inverse, 0] + a[matrix, 1] * a[inverse + 1, 0] + a[matrix, 2] * a[inverse + 2, 0]
         for i in range(3):
             for j in range(3):
-                out[i, j] *= r
-    return out
+                a[inverse + i, j] /= d
 
 
 @kernel
@@ -307,25 +316,24 @@ def flat_series(b, m, z, gh, gv, t, order, a):
 
     Q is the floor's friction, P its normal force on both corners together, N_a the force of a wall that presses.
     """
-    u, g, xi, y, p, q, na = a[U], a[G], a[XI], a[Y], a[P], a[Q], a[NA]
-    fill_series(gh, t, 1.0, order, u)
-    fill_series(gv, t, 1.0, order, g)
-    g[0] += 1.0
-    xi[0], xi[1], y[0], y[1] = z[X], z[VX], z[HEIGHT], z[VY]
+    fill_series(gh, t, 1.0, order, a, U)
+    fill_series(gv, t, 1.0, order, a, G)
+    a[G, 0] += 1.0
+    a[XI, 0], a[XI, 1], a[Y, 0], a[Y, 1] = z[X], z[VX], z[HEIGHT], z[VY]
     press = m[TIP] - m[FAR]
     for k in range(order - 1):
-        p[k] = g[k] if m[FLOOR] != OFF else 0.0
-        q[k] = na[k] = 0.0
+        a[P, k] = a[G, k] if m[FLOOR] != OFF else 0.0
+        a[Q, k] = a[NA, k] = 0.0
         if m[FLOOR] == SLIPPING:
-            q[k] = -b.mu_k * m[SLIP] * m[PULL] * p[k]
+            a[Q, k] = -b.mu_k * m[SLIP] * m[PULL] * a[P, k]
         if m[FLOOR] == STICK:
-            q[k] = u[k]
+            a[Q, k] = a[U, k]
         elif press != 0:
-            na[k] = press * u[k]
-        xi[k + 2] = (press * na[k] + q[k] - u[k]) / ((k + 2) * (k + 1))
-        y[k + 2] = (p[k] - g[k]) / ((k + 2) * (k + 1))
+            a[NA, k] = press * a[U, k]
+        a[XI, k + 2] = (press * a[NA, k] + a[Q, k] - a[U, k]) / ((k + 2) * (k + 1))
+        a[Y, k + 2] = (a[P, k] - a[G, k]) / ((k + 2) * (k + 1))
     for k in range(order - 1, order + 1):
-        p[k] = q[k] = na[k] = 0.0
+        a[P, k] = a[Q, k] = a[NA, k] = 0.0
     return order
 
 
@@ -336,8 +344,8 @@ def tilt_state(b, m, order, tau, pivot, a, z):
     `pivot` is the place of a sticking pivot, xi - s.
     """
     sign = float(m[S])
-    phi = value(a[PHI], order, tau)
-    w = value(a[OMEGA], order - 1, tau)
+    phi = value(a, PHI, order, tau)
+    w = value(a, OMEGA, order - 1, tau)
     if (m[FLOOR] == STICK and (m[TIP] != 0 or m[FAR] != 0)) or (m[TIP] != 0 and m[FAR] != 0):
         phi, w = a[PHI, 0], 0.0
     s, c = np.sin(b.alpha - phi), np.cos(b.alpha - phi)
@@ -348,11 +356,11 @@ def tilt_state(b, m, order, tau, pivot, a, z):
         reach, reach_rate = np.sin(b.alpha + phi), np.cos(b.alpha + phi)
         xi, v = wall * (reach - delta(b, m, m[TIP] != 0)), wall * reach_rate * w
     else:
-        xi, v = value(a[XI], order, tau), slope(a[XI], order, tau)
+        xi, v = value(a, XI, order, tau), slope(a, XI, order, tau)
     if m[FLOOR] != OFF:
         y, vy = c, s * w
     else:
-        y, vy = value(a[Y], order, tau), slope(a[Y], order, tau)
+        y, vy = value(a, Y, order, tau), slope(a, Y, order, tau)
     z[X], z[HEIGHT], z[THETA], z[VX], z[VY], z[W] = sign * xi, y, sign * phi, sign * v, vy, sign * w
 
 
@@ -360,13 +368,13 @@ def tilt_state(b, m, order, tau, pivot, a, z):
 def flat_state(b, m, order, tau, a, z):
     """Writes the state of a translating block at tau after the start of the series into z."""
     if m[TIP] == 0 and m[FAR] == 0 and m[FLOOR] != STICK:
-        z[X] = value(a[XI], order, tau)
-        z[VX] = slope(a[XI], order, tau)
+        z[X] = value(a, XI, order, tau)
+        z[VX] = slope(a, XI, order, tau)
     else:
         z[VX] = 0.0
     if m[FLOOR] == OFF:
-        z[HEIGHT] = value(a[Y], order, tau)
-        z[VY] = slope(a[Y], order, tau)
+        z[HEIGHT] = value(a, Y, order, tau)
+        z[VY] = slope(a, Y, order, tau)
     else:
         z[HEIGHT] = b.cos_alpha
         z[VY] = 0.0

@@ -7,9 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ebm.ground import Ground, ground_of
+from ebm.ground import GAUSSIAN, Ground, ground_of
 from ebm.motion import Setting
 from scenes.scene import Scene
+
+__all__ = ["GAUSSIAN", "grounds_of", "setting_of", "state_of", "time_unit", "to_si"]
 
 
 def time_unit(scene: Scene) -> float:

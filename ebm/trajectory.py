@@ -41,7 +41,6 @@ from ebm.motion import (
     flat_state,
     tilt_series,
     tilt_state,
-    workspace,
 )
 from ebm.series import NO_ROOT, NOISE, SLIP_NOISE, first_root, value
 from ebm.transitions import (
@@ -56,7 +55,9 @@ from ebm.transitions import (
     G_TOPPLE,
     GUARDS,
     closed_floor,
+    consistent,
     guard,
+    rock_guards_hold,
     select,
     slip_velocity,
 )
@@ -150,13 +151,12 @@ def mode_code(m):
 
 
 @kernel
-def run(b, gh, gv, z, t_end, control, out, out_mode, log):
+def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
     """Simulates from state z (changed in place) at t = 0 to t_end; returns a Tally.
 
     Row i of `out` (n x 6) is the state at i * output_step, `out_mode` its mode; `log` (n x 5) takes one row an event: time,
-    kind, mode before, mode after, impulse.
+    kind, mode before, mode after, impulse. `a` and `stack` are a `workspace()`.
     """
-    a, stack = workspace()
     m = np.zeros(MODE_SIZE, dtype=np.int64)
     left = np.full(MODE_SIZE, -9, dtype=np.int64)
     gains = np.zeros(2)
@@ -169,7 +169,9 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log):
     rows = steps = series = events = wall_impacts = zero_steps = 0
     peak, hop, t_rest = abs(z[THETA]), 0.0, np.nan
     ending = DONE
-    if not select(b, z, gh, gv, t, left, m, a):
+    m[FAMILY], m[S], m[FLOOR], m[PULL] = FLAT, 1, STICK, 1  # most often it stands
+    stands = z[THETA] == 0.0 and z[VX] == 0.0 and z[W] == 0.0 and z[HEIGHT] == b.cos_alpha and not b.walls
+    if not (stands and consistent(b, m, z, gh, gv, t, a)) and not select(b, z, gh, gv, t, left, m, a):
         return Tally(NO_MODE, t, peak, False, 0, 0, 0, 0, 0, 0.0, 0.0, 0, t_rest)
     while True:
         # --- rest: straight to the next uplift or slip
@@ -194,7 +196,9 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log):
             zero_steps = zero_steps + 1 if until == t else 0
             t = until
             left[:] = m
-            if not select(b, z, gh, gv, t, left, m, a):
+            m[:] = 0  # most often it rocks
+            m[FAMILY], m[S], m[FLOOR], m[PULL] = TILT, 1 if acceleration(gh, t) > 0.0 else -1, STICK, 1
+            if not consistent(b, m, z, gh, gv, t, a) and not select(b, z, gh, gv, t, left, m, a):
                 ending = NO_MODE
                 break
             t_rest = np.nan
@@ -222,23 +226,30 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log):
         pivot = 0.0
         if m[FAMILY] == FLAT:
             order = flat_series(b, m, z, gh, gv, t, control.order, a)
-            h = _step_size(a[U], a[G], order, control.tolerance, reach)
+            h = _step_size(a, U, G, order, control.tolerance, reach)
         else:
             order = tilt_series(b, m, z, gh, gv, t, control.order, 1e-2 * control.tolerance, reach, not b.no_slip or b.unilateral, a)
             pivot = m[S] * z[X] - a[SIN, 0]
             h = reach
             if order == control.order:
-                h = _step_size(a[PHI], a[COS], order, control.tolerance, reach)
+                h = _step_size(a, PHI, COS, order, control.tolerance, reach)
                 if m[FLOOR] != STICK or m[TIP] != 0 or m[FAR] != 0:
-                    h = _step_size(a[XI], a[Y], order, control.tolerance, h)
-                    h = _step_size(a[U], a[G], order, control.tolerance, h)  # forces follow the base acceleration
+                    h = _step_size(a, XI, Y, order, control.tolerance, h)
+                    h = _step_size(a, U, G, order, control.tolerance, h)  # forces follow the base acceleration
         tau, which = h, -1
-        for k in range(GUARDS):
-            degree = guard(b, m, k, order, pivot, a)
-            if degree >= 0:
-                root = first_root(a[GUARD], degree, tau, SLIP_NOISE if k == G_SLIP else NOISE, stack)
-                if root != NO_ROOT:
-                    tau, which = root, k
+        rocks = m[FAMILY] == TILT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
+        if rocks and m[PULL] > 0 and rock_guards_hold(b, order, b.walls, h, a):
+            tau = first_root(a, PHI, order, h, NOISE, stack)
+            which = G_PHI
+            if tau == NO_ROOT:
+                tau, which = h, -1
+        else:
+            for k in range(GUARDS):
+                degree = guard(b, m, k, order, pivot, a)
+                if degree >= 0:
+                    root = first_root(a, GUARD, degree, tau, SLIP_NOISE if k == G_SLIP else NOISE, stack)
+                    if root != NO_ROOT:
+                        tau, which = root, k
         if G_PUSH <= which <= G_CONE_MINUS and tau > 0.25 * h:
             # A force is the second derivative of a truncated series: its zero is found to rounding from nearby only.
             tau, which = 0.9 * tau, -1
@@ -256,10 +267,10 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log):
         if m[FAMILY] == FLAT:
             flat_state(b, m, order, tau, a, z)
         else:
-            if a[OMEGA, 0] > 0.0 and value(a[OMEGA], order - 1, tau) < 0.0:
-                top = first_root(a[OMEGA], order - 1, tau, NOISE, stack)
+            if a[OMEGA, 0] > 0.0 and value(a, OMEGA, order - 1, tau) < 0.0:
+                top = first_root(a, OMEGA, order - 1, tau, NOISE, stack)
                 if top > 0.0:
-                    peak = max(peak, value(a[PHI], order, top))
+                    peak = max(peak, value(a, PHI, order, top))
             if m[FLOOR] == OFF:
                 hop = max(hop, _highest(a, order, tau))
             tilt_state(b, m, order, tau, pivot, a, z)
@@ -364,10 +375,10 @@ def _note(log, count, t, kind, before, after, impulse):
 
 
 @kernel
-def _step_size(first, second, order, tolerance, reach):
+def _step_size(a, first, second, order, tolerance, reach):
     """The step at which the last two terms of the series stay below the tolerance, at most `reach`."""
-    last = abs(first[order]) + abs(second[order])
-    before = abs(first[order - 1]) + abs(second[order - 1])
+    last = abs(a[first, order]) + abs(a[second, order])
+    before = abs(a[first, order - 1]) + abs(a[second, order - 1])
     h = reach
     if last > 0.0:
         h = min(h, math.exp(math.log(tolerance / last) / order))
@@ -382,7 +393,7 @@ def _highest(a, order, tau):
     top = 0.0
     for k in range(1, 6):
         x = 0.2 * k * tau
-        top = max(top, value(a[Y], order, x) - value(a[COS], order, x))
+        top = max(top, value(a, Y, order, x) - value(a, COS, order, x))
     return top
 
 

@@ -77,57 +77,58 @@ CLOSED_RATE = 1e-9
 @kernel
 def guard(b, m, which, order, pivot, a):
     """Writes guard `which` of mode m into the workspace and returns its degree, or -1 where the mode has no such guard."""
-    out = a[GUARD]
     if m[FAMILY] == FLAT:
-        return _flat_guard(b, m, which, order, a, out)
+        return _flat_guard(b, m, which, order, a)
     if which == G_PHI:
-        out[: order + 1] = a[PHI, : order + 1]
+        for k in range(order + 1):
+            a[GUARD, k] = a[PHI, k]
         return order
     if which == G_TOPPLE:
         if a[PHI, 0] < 0.5:  # no step is long enough to turn the block over from here unseen: see largest_step
             return -1
         for k in range(order + 1):
-            out[k] = -a[PHI, k]
-        out[0] += 0.5 * math.pi
+            a[GUARD, k] = -a[PHI, k]
+        a[GUARD, 0] += 0.5 * math.pi
         return order
     if which == G_LANDING:
         if m[FLOOR] != OFF:
             return -1
         for k in range(order + 1):
-            out[k] = a[Y, k] - a[COS, k]
-        _settle_touch(out)
+            a[GUARD, k] = a[Y, k] - a[COS, k]
+        _settle_touch(a)
         return order
     if which == G_TIP_GAP or which == G_FAR_GAP:
-        return _gap(b, m, which == G_TIP_GAP, order, pivot, a, out)
+        return _gap(b, m, which == G_TIP_GAP, order, pivot, a)
     if which == G_PUSH:
         if m[FLOOR] == OFF or not (b.unilateral or m[FLOOR] == SLIPPING):
             return -1
         for k in range(order - 1):
-            out[k] = m[PULL] * a[P, k]
+            a[GUARD, k] = m[PULL] * a[P, k]
         return order - 2
     if which == G_TIP_PUSH or which == G_FAR_PUSH:
         if m[TIP if which == G_TIP_PUSH else FAR] == 0:
             return -1
-        out[: order - 1] = a[NA if which == G_TIP_PUSH else NB, : order - 1]
+        for k in range(order - 1):
+            a[GUARD, k] = a[NA if which == G_TIP_PUSH else NB, k]
         return order - 2
     if which == G_CONE_PLUS or which == G_CONE_MINUS:
         if m[FLOOR] != STICK or b.no_slip:
             return -1
         sense = 1.0 if which == G_CONE_PLUS else -1.0
         for k in range(order - 1):
-            out[k] = b.mu_s * m[PULL] * a[P, k] - sense * a[Q, k]
+            a[GUARD, k] = b.mu_s * m[PULL] * a[P, k] - sense * a[Q, k]
         return order - 2
     if which == G_SLIP:
         if m[FLOOR] != SLIPPING:
             return -1
         for k in range(order):
-            out[k] = m[SLIP] * (k + 1) * (a[XI, k + 1] - a[SIN, k + 1])
+            a[GUARD, k] = m[SLIP] * (k + 1) * (a[XI, k + 1] - a[SIN, k + 1])
         return order - 1
     return -1
 
 
 @kernel
-def _gap(b, m, tip, order, pivot, a, out):
+def _gap(b, m, tip, order, pivot, a):
     """The clear gap of the corner that faces the tip wall, or the far wall."""
     if m[TIP if tip else FAR] != 0:
         return -1
@@ -139,29 +140,30 @@ def _gap(b, m, tip, order, pivot, a, out):
     if rock and not tip and distance - pivot - 2.0 * b.sin_alpha > -1e-13:
         # About a fixed pivot the far gap shrinks with phi, down to this value as the block lands: it cannot close before.
         return -1
-    xi = a[SIN] if rock else a[XI]
+    xi = SIN if rock else XI
     for k in range(order + 1):
-        out[k] = sense * xi[k] - (b.sin_2alpha * a[COS, k] - b.cos_2alpha * a[SIN, k])
-    out[0] += distance + (sense * pivot if rock else 0.0)
-    _settle_touch(out)
+        a[GUARD, k] = sense * a[xi, k] - (b.sin_2alpha * a[COS, k] - b.cos_2alpha * a[SIN, k])
+    a[GUARD, 0] += distance + (sense * pivot if rock else 0.0)
+    _settle_touch(a)
     return order
 
 
 @kernel
-def _settle_touch(gap):
+def _settle_touch(a):
     """A contact that touches and parts or closes more slowly than CLOSED_RATE counts as resting: its acceleration decides."""
-    if abs(gap[0]) < 1e-12 and abs(gap[1]) < CLOSED_RATE:
-        gap[0] = gap[1] = 0.0
+    if abs(a[GUARD, 0]) < 1e-12 and abs(a[GUARD, 1]) < CLOSED_RATE:
+        a[GUARD, 0] = a[GUARD, 1] = 0.0
 
 
 @kernel
-def _flat_guard(b, m, which, order, a, out):
+def _flat_guard(b, m, which, order, a):
     """The guards of a translating block; the tip wall is the left one, the far wall the right one."""
     if which == G_LANDING:
         if m[FLOOR] != OFF:
             return -1
-        out[: order + 1] = a[Y, : order + 1]
-        out[0] -= b.cos_alpha
+        for k in range(order + 1):
+            a[GUARD, k] = a[Y, k]
+        a[GUARD, 0] -= b.cos_alpha
         return order
     if which == G_TIP_GAP or which == G_FAR_GAP:
         gap = b.gap_left if which == G_TIP_GAP else b.gap_right
@@ -169,42 +171,62 @@ def _flat_guard(b, m, which, order, a, out):
             return -1
         sense = 1.0 if which == G_TIP_GAP else -1.0
         for k in range(order + 1):
-            out[k] = sense * a[XI, k]
-        out[0] += gap
+            a[GUARD, k] = sense * a[XI, k]
+        a[GUARD, 0] += gap
         return order
     if which == G_TIP_PUSH:
         if m[FLOOR] != OFF or m[TIP] == m[FAR]:
             return -1
-        out[: order - 1] = a[NA, : order - 1]
+        for k in range(order - 1):
+            a[GUARD, k] = a[NA, k]
         return order - 2
     if m[FLOOR] == OFF:
         return -1
     if which == G_PUSH:
         if not b.unilateral:
             return -1
-        out[: order - 1] = a[P, : order - 1]
+        for k in range(order - 1):
+            a[GUARD, k] = a[P, k]
         return order - 2
     if which == G_CONE_PLUS or which == G_CONE_MINUS:
         if m[FLOOR] != STICK or b.no_slip or m[TIP if which == G_CONE_PLUS else FAR] != 0:
             return -1
         sense = 1.0 if which == G_CONE_PLUS else -1.0
         for k in range(order - 1):
-            out[k] = b.mu_s * a[P, k] - sense * a[Q, k]
+            a[GUARD, k] = b.mu_s * a[P, k] - sense * a[Q, k]
         return order - 2
     if which == G_UPLIFT_PLUS or which == G_UPLIFT_MINUS:
         if m[FLOOR] == STICK and m[TIP if which == G_UPLIFT_PLUS else FAR] != 0:
             return -1
         sense = 1.0 if which == G_UPLIFT_PLUS else -1.0
         for k in range(order - 1):
-            out[k] = b.sin_alpha * a[P, k] - sense * b.cos_alpha * a[Q, k]
+            a[GUARD, k] = b.sin_alpha * a[P, k] - sense * b.cos_alpha * a[Q, k]
         return order - 2
     if which == G_SLIP:
         if m[FLOOR] != SLIPPING:
             return -1
         for k in range(order):
-            out[k] = m[SLIP] * (k + 1) * a[XI, k + 1]
+            a[GUARD, k] = m[SLIP] * (k + 1) * a[XI, k + 1]
         return order - 1
     return -1
+
+
+@kernel
+def rock_guards_hold(b, order, pivot_walls, h, a):
+    """A cheap proof that a rocking block keeps every guard of ROCK but G_PHI through a step h, or False where it is open.
+
+    Each guard is bounded from below by its value now less the sum of its other terms.
+    """
+    if pivot_walls or a[PHI, 0] > 0.5:
+        return False
+    if b.no_slip and not b.unilateral:
+        return True
+    spread = 0.0
+    push = 0.0
+    for k in range(order - 2, 0, -1):
+        spread = (spread + b.mu_s * abs(a[P, k]) + abs(a[Q, k])) * h
+        push = (push + abs(a[P, k])) * h
+    return b.mu_s * a[P, 0] - abs(a[Q, 0]) > spread and a[P, 0] > push
 
 
 _LOOK = 6  # order of the series that a selection looks at
@@ -226,7 +248,7 @@ def consistent(b, m, z, gh, gv, t, a):
             continue
         if G_LANDING <= which <= G_FAR_GAP and a[GUARD, 1] < -CLOSED_RATE:
             continue  # not this mode's fault: an impact comes next
-        sign = leading(a[GUARD], degree, _AHEAD, SLIP_NOISE if which == G_SLIP else NOISE)
+        sign = leading(a, GUARD, degree, _AHEAD, SLIP_NOISE if which == G_SLIP else NOISE)
         if sign < 0 or not math.isfinite(a[GUARD, 0]):
             return False
         if sign == 0 and (which == G_SLIP or (which == G_PHI and m[FLOOR] != OFF)):

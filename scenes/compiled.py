@@ -22,7 +22,7 @@ from numba.core import config
 @cache
 def _cache_folder(package: Path) -> str:
     digest = hashlib.sha256()
-    for source in sorted(package.glob("*.py")):
+    for source in [Path(__file__), *sorted(package.glob("*.py"))]:
         digest.update(source.name.encode() + b"\0" + source.read_bytes())
     name = f"{package.name}-kernels-{digest.hexdigest()[:16]}"
     base = Path(config.CACHE_DIR) if config.CACHE_DIR else package / "__pycache__"
@@ -40,8 +40,12 @@ def _cache_folder(package: Path) -> str:
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compiles `function` with numba on its first call, cached on disk until any source of its package changes."""
-    compiled = numba.njit(function)
+    """Compiles `function` with numba on its first call, cached on disk until any source of its package changes.
+
+    The compiled code releases the interpreter's lock, so that batches run on threads, and divides as IEEE 754 does (no
+    exception for a zero divisor).
+    """
+    compiled = numba.njit(nogil=True, error_model="numpy")(function)
     before = config.CACHE_DIR
     config.CACHE_DIR = _cache_folder(Path(function.__code__.co_filename).parent)
     try:
