@@ -59,6 +59,8 @@ class Outcomes:
     peak: Floats
     t_end: Floats
     series: NDArray[np.int64]
+    #: How each run ended, a key of `ebm.trajectory.FAILURES` where it failed.
+    ending: NDArray[np.int64]
 
 
 def pack(scenes: Sequence[Scene], model: EventBasedModel) -> Packed:
@@ -124,13 +126,14 @@ def run_batch(
     model: EventBasedModel,
     *,
     until_decided: bool = True,
+    strict: bool = True,
     jobs: int | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Outcomes:
     """Runs every row; with `until_decided` to the moment when outcome and peak are certain, whatever its duration.
 
-    `jobs` threads (default: all cores). `progress` is called with the number of rows just done. Raises `ModelFailure`
-    where a row reaches a cap or has no consistent motion.
+    `jobs` threads (default: all cores). `progress` is called with the number of rows just done. Where a row
+    reaches a cap or has no consistent motion: `ModelFailure` if `strict`, else only its `ending` says so.
     """
     count = len(packed)
     side, peak, t_end = np.zeros(count, dtype=np.int8), np.zeros(count), np.zeros(count)
@@ -161,9 +164,9 @@ def run_batch(
             if progress is not None:
                 progress(done)
     failed = np.flatnonzero((ending != DONE) & (ending != OVERTURNED))
-    if failed.size:
+    if strict and failed.size:
         raise ModelFailure(f"{model.name}: run {failed[0]} of the batch: {FAILURES[int(ending[failed[0]])]}")
-    return Outcomes(side=side, peak=peak, t_end=t_end, series=series)
+    return Outcomes(side=side, peak=peak, t_end=t_end, series=series, ending=ending)
 
 
 @kernel

@@ -316,6 +316,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
                 resting, in_window = min(10.0 * resting, _RATTLE_BOUND), 0
             last_impact = t
             wall = which == G_TIP_GAP or which == G_FAR_GAP
+            _touch(b, m, z, which)
             if which == G_PHI:
                 z[THETA] = 0.0
             elif which == G_FAR_GAP and m[FAMILY] == TILT and abs(z[THETA]) < _LANDED and m[S] * z[W] < 0.0 and closed_floor(b, z):
@@ -398,6 +399,19 @@ def _highest(a, order, tau):
 
 
 @kernel
+def _touch(b, m, z, which):
+    """Puts the block onto the contact whose gap has just closed: the series knows the gap to the tolerance only."""
+    phi = abs(z[THETA])
+    if which == G_LANDING:
+        z[HEIGHT] = math.cos(b.alpha - phi)
+    elif which == G_TIP_GAP or which == G_FAR_GAP:
+        left = (which == G_TIP_GAP) == (m[FAMILY] == FLAT or m[S] > 0)
+        gap = b.gap_left if left else b.gap_right
+        x = math.sin(b.alpha + phi) - b.sin_alpha - gap
+        z[X] = x if left else -x
+
+
+@kernel
 def _floor_impact(b, m, z, impulse):
     """Bilateral pivot: the block lands at theta = 0. Returns whether it is already known to rock on in m."""
     w1, v1 = z[W], slip_velocity(b, z)
@@ -457,7 +471,7 @@ def _wall_impact(b, m, z, tip, gh, t, resting, impulse, gains):
     stays = stays or rebound < resting
     if stays:
         xdot2 = C * w2
-    if v2 == 0.0 and not stays:
+    if abs(xdot2 + c * w2) < _STOPPED:
         xdot2 = -c * w2
     z[W], z[VX], z[VY] = sign * w2, sign * xdot2, s * w2
     if b.no_slip and stays:
