@@ -62,27 +62,29 @@ class Outcomes:
     #: How each run ended, a key of `ebm.trajectory.FAILURES` where it failed.
     ending: NDArray[np.int64]
 
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Which runs reached a cap or had no consistent motion."""
+        return (self.ending != DONE) & (self.ending != OVERTURNED)
+
 
 def pack(scenes: Sequence[Scene], model: EventBasedModel) -> Packed:
     """Packs a list of scenes; raises `InputError` where the model cannot play one of them."""
     bank: list[Floats] = []
     offset = 0
-    horizontal, vertical = [], []
+    horizontal: list[list[float]] = []
+    vertical: list[list[float]] = []
     for scene in scenes:
         model.check(scene)
         for ground, rows in zip(natural.grounds_of(scene), (horizontal, vertical), strict=True):
             rows.append([*ground[:-1], offset, len(ground.samples)])
-            if len(ground.samples) > 1:
-                bank.append(ground.samples)
-                offset += len(ground.samples)
-            else:
-                bank.append(ground.samples)
-                offset += 1
+            bank.append(ground.samples)
+            offset += len(ground.samples)
     settings = [_setting(scene, model) for scene in scenes]
     return Packed(
-        settings=np.array(settings, dtype=float).reshape(len(scenes), len(Setting._fields)),
-        horizontal=np.array(horizontal, dtype=float),
-        vertical=np.array(vertical, dtype=float),
+        settings=np.array(settings, dtype=np.float64).reshape(len(scenes), len(Setting._fields)),
+        horizontal=np.array(horizontal, dtype=np.float64),
+        vertical=np.array(vertical, dtype=np.float64),
         states=np.array([natural.state_of(scene) for scene in scenes]).reshape(len(scenes), 6),
         durations=np.array([scene.duration / natural.time_unit(scene) for scene in scenes]),
         samples=np.concatenate(bank) if bank else np.zeros(1),
@@ -98,7 +100,7 @@ def pack_pulses(scene: Scene, model: EventBasedModel, amplitudes: Floats, period
     one, _ = natural.grounds_of(scene.replace(excitation=template(**pulse.model_dump())))
     # A pulse of amplitude a and period T is a times the unit pulse at time t/T.
     ratio = 1.0 / periods
-    horizontal = np.tile(np.array([*one[:-1], 0, 1], dtype=float), (count, 1))
+    horizontal = np.tile(np.array([*one[:-1], 0, 1], dtype=np.float64), (count, 1))
     for power in range(4):
         horizontal[:, 1 + power] *= amplitudes * (ratio**power if one.kind == natural.GAUSSIAN else 1.0)
     horizontal[:, 5] *= ratio**2 if one.kind == natural.GAUSSIAN else ratio
@@ -106,9 +108,9 @@ def pack_pulses(scene: Scene, model: EventBasedModel, amplitudes: Floats, period
     horizontal[:, 7] *= periods
     _, still = natural.grounds_of(scene)
     return Packed(
-        settings=np.tile(np.array(_setting(scene, model), dtype=float), (count, 1)),
+        settings=np.tile(np.array(_setting(scene, model), dtype=np.float64), (count, 1)),
         horizontal=horizontal,
-        vertical=np.tile(np.array([*still[:-1], 1, len(still.samples)], dtype=float), (count, 1)),
+        vertical=np.tile(np.array([*still[:-1], 1, len(still.samples)], dtype=np.float64), (count, 1)),
         states=np.tile(natural.state_of(scene), (count, 1)),
         durations=np.full(count, scene.duration / unit),
         samples=np.concatenate([np.zeros(1), still.samples]),
@@ -163,10 +165,11 @@ def run_batch(
         for done in pool.map(chunk, range(0, count, _CHUNK)):
             if progress is not None:
                 progress(done)
-    failed = np.flatnonzero((ending != DONE) & (ending != OVERTURNED))
-    if strict and failed.size:
-        raise ModelFailure(f"{model.name}: run {failed[0]} of the batch: {FAILURES[int(ending[failed[0]])]}")
-    return Outcomes(side=side, peak=peak, t_end=t_end, series=series, ending=ending)
+    found = Outcomes(side=side, peak=peak, t_end=t_end, series=series, ending=ending)
+    if strict and found.failed.any():
+        first = int(np.argmax(found.failed))
+        raise ModelFailure(f"{model.name}: run {first} of the batch: {FAILURES[int(ending[first])]}")
+    return found
 
 
 @kernel

@@ -1,0 +1,203 @@
+"""Overturning spectra: the outcome over a grid of pulse frequencies and amplitudes (the paper's Figs. 6 to 9)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ebm.model import EventBasedModel
+from scenes.errors import InputError
+from scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MOST_NODES = 50_000_000
+#: The outcome codes of a spectrum.
+LEFT, SAFE, RIGHT = -1, 0, 1
+_UNKNOWN = 9
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spectrum:
+    """Outcomes over frequency and amplitude.
+
+    `outcomes[i, j]` is -1 (overturned left, counterclockwise), 0 (safe) or +1 (right, clockwise) at `amplitude_ratios[i]`
+    (a_p / (g tan alpha)) and `frequency_ratios[j]` (omega_p / p). `evaluations` counts the runs, fewer than nodes where only
+    the boundary was refined. `undecided` lists the nodes (i, j) whose run failed; they count as safe.
+    """
+
+    outcomes: NDArray[np.int8]
+    frequency_ratios: NDArray[np.float64]
+    amplitude_ratios: NDArray[np.float64]
+    evaluations: int
+    undecided: NDArray[np.int64]
+    scene: Scene
+    model: EventBasedModel
+
+    @property
+    def safe_area(self) -> float:
+        """Share of nodes that are safe."""
+        return float(np.mean(self.outcomes == SAFE))
+
+    def least_overturning_amplitude(self) -> NDArray[np.float64]:
+        """The lowest overturning amplitude ratio at each frequency ratio; NaN where none overturns."""
+        fallen = self.outcomes != SAFE
+        first = np.argmax(fallen, axis=0)
+        return np.where(fallen.any(axis=0), self.amplitude_ratios[first], np.nan)
+
+    def plot(self) -> Figure:
+        """The spectrum as a matplotlib figure, in the paper's colours."""
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(4.5, 3.6), layout="constrained")
+        draw(self, figure.subplots())
+        return figure
+
+
+def draw(spectrum: Spectrum, axes: Any) -> None:
+    """Draws a spectrum into matplotlib axes: blue safe, orange counterclockwise, yellow clockwise."""
+    from matplotlib.colors import ListedColormap
+
+    colours = ListedColormap(["#e8833a", "#3b6fb6", "#f2cf4a"])
+    axes.pcolormesh(
+        spectrum.frequency_ratios,
+        spectrum.amplitude_ratios,
+        spectrum.outcomes,
+        cmap=colours,
+        vmin=-1,
+        vmax=1,
+        shading="nearest",
+        rasterized=True,
+    )
+    axes.set_xlabel(r"$\omega_p/p$")
+    axes.set_ylabel(r"$a_p/(g\,\tan\alpha)$")
+
+
+def overturning_spectrum(
+    scene: Scene,
+    frequency_ratios: ArrayLike,
+    amplitude_ratios: ArrayLike,
+    *,
+    model: EventBasedModel | None = None,
+    refine: bool = False,
+    jobs: int | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Spectrum:
+    """The outcomes of a scene under pulses of its own kind, each run until its outcome is decided.
+
+    `frequency_ratios` (omega_p/p) and `amplitude_ratios` (a_p/(g tan alpha)) are increasing, positive and finite. `scene`
+    gives block, floor, walls and the kind of pulse (Ricker or sine); its duration and the pulse's own size are not used. With
+    `refine` only every eighth node is run at first, then those between nodes that differ (and their neighbours).
+    `jobs` threads, default all cores; `progress` is called with the number of runs just done. Raises `InputError`.
+    """
+    frequencies, amplitudes = _axis(frequency_ratios, "frequency_ratios"), _axis(amplitude_ratios, "amplitude_ratios")
+    if len(frequencies) * len(amplitudes) > MOST_NODES:
+        raise InputError(f"{len(frequencies)} x {len(amplitudes)} nodes are more than {MOST_NODES}", "frequency_ratios")
+    if scene.excitation.kind not in ("ricker", "sine"):
+        raise InputError(f"{scene.excitation.kind!r} is not allowed: a spectrum needs a ricker or sine pulse", "excitation.kind")
+    model = model or EventBasedModel(tolerance=1e-8)
+    from ebm import batch
+
+    model.check(scene)
+    p, tan_alpha = scene.frequency_parameter, scene.block.half_width / scene.block.half_height
+    outcomes = np.full((len(amplitudes), len(frequencies)), _UNKNOWN, dtype=np.int8)
+    undecided: list[NDArray[np.int64]] = []
+    evaluations = 0
+
+    def run(nodes: NDArray[np.bool_]) -> None:
+        nonlocal evaluations
+        i, j = np.nonzero(nodes & (outcomes == _UNKNOWN))
+        if len(i) == 0:
+            return
+        packed = batch.pack_pulses(scene, model, amplitudes[i] * scene.gravity * tan_alpha, 2.0 * math.pi / (frequencies[j] * p))
+        found = batch.run_batch(packed, model, jobs=jobs, progress=progress, strict=False)
+        outcomes[i, j] = found.side
+        failed = found.failed
+        undecided.append(np.stack([i[failed], j[failed]], axis=1).astype(np.int64))
+        evaluations += len(i)
+
+    if refine:
+        _refine(outcomes, run)
+    else:
+        run(np.ones(outcomes.shape, dtype=bool))
+    return Spectrum(
+        outcomes=outcomes,
+        frequency_ratios=frequencies,
+        amplitude_ratios=amplitudes,
+        evaluations=evaluations,
+        undecided=np.concatenate(undecided) if undecided else np.zeros((0, 2), dtype=np.int64),
+        scene=scene,
+        model=model,
+    )
+
+
+def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None], coarsest: int = 8) -> None:
+    """Fills `outcomes`: a coarse grid, then at each halving only cells whose corners differ, with a ring around them."""
+    rows, columns = outcomes.shape
+    step = coarsest
+    lattice = _lattice(rows, columns, step)
+    run(lattice)
+    while step > 1:
+        half = step // 2
+        differs = _mixed_cells(outcomes, step)
+        near = differs.copy()  # one ring of cells around each
+        for axis in (0, 1):
+            near = near | _shifted(near, axis, 1) | _shifted(near, axis, -1)
+        wanted = np.zeros(outcomes.shape, dtype=bool)
+        for i, j in zip(*np.nonzero(near), strict=True):
+            wanted[i * step : min((i + 1) * step, rows - 1) + 1 : 1, j * step : min((j + 1) * step, columns - 1) + 1] = True
+        finer = _lattice(rows, columns, half)
+        run(wanted & finer)
+        # Cells without a boundary are uniform: their inner nodes take the value of a corner.
+        open_nodes = finer & (outcomes == _UNKNOWN)
+        i, j = np.nonzero(open_nodes)
+        outcomes[i, j] = outcomes[i // step * step, j // step * step]
+        step = half
+
+
+def _lattice(rows: int, columns: int, step: int) -> NDArray[np.bool_]:
+    """Every `step`-th node of each axis, and the last one."""
+    i, j = np.zeros(rows, dtype=bool), np.zeros(columns, dtype=bool)
+    i[::step] = j[::step] = True
+    i[-1] = j[-1] = True
+    return i[:, None] & j[None, :]
+
+
+def _mixed_cells(outcomes: NDArray[np.int8], step: int) -> NDArray[np.bool_]:
+    """Whether the corners of each cell of the lattice differ."""
+    rows, columns = outcomes.shape
+    i = np.append(np.arange(0, rows - 1, step), rows - 1)
+    j = np.append(np.arange(0, columns - 1, step), columns - 1)
+    corner = outcomes[np.ix_(i, j)]
+    a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[:-1, 1:], corner[1:, 1:]
+    mixed: NDArray[np.bool_] = (a != b) | (a != c) | (a != d)
+    return mixed
+
+
+def _shifted(cells: NDArray[np.bool_], axis: int, by: int) -> NDArray[np.bool_]:
+    out = np.zeros_like(cells)
+    source = [slice(None), slice(None)]
+    target = [slice(None), slice(None)]
+    source[axis], target[axis] = (slice(None, -1), slice(1, None)) if by > 0 else (slice(1, None), slice(None, -1))
+    out[tuple(target)] = cells[tuple(source)]
+    return out
+
+
+def _axis(values: ArrayLike, key: str) -> NDArray[np.float64]:
+    try:
+        axis = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError("numbers are asked for", key) from None
+    if axis.ndim != 1 or axis.size == 0:
+        raise InputError(f"{axis.size} values of {axis.ndim} dimensions; a list of at least one number is asked for", key)
+    if not np.all(np.isfinite(axis)) or axis[0] <= 0.0:
+        raise InputError("positive finite numbers are asked for", key)
+    if np.any(np.diff(axis) <= 0.0):
+        raise InputError("increasing numbers are asked for", key)
+    return axis
