@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from scenes import History, InputError, Scene
+from validation import closed_forms as _closed_forms  # noqa: F401 - registers them
 from validation.measures import DIFFERENCES, FIGURES, TURNS, Measure, Motion, Pair, Unavailable
 from validation.results import Figure
 
@@ -62,7 +63,7 @@ def compare(
 ) -> Discrepancy:
     """Compare two histories over their common time, up to `until` (s), by the `measures` of `validation.measures`.
 
-        By default by all but the costly ones.
+        By default by all but those that are `on_request`.
     The candidate is interpolated linearly onto the reference's times. `scene` adds its gravity (9.81 m/s^2 otherwise).
         A measure that cannot be computed is NaN and says why. Raises `InputError` if the histories have no time in common.
     """
@@ -72,7 +73,7 @@ def compare(
     if len(pair.time) == 0:
         raise InputError(f"{reference.model} and {candidate.model} have no time in common")
     window = "" if until is None else f"{until:g}s"
-    chosen = [m for m in DIFFERENCES.values() if not m.costly] if measures is None else [DIFFERENCES[name] for name in measures]
+    chosen = [m for m in DIFFERENCES.values() if not m.on_request] if measures is None else [DIFFERENCES[name] for name in measures]
     figures = tuple(
         evaluate(measure, pair, "rad" if pair.alpha is None else "alpha", against=reference.model, window=window, until=until)
         for measure in chosen
@@ -81,12 +82,13 @@ def compare(
 
 
 def describe(
-    history: History, *, until: float | None = None, scene: Scene | None = None, measures: Collection[str] = tuple(FIGURES)
+    history: History, *, until: float | None = None, scene: Scene | None = None, measures: Collection[str] | None = None
 ) -> tuple[Figure, ...]:
     """The figures of one history: peak rotation, last place, impacts, hop, penetration and so on; up to `until` (s)."""
     motion = Motion(history, scene, math.inf if until is None else until)
     window = "" if until is None else f"{until:g}s"
-    return tuple(evaluate(measure, motion, "alpha", window=window, until=until) for measure in map(FIGURES.__getitem__, measures))
+    chosen = [m for m in FIGURES.values() if not m.on_request] if measures is None else [FIGURES[name] for name in measures]
+    return tuple(evaluate(measure, motion, "alpha", window=window, until=until) for measure in chosen)
 
 
 def evaluate(

@@ -50,8 +50,10 @@ class Measure:
     evaluate: Callable[[Any], Value]
     ideal: float | None = 0.0
     sense: Literal["at most", "at least"] = "at most"
-    #: Computed only where it is asked for by name.
-    costly: bool = False
+    #: Computed only where a tolerance or a suite asks for it by name.
+    on_request: bool = False
+    #: The distance from a closed form.
+    exact: bool = False
 
     @property
     def formula(self) -> str:
@@ -65,7 +67,9 @@ FIGURES: dict[str, Measure] = {}
 Definition = Callable[[Callable[[Any], Value]], Callable[[Any], Value]]
 
 
-def _register(book: dict[str, Measure], label: str, unit: str, **settings: Any) -> Definition:
+def register(book: dict[str, Measure], label: str, unit: str, **settings: Any) -> Definition:
+    """A decorator that puts a function into a book of measures, under the function's name."""
+
     def register(function: Callable[[Any], Value]) -> Callable[[Any], Value]:
         name = function.__name__
         book[name] = Measure(name=name, label=label, unit=unit, evaluate=function, **settings)
@@ -76,12 +80,12 @@ def _register(book: dict[str, Measure], label: str, unit: str, **settings: Any) 
 
 def difference(label: str, unit: str, **settings: Any) -> Definition:
     """Register a function of a `Pair` as a measure of difference."""
-    return _register(DIFFERENCES, label, unit, **settings)
+    return register(DIFFERENCES, label, unit, **settings)
 
 
 def figure(label: str, unit: str, **settings: Any) -> Definition:
     """Register a function of one `Motion` as a figure; without an ideal value, so held against an expected one."""
-    return _register(FIGURES, label, unit, **{"ideal": None, **settings})
+    return register(FIGURES, label, unit, **{"ideal": None, **settings})
 
 
 @dataclass(frozen=True)
@@ -408,7 +412,7 @@ def outcome_agrees(pair: Pair) -> tuple[float, str]:
     return float(len(fates) == 1), first if first == second else f"{first} / {second}"
 
 
-@difference("ISO/TS 18571 rating", "1", ideal=1.0, costly=True)
+@difference("ISO/TS 18571 rating", "1", ideal=1.0, on_request=True)
 def iso_18571(pair: Pair) -> float:
     """ISO/TS 18571 overall rating of theta, 0 to 1 (corridor 0.4, phase 0.2, magnitude 0.2, slope 0.2), not rounded.
 
@@ -474,6 +478,12 @@ def _unmatched(pair: Pair, matched: MatchedImpacts) -> list[tuple[History, Seque
 def peak_rotation(motion: Motion) -> float:
     """max |theta|, in alpha."""
     return float(np.max(np.abs(motion.channel("theta")))) / motion.block.alpha
+
+
+@figure("last rotation", "angle")
+def last_rotation(motion: Motion) -> float:
+    """theta in the window's last row, in alpha: sees a shift in time that a peak does not."""
+    return float(motion.channel("theta")[-1]) / motion.block.alpha
 
 
 @figure("last x", "m")

@@ -68,6 +68,7 @@ def run_suite(
     read_back = set(records)
     waiting = [spot for spot in spots if spot not in records]
     report(len(records), len(spots), f"{len(records)} up to date")
+    waiting = _in_good_order(waiting)
     tasks = [workers.Task(s.scene, s.part.label, s.part.family_name, dict(s.part.settings), (str(suite.path.parent),)) for s in waiting]
     limits = [suite.part_of(spot.scene.name).limits for spot in waiting]
     for index, result in play(
@@ -107,6 +108,19 @@ def run_suite(
     )
 
 
+def _in_good_order(spots: Sequence[Spot]) -> list[Spot]:
+    """First one cell of each package, so that none compiles twice; then the engines, which are slow; then the rest."""
+    seen: set[str] = set()
+
+    def rank(spot: Spot) -> int:
+        module = spot.part.family.module
+        first = module not in seen
+        seen.add(module)
+        return 0 if first else 1 if module == "engines" else 2
+
+    return sorted(spots, key=rank)
+
+
 def _without_cell(suite: Suite, cells: Mapping[tuple[str, str], Spot]) -> tuple[str, ...]:
     """Tolerances that nothing in the suite can meet."""
     return tuple(f"tolerance [{place}] has no cell in the suite" for place in suite.tolerances if (place.scene, place.model) not in cells)
@@ -140,7 +154,7 @@ def _cell(
             scene,
             spot,
             reference,
-            sorted(p.what for p in asked if p.against == name and (p.what.window or p.what.definition.costly)),
+            sorted(p.what for p in asked if p.against == name and (p.what.window or p.what.definition.on_request)),
         )
         figures += [Figure(**figure) for figure in found["figures"]]
         gaps |= {(name, window): gap for window, gap in found["gaps"].items()}
@@ -195,7 +209,7 @@ def _compute(store: Store, scene: Scene, spot: Spot, reference: Spot | None, win
     yardstick = History.load(store.history(reference.name)) if reference else None
     figures: list[Figure] = []
     gaps: dict[str, str] = {}
-    asked: dict[str, list[str]] = {"": [m.name for m in (DIFFERENCES if reference else FIGURES).values() if not m.costly]}
+    asked: dict[str, list[str]] = {"": [m.name for m in (DIFFERENCES if reference else FIGURES).values() if not m.on_request]}
     for what in windowed:
         asked.setdefault(what.window, []).append(what.measure)
     for window, measures in asked.items():

@@ -54,7 +54,7 @@ from scenes.files import named_scenes, read_toml, scene_from
 from validation.measures import FIGURES
 from validation.models import Family, build, family
 from validation.results import Kind
-from validation.tolerances import EXACT, OWN_FIGURES, Place, Tolerances, Windowed, parse_tolerances
+from validation.tolerances import OWN_FIGURES, Place, Tolerances, Windowed, parse_tolerances
 
 DATA = Path(str(resources.files("validation"))) / "data"
 
@@ -174,9 +174,7 @@ class Suite:
     def kind(self, place: Place) -> Kind:
         """What a check means: with a wall (or a bounce), a model that cannot fly differs in form from one that can."""
         if place.against == OWN_FIGURES:
-            return "absolute"
-        if place.against == EXACT:
-            return "exact"
+            return "exact" if place.what.definition.exact else "absolute"
         if "measured" in (self.models[place.model].family_name, self.models[place.against].family_name):
             return "measured"
         scene = self.scenes[place.scene]
@@ -234,8 +232,8 @@ def _suite(given: SuiteFile, path: Path, shipped: bool) -> Suite:
     try:
         tolerances = parse_tolerances(tables)
         for place in tolerances:
-            if place.against not in (OWN_FIGURES, EXACT, *models):
-                raise unknown_name(f"reference of [{place.scene}.{place.model}]", place.against, [OWN_FIGURES, EXACT, *models])
+            if place.against not in (OWN_FIGURES, *models):
+                raise unknown_name(f"reference of [{place.scene}.{place.model}]", place.against, [OWN_FIGURES, *models])
     except InputError as error:
         raise InputError(f"{printable(tolerances_path)}: {error}") from None
     return Suite(

@@ -5,8 +5,8 @@ A tolerance file is TOML; a table a scene, model and reference, a line a measure
     [fig5a.mujoco.ebm-unilateral]
     "theta_rms@8s" = { expected = 2.3e-4, limit = 2e-3, drift = 1e-4, why = "first-order step error, prototype 2e-4" }
 
-The third name is the reference model; "figures" for a figure of the cell itself, "exact" for the distance from a closed
-form. `@` bounds the window: seconds, or `@horizon`. `limit` bounds the distance from the perfect value (from `expected`
+The third name is the reference model, or "figures" for a figure of the cell itself, its distance from a closed form among
+them. `@` bounds the window: seconds, or `@horizon`. `limit` bounds the distance from the perfect value (from `expected`
 for figures of the cell itself; for "at least" measures the value itself). Within the limit, but further than `drift` from
 `expected`, is *changed*. All in the measure's unit.
 """
@@ -26,7 +26,7 @@ from validation.measures import DIFFERENCES, FIGURES, Measure
 from validation.results import Check, CheckVerdict, Figure, Kind
 
 #: The third name of a table that is not a reference model.
-OWN_FIGURES, EXACT = "figures", "exact"
+OWN_FIGURES = "figures"
 HORIZON = "horizon"
 
 
