@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from ebm import EventBasedModel
-from scenes import Block, Scene
+from scenes import Block, Floor, Ricker, Scene, Wall
 
 PAPER_BLOCK = Block(half_width=0.397, half_height=1.555)
 
@@ -75,3 +76,17 @@ def run_to_end() -> Runner:
         )
 
     return run
+
+
+@pytest.fixture(scope="session")
+def pulse_scene(block: Block) -> Callable[..., Scene]:
+    """Makes a scene of the paper's block under a Ricker pulse of omega_p = `frequency` p and a_p = `amplitude` g tan(alpha)."""
+
+    def scene(frequency: float, amplitude: float, mu: float, wall: tuple[str, float, float] | None = None, **more: object) -> Scene:
+        walls = [Wall(side=wall[0], gap=wall[1], restitution=wall[2])] if wall else []
+        pulse = Ricker(amplitude=amplitude * 9.81 * math.tan(block.alpha), period=2.0 * math.pi / (frequency * block.frequency_parameter))
+        return Scene(
+            **{"name": "pulse", "block": block, "floor": Floor(friction=mu), "walls": walls, "excitation": pulse, "duration": 5.0} | more
+        )
+
+    return scene

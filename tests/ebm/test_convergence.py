@@ -1,0 +1,106 @@
+"""The error falls with the tolerance, and does not depend on what ran before."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ebm import EventBasedModel
+from scenes import History, ModelFailure
+
+CASES = {
+    "rocking": (2.0, 1.1, 1.0),
+    "slide-rock": (4.5, 4.0, 0.3),
+    "plastic wall": (4.5, 4.0, 0.3, ("left", 0.053, 0.0)),
+    "half restitution": (4.5, 4.0, 0.3, ("left", 0.053, 0.5)),
+    "grazing an elastic wall": (3.0, 6.0, 0.3, ("right", 0.003, 1.0)),
+}
+
+
+def distance(a: History, b: History) -> float:
+    """Largest difference of rotation (rad) and place (m) over all rows."""
+    assert len(a.channels["t"]) == len(b.channels["t"])
+    return max(float(np.max(np.abs(a.channels[name] - b.channels[name]))) for name in ("theta", "x"))
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
+def test_error_falls_with_the_tolerance(pivot, case, pulse_scene):
+    """From 1e-6 to 1e-12, against a run at 1e-14: the error stays below 200 tolerances, and loses five decades."""
+    scene = pulse_scene(*CASES[case], output_step=0.01)
+    truth = EventBasedModel(pivot=pivot, tolerance=1e-14).simulate(scene)
+    tolerances = 10.0 ** -np.arange(6.0, 13.0)
+    errors = np.array([distance(EventBasedModel(pivot=pivot, tolerance=float(t)).simulate(scene), truth) for t in tolerances])
+    assert np.all(errors <= 200.0 * tolerances)
+    assert errors[-1] <= 1e-5 * errors[0]
+    assert np.polyfit(np.log10(tolerances), np.log10(errors), 1)[0] == pytest.approx(1.0, abs=0.2)
+
+
+def test_error_estimate_is_the_error(pulse_scene):
+    """`cost.error_estimate` (in alpha) is the distance to a tighter run, hence the error to within a factor of two."""
+    scene = pulse_scene(4.5, 4.0, 0.3)
+    model = EventBasedModel(tolerance=1e-7, estimate_error=True)
+    estimated, truth = model.simulate(scene), EventBasedModel(tolerance=1e-14).simulate(scene)
+    error = np.max(np.abs(estimated.channels["theta"] - truth.channels["theta"])) / scene.block.alpha
+    assert 0.5 * error <= estimated.cost.error_estimate <= 2.0 * error
+    assert EventBasedModel(tolerance=1e-7).simulate(scene).cost.error_estimate is None
+
+
+def test_work_grows_with_accuracy(pulse_scene):
+    """Steps of a Taylor method grow with the number of digits, not with their power."""
+    scene = pulse_scene(4.5, 4.0, 0.3)
+    steps = [EventBasedModel(tolerance=tolerance).simulate(scene).cost.steps for tolerance in (1e-6, 1e-9, 1e-12)]
+    assert steps[0] <= steps[2] <= 2 * steps[0]
+
+
+@pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
+def test_a_run_leaves_no_trace(pivot, pulse_scene):
+    """The same scene gives the same bits before and after another one, and when its output grid is finer."""
+    scene = pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0), output_step=0.01)
+    model = EventBasedModel(pivot=pivot)
+    first = model.simulate(scene)
+    model.simulate(pulse_scene(4.5, 4.0, 0.6, ("left", 0.053, 0.5)))
+    again, finer = model.simulate(scene), model.simulate(scene.replace(output_step=0.005))
+    for name in ("x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate", "mode"):
+        np.testing.assert_array_equal(first.channels[name], again.channels[name])
+        np.testing.assert_array_equal(first.channels[name], finer.channels[name][::2])
+    assert first.event_list == again.event_list == finer.event_list
+
+
+def test_compiled_scratch_is_scratch(pulse_scene):
+    """What the loop finds in its work arrays, however wild, does not matter."""
+    from ebm import motion, natural, trajectory
+
+    scene = pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0))
+    unit = natural.time_unit(scene)
+    setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
+    control = trajectory.Control(1e-10, EventBasedModel().order, 100_000, 100_000, False, 1.0)
+    found = []
+    for filling in (0.0, np.nan, 1e300):
+        a, stack = motion.workspace()
+        a[:], stack[:] = filling, filling
+        state = natural.state_of(scene)
+        nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
+        tally = trajectory.run(setting, *natural.grounds_of(scene), state, scene.duration / unit, control, *nothing, a, stack)
+        found.append((tally.peak, tally.steps, tally.events, tally.t, *state))
+    assert found[0] == found[1] == found[2]
+
+
+@pytest.mark.parametrize(("cap", "said"), [({"most_steps": 3}, "steps"), ({"most_events": 3}, "events")])
+def test_a_cap_ends_in_a_failure(cap, said, pulse_scene):
+    with pytest.raises(ModelFailure, match=f"the cap on {said} was reached at t = "):
+        EventBasedModel(**cap).simulate(pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0)))
+
+
+def test_hop_of_the_loop_is_that_of_the_history(pulse_scene, run_to_end):
+    """The lift that the compiled loop reports counts every flight, also of a block that flies upright.
+
+    Known fault: `Tally.hop` overlooks flights with theta = 0 (1.14 mm instead of 4.17 mm here).
+    """
+    from scenes import kinematics
+
+    scene = pulse_scene(3.0, 2.5, 0.6, ("right", 0.003, 0.0), output_step=1e-3)
+    motion = EventBasedModel(pivot="unilateral", tolerance=1e-12).simulate(scene).channels
+    hop = np.max(kinematics.pivot_height(scene.block, motion["y"], motion["theta"]))
+    assert hop == pytest.approx(0.00416838, abs=2e-6)
+    assert run_to_end(scene, pivot="unilateral").hop == pytest.approx(hop, rel=0.05)
