@@ -22,14 +22,15 @@ from scenes import ModelFailure, Scene
 FloatArray = NDArray[np.float64]
 Vector = tuple[float, float, float]  # along x, y and theta
 
-CLOSED = 1e-7  # m: a corner nearer than this touches
-EMBEDDED = 1e-8  # m: how deep the engine sees a corner that touches
-IMPACT_STEP = 1e-6  # s
-PROBE_STEP = 3e-5  # s: the longest step where the acceleration is not known, that is, after an event
-SHORTEST_STEP = 1e-7  # s
-LONG_APPROACH = 3e-4  # s: from farther away a prediction is only trusted to 95 %
-RESTING = 0.005  # of g times the longest step: slower approaches and departures, m/s, are not told from rest
-SETTLING_GAP = 3e-6  # m
+# Lengths in units of the block's radius R, times in units of 1/p.
+CLOSED = 5e-8  # a corner nearer than this touches
+EMBEDDED = 5e-9  # how deep the engine sees a corner that touches
+IMPACT_STEP = 2e-6
+PROBE_STEP = 6e-5  # the longest step where the acceleration is not known, that is, after an event
+SHORTEST_STEP = 2e-7
+LONG_APPROACH = 6e-4  # from farther away a prediction is only trusted to 95 %
+RESTING = 0.005  # of g times the longest step: slower approaches and departures are not told from rest
+SETTLING_GAP = 2e-6
 SETTLING_TIME = 0.15  # of the longest step: a corner that is back on the floor within twice that time is taken to stay
 
 
@@ -46,12 +47,16 @@ class Push(Protocol):
 def march_adaptively(scene: Scene, push: Push, longest: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Times (n) and states (n, 6) at step ends, and the accelerations (n-1, 2) felt in the steps, until |theta| = pi/2.
 
-    No step is longer than `longest` s. Raises `ModelFailure` if the motion blows up or needs very many steps.
+    The scene is one of a block with R = 1, see `engines.engine.in_units_of`. No step is longer than `longest` s.
+    Raises `ModelFailure` if the motion blows up or needs very many steps.
     """
     floor, walls = contacts_of(scene)[:2], contacts_of(scene)[2:]
     across, up = BaseVelocity(scene.excitation), BaseVelocity(scene.vertical)
     starts, end = [*starts_of_motion(scene), math.inf], float(scene.output_times[-1])
     resting, gravity, upright = RESTING * longest * scene.gravity, scene.gravity, scene.block.half_height
+    moment = 1.0 / scene.frequency_parameter
+    impact_step, probe_step = min(IMPACT_STEP * moment, longest), PROBE_STEP * moment
+    shortest, long_approach = SHORTEST_STEP * moment, LONG_APPROACH * moment
     most_steps = 100_000 + 20 * int(end / longest)
 
     t, before, next_start = 0.0, (across(0.0), up(0.0)), 0
@@ -62,7 +67,7 @@ def march_adaptively(scene: Scene, push: Push, longest: float) -> tuple[FloatArr
         # How long the step may be, and which corners touch.
         dt = min(longest, end - t)
         if acceleration is None:
-            dt = min(dt, PROBE_STEP)
+            dt = min(dt, probe_step)
         while starts[next_start] <= t + 1e-9:
             next_start += 1
         dt = min(dt, starts[next_start] - t)
@@ -77,7 +82,7 @@ def march_adaptively(scene: Scene, push: Push, longest: float) -> tuple[FloatArr
                     curvature = 0.0 if acceleration is None else contact.acceleration(*acceleration, w, arm)
                     closing = _time_to_close(gap, rate, curvature)
                     if closing < dt:
-                        dt, stops = max(0.95 * closing if closing > LONG_APPROACH else closing, SHORTEST_STEP), False
+                        dt, stops = max(0.95 * closing if closing > long_approach else closing, shortest), False
                     continue
                 closed.append(contact)
                 if rate < -resting:
@@ -88,7 +93,7 @@ def march_adaptively(scene: Scene, push: Push, longest: float) -> tuple[FloatArr
                     if slip * slowing < 0.0 and 0.2 * resting < abs(slip) < abs(slowing) * dt:
                         dt, stops = abs(slip / slowing), True
         if impact:
-            dt = min(IMPACT_STEP, longest)
+            dt = impact_step
 
         # Drift, kick, drift. The engine sees the block at mid-step, with the corners that touch just below the surface. What
         # rests on a surface at the end of the step moves along its arc in mid-step; `carry` is that velocity: in a frame that
@@ -153,6 +158,6 @@ def _settles(floor: Sequence[Contact], pose: Vector, velocity: Vector, accelerat
         arm = contact.arm(cos, sin)
         rate = contact.rate(*velocity, arm)
         pulled = contact.acceleration(*acceleration, velocity[2], arm)
-        if contact.gap(x, y, arm) > SETTLING_GAP or abs(rate) > max(1e-6, -SETTLING_TIME * longest * pulled):
+        if contact.gap(x, y, arm) > SETTLING_GAP or abs(rate) > max(SETTLING_GAP, -SETTLING_TIME * longest * pulled):
             return False
     return True

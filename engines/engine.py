@@ -18,7 +18,7 @@ from engines.adaptive import Push, march_adaptively
 from engines.base_motion import felt_acceleration
 from engines.contacts import contacts_of
 from engines.events import events_of
-from scenes import Cost, History, InputError, ModelFailure, Scene
+from scenes import Block, Cost, History, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall
 from scenes.base import Frozen, Positive
 from scenes.observation import observe
 
@@ -95,17 +95,19 @@ class Engine(Frozen):
             key = "largest_step" if self.time_step == "adaptive" else "time_step"
             raise InputError(f"{step:g} is not allowed: {scene.duration:g} s would need more than {MOST_STEPS} steps", key)
         start = time.perf_counter()
+        unit = scene.block.radius if self.settings == "best" else 1.0  # of length, m
+        played = in_units_of(unit, scene)
         march: Callable[[], Marched]
         with ExitStack() as stack:
             if self.time_step == "adaptive":
-                rigid = self.rigid_world(scene)
+                rigid = self.rigid_world(played)
                 stack.callback(rigid.close)
-                march = partial(march_adaptively, scene, rigid.push, step)
+                march = partial(march_adaptively, played, rigid.push, step)
             else:
-                world = self.rigid_world(scene) if self.settings == "best" else self.stock_world(scene)
+                world = self.rigid_world(played) if self.settings == "best" else self.stock_world(played)
                 stack.callback(world.close)
                 times = step * np.arange(math.ceil(scene.output_times[-1] / step - 1e-9) + 1)
-                march = partial(_march, world, scene, times, felt_acceleration(scene, times))
+                march = partial(_march, world, played, times, felt_acceleration(played, times))
             begin, begin_cpu = time.perf_counter(), time.process_time()
             times, states, felt = march()
             cost = Cost(
@@ -114,15 +116,34 @@ class Engine(Frozen):
                 set_up=begin - start,
                 steps=len(states) - 1,
             )
+        states[:, [0, 1, 3, 4]] *= unit
         return observe(
             scene,
             self.name,
             at_output_times(scene, times, states),
-            events=events_of(scene, contacts_of(scene), times, states, felt),
+            events=events_of(scene, contacts_of(scene), times, states, unit * felt),
             cost=cost,
             settings=self.model_dump(),
             notes=self.notes(scene),
         )
+
+
+def in_units_of(length: float, scene: Scene) -> Scene:
+    """The scene with all lengths in units of `length` m, so that the absolute tolerances of an engine fit any block."""
+
+    def rescaled(excitation: Rest | Ricker | Sine | Record) -> Rest | Ricker | Sine | Record:
+        sizes = {name: getattr(excitation, name) / length for name in ("amplitude", "scale") if hasattr(excitation, name)}
+        return excitation.model_copy(update=sizes)
+
+    return scene.replace(
+        block=Block(half_width=scene.block.half_width / length, half_height=scene.block.half_height / length),
+        walls=tuple(Wall(side=wall.side, gap=wall.gap / length, restitution=wall.restitution) for wall in scene.walls),
+        excitation=rescaled(scene.excitation),
+        vertical=rescaled(scene.vertical),
+        initial_velocity=scene.initial_velocity / length,
+        initial_height=scene.initial_height / length,
+        gravity=scene.gravity / length,
+    )
 
 
 def _march(world: World, scene: Scene, times: FloatArray, felt: FloatArray) -> Marched:

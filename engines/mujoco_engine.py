@@ -14,11 +14,12 @@ from engines.engine import Engine, RigidWorld, World
 from scenes import Scene
 
 FloatArray = NDArray[np.float64]
-CORNER_RADIUS = 1e-6  # m; contacts are points, and MuJoCo has no contact of a point with a plane
+CORNER_RADIUS = 1e-6  # of the block's radius; contacts are points, and MuJoCo has no contact of a point with a plane
 PUSHED_OUT = 0.01  # share of a penetration that one step removes
 IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 1.0)
 RIGID = 1e7  # inverse regularisation of a contact, kg, where MuJoCo gives at most 1.5e4 to a block of 1 kg
-SLIDING = 1e-7  # m/s: how well a slip rate has to be known for the correction of the cone
+SLIDING = 1e-7  # block radii per second: how well a slip rate has to be known for the correction of the cone
+FLATTEST = -0.05  # slope that the secant method trusts
 MOST_CORRECTIONS = 20
 
 
@@ -56,25 +57,27 @@ class _MuJoCoWorld:
     def __init__(self, model_text: str) -> None:
         import mujoco
 
+        self.mujoco: Any = mujoco
         self.model: Any = mujoco.MjModel.from_xml_string(model_text)
         self.data: Any = mujoco.MjData(self.model)
-        self.mujoco: Any = mujoco
+        # Views of the data, which are dear to make anew in each step.
+        self.qpos, self.qvel, self.qacc = self.data.qpos, self.data.qvel, self.data.qacc
+        self.force = self.data.qfrc_applied[:2]
 
     def place(self, state: FloatArray) -> None:
         """Put the block where `state` says."""
-        self.data.qpos[:] = state[:3]
-        self.data.qvel[:] = state[3:]
+        self.qpos[:] = state[:3]
+        self.qvel[:] = state[3:]
 
     def march(self, felt: FloatArray, dt: float) -> FloatArray:
         """States after each step."""
         self.model.opt.timestep = dt
-        qpos, qvel, force = self.data.qpos, self.data.qvel, self.data.qfrc_applied[:2]
         states = np.empty((len(felt), 6))
         for state, acceleration in zip(states, felt, strict=True):
-            force[:] = acceleration
+            self.force[:] = acceleration
             self.step()
-            state[:3] = qpos
-            state[3:] = qvel
+            state[:3] = self.qpos
+            state[3:] = self.qvel
         return states
 
     def step(self) -> None:
@@ -91,7 +94,8 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
     def __init__(self, model_text: str, contacts: Sequence[Contact], corrected_friction: float) -> None:
         super().__init__(model_text)
         self.friction = corrected_friction
-        self.model.pair_solref[:, 0] = 0.0
+        self.stiffness, self.damping = self.model.pair_solref.T
+        self.stiffness[:] = 0.0
         restitutions = np.array([contact.restitution for contact in contacts])
         self.stopping, self.bouncing = np.full(len(contacts), -1.0), -1.0 - restitutions
         # Not of a penetration that would come back as a bounce: no weight presses the block on a wall.
@@ -100,43 +104,46 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
     def march(self, felt: FloatArray, dt: float) -> FloatArray:
         """States after each step."""
         # Reference acceleration: -(1+e)/dt times the velocity, less a share of the penetration.
-        self.model.pair_solref[:, 0] = self.pushing_out / dt**2
-        self.model.pair_solref[:, 1] = self.bouncing / dt
+        self.stiffness[:] = self.pushing_out / dt**2
+        self.damping[:] = self.bouncing / dt
         return super().march(felt, dt)
 
     def step(self) -> None:
-        """One step, with the correction of the cone."""
-        if self.friction == 0.0:
-            super().step()
-            return
-        self.mujoco.mj_step1(self.model, self.data)
-        self._accelerate(self.model.opt.timestep)
-        self.mujoco.mj_Euler(self.model, self.data)
+        """One step; where a contact slips, it is done again with the corrected cone."""
+        before = self.qpos.tolist(), self.qvel.tolist()
+        super().step()
+        if self.friction > 0.0 and (rows := self._slipping_rows()):
+            self.qpos[:], self.qvel[:] = before
+            self.mujoco.mj_step1(self.model, self.data)
+            self.mujoco.mj_fwdAcceleration(self.model, self.data)
+            self._correct_cone(rows, self.model.opt.timestep)
+            self.mujoco.mj_Euler(self.model, self.data)
 
     def push(self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool) -> Vector:
         """Velocity after `dt` s with the contacts closed at `pose`."""
         model, data = self.model, self.data
-        data.qpos[:] = pose
-        data.qvel[:] = velocity
-        data.qfrc_applied[:2] = felt
-        model.pair_solref[:, 1] = (self.bouncing if bouncing else self.stopping) * (IMPEDANCE[0] / dt)
+        self.qpos[:] = pose
+        self.qvel[:] = velocity
+        self.force[:] = felt
+        self.damping[:] = (self.bouncing if bouncing else self.stopping) * (IMPEDANCE[0] / dt)
         self.mujoco.mj_step1(model, data)
         data.efc_D[:] = RIGID  # MuJoCo caps the impedance, and with it the share of an impact that its contacts take up
-        self._accelerate(dt)
-        ax, ay, spin = data.qacc.tolist()
-        return velocity[0] + dt * ax, velocity[1] + dt * ay, velocity[2] + dt * spin
-
-    def _accelerate(self, dt: float) -> None:
-        """Solve for accelerations and contact forces."""
-        model, data = self.model, self.data
         self.mujoco.mj_fwdAcceleration(model, data)
         self.mujoco.mj_fwdConstraint(model, data)
-        if self.friction > 0.0:
-            forces = data.efc_force.tolist()
-            # Three rows for each contact with friction, which come first, and one for each without.
-            rows = range(0, 3 * ((len(forces) - data.ncon) // 2), 3)
-            if any(abs(forces[row + 2]) > 0.999 * self.friction * forces[row] > 0.0 for row in rows):
-                self._correct_cone(list(rows), dt)
+        if self.friction > 0.0 and (rows := self._slipping_rows()):
+            self._correct_cone(rows, dt)
+        ax, ay, spin = self.qacc.tolist()
+        return velocity[0] + dt * ax, velocity[1] + dt * ay, velocity[2] + dt * spin
+
+    def _slipping_rows(self) -> list[int]:
+        """The first constraint row of each floor contact, if one of them has reached the edge of its cone."""
+        forces = self.data.efc_force.tolist()
+        # Three rows for each contact with friction, which come first, and one for each without.
+        rows = range(0, 3 * ((len(forces) - self.data.ncon) // 2), 3)
+        for row in rows:
+            if abs(forces[row + 2]) > 0.999 * self.friction * forces[row] > 0.0:
+                return list(rows)
+        return []
 
     def _correct_cone(self, rows: list[int], dt: float) -> None:
         """Solve again with the normal target of each floor contact lowered by mu times its slip rate, until that is consistent.
@@ -144,21 +151,23 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
         The fixed point obeys Coulomb's law with the contact neither parting nor closing (De Saxce & Feng 1998). Found by
         the secant method, from the slip rate before the step.
         """
-        model, data = self.model, self.data
+        model, data, count = self.model, self.data, len(rows)
         original, tangents = data.efc_aref.copy(), data.efc_J.reshape(-1, 3)[[row + 2 for row in rows]]
-        guess = np.abs(tangents @ data.qvel)
-        last_guess = last_excess = np.full(len(rows), np.nan)
+        guess: list[float] = np.abs(tangents @ self.qvel).tolist()
+        slope = [-1.0] * count  # of the excess over the guess
+        last: list[tuple[float, float]] = []
         for _ in range(MOST_CORRECTIONS):
-            data.efc_aref[rows] = original[rows] - self.friction * guess / dt
+            data.efc_aref[rows] = original[rows] - np.multiply(guess, self.friction / dt)
             self.mujoco.mj_fwdConstraint(model, data)
-            excess = np.abs(tangents @ (data.qvel + dt * data.qacc)) - guess
-            if np.all(np.abs(excess) < SLIDING):
+            slip = np.abs(tangents @ (self.qvel + dt * self.qacc)).tolist()
+            now = [(guess[i], slip[i] - guess[i]) for i in range(count)]
+            if max(abs(excess) for _, excess in now) < SLIDING:
                 return
-            with np.errstate(divide="ignore", invalid="ignore"):
-                slope = (excess - last_excess) / (guess - last_guess)
-            last_guess, last_excess = guess, excess
-            # The slip rate falls as its guess grows, or hardly depends on it: the slope is at most about -1.
-            guess = np.maximum(guess - excess / np.where(slope < -0.5, slope, -1.0), 0.0)
+            for i, ((before, had), (here, has)) in enumerate(zip(last, now, strict=False)):
+                if before != here:
+                    slope[i] = min((has - had) / (here - before), FLATTEST)
+            guess = [max(here - has / slope[i], 0.0) for i, (here, has) in enumerate(now)]
+            last = now
 
 
 def _planar_body(scene: Scene, geoms: str) -> str:

@@ -15,9 +15,9 @@ from engines.engine import Engine, RigidWorld, World
 from scenes import Scene
 
 FloatArray = NDArray[np.float64]
-CORNER_RADIUS = 1e-6  # m
-SLAB = 1.0  # m, half the thickness of floor and walls
-REACH = 100.0  # m, half their extent
+CORNER_RADIUS = 1e-6  # of the block's radius
+SLAB = 1.0  # half the thickness of floor and walls
+REACH = 1e4  # half their extent; far beyond that the direction of a normal is lost to rounding
 FLOOR_ERP = 0.02  # share of a penetration that one step removes; none where it would add to a bounce or make one
 
 
