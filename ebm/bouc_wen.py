@@ -1,0 +1,555 @@
+"""The model `ebm-bouc-wen`: the bilateral pivot with the paper's regularised friction (9) in place of stick and slip.
+
+The floor's friction force on the pivot is Q = -mu_k |P| z. The hysteretic variable z replaces the sign of the slip
+velocity V and follows it over the yield displacement u_y:
+
+    z' = (-gamma |V| z |z|^(n-1) - beta V |z|^n + V) / u_y,    beta = gamma = 1/2, n = 2,
+
+that is z' = V (1 - z^2)/u_y while the pivot *loads* (V z > 0) and z' = V/u_y while it unloads. A pivot that sticks is
+thus a stiff undamped spring, and after some u_y of slip z = +-1, which is an invariant state: the pivot has *yielded* and
+slips as in (7), (8) until V = 0. So the equation, stiff as it looks (eigenvalue -2 |V|/u_y), is smooth between the instants
+at which V or z changes sign, and needs no stiff integrator: Taylor steps stop there, and hold z once it has come within
+the tolerance of +-1. Everything else (guards, impacts, natural units, state and mode vectors) is the exact model's.
+
+What (9) leaves open: a block at rest on its base does not move at all, z being -u/(mu_k G0), so that it uplifts or slides
+exactly when it should. Impacts are the paper's, with their own stick and slip; they change velocities only, so that z goes
+on through them. "slip" and "stick" events, and the modes, tell a yielded pivot (SLIDE-ROCK, LADDER) from one that has not
+(ROCK, LEAN).
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ebm import natural, trajectory
+from ebm.ground import acceleration, fill_series, next_kink
+from ebm.motion import (
+    COS,
+    FAMILY,
+    FAR,
+    FLAT,
+    FLOOR,
+    GUARD,
+    MODE_SIZE,
+    NA,
+    NB,
+    OMEGA,
+    PHI,
+    PULL,
+    ROWS,
+    SIN,
+    SLIP,
+    SLIPPING,
+    STICK,
+    THETA,
+    TILT,
+    TIP,
+    VX,
+    VY,
+    XI,
+    G,
+    P,
+    Q,
+    S,
+    U,
+    W,
+    X,
+    flat_series,
+    flat_state,
+    tilt_series,
+    tilt_state,
+)
+from ebm.series import MOST_TERMS, NO_ROOT, NOISE, SLIP_NOISE, first_root, leading, value
+from ebm.trajectory import (
+    _LANDED,
+    _QUIET_TIME,
+    _RATTLE_BOUND,
+    _RATTLE_IMPACTS,
+    _RATTLE_TIME,
+    _REST_BILATERAL,
+    DONE,
+    FLOOR_IMPACT,
+    LEFT,
+    NO_MODE,
+    NOT_FINITE,
+    OVERTURNED,
+    RELEASE,
+    RIGHT,
+    SETTLE_SPIN,
+    SLIPS,
+    STICKS,
+    TOO_MANY_EVENTS,
+    TOO_MANY_STEPS,
+    UPLIFT,
+    WALL_IMPACT,
+    Control,
+    Tally,
+    _floor_impact,
+    _note,
+    _step_size,
+    _touch,
+    _upright,
+    _wall_impact,
+)
+from ebm.transitions import (
+    G_CONE_MINUS,
+    G_FAR_GAP,
+    G_FAR_PUSH,
+    G_PHI,
+    G_PUSH,
+    G_SLIP,
+    G_TIP_GAP,
+    G_TIP_PUSH,
+    G_TOPPLE,
+    G_UPLIFT_PLUS,
+    GUARDS,
+    closed_wall,
+    guard,
+    slip_velocity,
+)
+from scenes.compiled import kernel
+from scenes.errors import InputError, ModelFailure
+from scenes.history import Cost, History
+from scenes.observation import observe
+from scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from ebm.model import EventBasedModel
+
+# Rows of the workspace after those of ebm.motion: z, V and what the recurrences need.
+Z, V, Z2, SPIN2, ARM, TURN, REACH, INERTIA, LOAD, PUSH, ZA, LEVER, DEN, TORQUE = range(ROWS, ROWS + 14)
+_ROWS = ROWS + 14
+
+# A guard besides those of ebm.transitions: z comes to the sign of V, from where the pivot loads.
+_G_LOADS = GUARDS
+# A pivot that slips more slowly than this after an impact stands.
+_STOPPED = 1e-10
+_LOOK, _AHEAD = 6, 1e-2
+_MOST_ZERO_STEPS = 60
+
+
+def simulate(model: EventBasedModel, scene: Scene, tolerance: float) -> History:
+    """The motion of `scene` with friction (9) and `model.yield_displacement` (m) as u_y.
+
+    Raises `InputError` where the static friction differs from the kinetic one, of which (9) knows nothing, or the pivot is
+    unilateral; `ModelFailure` where a cap is reached or no mode is consistent.
+    """
+    start = time.perf_counter()
+    if model.pivot != "bilateral":
+        raise InputError(f'{model.pivot!r} is not allowed with friction="bouc-wen": only "bilateral" is', "pivot")
+    if scene.floor.mu_s != scene.floor.friction:
+        raise InputError(
+            f"{scene.floor.mu_s:g} is not allowed: Bouc-Wen friction has one coefficient, {scene.floor.friction:g}", "floor.static_friction"
+        )
+    from ebm import model as exact
+
+    b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
+    horizontal, vertical = natural.grounds_of(scene)
+    unit = natural.time_unit(scene)
+    times = scene.output_times
+    order = type(model)(tolerance=tolerance).order
+    control = Control(tolerance, order, model.most_steps, model.most_events, False, scene.output_step / unit)
+    yield_displacement = model.yield_displacement / scene.block.radius
+    state = natural.state_of(scene)
+    out = np.empty((len(times), 6))
+    out_mode = np.zeros(len(times), dtype=np.int8)
+    log = np.empty((model.most_events, 5))
+    run(b, horizontal, vertical, state.copy(), yield_displacement, 0.0, control, out[:0], out_mode[:0], log)  # loads or compiles
+    ready, cpu = time.perf_counter(), time.process_time()
+    tally = run(b, horizontal, vertical, state, yield_displacement, scene.duration / unit, control, out, out_mode, log)
+    seconds, cpu = time.perf_counter() - ready, time.process_time() - cpu
+    if tally.ending in trajectory.FAILURES:
+        raise ModelFailure(f"{model.name}: {trajectory.FAILURES[tally.ending]} at t = {tally.t * unit:.6g} s")
+    return observe(
+        scene,
+        model.name,
+        natural.to_si(scene, out[: tally.rows]),
+        mode=np.array(trajectory.MODE_NAMES)[out_mode[: tally.rows]],
+        events=exact._events(log[: tally.events], unit, scene.block.radius),
+        outcome=exact._outcome(tally, state[THETA]),
+        cost=Cost(
+            wall_seconds=seconds,
+            cpu_seconds=cpu,
+            set_up=ready - start,
+            steps=tally.steps,
+            evaluations=tally.series,
+            energy_gains=tally.gains,
+            largest_energy_gain=tally.largest_gain,
+        ),
+        settings=model.model_dump(),
+    )
+
+
+@kernel
+def _product(a, x, y, k):
+    """Coefficient k of the product of two rows."""
+    total = 0.0
+    for j in range(k + 1):
+        total += a[x, j] * a[y, k - j]
+    return total
+
+
+@kernel
+def _fill_z(a, k, loads, yielded, yield_displacement):
+    """Coefficient k + 1 of z by (9) with beta = gamma = 1/2 and n = 2, given those of V and z up to k."""
+    if yielded:
+        a[Z, k + 1] = 0.0
+        return
+    rate = a[V, k]
+    if loads:
+        a[Z2, k] = _product(a, Z, Z, k)
+        rate -= _product(a, V, Z2, k)
+    a[Z, k + 1] = rate / (yield_displacement * (k + 1))
+
+
+@kernel
+def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order, a):
+    """Fills the workspace with the series of a block whose pivot, or base, carries the friction force -mu_k |P| z.
+
+    Tilted, in the pivot's frame (see ebm.motion): with Sw = +-1 where a corner rests on the tip or far wall, else 0,
+    C = Sw c', J = 1/3 + C^2, f = u - Sw s' w^2, G = G0 - c w^2 and k = mu_k z sgn P,
+
+        P = (G J - s C f) / (J + s^2 + k s (c + C)),   Q = -k P,   J theta'' = -s P + (c + C) Q - C f,
+
+    which is (7), (8) with z for d where Sw = 0, and LADDER with z for d otherwise. Flat: P = G0, x'' = Q - u.
+    """
+    sign = float(m[S])
+    fill_series(gh, t, sign, order, a, U)
+    fill_series(gv, t, 1.0, order, a, G)
+    a[G, 0] += 1.0
+    a[XI, 0], a[XI, 1] = sign * z[X], sign * z[VX]
+    a[Z, 0] = sign * zeta
+    loads = m[SLIP] * a[Z, 0] > -1e-13
+    friction = b.mu_k * m[PULL]
+    for k in range(order + 1):
+        a[P, k] = a[Q, k] = a[NA, k] = a[NB, k] = 0.0
+    if m[FAMILY] == FLAT:
+        for k in range(order - 1):
+            a[P, k] = a[G, k]
+            a[Q, k] = -friction * _product(a, Z, P, k)
+            a[XI, k + 2] = (a[Q, k] - a[U, k]) / ((k + 2) * (k + 1))
+            a[V, k] = (k + 1) * a[XI, k + 1]
+            _fill_z(a, k, loads, yielded, yield_displacement)
+        return
+    wall = float(m[TIP] - m[FAR])
+    push = NA if m[TIP] != 0 else NB
+    a[PHI, 0], a[OMEGA, 0] = sign * z[THETA], sign * z[W]
+    a[SIN, 0], a[COS, 0] = math.sin(b.alpha - a[PHI, 0]), math.cos(b.alpha - a[PHI, 0])
+    for k in range(order):
+        a[PHI, k + 1] = a[OMEGA, k] / (k + 1)
+        a[SIN, k + 1] = -_product(a, OMEGA, COS, k) / (k + 1)
+        a[COS, k + 1] = _product(a, OMEGA, SIN, k) / (k + 1)
+        a[V, k] = (k + 1) * (a[XI, k + 1] - a[SIN, k + 1])
+        if k == order - 1:
+            break
+        a[SPIN2, k] = _product(a, OMEGA, OMEGA, k)
+        a[G, k] -= _product(a, COS, SPIN2, k)
+        a[TURN, k] = wall * (b.sin_2alpha * a[SIN, k] + b.cos_2alpha * a[COS, k])  # C
+        a[ARM, k] = a[COS, k] + a[TURN, k]
+        a[INERTIA, k] = 1.0 / 3.0 if k == 0 else 0.0
+        a[LOAD, k] = 0.0  # f
+        normal = a[G, k] / 3.0
+        if wall != 0.0:
+            a[REACH, k] = b.sin_2alpha * a[COS, k] - b.cos_2alpha * a[SIN, k]  # s'
+            a[INERTIA, k] += _product(a, TURN, TURN, k)
+            a[LOAD, k] = a[U, k] - wall * _product(a, REACH, SPIN2, k)
+            a[PUSH, k] = _product(a, TURN, LOAD, k)  # C f
+            normal = _product(a, G, INERTIA, k) - _product(a, SIN, PUSH, k)
+        a[ZA, k] = _product(a, Z, ARM, k)
+        a[LEVER, k] = a[SIN, k] + friction * a[ZA, k]  # s + k (c + C)
+        a[DEN, k] = a[INERTIA, k] + _product(a, SIN, LEVER, k)
+        for j in range(1, k + 1):
+            normal -= a[DEN, j] * a[P, k - j]
+        a[P, k] = normal / a[DEN, 0]
+        a[Q, k] = -friction * _product(a, Z, P, k)
+        moment = -_product(a, LEVER, P, k)
+        if wall != 0.0:
+            moment -= a[PUSH, k]
+            for j in range(1, k + 1):
+                moment -= a[INERTIA, j] * a[TORQUE, k - j]
+        a[TORQUE, k] = moment / a[INERTIA, 0]  # theta''
+        a[OMEGA, k + 1] = a[TORQUE, k] / (k + 1)
+        along = a[Q, k] - a[U, k]
+        if wall != 0.0:  # the corner slides on the wall: x'' = Sw (c' theta'' - s' w^2), which takes the force N
+            held = _product(a, TURN, TORQUE, k) - wall * _product(a, REACH, SPIN2, k)
+            a[push, k] = wall * (held - along)
+            along = held
+        a[XI, k + 2] = along / ((k + 2) * (k + 1))
+        _fill_z(a, k, loads, yielded, yield_displacement)
+
+
+@kernel
+def _held(b, z, gh, gv, t):
+    """Whether a flat block without speed stays at rest: the base neither lifts nor slides it, or presses it on a wall."""
+    limit = min(b.sin_alpha / b.cos_alpha, b.mu_k) * (1.0 + acceleration(gv, t))
+    u = acceleration(gh, t)
+    return (u <= limit or closed_wall(b, z, 1, False)) and (u >= -limit or closed_wall(b, z, -1, False))
+
+
+@kernel
+def _rest(b, m, z):
+    """The mode of a block at rest on its base."""
+    m[:] = 0
+    m[FAMILY], m[S], m[PULL], m[FLOOR] = FLAT, 1, 1, STICK
+    m[TIP], m[FAR] = closed_wall(b, z, 1, False), closed_wall(b, z, -1, False)
+
+
+@kernel
+def _leave_rest(b, m, gh, gv, t):
+    """The block at rest starts to slide, or to tilt: returns z = -u/(mu_k G0), which is +-1 if it slides."""
+    u, g = acceleration(gh, t), 1.0 + acceleration(gv, t)
+    sense = 1 if u > 0.0 else -1
+    m[:] = 0
+    m[PULL], m[FLOOR] = 1, SLIPPING
+    if b.mu_k * b.cos_alpha <= b.sin_alpha:
+        m[FAMILY], m[S], m[SLIP] = FLAT, 1, -sense
+        return -float(sense)
+    m[FAMILY], m[S], m[SLIP] = TILT, sense, -1
+    return min(max(-u / (b.mu_k * abs(g)), -1.0), 1.0)
+
+
+@kernel
+def _begin(b, m, z, zeta, yield_displacement, gh, gv, t, a):
+    """The contacts of a block that starts, or goes on after an impact, into m; returns z, changed only where it was at rest."""
+    v = slip_velocity(b, z)
+    if z[THETA] == 0.0 and z[W] == 0.0:
+        if v == 0.0:
+            if not _held(b, z, gh, gv, t):
+                return _leave_rest(b, m, gh, gv, t)
+            _rest(b, m, z)
+            return 0.0
+        m[:] = 0
+        m[FAMILY], m[S], m[PULL], m[FLOOR], m[SLIP] = FLAT, 1, 1, SLIPPING, 1 if v > 0.0 else -1
+        return zeta
+    sense = 1 if (z[THETA] if z[THETA] != 0.0 else z[W]) > 0.0 else -1
+    m[:] = 0
+    m[FAMILY], m[S], m[PULL], m[FLOOR], m[SLIP] = TILT, sense, 1, SLIPPING, 1 if sense * v > 0.0 else -1
+    m[TIP], m[FAR] = closed_wall(b, z, sense, False), closed_wall(b, z, -sense, True)
+    if m[TIP] != 0 and m[FAR] != 0:
+        m[FLOOR] = STICK
+        tilt_series(b, m, z, gh, gv, t, _LOOK, 0.0, 0.0, True, a)
+        if a[NA, 0] >= 0.0 and a[NB, 0] >= 0.0:  # wedged between the walls
+            z[W] = z[VX] = z[VY] = 0.0
+            return zeta
+        m[FLOOR] = SLIPPING
+        m[FAR if a[NB, 0] < a[NA, 0] else TIP] = 0
+    friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
+    if m[TIP] + m[FAR] > 0 and leading(a, NA if m[TIP] != 0 else NB, _LOOK - 2, _AHEAD, NOISE) < 0:
+        m[TIP] = m[FAR] = 0
+        friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
+    if a[P, 0] < 0.0:
+        m[PULL] = -1
+    return zeta
+
+
+@kernel
+def _initial_friction(b, m, z, gh, gv, t, a):
+    """z at the start: sgn V for a pivot that slips, else the value that lets it stand still (at most 1 in size)."""
+    v = slip_velocity(b, z)
+    if abs(v) > _STOPPED:
+        return 1.0 if v > 0.0 else -1.0
+    if z[THETA] == 0.0 and z[W] == 0.0:
+        return 0.0
+    sense = 1 if (z[THETA] if z[THETA] != 0.0 else z[W]) > 0.0 else -1
+    m[:] = 0
+    m[FAMILY], m[S], m[PULL], m[FLOOR] = TILT, sense, 1, STICK
+    m[TIP] = closed_wall(b, z, sense, False)
+    tilt_series(b, m, z, gh, gv, t, _LOOK, 0.0, 0.0, True, a)
+    if m[TIP] != 0 and a[NA, 0] < 0.0:
+        m[TIP] = 0
+        tilt_series(b, m, z, gh, gv, t, _LOOK, 0.0, 0.0, True, a)
+    most = b.mu_k * abs(a[P, 0])
+    return -sense * a[Q, 0] / most if abs(a[Q, 0]) < most else -math.copysign(1.0, sense * a[Q, 0])
+
+
+@kernel
+def _has_yielded(b, m, z, zeta):
+    """Whether the pivot slips with z = +-1."""
+    return m[FLOOR] == SLIPPING and abs(zeta) == 1.0 and zeta * slip_velocity(b, z) > _STOPPED
+
+
+@kernel
+def _label(m, yielded):
+    """Index into trajectory.MODE_NAMES: rest, slide, rock, slide-rock, lean, ladder."""
+    if m[FAMILY] == FLAT:
+        return 0 if m[FLOOR] == STICK else 1
+    return (4 if m[TIP] != 0 or m[FAR] != 0 else 2) + (1 if yielded else 0)
+
+
+@kernel
+def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
+    """Simulates from state z (changed in place) at t = 0 to t_end; returns a Tally. Arguments as of trajectory.run."""
+    a, stack = np.zeros((_ROWS, MOST_TERMS)), np.zeros((48, MOST_TERMS))
+    m = np.zeros(MODE_SIZE, dtype=np.int64)
+    impulse, gains = np.zeros(2), np.zeros(2)
+    rattle = np.array([_REST_BILATERAL, -1.0, -1.0, 0.0])
+    t = 0.0
+    steps = events = wall_impacts = zero_steps = 0
+    rows = min(1, out.shape[0])
+    peak = abs(z[THETA])
+    ending = DONE
+    zeta = _begin(b, m, z, _initial_friction(b, m, z, gh, gv, t, a), yield_displacement, gh, gv, t, a)
+    yielded = _has_yielded(b, m, z, zeta)
+    if rows > 0:
+        out[0] = z
+        out_mode[0] = _label(m, yielded)
+    while t < t_end:
+        if steps >= control.most_steps:
+            ending = TOO_MANY_STEPS
+            break
+        steps += 1
+        kink = min(next_kink(gh, t), next_kink(gv, t))
+        reach = min(kink, t_end) - t
+        order = control.order
+        moving = m[FLOOR] == SLIPPING
+        if moving:
+            friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order, a)
+        elif m[FAMILY] == FLAT:
+            order = flat_series(b, m, z, gh, gv, t, order, a)
+        else:
+            order = tilt_series(b, m, z, gh, gv, t, order, 0.0, reach, True, a)
+        h = _step_size(a, U, G, order - 1, control.tolerance, reach)
+        if moving:
+            h = _step_size(a, XI, Z, order - 1, control.tolerance, h)
+            if m[FAMILY] == TILT:
+                h = _step_size(a, PHI, COS, order, control.tolerance, h)
+        # --- the first event of the step
+        tau, which = h, -1
+        for k in range(GUARDS + 1):
+            if k < GUARDS:
+                degree = guard(b, m, k, order, 0.0, a)
+            else:
+                degree = -1
+                if moving and m[SLIP] * a[Z, 0] <= -1e-13:
+                    degree = order - 1
+                    for j in range(order):
+                        a[GUARD, j] = -m[SLIP] * a[Z, j]
+            if degree >= 0:
+                root = first_root(a, GUARD, degree, tau, SLIP_NOISE if k == G_SLIP else NOISE, stack)
+                if root != NO_ROOT:
+                    tau, which = root, k
+        if G_PUSH <= which <= G_CONE_MINUS and tau > 0.25 * h:
+            # A force is the second derivative of a truncated series: its zero is found to rounding from nearby only.
+            tau, which = 0.9 * tau, -1
+        if not math.isfinite(tau):
+            ending = NOT_FINITE
+            break
+        whole = which < 0 and tau >= reach
+        end = min(kink, t_end) if whole else t + tau
+        while rows < out.shape[0] and rows * control.output_step < end:
+            out[rows] = z
+            _state(b, m, order, rows * control.output_step - t, a, out[rows])
+            out_mode[rows] = _label(m, yielded)
+            rows += 1
+        _state(b, m, order, tau, a, z)
+        t = end
+        peak = max(peak, abs(z[THETA]))
+        before = _label(m, yielded)
+        kind = -1
+        if moving and not yielded:
+            zeta = m[S] * value(a, Z, order - 1, tau)
+            towards = m[S] * m[SLIP] * zeta
+            if towards > 0.0 and 1.0 - towards < max(10.0 * control.tolerance, 1e-12):
+                zeta, yielded = math.copysign(1.0, zeta), True
+                kind = SLIPS
+        if which >= 0:
+            zero_steps = zero_steps + 1 if tau <= 0.0 else 0
+            if zero_steps > _MOST_ZERO_STEPS:
+                ending = NO_MODE
+                break
+        # --- what follows it
+        impulse[:] = 0.0
+        if which == G_TOPPLE:
+            ending = OVERTURNED
+            kind = LEFT if m[S] > 0 else RIGHT
+            z[THETA] = math.copysign(0.5 * math.pi, z[THETA])
+            peak = 0.5 * math.pi
+        elif which == _G_LOADS:
+            zeta = 0.0
+        elif which == G_PUSH:
+            m[PULL] = -m[PULL]
+        elif which == G_SLIP:
+            if yielded:
+                kind = STICKS
+            yielded = False
+            m[SLIP] = -m[SLIP]
+            if m[FAMILY] == FLAT and _held(b, z, gh, gv, t):
+                z[VX] = 0.0
+                kind = STICKS
+                _rest(b, m, z)
+        elif which == G_TIP_PUSH or which == G_FAR_PUSH:
+            kind = RELEASE
+            m[TIP if which == G_TIP_PUSH else FAR] = 0
+            m[FLOOR] = SLIPPING
+        elif which >= G_UPLIFT_PLUS and moving:  # tilts while it slides
+            kind = UPLIFT
+            m[FAMILY], m[S] = TILT, 1 if which == G_UPLIFT_PLUS else -1
+            m[SLIP] = m[S] * m[SLIP]
+        elif which > G_FAR_PUSH:  # the cone, or uplift from rest
+            zeta = _leave_rest(b, m, gh, gv, t)
+            yielded = abs(zeta) == 1.0
+            kind = UPLIFT if m[FAMILY] == TILT else SLIPS
+        elif which >= 0:
+            kind = WALL_IMPACT
+            if which == G_FAR_GAP and m[FAMILY] == TILT and abs(z[THETA]) < _LANDED and m[S] * z[W] < 0.0:
+                which = G_PHI  # the corner meets the wall as the block lands: a floor event
+            _touch(b, m, z, which)
+            resting = _resting_speed(rattle, t)
+            if which == G_PHI:
+                kind = FLOOR_IMPACT
+                _upright(b, m, z)
+                _floor_impact(b, m, z, impulse)
+            else:
+                wall_impacts += 1
+                _wall_impact(b, m, z, which == G_TIP_GAP, gh, t, resting, impulse, gains)
+            if z[THETA] == 0.0 and abs(z[W]) < SETTLE_SPIN:
+                v = slip_velocity(b, z)
+                z[VX] = v if abs(v) > resting else 0.0
+                z[W] = z[VY] = 0.0
+            zeta = _begin(b, m, z, zeta, yield_displacement, gh, gv, t, a)
+            yielded = _has_yielded(b, m, z, zeta)
+        if kind >= 0:
+            events += 1
+            if events >= control.most_events:
+                ending = TOO_MANY_EVENTS
+                break
+            if log.shape[0] >= events:
+                _note(log, events, t, kind, before, _label(m, yielded), impulse[0] + impulse[1])
+        if ending == OVERTURNED:
+            break
+    at_rest = m[FAMILY] == FLAT and m[FLOOR] == STICK
+    if ending == DONE and not math.isfinite(z[THETA]):
+        ending = NOT_FINITE
+    while ending == DONE and rows < out.shape[0]:
+        out[rows] = z
+        out_mode[rows] = _label(m, yielded)
+        rows += 1
+    return Tally(ending, t, peak, at_rest, steps, steps, events, wall_impacts, int(gains[0]), gains[1], 0.0, rows, np.nan)
+
+
+@kernel
+def _state(b, m, order, tau, a, z):
+    """The state at tau after the start of the step."""
+    if m[FAMILY] == FLAT:
+        flat_state(b, m, order, tau, a, z)
+    else:
+        tilt_state(b, m, order, tau, m[S] * z[X] - a[SIN, 0], a, z)
+
+
+@kernel
+def _resting_speed(rattle, t):
+    """The speed below which a contact that is struck at time t stays closed: impacts that rattle on raise it tenfold."""
+    resting, since, last, count = rattle
+    if t - last > _QUIET_TIME:
+        resting = _REST_BILATERAL
+    if t - since > _RATTLE_TIME:
+        since, count = t, 0.0
+    count += 1.0
+    if count >= _RATTLE_IMPACTS:
+        resting, count = min(10.0 * resting, _RATTLE_BOUND), 0.0
+    rattle[0], rattle[1], rattle[2], rattle[3] = resting, since, t, count
+    return resting
