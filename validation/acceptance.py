@@ -18,8 +18,8 @@ from validation.tolerances import OWN_FIGURES, Windowed
 #: New lines: the limit and the drift band as shares of a difference from perfection, and of a figure of the cell itself.
 ROOM, DRIFT = 2.0, 0.2
 OWN_ROOM, OWN_DRIFT = 0.02, 0.002
-#: What is small against the limit need not be looked at.
-LEAST_DRIFT = 0.01
+#: The least limit and drift band of new lines: multiples of the measure's resolution, and a share of the limit.
+LEAST_LIMIT, LEAST_DRIFT, LEAST_SHARE = 10.0, 1.0, 0.01
 
 
 def accept(suite: Suite, run: Run, reason: str | None) -> tuple[list[str], list[str]]:
@@ -80,9 +80,12 @@ def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
     size = abs(value) if own else abs(value - (measure.ideal or 0.0))
     limit, why = check.limit, check.why
     if limit is None or outside:
-        limit = _round(0.9 * value, down=True) if at_least else _round((OWN_ROOM if own else ROOM) * size)
+        room = max((OWN_ROOM if own else ROOM) * size, LEAST_LIMIT * measure.resolution)
+        limit = _round(0.9 * value, down=True) if at_least else _round(room)
         why = reason or "first accepted figure"
-    drift = check.drift if check.drift is not None else _round(max((OWN_DRIFT if own else DRIFT) * size, LEAST_DRIFT * limit))
+    drift = check.drift
+    if drift is None:
+        drift = _round(max((OWN_DRIFT if own else DRIFT) * size, LEAST_SHARE * limit, LEAST_DRIFT * measure.resolution))
     expected = value if check.verdict != "pass" or check.expected is None else check.expected
     return {"expected": _short(expected), "limit": limit, "drift": drift, "why": why}
 
@@ -96,7 +99,7 @@ def _table(tables: MutableMapping[str, Any], path: tuple[str, ...]) -> Any:
 
 
 def _short(value: float) -> float:
-    return float(f"{value:.6g}")
+    return float(f"{value:.8g}")
 
 
 def _round(value: float, down: bool = False) -> float:

@@ -54,6 +54,8 @@ class Measure:
     on_request: bool = False
     #: The distance from a closed form.
     exact: bool = False
+    #: Changes below this mean nothing (in the measure's unit); 0 for what is counted.
+    resolution: float = 1e-6
 
     @property
     def formula(self) -> str:
@@ -379,7 +381,7 @@ def events_agree_until(pair: Pair) -> tuple[float, str]:
     return min(alone, default=(pair.end, "all events agree"))
 
 
-@difference("impacts without counterpart", "1")
+@difference("impacts without counterpart", "1", resolution=0.0)
 def unmatched_impacts(pair: Pair) -> tuple[float, str]:
     """Number of impacts of either that have no counterpart in the other, matched as in `events_agree_until`."""
     matched = pair.impacts
@@ -404,7 +406,7 @@ def overturning_time(pair: Pair) -> float:
     return 0.0 if first == second else abs(second - first)
 
 
-@difference("outcome agrees", "1", ideal=1.0)
+@difference("outcome agrees", "1", resolution=0.0, ideal=1.0)
 def outcome_agrees(pair: Pair) -> tuple[float, str]:
     """1 if both overturn to the same side or neither overturns, else 0; of the whole histories, whatever the window."""
     first, second = pair.reference.outcome, pair.candidate.outcome
@@ -504,13 +506,13 @@ def end_time(motion: Motion) -> float:
     return float(motion.channel("t")[-1])
 
 
-@figure("floor impacts", "1")
+@figure("floor impacts", "1", resolution=0.0)
 def floor_impacts(motion: Motion) -> float:
     """Number of floor impacts stronger than 1 % of the strongest."""
     return _strong_count(motion, "floor impact")
 
 
-@figure("wall impacts", "1")
+@figure("wall impacts", "1", resolution=0.0)
 def wall_impacts(motion: Motion) -> float:
     """Number of wall impacts stronger than 1 % of the strongest."""
     return _strong_count(motion, "wall impact")

@@ -18,7 +18,7 @@ from validation.measures import DIFFERENCES, FIGURES
 from validation.results import HISTORIES, Cell, CostRecord, Figure, MeasureRecord, Run
 from validation.store import Store, name_of
 from validation.suites import Part, Suite
-from validation.tolerances import OWN_FIGURES, Place, Windowed, judge
+from validation.tolerances import HORIZON, OWN_FIGURES, Place, Windowed, judge
 
 #: Told after each cell: cells done, cells in all, and a few words on what was last.
 Progress = Callable[[int, int, str], None]
@@ -149,13 +149,9 @@ def _cell(
         reference = spots.get((scene.name, name))
         if name != OWN_FIGURES and (reference is None or reference is spot or reference not in records):
             continue
-        found = _compared(
-            store,
-            scene,
-            spot,
-            reference,
-            sorted(p.what for p in asked if p.against == name and (p.what.window or p.what.definition.on_request)),
-        )
+        extra = sorted(p.what for p in asked if p.against == name and (p.what.window or p.what.definition.on_request))
+        horizon = _horizon(store, scene) if any(what.window == HORIZON for what in extra) else None
+        found = _compared(store, scene, spot, reference, extra, horizon)
         figures += [Figure(**figure) for figure in found["figures"]]
         gaps |= {(name, window): gap for window, gap in found["gaps"].items()}
     checks = []
@@ -189,22 +185,39 @@ def _figure(figures: Sequence[Figure], place: Place) -> Figure:
     )
 
 
-def _compared(store: Store, scene: Scene, spot: Spot, reference: Spot | None, windowed: Sequence[Windowed]) -> dict[str, Any]:
+def _horizon(store: Store, scene: Scene) -> float:
+    """The time up to which histories of this scene can be compared point by point (`ebm.horizon`), s; kept in the store."""
+    key = provenance.cell_key(scene, "ebm-unilateral", {"of": "horizon"})
+    name = name_of(scene.name, HORIZON, key)
+    found = store.get_comparison(name)
+    if found is None:
+        from ebm.horizon import predictability_horizon
+
+        found = {"horizon": predictability_horizon(scene)}
+        store.put_comparison(name, found)
+    return float(found["horizon"])
+
+
+def _compared(
+    store: Store, scene: Scene, spot: Spot, reference: Spot | None, windowed: Sequence[Windowed], horizon: float | None
+) -> dict[str, Any]:
     """All figures over the whole time, and those asked for over a window; kept in the store.
 
     Figures of the cell itself where `reference` is None. "gaps" says by window what could not be compared.
     """
     code = provenance.code_digest("validation.discrepancy")
-    key = provenance.digest(json.dumps([spot.key, reference.key if reference else "", list(map(str, windowed)), code]))
+    key = provenance.digest(json.dumps([spot.key, reference.key if reference else "", list(map(str, windowed)), horizon, code]))
     name = name_of(scene.name, spot.part.label, reference.part.label if reference else OWN_FIGURES, key)
     found = store.get_comparison(name)
     if found is None:
-        found = _compute(store, scene, spot, reference, windowed)
+        found = _compute(store, scene, spot, reference, windowed, horizon)
         store.put_comparison(name, found)
     return found
 
 
-def _compute(store: Store, scene: Scene, spot: Spot, reference: Spot | None, windowed: Sequence[Windowed]) -> dict[str, Any]:
+def _compute(
+    store: Store, scene: Scene, spot: Spot, reference: Spot | None, windowed: Sequence[Windowed], horizon: float | None
+) -> dict[str, Any]:
     candidate = History.load(store.history(spot.name))
     yardstick = History.load(store.history(reference.name)) if reference else None
     figures: list[Figure] = []
@@ -213,12 +226,11 @@ def _compute(store: Store, scene: Scene, spot: Spot, reference: Spot | None, win
     for what in windowed:
         asked.setdefault(what.window, []).append(what.measure)
     for window, measures in asked.items():
-        until = float(window[:-1]) if window else None
+        until = horizon if window == HORIZON else float(window[:-1]) if window else None
         if yardstick is None:
-            figures += describe(candidate, until=until, scene=scene, measures=measures)
-            gaps[window] = too_short(candidate, until)
+            found, gaps[window] = describe(candidate, until=until, scene=scene, measures=measures), too_short(candidate, until)
         else:
             discrepancy = compare(yardstick, candidate, until=until, scene=scene, measures=measures)
-            figures += discrepancy.figures
-            gaps[window] = discrepancy.gap
+            found, gaps[window] = discrepancy.figures, discrepancy.gap
+        figures += [figure.model_copy(update={"window": window}) for figure in found]
     return {"figures": [figure.model_dump(mode="json") for figure in figures], "gaps": gaps}

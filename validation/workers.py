@@ -122,7 +122,9 @@ def local(tasks: Sequence[Task], *, jobs: int, seconds: Sequence[float], memory_
 def _prepare(memory_mb: float) -> None:
     """Make this worker die with the run, and fail where it takes more memory than it may (where the system can say so)."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run itself ends its workers
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # engines greet on stdout, which is the run's
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):  # the terminal is the run's; engines greet on it from C
+        os.dup2(nowhere, stream)
     try:
         import resource
 

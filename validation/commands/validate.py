@@ -29,6 +29,7 @@ def run(
     force: ForceOption = False,
     strict: Annotated[bool, typer.Option("--strict", help="Figures that changed beyond their drift band fail.")] = False,
     scheduler: SchedulerOption = None,
+    report: Annotated[bool, typer.Option("--report/--no-report", help="Render the pages; without them only run.json and tables.")] = True,
 ) -> None:
     """Run every model of a suite on every scene, compare, judge, and write the report.
 
@@ -39,7 +40,7 @@ def run(
     folder = usable_folder(out)
     finished = play_suite(suite or ("smoke" if quick else "paper"), folder, jobs, force, strict, scheduler)
     show(finished, console())
-    console().print(f"report: {publish(finished, folder)}", soft_wrap=True)
+    console().print(f"report: {publish(finished, folder, pages=report)}", soft_wrap=True)
     raise typer.Exit(finished.exit_code)
 
 
