@@ -1,0 +1,72 @@
+"""The horizon of predictability: a closed form, its definition on a record, and what has none."""
+
+import math
+
+import numpy as np
+import pytest
+
+from ebm import EventBasedModel
+from ebm.horizon import predictability_horizon
+from scenes import Block, Floor, InputError, Ricker, Scene, Wall, load_scene
+
+BLOCK = Block(half_width=0.397, half_height=1.555)
+
+
+def balanced(**change: object) -> Scene:
+    """The block on its corner, in unstable balance."""
+    scene = Scene(name="balanced", block=BLOCK, floor=Floor(friction=1.0), initial_rotation=BLOCK.alpha, duration=8.0, output_step=0.001)
+    return scene.replace(**change)
+
+
+@pytest.mark.parametrize(("perturbation", "allowed"), [(1e-6, 1e-3), (1e-7, 1e-3), (1e-6, 1e-4)])
+def test_unstable_balance_amplifies_as_the_hyperbolic_cosine(perturbation: float, allowed: float) -> None:
+    """A tilt of alpha (1 + d) turns away as alpha (1 + d cosh(p t)) while that is small, so that t = acosh(allowed/d)/p."""
+    scene = balanced()
+    expected = math.acosh(allowed / perturbation) / scene.frequency_parameter
+    found = predictability_horizon(scene, perturbation=perturbation, allowed=allowed)
+    assert found == pytest.approx(expected, abs=scene.output_step)
+
+
+def test_free_rocking_can_be_compared_to_its_end() -> None:
+    scene = balanced(initial_rotation=0.5 * BLOCK.alpha)
+    assert predictability_horizon(scene) == scene.duration
+
+
+def test_a_standing_block_on_a_still_base_has_nothing_to_disturb() -> None:
+    assert predictability_horizon(balanced(initial_rotation=0.0)) == 8.0
+
+
+def test_a_record_parts_from_its_disturbed_self_just_after_the_horizon() -> None:
+    """By the definition, from histories; and the ratio alone decides."""
+    scene = load_scene("fig4a")
+    horizon = predictability_horizon(scene)
+    assert horizon == predictability_horizon(scene)
+    assert horizon == pytest.approx(predictability_horizon(scene, perturbation=1e-7, allowed=1e-4), abs=2 * scene.output_step)
+    model = EventBasedModel(pivot="unilateral", tolerance=1e-13)
+    plain = model.simulate(scene).channels
+    apart = np.zeros_like(plain["t"])
+    for factor in (1 - 1e-6, 1 + 1e-6):
+        louder = scene.excitation.model_copy(update={"scale": 1.6 * factor})
+        disturbed = model.simulate(scene.replace(excitation=louder)).channels["theta"]
+        apart = np.maximum(apart, np.abs(disturbed - plain["theta"]) / scene.block.alpha)
+    inside = plain["t"] <= horizon + 1e-9
+    assert 8.0 < horizon < 36.0
+    assert apart[inside].max() <= 1e-3 < apart[~inside][0]
+
+
+def test_a_start_against_a_wall_is_disturbed_away_from_it() -> None:
+    tilt = 0.3 * BLOCK.alpha
+    gap = BLOCK.radius * (math.sin(BLOCK.alpha + tilt) - math.sin(BLOCK.alpha - tilt))  # of the upright block
+    scene = balanced(initial_rotation=tilt, walls=[Wall(side="left", gap=gap)])
+    with pytest.raises(InputError, match="inside the left wall"):
+        scene.replace(initial_rotation=tilt * (1 + 1e-6))
+    assert 0.0 < predictability_horizon(scene) <= scene.duration
+
+
+def test_of_the_bilateral_model_on_request() -> None:
+    """With a wall the two models move differently, and so do their horizons."""
+    pulse = Ricker(amplitude=6.0, period=0.98)
+    scene = balanced(initial_rotation=0.0, floor=Floor(friction=0.3), walls=[Wall(side="left", gap=0.053)], excitation=pulse)
+    for pivot in ("bilateral", "unilateral"):
+        found = predictability_horizon(scene, EventBasedModel(pivot=pivot, tolerance=1e-13))
+        assert 1.0 < found <= scene.duration
