@@ -298,8 +298,6 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             if log.shape[0] >= events:
                 _note(log, events, t, LEFT if m[S] > 0 else RIGHT, mode_code(m), mode_code(m), 0.0)
             break
-        if which == G_SLIP and m[FAR] != 0 and abs(z[THETA]) < _LANDED:
-            which = G_PHI  # a corner that slides down the far wall lands as its pivot comes to rest
         before = mode_code(m)
         left[:] = m
         impulse[:] = 0.0
@@ -317,10 +315,10 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             last_impact = t
             wall = which == G_TIP_GAP or which == G_FAR_GAP
             _touch(b, m, z, which)
+            if which == G_FAR_GAP and m[FAMILY] == TILT and abs(z[THETA]) < _LANDED and m[S] * z[W] < 0.0 and closed_floor(b, z):
+                which, wall = G_PHI, False  # the corner meets the wall as the block lands: a floor event
             if which == G_PHI:
-                z[THETA] = 0.0
-            elif which == G_FAR_GAP and m[FAMILY] == TILT and abs(z[THETA]) < _LANDED and m[S] * z[W] < 0.0 and closed_floor(b, z):
-                z[THETA], wall = 0.0, False  # the corner meets the wall as the block lands: a floor event
+                _upright(b, m, z)
             if b.unilateral:
                 found = _strike(b, m, z, resting, impulse, gains)
                 known = False
@@ -409,6 +407,21 @@ def _touch(b, m, z, which):
         gap = b.gap_left if left else b.gap_right
         x = math.sin(b.alpha + phi) - b.sin_alpha - gap
         z[X] = x if left else -x
+
+
+@kernel
+def _upright(b, m, z):
+    """Sets theta from nearly to exactly zero, the pivot keeping its place; a side that then touches a wall touches it exactly."""
+    sign = float(m[S])
+    phi = sign * z[THETA]
+    z[X] += sign * (b.sin_alpha - math.sin(b.alpha - phi))
+    if m[FLOOR] != OFF or closed_floor(b, z):
+        z[HEIGHT] = b.cos_alpha
+    z[THETA] = 0.0
+    if abs(z[X] + b.gap_left) < _TOUCH:
+        z[X] = -b.gap_left
+    elif abs(b.gap_right - z[X]) < _TOUCH:
+        z[X] = b.gap_right
 
 
 @kernel

@@ -26,6 +26,7 @@ from ebm.motion import (
     NA,
     NB,
     OFF,
+    OMEGA,
     PHI,
     PULL,
     SIN,
@@ -122,7 +123,9 @@ def guard(b, m, which, order, pivot, a):
         if m[FLOOR] != SLIPPING:
             return -1
         for k in range(order):
-            a[GUARD, k] = m[SLIP] * (k + 1) * (a[XI, k + 1] - a[SIN, k + 1])
+            # Along a wall V = (c + C) dtheta/dt, and C = -c at theta = 0: the rotation tells the sense of slip everywhere.
+            v = (k + 1) * (a[XI, k + 1] - a[SIN, k + 1]) if m[TIP] == 0 and m[FAR] == 0 else a[OMEGA, k]
+            a[GUARD, k] = m[SLIP] * v
         return order - 1
     return -1
 
@@ -246,7 +249,7 @@ def consistent(b, m, z, gh, gv, t, a):
         degree = guard(b, m, which, order, pivot, a)
         if degree < 0:
             continue
-        if G_LANDING <= which <= G_FAR_GAP and a[GUARD, 1] < -CLOSED_RATE:
+        if which <= G_FAR_GAP and a[GUARD, 1] < -CLOSED_RATE:
             continue  # not this mode's fault: an impact comes next
         sign = leading(a, GUARD, degree, _AHEAD, SLIP_NOISE if which == G_SLIP else NOISE)
         if sign < 0 or not math.isfinite(a[GUARD, 0]):
@@ -297,6 +300,9 @@ def select(b, z, gh, gv, t, left, m, a):
     """
     flat = z[THETA] == 0.0 and z[W] == 0.0
     floor = closed_floor(b, z) or not b.unilateral
+    if floor and b.walls and z[THETA] != 0.0 and abs(z[W]) < CLOSED_RATE:
+        if closed_wall(b, z, 1, False) or closed_wall(b, z, -1, False):
+            z[W] = z[VX] = z[VY] = 0.0  # on floor and wall a block that does not turn stands
     for attempt in range(2):
         if flat:
             if _select_flat(b, z, gh, gv, t, floor, left, m, a, attempt == 1):
@@ -352,11 +358,11 @@ def _select_tilt(b, z, gh, gv, t, sense, floor, left, m, a, again):
     m[FAMILY], m[S] = TILT, sense
     tip_closed = b.walls and closed_wall(b, z, sense, False)
     far_closed = b.walls and closed_wall(b, z, -sense, True)
-    v = sense * slip_velocity(b, z)
     for walls in (3, 1, 2, 0):
         if (walls & 1 and not tip_closed) or (walls & 2 and not far_closed):
             continue
         m[TIP], m[FAR] = walls & 1, walls >> 1
+        v = sense * (slip_velocity(b, z) if walls == 0 else z[W])  # along a wall the pivot slips as the block turns
         for slip in (0, 1, -1):
             if not floor or (slip == 0 and v != 0.0) or slip * v < 0.0 or (slip != 0 and b.no_slip):
                 continue

@@ -10,6 +10,7 @@ import hashlib
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -19,6 +20,8 @@ import numba
 from numba.core import config as numba_config
 
 config: Any = numba_config
+
+_KEPT = 7 * 86400.0  # s
 
 
 @cache
@@ -34,7 +37,7 @@ def _cache_folder(package: Path) -> str:
         with tempfile.TemporaryFile(dir=folder):
             pass
         for old in base.glob(f"{package.name}-kernels-*"):
-            if old != folder:
+            if old != folder and time.time() - old.stat().st_mtime > _KEPT:  # another process may be using a younger one
                 shutil.rmtree(old, ignore_errors=True)
     except OSError:  # installed where we may not write
         folder = Path(tempfile.gettempdir()) / f"rockcheck-{os.getuid() if hasattr(os, 'getuid') else 'user'}" / name
