@@ -212,11 +212,12 @@ class Pair:
 
     @cached_property
     def impacts(self) -> MatchedImpacts:
-        """The impacts of both within the common time, matched; a history that moves without any event does not know them."""
-        for history in (self.reference, self.candidate):
-            if not history.event_list and np.ptp(history.channels["theta"]) > 0.0:
+        """The impacts of both within the common time, matched; a history without any event, unlike the other's, does not know them."""
+        both = [self._within(history) for history in (self.reference, self.candidate)]
+        for history, others in ((self.reference, both[1]), (self.candidate, both[0])):
+            if others and not history.event_list:
                 raise Unavailable(f"{history.model} has no events")
-        return match_impacts(*(self._within(h) for h in (self.reference, self.candidate)))
+        return match_impacts(*both)
 
     def _within(self, history: History) -> list[Event]:
         return [e for e in _as_impacts(history.event_list) if e.kind in IMPACTS + TURNS and self.start - 1e-9 <= e.t <= self.end + 1e-9]

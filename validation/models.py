@@ -74,17 +74,26 @@ def family(name: str) -> Family:
     return FAMILIES[name]
 
 
+def home(name: str) -> str:
+    """The module in which the model of that name is defined."""
+    return str(_class_of(name).__module__)
+
+
+def _class_of(name: str) -> Any:
+    kind = family(name)
+    try:
+        return getattr(importlib.import_module(kind.module), kind.class_name)
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"model {name!r} is not available in this installation: {printable(error)}") from None
+
+
 def build(name: str, settings: Mapping[str, Any] | None = None) -> Model:
     """The model of that name with these settings; raises `InputError` naming the setting that is not usable."""
     kind, settings = family(name), dict(settings or {})
     for key in kind.fixed.keys() & settings.keys():
         raise InputError(f"is fixed by the name of the model, {name}", f"{name}.{key}")
     try:
-        model_class = getattr(importlib.import_module(kind.module), kind.class_name)
-    except (ImportError, AttributeError) as error:
-        raise InputError(f"model {name!r} is not available in this installation: {printable(error)}") from None
-    try:
-        model: Model = model_class(**kind.fixed, **settings)
+        model: Model = _class_of(name)(**kind.fixed, **settings)
     except InputError as error:
         raise InputError(error.reason, f"{name}.{error.key}" if error.key else name) from None
     return model

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from scenes import Scene
-from validation.models import FAMILIES, family
+from validation.models import FAMILIES, family, home
 
 #: Packages whose code counts where it can be reached; the package of the model itself always does.
 OWN_PACKAGES = ("scenes", "ebm", "cm", "engines", "validation")
@@ -28,7 +28,7 @@ def cell_key(scene: Scene, name: str, settings: Mapping[str, Any]) -> str:
         "model": name,
         "settings": dict(settings),
         "files": {name: hashlib.sha256(Path(file).read_bytes()).hexdigest() for name, file in _files(settings, scene).items()},
-        "code": code_digest(family(name).module),
+        "code": code_digest(home(name)),
         "libraries": {library: version_of(library) for library in family(name).libraries},
         "python": platform.python_version(),
         "machine": platform.machine(),
@@ -56,18 +56,26 @@ def code_digest(module: str) -> str:
 
 
 def reachable(module: str) -> dict[str, Path]:
-    """Names and files of the project modules that `module` can import, itself included."""
+    """Names and files of the project modules that `module` can import, itself included.
+
+    The packages that a module lies in count themselves, but not what else they import.
+    """
     found: dict[str, Path] = {}
     packages = {*OWN_PACKAGES, module.split(".")[0]}
     waiting = [module]
+    followed: set[str] = set()
     while waiting:
         name = waiting.pop()
         path = _source(name) if name.split(".")[0] in packages else None
-        if path is None or name in found:
+        if path is None or name in followed:
             continue
+        followed.add(name)
         found[name] = path
-        waiting += _imports(path, name if path.name == "__init__.py" else name.rpartition(".")[0])
-        waiting.append(name.rpartition(".")[0])
+        parents = name.split(".")[:-1]
+        for depth in range(len(parents)):
+            parent = ".".join(parents[: depth + 1])
+            found.setdefault(parent, _source(parent) or path)
+        waiting += _imports(path, name if path.name == "__init__.py" else ".".join(parents))
     return found
 
 

@@ -55,3 +55,85 @@ def project(tmp_path_factory):
     code, out = copy.run("validate", "smoke", "--strict")
     assert code == 0, out
     return copy
+
+
+#: What is done wrong, in which file, by replacing what (a regular expression) with what. Compiled code last: it takes a minute.
+FAULTS = [
+    ("gravity 9.8", "scenes/scene.py", r"gravity: Positive = 9\.81", "gravity: Positive = 9.8"),
+    ("the record's last sample dropped", "scenes/excitations.py", r"tuple\(samples\.tolist\(\)\)", "tuple(samples[:-1].tolist())"),
+    ("output shifted by one sample", "scenes/observation.py", r"name: state\[:, column\] for", "name: np.roll(state[:, column], 1) for"),
+    ("NaN at the end", "scenes/observation.py", r"    rows = max\(rows, 1\)\n", "    rows = max(rows, 1)\n    state[rows - 1] = np.nan\n"),
+    ("wall 1 mm off", "engines/contacts.py", r"distance=b \+ wall\.gap", "distance=b + wall.gap + 0.001 / 1.605"),
+    ("e ignored", "engines/contacts.py", r"restitution=wall\.restitution", "restitution=0.0"),
+    ("a swapped left and right", "engines/contacts.py", r'inward = 1\.0 if wall\.side == "left"', 'inward = 1.0 if wall.side == "right"'),
+    ("dt off by 1e-3", "engines/engine.py", r"\], dt\)", "], 1.001 * dt)"),
+    ("a lost impact", "engines/events.py", r"in _rises\(flags\):", "in _rises(flags)[1:]:"),
+    ("friction 5 % low", "ebm/natural.py", r"mu_k=scene\.floor\.friction", "mu_k=0.95 * scene.floor.friction"),
+    ("Housner's ratio off by 1 %", "ebm/impacts.py", r"w2 = \(1\.0 - 1\.5 \* s \* s\) \* w1", "w2 = 1.01 * (1.0 - 1.5 * s * s) * w1"),
+    ("a sign in (3)", "ebm/motion.py", r"0\.75 \* \(push - weight\)", "0.75 * (push + weight)"),
+]
+
+
+@pytest.mark.parametrize(("fault", "file", "old", "new"), FAULTS, ids=[fault[0] for fault in FAULTS])
+def test_a_deliberate_fault_fails_the_smoke_suite(project, fault, file, old, new):
+    project.change(file, old, new)
+    try:
+        code, out = project.run("validate", "smoke", "--strict")
+    finally:
+        project.restore(file)
+    assert code in (1, 3), f"{fault}: {out}"
+    assert "Traceback" not in out
+
+
+def test_exactly_what_depends_on_a_changed_file_runs_again(project):
+    project.run("validate", "smoke")
+    assert "25 of 25 cells were up to date" in project.run("validate", "smoke")[1]
+    project.change("engines/pybullet_engine.py", r"\Z", "\nUNUSED = 1\n")
+    try:
+        _, out = project.run("validate", "smoke")
+    finally:
+        project.restore("engines/pybullet_engine.py")
+    assert "20 of 25 cells were up to date" in out
+
+
+def test_a_killed_run_goes_on_and_ends_the_same(project, tmp_path):
+    def tables(folder: Path) -> list[bytes]:
+        return [(folder / name).read_bytes() for name in ("checks.csv", "figures.csv")]
+
+    began = time.perf_counter()
+    project.run("validate", "smoke", "--out", str(tmp_path / "undisturbed"))
+    length = time.perf_counter() - began
+    expected = tables(tmp_path / "undisturbed")
+    chance = random.Random(20)
+    killed = 0
+    for attempt in range(20):
+        out = tmp_path / f"killed-{attempt}"
+        process = project.start("validate", "smoke", "--out", str(out))
+        time.sleep(chance.uniform(0.0, 1.1) * length)
+        killed += process.poll() is None
+        os.kill(process.pid, signal.SIGKILL)
+        process.communicate()
+        code, text = project.run("validate", "smoke", "--out", str(out))
+        assert code == 0, text
+        assert tables(out) == expected
+        assert not _alive(process.pid), "its workers outlive a killed run"
+        shutil.rmtree(out)
+    assert killed >= 10
+
+
+def test_two_runs_on_one_folder(project, tmp_path):
+    both = [project.start("validate", "smoke", "--out", str(tmp_path / "shared")) for _ in range(2)]
+    texts = [process.communicate(timeout=900)[0] for process in both]
+    assert [process.returncode for process in both] == [0, 0], texts
+
+
+def _alive(group: int) -> list[str]:
+    """Processes of a process group, after half a minute's grace."""
+    listed: list[str] = []
+    for _ in range(60):
+        done = subprocess.run(["ps", "-o", "pid=,args=", "--sort=pid", "-g", str(group)], capture_output=True, text=True, check=False)
+        listed = [line for line in done.stdout.splitlines() if "<defunct>" not in line]
+        if not listed:
+            break
+        time.sleep(0.5)
+    return listed
