@@ -8,7 +8,7 @@ import importlib.util
 import json
 import os
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -75,7 +75,7 @@ def reachable(module: str) -> dict[str, Path]:
         for depth in range(len(parents)):
             parent = ".".join(parents[: depth + 1])
             found.setdefault(parent, _source(parent) or path)
-        waiting += _imports(path, name if path.name == "__init__.py" else ".".join(parents))
+        waiting += _imports(path, name if path.name == "__init__.py" else ".".join(parents), packages)
     return found
 
 
@@ -91,7 +91,8 @@ def _source(name: str) -> Path | None:
     return next((path for path in (base / "__init__.py", base.with_suffix(".py")) if path.is_file()), None)
 
 
-def _imports(path: Path, package: str) -> Iterable[str]:
+def _imports(path: Path, package: str, packages: Container[str]) -> Iterable[str]:
+    """Names of the modules that a file of `package` imports; of a package only where something that is no module is taken from it."""
     for node in ast.walk(syntax(path)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -99,8 +100,9 @@ def _imports(path: Path, package: str) -> Iterable[str]:
             base = node.module or ""
             if node.level:
                 base = ".".join(filter(None, [*package.split(".")[: len(package.split(".")) - node.level + 1], base]))
-            yield base
-            yield from (f"{base}.{alias.name}" for alias in node.names)
+            for alias in node.names:
+                inner = f"{base}.{alias.name}"
+                yield inner if base.split(".")[0] in packages and _source(inner) else base
 
 
 @cache
