@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,20 +13,30 @@ from numpy.typing import ArrayLike, NDArray
 
 from ebm.model import EventBasedModel
 from scenes.errors import InputError
-from scenes.scene import Scene
+from scenes.excitations import Record
+from scenes.scene import Block, Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Floats = NDArray[np.float64]
 MOST_NODES = 50_000_000
+#: Of the model that plays a spectrum unless another is given: well below what moves a boundary by a node.
+TOLERANCE = 1e-8
 #: The outcome codes of a spectrum.
 LEFT, SAFE, RIGHT = -1, 0, 1
 _UNKNOWN = 9
+#: The paper's colours.
+COLOURS = {"safe": "#3b6fb6", "counterclockwise": "#e8833a", "clockwise": "#f2cf4a", "overturned": "#e8833a"}
+
+
+#: Plays nodes of a spectrum: scene, amplitude ratios and frequency ratios (1-D, of one length) to sides and failures, see `play_nodes`.
+Player = Callable[[Scene, Floats, Floats], tuple[NDArray[np.int8], NDArray[np.bool_]]]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Spectrum:
-    """Outcomes over frequency and amplitude.
+    """Outcomes over frequency and amplitude, or over block size and scale of a record (see `overturning_spectrum`).
 
     `outcomes[i, j]` is -1 (overturned left, counterclockwise), 0 (safe) or +1 (right, clockwise) at `amplitude_ratios[i]`
     (a_p / (g tan alpha)) and `frequency_ratios[j]` (omega_p / p). `evaluations` counts the runs, fewer than nodes where only
@@ -33,19 +44,19 @@ class Spectrum:
     """
 
     outcomes: NDArray[np.int8]
-    frequency_ratios: NDArray[np.float64]
-    amplitude_ratios: NDArray[np.float64]
+    frequency_ratios: Floats
+    amplitude_ratios: Floats
     evaluations: int
     undecided: NDArray[np.int64]
     scene: Scene
-    model: EventBasedModel
+    model: EventBasedModel | None
 
     @property
     def safe_area(self) -> float:
         """Share of nodes that are safe."""
         return float(np.mean(self.outcomes == SAFE))
 
-    def least_overturning_amplitude(self) -> NDArray[np.float64]:
+    def least_overturning_amplitude(self) -> Floats:
         """The lowest overturning amplitude ratio at each frequency ratio; NaN where none overturns."""
         fallen = self.outcomes != SAFE
         first = np.argmax(fallen, axis=0)
@@ -61,10 +72,13 @@ class Spectrum:
 
 
 def draw(spectrum: Spectrum, axes: Any) -> None:
-    """Draws a spectrum into matplotlib axes: blue safe, orange counterclockwise, yellow clockwise."""
+    """Draws a spectrum into matplotlib axes in the paper's colours.
+
+    Blue is safe. Without a wall orange is overturned counterclockwise and yellow clockwise; with a wall orange is overturned.
+    """
     from matplotlib.colors import ListedColormap
 
-    colours = ListedColormap(["#e8833a", "#3b6fb6", "#f2cf4a"])
+    colours = ListedColormap([COLOURS["counterclockwise"], COLOURS["safe"], COLOURS["overturned" if spectrum.scene.walls else "clockwise"]])
     axes.pcolormesh(
         spectrum.frequency_ratios,
         spectrum.amplitude_ratios,
@@ -75,8 +89,17 @@ def draw(spectrum: Spectrum, axes: Any) -> None:
         shading="nearest",
         rasterized=True,
     )
-    axes.set_xlabel(r"$\omega_p/p$")
-    axes.set_ylabel(r"$a_p/(g\,\tan\alpha)$")
+    horizontal, vertical = axis_labels(spectrum.scene)
+    axes.set_xlabel(horizontal)
+    axes.set_ylabel(vertical)
+    axes.grid(False)
+
+
+def axis_labels(scene: Scene) -> tuple[str, str]:
+    """What the axes of the scene's spectrum show, in plain text: frequency and amplitude ratio, or size and scale."""
+    if scene.excitation.kind == "record":
+        return "size of the block / its own", "scale of the record"
+    return "\u03c9\u209a / p", "a\u209a / (g tan \u03b1)"
 
 
 def overturning_spectrum(
@@ -88,39 +111,35 @@ def overturning_spectrum(
     refine: bool = False,
     jobs: int | None = None,
     progress: Callable[[int], None] | None = None,
+    play: Player | None = None,
 ) -> Spectrum:
     """The outcomes of a scene under pulses of its own kind, each run until its outcome is decided.
 
     `frequency_ratios` (omega_p/p) and `amplitude_ratios` (a_p/(g tan alpha)) are increasing, positive and finite. `scene`
-    gives block, floor, walls and the kind of pulse (Ricker or sine); its duration and the pulse's own size are not used. With
-    `refine` only every eighth node is run at first, then those between nodes that differ (and their neighbours).
-    `jobs` threads, default all cores; `progress` is called with the number of runs just done. Raises `InputError`.
+    gives block, floor, walls and the kind of pulse (Ricker or sine); its duration and the pulse's own size are not used.
+    Where the scene's excitation is a record, `frequency_ratios` are sizes of the block relative to its own (the gaps stay as
+    they are) and `amplitude_ratios` multiply the record. With `refine` only every eighth node is run at first, then those
+    between nodes that differ (and their neighbours). `jobs` threads, default all cores; `progress` is called with the number
+    of runs just done. `play` runs the nodes elsewhere or by another model, instead of `model` here. Raises `InputError`.
     """
     frequencies, amplitudes = _axis(frequency_ratios, "frequency_ratios"), _axis(amplitude_ratios, "amplitude_ratios")
     if len(frequencies) * len(amplitudes) > MOST_NODES:
         raise InputError(f"{len(frequencies)} x {len(amplitudes)} nodes are more than {MOST_NODES}", "frequency_ratios")
-    if scene.excitation.kind not in ("ricker", "sine"):
-        raise InputError(f"{scene.excitation.kind!r} is not allowed: a spectrum needs a ricker or sine pulse", "excitation.kind")
-    model = model or EventBasedModel(tolerance=1e-8)
-    from ebm import batch
-
-    model.check(scene)
-    p, tan_alpha = scene.frequency_parameter, scene.block.half_width / scene.block.half_height
+    check_excitation(scene)
+    if play is None:
+        model = model or EventBasedModel(tolerance=TOLERANCE)
+        model.check(scene)
+        play = partial(play_nodes, model=model, jobs=jobs, progress=progress)
     outcomes = np.full((len(amplitudes), len(frequencies)), _UNKNOWN, dtype=np.int8)
-    undecided: list[NDArray[np.int64]] = []
+    undecided = np.zeros(outcomes.shape, dtype=bool)
     evaluations = 0
 
     def run(nodes: NDArray[np.bool_]) -> None:
         nonlocal evaluations
         i, j = np.nonzero(nodes & (outcomes == _UNKNOWN))
-        if len(i) == 0:
-            return
-        packed = batch.pack_pulses(scene, model, amplitudes[i] * scene.gravity * tan_alpha, 2.0 * math.pi / (frequencies[j] * p))
-        found = batch.run_batch(packed, model, jobs=jobs, progress=progress, strict=False)
-        outcomes[i, j] = found.side
-        failed = found.failed
-        undecided.append(np.stack([i[failed], j[failed]], axis=1).astype(np.int64))
-        evaluations += len(i)
+        if len(i):
+            outcomes[i, j], undecided[i, j] = play(scene, amplitudes[i], frequencies[j])
+            evaluations += len(i)
 
     if refine:
         _refine(outcomes, run)
@@ -131,10 +150,56 @@ def overturning_spectrum(
         frequency_ratios=frequencies,
         amplitude_ratios=amplitudes,
         evaluations=evaluations,
-        undecided=np.concatenate(undecided) if undecided else np.zeros((0, 2), dtype=np.int64),
+        undecided=np.argwhere(undecided),
         scene=scene,
         model=model,
     )
+
+
+def play_nodes(
+    scene: Scene,
+    amplitude_ratios: Floats,
+    frequency_ratios: Floats,
+    *,
+    model: EventBasedModel,
+    jobs: int | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
+    """The outcomes at nodes of a spectrum (1-D arrays of one length): sides (-1, 0, +1), and whether the run failed."""
+    from ebm import batch
+
+    if scene.excitation.kind == "record":
+        packed = batch.pack([node_scene(scene, a, f) for a, f in zip(amplitude_ratios, frequency_ratios, strict=True)], model)
+    else:
+        p, tan_alpha = scene.frequency_parameter, scene.block.half_width / scene.block.half_height
+        periods = 2.0 * math.pi / (frequency_ratios * p)
+        packed = batch.pack_pulses(scene, model, amplitude_ratios * scene.gravity * tan_alpha, periods)
+    found = batch.run_batch(packed, model, jobs=jobs, progress=progress, strict=False)
+    return found.side, found.failed
+
+
+def node_scene(scene: Scene, amplitude_ratio: float, frequency_ratio: float, settle: float = 6.0) -> Scene:
+    """The scene of one node of a spectrum, for any model to play; it lasts until `settle` s after the motion of the base."""
+    if isinstance(scene.excitation, Record):
+        block = scene.block
+        return scene.replace(
+            excitation=scene.excitation.model_copy(update={"scale": scene.excitation.scale * float(amplitude_ratio)}),
+            block=Block(half_width=block.half_width * float(frequency_ratio), half_height=block.half_height * float(frequency_ratio)),
+            duration=scene.excitation.quiet_after + settle,
+        )
+    tan_alpha = scene.block.half_width / scene.block.half_height
+    amplitude = float(amplitude_ratio) * scene.gravity * tan_alpha
+    period = 2.0 * math.pi / (float(frequency_ratio) * scene.frequency_parameter)
+    pulse = type(scene.excitation)(**scene.excitation.model_dump() | {"amplitude": amplitude, "period": period})
+    return scene.replace(excitation=pulse, duration=pulse.quiet_after + settle)
+
+
+def check_excitation(scene: Scene) -> None:
+    """Raises `InputError` where the scene's excitation has no size that a spectrum could vary."""
+    if scene.excitation.kind not in ("ricker", "sine", "record"):
+        raise InputError(
+            f"{scene.excitation.kind!r} is not allowed: a spectrum needs a ricker or sine pulse, or a record", "excitation.kind"
+        )
 
 
 def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None], coarsest: int = 8) -> None:

@@ -153,8 +153,8 @@ def _gap(b, m, tip, order, pivot, a):
 
 @kernel
 def _settle_touch(a):
-    """A contact that touches and parts or closes more slowly than CLOSED_RATE counts as resting: its acceleration decides."""
-    if abs(a[GUARD, 0]) < 1e-12 and abs(a[GUARD, 1]) < CLOSED_RATE:
+    """A contact that touches and closes more slowly than CLOSED_RATE counts as resting: its acceleration decides."""
+    if abs(a[GUARD, 0]) < 1e-12 and a[GUARD, 1] < 0.0 and a[GUARD, 1] > -CLOSED_RATE:
         a[GUARD, 0] = a[GUARD, 1] = 0.0
 
 
