@@ -153,12 +153,15 @@ def _march(world: World, scene: Scene, times: FloatArray, felt: FloatArray) -> M
     world.place(pieces[0][0])
     for first in range(0, len(felt), STEPS_AT_ONCE):
         states = world.march(felt[first : first + STEPS_AT_ONCE], dt)
-        if not np.all(np.abs(states) < BLOWN_UP):  # catches nan, too
-            raise ModelFailure(f"the motion blew up between t = {times[first]:g} and {times[first + len(states)]:g} s")
-        pieces.append(states)
         tipped = np.flatnonzero(np.abs(states[:, 2]) >= math.pi / 2)
         if tipped.size:
-            pieces[-1] = states[: tipped[0] + 1]
+            states = states[: tipped[0] + 1]
+        if not np.all(np.abs(states) < BLOWN_UP):  # catches nan, too
+            raise ModelFailure(f"the motion blew up between t = {times[first]:g} and {times[first + len(states)]:g} s")
+        if np.any(states[:, 1] < 0.0):
+            raise ModelFailure(f"the block fell through the floor before t = {times[first + len(states)]:g} s: is the step too long?")
+        pieces.append(states)
+        if tipped.size:
             break
     marched = np.concatenate(pieces)
     return times[: len(marched)], marched, felt

@@ -15,9 +15,9 @@ from engines.engine import Engine, RigidWorld, World
 from scenes import Scene
 
 FloatArray = NDArray[np.float64]
-CORNER_RADIUS = 1e-6  # of the block's radius
-SLAB = 1.0  # half the thickness of floor and walls
-REACH = 1e4  # half their extent; far beyond that the direction of a normal is lost to rounding
+CORNER_RADIUS = 3e-6  # of the block's radius
+SLAB = 10.0  # half the thickness of floor and walls
+REACH = 300.0  # half their extent; a larger one costs digits of the normals on so small spheres
 FLOOR_ERP = 0.02  # share of a penetration that one step removes; none where it would add to a bounce or make one
 
 
@@ -35,6 +35,11 @@ class PyBullet(Engine):
         return _PyBulletWorld(scene)
 
 
+def _aloft(scene: Scene) -> tuple[float, float, float]:
+    """Where a block is made, away from all contacts."""
+    return 0.0, 0.0, 10.0 * scene.block.radius
+
+
 class _PyBulletWorld:
     """A physics server of its own with block, floor and walls, and PyBullet's default parameters."""
 
@@ -47,6 +52,8 @@ class _PyBulletWorld:
         self.client: int = pybullet.connect(pybullet.DIRECT)
         self.options: dict[str, Any] = {"physicsClientId": self.client}
         self.body = self.make_block(scene)
+        # A step in the air, in which Bullet takes notice of an inertia that was changed.
+        pybullet.stepSimulation(**self.options)
         self._make_slab(0.0, 1.0, 0.0, scene.floor.friction, scene.floor.restitution)
         for wall in scene.walls:
             inward = 1.0 if wall.side == "left" else -1.0
@@ -56,7 +63,7 @@ class _PyBulletWorld:
         """A box. Friction and restitution of two bodies multiply: the block's are 1, so that those of floor and walls count."""
         half = [scene.block.half_width, scene.block.half_width, scene.block.half_height]
         shape = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=half, **self.options)
-        body: int = self.bullet.createMultiBody(1.0, shape, **self.options)
+        body: int = self.bullet.createMultiBody(1.0, shape, basePosition=_aloft(scene), **self.options)
         self.bullet.changeDynamics(body, -1, lateralFriction=1.0, restitution=1.0, **self.options)
         return body
 
@@ -100,12 +107,17 @@ class _RigidPyBulletWorld(_PyBulletWorld):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
+        self.far = 2.0 + max((wall.gap for wall in scene.walls), default=0.0)  # away from all walls, x does not matter; the floor ends
         self.bounces = any(contact.restitution > 0.0 for contact in contacts_of(scene))
         # Where it would add to a bounce or make one, a penetration is left as it is.
         self.erp = 0.0 if self.bounces or scene.walls else FLOOR_ERP
         self.bouncing: bool | None = None
         self.bullet.setPhysicsEngineParameter(
-            numSolverIterations=1000, solverResidualThreshold=1e-20, contactSlop=0.0, contactERP=0.0, **self.options
+            numSolverIterations=1000,
+            solverResidualThreshold=1e-20,
+            contactSlop=0.0,
+            contactERP=0.0,
+            **self.options,
         )
 
     def make_block(self, scene: Scene) -> int:
@@ -117,7 +129,7 @@ class _RigidPyBulletWorld(_PyBulletWorld):
             collisionFramePositions=places,
             **self.options,
         )
-        body: int = self.bullet.createMultiBody(1.0, shape, useMaximalCoordinates=1, **self.options)
+        body: int = self.bullet.createMultiBody(1.0, shape, basePosition=_aloft(scene), useMaximalCoordinates=1, **self.options)
         inertia = scene.block.radius**2 / 3.0
         self.bullet.changeDynamics(
             body,
@@ -145,7 +157,8 @@ class _RigidPyBulletWorld(_PyBulletWorld):
         bullet, client = self.bullet, self.client
         if self.bounces and bouncing is not self.bouncing:
             self._bounce(bouncing)
-        self.place((*pose, *velocity))
+        x, y, theta = pose
+        self.place((min(max(x, -self.far), self.far), y, theta, *velocity))
         bullet.setTimeStep(dt, physicsClientId=client)
         bullet.setGravity(felt[0], 0.0, felt[1], physicsClientId=client)
         bullet.stepSimulation(physicsClientId=client)
