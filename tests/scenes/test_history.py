@@ -1,0 +1,159 @@
+"""Histories: tables, saving and loading, and files that are not histories."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from scenes import Block, Cost, Event, Floor, History, InputError, Rest, Scene
+from scenes.observation import observe
+
+SCENE = Scene(
+    name="observed",
+    block=Block(half_width=0.4, half_height=1.6),
+    floor=Floor(friction=0.3),
+    excitation=Rest(),
+    duration=0.05,
+    output_step=0.005,
+)
+
+
+def states(theta: np.ndarray) -> np.ndarray:
+    """States of a block that turns about its lower corner, at rest at each instant."""
+    block, side = SCENE.block, np.sign(theta)
+    x = side * (block.radius * np.sin(block.alpha - np.abs(theta)) - block.half_width)
+    y = block.radius * np.cos(block.alpha - np.abs(theta))
+    return np.column_stack([x, y, theta, *np.zeros((3, len(theta)))])
+
+
+@pytest.fixture
+def history() -> History:
+    return observe(
+        SCENE,
+        "model",
+        states(np.linspace(0.1, 0.01, 11)),
+        events=[
+            Event(t=0.012, kind="uplift", mode_before="rest", mode_after="rock"),
+            Event(t=0.03, kind="floor impact", impulse=0.1 / 3.0),
+        ],
+        outcome="moving",
+        cost=Cost(wall_seconds=0.25, steps=12, error_estimate=1e-9),
+        settings={"tolerance": 1e-10},
+        notes=["a note, with a comma"],
+    )
+
+
+def test_save_and_load_round_trip(history, tmp_path):
+    """Every number comes back to the bit."""
+    path = tmp_path / "run.csv"
+    history.save(path)
+    again = History.load(path)
+    assert (again.name, again.model, again.outcome, again.notes) == ("observed", "model", "moving", ("a note, with a comma",))
+    assert (again.half_width, again.half_height, again.alpha) == (0.4, 1.6, SCENE.block.alpha)
+    assert again.cost == history.cost
+    assert again.settings == history.settings
+    assert list(again.event_list) == list(history.event_list)
+    assert list(again.channels) == list(history.channels)
+    for name, values in history.channels.items():
+        np.testing.assert_array_equal(again.channels[name], values)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["run.csv", "run.events.csv"]
+
+
+def test_tables(history):
+    assert list(history.frame.columns) == ["t", "x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate", "mode"]
+    assert len(history.frame) == 11
+    assert list(history.events["kind"]) == ["uplift", "floor impact"]
+    assert history.peak_rotation == 0.1
+    np.testing.assert_allclose(history.channels["slip"], 0.0, atol=1e-15)
+    assert set(history.frame["mode"]) == {"rock"}
+
+
+def test_a_plain_table_is_a_measured_history(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("time,theta,t\n9,0.0,0\n9,0.1,0.5\n9,0.00001,1\n")
+    history = History.load(path)
+    assert (history.name, history.model, history.outcome, history.alpha) == ("table", "measured", "at rest", None)
+    assert set(history.channels) == {"t", "theta"}
+    assert list(history.event_list) == []
+    path.write_text("t,theta\n0,0\n1,-1.57\n")
+    assert History.load(path).outcome == "overturned right"
+
+
+HEAD = "# rockcheck history "
+ROWS = "t,theta\n0,0\n1,0.1\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "not a CSV table"),
+        ("t,theta\n", "no rows"),
+        ("time,theta\n0,0\n", "no column 't'"),
+        ("t,x\n0,0\n", "no column 'theta'"),
+        ("t,theta\n0,a\n", "column 'theta' is not numeric"),
+        ("t,theta\n0,0\n1,nan\n", "column 'theta', row 2: nan is not finite"),
+        ("t,theta\n0,0\n1,inf\n", "column 'theta', row 2: inf is not finite"),
+        ("t,theta\n0,0\n1,\n", "column 'theta', row 2: nan is not finite"),
+        ("t,theta\n0,0\n0,1\n", "column 't' does not increase"),
+        ("t,theta\n1,0\n0,1\n", "column 't' does not increase"),
+        ("t,theta\n0,0\n1,0,5,6\n", "not a CSV table"),
+        (HEAD + "{broken\n" + ROWS, "line 1: not a header written by rockcheck"),
+        (HEAD + "[1, 2]\n" + ROWS, "line 1: not a header written by rockcheck"),
+        (HEAD + "[" * 100000 + "\n" + ROWS, "line 1: not a header written by rockcheck"),
+        (HEAD + '{"cost": 3}\n' + ROWS, "line 1: not a header written by rockcheck"),
+        (HEAD + '{"settings": []}\n' + ROWS, "line 1: not a header written by rockcheck"),
+        (HEAD + '{"notes": "x"}\n' + ROWS, "line 1: not a header written by rockcheck"),
+        (HEAD + '{"half_width": -1}\n' + ROWS, "half_width: -1 is not allowed"),
+        (HEAD + '{"half_width": "1"}\n' + ROWS, "half_width: 1 is not allowed"),
+        (HEAD + '{"half_height": true}\n' + ROWS, "half_height: True is not allowed"),
+        (HEAD + '{"half_height": Infinity}\n' + ROWS, "half_height: inf is not allowed"),
+    ],
+)
+def test_hostile_tables(text, said, tmp_path):
+    path = tmp_path / "hostile.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as fault:
+        History.load(path)
+    assert "hostile.csv" in str(fault.value)
+    assert said in str(fault.value)
+    assert "\n" not in str(fault.value)
+
+
+def test_hostile_events(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text(ROWS)
+    (tmp_path / "run.events.csv").write_text("t,kind,mode_before,mode_after,impulse\nsoon,uplift,,,0\n")
+    with pytest.raises(InputError, match=r"run\.events\.csv: not an events table"):
+        History.load(path)
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(InputError, match="cannot be read: No such file"):
+        History.load(tmp_path / "none.csv")
+    binary = tmp_path / "binary.csv"
+    binary.write_bytes(bytes(range(256)))
+    with pytest.raises(InputError, match="not a CSV table"):
+        History.load(binary)
+    with pytest.raises(InputError, match="cannot be read"):
+        History.load(tmp_path)
+
+
+def test_unknown_outcome_in_a_header_is_not_believed(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text(HEAD + json.dumps({"outcome": "<script>"}) + "\n" + ROWS)
+    assert History.load(path).outcome == "moving"
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_overturning_cuts_the_rows(side):
+    state = states(side * np.linspace(1.2, 2.2, 11))
+    name = "overturned left" if side > 0 else "overturned right"
+    history = observe(SCENE, "model", state, events=[Event(t=0.02, kind=name)])
+    assert history.outcome == name
+    assert np.all(np.abs(history.channels["theta"]) < math.pi / 2)
+    assert len(history.channels["t"]) == 4
+    with pytest.raises(ValueError, match="must report the event"):
+        observe(SCENE, "model", state)

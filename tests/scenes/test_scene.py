@@ -1,0 +1,223 @@
+"""Scenes: what they accept, what they refuse, what follows from them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+
+GOOD = {
+    "name": "good",
+    "block": {"half_width": 0.397, "half_height": 1.555},
+    "floor": {"friction": 0.3},
+    "walls": [{"side": "left", "gap": 0.053, "restitution": 0.5}],
+    "excitation": {"kind": "ricker", "amplitude": 6.0, "period": 0.98},
+    "duration": 10.0,
+}
+
+
+def scene(**change: object) -> Scene:
+    return Scene(**(GOOD | change))
+
+
+def fault_of(**change: object) -> InputError:
+    with pytest.raises(InputError) as fault:
+        scene(**change)
+    assert "\n" not in str(fault.value)
+    return fault.value
+
+
+WRONG_NUMBERS = [math.nan, math.inf, -math.inf, "1", True, None]
+
+
+@pytest.mark.parametrize("value", [*WRONG_NUMBERS, 0.0, -1.0])
+@pytest.mark.parametrize("key", ["block.half_width", "block.half_height", "excitation.period", "duration", "output_step", "gravity"])
+def test_positive_numbers(key, value):
+    table, _, name = key.rpartition(".")
+    assert fault_of(**({table: GOOD[table] | {name: value}} if table else {name: value})).key == key
+
+
+@pytest.mark.parametrize("value", [*WRONG_NUMBERS[:-1], -1e-9])
+@pytest.mark.parametrize("key", ["floor.friction", "floor.static_friction", "initial_height"])
+def test_numbers_that_are_not_negative(key, value):
+    table, _, name = key.rpartition(".")
+    assert fault_of(**({table: GOOD[table] | {name: value}} if table else {name: value})).key == key
+
+
+@pytest.mark.parametrize("value", WRONG_NUMBERS)
+@pytest.mark.parametrize("key", ["excitation.amplitude", "initial_rotation", "initial_angular_velocity", "initial_velocity"])
+def test_finite_numbers(key, value):
+    table, _, name = key.rpartition(".")
+    assert fault_of(**({table: GOOD[table] | {name: value}} if table else {name: value})).key == key
+
+
+@pytest.mark.parametrize("value", [math.nan, -0.01, 1.01, "0.5"])
+def test_restitution_is_between_0_and_1(value):
+    assert fault_of(floor={"friction": 0.3, "restitution": value}).key == "floor.restitution"
+    assert fault_of(walls=[{"side": "left", "gap": 0.1, "restitution": value}]).key == "walls.0.restitution"
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "said"),
+    [
+        ({"block": {"half_width": 0.4}}, "block.half_height", "is missing"),
+        ({"block": {"half_width": 0.4, "half_height": 1.0, "depth": 1.0}}, "block.depth", "unknown key"),
+        ({"block": {"half_width": 0.4, "half_height": 1.0, "mass": 0.0}}, "block.mass", "0.0 is not allowed"),
+        ({"floors": {}}, "floors", "unknown key"),
+        ({"floor": {"friction": 4.0 / 3.0}}, "floor.friction", "below 4/3"),
+        ({"floor": {"friction": 0.3, "static_friction": 1.5}}, "floor.static_friction", "below 4/3"),
+        ({"floor": {"friction": 0.3, "static_friction": 0.2}}, "floor.static_friction", "at least the kinetic friction 0.3"),
+        ({"walls": [{"side": "up", "gap": 0.1}]}, "walls.0.side", "'left' or 'right'"),
+        ({"walls": [{"side": "left", "gap": -0.1}]}, "walls.0.gap", "-0.1 is not allowed"),
+        ({"walls": [{"side": "left", "gap": math.nan}]}, "walls.0.gap", "nan is not allowed"),
+        ({"walls": [{"side": "left", "gap": 0.1}, {"side": "left", "gap": 0.2}]}, "walls", "two walls on one side"),
+        ({"excitation": {"kind": "quake"}}, "excitation", "ricker"),
+        ({"excitation": {"amplitude": 1.0}}, "excitation", "kind"),
+        ({"excitation": {"kind": "sine", "amplitude": 1.0, "period": 1.0, "cycles": 0}}, "excitation.cycles", "0 is not allowed"),
+        ({"excitation": {"kind": "record", "unscaled": [], "time_step": 0.1}}, "excitation.unscaled", "at least 1"),
+        ({"excitation": {"kind": "record", "unscaled": [1.0, math.nan], "time_step": 0.1}}, "excitation.unscaled.1", "nan"),
+        ({"excitation": {"kind": "record", "unscaled": [1.0], "time_step": 0.0}}, "excitation.time_step", "0.0 is not allowed"),
+        ({"excitation": {"kind": "record", "file": 3}}, "excitation.file", "the path of a"),
+        ({"excitation": {"kind": "record", "file": "a.csv", "time_step": 0.1}}, "excitation.time_step", "together with file"),
+        ({"vertical": {"kind": "ricker", "amplitude": 1.0}}, "vertical.period", "is missing"),
+        ({"initial_rotation": 1.6}, "initial_rotation", "1.6 is not allowed"),
+        ({"initial_rotation": 0.1}, "initial_rotation", "inside the left wall"),
+        ({"duration": 1e5, "output_step": 1e-3}, "output_step", "more than 5000000 samples"),
+        ({"name": ""}, "name", "not allowed"),
+        ({"name": "../etc"}, "name", "not allowed"),
+        ({"name": "a\nb"}, "name", "not allowed"),
+        ({"description": "x" * 501}, "description", "500"),
+    ],
+)
+def test_faults_name_the_key_and_what_is_allowed(change, key, said):
+    fault = fault_of(**change)
+    assert fault.key == key
+    assert said in str(fault)
+
+
+def test_a_tilt_may_touch_a_wall_but_not_enter_it():
+    """Tilted by theta about its left corner, the top corner moves left by R sin(alpha + theta) - R sin(alpha - theta)."""
+    block = Block(**GOOD["block"])
+    tilt = 0.03
+    reach = block.radius * (math.sin(block.alpha + tilt) - math.sin(block.alpha - tilt))
+    touching = scene(initial_rotation=tilt, walls=[Wall(side="left", gap=reach)])
+    x, _, theta, *_ = touching.initial_state
+    assert kinematics.wall_gap(touching, "left", x, theta) == pytest.approx(0.0, abs=1e-15)
+    assert fault_of(initial_rotation=tilt, walls=[Wall(side="left", gap=reach - 1e-6)]).key == "initial_rotation"
+    assert scene(initial_rotation=-tilt, walls=[Wall(side="left", gap=reach)])
+
+
+def test_frozen():
+    with pytest.raises(ValueError, match="frozen"):
+        scene().duration = 3.0
+    with pytest.raises(ValueError, match="frozen"):
+        scene().block.half_width = 3.0
+
+
+def test_derived_quantities():
+    block = Block(half_width=0.397, half_height=1.555)
+    assert block.alpha == pytest.approx(0.25, abs=1e-4)
+    assert block.radius == pytest.approx(math.hypot(0.397, 1.555))
+    assert block.frequency_parameter == pytest.approx(2.14, abs=5e-3)
+    moon = scene(gravity=1.62)
+    assert moon.frequency_parameter == pytest.approx(math.sqrt(0.75 * 1.62 / block.radius))
+    assert Floor(friction=0.3).mu_s == 0.3
+    assert Floor(friction=0.3, static_friction=0.4).mu_s == 0.4
+    assert scene().wall("left") == Wall(side="left", gap=0.053, restitution=0.5)
+    assert scene().wall("right") is None
+
+
+@pytest.mark.parametrize(("duration", "step", "rows"), [(1.0, 0.1, 11), (0.3, 0.1, 4), (1.0, 0.3, 4), (0.05, 0.1, 1), (36.0, 0.005, 7201)])
+def test_output_times(duration, step, rows):
+    times = scene(duration=duration, output_step=step).output_times
+    assert len(times) == rows
+    assert times[0] == 0.0
+    assert times[-1] <= duration * (1.0 + 1e-9)
+    np.testing.assert_allclose(np.diff(times), step, rtol=1e-9)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.04, -0.2])
+def test_initial_state_stands_on_its_pivot(tilt):
+    made = scene(walls=[], initial_rotation=tilt, initial_angular_velocity=0.3, initial_velocity=0.2)
+    x, y, theta, x_dot, y_dot, theta_dot = made.initial_state
+    assert (theta, theta_dot) == (tilt, 0.3)
+    assert kinematics.slip(made.block, x, theta) == pytest.approx(0.0, abs=1e-15)
+    assert kinematics.slip_rate(made.block, theta, x_dot, theta_dot) == pytest.approx(0.2, abs=1e-15)
+    assert kinematics.pivot_height(made.block, y, theta) == pytest.approx(0.0, abs=1e-15)
+    step = 1e-7  # the centroid's vertical velocity is that of a turn about the pivot
+    lever = made.block.radius
+    height = [lever * math.cos(made.block.alpha - abs(tilt + 0.3 * s)) for s in (0.0, step)]
+    assert y_dot == pytest.approx((height[1] - height[0]) / step, abs=1e-6)
+
+
+def test_replace_validates():
+    assert scene().replace(duration=2.0).duration == 2.0
+    with pytest.raises(InputError, match=r"^duration: -1.0 is not allowed"):
+        scene().replace(duration=-1.0)
+
+
+# --- excitations
+
+
+def test_ricker_is_the_papers():
+    """(34) term by term, its peak 1.00009 a_p at 0.2045 T_p from the centre, and a weak negative lobe first."""
+    pulse = Ricker(amplitude=6.0, period=0.98)
+    t = np.linspace(0.0, 4.0 * pulse.period, 4001)
+    q = t - 2.0 * pulse.period
+    T = pulse.period
+    expected = (
+        (6.0 / 1.38)
+        * (4 * np.pi**2 * q**2 / (3 * T**2) - 3)
+        * (2 * np.pi * q / (np.sqrt(3) * T))
+        * np.exp(-2 * np.pi**2 * q**2 / (3 * T**2))
+    )
+    np.testing.assert_allclose(pulse.acceleration(t), expected, rtol=1e-12, atol=1e-14)
+    peak = np.argmax(pulse.acceleration(t))
+    assert pulse.acceleration(t)[peak] == pytest.approx(1.00009 * 6.0, rel=1e-5)
+    assert abs(q[peak]) == pytest.approx(0.2045 * T, abs=1e-3)
+    assert q[peak] < 0.0
+    assert np.sign(pulse.acceleration(np.array([0.8 * T]))) == -1.0
+
+
+def test_symmetric_ricker_peaks_at_its_centre():
+    pulse = Ricker(amplitude=-2.0, period=0.5, symmetric=True)
+    assert pulse.acceleration(pulse.centre) == pytest.approx(-2.0)
+    offset = np.linspace(0.01, 1.0, 50)
+    np.testing.assert_allclose(pulse.acceleration(1.0 + offset), pulse.acceleration(1.0 - offset), rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "excitation",
+    [
+        Rest(),
+        Ricker(amplitude=6.0, period=0.98),
+        Ricker(amplitude=6.0, period=0.98, symmetric=True),
+        Sine(amplitude=2.0, period=0.5, cycles=3),
+        Record.from_samples([0.0, 1.0, -2.0, 0.5], time_step=0.1, scale=1.5),
+    ],
+    ids=lambda excitation: excitation.kind,
+)
+def test_quiet_before_and_after(excitation):
+    after = excitation.quiet_after + np.array([1e-9, 0.1, 10.0])
+    np.testing.assert_allclose(excitation.acceleration(after), 0.0, atol=1e-14)
+    np.testing.assert_array_equal(excitation.acceleration(np.array([-1e-9, -5.0])), 0.0)
+
+
+def test_record_is_linear_between_samples():
+    record = Record.from_samples([0.0, 1.0, -2.0], time_step=0.1, scale=-2.0)
+    np.testing.assert_allclose(record.acceleration([0.05, 0.1, 0.15, 0.2]), [-1.0, -2.0, 1.0, 4.0], atol=1e-14)
+    assert record.peak == pytest.approx(4.0 / 9.80665)
+
+
+def test_mirrored():
+    made = scene(initial_rotation=-0.02, initial_angular_velocity=0.1, initial_velocity=-0.3, vertical=Sine(amplitude=1.0, period=0.3))
+    image = made.mirrored()
+    assert image.wall("right").gap == 0.053
+    assert image.wall("left") is None
+    assert image.excitation.amplitude == -6.0
+    assert image.vertical == made.vertical
+    assert (image.initial_rotation, image.initial_angular_velocity, image.initial_velocity) == (0.02, -0.1, 0.3)
+    assert image.mirrored() == made
