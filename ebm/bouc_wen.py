@@ -97,6 +97,7 @@ from ebm.trajectory import (
 )
 from ebm.transitions import (
     G_CONE_MINUS,
+    G_CONE_PLUS,
     G_FAR_GAP,
     G_FAR_PUSH,
     G_PHI,
@@ -130,6 +131,8 @@ _G_LOADS = GUARDS
 _STOPPED = 1e-10
 _LOOK, _AHEAD = 6, 1e-2
 _MOST_ZERO_STEPS = 60
+# Static friction of a frictionless floor: with less, the rounding of a base acceleration that dies out moves a resting block.
+_LEAST_HOLD = 1e-12
 
 
 def simulate(model: EventBasedModel, scene: Scene, tolerance: float) -> History:
@@ -148,6 +151,7 @@ def simulate(model: EventBasedModel, scene: Scene, tolerance: float) -> History:
     from ebm import model as exact
 
     b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
+    b = b._replace(mu_s=max(b.mu_s, _LEAST_HOLD))
     horizontal, vertical = natural.grounds_of(scene)
     unit = natural.time_unit(scene)
     times = scene.output_times
@@ -285,7 +289,7 @@ def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order
 @kernel
 def _held(b, z, gh, gv, t):
     """Whether a flat block without speed stays at rest: the base neither lifts nor slides it, or presses it on a wall."""
-    limit = min(b.sin_alpha / b.cos_alpha, b.mu_k) * (1.0 + acceleration(gv, t))
+    limit = min(b.sin_alpha / b.cos_alpha, b.mu_s) * (1.0 + acceleration(gv, t))
     u = acceleration(gh, t)
     return (u <= limit or closed_wall(b, z, 1, False)) and (u >= -limit or closed_wall(b, z, -1, False))
 
@@ -299,17 +303,18 @@ def _rest(b, m, z):
 
 
 @kernel
-def _leave_rest(b, m, gh, gv, t):
-    """The block at rest starts to slide, or to tilt: returns z = -u/(mu_k G0), which is +-1 if it slides."""
+def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, a):
+    """The block at rest starts to slide, or to tilt, as u of sign `sense` grows; returns z = -u/(mu_k G0), +-1 if it slides."""
     u, g = acceleration(gh, t), 1.0 + acceleration(gv, t)
-    sense = 1 if u > 0.0 else -1
     m[:] = 0
     m[PULL], m[FLOOR] = 1, SLIPPING
     if b.mu_k * b.cos_alpha <= b.sin_alpha:
         m[FAMILY], m[S], m[SLIP] = FLAT, 1, -sense
         return -float(sense)
     m[FAMILY], m[S], m[SLIP] = TILT, sense, -1
-    return min(max(-u / (b.mu_k * abs(g)), -1.0), 1.0)
+    zeta = min(max(-u / (b.mu_k * abs(g)), -1.0), 1.0)
+    _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a)
+    return zeta
 
 
 @kernel
@@ -319,7 +324,7 @@ def _begin(b, m, z, zeta, yield_displacement, gh, gv, t, a):
     if z[THETA] == 0.0 and z[W] == 0.0:
         if v == 0.0:
             if not _held(b, z, gh, gv, t):
-                return _leave_rest(b, m, gh, gv, t)
+                return _leave_rest(b, m, z, 1 if acceleration(gh, t) > 0.0 else -1, yield_displacement, gh, gv, t, a)
             _rest(b, m, z)
             return 0.0
         m[:] = 0
@@ -327,23 +332,37 @@ def _begin(b, m, z, zeta, yield_displacement, gh, gv, t, a):
         return zeta
     sense = 1 if (z[THETA] if z[THETA] != 0.0 else z[W]) > 0.0 else -1
     m[:] = 0
-    m[FAMILY], m[S], m[PULL], m[FLOOR], m[SLIP] = TILT, sense, 1, SLIPPING, 1 if sense * v > 0.0 else -1
-    m[TIP], m[FAR] = closed_wall(b, z, sense, False), closed_wall(b, z, -sense, True)
+    m[FAMILY], m[S], m[SLIP] = TILT, sense, 1 if sense * v > 0.0 else -1
+    _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a)
+    return zeta
+
+
+@kernel
+def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a):
+    """Lets the corners of a tilting block rest on the walls that they touch and that would push them."""
+    m[TIP], m[FAR] = closed_wall(b, z, m[S], False), closed_wall(b, z, -m[S], True)
     if m[TIP] != 0 and m[FAR] != 0:
-        m[FLOOR] = STICK
+        m[FLOOR], m[PULL] = STICK, 1
         tilt_series(b, m, z, gh, gv, t, _LOOK, 0.0, 0.0, True, a)
         if a[NA, 0] >= 0.0 and a[NB, 0] >= 0.0:  # wedged between the walls
             z[W] = z[VX] = z[VY] = 0.0
-            return zeta
-        m[FLOOR] = SLIPPING
+            return
         m[FAR if a[NB, 0] < a[NA, 0] else TIP] = 0
-    friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
+    m[FLOOR] = SLIPPING
+    _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a)
     if m[TIP] + m[FAR] > 0 and leading(a, NA if m[TIP] != 0 else NB, _LOOK - 2, _AHEAD, NOISE) < 0:
         m[TIP] = m[FAR] = 0
-        friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
+        _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a)
+
+
+@kernel
+def _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a):
+    """Sets the sign of P, which does not depend on the sign that is assumed for it; the workspace then holds the series."""
+    m[PULL] = 1
+    friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
     if a[P, 0] < 0.0:
         m[PULL] = -1
-    return zeta
+        friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
 
 
 @kernel
@@ -489,8 +508,10 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
             kind = UPLIFT
             m[FAMILY], m[S] = TILT, 1 if which == G_UPLIFT_PLUS else -1
             m[SLIP] = m[S] * m[SLIP]
+            _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a)
         elif which > G_FAR_PUSH:  # the cone, or uplift from rest
-            zeta = _leave_rest(b, m, gh, gv, t)
+            sense = 1 if which == G_CONE_PLUS or which == G_UPLIFT_PLUS else -1
+            zeta = _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, a)
             yielded = abs(zeta) == 1.0
             kind = UPLIFT if m[FAMILY] == TILT else SLIPS
         elif which >= 0:
