@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Protocol
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,100 +45,157 @@ class Push(Protocol):
         """
 
 
+@dataclass(frozen=True, slots=True)
+class _Limits:
+    """The steps and speeds that count as short, long and slow in a scene, s and 1/s (lengths in R)."""
+
+    longest: float
+    impact: float
+    probe: float
+    shortest: float
+    long_approach: float
+    resting: float
+
+    @classmethod
+    def of(cls, scene: Scene, longest: float) -> _Limits:
+        """Those of a scene whose steps are at most `longest` s."""
+        moment = 1.0 / scene.frequency_parameter
+        return cls(
+            longest=longest,
+            impact=min(IMPACT_STEP * moment, longest),
+            probe=min(PROBE_STEP * moment, longest),
+            shortest=SHORTEST_STEP * moment,
+            long_approach=LONG_APPROACH * moment,
+            resting=RESTING * longest * scene.gravity,
+        )
+
+
+class _Plan(NamedTuple):
+    """A step: its length in s, the corners that touch floor and walls, and whether it is an impact or ends where slip stops."""
+
+    dt: float
+    touching: tuple[list[Contact], list[Contact]]
+    impact: bool
+    stops: bool
+
+
 def march_adaptively(scene: Scene, push: Push, longest: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Times (n) and states (n, 6) at step ends, and the accelerations (n-1, 2) felt in the steps, until |theta| = pi/2.
 
     The scene is one of a block with R = 1, see `engines.engine.in_units_of`. No step is longer than `longest` s.
     Raises `ModelFailure` if the motion blows up or needs very many steps.
     """
-    floor, walls = contacts_of(scene)[:2], contacts_of(scene)[2:]
+    contacts, limits = contacts_of(scene), _Limits.of(scene, longest)
+    sides = contacts[:2], contacts[2:]
     across, up = BaseVelocity(scene.excitation), BaseVelocity(scene.vertical)
-    starts, end = [*starts_of_motion(scene), math.inf], float(scene.output_times[-1])
-    resting, gravity, upright = RESTING * longest * scene.gravity, scene.gravity, scene.block.half_height
-    moment = 1.0 / scene.frequency_parameter
-    impact_step, probe_step = min(IMPACT_STEP * moment, longest), PROBE_STEP * moment
-    shortest, long_approach = SHORTEST_STEP * moment, LONG_APPROACH * moment
+    starts, end, gravity = [*starts_of_motion(scene), math.inf], float(scene.output_times[-1]), scene.gravity
     most_steps = 100_000 + 20 * int(end / longest)
 
     t, before, next_start = 0.0, (across(0.0), up(0.0)), 0
-    x, y, theta, vx, vy, w = scene.initial_state
+    pose, velocity = scene.initial_state[:3], scene.initial_state[3:]
     acceleration: Vector | None = None
-    times, states, felt = [t], [(x, y, theta, vx, vy, w)], []
-    while t < end - 1e-12 and abs(theta) < math.pi / 2:
-        # How long the step may be, and which corners touch.
-        dt = min(longest, end - t)
-        if acceleration is None:
-            dt = min(dt, probe_step)
+    times, states, felt = [t], [(*pose, *velocity)], []
+    while t < end - 1e-12 and abs(pose[2]) < math.pi / 2:
         while starts[next_start] <= t + 1e-9:
             next_start += 1
-        dt = min(dt, starts[next_start] - t)
-        impact = stops = False
-        touching: tuple[list[Contact], list[Contact]] = ([], [])
-        cos, sin = math.cos(theta), math.sin(theta)
-        for contacts, closed in zip((floor, walls), touching, strict=True):
-            for contact in contacts:
-                arm = contact.arm(cos, sin)
-                gap, rate = contact.gap(x, y, arm), contact.rate(vx, vy, w, arm)
-                if gap > CLOSED or rate > resting:
-                    curvature = 0.0 if acceleration is None else contact.acceleration(*acceleration, w, arm)
-                    closing = _time_to_close(gap, rate, curvature)
-                    if closing < dt:
-                        dt, stops = max(0.95 * closing if closing > long_approach else closing, shortest), False
-                    continue
-                closed.append(contact)
-                if rate < -resting:
-                    impact = True
-                elif contacts is floor and acceleration is not None:
-                    slip = vx - w * arm[1]
-                    slowing = acceleration[0] - acceleration[2] * arm[1] - w * w * arm[0]
-                    if slip * slowing < 0.0 and 0.2 * resting < abs(slip) < abs(slowing) * dt:
-                        dt, stops = abs(slip / slowing), True
-        if impact:
-            dt = impact_step
-
-        # Drift, kick, drift. The engine sees the block at mid-step, with the corners that touch just below the surface. What
-        # rests on a surface at the end of the step moves along its arc in mid-step; `carry` is that velocity: in a frame that
-        # moves with it the engine's contacts, which know of no arcs, are right.
-        after = across(t + dt), up(t + dt)
-        feels = (before[0] - after[0]) / dt, -gravity - (after[1] - before[1]) / dt
-        later = w if impact or acceleration is None else w + dt * acceleration[2]
-        middle, final = theta + 0.5 * dt * w, theta + 0.5 * dt * (w + later)
-        px, py, carry_x, carry_y = x + 0.5 * dt * vx, y + 0.5 * dt * vy, 0.0, 0.0
-        cos, sin = math.cos(middle), math.sin(middle)
-        for closed in touching:
-            if closed:
-                arms = [contact.arm(cos, sin) for contact in closed]
-                depth = EMBEDDED + max(contact.gap(px, py, arm) for contact, arm in zip(closed, arms, strict=True))
-                nx, nz = closed[0].normal
-                px, py = px - nx * depth, py - nz * depth
-                ends = closed[0].arm(math.cos(final), math.sin(final))
-                carry_x = -later * (ends[1] - arms[0][1])
-                if nz:
-                    carry_y = later * (ends[0] - arms[0][0])
-        kicked = push((px, py, middle), (vx + carry_x, vy + carry_y, w), dt, feels, impact)
-        new_vx, new_vy, new_w = kicked[0] - carry_x, kicked[1] - carry_y, kicked[2]
-        found = (new_vx - vx) / dt, (new_vy - vy) / dt, (new_w - w) / dt
-        x, y, theta = x + 0.5 * dt * (vx + new_vx), y + 0.5 * dt * (vy + new_vy), theta + 0.5 * dt * (w + new_w)
-        vx, vy, w = new_vx, new_vy, new_w
-
-        # A corner that stays on its surface is put back onto it, and a block that rocks no more is put down.
-        cos, sin = math.cos(theta), math.sin(theta)
-        for closed in touching:
-            if len(closed) == 1:
-                arm = closed[0].arm(cos, sin)
-                if abs(closed[0].rate(vx, vy, w, arm)) < resting:
-                    gap = closed[0].gap(x, y, arm)
-                    x, y = x - closed[0].normal[0] * gap, y - closed[0].normal[1] * gap
-        if acceleration is None and touching[0] and _settles(floor, (x, y, theta), (vx, vy, w), found, longest):
-            y, theta, vy, w = upright, 0.0, 0.0, 0.0
-        acceleration = None if impact or stops else found
-        t, before = t + dt, after
+        plan = _plan(pose, velocity, acceleration, sides, limits, min(end - t, starts[next_start] - t))
+        t += plan.dt
+        after = across(t), up(t)
+        feels = (before[0] - after[0]) / plan.dt, (before[1] - after[1]) / plan.dt - gravity
+        pose, velocity, found = _drift_kick_drift(pose, velocity, acceleration, plan, feels, push)
+        pose = _put_back(pose, velocity, plan, limits)
+        if acceleration is None and plan.touching[0] and _settles(sides[0], pose, velocity, found, limits):
+            pose, velocity = (pose[0], scene.block.half_height, 0.0), (velocity[0], 0.0, 0.0)
+        acceleration = None if plan.impact or plan.stops else found
+        before = after
         times.append(t)
-        states.append((x, y, theta, vx, vy, w))
+        states.append((*pose, *velocity))
         felt.append(feels)
-        if not abs(w) < 1e6 or len(times) > most_steps:
+        if not abs(velocity[2]) < 1e6 or len(times) > most_steps:  # nan, too
             raise ModelFailure(f"no end to the events, or a motion that blew up, after {len(times)} steps at t = {t:g} s")
     return np.array(times), np.array(states), np.array(felt).reshape(-1, 2)
+
+
+def _plan(
+    pose: Vector,
+    velocity: Vector,
+    acceleration: Vector | None,
+    sides: tuple[Sequence[Contact], Sequence[Contact]],
+    limits: _Limits,
+    dt: float,
+) -> _Plan:
+    """The next step, at most `dt` s long: it ends before a gap closes or a slip stops that the present acceleration brings."""
+    (x, y, theta), (vx, vy, w), resting = pose, velocity, limits.resting
+    dt = min(dt, limits.longest if acceleration is not None else limits.probe)
+    impact = stops = False
+    touching: tuple[list[Contact], list[Contact]] = ([], [])
+    cos, sin = math.cos(theta), math.sin(theta)
+    for contacts, closed in zip(sides, touching, strict=True):
+        for contact in contacts:
+            arm = contact.arm(cos, sin)
+            gap, rate = contact.gap(x, y, arm), contact.rate(vx, vy, w, arm)
+            if gap > CLOSED or rate > resting:
+                curvature = 0.0 if acceleration is None else contact.acceleration(*acceleration, w, arm)
+                closing = _time_to_close(gap, rate, curvature)
+                if closing < dt:
+                    dt, stops = max(0.95 * closing if closing > limits.long_approach else closing, limits.shortest), False
+                continue
+            closed.append(contact)
+            if rate < -resting:
+                impact = True
+            elif contact.surface == "floor" and acceleration is not None:
+                slip = vx - w * arm[1]
+                slowing = acceleration[0] - acceleration[2] * arm[1] - w * w * arm[0]
+                if slip * slowing < 0.0 and 0.2 * resting < abs(slip) < abs(slowing) * dt:
+                    dt, stops = abs(slip / slowing), True
+    return _Plan(limits.impact if impact else dt, touching, impact, stops)
+
+
+def _drift_kick_drift(
+    pose: Vector, velocity: Vector, acceleration: Vector | None, plan: _Plan, felt: tuple[float, float], push: Push
+) -> tuple[Vector, Vector, Vector]:
+    """Pose and velocity at the step's end, and the mean acceleration.
+
+    The engine sees the block at mid-step, with the corners that touch just below the surface. What rests on a surface at the
+    step's end still moves along its arc at mid-step; `carry` is that velocity. The engine's contacts know nothing of arcs, but
+    in a frame that moves with it they are right.
+    """
+    (x, y, theta), (vx, vy, w), dt = pose, velocity, plan.dt
+    later = w if plan.impact or acceleration is None else w + dt * acceleration[2]
+    middle, final = theta + 0.5 * dt * w, theta + 0.5 * dt * (w + later)
+    px, py, carry_x, carry_y = x + 0.5 * dt * vx, y + 0.5 * dt * vy, 0.0, 0.0
+    cos, sin = math.cos(middle), math.sin(middle)
+    for closed in plan.touching:
+        if closed:
+            arms = [contact.arm(cos, sin) for contact in closed]
+            depth = EMBEDDED + max(contact.gap(px, py, arm) for contact, arm in zip(closed, arms, strict=True))
+            nx, nz = closed[0].normal
+            px, py = px - nx * depth, py - nz * depth
+            ends = closed[0].arm(math.cos(final), math.sin(final))
+            carry_x = -later * (ends[1] - arms[0][1])
+            if nz:
+                carry_y = later * (ends[0] - arms[0][0])
+    kicked = push((px, py, middle), (vx + carry_x, vy + carry_y, w), dt, felt, plan.impact)
+    new_vx, new_vy, new_w = kicked[0] - carry_x, kicked[1] - carry_y, kicked[2]
+    half = 0.5 * dt
+    return (
+        (x + half * (vx + new_vx), y + half * (vy + new_vy), theta + half * (w + new_w)),
+        (new_vx, new_vy, new_w),
+        ((new_vx - vx) / dt, (new_vy - vy) / dt, (new_w - w) / dt),
+    )
+
+
+def _put_back(pose: Vector, velocity: Vector, plan: _Plan, limits: _Limits) -> Vector:
+    """The pose with the one corner that stays on a surface put back onto it."""
+    x, y, theta = pose
+    cos, sin = math.cos(theta), math.sin(theta)
+    for closed in plan.touching:
+        if len(closed) == 1:
+            arm, (nx, nz) = closed[0].arm(cos, sin), closed[0].normal
+            if abs(closed[0].rate(*velocity, arm)) < limits.resting:
+                gap = closed[0].gap(x, y, arm)
+                x, y = x - nx * gap, y - nz * gap
+    return x, y, theta
 
 
 def _time_to_close(gap: float, rate: float, curvature: float) -> float:
@@ -150,7 +208,7 @@ def _time_to_close(gap: float, rate: float, curvature: float) -> float:
     return (rate + math.sqrt(discriminant)) / -curvature if curvature < 0.0 else math.inf
 
 
-def _settles(floor: Sequence[Contact], pose: Vector, velocity: Vector, acceleration: Vector, longest: float) -> bool:
+def _settles(floor: Sequence[Contact], pose: Vector, velocity: Vector, acceleration: Vector, limits: _Limits) -> bool:
     """Whether both lower corners are on the floor, or so near and slow that they are back on it at once."""
     x, y, theta = pose
     cos, sin = math.cos(theta), math.sin(theta)
@@ -158,6 +216,6 @@ def _settles(floor: Sequence[Contact], pose: Vector, velocity: Vector, accelerat
         arm = contact.arm(cos, sin)
         rate = contact.rate(*velocity, arm)
         pulled = contact.acceleration(*acceleration, velocity[2], arm)
-        if contact.gap(x, y, arm) > SETTLING_GAP or abs(rate) > max(SETTLING_GAP, -SETTLING_TIME * longest * pulled):
+        if contact.gap(x, y, arm) > SETTLING_GAP or abs(rate) > max(SETTLING_GAP, -SETTLING_TIME * limits.longest * pulled):
             return False
     return True

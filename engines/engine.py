@@ -12,7 +12,7 @@ from typing import ClassVar, Literal, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from engines.adaptive import Push, march_adaptively
 from engines.base_motion import felt_acceleration
@@ -20,6 +20,7 @@ from engines.contacts import contacts_of
 from engines.events import events_of
 from scenes import Block, Cost, History, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall
 from scenes.base import Frozen, Positive
+from scenes.errors import printable
 from scenes.observation import observe
 
 FloatArray = NDArray[np.float64]
@@ -60,9 +61,18 @@ class Engine(Frozen):
     """
 
     name: ClassVar[str]
-    time_step: Positive | Literal["adaptive"] = 1e-4
+    time_step: float | Literal["adaptive"] = 1e-4
     largest_step: Positive = 1e-3
     settings: Literal["best", "default"] = "best"
+
+    @field_validator("time_step", mode="plain")
+    @classmethod
+    def _step_or_adaptive(cls, value: object) -> float | Literal["adaptive"]:
+        if value == "adaptive":
+            return "adaptive"
+        if isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < math.inf:
+            return float(value)
+        raise InputError(f'{printable(value)} is not allowed: a step above 0 s, or "adaptive", is asked for')
 
     @model_validator(mode="after")
     def _rigid_if_adaptive(self) -> Self:

@@ -14,7 +14,8 @@ from scenes.observation import STATE, modes_of
 
 FloatArray = NDArray[np.float64]
 HOLD = 2e-3  # s: shorter openings of a contact are the engine's chatter, and an impulse is summed over this time
-CLOSED = 1e-6  # m; wider at fixed steps, where a resting block falls freely for a step now and then
+CLOSED = 1e-6  # block radii; wider at fixed steps, where a resting block falls freely for a step now and then
+NOISE = 1e-3  # of the thresholds
 SLIPPING = 1e-3  # m/s
 TURNING = 1e-3  # rad/s
 
@@ -23,8 +24,8 @@ def events_of(scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: 
     """Events in order of time; `t` (n) and `states` (n, 6) at step ends, `felt` (n-1 or more, 2) accelerations in the steps.
 
     "floor impact" and "wall impact": the onset of a contact that had been open for more than 2 ms, with its normal
-    impulse in the first 2 ms; "uplift": one lower corner opens after both were closed for more than 2 ms; "lift-off", "landing": of both;
-    "release": a wall contact opens after more than 2 ms; "slip" and "stick" of the pivot; "settled"; "overturned ...".
+    impulse in the first 2 ms; "uplift": one lower corner opens after both were closed for more than 2 ms; "lift-off",
+    "landing": of both; "release": a wall contact opens after more than 2 ms; "slip" and "stick" of the pivot; "settled"; "overturned ...".
     """
     motion = _Motion(scene, contacts, t, states, felt)
     found: list[tuple[float, str, int, float]] = []
@@ -37,11 +38,14 @@ def events_of(scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: 
             found += [(t[end], "release", end, 0.0) for end in _falls(flags) if t[end] - t[_run_start(flags, end)] > HOLD]
     floor = [flags for contact, flags in zip(contacts, closed, strict=True) if contact.surface == "floor"]
     flat, flight = floor[0] & floor[1], ~(floor[0] | floor[1])
-    found += [(t[i], "uplift", i, 0.0) for i in _falls(_held(flat, t, value=True)) if not flight[i]]
-    found += [(t[i], "lift-off", i, 0.0) for i in _rises(flight)]
+    noise = NOISE * motion.near
+    lowest, highest = np.sort([motion.gap(contact) for contact in contacts[:2]], axis=0)
+    found += [(t[_start(highest, i, noise)], "uplift", i, 0.0) for i in _falls(_held(flat, t, value=True)) if not flight[i]]
+    found += [(t[_start(lowest, i, noise)], "lift-off", i, 0.0) for i in _rises(flight)]
     found += [(t[i], "landing", i, 0.0) for i in _falls(flight)]
-    slipping = _held(_held(~flight & (np.abs(motion.slip_rate) > SLIPPING), t), t, value=True)
-    found += [(t[i], "slip", i, 0.0) for i in _rises(slipping)]
+    slip_speed = np.abs(motion.slip_rate)
+    slipping = _held(_held(~flight & (slip_speed > SLIPPING), t), t, value=True)
+    found += [(t[_start(slip_speed, i, NOISE * SLIPPING)], "slip", i, 0.0) for i in _rises(slipping)]
     found += [(t[i], "stick", i, 0.0) for i in _falls(slipping) if not flight[i]]
     resting = _held(flat & ~slipping & (np.abs(states[:, 5]) < TURNING), t, value=True)
     found += [(t[i], "settled", i, 0.0) for i in _rises(resting)]
@@ -63,7 +67,7 @@ class _Motion:
 
     def __init__(self, scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: FloatArray, felt: FloatArray) -> None:
         self.scene, self.contacts, self.t, self.states, self.felt = scene, contacts, t, states, felt
-        self.near = CLOSED + 2.0 * scene.gravity * float(np.min(np.diff(t), initial=1e-3)) ** 2
+        self.near = CLOSED * scene.block.radius + 2.0 * scene.gravity * float(np.min(np.diff(t), initial=1e-3)) ** 2
         self.slip_rate = kinematics.slip_rate(scene.block, states[:, 2], states[:, 3], states[:, 5])
 
     def gap(self, contact: Contact, rows: slice = slice(None)) -> FloatArray:
@@ -129,6 +133,13 @@ def _rises(flags: NDArray[np.bool_]) -> list[int]:
 def _falls(flags: NDArray[np.bool_]) -> list[int]:
     """Indices at which a flag is not set that was set one earlier."""
     return _rises(~flags)
+
+
+def _start(values: FloatArray, index: int, noise: float) -> int:
+    """Where the rise of `values` above `noise` began that goes on at `index`: what grows slowly is noticed late."""
+    while index > 0 and values[index] > max(values[index - 1], noise):
+        index -= 1
+    return index
 
 
 def _run_start(flags: NDArray[np.bool_], end: int) -> int:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from engines.adaptive import Vector
 from engines.contacts import Contact, contacts_of
 from engines.engine import Engine, RigidWorld, World
-from scenes import Scene
+from scenes import ModelFailure, Scene
+from scenes.errors import printable
 
 FloatArray = NDArray[np.float64]
 CORNER_RADIUS = 1e-6  # of the block's radius; contacts are points, and MuJoCo has no contact of a point with a plane
@@ -58,6 +59,10 @@ class _MuJoCoWorld:
         import mujoco
 
         self.mujoco: Any = mujoco
+        # MuJoCo would print its warnings and keep a log of them in the working directory.
+        self.warnings: list[str] = []
+        self.former_handler = mujoco.get_mju_user_warning()
+        mujoco.set_mju_user_warning(self.warnings.append)
         self.model: Any = mujoco.MjModel.from_xml_string(model_text)
         self.data: Any = mujoco.MjData(self.model)
         # Views of the data, which are dear to make anew in each step.
@@ -78,14 +83,21 @@ class _MuJoCoWorld:
             self.step()
             state[:3] = self.qpos
             state[3:] = self.qvel
+        self.check()
         return states
 
     def step(self) -> None:
         """One step."""
         self.mujoco.mj_step(self.model, self.data)
 
+    def check(self) -> None:
+        """Raise `ModelFailure` if MuJoCo had anything to warn of: a state or an acceleration that is huge or not finite."""
+        if self.warnings:
+            raise ModelFailure(f"MuJoCo: {printable(self.warnings[0], 200)}")
+
     def close(self) -> None:
-        """Nothing to give back: the model goes with its last reference."""
+        """Leave the library as it was."""
+        self.mujoco.set_mju_user_warning(self.former_handler)
 
 
 class _RigidMuJoCoWorld(_MuJoCoWorld):
@@ -132,6 +144,7 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
         self.mujoco.mj_fwdConstraint(model, data)
         if self.friction > 0.0 and (rows := self._slipping_rows()):
             self._correct_cone(rows, dt)
+        self.check()
         ax, ay, spin = self.qacc.tolist()
         return velocity[0] + dt * ax, velocity[1] + dt * ay, velocity[2] + dt * spin
 
@@ -230,6 +243,5 @@ def _stock_model(scene: Scene) -> str:
     planes = _plane("floor", scene, 0.0, f'condim="3" friction="{mu!r} 0 0"')
     planes += "".join(_plane(wall.side, scene, 0.0, 'condim="1"') for wall in scene.walls)
     size = f"{block.half_width!r} {block.half_width!r} {block.half_height!r}"
-    return _model(
-        "><flag autoreset='disable'/>", planes + _planar_body(scene, f'<geom type="box" size="{size}" condim="1" friction="0 0 0"/>')
-    )
+    box = f'<geom type="box" size="{size}" condim="1" friction="0 0 0"/>'
+    return _model('><flag autoreset="disable"/>', planes + _planar_body(scene, box))

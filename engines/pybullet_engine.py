@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable
+from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -35,6 +37,20 @@ class PyBullet(Engine):
         return _PyBulletWorld(scene)
 
 
+@cache
+def _bullet() -> Any:
+    """The module, imported without the banner that it writes on the process's standard error."""
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        import pybullet
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+    return pybullet
+
+
 def _aloft(scene: Scene) -> tuple[float, float, float]:
     """Where a block is made, away from all contacts."""
     return 0.0, 0.0, 10.0 * scene.block.radius
@@ -46,9 +62,7 @@ class _PyBulletWorld:
     inset = 0.0  # m: how far behind their surfaces floor and walls stand
 
     def __init__(self, scene: Scene) -> None:
-        import pybullet
-
-        self.bullet: Any = pybullet
+        self.bullet = pybullet = _bullet()
         self.client: int = pybullet.connect(pybullet.DIRECT)
         self.options: dict[str, Any] = {"physicsClientId": self.client}
         self.body = self.make_block(scene)
