@@ -156,6 +156,24 @@ def _next_extremum(g, t):
 
 
 @kernel
+def largest_ahead(g, t):
+    """A bound on |acceleration| from time t on: its value now and at the extrema to come; a record's largest sample."""
+    if t > g.quiet or g.kind == STILL:
+        return 0.0
+    if g.kind == SINE:
+        return abs(g.c0)
+    largest = 0.0
+    if g.kind == SAMPLED:
+        for i in range(max(interval(g, t), 0), g.samples.size):
+            largest = max(largest, abs(g.samples[i]))
+        return largest
+    while t < NEVER:
+        largest = max(largest, abs(acceleration(g, t)))
+        t = _next_extremum(g, t)
+    return largest
+
+
+@kernel
 def next_exceedance(g, t, low, high):
     """The first time from t on at which the acceleration is below `low` or above `high`, on that side; else NEVER."""
     here = acceleration(g, t)

@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ebm.ground import fill_series
+from ebm.ground import STILL, fill_series
 from ebm.series import MOST_TERMS, slope, value
 from scenes.compiled import kernel
 
@@ -79,8 +79,10 @@ X, HEIGHT, THETA, VX, VY, W = range(6)
 
 @kernel
 def workspace():
-    """Scratch for one trajectory: the series, and the stack of the root search."""
-    return np.zeros((ROWS, MOST_TERMS)), np.zeros((48, MOST_TERMS))
+    """Scratch for one trajectory: the series (G = 1: no vertical motion), and the stack of the root search."""
+    series = np.zeros((ROWS, MOST_TERMS))
+    series[G, 0] = 1.0
+    return series, np.zeros((48, MOST_TERMS))
 
 
 @kernel
@@ -99,14 +101,15 @@ def tilt_series(b, m, z, gh, gv, t, order, enough, reach, need_forces, a):
     """
     sign = float(m[S])
     fill_series(gh, t, sign, order, a, U)
-    fill_series(gv, t, 1.0, order, a, G)
-    a[G, 0] += 1.0
+    if gv.kind != STILL:  # otherwise G is 1 throughout, as the run has set it
+        fill_series(gv, t, 1.0, order, a, G)
+        a[G, 0] += 1.0
     a[PHI, 0] = sign * z[THETA]
     a[OMEGA, 0] = sign * z[W]
     a[SIN, 0] = np.sin(b.alpha - a[PHI, 0])
     a[COS, 0] = np.cos(b.alpha - a[PHI, 0])
     if m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0:
-        return _rock_series(gv.kind == 0, order, enough, reach, need_forces, a)
+        return _rock_series(gv.kind == STILL, order, enough, reach, need_forces, a)
     a[XI, 0] = sign * z[X]
     a[XI, 1] = sign * z[VX]
     a[Y, 0] = z[HEIGHT]
@@ -317,8 +320,9 @@ def flat_series(b, m, z, gh, gv, t, order, a):
     Q is the floor's friction, P its normal force on both corners together, N_a the force of a wall that presses.
     """
     fill_series(gh, t, 1.0, order, a, U)
-    fill_series(gv, t, 1.0, order, a, G)
-    a[G, 0] += 1.0
+    if gv.kind != STILL:  # otherwise G is 1 throughout, as the run has set it
+        fill_series(gv, t, 1.0, order, a, G)
+        a[G, 0] += 1.0
     a[XI, 0], a[XI, 1], a[Y, 0], a[Y, 1] = z[X], z[VX], z[HEIGHT], z[VY]
     press = m[TIP] - m[FAR]
     for k in range(order - 1):

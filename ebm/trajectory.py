@@ -9,7 +9,7 @@ import numpy as np
 
 from ebm import impacts
 from ebm.contact_impacts import CONTACTS, FAR_BOTTOM, FAR_TOP, TIP_BOTTOM, TIP_TOP, E, F, contact_impact
-from ebm.ground import STILL, acceleration, next_exceedance, next_kink
+from ebm.ground import GAUSSIAN, STILL, acceleration, largest_ahead, next_exceedance, next_kink
 from ebm.motion import (
     COS,
     FAMILY,
@@ -57,6 +57,7 @@ from ebm.transitions import (
     closed_floor,
     consistent,
     guard,
+    guards_of,
     rock_guards_hold,
     select,
     slip_velocity,
@@ -162,7 +163,13 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
     gains = np.zeros(2)
     impulse = np.zeros(2)
     still = gv.kind == STILL
+    smooth = still and (gh.kind == STILL or gh.kind == GAUSSIAN)
+    for k in range(a.shape[1]):  # the series of 1 + vertical acceleration: of a still base it stays as it is
+        a[G, k] = 0.0
+    a[G, 0] = 1.0
     quiet = max(gh.quiet, gv.quiet)
+    if control.until_decided and smooth:
+        quiet = gh.centre + math.sqrt(32.0 / gh.rate) if gh.kind == GAUSSIAN else 0.0  # 1e-12 of the pulse is left
     base_rest = _REST_UNILATERAL if b.unilateral else _REST_BILATERAL
     resting, window_start, last_impact, in_window = base_rest, -1.0, -1.0, 0
     t = 0.0
@@ -208,8 +215,8 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             continue
         if t >= t_end:
             break
-        if control.until_decided and t >= quiet:
-            verdict = _decided(b, m, z, gh, gv, peak)
+        if control.until_decided and (t >= quiet or abs(z[THETA]) > b.alpha):
+            verdict = _decided(b, m, z, gh, peak) if t >= quiet else _falls(b, m, z, gh, t, still)
             if verdict > 0.0:
                 peak = verdict
                 if peak >= 0.5 * math.pi:
@@ -222,7 +229,8 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         # --- one step of the series
         steps += 1
         series += 1
-        reach = min(min(next_kink(gh, t), next_kink(gv, t)), t_end) - t
+        end = t_end if smooth else min(min(next_kink(gh, t), next_kink(gv, t)), t_end)
+        reach = end - t
         pivot = 0.0
         if m[FAMILY] == FLAT:
             order = flat_series(b, m, z, gh, gv, t, control.order, a)
@@ -244,8 +252,9 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             if tau == NO_ROOT:
                 tau, which = h, -1
         else:
+            mask = guards_of(b, m)
             for k in range(GUARDS):
-                degree = guard(b, m, k, order, pivot, a)
+                degree = guard(b, m, k, order, pivot, a) if mask >> k & 1 else -1
                 if degree >= 0:
                     root = first_root(a, GUARD, degree, tau, SLIP_NOISE if k == G_SLIP else NOISE, stack)
                     if root != NO_ROOT:
@@ -256,8 +265,8 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         if not math.isfinite(tau):
             ending = NOT_FINITE
             break
-        end = t + tau if which >= 0 or tau < reach else t + reach
-        while rows < out.shape[0] and rows * control.output_step < end:
+        until = t + tau if which >= 0 or tau < reach else end
+        while rows < out.shape[0] and rows * control.output_step < until:
             if m[FAMILY] == FLAT:
                 flat_state(b, m, order, rows * control.output_step - t, a, out[rows])
             else:
@@ -275,8 +284,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
                 hop = max(hop, _highest(a, order, tau))
             tilt_state(b, m, order, tau, pivot, a, z)
         if which < 0 and tau >= reach:
-            kink = min(next_kink(gh, t), next_kink(gv, t))
-            t = kink if kink <= t_end else t_end
+            t = end
         else:
             t += tau
         peak = max(peak, abs(z[THETA]))
@@ -539,7 +547,7 @@ def _strike(b, m, z, resting, impulse, gains):
 
 
 @kernel
-def _decided(b, m, z, gh, gv, peak):
+def _decided(b, m, z, gh, peak):
     """After the excitation: the final peak rotation (>= pi/2: overturns) if the rest of the motion is certain, else -1.
 
     Without excitation the energy of block and floor cannot grow, and a block whose energy is below that of standing on its
@@ -561,6 +569,22 @@ def _decided(b, m, z, gh, gv, peak):
     if rocks and m[S] * z[W] >= 0.0 and (phi > b.alpha or energy > 1.0):
         return 0.5 * math.pi
     return -1.0
+
+
+@kernel
+def _falls(b, m, z, gh, t, still):
+    """pi/2 if a block past its balance point falls whatever the rest of the excitation does, else -1.
+
+    Turning outward, beyond tan(phi - alpha) > mu and > |u| for all time to come, it is accelerated outward in every mode:
+    sticking by (3), slipping by (7), by an impulse of the floor, or not at all in flight. Walls it could meet are left out.
+    """
+    phi = abs(z[THETA])
+    if not still or m[FAMILY] == FLAT or m[S] * z[W] < 0.0 or (b.gap_left if m[S] > 0 else b.gap_right) < np.inf:
+        return -1.0
+    steepness = math.tan(phi - b.alpha)
+    if (not b.no_slip and steepness <= b.mu_s) or steepness <= abs(acceleration(gh, t)) or steepness <= largest_ahead(gh, t):
+        return -1.0
+    return 0.5 * math.pi
 
 
 @kernel

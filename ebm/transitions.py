@@ -76,6 +76,22 @@ CLOSED_RATE = 1e-9
 
 
 @kernel
+def guards_of(b, m):
+    """The guards that mode m may have, as bits: what a scene or a mode does not need is not looked at."""
+    walls = 1 << G_TIP_GAP | 1 << G_FAR_GAP | 1 << G_TIP_PUSH | 1 << G_FAR_PUSH if b.walls else 0
+    push = 1 << G_PUSH if b.unilateral or m[FLOOR] == SLIPPING else 0
+    if m[FLOOR] == OFF:
+        floor = 1 << G_LANDING
+    elif m[FLOOR] == SLIPPING:
+        floor = push | 1 << G_SLIP
+    else:
+        floor = push if b.no_slip else push | 1 << G_CONE_PLUS | 1 << G_CONE_MINUS
+    if m[FAMILY] == FLAT:
+        return walls | floor | 1 << G_UPLIFT_PLUS | 1 << G_UPLIFT_MINUS
+    return walls | floor | 1 << G_PHI | 1 << G_TOPPLE
+
+
+@kernel
 def guard(b, m, which, order, pivot, a):
     """Writes guard `which` of mode m into the workspace and returns its degree, or -1 where the mode has no such guard."""
     if m[FAMILY] == FLAT:
@@ -245,8 +261,9 @@ def consistent(b, m, z, gh, gv, t, a):
     else:
         order = tilt_series(b, m, z, gh, gv, t, _LOOK, 0.0, 0.0, True, a)
         pivot = m[S] * z[X] - a[SIN, 0]
+    mask = guards_of(b, m)
     for which in range(GUARDS):
-        degree = guard(b, m, which, order, pivot, a)
+        degree = guard(b, m, which, order, pivot, a) if mask >> which & 1 else -1
         if degree < 0:
             continue
         if which <= G_FAR_GAP and a[GUARD, 1] < -CLOSED_RATE:
@@ -300,9 +317,9 @@ def select(b, z, gh, gv, t, left, m, a):
     """
     flat = z[THETA] == 0.0 and z[W] == 0.0
     floor = closed_floor(b, z) or not b.unilateral
-    if floor and b.walls and z[THETA] != 0.0 and abs(z[W]) < CLOSED_RATE:
-        if closed_wall(b, z, 1, False) or closed_wall(b, z, -1, False):
-            z[W] = z[VX] = z[VY] = 0.0  # on floor and wall a block that does not turn stands
+    stands = floor and b.walls and z[THETA] != 0.0 and abs(z[W]) < CLOSED_RATE
+    if stands and (closed_wall(b, z, 1, False) or closed_wall(b, z, -1, False)):
+        z[W] = z[VX] = z[VY] = 0.0  # on floor and wall a block that does not turn stands
     for attempt in range(2):
         if flat:
             if _select_flat(b, z, gh, gv, t, floor, left, m, a, attempt == 1):
@@ -363,15 +380,15 @@ def _select_tilt(b, z, gh, gv, t, sense, floor, left, m, a, again):
             continue
         m[TIP], m[FAR] = walls & 1, walls >> 1
         v = sense * (slip_velocity(b, z) if walls == 0 else z[W])  # along a wall the pivot slips as the block turns
-        for slip in (0, 1, -1):
-            if not floor or (slip == 0 and v != 0.0) or slip * v < 0.0 or (slip != 0 and b.no_slip):
+        for pull in (1, -1):  # a floor that pulls is rare
+            if pull < 0 and (b.unilateral or walls == 3):
                 continue
-            m[FLOOR] = STICK if slip == 0 else SLIPPING
-            m[SLIP] = slip
-            for pull in (1, -1):
-                if pull < 0 and (b.unilateral or walls == 3 or (b.no_slip and slip == 0)):
+            m[PULL] = pull
+            for slip in (0, 1, -1):
+                if not floor or (slip == 0 and v != 0.0) or slip * v < 0.0 or (b.no_slip and (slip != 0 or pull < 0)):
                     continue
-                m[PULL] = pull
+                m[FLOOR] = STICK if slip == 0 else SLIPPING
+                m[SLIP] = slip
                 if _accept(b, m, z, gh, gv, t, left, a, again):
                     return True
         if b.unilateral or not floor:
