@@ -80,6 +80,7 @@ def work_precision_figure(found: WorkPrecision, families: Sequence[str]) -> Figu
                 form = ax.axhline(found.model_form[family], color="#6e6e6e", linewidth=1.0, linestyle=(0, (6, 3)))
                 handles.setdefault("model form: EBM against unilateral", form)
             ax.set(xscale="log", yscale="log", ylim=(FLOOR, 3.0), title=family)
+            _log_scales(ax)
         for ax in axes.flat[len(families) :]:
             ax.set_axis_off()
         for ax in axes[:, 0]:
@@ -89,6 +90,23 @@ def work_precision_figure(found: WorkPrecision, families: Sequence[str]) -> Figu
         names = {label: _label(label) for label in handles}
         figure.legend(handles.values(), [names[label] for label in handles], loc="outside lower center", ncols=4)
     return figure
+
+
+def _log_scales(ax: Axes) -> None:
+    """Both axes in powers of ten, written out: the common style leaves $ as it is, which matplotlib's own labels need."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    for axis in (ax.xaxis, ax.yaxis):
+        if axis.get_scale() == "log":
+            axis.set_major_locator(LogLocator(numticks=7))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+            axis.set_minor_locator(NullLocator())
+
+
+def power_of_ten(value: float) -> str:
+    """10⁻³; plain from 0.1 to 1000."""
+    exponent = round(math.log10(value))
+    return f"{value:g}" if -1 <= exponent <= 3 else "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def _drawn(point: Point) -> bool:
@@ -142,6 +160,7 @@ def ratio_figure(found: WorkPrecision) -> Figure:
         ax.set(xscale="log", xlabel=f"CPU time at an error of {LEVEL:g} α over the EBM's", ylim=(len(LINES) - 0.4, -0.6))
         low, high = ax.get_xlim()
         ax.set_xlim(low, high * 12.0)  # room for the words
+        _log_scales(ax)
         ax.set_yticks(range(len(LINES)), [_label(label) for label in LINES])
         ax.grid(visible=False, axis="y")
     return figure
@@ -160,6 +179,7 @@ def batch_figure(speed: EbmSpeed) -> Figure:
             ax.plot(errors, costs, marker=marker, color=colour, label=f"{case.name}: {case.words}")
         ax.axvline(BATCH_LEVEL, color="#6e6e6e", linewidth=0.8, linestyle=(0, (6, 3)))
         ax.set(xscale="log", yscale="log", xlabel="p95 error of the peak, rad (rotation)", ylabel="CPU μs a trajectory, one core")
+        _log_scales(ax)
         ax.invert_xaxis()
         figure.legend(loc="outside right center")
     return figure

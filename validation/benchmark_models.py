@@ -27,6 +27,8 @@ LEVEL = 1e-3
 LONG_ENOUGH, REPEATS = 0.02, 3
 #: An engine's step below which its runs are played side by side in worker processes, after all others.
 SIDE_BY_SIDE = 1e-4
+#: Share of the time after which the longest runs get their turn.
+SHARE_OF_SHORT = 0.6
 #: An order is fitted to median errors between these, alpha: below is rounding, above nothing converges yet.
 FITTED = 3e-13, 0.2
 
@@ -203,7 +205,7 @@ def work_precision(
 
     Runs are interleaved: member by member, family by family, every model and setting in turn, so that whatever else the
     machine does touches all alike; one at a time, but for the longest (`SIDE_BY_SIDE`), which follow in `jobs` processes.
-    What has not begun at `deadline` (of `time.monotonic`) is left out and listed.
+    What has not begun at `deadline` (of `time.monotonic`; the others: at `SHARE_OF_SHORT` of the time) is left out and listed.
     """
     families = QUICK if quick else tuple(FAMILIES)
     plays = [
@@ -216,8 +218,9 @@ def work_precision(
     long = [play for play in plays if _takes_long(play[2], play[3])]
     samples: list[Sample] = []
     short = [play for play in plays if not _takes_long(play[2], play[3])]
+    now = time.monotonic()
     for n, play in enumerate(short):
-        if time.monotonic() > deadline:
+        if time.monotonic() > now + SHARE_OF_SHORT * (deadline - now):
             break
         progress(f"{n + 1} of {len(short)} runs: {play[0]}, {play[2]}")
         samples.append(measure(*play))
