@@ -14,6 +14,7 @@ from scenes.observation import STATE, modes_of
 
 FloatArray = NDArray[np.float64]
 HOLD = 2e-3  # s: shorter openings of a contact are the engine's chatter, and an impulse is summed over this time
+REST = 20e-3  # s: a shorter rest is the dead centre of a last tiny rocking
 CLOSED = 1e-6  # block radii; wider at fixed steps, where a resting block falls freely for a step now and then
 NOISE = 1e-3  # of the thresholds
 SLIPPING = 1e-3  # m/s
@@ -24,7 +25,7 @@ def events_of(scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: 
     """Events in order of time; `t` (n) and `states` (n, 6) at step ends, `felt` (n-1 or more, 2) accelerations in the steps.
 
     "floor impact" and "wall impact": the onset of a contact that had been open for more than 2 ms, with its normal
-    impulse in the first 2 ms; "uplift": one lower corner opens after both were closed for more than 2 ms; "lift-off",
+    impulse in the first 2 ms; "uplift": one lower corner opens after both were closed for more than 20 ms; "lift-off",
     "landing": of both; "release": a wall contact opens after more than 2 ms; "slip" and "stick" of the pivot; "settled"; "overturned ...".
     """
     motion = _Motion(scene, contacts, t, states, felt)
@@ -40,14 +41,14 @@ def events_of(scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: 
     flat, flight = floor[0] & floor[1], ~(floor[0] | floor[1])
     noise = NOISE * motion.near
     lowest, highest = np.sort([motion.gap(contact) for contact in contacts[:2]], axis=0)
-    found += [(t[_start(highest, i, noise)], "uplift", i, 0.0) for i in _falls(_held(flat, t, value=True)) if not flight[i]]
+    found += [(t[_start(highest, i, noise)], "uplift", i, 0.0) for i in _falls(_held(flat, t, REST, value=True)) if not flight[i]]
     found += [(t[_start(lowest, i, noise)], "lift-off", i, 0.0) for i in _rises(flight)]
     found += [(t[i], "landing", i, 0.0) for i in _falls(flight)]
     slip_speed = np.abs(motion.slip_rate)
     slipping = _held(_held(~flight & (slip_speed > SLIPPING), t), t, value=True)
     found += [(t[_start(slip_speed, i, NOISE * SLIPPING)], "slip", i, 0.0) for i in _rises(slipping)]
     found += [(t[i], "stick", i, 0.0) for i in _falls(slipping) if not flight[i]]
-    resting = _held(flat & ~slipping & (np.abs(states[:, 5]) < TURNING), t, value=True)
+    resting = _held(flat & ~slipping & (np.abs(states[:, 5]) < TURNING), t, REST, value=True)
     found += [(t[i], "settled", i, 0.0) for i in _rises(resting)]
     if abs(states[-1, 2]) >= math.pi / 2:
         part = (math.pi / 2 - abs(states[-2, 2])) / (abs(states[-1, 2]) - abs(states[-2, 2]))
@@ -148,11 +149,11 @@ def _run_start(flags: NDArray[np.bool_], end: int) -> int:
     return int(unset[-1]) + 1 if unset.size else 0
 
 
-def _held(flags: NDArray[np.bool_], t: FloatArray, *, value: bool = False) -> NDArray[np.bool_]:
-    """`flags` without those runs of `value` inside it that last for 2 ms or less."""
+def _held(flags: NDArray[np.bool_], t: FloatArray, hold: float = HOLD, *, value: bool = False) -> NDArray[np.bool_]:
+    """`flags` without those runs of `value` inside it that last for `hold` s or less."""
     edges = np.flatnonzero(flags[1:] != flags[:-1]) + 1
     starts, ends = edges[:-1], edges[1:]  # of runs that neither begin nor end the motion
-    short = (flags[starts] == value) & (t[ends] - t[starts] <= HOLD)
+    short = (flags[starts] == value) & (t[ends] - t[starts] <= hold)
     change = np.zeros(len(flags) + 1, dtype=np.intp)
     np.add.at(change, starts[short], 1)
     np.add.at(change, ends[short], -1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from scenes import Block, Floor, Scene
+from scenes import Block, Floor, Ricker, Scene, Wall
 
 BLOCK = Block(half_width=0.397, half_height=1.555)
 
@@ -28,6 +28,19 @@ def free_rocking() -> Callable[[float], Scene]:
 
     def scene(tilt: float) -> Scene:
         return Scene(name="free rocking", block=BLOCK, floor=Floor(friction=1.0), initial_rotation=tilt * BLOCK.alpha, duration=4.0)
+
+    return scene
+
+
+@pytest.fixture(scope="session")
+def pulse() -> Callable[..., Scene]:
+    """A Ricker pulse: amplitude in g tan(alpha), frequency in p; friction and walls as given."""
+
+    def scene(amplitude: float, frequency: float, friction: float = 1.0, walls: Sequence[Wall] = (), duration: float = 4.0) -> Scene:
+        excitation = Ricker(
+            amplitude=amplitude * 9.81 * math.tan(BLOCK.alpha), period=2 * math.pi / (frequency * BLOCK.frequency_parameter)
+        )
+        return Scene(name="pulse", block=BLOCK, floor=Floor(friction=friction), walls=walls, excitation=excitation, duration=duration)
 
     return scene
 

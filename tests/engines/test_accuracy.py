@@ -1,0 +1,141 @@
+"""How far the engines are from exact motions, and at which order they come nearer."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from engines import MuJoCo, PyBullet
+from scenes import Floor, Ricker, Scene, Wall
+
+CASES = Path(__file__).parents[1] / "data" / "unilateral_ricker_cases.csv"
+TILTS = (0.3, -0.4, 0.5, 0.6, 0.7, -0.8, 0.9)
+PULSES = ((1.5, 3.0), (3.0, 5.0), (4.0, 6.0), (-2.5, 4.5), (2.2, 3.8))  # amplitude in g tan(alpha), frequency in p
+each_engine = pytest.mark.parametrize("engine", [MuJoCo, PyBullet], ids=lambda engine: engine.name)
+
+
+@each_engine
+def test_fixed_steps_are_of_first_order(engine, free_rocking, rotation_error):
+    """One run may be lucky by a factor of five: it is the median of several starts that falls with the step."""
+    errors = {}
+    for step in (2e-3, 2e-4):
+        histories = [(engine(time_step=step).simulate(scene), scene) for scene in map(free_rocking, TILTS)]
+        errors[step] = np.median([rotation_error(history.channels["theta"], scene) for history, scene in histories])
+    assert errors[2e-4] < 2e-3
+    assert 5.0 < errors[2e-3] / errors[2e-4] < 30.0
+
+
+@each_engine
+def test_adaptive_steps_are_of_second_order(engine, pulse, rotation_error):
+    errors = {}
+    for step in (4e-3, 1e-3):
+        model = engine(time_step="adaptive", largest_step=step)
+        errors[step] = np.median([rotation_error(model.simulate(scene).channels["theta"], scene) for scene in (pulse(*p) for p in PULSES)])
+    assert errors[1e-3] < 1e-5
+    assert errors[4e-3] < 1e-4
+    assert errors[4e-3] / errors[1e-3] > 9.0
+
+
+@each_engine
+def test_adaptive_steps_resolve_each_impact(engine, free_rocking, rotation_error):
+    """Ten times better than a fixed step of a tenth of their length."""
+    adaptive = engine(time_step="adaptive", largest_step=4e-3)
+    fixed = engine(time_step=4e-4)
+    for tilt in (0.3, 0.7):
+        scene = free_rocking(tilt)
+        history = adaptive.simulate(scene)
+        assert history.cost.steps < 1.1 * scene.duration / 4e-3
+        error = rotation_error(history.channels["theta"], scene)
+        assert error < 2e-5
+        assert error < 0.1 * rotation_error(fixed.simulate(scene).channels["theta"], scene)
+
+
+@each_engine
+def test_a_stock_engine_is_far_off(engine, free_rocking, rotation_error):
+    """What "default" is there to show: contacts as they come do not get better with the step."""
+    scene = free_rocking(0.7)
+    for step in (1e-3, 2e-4):
+        assert rotation_error(engine(time_step=step, settings="default").simulate(scene).channels["theta"], scene) > 2e-3
+    assert rotation_error(engine(time_step=2e-4).simulate(scene).channels["theta"], scene) < 1e-3
+
+
+def cases(every: int) -> list[dict[str, str]]:
+    """Rows of the table of an independent event-driven implementation, those left out where rigid bodies have no answer."""
+    with CASES.open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["depends_on_rule"] == "0"]
+    return rows[::every]
+
+
+def peak_errors(engine, block, rows) -> list[float]:
+    """Errors of the peak of |theta|, in alpha, of the runs that end safe; asserts all outcomes."""
+    errors = []
+    for row in rows:
+        period = 2 * math.pi / (float(row["wp_over_p"]) * block.frequency_parameter)
+        walls = [] if row["side"] == "none" else [Wall(side=row["side"], gap=float(row["gap"]), restitution=float(row["e_w"]))]
+        scene = Scene(
+            name="case",
+            block=block,
+            floor=Floor(friction=float(row["mu"])),
+            walls=walls,
+            excitation=Ricker(amplitude=float(row["ap_ratio"]) * 9.81 * math.tan(block.alpha), period=period),
+            duration=4 * period + 20.0,
+            output_step=1e-3,  # peaks at a wall are sharp
+        )
+        history = engine.simulate(scene)
+        outcome = {"overturned left": "ccw", "overturned right": "cw"}.get(history.outcome, "safe")
+        assert outcome == row["outcome"], row
+        if outcome == "safe":
+            errors.append(abs(history.peak_rotation / block.alpha - float(row["peak_theta_over_alpha"])))
+    return errors
+
+
+@each_engine
+def test_walls_and_slip(engine, block):
+    """Outcomes and peaks beside walls with e = 0, 0.5 and 1, with and without slip."""
+    errors = peak_errors(engine(time_step="adaptive", largest_step=2e-3), block, cases(every=41))
+    assert len(errors) >= 7
+    assert np.median(errors) < 5e-5
+    assert np.max(errors) < 5e-4
+
+
+@pytest.mark.slow
+@each_engine
+def test_walls_and_slip_throughout(engine, block):
+    errors = peak_errors(engine(time_step="adaptive", largest_step=2e-3), block, cases(every=1))
+    assert np.median(errors) < 3e-5
+    assert np.quantile(errors, 0.95) < 2e-4
+    assert np.max(errors) < 3e-3
+
+
+def test_the_engines_agree(pulse):
+    """Two engines that share nothing but the steps: slip, both kinds of wall impact, hops."""
+    scenes = [
+        pulse(4.0, 4.5, friction=0.3),
+        pulse(3.0, 6.0, friction=0.6, walls=[Wall(side="left", gap=0.053, restitution=1.0)]),
+        pulse(2.0, 4.0, friction=0.3, walls=[Wall(side="right", gap=0.053, restitution=0.5)]),
+    ]
+    for scene in scenes:
+        one, other = (engine(time_step="adaptive").simulate(scene) for engine in (MuJoCo, PyBullet))
+        assert np.max(np.abs(one.channels["theta"] - other.channels["theta"])) < 1e-4 * scene.block.alpha
+        assert [event.kind for event in one.event_list][:12] == [event.kind for event in other.event_list][:12]
+
+
+@pytest.mark.parametrize("step", [1e-4, "adaptive"])
+def test_cone_correction(pulse, step):
+    """MuJoCo's own cone lifts a slipping pivot at mu times its slip rate, whatever the step; 0.3162 is exact here."""
+    scene = pulse(3.0, 6.0, friction=0.6, walls=[Wall(side="left", gap=0.053, restitution=1.0)], duration=2.0)
+    mended = MuJoCo(time_step=step).simulate(scene)
+    plain = MuJoCo(time_step=step, cone_correction=False).simulate(scene)
+    assert mended.peak_rotation / scene.block.alpha == pytest.approx(0.3162, abs=3e-4)
+    assert plain.peak_rotation / scene.block.alpha == pytest.approx(0.400, abs=3e-3)
+
+
+def test_a_corrected_block_slides_without_lifting(block):
+    scene = Scene(name="slide", block=block, floor=Floor(friction=0.2), initial_velocity=1.0, duration=0.3)
+    for cone_correction, lifted in ((True, False), (False, True)):
+        history = MuJoCo(time_step=1e-3, cone_correction=cone_correction).simulate(scene)
+        assert (np.max(history.channels["y"]) - block.half_height > 1e-5) == lifted

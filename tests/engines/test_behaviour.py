@@ -1,0 +1,292 @@
+"""Settings, events, notes, failures and everything else that a user of an engine relies on."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from engines import MuJoCo, PyBullet
+from engines.engine import Engine
+from scenes import Block, Floor, InputError, ModelFailure, Record, Ricker, Scene, Sine, Wall
+
+each_engine = pytest.mark.parametrize("engine", [MuJoCo, PyBullet], ids=lambda engine: engine.name)
+
+
+def run(code: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+
+
+def test_import_loads_no_engine():
+    code = "import sys, engines; print(sorted({'mujoco', 'pybullet', 'scipy', 'pandas', 'numba'} & set(sys.modules)))"
+    assert run(code).stdout.strip() == "[]"
+
+
+def test_a_run_prints_nothing():
+    code = """
+from engines import MuJoCo, PyBullet
+from scenes import Block, Floor, Scene
+scene = Scene(name="quiet", block=Block(half_width=0.4, half_height=1.5), floor=Floor(friction=0.3), duration=0.01)
+for engine in (MuJoCo, PyBullet):
+    engine(time_step=1e-3).simulate(scene)
+"""
+    done = run(code)
+    assert done.stdout + done.stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"time_step": "adaptve"}, "time_step: adaptve is not allowed"),
+        ({"time_step": 0.0}, "time_step: 0.0 is not allowed"),
+        ({"time_step": True}, "time_step: True is not allowed"),
+        ({"time_step": math.nan}, "time_step: nan is not allowed"),
+        ({"largest_step": -1.0}, "largest_step"),
+        ({"settings": "worst"}, "settings"),
+        ({"time_step": "adaptive", "settings": "default"}, "time_step"),
+        ({"step": 1e-3}, "step: unknown key"),
+    ],
+)
+@each_engine
+def test_wrong_settings(engine, settings, words):
+    with pytest.raises(InputError, match=words):
+        engine(**settings)
+
+
+@pytest.mark.parametrize("settings", [{"time_step": 1e-9}, {"time_step": "adaptive", "largest_step": 1e-9}])
+@each_engine
+def test_too_many_steps_are_refused_at_once(engine, settings, free_rocking):
+    with pytest.raises(InputError, match="5000000 steps"):
+        engine(**settings).simulate(free_rocking(0.5))
+
+
+@each_engine
+def test_history_says_how_it_came_about(engine, free_rocking):
+    history = engine(time_step=1e-3).simulate(free_rocking(0.5).replace(duration=1.0))
+    assert history.model == engine.name
+    assert history.settings["time_step"] == 1e-3
+    assert history.settings["settings"] == "best"
+    assert history.cost.steps == 1000
+    assert history.cost.wall_seconds > 0.0
+    assert history.cost.cpu_seconds > 0.0
+    assert history.cost.set_up > 0.0
+    assert history.notes == ()
+
+
+@each_engine
+def test_what_an_engine_cannot_do_is_noted(engine, free_rocking):
+    scene = free_rocking(0.5).replace(duration=0.1, floor=Floor(friction=0.5, static_friction=0.7))
+    assert any("kinetic 0.5 is used for static 0.7" in note for note in engine(time_step=1e-3).simulate(scene).notes)
+
+
+def test_stock_mujoco_has_no_restitution(free_rocking):
+    scene = free_rocking(0.5).replace(duration=0.1, floor=Floor(friction=0.5, restitution=0.5))
+    assert any("restitution" in note for note in MuJoCo(time_step=1e-3, settings="default").simulate(scene).notes)
+    assert MuJoCo(time_step=1e-3).simulate(scene).notes == ()
+
+
+@each_engine
+@pytest.mark.parametrize("step", [1e-3, "adaptive"])
+def test_scene_shorter_than_its_output_step(engine, step, free_rocking):
+    history = engine(time_step=step).simulate(free_rocking(0.5).replace(duration=1e-3, output_step=5e-3))
+    assert history.channels["t"].tolist() == [0.0]
+
+
+@each_engine
+@pytest.mark.parametrize("step", [7e-4, "adaptive"])
+def test_output_grid_need_not_fit_the_steps(engine, step, free_rocking):
+    coarse = engine(time_step=step).simulate(free_rocking(0.5).replace(duration=2.0, output_step=3.1e-3))
+    fine = engine(time_step=step).simulate(free_rocking(0.5).replace(duration=2.0, output_step=1e-4))
+    again = np.interp(coarse.channels["t"], fine.channels["t"], fine.channels["theta"])
+    assert np.max(np.abs(coarse.channels["theta"] - again)) < (1e-7 if step == 7e-4 else 1e-5)
+
+
+@each_engine
+def test_events_of_a_pulse_beside_a_wall(engine, pulse):
+    """Times from an event-driven implementation of the unilateral model."""
+    scene = pulse(3.0, 6.0, friction=0.6, walls=[Wall(side="left", gap=0.053, restitution=1.0)], duration=1.9)
+    history = engine(time_step="adaptive").simulate(scene)
+    expected = [
+        ("uplift", 0.783060),
+        ("wall impact", 0.941125),
+        ("lift-off", 0.941125),
+        ("floor impact", 0.983946),
+        ("landing", 0.983946),
+        ("floor impact", 1.831316),
+        ("wall impact", 1.849009),
+    ]
+    found = [(event.kind, event.t) for event in history.event_list][: len(expected)]
+    assert [kind for kind, _ in found] == [kind for kind, _ in expected]
+    assert [t for _, t in found] == pytest.approx([t for _, t in expected], abs=2e-5)
+    hit = history.event_list[1]
+    assert (hit.mode_before, hit.mode_after) == ("rock", "flight")
+    assert hit.impulse == pytest.approx(0.407101, abs=1e-4)
+
+
+@each_engine
+def test_slip_and_stick_events(engine, pulse):
+    history = engine(time_step="adaptive").simulate(pulse(4.0, 4.5, friction=0.3, duration=1.6))
+    found = {event.kind: event.t for event in history.event_list if event.kind in ("slip", "stick")}
+    assert found["slip"] == pytest.approx(1.057406, abs=1.1e-3)  # of the unilateral model; known to one step
+    assert found["stick"] == pytest.approx(1.366917, abs=1e-4)
+
+
+@each_engine
+def test_a_rocking_block_comes_to_rest_once(engine, block):
+    scene = Scene(name="decay", block=block, floor=Floor(friction=1.0), initial_rotation=0.1 * block.alpha, duration=8.0)
+    history = engine(time_step="adaptive").simulate(scene)
+    kinds = [event.kind for event in history.event_list]
+    assert kinds.count("settled") == 1
+    assert kinds[-1] == "settled"
+    assert history.outcome == "at rest"
+    assert set(kinds) == {"floor impact", "settled"}
+
+
+def test_small_and_large_blocks_move_alike(pulse):
+    """Lengths times 0.01 and times times 0.1: the same motion."""
+    walls = [Wall(side="left", gap=0.053, restitution=0.5)]
+    large = pulse(2.0, 4.0, friction=0.3, walls=walls, duration=4.0)
+    excitation = Ricker(amplitude=large.excitation.amplitude, period=0.1 * large.excitation.period)
+    small = large.replace(
+        block=Block(half_width=0.01 * large.block.half_width, half_height=0.01 * large.block.half_height),
+        walls=[Wall(side="left", gap=0.00053, restitution=0.5)],
+        excitation=excitation,
+        duration=0.1 * large.duration,
+        output_step=0.1 * large.output_step,
+    )
+    for engine in (MuJoCo, PyBullet):
+        one = engine(time_step="adaptive", largest_step=2e-3).simulate(large)
+        other = engine(time_step="adaptive", largest_step=2e-4).simulate(small)
+        assert np.max(np.abs(one.channels["theta"] - other.channels["theta"])) < 1e-6
+        assert np.max(np.abs(one.channels["x"] - 100 * other.channels["x"])) < 1e-5
+        assert [e.kind for e in one.event_list if "impact" in e.kind][:6] == [e.kind for e in other.event_list if "impact" in e.kind][:6]
+
+
+def test_mirrored_adaptive_run(pulse):
+    scene = pulse(2.0, 4.0, friction=0.3, walls=[Wall(side="left", gap=0.053, restitution=0.5)], duration=3.0)
+    one, other = (MuJoCo(time_step="adaptive").simulate(s) for s in (scene, scene.mirrored()))
+    assert np.max(np.abs(one.channels["theta"] + other.channels["theta"])) < 1e-6
+
+
+@each_engine
+def test_record_with_kinks(engine):
+    """A sliding block feels the exact integral of a record that is linear between its samples."""
+    rng = np.random.default_rng(5)
+    samples = rng.normal(size=40)
+    scene = Scene(
+        name="kinks",
+        block=Block(half_width=1.0, half_height=0.5),
+        floor=Floor(friction=0.0),
+        excitation=Record.from_samples(samples, time_step=0.02),
+        duration=0.76,
+    )
+    history = engine(time_step="adaptive", largest_step=1e-3).simulate(scene)
+    velocity = -np.concatenate([[0.0], np.cumsum(0.01 * (samples[1:] + samples[:-1]))])
+    every = history.channels["x_dot"][::4]
+    assert np.max(np.abs(every - velocity[: len(every)])) < 2e-5  # linear between steps
+
+
+HARD = [
+    Scene(
+        name="rattle between walls",
+        block=Block(half_width=0.397, half_height=1.555),
+        floor=Floor(friction=0.3),
+        walls=[Wall(side="left", gap=0.0, restitution=0.9), Wall(side="right", gap=0.001, restitution=1.0)],
+        excitation=Sine(amplitude=8.0, period=0.7, cycles=2),
+        duration=2.0,
+    ),
+    Scene(
+        name="bouncing floor",
+        block=Block(half_width=0.3, half_height=0.4),
+        floor=Floor(friction=0.7, restitution=0.9),
+        excitation=Ricker(amplitude=9.0, period=0.8),
+        vertical=Sine(amplitude=14.0, period=0.3, cycles=4),
+        initial_height=0.02,
+        initial_rotation=0.1,
+        duration=2.0,
+    ),
+    Scene(
+        name="squat and frictionless",
+        block=Block(half_width=2.0, half_height=0.1),
+        floor=Floor(friction=0.0, restitution=0.5),
+        walls=[Wall(side="right", gap=0.05, restitution=1.0)],
+        initial_velocity=1.0,
+        initial_angular_velocity=0.5,
+        duration=1.0,
+    ),
+    Scene(
+        name="pressed on a wall",
+        block=Block(half_width=0.397, half_height=1.555),
+        floor=Floor(friction=1.2),
+        walls=[Wall(side="left", gap=0.0, restitution=0.5)],
+        excitation=Record.from_samples([6.0] * 150, time_step=0.01),
+        duration=2.0,
+    ),
+]
+
+
+@each_engine
+@pytest.mark.parametrize("scene", HARD, ids=lambda scene: scene.name)
+@pytest.mark.parametrize("step", [1e-3, 1e-2, "adaptive"])
+def test_hard_scenes_end(engine, scene, step):
+    """Rattling, bouncing and flush contacts: bounded work, finite states, nothing through a wall."""
+    history = engine(time_step=step).simulate(scene)
+    assert history.cost.steps < 40_000
+    for channel in ("x", "y", "theta", "x_dot", "y_dot", "theta_dot"):
+        assert np.all(np.isfinite(history.channels[channel]))
+    if step == "adaptive":
+        block, theta = scene.block, history.channels["theta"]
+        reach = block.radius * np.sin(block.alpha + np.abs(theta))
+        assert np.min(history.channels["y"] - block.radius * np.cos(block.alpha - np.abs(theta))) > -1e-5
+        for wall in scene.walls:
+            outward = -1.0 if wall.side == "left" else 1.0
+            assert np.max(outward * history.channels["x"] + reach) < block.half_width + wall.gap + 1e-5
+
+
+@pytest.mark.parametrize("step", [1e-3, "adaptive"])
+@each_engine
+def test_blow_up_is_a_failure(engine, step, block, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    blast = Record.from_samples([1e200] * 50, time_step=0.01)
+    with pytest.raises(ModelFailure):
+        engine(time_step=step).simulate(Scene(name="blast", block=block, floor=Floor(friction=0.3), vertical=blast, duration=0.4))
+    assert list(tmp_path.iterdir()) == []  # no log of the engine's own
+
+
+class Scripted(Engine):
+    """An engine that answers what it is told to."""
+
+    name = "scripted"
+    answers: dict[str, object]
+
+    def rigid_world(self, scene):
+        return SimpleNamespace(place=lambda state: None, close=lambda: None, **self.answers)
+
+    stock_world = rigid_world
+
+
+def test_states_that_are_not_finite_are_a_failure(free_rocking):
+    engine = Scripted(time_step=1e-3, answers={"march": lambda felt, dt: np.full((len(felt), 6), np.nan)})
+    with pytest.raises(ModelFailure, match="blew up"):
+        engine.simulate(free_rocking(0.5))
+    engine = Scripted(time_step="adaptive", answers={"push": lambda pose, velocity, dt, felt, bouncing: (math.nan,) * 3})
+    with pytest.raises(ModelFailure, match="blew up"):
+        engine.simulate(free_rocking(0.5))
+
+
+def test_a_fall_through_the_floor_is_a_failure(free_rocking):
+    fallen = np.array([0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
+    engine = Scripted(time_step=1e-3, answers={"march": lambda felt, dt: np.tile(fallen, (len(felt), 1))})
+    with pytest.raises(ModelFailure, match="fell through the floor"):
+        engine.simulate(free_rocking(0.5))
+
+
+def test_endless_events_are_a_failure(block):
+    """A contact that never stops what approaches: one impact step after the other."""
+    engine = Scripted(time_step="adaptive", answers={"push": lambda pose, velocity, dt, felt, bouncing: (0.0, -1.0, 0.0)})
+    with pytest.raises(ModelFailure, match="no end to the events"):
+        engine.simulate(Scene(name="falling", block=block, floor=Floor(friction=0.3), duration=1.0))
