@@ -1,10 +1,242 @@
-"""`rockcheck spectrum`."""
+"""`rockcheck spectrum`: overturning spectra, the paper's or the user's own."""
 
 from __future__ import annotations
 
-from scenes import InputError
+import contextlib
+import math
+import os
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from ebm import Spectrum
+from scenes import InputError, load_scene
+from scenes.errors import unknown_name
+from validation.commands import OUT, JobsOption, OutOption, SchedulerOption, console, usable_folder
+from validation.results import write_whole
+from validation.spectra import (
+    AMPLITUDES,
+    FIGURES,
+    FREQUENCIES,
+    SPECTRA,
+    TILES,
+    Asked,
+    Panel,
+    Tiles,
+    axis,
+    paper_panels,
+    play_panels,
+    save,
+    stem,
+    warm_up,
+)
+from validation.store import name_of
+
+MOST_SIZE = 5000
 
 
-def run() -> None:
-    """Overturning spectra: the figures of the paper, or your own grid."""
-    raise InputError("spectrum is not available yet")
+def run(
+    figure: Annotated[str | None, typer.Option("--figure", help="6, 7, 8, 9 or all: the paper's figures.")] = None,
+    scene: Annotated[
+        str | None, typer.Option("--scene", help="Your own block, walls, friction and pulse or record: a name or .toml file.")
+    ] = None,
+    size: Annotated[int, typer.Option("--size", help="Nodes an axis.")] = 100,
+    frequencies: Annotated[
+        tuple[float, float],
+        typer.Option("--frequencies", help="Range of omega_p/p; with a record, of the block's size relative to its own."),
+    ] = FREQUENCIES,
+    amplitudes: Annotated[
+        tuple[float, float], typer.Option("--amplitudes", help="Range of a_p/(g tan alpha); with a record, of its scale.")
+    ] = AMPLITUDES,
+    pivot: Annotated[str, typer.Option("--pivot", help="bilateral (the paper's) or unilateral (the block may hop).")] = "bilateral",
+    model: Annotated[str | None, typer.Option("--model", help="Another model: cm, mujoco, pybullet (slow: mind --size).")] = None,
+    tolerance: Annotated[float | None, typer.Option("--tolerance", help="Of the event-based model.")] = None,
+    refine: Annotated[bool, typer.Option("--refine", help="Run only what lies near a boundary.")] = False,
+    agreement: Annotated[int | None, typer.Option("--agreement", help="Nodes a spectrum at which the other models are compared.")] = None,
+    fragility: Annotated[
+        bool, typer.Option("--fragility", help="Probability of overturning against intensity, with and without the wall.")
+    ] = False,
+    records: Annotated[list[Path] | None, typer.Option("--record", help="A record of the fragility's set; repeatable.")] = None,
+    out: OutOption = OUT,
+    jobs: JobsOption = None,
+    scheduler: SchedulerOption = None,
+    force: Annotated[bool, typer.Option("--force", help="Run everything, also what is up to date.")] = False,
+) -> None:
+    """Overturning spectra: the figures of the paper, or your own grid. What is finished is kept, and read back next time."""
+    panels = _panels(figure, scene)
+    asked = _asked(size, frequencies, amplitudes, pivot, model, tolerance, refine)
+    if records and not fragility:
+        raise InputError("needs --fragility", "--record")
+    folder = usable_folder(out)
+    data = usable_folder(folder / SPECTRA)
+    screen = console()
+    with contextlib.ExitStack() as stack:
+        client = None
+        if scheduler:
+            from validation.cluster import connected
+
+            client = stack.enter_context(connected(scheduler))
+        tiles = stack.enter_context(Tiles(data / TILES, jobs=jobs, client=client, force=force))
+        if fragility:
+            _fragility(panels, asked, records or [], tiles, data, screen)
+        elif agreement is not None:
+            _agreement(panels, asked, agreement, tiles, data, screen)
+        else:
+            _spectra(panels, asked, tiles, data, screen)
+    from reports.spectra import write_page
+
+    screen.print(f"report: {write_page(folder)}", soft_wrap=True)
+
+
+def _panels(figure: str | None, scene: str | None) -> list[Panel]:
+    if scene is not None and figure is not None:
+        raise InputError("cannot be given together with --scene", "--figure")
+    if scene is not None:
+        what = load_scene(scene)
+        return [Panel(name_of(what.name.replace(" ", "-")), what.name, what)]
+    chosen = list(FIGURES) if figure in (None, "all") else [number for number in FIGURES if str(number) == figure]
+    if not chosen:
+        raise InputError(str(unknown_name("figure", str(figure), [*map(str, FIGURES), "all"])), "--figure")
+    return [panel for number in chosen for panel in paper_panels(number)]
+
+
+def _asked(
+    size: int,
+    frequencies: tuple[float, float],
+    amplitudes: tuple[float, float],
+    pivot: str,
+    model: str | None,
+    tolerance: float | None,
+    refine: bool,
+) -> Asked:
+    if not 2 <= size <= MOST_SIZE:
+        raise InputError(f"{size} is not allowed: 2 to {MOST_SIZE} nodes an axis are asked for", "--size")
+    if pivot not in ("bilateral", "unilateral"):
+        raise InputError(str(unknown_name("pivot", pivot, ("bilateral", "unilateral"))), "--pivot")
+    if model is not None and pivot != "bilateral":
+        raise InputError("cannot be given together with --model", "--pivot")
+    name = model or ("ebm" if pivot == "bilateral" else "ebm-unilateral")
+    if tolerance is not None and not (name.startswith("ebm") and math.isfinite(tolerance)):
+        raise InputError(f"{tolerance:g} is not allowed: a finite number, with an event-based model", "--tolerance")
+    return Asked(
+        frequencies=axis(*frequencies, size, "--frequencies"),
+        amplitudes=axis(*amplitudes, size, "--amplitudes"),
+        model=name,
+        settings={} if tolerance is None else {"tolerance": tolerance},
+        refine=refine,
+    )
+
+
+def _spectra(panels: Sequence[Panel], asked: Asked, tiles: Tiles, data: Path, screen: Console) -> None:
+    if tiles.client is None:
+        warm_up(panels[0], asked)  # so that no run's time holds the compiler's
+    began, cpu = time.perf_counter(), time.process_time()
+    nodes = len(asked.frequencies) * len(asked.amplitudes)
+    finished = 0
+    with _bar("spectra", nodes * len(panels)) as advance:
+
+        def done(panel: Panel) -> None:
+            nonlocal finished
+            finished += 1
+            advance(to=finished * nodes)
+
+        tiles.progress = advance
+        spectra = play_panels(panels, asked, tiles, done)
+    taken, cpu = time.perf_counter() - began, time.process_time() - cpu
+    screen.print(_shares(panels, spectra))
+    _speed(spectra, asked, tiles, taken, cpu, screen)
+    save(panels, spectra, asked, data)
+    _draw(panels, spectra, asked, data)
+    if {panel.figure for panel in panels} == set(FIGURES) and asked.model == "ebm":
+        _claims(spectra, asked, tiles, data, screen)
+
+
+def _shares(panels: Sequence[Panel], spectra: Sequence[Spectrum]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for title, justify in (("spectrum", "left"), ("safe", "right"), ("left", "right"), ("right", "right"), ("undecided", "right")):
+        table.add_column(title, justify=justify)  # type: ignore[arg-type]
+    for panel, spectrum in zip(panels, spectra, strict=True):
+        shares = (100.0 * float((spectrum.outcomes == side).mean()) for side in (0, -1, 1))
+        table.add_row(panel.name, *(f"{share:.2f} %" for share in shares), str(len(spectrum.undecided)))
+    return table
+
+
+def _speed(spectra: Sequence[Spectrum], asked: Asked, tiles: Tiles, taken: float, cpu: float, screen: Console) -> None:
+    nodes, evaluations = sum(s.outcomes.size for s in spectra), sum(s.evaluations for s in spectra)
+    share = f" ({nodes / evaluations:.1f} times fewer than nodes)" if asked.refine else ""
+    screen.print(f"{len(spectra)} spectra, {nodes} nodes, {evaluations} runs{share}, {tiles.read_back} read back; {taken:.1f} s")
+    if tiles.played and tiles.client is None and asked.model in ("ebm", "ebm-unilateral"):
+        from validation.benchmark_ebm import right_hand_side_seconds
+
+        one = right_hand_side_seconds()
+        each = cpu / tiles.played
+        screen.print(
+            f"{tiles.played / taken:,.0f} trajectories/s on {tiles.jobs or os.cpu_count()} threads; one takes {1e6 * each:.1f} us of CPU,"
+            f" {each / one:,.0f} times one right-hand-side evaluation ({1e9 * one:.1f} ns)",
+            soft_wrap=True,
+        )
+
+
+def _draw(panels: Sequence[Panel], spectra: Sequence[Spectrum], asked: Asked, data: Path) -> None:
+    from reports.spectra import areas_figure, figure_stem, own_figure, paper_figure, write
+
+    for number in dict.fromkeys(panel.figure for panel in panels):
+        mine = [(panel, spectrum) for panel, spectrum in zip(panels, spectra, strict=True) if panel.figure == number]
+        if number is None:
+            for panel, spectrum in mine:
+                write(own_figure(panel, spectrum), data / stem(panel.name, asked.model))
+        else:
+            drawn = paper_figure([p for p, _ in mine], [s for _, s in mine], of="" if asked.model == "ebm" else asked.model)
+            write(drawn, data / figure_stem(number, asked.model))
+    if {panel.figure for panel in panels} == set(FIGURES) and asked.model == "ebm":
+        write(areas_figure(spectra), data / "safe-areas")
+
+
+def _claims(spectra: Sequence[Spectrum], asked: Asked, tiles: Tiles, data: Path, screen: Console) -> None:
+    from validation.claims import Claims, check_claims, least_amplitudes_at_six
+
+    tiles.progress = None
+    claims = check_claims(spectra, least_amplitudes_at_six(tiles, asked))
+    grid = f"{len(asked.amplitudes)} x {len(asked.frequencies)}"
+    write_whole(data / "claims.json", Claims(grid=grid, model=asked.model, claims=claims).model_dump_json(indent=1) + "\n")
+    table = Table(box=None, pad_edge=False, title="The paper's section 5", title_justify="left")
+    for title in ("sentence", "verdict", "finding"):
+        table.add_column(title)
+    for claim in claims:
+        table.add_row(claim.sentence, claim.verdict, claim.finding)
+    screen.print(table)
+
+
+def _agreement(panels: Sequence[Panel], asked: Asked, count: int, tiles: Tiles, data: Path, screen: Console) -> None:
+    raise InputError("not available yet", "--agreement")
+
+
+def _fragility(panels: Sequence[Panel], asked: Asked, records: Sequence[Path], tiles: Tiles, data: Path, screen: Console) -> None:
+    raise InputError("not available yet", "--fragility")
+
+
+@contextlib.contextmanager
+def _bar(what: str, total: int) -> Iterator[Any]:
+    """A progress bar on stderr with the time left; gives a function that advances it by a count, or `to` a place."""
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+        TextColumn("left"),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    with bar:
+        task = bar.add_task(what, total=total)
+
+        def advance(count: int = 0, *, to: int | None = None) -> None:
+            bar.update(task, advance=count) if to is None else bar.update(task, completed=to)
+
+        yield advance

@@ -1,0 +1,207 @@
+"""Overturning spectra as the paper shows them, and the page with all that was found out about them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ebm.spectrum import COLOURS, Spectrum, draw
+from reports.site import Site
+from reports.style import PAGE, figure_style, save
+from validation.results import RUN_FILE
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from validation.spectra import Panel
+
+TITLES = {
+    6: "Wall on the left, μ = 0.3",
+    7: "Wall on the left, μ = 0.6",
+    8: "Wall on the right, μ = 0.3",
+    9: "Wall on the right, μ = 0.6",
+}
+PAGE_NAME = "spectra.html"
+
+
+def paper_figure(panels: Sequence[Panel], spectra: Sequence[Spectrum], *, of: str = "") -> Figure:
+    """One of the paper's Figs. 6 to 9: the unobstructed spectrum beside those with a wall, a column a gap, a row an e.
+
+    `of` names the model where it is not the paper's.
+    """
+    from matplotlib.figure import Figure
+
+    gaps = sorted({panel.wall.gap for panel in panels if panel.wall})
+    restitutions = sorted({panel.wall.restitution for panel in panels if panel.wall})
+    with figure_style():
+        figure = Figure(figsize=(PAGE, 3.75), layout="constrained")
+        grid = figure.add_gridspec(2 * len(restitutions), 1 + len(gaps))
+        for panel, spectrum in zip(panels, spectra, strict=True):
+            if panel.wall is None:
+                axes = figure.add_subplot(grid[1:3, 0])
+            else:
+                row = 2 * restitutions.index(panel.wall.restitution)
+                axes = figure.add_subplot(grid[row : row + 2, 1 + gaps.index(panel.wall.gap)])
+            _panel(axes, spectrum, panel.title)
+        number = panels[0].figure or 0
+        figure.suptitle(f"Fig. {number}: {TITLES[number]}{f' ({of})' if of else ''}", fontsize=9, x=0.01, ha="left")
+        _legend(figure, spectra)
+    return figure
+
+
+def own_figure(panel: Panel, spectrum: Spectrum) -> Figure:
+    """The user's own spectrum."""
+    from matplotlib.figure import Figure
+
+    with figure_style():
+        figure = Figure(figsize=(PAGE / 1.6, 3.6), layout="constrained")
+        _panel(figure.subplots(), spectrum, panel.title)
+        _legend(figure, [spectrum])
+    return figure
+
+
+def _panel(axes: Any, spectrum: Spectrum, title: str) -> None:
+    draw(spectrum, axes)
+    axes.set_title(title, fontsize=7.5)
+    axes.set_xlim(spectrum.frequency_ratios[[0, -1]])
+    axes.set_ylim(spectrum.amplitude_ratios[[0, -1]])
+    for spine in ("top", "right"):
+        axes.spines[spine].set_visible(True)
+    if spectrum.scene.excitation.kind != "record" and spectrum.frequency_ratios[-1] <= 12:
+        axes.set_xticks(np.arange(np.ceil(spectrum.frequency_ratios[0]), spectrum.frequency_ratios[-1] + 1e-9))
+
+
+def _legend(figure: Figure, spectra: Iterable[Spectrum]) -> None:
+    from matplotlib.patches import Patch
+
+    names = ["safe"]
+    if any(not spectrum.scene.walls for spectrum in spectra):
+        names += ["clockwise", "counterclockwise"]
+    if any(spectrum.scene.walls for spectrum in spectra):
+        names += ["overturned"]
+    labels = {
+        "safe": "safe",
+        "clockwise": "no wall: overturned clockwise",
+        "counterclockwise": "no wall: overturned counterclockwise",
+        "overturned": "wall: overturned",
+    }
+    patches = [Patch(facecolor=COLOURS[name], label=labels[name]) for name in names]
+    figure.legend(handles=patches, loc="outside lower center", ncols=4, fontsize=7)
+
+
+def areas_figure(spectra: Sequence[Spectrum]) -> Figure:
+    """The safe areas of the 28 spectra against the gap, with those without a wall: what the claims about areas rest on."""
+    from matplotlib.figure import Figure
+
+    with figure_style():
+        figure = Figure(figsize=(PAGE, 2.6), layout="constrained")
+        for axes, side in zip(figure.subplots(1, 2, sharey=True), ("left", "right"), strict=True):
+            for friction, colour in ((0.3, "#0072b2"), (0.6, "#d55e00")):
+                for e, line, marker in ((0.0, "-", "o"), (1.0, "--", "s")):
+                    walls = sorted(
+                        (s.scene.walls[0].gap, s.safe_area)
+                        for s in spectra
+                        if s.scene.walls
+                        and (s.scene.walls[0].side, s.scene.floor.friction, s.scene.walls[0].restitution) == (side, friction, e)
+                    )
+                    gaps, areas = zip(*walls, strict=True)
+                    axes.plot(
+                        1000.0 * np.array(gaps),
+                        100.0 * np.array(areas),
+                        line,
+                        color=colour,
+                        marker=marker,
+                        label=f"μ {friction:g}, e {e:g}",
+                    )
+                free = next(s.safe_area for s in spectra if not s.scene.walls and s.scene.floor.friction == friction)
+                axes.axhline(100.0 * free, color=colour, linestyle=":", label=f"μ {friction:g}, no wall")
+            axes.set_title(f"Wall on the {side}")
+            axes.set_xlabel("gap, mm")
+            axes.set_xticks([3, 53, 103])
+            axes.set_ylim(0, None)
+        figure.axes[0].set_ylabel("safe nodes, %")
+        figure.axes[1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def fragility_figure(fragility: Mapping[str, Any]) -> Figure:
+    """Probability of overturning against intensity: observed shares, the fitted curve and its confidence band, case by case."""
+    from matplotlib.figure import Figure
+
+    looks = (("#1b1b1b", "o", ()), ("#0072b2", "s", (5.0, 1.5)), ("#d55e00", "^", (2.0, 1.0)))
+    with figure_style():
+        figure = Figure(figsize=(PAGE / 1.4, 3.2), layout="constrained")
+        axes = figure.subplots()
+        for case, (colour, marker, dash) in zip(fragility["cases"], looks, strict=False):
+            points = np.array(case["points"])
+            axes.fill_between(points[:, 0], points[:, 3], points[:, 4], color=colour, alpha=0.15, linewidth=0)
+            axes.plot(points[:, 0], points[:, 2], color=colour, linestyle=(0, dash) if dash else "-", label=case["label"])
+            axes.plot(points[:, 0], points[:, 1], marker, color=colour, markersize=2.5, linestyle="none")
+        axes.set_xlabel(fragility["intensity"])
+        axes.set_ylabel("probability of overturning")
+        axes.set_ylim(-0.02, 1.02)
+        axes.legend(loc="lower right")
+        axes.set_title(fragility["title"], fontsize=7.5)
+    return figure
+
+
+def write_page(folder: Path) -> Path:
+    """Write `spectra.html` into the report's folder from what its `spectra/` holds; returns the page."""
+    from validation import provenance
+    from validation.spectra import SPECTRA, read_index
+
+    data = folder / SPECTRA
+    index = read_index(data)
+    kept = {name: _read(data / f"{name}.json") for name in ("claims", "agreement", "fragility", "refinement")}
+    figures = sorted({(record.figure, record.model) for record in index.spectra if record.figure}, key=lambda key: (key[0] or 0, key[1]))
+    shown = [
+        {
+            "stem": f"{SPECTRA}/{figure_stem(number, model)}",
+            "number": number,
+            "model": model,
+            "title": TITLES[number or 6],
+            "records": [record for record in index.spectra if (record.figure, record.model) == (number, model)],
+        }
+        for number, model in figures
+        if (data / f"{figure_stem(number, model)}.svg").exists()
+    ]
+    own = [record for record in index.spectra if record.figure is None]
+    site = Site(folder, "rockcheck: overturning spectra", (*_scene_links(folder), ("Spectra", PAGE_NAME)))
+    site.assets(())
+    return site.page(
+        PAGE_NAME,
+        "spectra.html",
+        figures=shown,
+        own=own,
+        kept=kept,
+        areas=(data / "safe-areas.svg").exists(),
+        fragility_drawn=(data / "fragility.svg").exists(),
+        versions=provenance.versions(),
+    )
+
+
+def figure_stem(number: int | None, model: str) -> str:
+    """The name of a figure's files."""
+    return f"figure-{number}" if model == "ebm" else f"figure-{number}--{model}"
+
+
+def write(figure: Figure, stem: Path) -> list[Path]:
+    """Write a figure as SVG, PNG and PDF."""
+    return save(figure, stem)
+
+
+def _scene_links(folder: Path) -> tuple[tuple[str, str], ...]:
+    """The navigation of the finished run that shares the folder, if any."""
+    pages = sorted((folder / "scenes").glob("*.html")) if (folder / RUN_FILE).exists() else []
+    return tuple((page.stem, f"scenes/{page.name}") for page in pages)
+
+
+def _read(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
