@@ -122,8 +122,8 @@ if TYPE_CHECKING:
     from ebm.model import EventBasedModel
 
 # Rows of the workspace after those of ebm.motion: z, V and what the recurrences need.
-Z, V, Z2, SPIN2, ARM, TURN, REACH, INERTIA, LOAD, PUSH, ZA, LEVER, DEN, TORQUE = range(ROWS, ROWS + 14)
-_ROWS = ROWS + 14
+Z, V, Z2, SPIN2, WEIGHT, ARM, TURN, REACH, INERTIA, LOAD, PUSH, ZA, LEVER, DEN, TORQUE = range(ROWS, ROWS + 15)
+_ROWS = ROWS + 15
 
 # A guard besides those of ebm.transitions: z comes to the sign of V, from where the pivot loads.
 _G_LOADS = GUARDS
@@ -215,9 +215,9 @@ def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order
     """Fills the workspace with the series of a block whose pivot, or base, carries the friction force -mu_k |P| z.
 
     Tilted, in the pivot's frame (see ebm.motion): with Sw = +-1 where a corner rests on the tip or far wall, else 0,
-    C = Sw c', J = 1/3 + C^2, f = u - Sw s' w^2, G = G0 - c w^2 and k = mu_k z sgn P,
+    C = Sw c', J = 1/3 + C^2, f = u - Sw s' w^2, g = G0 - c w^2 and k = mu_k z sgn P,
 
-        P = (G J - s C f) / (J + s^2 + k s (c + C)),   Q = -k P,   J theta'' = -s P + (c + C) Q - C f,
+        P = (g J - s C f) / (J + s^2 + k s (c + C)),   Q = -k P,   J theta'' = -s P + (c + C) Q - C f,
 
     which is (7), (8) with z for d where Sw = 0, and LADDER with z for d otherwise. Flat: P = G0, x'' = Q - u.
     """
@@ -251,18 +251,18 @@ def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order
         if k == order - 1:
             break
         a[SPIN2, k] = _product(a, OMEGA, OMEGA, k)
-        a[G, k] -= _product(a, COS, SPIN2, k)
+        a[WEIGHT, k] = a[G, k] - _product(a, COS, SPIN2, k)  # g
         a[TURN, k] = wall * (b.sin_2alpha * a[SIN, k] + b.cos_2alpha * a[COS, k])  # C
         a[ARM, k] = a[COS, k] + a[TURN, k]
         a[INERTIA, k] = 1.0 / 3.0 if k == 0 else 0.0
         a[LOAD, k] = 0.0  # f
-        normal = a[G, k] / 3.0
+        normal = a[WEIGHT, k] / 3.0
         if wall != 0.0:
             a[REACH, k] = b.sin_2alpha * a[COS, k] - b.cos_2alpha * a[SIN, k]  # s'
             a[INERTIA, k] += _product(a, TURN, TURN, k)
             a[LOAD, k] = a[U, k] - wall * _product(a, REACH, SPIN2, k)
             a[PUSH, k] = _product(a, TURN, LOAD, k)  # C f
-            normal = _product(a, G, INERTIA, k) - _product(a, SIN, PUSH, k)
+            normal = _product(a, WEIGHT, INERTIA, k) - _product(a, SIN, PUSH, k)
         a[ZA, k] = _product(a, Z, ARM, k)
         a[LEVER, k] = a[SIN, k] + friction * a[ZA, k]  # s + k (c + C)
         a[DEN, k] = a[INERTIA, k] + _product(a, SIN, LEVER, k)
@@ -403,6 +403,7 @@ def _label(m, yielded):
 def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
     """Simulates from state z (changed in place) at t = 0 to t_end; returns a Tally. Arguments as of trajectory.run."""
     a, stack = np.zeros((_ROWS, MOST_TERMS)), np.zeros((48, MOST_TERMS))
+    a[G, 0] = 1.0
     m = np.zeros(MODE_SIZE, dtype=np.int64)
     impulse, gains = np.zeros(2), np.zeros(2)
     rattle = np.array([_REST_BILATERAL, -1.0, -1.0, 0.0])
@@ -549,7 +550,7 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
         out[rows] = z
         out_mode[rows] = _label(m, yielded)
         rows += 1
-    return Tally(ending, t, peak, at_rest, steps, steps, events, wall_impacts, int(gains[0]), gains[1], 0.0, rows, np.nan)
+    return Tally(ending, t, peak, at_rest, steps, steps, events, wall_impacts, int(gains[0]), gains[1], rows, np.nan)
 
 
 @kernel

@@ -44,18 +44,17 @@ def floor_impact(s, c, S1, w1, v1, mu_s, mu_k):
     w2, p, q = floor_stick(s, c, S2, w1, v1)
     if S2 * w2 >= 0.0 and p >= 0.0 and abs(q) <= mu_s * p:
         return STICK, w2, 0.0, p
-    turns = S2 * w2 >= 0.0
+    stuck = w2, p
+    turns = False
     toward = -1.0 if q > 0.0 else 1.0
     for d in (toward, -toward):
         w2, v2, p = floor_slip(s, c, S2, d, mu_k, w1, v1)
         turns = turns or S2 * w2 >= 0.0
         if S2 * w2 >= 0.0 and d * v2 >= 0.0:
             return SLIP, w2, v2, p
-    if turns:
+    if turns and mu_s > mu_k and S2 * stuck[0] >= 0.0:
         # Static friction above kinetic leaves a gap in which neither form is consistent: sticking is the nearer one.
-        w2, p, q = floor_stick(s, c, S2, w1, v1)
-        if S2 * w2 >= 0.0:
-            return STICK, w2, 0.0, p
+        return STICK, stuck[0], 0.0, stuck[1]
     p = s * abs(w1)
     xdot = v1 - c * w1
     return FLAT_END, 0.0, (0.0 if abs(xdot) <= mu_s * p else xdot - math.copysign(mu_k * p, xdot)), p

@@ -375,6 +375,7 @@ def flat_state(b, m, order, tau, a, z):
         z[X] = value(a, XI, order, tau)
         z[VX] = slope(a, XI, order, tau)
     else:
+        z[X] = a[XI, 0]
         z[VX] = 0.0
     if m[FLOOR] == OFF:
         z[HEIGHT] = value(a, Y, order, tau)

@@ -53,6 +53,8 @@ from ebm.transitions import (
     G_SLIP,
     G_TIP_GAP,
     G_TOPPLE,
+    G_UPLIFT_MINUS,
+    G_UPLIFT_PLUS,
     GUARDS,
     closed_floor,
     consistent,
@@ -133,7 +135,6 @@ class Tally(NamedTuple):
     wall_impacts: int
     gains: int
     largest_gain: float
-    hop: float
     rows: int
     t_rest: float
 
@@ -174,12 +175,12 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
     resting, window_start, last_impact, in_window = base_rest, -1.0, -1.0, 0
     t = 0.0
     rows = steps = series = events = wall_impacts = zero_steps = 0
-    peak, hop, t_rest = abs(z[THETA]), 0.0, np.nan
+    peak, t_rest = abs(z[THETA]), np.nan
     ending = DONE
     m[FAMILY], m[S], m[FLOOR], m[PULL] = FLAT, 1, STICK, 1  # most often it stands
     stands = z[THETA] == 0.0 and z[VX] == 0.0 and z[W] == 0.0 and z[HEIGHT] == b.cos_alpha and not b.walls
     if not (stands and consistent(b, m, z, gh, gv, t, a)) and not select(b, z, gh, gv, t, left, m, a):
-        return Tally(NO_MODE, t, peak, False, 0, 0, 0, 0, 0, 0.0, 0.0, 0, t_rest)
+        return Tally(NO_MODE, t, peak, False, 0, 0, 0, 0, 0, 0.0, 0, t_rest)
     while True:
         # --- rest: straight to the next uplift or slip
         if m[FAMILY] == FLAT and m[FLOOR] == STICK and still:
@@ -280,8 +281,6 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
                 top = first_root(a, OMEGA, order - 1, tau, NOISE, stack)
                 if top > 0.0:
                     peak = max(peak, value(a, PHI, order, top))
-            if m[FLOOR] == OFF:
-                hop = max(hop, _highest(a, order, tau))
             tilt_state(b, m, order, tau, pivot, a, z)
         if which < 0 and tau >= reach:
             t = end
@@ -356,13 +355,17 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
                     z[VX] = 0.0
             elif which == G_CONE_PLUS or which == G_CONE_MINUS:
                 kind = SLIPS
+            elif which == G_UPLIFT_PLUS or which == G_UPLIFT_MINUS:
+                kind = UPLIFT
             elif which == G_PUSH and b.unilateral:
                 kind = LIFT_OFF
             found = select(b, z, gh, gv, t, left, m, a)
         if not found:
             ending = NO_IMPACT if strikes else NO_MODE
             break
-        if log.shape[0] >= events:
+        if strikes and b.unilateral and impulse[0] + impulse[1] == 0.0:
+            events -= 1  # nothing was struck: a block in flight passes theta = 0
+        elif log.shape[0] >= events:
             _note(log, events, t, kind, before, mode_code(m), impulse[0] + impulse[1])
     at_rest = m[FAMILY] == FLAT and m[FLOOR] == STICK
     if ending == DONE and not math.isfinite(z[THETA]):
@@ -372,7 +375,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             out[rows] = z
             out_mode[rows] = mode_code(m)
             rows += 1
-    return Tally(ending, t, peak, at_rest, steps, series, events, wall_impacts, int(gains[0]), gains[1], hop, rows, t_rest)
+    return Tally(ending, t, peak, at_rest, steps, series, events, wall_impacts, int(gains[0]), gains[1], rows, t_rest)
 
 
 @kernel
@@ -392,16 +395,6 @@ def _step_size(a, first, second, order, tolerance, reach):
     if before > 0.0:
         h = min(h, math.exp(math.log(tolerance / before) / (order - 1)))
     return h
-
-
-@kernel
-def _highest(a, order, tau):
-    """The highest lift of the pivot among 5 instants of the step."""
-    top = 0.0
-    for k in range(1, 6):
-        x = 0.2 * k * tau
-        top = max(top, value(a, Y, order, x) - value(a, COS, order, x))
-    return top
 
 
 @kernel

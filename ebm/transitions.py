@@ -322,10 +322,18 @@ def select(b, z, gh, gv, t, left, m, a):
         z[W] = z[VX] = z[VY] = 0.0  # on floor and wall a block that does not turn stands
     for attempt in range(2):
         if flat:
-            if _select_flat(b, z, gh, gv, t, floor, left, m, a, attempt == 1):
-                return True
             # Both senses of tilting; where both fit (they do not, but for rounding) the base acceleration decides.
             first = 1 if acceleration(gh, t) >= 0.0 else -1
+            if floor and z[VX] == 0.0 and not b.walls:
+                # Static friction above kinetic can leave both rocking and sliding consistent: it holds as long as it can.
+                m[:] = 0
+                m[S], m[FLOOR], m[PULL] = first, STICK, 1
+                for family in (FLAT, TILT):
+                    m[FAMILY] = family
+                    if _accept(b, m, z, gh, gv, t, left, a, attempt == 1):
+                        return True
+            if _select_flat(b, z, gh, gv, t, floor, left, m, a, attempt == 1):
+                return True
             for sense in (first, -first):
                 if _select_tilt(b, z, gh, gv, t, sense, floor, left, m, a, attempt == 1):
                     return True

@@ -25,8 +25,6 @@ class Run:
     theta: float
     #: Largest |theta|/alpha, located between the rows of a history.
     peak: float
-    #: Highest lift of the lower bottom corner that the compiled loop saw, m.
-    hop: float
     wall_impacts: int
     steps: int
     energy_gains: int
@@ -69,7 +67,6 @@ def run_to_end() -> Runner:
             x=state[0] * radius,
             theta=state[2],
             peak=tally.peak / scene.block.alpha,
-            hop=tally.hop * radius,
             wall_impacts=tally.wall_impacts,
             steps=tally.steps,
             energy_gains=tally.gains,

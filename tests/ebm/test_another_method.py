@@ -421,8 +421,6 @@ def test_motion_and_events(scene):
 
     Events are compared as long as impacts are not yet tiny (1e-3 m/s), since an instant is worth the less the slower its event is.
 
-    Known faults ("vertical shaking"): rows of a shaken block at rest have no x (see test_invariance.py), and its uplift is
-    reported as a "release".
     """
     other = PaperModel(scene).run()
     ours = EventBasedModel(tolerance=1e-13).simulate(scene)

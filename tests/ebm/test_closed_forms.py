@@ -178,8 +178,7 @@ def first_mode_by_shenton(mu_s: float, mu_k: float, slope: float, a: float) -> s
 def test_shentons_map(friction, pivot):
     """1,000 random frictions, slendernesses and accelerations, both ways, for each pivot and kind of friction.
 
-    Known fault (static above kinetic): a block that starts under an acceleration at which it can stick and rock slides,
-    where mu_k < tan(alpha); from rest under a growing acceleration it rocks, as it should.
+    Static above kinetic friction: a block that starts under an acceleration at which it can stick and rock does not slide.
     """
     rng = np.random.default_rng(1996)
     model = EventBasedModel(pivot=pivot)
@@ -217,8 +216,7 @@ def random_floor_impacts(count: int, least: float, most: float):
 def test_floor_impact_balances_momentum(least, most):
     """Vertical, horizontal and angular momentum about the centroid, Coulomb's law, and a block that turns onto its new pivot.
 
-    Known fault (squat): where sticking asks for more friction than there is, and slipping cannot turn the block, `floor_impact`
-    sticks nevertheless, |Q| > mu_s P; the block should land flat (and slide).
+    Squat blocks: where sticking asks for more friction than there is, and slipping cannot turn the block, it lands flat.
     """
     from ebm import impacts
 

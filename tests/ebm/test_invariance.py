@@ -59,7 +59,7 @@ def assert_mirror_images(a: History, b: History) -> None:
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_mirror_image_to_the_bit(pivot, name):
-    """Known fault ("vertical record", and "left wall" where the block flies along the wall): as in the test of rows at rest."""
+    """The mirrored scene gives the mirrored history, to the bit."""
     model, scene = EventBasedModel(pivot=pivot), SCENES[name]
     assert_mirror_images(model.simulate(scene), model.simulate(scene.mirrored()))
     assert scene.mirrored().mirrored() == scene
@@ -88,7 +88,7 @@ def test_dynamic_similarity(pivot, scale):
 
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_constant_vertical_acceleration_is_gravity(pivot):
-    """A floor that accelerates up with a is a gravity of g + a. Known fault: as in `test_rows_of_a_shaken_block_at_rest`."""
+    """A floor that accelerates up with a is a gravity of g + a."""
     duration, a = 4.0, 3.0
     vertical = Record.from_samples([a, a], time_step=duration + 1.0)
     scene = scene_of(walls=walls(left=0.053, e=0.5), duration=duration)
@@ -103,8 +103,7 @@ def test_constant_vertical_acceleration_is_gravity(pivot):
 def test_rows_of_a_shaken_block_at_rest(pivot):
     """A block on a floor that shakes vertically, too little to lift it, stays where it stands.
 
-    Known fault: `flat_state` does not write x where the block sticks or flies along a wall, so that those rows hold
-    whatever the memory held.
+    Such rows once held whatever the memory had held.
     """
     scene = scene_of(excitation=Rest(), vertical=Sine(amplitude=4.0, period=0.4, cycles=8), duration=1.0)
     EventBasedModel(pivot=pivot).simulate(scene_of(duration=1.5, initial_velocity=1.0))  # leaves other numbers in the memory

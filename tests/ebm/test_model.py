@@ -111,7 +111,7 @@ def test_overturning_ends_the_history(pivot, side):
 
 
 def test_events_of_a_flight_are_not_floor_impacts():
-    """A floor impact has an impulse. Known fault: a block that flies through theta = 0 is said to strike the floor with none."""
+    """A floor impact has an impulse. A block that flies through theta = 0 strikes nothing."""
     scene = load_scene("fig5b")
     history = EventBasedModel(pivot="unilateral").simulate(scene)
     empty = [e for e in history.event_list if e.kind in ("floor impact", "wall impact") and e.impulse == 0.0]

@@ -1,0 +1,163 @@
+"""ebm-bouc-wen: the regularised friction (9) against an independent stiff integration, the exact model and its own limits."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from ebm import EventBasedModel
+from scenes import Block, Floor, InputError, Ricker, Scene, Wall, kinematics, load_scene
+from scenes.errors import ModelFailure
+
+BLOCK = Block(half_width=0.397, half_height=1.555)
+G = 9.81
+
+
+def pulse(a_ratio=4.0, w_ratio=4.5, mu=0.3, walls=(), block=BLOCK, **more):
+    period = 2.0 * math.pi / (w_ratio * block.frequency_parameter)
+    excitation = Ricker(amplitude=a_ratio * G * math.tan(block.alpha), period=period)
+    fields = {"name": "pulse", "block": block, "floor": Floor(friction=mu), "walls": walls, "excitation": excitation, "duration": 10.0}
+    return Scene(**fields | more)
+
+
+def bouc_wen(scene, yield_displacement=1e-5, **settings):
+    return EventBasedModel(friction="bouc-wen", yield_displacement=yield_displacement, **settings).simulate(scene)
+
+
+def peak(history):
+    return history.peak_rotation / history.alpha
+
+
+def test_the_paper_s_yield_displacement_is_not_converged_but_smaller_ones_converge_at_first_order():
+    scene = pulse(output_step=0.001)
+    exact = peak(EventBasedModel().simulate(scene))
+    coarse, paper, fine, finest = (peak(bouc_wen(scene, u)) for u in (1e-4, 1e-5, 1e-6, 1e-7))
+    assert exact == pytest.approx(0.3216, abs=1e-4)
+    assert paper == pytest.approx(0.330, abs=1e-4)
+    assert abs(coarse - exact) > 2.0 * abs(paper - exact)
+    orders = np.log10([(paper - exact) / (fine - exact), (fine - exact) / (finest - exact)])
+    assert np.all((orders > 0.8) & (orders < 1.2)), orders
+
+
+def integrated(scene, yield_displacement, z, t_end):
+    """(7), (8) and (9) with z for d in SI units, integrated by an implicit Runge-Kutta method from the scene's initial state."""
+    block, mu, spin = scene.block, scene.floor.friction, math.copysign(1.0, scene.initial_rotation)
+    x, _, theta, v, _, w = scene.initial_state
+
+    def rates(t, q):
+        _, theta, v, w, z = q
+        s, c = math.sin(block.alpha - abs(theta)), math.cos(block.alpha - abs(theta))
+        u = float(scene.excitation.acceleration(t))
+        eta = mu * spin * z
+        gravity = G + float(scene.vertical.acceleration(t)) - block.radius * c * w * w
+        force = gravity / (1.0 + 3.0 * s * s + 3.0 * eta * s * c)
+        slip = v + block.radius * c * w
+        z_rate = (-0.5 * abs(slip) * z * abs(z) - 0.5 * slip * z * z + slip) / yield_displacement
+        return v, w, -mu * z * force - u, -3.0 / block.radius * spin * (s + eta * c) * force, z_rate
+
+    start = (x, theta, v, w, z)
+    return solve_ivp(
+        rates, (0.0, t_end), start, method="Radau", rtol=1e-10, atol=1e-13, t_eval=scene.output_times[: int(t_end / 0.005) + 1]
+    )
+
+
+@pytest.mark.parametrize(("slip", "vertical"), [(0.6, 0.0), (-0.4, 4.0)])
+def test_slip_yield_and_stick_agree_with_an_implicit_integration(slip, vertical):
+    scene = pulse(
+        a_ratio=1.0, initial_rotation=0.12, initial_velocity=slip, vertical=Ricker(amplitude=vertical, period=0.7), output_step=0.005
+    )
+    history = bouc_wen(scene, 1e-3, tolerance=1e-12)
+    landing = next(event.t for event in history.event_list if event.kind == "floor impact")
+    reference = integrated(scene, 1e-3, math.copysign(1.0, slip), 0.99 * landing)
+    rows = reference.t.size
+    assert {event.kind for event in history.event_list if event.t < landing} >= {"stick"}
+    for row, name in enumerate(("x", "theta", "x_dot", "theta_dot")):
+        assert np.max(np.abs(history.channels[name][:rows] - reference.y[row])) < 2e-7, name
+
+
+def test_tolerance_controls_the_error_of_the_steps():
+    scene = pulse(duration=4.0)
+    truth = bouc_wen(scene, tolerance=1e-14).channels["theta"]
+    errors = [np.max(np.abs(bouc_wen(scene, tolerance=tolerance).channels["theta"] - truth)) for tolerance in (1e-7, 1e-9, 1e-11)]
+    assert errors[2] < 1e-6 * BLOCK.alpha
+    assert errors[2] < 0.1 * errors[1] < 0.01 * errors[0]
+
+
+@pytest.mark.parametrize("mu", [0.2, 0.25])
+def test_flat_sliding_tends_to_the_exact_model_with_the_root_of_the_yield_displacement(mu):
+    # After each reversal the friction turns only while the base slips some u_y, which takes a time of sqrt(u_y/acceleration).
+    scene = pulse(a_ratio=2.0, mu=mu)
+    exact = EventBasedModel().simulate(scene)
+    histories = [bouc_wen(scene, u) for u in (1e-4, 1e-5, 1e-6)]
+    errors = np.array([np.max(np.abs(h.channels["x"] - exact.channels["x"])) for h in histories])
+    assert all(h.peak_rotation == 0.0 and h.outcome == exact.outcome == "at rest" for h in histories)
+    assert errors[:-1] / errors[1:] == pytest.approx(math.sqrt(10.0), rel=0.05)
+
+
+@pytest.mark.parametrize("name", ["fig4a", "fig5a"])
+def test_el_centro_tends_to_the_exact_model(name):
+    scene = load_scene(name)
+    exact = EventBasedModel().simulate(scene)
+    paper, fine = bouc_wen(scene), bouc_wen(scene, 1e-6)
+    assert abs(peak(paper) - peak(exact)) < 2e-3
+    assert abs(peak(fine) - peak(exact)) < 0.3 * abs(peak(paper) - peak(exact))
+    assert exact.outcome == paper.outcome == fine.outcome == "at rest"
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_walls_hold_the_block_and_the_motion_tends_to_the_exact_one(side, restitution):
+    scene = pulse(a_ratio=3.0, w_ratio=3.0, walls=[Wall(side=side, gap=0.053, restitution=restitution)])
+    exact, fine = EventBasedModel().simulate(scene), bouc_wen(scene, 1e-7)
+    gap = kinematics.wall_gap(scene, side, fine.channels["x"], fine.channels["theta"])
+    assert [e.kind for e in fine.event_list].count("wall impact") >= 1
+    assert gap.min() > -1e-9
+    assert fine.outcome == exact.outcome
+    assert np.max(np.abs(kinematics.pivot_height(BLOCK, fine.channels["y"], fine.channels["theta"]))) < 1e-12
+    rows = min(len(fine.channels["theta"]), len(exact.channels["theta"]), 600)
+    assert np.max(np.abs(fine.channels["theta"][:rows] - exact.channels["theta"][:rows])) < 2e-3 * BLOCK.alpha
+
+
+def test_the_mirror_image_is_exact():
+    scene = pulse(walls=[Wall(side="left", gap=0.02, restitution=0.5)], initial_velocity=0.2)
+    one, other = bouc_wen(scene), bouc_wen(scene.mirrored())
+    for name in ("x", "theta", "x_dot", "theta_dot"):
+        assert np.array_equal(one.channels[name], -other.channels[name])
+    assert [event.t for event in one.event_list] == [event.t for event in other.event_list]
+
+
+def test_a_block_that_leans_on_the_wall_stays():
+    tall = Block(half_width=0.3, half_height=1.5)
+    tilt = 1.5 * tall.alpha
+    gap = tall.radius * (math.sin(tall.alpha + tilt) - math.sin(tall.alpha - tilt))
+    scene = Scene(
+        name="leaning",
+        block=tall,
+        floor=Floor(friction=0.9),
+        walls=[Wall(side="left", gap=gap)],
+        initial_rotation=tilt,
+        duration=3.0,
+    )
+    history = bouc_wen(scene)
+    assert set(history.channels["mode"]) == {"lean"}
+    assert np.max(np.abs(history.channels["theta"] - tilt)) < 1e-4
+
+
+def test_overturning_ends_the_run():
+    history = bouc_wen(pulse(a_ratio=6.0, w_ratio=2.0, mu=0.8))
+    exact = EventBasedModel().simulate(pulse(a_ratio=6.0, w_ratio=2.0, mu=0.8))
+    assert history.outcome == exact.outcome
+    assert history.event_list[-1].kind == history.outcome
+    assert history.channels["t"][-1] <= history.event_list[-1].t
+
+
+def test_what_it_cannot_do_is_refused():
+    with pytest.raises(InputError, match="one coefficient"):
+        bouc_wen(pulse().replace(floor=Floor(friction=0.3, static_friction=0.4)))
+    with pytest.raises(InputError, match="bilateral"):
+        bouc_wen(pulse(), pivot="unilateral")
+    with pytest.raises(InputError, match="free flight"):
+        bouc_wen(pulse().replace(floor=Floor(friction=0.3, restitution=0.2)))
+    with pytest.raises(ModelFailure, match="cap on steps"):
+        bouc_wen(pulse(), most_steps=50)
