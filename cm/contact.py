@@ -9,17 +9,33 @@ from __future__ import annotations
 import math
 
 #: A clamped Kelvin-Voigt contact reaches a restitution of zero only at infinite damping: this is the least one asked of it.
-LEAST_RESTITUTION = 0.005
+LEAST_RESTITUTION = 1e-4
 
 
-def normal_force(stiffness: float, damping: float, depth: float, rate: float) -> float:
-    """Kelvin-Voigt force of a contact that can only push: k depth + c rate, never negative, zero where open.
+def felt_share(x: float) -> float:
+    """Share of a step's change of speed that a damper feels within that step, for x = c K step (damping, mobility, step).
 
-    `depth` (m) is the penetration, `rate` (m/s) its rate of growth.
+    The Kelvin-Voigt force is k depth - c (rate + share change), change = K step force: the speed then decays by
+    1/(1 + x + x^2/2), of second order and without overshoot however large x is, and at rest the spring alone carries the load.
     """
-    if depth <= 0.0:
-        return 0.0
-    return max(0.0, stiffness * depth + damping * rate)
+    return (1.0 + x) / (2.0 + x)
+
+
+def normal_forces(f1: float, f2: float, d1: float, d2: float, k11: float, k12: float, k21: float, k22: float) -> tuple[float, float]:
+    """Forces of two Kelvin-Voigt contacts that can only push, each of which feels both forces within the step.
+
+    f is the force k depth - c rate as it would be without them, d what a unit of velocity gained within the step takes off it,
+    and K how much velocity (over the step's length) a unit of force j gives to corner i: F_i + d_i (K F)_i = f_i, but F_i >= 0.
+    An open contact has f = d = 0.
+    """
+    a11, a12, a21, a22 = 1.0 + d1 * k11, d1 * k12, d2 * k21, 1.0 + d2 * k22
+    determinant = a11 * a22 - a12 * a21
+    force1, force2 = (a22 * f1 - a12 * f2) / determinant, (a11 * f2 - a21 * f1) / determinant
+    if force1 <= 0.0:
+        return 0.0, max(0.0, f2 / a22)
+    if force2 <= 0.0:
+        return max(0.0, f1 / a11), 0.0
+    return force1, force2
 
 
 def friction_force(
@@ -36,6 +52,23 @@ def friction_force(
     if abs(force) <= (mu_k if slipping else mu_s) * normal:
         return force, False
     return math.copysign(mu_k * normal, force), True
+
+
+def effective_mass(k_n: float, k_t: float, k_c: float, normal: float, tangential: float, friction: float, restitution: float) -> float:
+    """Share of the block's mass that a corner brings to an impact with friction, arriving at `normal` < 0, `tangential`.
+
+    A unit impulse along the normal changes the corner's velocity by k_n = 1 + 3 r_t^2/R^2 along the normal and by k_c =
+    -3 r_n r_t/R^2 along the surface, a tangential one by k_c and k_t = 1 + 3 r_n^2/R^2 (r_n, r_t: offset of the corner from the
+    centroid). Friction that holds the corner makes it heavier, 1/m = k_n - k_c^2/k_t; friction mu N that it slips against gives
+    1/m = k_n + mu k_c, signed as it acts. Which of them holds is asked of the rigid impact; that slip stops or turns within
+    the impact is left out.
+    """
+    held = k_n - k_c * k_c / k_t
+    push = (-(1.0 + restitution) * normal + k_c * tangential / k_t) / held
+    shear = -(tangential + k_c * push) / k_t
+    if push > 0.0 and abs(shear) <= friction * push:
+        return 1.0 / held
+    return 1.0 / (k_n + math.copysign(friction, shear) * k_c)
 
 
 def damping_ratio_of_paper(restitution: float) -> float:
@@ -65,12 +98,12 @@ def restitution_of(damping_ratio: float) -> float:
 def damping_ratio(restitution: float) -> float:
     """Damping ratio at which a clamped Kelvin-Voigt contact has this restitution: the inverse of `restitution_of`.
 
-    Restitutions below `LEAST_RESTITUTION` get its damping ratio, about 7.
+    Restitutions below `LEAST_RESTITUTION` get its damping ratio, about 50.
     """
     if restitution == 1.0:
         return 0.0
     aim = max(restitution, LEAST_RESTITUTION)
-    low, high = 0.0, 16.0
+    low, high = 0.0, 100.0
     while high - low > 1e-12:
         middle = 0.5 * (low + high)
         if restitution_of(middle) > aim:

@@ -5,7 +5,16 @@ import math
 import pytest
 from scipy.integrate import solve_ivp
 
-from cm.contact import LEAST_RESTITUTION, damping_ratio, damping_ratio_of_paper, friction_force, normal_force, restitution_of
+from cm.contact import (
+    LEAST_RESTITUTION,
+    damping_ratio,
+    damping_ratio_of_paper,
+    effective_mass,
+    felt_share,
+    friction_force,
+    normal_forces,
+    restitution_of,
+)
 
 
 def integrated_restitution(xi: float) -> float:
@@ -50,10 +59,28 @@ def test_damping_ratio_of_paper_is_critical_without_restitution():
     assert restitution_of(1.0) == pytest.approx(0.135335, abs=1e-6)
 
 
-def test_normal_force_only_pushes():
-    assert normal_force(100.0, 5.0, 0.02, 0.1) == pytest.approx(2.5)
-    assert normal_force(100.0, 5.0, 0.02, -1.0) == 0.0
-    assert normal_force(100.0, 5.0, -1e-9, 1.0) == 0.0
+def test_normal_forces_only_push():
+    apart = {"d1": 0.0, "d2": 0.0, "k11": 1.2, "k12": 0.8, "k21": 0.8, "k22": 1.2}
+    assert normal_forces(2.0, 3.0, **apart) == (2.0, 3.0)
+    assert normal_forces(-2.0, 3.0, **apart) == (0.0, 3.0)
+    assert normal_forces(2.0, -3.0, **apart) == (2.0, 0.0)
+    assert normal_forces(-2.0, -3.0, **apart) == (0.0, 0.0)
+
+
+def test_normal_forces_feel_each_other():
+    f1, f2, d1, d2, k11, k12, k21, k22 = 2.0, 3.0, 0.4, 0.7, 1.2, 0.8, 0.5, 1.3
+    force1, force2 = normal_forces(f1, f2, d1, d2, k11, k12, k21, k22)
+    assert force1 + d1 * (k11 * force1 + k12 * force2) == pytest.approx(f1)
+    assert force2 + d2 * (k21 * force1 + k22 * force2) == pytest.approx(f2)
+    assert normal_forces(0.1, 9.0, d1, d2, k11, k12, k21, k22) == (0.0, pytest.approx(9.0 / (1.0 + d2 * k22)))
+
+
+@pytest.mark.parametrize("x", [0.01, 0.3, 2.0, 100.0])
+def test_damper_stops_a_corner_without_overshoot(x):
+    c, mobility, step, speed = x / 2e-3, 2.0, 1e-3, -0.4
+    d = felt_share(x) * c * step
+    force, _ = normal_forces(-c * speed, 0.0, d, 0.0, mobility, 0.0, 0.0, mobility)
+    assert speed + step * mobility * force == pytest.approx(speed / (1.0 + x + 0.5 * x * x))
 
 
 def test_friction_sticks_up_to_static_and_slips_at_kinetic_friction():
@@ -69,3 +96,25 @@ def test_stiff_friction_stops_the_corner_at_once():
     force, slipping = friction_force(0.0, 1e12, mobility, 1.0, 1.0, 1e9, 0.0, rate, False)
     assert not slipping
     assert rate + mobility * force == pytest.approx(0.0, abs=1e-7)
+
+
+def impact_velocity(k_n, k_t, k_c, normal, tangential, mu, e):
+    """Push of the rigid impact with Newton's restitution by sweeping (Gauss-Seidel) over the two unknown impulses."""
+    push = shear = 0.0
+    for _ in range(500):
+        push = max(0.0, (-(1.0 + e) * normal - k_c * shear) / k_n)
+        shear = min(max(-(tangential + k_c * push) / k_t, -mu * push), mu * push)
+    return push
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.1, 0.3, 1.0])
+@pytest.mark.parametrize("k_c", [-0.7, 0.0, 0.7])
+def test_effective_mass_is_the_impulse_of_the_rigid_impact(mu, k_c):
+    k_n, k_t, e = 1.2, 3.8, 0.5
+    push = impact_velocity(k_n, k_t, k_c, -1.0, 0.0, mu, e)
+    assert effective_mass(k_n, k_t, k_c, -1.0, 0.0, mu, e) == pytest.approx(push / (1.0 + e), rel=1e-9)
+
+
+def test_effective_mass_of_a_corner_that_slides_on():
+    assert effective_mass(1.2, 3.8, 0.7, -1.0, 50.0, 0.3, 0.5) == pytest.approx(1.0 / (1.2 - 0.3 * 0.7))
+    assert effective_mass(1.2, 3.8, 0.7, -1.0, -50.0, 0.3, 0.5) == pytest.approx(1.0 / (1.2 + 0.3 * 0.7))

@@ -1,0 +1,70 @@
+"""The restitution reached, against the one that the scene asks for."""
+
+import math
+
+import pytest
+
+from cm import ContinuousModel, measured_restitution
+from cm.contact import damping_ratio_of_paper, restitution_of
+from scenes import Block, Floor, InputError, Scene, Wall
+
+BLOCK = Block(half_width=0.397, half_height=1.555)
+RESTITUTIONS = [0.0, 0.25, 0.5, 0.75, 1.0]
+
+
+def scene(*, friction=0.3, floor=0.0, wall=None, gap=0.03, side="left", **change):
+    walls = [] if wall is None else [Wall(side=side, gap=gap, restitution=wall)]
+    floor = Floor(friction=friction, restitution=floor)
+    return Scene(**{"name": "strike", "block": BLOCK, "floor": floor, "walls": walls, "duration": 0.7, "output_step": 0.001} | change)
+
+
+FLOOR = {
+    "flat": {"initial_height": 0.02},
+    "offset corner, frictionless": {"friction": 0.0, "initial_height": 0.02, "initial_rotation": 0.1},
+    "offset corner, slipping": {"friction": 0.1, "initial_height": 0.02, "initial_rotation": 0.2},
+    "offset corner, sticking": {"friction": 1.0, "initial_height": 0.02, "initial_rotation": -0.2},
+    "corner below the centroid": {"friction": 0.3, "initial_height": 0.02, "initial_rotation": BLOCK.alpha},
+    "sliding corner": {"friction": 0.3, "initial_height": 0.02, "initial_rotation": 0.1, "initial_velocity": -1.0},
+    "rocking block": {"friction": 0.3, "initial_rotation": 0.1},
+}
+WALL = {
+    "top corner": {"gap": 0.05, "initial_angular_velocity": 0.5},
+    "top corner, right wall": {"gap": 0.05, "side": "right", "initial_angular_velocity": -0.5},
+    "bottom corner": {"gap": 0.01, "initial_angular_velocity": -0.3, "initial_velocity": -1.0},
+    "bottom corner, rough floor": {"friction": 1.0, "gap": 0.01, "initial_angular_velocity": -0.3, "initial_velocity": -1.0},
+    "flat side, sliding": {"friction": 0.1, "initial_velocity": -0.7},
+    "in flight": {"initial_velocity": -0.7, "initial_height": 0.2, "initial_rotation": -0.05},
+}
+
+
+@pytest.mark.parametrize("e", RESTITUTIONS)
+@pytest.mark.parametrize("case", FLOOR)
+def test_floor_has_the_restitution_asked_for(case, e):
+    assert measured_restitution(ContinuousModel(), scene(floor=e, **FLOOR[case])) == pytest.approx(e, abs=1e-3)
+
+
+@pytest.mark.parametrize("e", RESTITUTIONS)
+@pytest.mark.parametrize("case", WALL)
+def test_wall_has_the_restitution_asked_for(case, e):
+    assert measured_restitution(ContinuousModel(), scene(wall=e, **WALL[case])) == pytest.approx(e, abs=1e-3)
+
+
+@pytest.mark.parametrize("e", RESTITUTIONS)
+def test_restitution_of_a_soft_contact_is_within_a_hundredth(e):
+    model = ContinuousModel(penetration=1e-6)
+    assert measured_restitution(model, scene(floor=e, **FLOOR["rocking block"])) == pytest.approx(e, abs=0.01)
+    assert measured_restitution(model, scene(wall=e, **WALL["top corner"])) == pytest.approx(e, abs=0.01)
+
+
+@pytest.mark.parametrize("e", RESTITUTIONS)
+def test_paper_rule_misses_as_its_formula_says(e):
+    # (33) takes the whole mass, the corner has less of it, and the contact lets go when its force does.
+    drop = scene(friction=0.0, floor=e, initial_height=0.02, initial_rotation=0.1)
+    lever = BLOCK.radius * math.sin(BLOCK.alpha - 0.1)
+    xi = damping_ratio_of_paper(e) * math.sqrt(1.0 + 3.0 * (lever / BLOCK.radius) ** 2)
+    assert measured_restitution(ContinuousModel(damping_rule="paper"), drop) == pytest.approx(restitution_of(xi), abs=1e-3)
+
+
+def test_scene_without_an_impact_has_no_restitution():
+    with pytest.raises(InputError, match="strikes"):
+        measured_restitution(ContinuousModel(), scene())
