@@ -91,9 +91,7 @@ def describe(
     return tuple(evaluate(measure, motion, "alpha", window=window, until=until) for measure in chosen)
 
 
-def evaluate(
-    measure: Measure, what: Pair | Motion, angle: str, *, against: str = "", window: str = "", until: float | None = None
-) -> Figure:
+def evaluate(measure: Measure, what: object, angle: str, *, against: str = "", window: str = "", until: float | None = None) -> Figure:
     """One measure as a figure; what is not finite becomes None with a note."""
     try:
         result = measure.evaluate(what)

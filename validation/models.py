@@ -31,6 +31,11 @@ class Family:
     #: Whether the block can leave the floor; a model that cannot differs in form from one that can.
     flies: bool = True
 
+    @property
+    def compiled(self) -> bool:
+        """Whether its first run on a machine compiles, which may take longer than any cell."""
+        return "numba" in self.libraries
+
 
 COMPILED = ("numba", "llvmlite", "numpy", "scipy")
 FAMILIES: dict[str, Family] = {

@@ -138,12 +138,27 @@ class Cell(Stored):
         return worst(check.verdict for check in self.checks)
 
 
+class EnsembleRecord(Stored):
+    """What each model made of an ensemble: by model, peak |theta| in alpha and outcome of each scene (None and why it failed).
+
+    The statistics are in the figures of the ensemble's cells, whose `scene` is the ensemble's name. `definition` is the table
+    that the scenes are drawn from.
+    """
+
+    name: str
+    description: str = ""
+    definition: dict[str, Any]
+    peaks: dict[str, tuple[float | None, ...]]
+    outcomes: dict[str, tuple[str, ...]]
+
+
 class Run(Stored):
     """All of one run of a suite.
 
     `scenes` holds each scene's `model_dump(mode="json")` by name, in the suite's order, `models` the models' names in
-    order. `reference` is the model that judges numerical differences, `model_form` the one whose missing physics is shown
-    beside it. `faults` are checks that belong to no cell of the run (a tolerance whose cell is missing).
+    order; a cell's `scene` may also be one of `ensembles`. `reference` is the model that judges numerical differences,
+    `model_form` the one whose missing physics is shown beside it. `faults` are checks that belong to no cell of the run (a
+    tolerance whose cell is missing).
     """
 
     format: int = FORMAT
@@ -162,14 +177,13 @@ class Run(Stored):
     wall_seconds: float = 0.0
     strict: bool = False
     tolerances_file: str = ""
-    #: Ensemble statistics, where the suite has ensembles (validation.ensembles).
-    ensembles: tuple[dict[str, Any], ...] = ()
+    ensembles: tuple[EnsembleRecord, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
         """The worst cell; "fail" at least where there are faults, and never "pass" without a single check."""
         found = worst([cell.verdict for cell in self.cells] + (["fail"] if self.faults else []))
-        return worst([found, "fail"]) if not any(cell.checks for cell in self.cells) and not self.ensembles else found
+        return found if any(cell.checks for cell in self.cells) else worst([found, "fail"])
 
     @property
     def exit_code(self) -> int:
@@ -184,6 +198,11 @@ class Run(Stored):
     def cell(self, scene: str, model: str) -> Cell | None:
         """The cell of that scene and model, or None."""
         return next((cell for cell in self.cells if (cell.scene, cell.model) == (scene, model)), None)
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Names of scenes and ensembles that have cells, in order."""
+        return tuple(dict.fromkeys(cell.scene for cell in self.cells))
 
     def of_scene(self, scene: str) -> tuple[Cell, ...]:
         """The cells of one scene, in the models' order."""

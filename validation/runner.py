@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from scenes import History, InputError, Scene
 from validation import provenance, workers
-from validation.discrepancy import compare, describe, too_short
+from validation.discrepancy import compare, describe, evaluate, too_short
+from validation.ensembles import STATISTICS, Ensemble, Sample, Samples
 from validation.measures import DIFFERENCES, FIGURES
-from validation.results import HISTORIES, Cell, CostRecord, Figure, MeasureRecord, Run
+from validation.results import HISTORIES, Cell, CostRecord, EnsembleRecord, Figure, MeasureRecord, Run
 from validation.store import Store, name_of
 from validation.suites import Part, Suite
-from validation.tolerances import HORIZON, OWN_FIGURES, Place, Windowed, judge
+from validation.tolerances import HORIZON, MEASURES, OWN_FIGURES, Place, Windowed, judge
 
 #: Told after each cell: cells done, cells in all, and a few words on what was last.
 Progress = Callable[[int, int, str], None]
@@ -38,6 +43,22 @@ class Spot:
     def name(self) -> str:
         """Name of its files."""
         return name_of(self.scene.name, self.part.label, self.key)
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Some scenes of an ensemble, for one model."""
+
+    ensemble: Ensemble
+    base: Scene
+    part: Part
+    numbers: range
+    key: str
+
+    @property
+    def name(self) -> str:
+        """Name of its file."""
+        return name_of(self.ensemble.name, self.part.label, f"{self.numbers.start}", self.key)
 
 
 def run_suite(
@@ -61,31 +82,40 @@ def run_suite(
     except OSError as error:
         raise InputError(f"{folder}: cannot be used as the output folder: {error.strerror}") from None
     spots = [Spot(scene, part, provenance.cell_key(scene, part.family_name, part.settings)) for scene, part in suite.cells()]
-    records: dict[Spot, dict[str, Any]] = {}
-    failures: dict[Spot, str] = {}
+    batches = [batch for crowd in suite.crowds() for batch in _batches(*crowd)]
+    items: list[Spot | Batch] = [*spots, *batches]
+    records: dict[Spot | Batch, dict[str, Any]] = {}
+    failures: dict[Spot | Batch, str] = {}
     if not force:
-        records = {spot: found for spot in spots if (found := store.get(spot.name)) is not None}
+        for item in items:
+            found = store.get(item.name) if isinstance(item, Spot) else store.get_comparison(item.name)
+            if found is not None:
+                records[item] = found
     read_back = set(records)
-    waiting = [spot for spot in spots if spot not in records]
-    report(len(records), len(spots), f"{len(records)} up to date")
-    waiting = _in_good_order(waiting)
-    tasks = [workers.Task(s.scene, s.part.label, s.part.family_name, dict(s.part.settings), (str(suite.path.parent),)) for s in waiting]
-    limits = [suite.part_of(spot.scene.name).limits for spot in waiting]
+    waiting = [item for item in items if item not in records]
+    report(len(records), len(items), f"{len(records)} up to date")
+    limits = [suite.part_of(item.scene.name if isinstance(item, Spot) else item.ensemble.name).limits for item in waiting]
     for index, result in play(
-        tasks,
+        [_task(item, suite.path.parent) for item in waiting],
         jobs=jobs or os.cpu_count() or 1,
         seconds=[limit.seconds for limit in limits],
         memory_mb=max((limit.memory_mb for limit in limits), default=0.0),
     ):
-        spot = waiting[index]
+        item = waiting[index]
         if result.failure:
-            failures[spot] = result.failure
+            failures[item] = result.failure
         else:
-            store.put(spot.name, result.files, result.record)
-            records[spot] = result.record
-        report(len(records) + len(failures), len(spots), f"{spot.scene.name}, {spot.part.label}")
+            records[item] = result.record
+            if isinstance(item, Spot):
+                store.put(item.name, result.files, result.record)
+            else:
+                store.put_comparison(item.name, result.record)
+        place = item.scene.name if isinstance(item, Spot) else item.ensemble.name
+        report(len(records) + len(failures), len(items), f"{place}, {item.part.label}")
     by_place = {(spot.scene.name, spot.part.label): spot for spot in spots}
-    cells = tuple(_cell(suite, spot, by_place, records, failures, store, spot in read_back) for spot in spots)
+    cells = [_cell(suite, spot, by_place, records, failures, store, spot in read_back) for spot in spots]
+    ensembles, crowds = _crowds(suite, batches, records, failures, read_back)
+    cells += crowds
     store.prune()
     return Run(
         suite=suite.name,
@@ -95,11 +125,10 @@ def run_suite(
         model_form=suite.model_form,
         scenes={name: scene.model_dump(mode="json") for name, scene in suite.scenes.items()},
         models=tuple(suite.models),
-        cells=cells,
-        faults=_without_cell(suite, by_place),
-        measures=tuple(
-            MeasureRecord(name=m.name, label=m.label, unit=m.unit, formula=m.formula) for m in (*DIFFERENCES.values(), *FIGURES.values())
-        ),
+        cells=tuple(cells),
+        ensembles=tuple(ensembles),
+        faults=_without_cell(suite, {(cell.scene, cell.model) for cell in cells}),
+        measures=tuple(MeasureRecord(name=m.name, label=m.label, unit=m.unit, formula=m.formula) for m in MEASURES.values()),
         versions=provenance.versions(),
         hardware=provenance.hardware(),
         wall_seconds=time.perf_counter() - began,
@@ -108,20 +137,99 @@ def run_suite(
     )
 
 
-def _in_good_order(spots: Sequence[Spot]) -> list[Spot]:
-    """First one cell of each package, so that none compiles twice; then the engines, which are slow; then the rest."""
-    seen: set[str] = set()
+def _batches(ensemble: Ensemble, base: Scene, part: Part) -> Iterator[Batch]:
+    """An ensemble cut into batches; a batch's key covers how its scenes are drawn, so that they need not be drawn to look it up."""
+    drawing = {
+        "ensemble": ensemble.model_dump(mode="json", exclude={"count", "batch", "description"}),
+        "code": provenance.code_digest("validation.ensembles"),
+    }
+    for start in range(0, ensemble.count, ensemble.batch):
+        numbers = range(start, min(start + ensemble.batch, ensemble.count))
+        settings = {**part.settings, "drawn": {**drawing, "numbers": [numbers.start, numbers.stop]}}
+        yield Batch(ensemble, base, part, numbers, provenance.cell_key(base, part.family_name, settings))
 
-    def rank(spot: Spot) -> int:
-        module = spot.part.family.module
-        first = module not in seen
-        seen.add(module)
-        return 0 if first else 1 if module == "engines" else 2
 
-    return sorted(spots, key=rank)
+def _task(item: Spot | Batch, folder: Path) -> workers.Task | workers.BatchTask:
+    part = item.part
+    model: dict[str, Any] = {
+        "label": part.label,
+        "family": part.family_name,
+        "settings": dict(part.settings),
+        "search_path": (str(folder),),
+    }
+    if isinstance(item, Spot):
+        return workers.Task(scene=item.scene, **model)
+    return workers.BatchTask(scenes=tuple(item.ensemble.drawn(item.base, n) for n in item.numbers), **model)
 
 
-def _without_cell(suite: Suite, cells: Mapping[tuple[str, str], Spot]) -> tuple[str, ...]:
+def _crowds(
+    suite: Suite,
+    batches: Sequence[Batch],
+    records: Mapping[Spot | Batch, Mapping[str, Any]],
+    failures: Mapping[Spot | Batch, str],
+    read_back: Container[Spot | Batch],
+) -> tuple[list[EnsembleRecord], list[Cell]]:
+    """The ensembles with all peaks and outcomes, and a cell for each of them and each model."""
+    ensembles: list[EnsembleRecord] = []
+    cells: list[Cell] = []
+    for ensemble, of_ensemble in groupby(batches, key=lambda batch: batch.ensemble):
+        by_model = {label: list(found) for label, found in groupby(of_ensemble, key=lambda batch: batch.part.label)}
+        samples: dict[str, Sample] = {}
+        for label, parts in by_model.items():
+            got = [records.get(b) or {"peaks": [None] * len(b.numbers), "outcomes": [failures[b]] * len(b.numbers)} for b in parts]
+            peaks = [math.nan if peak is None else peak for record in got for peak in record["peaks"]]
+            samples[label] = Sample(np.array(peaks), tuple(outcome for record in got for outcome in record["outcomes"]))
+        ensembles.append(
+            EnsembleRecord(
+                name=ensemble.name,
+                description=ensemble.description,
+                definition=ensemble.model_dump(mode="json", exclude_none=True),
+                peaks={label: tuple(peak if math.isfinite(peak) else None for peak in sample.peaks) for label, sample in samples.items()},
+                outcomes={label: tuple(sample.outcomes) for label, sample in samples.items()},
+            )
+        )
+        cells += [_crowd_cell(suite, ensemble, by_model[label], samples, records, read_back) for label in samples]
+    return ensembles, cells
+
+
+def _crowd_cell(
+    suite: Suite,
+    ensemble: Ensemble,
+    batches: Sequence[Batch],
+    samples: Mapping[str, Sample],
+    records: Mapping[Spot | Batch, Mapping[str, Any]],
+    read_back: Container[Spot | Batch],
+) -> Cell:
+    part = batches[0].part
+    own, origin = samples[part.label], suite.part_of(ensemble.name)
+    costs = [records[batch]["cost"] for batch in batches if batch in records]
+    about: dict[str, Any] = {
+        "scene": ensemble.name,
+        "model": part.label,
+        "key": provenance.digest("".join(batch.key for batch in batches)),
+        "settings": dict(part.settings),
+        "read_back": all(batch in read_back for batch in batches),
+        "cost": CostRecord(**{key: sum(cost[key] for cost in costs) for key in (costs[0] if costs else ())}),
+    }
+    if own.failures:
+        reason = next(outcome for peak, outcome in zip(own.peaks, own.outcomes, strict=True) if not math.isfinite(peak))
+        return Cell(**about, status="failed", reason=f"{own.failures} of {len(own.peaks)} scenes failed; the first: {reason}")
+    asked = origin.asked(ensemble.name, part.label)
+    figures = [
+        evaluate(measure, Samples(samples[name], own), "alpha", against=name)
+        for name in dict.fromkeys([origin.reference, origin.model_form, *(place.against for place in asked)])
+        if name in samples and name != part.label
+        for measure in STATISTICS.values()
+    ]
+    checks = [
+        judge(_figure(figures, place), origin.tolerances.get(place), kind=kind, measure=place.what.definition)
+        for place, kind in asked.items()
+    ]
+    outcome = f"{int(np.sum(own.fallen))} of {len(own.peaks)} overturned"
+    return Cell(**about, status="done", outcome=outcome, figures=tuple(figures), checks=tuple(checks))
+
+
+def _without_cell(suite: Suite, cells: Container[tuple[str, str]]) -> tuple[str, ...]:
     """Tolerances that nothing in the suite can meet."""
     return tuple(f"tolerance [{place}] has no cell in the suite" for place in suite.tolerances if (place.scene, place.model) not in cells)
 
@@ -130,8 +238,8 @@ def _cell(
     suite: Suite,
     spot: Spot,
     spots: Mapping[tuple[str, str], Spot],
-    records: Mapping[Spot, Mapping[str, Any]],
-    failures: Mapping[Spot, str],
+    records: Mapping[Spot | Batch, Mapping[str, Any]],
+    failures: Mapping[Spot | Batch, str],
     store: Store,
     read_back: bool,
 ) -> Cell:

@@ -31,8 +31,9 @@ A suite is a TOML file that a user can write:
         [{ name = "weak", excitation = { kind = "ricker", amplitude = 4.0, period = 1.5 } }],
     ]
 
-Scenes can also be written out as `[[scene]]` tables. Tolerances (validation.tolerances) are a table `[tolerances]` in the
-file or a file `<suite>.tolerances.toml` beside it. `include = ["smoke", "walls"]` joins other suites instead.
+Ensembles are `[[ensemble]]` tables (validation.ensembles), judged by what `require.ensemble` names. Scenes can also be written
+out as `[[scene]]` tables. Tolerances (validation.tolerances) are a table `[tolerances]` in the file or a file
+`<suite>.tolerances.toml` beside it. `include = ["smoke", "walls"]` joins other suites instead.
 """
 
 from __future__ import annotations
@@ -51,7 +52,8 @@ from scenes import InputError, Scene, load_scene
 from scenes.base import Frozen, Positive
 from scenes.errors import printable, unknown_name
 from scenes.files import named_scenes, read_toml, scene_from
-from validation.measures import FIGURES
+from validation.ensembles import STATISTICS, Ensemble
+from validation.measures import DIFFERENCES, FIGURES
 from validation.models import Family, build, family
 from validation.results import Kind
 from validation.tolerances import OWN_FIGURES, Place, Tolerances, Windowed, parse_tolerances
@@ -70,12 +72,13 @@ class Require(Frozen):
     """Measures ("name" or "name@window") that must have a tolerance in every scene.
 
     `difference`: of every other model against the reference; `model_form`: against the suite's `model_form`; `figures`: of
-    every cell itself.
+    every cell itself; `ensemble`: of every other model against the reference, in the suite's ensembles.
     """
 
     difference: tuple[str, ...] = ()
     model_form: tuple[str, ...] = ()
     figures: tuple[str, ...] = ()
+    ensemble: tuple[str, ...] = ()
 
 
 class Grid(Frozen):
@@ -98,6 +101,7 @@ class SuiteFile(Frozen):
     models: dict[str, dict[str, Any]] = Field(default_factory=dict)
     require: Require = Require()
     limits: Limits = Limits()
+    ensemble: tuple[Ensemble, ...] = ()
     tolerances: dict[str, Any] | None = None
 
 
@@ -131,11 +135,13 @@ class Suite:
     tolerances: Tolerances = field(repr=False)
     #: Where `rockcheck accept` writes: the tolerance file, or the suite file where it holds a table `[tolerances]`.
     tolerances_path: Path = Path()
+    #: Ensembles with the scene that each is drawn from.
+    ensembles: Mapping[str, tuple[Ensemble, Scene]] = field(default_factory=dict)
     parts: tuple[Suite, ...] = ()
 
     def part_of(self, scene: str) -> Suite:
-        """The suite that a scene comes from: this one, or the included one."""
-        return next((part for part in self.parts if scene in part.scenes), self)
+        """The suite that a scene or an ensemble comes from: this one, or the included one."""
+        return next((part for part in self.parts if scene in part.scenes or scene in part.ensembles), self)
 
     def cells(self) -> Iterator[tuple[Scene, Part]]:
         """All cells, scene by scene."""
@@ -144,6 +150,13 @@ class Suite:
                 for model in part.models.values():
                     if scene.name in model.settings.get("files", {scene.name: ""}):
                         yield scene, model
+
+    def crowds(self) -> Iterator[tuple[Ensemble, Scene, Part]]:
+        """All ensembles with the scene that they are drawn from, model by model."""
+        for part in self.parts or (self,):
+            for ensemble, base in part.ensembles.values():
+                for model in part.models.values():
+                    yield ensemble, base, model
 
     def only(self, scene: str, model: str) -> Suite:
         """The suite with one cell, and the references that it is held against."""
@@ -157,6 +170,7 @@ class Suite:
         return replace(
             own,
             scenes={scene: own.scenes[scene]},
+            ensembles={},
             models={label: part for label, part in own.models.items() if label in needed},
             tolerances=tolerances,
         )
@@ -164,8 +178,11 @@ class Suite:
     def asked(self, scene: str, model: str) -> dict[Place, Kind]:
         """What must be judged in a cell, and as what: what the suite requires and whatever has a tolerance."""
         own = self.part_of(scene)
-        places = [Place(scene, model, OWN_FIGURES, Windowed.parse(text)) for text in own.require.figures]
-        for against, texts in ((own.reference, own.require.difference), (own.model_form, own.require.model_form)):
+        required = own.require
+        if scene in own.ensembles:
+            required = Require(difference=required.ensemble)
+        places = [Place(scene, model, OWN_FIGURES, Windowed.parse(text)) for text in required.figures]
+        for against, texts in ((own.reference, required.difference), (own.model_form, required.model_form)):
             if against and model not in (own.reference, against):
                 places += [Place(scene, model, against, Windowed.parse(text)) for text in texts]
         places += [place for place in own.tolerances if (place.scene, place.model) == (scene, model)]
@@ -177,7 +194,7 @@ class Suite:
             return "exact" if place.what.definition.exact else "absolute"
         if "measured" in (self.models[place.model].family_name, self.models[place.against].family_name):
             return "measured"
-        scene = self.scenes[place.scene]
+        scene = self.ensembles[place.scene][1] if place.scene in self.ensembles else self.scenes[place.scene]
         may_hop = bool(scene.walls) or scene.floor.restitution > 0.0 or scene.initial_height > 0.0
         differ = self.models[place.model].family.flies != self.models[place.against].family.flies
         return "model form" if may_hop and differ else "numerical"
@@ -223,8 +240,11 @@ def _suite(given: SuiteFile, path: Path, shipped: bool) -> Suite:
     if not models:
         raise InputError("no model; at least the reference is needed", "models")
     scenes = _scenes(given, path.parent)
-    if not scenes:
+    ensembles = {e.name: (e, scene_from(e.scene, folder=path.parent, default_name=e.name)) for e in given.ensemble}
+    if not scenes and not ensembles:
         raise InputError("no scene; at least one is needed", "scenes")
+    for name in ensembles.keys() & scenes.keys():
+        raise InputError(f"{name!r} is a scene, too", "ensemble.name")
     for key, texts in given.require:
         for text in texts:
             _required(key, text)
@@ -243,6 +263,7 @@ def _suite(given: SuiteFile, path: Path, shipped: bool) -> Suite:
         reference=given.reference,
         model_form=given.model_form,
         scenes=scenes,
+        ensembles=ensembles,
         models=models,
         require=given.require,
         limits=given.limits,
@@ -255,21 +276,24 @@ def _joined(given: SuiteFile, path: Path) -> Suite:
     """Several suites as one; their scenes must have different names, their references must agree."""
     parts = [load_suite(name if name in named_suites() else path.parent / name) for name in given.include]
     scenes: dict[str, Scene] = {}
+    ensembles: dict[str, tuple[Ensemble, Scene]] = {}
     models: dict[str, Part] = {}
     for part in parts:
-        for name in part.scenes.keys() & scenes.keys():
+        for name in {*part.scenes, *part.ensembles} & {*scenes, *ensembles}:
             raise InputError(f"scene {name!r} is in two of the suites", "include")
-        if (part.reference, part.model_form) != (parts[0].reference, parts[0].model_form):
+        if part.reference != parts[0].reference:
             raise InputError(f"{part.name} and {parts[0].name} have different references", "include")
         scenes |= part.scenes
+        ensembles |= part.ensembles
         models |= part.models
     return Suite(
         name=path.stem,
         path=path,
         description=given.description,
         reference=parts[0].reference,
-        model_form=parts[0].model_form,
+        model_form=next((part.model_form for part in parts if part.model_form), ""),
         scenes=scenes,
+        ensembles=ensembles,
         models=models,
         require=Require(),
         limits=given.limits,
@@ -323,9 +347,9 @@ def _merged(base: Any, change: Any) -> Any:
 
 
 def _required(key: str, text: str) -> None:
-    what = Windowed.parse(text)
-    if (what.measure in FIGURES) != (key == "figures"):
-        raise InputError(f"{text} is {'not ' if key == 'figures' else ''}a figure of a cell itself", f"require.{key}")
+    book = {"figures": FIGURES, "ensemble": STATISTICS}.get(key, DIFFERENCES)
+    if Windowed.parse(text).measure not in book:
+        raise unknown_name(f"measure of require.{key}", text, book)
 
 
 def _tolerance_tables(given: SuiteFile, path: Path, shipped: bool) -> tuple[Path, Mapping[str, Any]]:

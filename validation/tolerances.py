@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import ChainMap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -22,9 +23,11 @@ from typing import Any
 from scenes import InputError
 from scenes.base import Finite, Frozen, NonNegative
 from scenes.errors import printable, unknown_name
+from validation.ensembles import STATISTICS
 from validation.measures import DIFFERENCES, FIGURES, Measure
 from validation.results import Check, CheckVerdict, Figure, Kind
 
+MEASURES: Mapping[str, Measure] = ChainMap(DIFFERENCES, FIGURES, STATISTICS)
 #: The third name of a table that is not a reference model.
 OWN_FIGURES = "figures"
 HORIZON = "horizon"
@@ -41,8 +44,8 @@ class Windowed:
     def parse(cls, text: str) -> Windowed:
         """Read "measure@window"; raises `InputError` for an unknown measure or a window that is none."""
         name, at, window = text.partition("@")
-        if name not in DIFFERENCES and name not in FIGURES:
-            raise unknown_name("measure", name, [*DIFFERENCES, *FIGURES])
+        if name not in MEASURES:
+            raise unknown_name("measure", name, MEASURES)
         if at and window != HORIZON and not re.fullmatch(r"\d+(\.\d+)?s", window):
             raise InputError(f"window {printable(window)!r} of {name}: seconds such as 8s, or {HORIZON}, are asked for")
         return cls(name, window)
@@ -55,7 +58,7 @@ class Windowed:
     @property
     def definition(self) -> Measure:
         """The measure itself."""
-        return DIFFERENCES.get(self.measure) or FIGURES[self.measure]
+        return MEASURES[self.measure]
 
     def __str__(self) -> str:
         return f"{self.measure}@{self.window}" if self.window else self.measure

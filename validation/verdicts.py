@@ -18,7 +18,7 @@ def junit(run: Run) -> str:
     A figure that changed within its limit is a failure only in a strict run.
     """
     document = JUnitXml(f"rockcheck {run.suite}")
-    for scene in run.scenes:
+    for scene in run.places:
         suite = TestSuite(scene)
         for cell in run.of_scene(scene):
             suite.add_testcases(list(_cases(cell, run.strict)))
@@ -61,7 +61,7 @@ def markdown(run: Run) -> str:
     if reasons:
         lines += [*(f"- {_plain(reason)}" for reason in reasons), ""]
     lines += ["| scene | " + " | ".join(run.models) + " |", "|---" * (len(run.models) + 1) + "|"]
-    for scene in run.scenes:
+    for scene in run.places:
         row = [run.cell(scene, model) for model in run.models]
         lines.append(f"| {_plain(scene)} | " + " | ".join(_entry(cell) for cell in row) + " |")
     return "\n".join(lines) + "\n"

@@ -149,7 +149,7 @@ def test_accept_writes_a_line_that_was_missing(tmp_path):
     accepted(path, made_run(check(1.23456789e-3, None), check(0.99, None, "peak_ratio")))
     lines = parse_tolerances(tomllib.loads(path.read_text()))
     assert {str(place.what): (line.expected, line.limit) for place, line in lines.items()} == {
-        "theta_rms": (0.00123457, 0.0025),
+        "theta_rms": (0.0012345679, 0.0025),
         "peak_ratio": (0.99, 0.02),
     }
     for place, line in lines.items():

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from scenes import InputError
+from validation import remote, workers
 from validation.commands import OUT, JobsOption, OutOption, SchedulerOption, console, usable_folder
 from validation.publish import publish
 from validation.results import Run
@@ -61,7 +62,8 @@ def play_suite(suite: str, folder: Path, jobs: int | None, force: bool, strict: 
         def progress(done: int, of: int, what: str) -> None:
             bar.update(task, completed=done, total=of, description=f"{loaded.name}: {what[:40]}")
 
-        return run_suite(loaded, folder, jobs=jobs, force=force, strict=strict, progress=progress)
+        play = workers.local if scheduler is None else remote.OnCluster(scheduler)
+        return run_suite(loaded, folder, jobs=jobs, force=force, strict=strict, play=play, progress=progress)
 
 
 def show(finished: Run, out: Console) -> None:

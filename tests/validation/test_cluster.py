@@ -1,0 +1,58 @@
+"""The same cells on a Dask cluster of two local workers: the same run, and failures that stay in their cells."""
+
+from __future__ import annotations
+
+import pytest
+
+from scenes import InputError
+from validation.remote import OnCluster
+from validation.runner import run_suite
+from validation.suites import load_suite
+
+pytest.importorskip("distributed")
+MODELS = "\n".join(f'[models.{name}]\nmodel = "faulty:{name}"' for name in ("Segfault", "Hang", "Hog", "Fails"))
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")
+def test_a_cluster_gives_the_same_run_and_survives_failures(tmp_path):
+    import shutil
+    from pathlib import Path
+
+    shutil.copy(Path(__file__).parent / "models" / "faulty.py", tmp_path / "faulty.py")
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        f"""reference = "Still"
+[limits]
+seconds = 15.0
+memory_mb = 600
+[models.Still]
+model = "faulty:Still"
+{MODELS}
+[[scene]]
+name = "short"
+duration = 0.5
+block = {{ half_width = 0.4, half_height = 1.5 }}
+floor = {{ friction = 0.5 }}
+""",
+        encoding="utf-8",
+    )
+    suite = load_suite(path)
+    run = run_suite(suite, tmp_path / "out", play=OnCluster("local:2"))
+    reasons = {cell.model: cell.reason for cell in run.cells}
+    assert reasons == {
+        "Still": "",
+        "Segfault": "crashed: SIGSEGV",
+        "Hang": "did not end within 15 s",
+        "Hog": "out of memory",
+        "Fails": "more than 10 events",
+    }
+    at_home = run_suite(suite, tmp_path / "home", jobs=1)
+    assert at_home.cell("short", "Still").figures == run.cell("short", "Still").figures
+
+
+@pytest.mark.parametrize("address", ["local:0", "local:two", "nonsense"])
+def test_an_unusable_address_is_bad_input(tmp_path, address):
+    suite = load_suite("smoke")
+    with pytest.raises(InputError, match="--scheduler"):
+        run_suite(suite, tmp_path / "out", play=OnCluster(address))

@@ -1,0 +1,136 @@
+"""Ensembles: drawing is repeatable, statistics are right on samples that are known, and a run holds them against tolerances."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenes import InputError
+from validation import workers
+from validation.ensembles import STATISTICS, Distribution, Sample, Samples
+from validation.runner import run_suite
+from validation.suites import load_suite
+
+SUITE = """
+reference = "still"
+[models.still]
+model = "faulty:Still"
+[models.near]
+model = "faulty:Still"
+offset = 1e-3
+[models.broken]
+model = "faulty:Fails"
+[require]
+ensemble = ["ks_distance", "overturning_accuracy"]
+[[ensemble]]
+name = "crowd"
+count = 10
+batch = 4
+seed = 7
+friction = { uniform = [0.3, 0.8] }
+gap = { lognormal = [0.05, 0.3] }
+noise = { amplitude = { uniform = [4.0, 5.0] }, frequency = 2.5, damping = 0.6, strong = 0.5 }
+[ensemble.scene]
+duration = 0.5
+block = { half_width = 0.4, half_height = 1.5 }
+floor = { friction = 0.5 }
+walls = [{ side = "left", gap = 0.05 }]
+[tolerances.crowd.near.still]
+ks_distance = { expected = 1.0, limit = 1.0, drift = 0.0, why = "a test" }
+overturning_accuracy = { expected = 1.0, limit = 0.0, drift = 0.0, why = "none falls" }
+"""
+
+
+@pytest.fixture
+def suite_file(tmp_path, monkeypatch):
+    shutil.copy(Path(__file__).parent / "models" / "faulty.py", tmp_path / "faulty.py")
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.delitem(sys.modules, "faulty", raising=False)
+    path = tmp_path / "mine.toml"
+    path.write_text(SUITE, encoding="utf-8")
+    return path
+
+
+def in_this_process(tasks, **limits):
+    return enumerate(map(workers.play, tasks))
+
+
+def test_scenes_are_drawn_alike_whatever_the_count(suite_file):
+    ensemble, base = load_suite(suite_file).ensembles["crowd"]
+    first = [ensemble.drawn(base, n) for n in range(10)]
+    again = [ensemble.model_copy(update={"count": 5}).drawn(base, n) for n in range(5)]
+    assert first[:5] == again
+    assert len({scene.floor.friction for scene in first}) == 10
+    for scene in first:
+        assert 0.3 <= scene.floor.friction <= 0.8
+        assert scene.walls[0].gap > 0.0
+        assert 4.0 <= np.max(np.abs(scene.excitation.samples)) <= 5.0
+    assert ensemble.model_copy(update={"seed": 8}).drawn(base, 0) != first[0]
+
+
+def test_noise_has_the_spectrum_that_it_states(suite_file):
+    ensemble, _ = load_suite(suite_file).ensembles["crowd"]
+    noise = ensemble.noise.model_copy(update={"strong": 40.0})
+    power = sum(np.abs(np.fft.rfft(noise.draw(np.random.default_rng(n)).samples)) ** 2 for n in range(40))
+    frequency = np.fft.rfftfreq(20000, 0.002)
+    band = [float(np.mean(power[(frequency > f - 0.3) & (frequency < f + 0.3)])) for f in (2.5, 10.0)]
+    ratio = (10.0 / 2.5) ** 2
+    stated = ((1 + 4 * 0.36 * ratio) / ((1 - ratio) ** 2 + 4 * 0.36 * ratio)) / ((1 + 4 * 0.36) / (4 * 0.36))
+    assert band[1] / band[0] == pytest.approx(stated, rel=0.25)
+
+
+def test_statistics_of_known_samples():
+    chance = np.random.default_rng(3)
+    peaks = np.exp(0.3 * chance.standard_normal(4000) - 1.5)
+    outcomes = np.where(peaks > 0.4, "overturned left", "at rest")
+    same = Samples(Sample(peaks, tuple(outcomes)), Sample(peaks, tuple(outcomes)))
+    perfect = {name: measure.evaluate(same) for name, measure in STATISTICS.items()}
+    assert {name: value[0] for name, value in perfect.items()} == {
+        "ks_distance": 0.0,
+        "overturning_accuracy": 1.0,
+        "overturning_precision": 1.0,
+        "overturning_recall": 1.0,
+        "peak_bias": 0.0,
+        "peak_scatter": 0.0,
+    }
+    scattered = peaks * np.exp(0.05 + 0.1 * chance.standard_normal(4000))
+    safe = ("at rest",) * 4000
+    other = Samples(Sample(peaks, safe), Sample(scattered, safe))
+    assert STATISTICS["peak_bias"].evaluate(other)[0] == pytest.approx(0.05, abs=0.005)
+    assert STATISTICS["peak_scatter"].evaluate(other)[0] == pytest.approx(0.1, abs=0.005)
+    assert 0.05 < STATISTICS["ks_distance"].evaluate(other)[0] < 0.15
+    falls = Samples(
+        Sample(np.ones(4), ("overturned left", "at rest", "moving", "overturned right")),
+        Sample(np.ones(4), ("overturned left", "overturned left", "moving", "moving")),
+    )
+    assert [STATISTICS[f"overturning_{name}"].evaluate(falls)[0] for name in ("accuracy", "precision", "recall")] == [0.5, 0.5, 0.5]
+    assert STATISTICS["ks_distance"].evaluate(falls)[0] == 0.0
+    lost = Samples(falls.reference, Sample(np.array([1.0, math.nan, 1.0, 1.0]), ("moving", "failed", "moving", "moving")))
+    assert math.isnan(STATISTICS["ks_distance"].evaluate(lost)[0])
+
+
+def test_an_ensemble_is_judged_and_read_back(suite_file, tmp_path):
+    run = run_suite(load_suite(suite_file), tmp_path / "out", play=in_this_process)
+    near, broken = run.cell("crowd", "near"), run.cell("crowd", "broken")
+    assert [check.verdict for check in near.checks] == ["pass", "pass"]
+    assert near.outcome == "0 of 10 overturned"
+    assert run.ensembles[0].peaks["near"] == pytest.approx([1e-3 / math.atan2(0.4, 1.5)] * 10)
+    assert broken.status == "failed"
+    assert broken.reason == "10 of 10 scenes failed; the first: more than 10 events"
+    assert run.exit_code == 3
+    again = run_suite(load_suite(suite_file), tmp_path / "out", play=in_this_process)
+    assert [cell.read_back for cell in again.cells] == [True, True, True]
+    assert again.cells == tuple(cell.model_copy(update={"read_back": True}) for cell in run.cells)
+    run.save(tmp_path / "out")
+    assert type(run).load(tmp_path / "out") == run
+
+
+@pytest.mark.parametrize("given", [{}, {"uniform": (0.0, 1.0), "lognormal": (1.0, 1.0)}, {"lognormal": (-1.0, 1.0)}])
+def test_a_distribution_is_one_thing(given):
+    with pytest.raises(InputError):
+        Distribution(**given)
