@@ -12,7 +12,7 @@ import typer
 
 from scenes import InputError, ModelFailure
 from scenes.errors import printable
-from validation.commands import accept, benchmark, compare, report, scenes, simulate, spectrum, stress, validate
+from validation.commands import accept, benchmark, compare, convergence, report, scenes, simulate, spectrum, stress, validate
 
 app = typer.Typer(
     name="rockcheck",
@@ -21,7 +21,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for module in (scenes, simulate, compare, validate, accept, spectrum, benchmark, stress, report):
+for module in (scenes, simulate, compare, validate, accept, spectrum, benchmark, convergence, stress, report):
     app.command(name=module.__name__.rpartition(".")[2])(module.run)
 
 
