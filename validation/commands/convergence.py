@@ -1,0 +1,60 @@
+"""`rockcheck convergence`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from validation.commands import OUT, JobsOption, OutOption, console, usable_folder
+
+if TYPE_CHECKING:
+    from validation.convergence import Convergence
+
+
+def run(
+    out: OutOption = OUT / "convergence",
+    quick: Annotated[bool, typer.Option("--quick", help="Three scenes without the finest steps, below a minute.")] = False,
+    jobs: JobsOption = None,
+) -> None:
+    """What engines and CM converge to beside a wall, as their steps fall: the unilateral event-based model, not the paper's.
+
+    Writes a page with a diagram and tables, and the tables as CSV.
+    """
+    from validation import convergence
+
+    folder = usable_folder(out)
+    with Console(stderr=True).status("convergence") as status:
+        found = convergence.run_convergence(quick=quick, jobs=jobs, progress=status.update)
+        convergence.save(found, folder)
+        from reports.convergence import write_convergence
+
+        index = write_convergence(found, folder)
+    show(found, console())
+    console().print(f"report: {index}", soft_wrap=True)
+
+
+def show(found: Convergence, out: Console) -> None:
+    """Errors by model and step against both references, the observed orders, and the runs that do not converge."""
+    from validation.convergence import LEVEL, REFERENCES
+
+    out.print(f"RMS error of theta, alpha: median (largest) of {len(found.cases)} scenes")
+    table = Table(box=None, pad_edge=False)
+    table.add_column("model")
+    for column in ("step, s", *(f"against {reference}" for reference in REFERENCES), f"within {LEVEL:g}"):
+        table.add_column(column, justify="right")
+    for level in found.levels:
+        if level.reference == REFERENCES[0]:
+            other = found.level(level.model, REFERENCES[1], level.value)
+            errors = (f"{one.median:.1e} ({one.largest:.1e})" for one in (level, other))
+            table.add_row(level.model, f"{level.step:.1e}", *errors, f"{level.within} of {level.runs}")
+    out.print(table)
+    for model in dict.fromkeys(level.model for level in found.levels):
+        orders = ", ".join(f"{found.order(model, reference):.2f} against {reference}" for reference in REFERENCES)
+        out.print(f"order of {model}: {orders}", soft_wrap=True)
+    out.print(f"ebm against ebm-unilateral: {found.model_form:.1e} (median)")
+    for line in found.exceptions:
+        out.print(f"does not converge: {line}", soft_wrap=True)
+    out.print(f"{', '.join(found.hardware.values())}; {found.wall_seconds:.0f} s", soft_wrap=True)
