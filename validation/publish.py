@@ -14,19 +14,19 @@ from validation.verdicts import junit, markdown
 LOCK, STAMP = ".lock", ".rendered"
 
 
-def publish(run: Run, folder: Path, *, pages: bool = True) -> Path:
-    """Write everything but the histories, which are there already; returns the page to open, or run.json without `pages`.
-
-    Two runs on one folder take turns. Pages are rendered only if anything that they show has changed.
-    """
+def keep(run: Run, folder: Path) -> Path:
+    """Write run.json, its schema and the tables (the histories are there already); returns run.json. Two runs take turns."""
     with FileLock(folder / LOCK):
-        saved = run.save(folder)
         write_whole(folder / "checks.csv", checks_csv(run))
         write_whole(folder / "figures.csv", figures_csv(run))
         write_whole(folder / "junit.xml", junit(run))
         write_whole(folder / "summary.md", markdown(run))
-        if not pages:
-            return saved
+        return run.save(folder)
+
+
+def publish(run: Run, folder: Path) -> Path:
+    """Render the pages of a run that was kept, if anything that they show has changed; returns the page to open."""
+    with FileLock(folder / LOCK):
         cells = tuple(cell.model_copy(update={"read_back": False}) for cell in run.cells)
         same = run.model_copy(update={"created": "", "wall_seconds": 0.0, "cells": cells})
         stamp = provenance.digest(same.model_dump_json() + provenance.code_digest("reports"))

@@ -26,7 +26,8 @@ def verdict_table(run: Run) -> Table:
     for cell in run.cells:
         near = nearest(cell)
         words = f"{cell.reason or 'failed'}" if cell.status == "failed" else share(near) if near else "nothing judged"
-        table.add_row("" if cell.scene == before else cell.scene, cell.model, Text(words), Text(cell.verdict, COLOURS[cell.verdict]))
+        verdict = Text("-") if cell.status == "done" and not cell.checks else Text(cell.verdict, COLOURS[cell.verdict])
+        table.add_row("" if cell.scene == before else cell.scene, cell.model, Text(words), verdict)
         before = cell.scene
     return table
 

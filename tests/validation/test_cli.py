@@ -98,3 +98,42 @@ def test_compare_two_histories(capsys):
     assert "RMS difference of rotation" in out
     assert f"{0.001 / math.atan2(0.4, 1.5):.6g}" in out
     assert max(map(len, out.splitlines())) <= 80
+
+
+def test_validate_keeps_the_run_before_it_tells(capsys):
+    suite = """
+reference = "still"
+[models.still]
+model = "faulty:Still"
+[models.near]
+model = "faulty:Still"
+offset = 1e-3
+[[scene]]
+name = "short"
+duration = 0.2
+block = { half_width = 0.4, half_height = 1.5 }
+floor = { friction = 0.5 }
+"""
+    line = "[tolerances.short.near.still]\ntheta_peak = { expected = 0.0038, limit = %s, drift = 0.0001, why = 'a test' }\n"
+    expected = {"0.01": 0, "0.001": 1}
+    for limit, code in expected.items():
+        write("mine.toml", suite + line % limit)
+        assert main(["validate", "mine.toml", "--no-report", "--jobs", "1"]) == code
+        out = capsys.readouterr().out
+        assert max(map(len, out.splitlines())) <= 80
+        assert f"verdict: {'pass' if code == 0 else 'fail'}" in out
+    assert {path.name for path in Path("rockcheck-report").iterdir()} >= {
+        "run.json",
+        "checks.csv",
+        "figures.csv",
+        "junit.xml",
+        "summary.md",
+    }
+    assert 'failures="1"' in Path("rockcheck-report/junit.xml").read_text()
+    assert "theta_peak against still: 0.003837 is more than 0.001" in Path("rockcheck-report/summary.md").read_text()
+    write("mine.toml", suite.replace("offset = 1e-3", "offset = 1.2e-3") + line % "0.01")
+    assert main(["validate", "mine.toml", "--no-report", "--jobs", "1"]) == 0
+    assert main(["validate", "mine.toml", "--no-report", "--jobs", "1", "--strict"]) == 1
+    assert "verdict: changed" in capsys.readouterr().out
+    assert main(["accept", "mine.toml", "--jobs", "1"]) == 0
+    assert main(["validate", "mine.toml", "--no-report", "--jobs", "1", "--strict"]) == 0

@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from scenes import InputError
 from validation import remote, workers
 from validation.commands import OUT, JobsOption, OutOption, SchedulerOption, console, usable_folder
-from validation.publish import publish
+from validation.publish import keep, publish
 from validation.results import Run
 from validation.runner import run_suite
 from validation.suites import load_suite
@@ -40,8 +40,9 @@ def run(
         raise InputError(f"cannot be given together with the suite {suite!r}", "--quick")
     folder = usable_folder(out)
     finished = play_suite(suite or ("smoke" if quick else "paper"), folder, jobs, force, strict, scheduler)
+    kept = keep(finished, folder)
     show(finished, console())
-    console().print(f"report: {publish(finished, folder, pages=report)}", soft_wrap=True)
+    console().print(f"report: {publish(finished, folder) if report else kept}", soft_wrap=True)
     raise typer.Exit(finished.exit_code)
 
 
