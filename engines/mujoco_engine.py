@@ -91,9 +91,13 @@ class _MuJoCoWorld:
         self.mujoco.mj_step(self.model, self.data)
 
     def check(self) -> None:
-        """Raise `ModelFailure` if MuJoCo had anything to warn of: a state or an acceleration that is huge or not finite."""
+        """Raise `ModelFailure` if MuJoCo met a state or an acceleration that is huge or not finite."""
         if self.warnings:
-            raise ModelFailure(f"MuJoCo: {printable(self.warnings[0], 200)}")
+            kinds = self.mujoco.mjtWarning
+            bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
+            if any(self.data.warning[kind].number for kind in bad):
+                raise ModelFailure(f"MuJoCo: {printable(self.warnings[-1], 200)}")
+            self.warnings.clear()
 
     def close(self) -> None:
         """Leave the library as it was."""
@@ -194,12 +198,8 @@ def _planar_body(scene: Scene, geoms: str) -> str:
 </body>"""
 
 
-def _model(option: str, world: str, contact: str = "") -> str:
-    return f"""<mujoco>
-<option gravity="0 0 0" {option}</option>
-<worldbody>{world}</worldbody>
-{contact}
-</mujoco>"""
+def _model(world: str, settings: str = "") -> str:
+    return f'<mujoco><option gravity="0 0 0"/>{settings}<worldbody>{world}</worldbody></mujoco>'
 
 
 def _plane(name: str, scene: Scene, inset: float, attributes: str) -> str:
@@ -216,7 +216,7 @@ def _point_contact_model(scene: Scene) -> str:
     """Corners as tiny spheres, and one contact pair for each contact that the scene can use, in their order."""
     off = 'contype="0" conaffinity="0"'
     contacts = contacts_of(scene)
-    corners = {contact.corner: f"corner{contact.corner[0]:+g}{contact.corner[1]:+g}" for contact in contacts}
+    corners = {corner: f"corner {number}" for number, corner in enumerate(dict.fromkeys(contact.corner for contact in contacts))}
     spheres = "".join(
         f'<geom name="{name}" type="sphere" size="{CORNER_RADIUS!r}" pos="{bx!r} 0 {bz!r}" {off}/>' for (bx, bz), name in corners.items()
     )
@@ -232,9 +232,11 @@ def _point_contact_model(scene: Scene) -> str:
         for contact in contacts
     )
     # Without warm start Newton's method needs fewer iterations, and it does not get stuck on the edge of a stiff cone.
-    option = """integrator="Euler" cone="elliptic" impratio="1" solver="Newton" iterations="100" tolerance="1e-15" ls_tolerance="1e-6"
-  jacobian="dense"><flag autoreset="disable" island="disable" warmstart="disable"/>"""
-    return _model(option, planes + _planar_body(scene, spheres), f"<contact>{pairs}</contact>")
+    settings = f"""
+<option integrator="Euler" cone="elliptic" impratio="1" jacobian="dense" solver="Newton" iterations="100" tolerance="1e-15"
+  ls_tolerance="1e-6"><flag island="disable" warmstart="disable"/></option>
+<contact>{pairs}</contact>"""
+    return _model(planes + _planar_body(scene, spheres), settings)
 
 
 def _stock_model(scene: Scene) -> str:
@@ -244,4 +246,4 @@ def _stock_model(scene: Scene) -> str:
     planes += "".join(_plane(wall.side, scene, 0.0, 'condim="1"') for wall in scene.walls)
     size = f"{block.half_width!r} {block.half_width!r} {block.half_height!r}"
     box = f'<geom type="box" size="{size}" condim="1" friction="0 0 0"/>'
-    return _model('><flag autoreset="disable"/>', planes + _planar_body(scene, box))
+    return _model(planes + _planar_body(scene, box))

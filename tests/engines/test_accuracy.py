@@ -105,7 +105,7 @@ def test_walls_and_slip(engine, block):
 @pytest.mark.slow
 @each_engine
 def test_walls_and_slip_throughout(engine, block):
-    errors = peak_errors(engine(time_step="adaptive", largest_step=2e-3), block, cases(every=1))
+    errors = peak_errors(engine(time_step="adaptive", largest_step=2e-3), block, cases(every=5))
     assert np.median(errors) < 3e-5
     assert np.quantile(errors, 0.95) < 2e-4
     assert np.max(errors) < 3e-3
