@@ -188,10 +188,6 @@ def press(
     away = nx * x + ny * y + parameters.distance[surface]
     gap1, gap2 = away + nx * ax + ny * ay, away + nx * bx + ny * by
     one, two = 2 * surface, 2 * surface + 1
-    if gap1 >= 0.0 and memory[one, CLOSED] != 0.0:
-        memory[one, CLOSED], memory[one, LAST_CLOSED] = 0.0, t
-    if gap2 >= 0.0 and memory[two, CLOSED] != 0.0:
-        memory[two, CLOSED], memory[two, LAST_CLOSED] = 0.0, t
     lever1, lever2 = ax * ny - ay * nx, bx * ny - by * nx
     k11, k22, k12 = 1.0 + inverse * lever1 * lever1, 1.0 + inverse * lever2 * lever2, 1.0 + inverse * lever1 * lever2
     # J belongs to the middle of the step, v to its end and v0 to its start: J changes by -w^2 (n.r) a unit of time.
@@ -201,18 +197,25 @@ def press(
     rate1, rate2 = nx * v[0] + ny * v[1] + lever1 * v[2] - turn1, nx * v[0] + ny * v[1] + lever2 * v[2] - turn2
     before1 = nx * v0[0] + ny * v0[1] + lever1 * v0[2] + turn1
     before2 = nx * v0[0] + ny * v0[1] + lever2 * v0[2] + turn2
+    # A settled contact stays closed while it would close again within the step.
+    closed1 = gap1 < 0.0 or (memory[one, CLOSED] != 0.0 and gap1 + ahead * rate1 < 0.0)
+    closed2 = gap2 < 0.0 or (memory[two, CLOSED] != 0.0 and gap2 + ahead * rate2 < 0.0)
+    if memory[one, CLOSED] != 0.0 and not closed1:
+        memory[one, CLOSED], memory[one, LAST_CLOSED] = 0.0, t
+    if memory[two, CLOSED] != 0.0 and not closed2:
+        memory[two, CLOSED], memory[two, LAST_CLOSED] = 0.0, t
     fine = math.inf
     force1 = force2 = 0.0
-    if gap1 < 0.0 or gap2 < 0.0:
+    if closed1 or closed2:
         f1 = f2 = d1 = d2 = 0.0
-        if gap1 < 0.0:
+        if closed1:
             if memory[one, CLOSED] == 0.0:
                 slip = v[0] - v[2] * ay
                 fine = closes(memory, parameters, inverse, surface, 0, ax, ay, k11, k12, rate1, slip, gap2, rate2, t)
             share = felt_share(memory[one, DAMPING] * k11 * step)
             f1 = -k * (gap1 + ahead * rate1) - memory[one, DAMPING] * (before1 + share * (rate1 - before1))
             d1 = step * (share * memory[one, DAMPING] + k * ahead)
-        if gap2 < 0.0:
+        if closed2:
             if memory[two, CLOSED] == 0.0:
                 slip = v[0] - v[2] * by
                 fine = min(fine, closes(memory, parameters, inverse, surface, 1, bx, by, k22, k12, rate2, slip, gap1, rate1, t))
@@ -250,9 +253,9 @@ def press(
         friction[SHEAR] = friction[SLIPS] = 0.0
     memory[one, FORCE], memory[two, FORCE] = force1, force2
     closing = math.inf
-    if gap1 >= 0.0:
+    if not closed1:
         closing = closes_in(parameters, gap1, before1, rate1, step)
-    if gap2 >= 0.0:
+    if not closed2:
         closing = min(closing, closes_in(parameters, gap2, before2, rate2, step))
     return v, closing, fine
 
@@ -379,7 +382,7 @@ def advance(
                 state[:6] = x, y, theta, v[0], v[1], v[2]
                 return OVERTURNED, row, n_events, steps, sweeps, t
         energy = 0.5 * (v[0] ** 2 + v[1] ** 2 + v[2] ** 2 / inverse) + parameters.gravity * (y - h)
-        if not energy <= allowed + ENERGY * gross:
+        if not (energy <= allowed + ENERGY * gross and energy < 1e300):
             return BLOWN_UP, row, n_events, steps, sweeps, t
         output[row, :] = x, y, theta, v[0], v[1], v[2]
     state[:] = x, y, theta, v[0], v[1], v[2], calm, fine, closing, allowed, gross
