@@ -212,4 +212,4 @@ def _run_rows(settings, horizontal, vertical, states, durations, samples, contro
             side[i] = -1 if z[2] > 0.0 else 1
         peak[i] = tally.peak
         t_end[i] = tally.t
-        series[i] = tally.series
+        series[i] = tally.steps

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import suppress
 
@@ -10,10 +11,13 @@ import numpy as np
 from ebm.model import EventBasedModel
 from scenes.errors import InputError
 from scenes.excitations import Record, Rest, Ricker, Sine
+from scenes.history import History
 from scenes.scene import Scene
 
 #: What is disturbed, relatively, and the separation in alpha up to which histories still say the same.
 PERTURBATION, ALLOWED = 1e-6, 1e-3
+#: Of the block's radius: how near to the wall a block lands that lands against it.
+FLUSH = 1e-9
 START = ("initial_rotation", "initial_angular_velocity", "initial_velocity", "initial_height")
 
 
@@ -30,15 +34,32 @@ def predictability_horizon(
     which is a good engine's, is as large as a tenth of the motion: how far two histories are apart then tells of the scene, no
     more of the models. It is the ratio that matters: with 1e-7 and 1e-4 the horizon of El Centro is the same. Deterministic.
     The model's tolerance has to be well below the perturbation. Raises what `simulate` raises.
+
+    It ends earlier where a rocking block lands flush against a wall with restitution: both corners of a side meet the wall as
+    the other bottom corner meets the floor, and what follows depends on the order in which they are taken, in any model.
     """
     model = model or EventBasedModel(pivot="unilateral", tolerance=1e-13)
-    undisturbed = model.simulate(scene).channels["theta"]
-    rows = len(undisturbed)
+    history = model.simulate(scene)
+    undisturbed = history.channels["theta"]
+    rows = min(len(undisturbed), int(np.searchsorted(history.channels["t"], _flush_landing(scene, history))))
     for disturbed in _disturbed(scene, perturbation):
         theta = model.simulate(disturbed).channels["theta"][:rows]
         apart = np.abs(theta - undisturbed[: len(theta)]) > allowed * scene.block.alpha
         rows = int(np.argmax(apart)) if apart.any() else rows
     return scene.duration if rows == len(undisturbed) else float(scene.output_times[max(rows - 1, 1)])
+
+
+def _flush_landing(scene: Scene, history: History) -> float:
+    """Time in s of the first landing on both floor and bouncing wall, infinite where there is none."""
+    t, slip, mode = (history.channels[name] for name in ("t", "slip", "mode"))
+    flush = [wall.gap * (1.0 if wall.side == "right" else -1.0) for wall in scene.walls if wall.restitution > 0.0]
+    for event in history.event_list:
+        before = int(np.searchsorted(t, event.t)) - 1
+        # While it rocks, the pivot's slip is where the block will stand.
+        rocks = event.kind == "floor impact" and before >= 0 and mode[before] == "rock"
+        if rocks and any(abs(slip[before] - place) < FLUSH * scene.block.radius for place in flush):
+            return event.t
+    return math.inf
 
 
 def _disturbed(scene: Scene, perturbation: float) -> Iterator[Scene]:

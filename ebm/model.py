@@ -116,7 +116,7 @@ class EventBasedModel(Frozen):
             cpu_seconds=cpu,
             set_up=ready - start,
             steps=tally.steps,
-            evaluations=tally.series,
+            evaluations=tally.steps,
             energy_gains=tally.gains,
             largest_energy_gain=tally.largest_gain,
         )

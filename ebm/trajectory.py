@@ -130,7 +130,6 @@ class Tally(NamedTuple):
     peak: float
     at_rest: bool
     steps: int
-    series: int
     events: int
     wall_impacts: int
     gains: int
@@ -174,13 +173,13 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
     base_rest = _REST_UNILATERAL if b.unilateral else _REST_BILATERAL
     resting, window_start, last_impact, in_window = base_rest, -1.0, -1.0, 0
     t = 0.0
-    rows = steps = series = events = wall_impacts = zero_steps = 0
+    rows = steps = events = wall_impacts = zero_steps = 0
     peak, t_rest = abs(z[THETA]), np.nan
     ending = DONE
     m[FAMILY], m[S], m[FLOOR], m[PULL] = FLAT, 1, STICK, 1  # most often it stands
     stands = z[THETA] == 0.0 and z[VX] == 0.0 and z[W] == 0.0 and z[HEIGHT] == b.cos_alpha and not b.walls
     if not (stands and consistent(b, m, z, gh, gv, t, a)) and not select(b, z, gh, gv, t, left, m, a):
-        return Tally(NO_MODE, t, peak, False, 0, 0, 0, 0, 0, 0.0, 0, t_rest)
+        return Tally(NO_MODE, t, peak, False, 0, 0, 0, 0, 0.0, 0, t_rest)
     while True:
         # --- rest: straight to the next uplift or slip
         if m[FAMILY] == FLAT and m[FLOOR] == STICK and still:
@@ -227,42 +226,12 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         if steps >= control.most_steps:
             ending = TOO_MANY_STEPS
             break
-        # --- one step of the series
+        # --- one step of the series, to its end or to the first event in it
         steps += 1
-        series += 1
         end = t_end if smooth else min(min(next_kink(gh, t), next_kink(gv, t)), t_end)
         reach = end - t
-        pivot = 0.0
-        if m[FAMILY] == FLAT:
-            order = flat_series(b, m, z, gh, gv, t, control.order, a)
-            h = _step_size(a, U, G, order, control.tolerance, reach)
-        else:
-            order = tilt_series(b, m, z, gh, gv, t, control.order, 1e-2 * control.tolerance, reach, not b.no_slip or b.unilateral, a)
-            pivot = m[S] * z[X] - a[SIN, 0]
-            h = reach
-            if order == control.order:
-                h = _step_size(a, PHI, COS, order, control.tolerance, reach)
-                if m[FLOOR] != STICK or m[TIP] != 0 or m[FAR] != 0:
-                    h = _step_size(a, XI, Y, order, control.tolerance, h)
-                    h = _step_size(a, U, G, order, control.tolerance, h)  # forces follow the base acceleration
-        tau, which = h, -1
-        rocks = m[FAMILY] == TILT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
-        if rocks and m[PULL] > 0 and rock_guards_hold(b, order, b.walls, h, a):
-            tau = first_root(a, PHI, order, h, NOISE, stack)
-            which = G_PHI
-            if tau == NO_ROOT:
-                tau, which = h, -1
-        else:
-            mask = guards_of(b, m)
-            for k in range(GUARDS):
-                degree = guard(b, m, k, order, pivot, a) if mask >> k & 1 else -1
-                if degree >= 0:
-                    root = first_root(a, GUARD, degree, tau, SLIP_NOISE if k == G_SLIP else NOISE, stack)
-                    if root != NO_ROOT:
-                        tau, which = root, k
-        if G_PUSH <= which <= G_CONE_MINUS and tau > 0.25 * h:
-            # A force is the second derivative of a truncated series: its zero is found to rounding from nearby only.
-            tau, which = 0.9 * tau, -1
+        order, pivot, h = _expand(b, m, z, gh, gv, t, reach, control, a)
+        tau, which = _first_event(b, m, order, pivot, h, a, stack)
         if not math.isfinite(tau):
             ending = NOT_FINITE
             break
@@ -308,8 +277,6 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         before = mode_code(m)
         left[:] = m
         impulse[:] = 0.0
-        kind = RELEASE
-        found = True
         strikes = which == G_TIP_GAP or which == G_FAR_GAP or which == G_LANDING or which == G_PHI
         if strikes:
             if t - last_impact > _QUIET_TIME:
@@ -320,45 +287,13 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             if in_window >= _RATTLE_IMPACTS:
                 resting, in_window = min(10.0 * resting, _RATTLE_BOUND), 0
             last_impact = t
-            wall = which == G_TIP_GAP or which == G_FAR_GAP
-            _touch(b, m, z, which)
-            if which == G_FAR_GAP and m[FAMILY] == TILT and abs(z[THETA]) < _LANDED and m[S] * z[W] < 0.0 and closed_floor(b, z):
-                which, wall = G_PHI, False  # the corner meets the wall as the block lands: a floor event
-            if which == G_PHI:
-                _upright(b, m, z)
-            if b.unilateral:
-                found = _strike(b, m, z, resting, impulse, gains)
-                known = False
-            elif wall:
-                known = _wall_impact(b, m, z, which == G_TIP_GAP, gh, t, resting, impulse, gains)
-            else:
-                known = _floor_impact(b, m, z, impulse)
-            if z[THETA] == 0.0 and abs(z[W]) < SETTLE_SPIN:
-                v = slip_velocity(b, z)
-                z[VX] = v if abs(v) > resting else 0.0
-                z[W] = 0.0
-                if abs(z[HEIGHT] - b.cos_alpha) < _TOUCH and z[VY] < resting:
-                    z[VY] = 0.0
-                known = False
-            wall_impacts += wall
-            kind = WALL_IMPACT if wall else (LANDS if which == G_LANDING else FLOOR_IMPACT)
+            kind, found, known = _impact(b, m, z, which, gh, t, resting, impulse, gains)
+            wall_impacts += kind == WALL_IMPACT
             if not known:
                 left[:] = -9
                 found = found and select(b, z, gh, gv, t, left, m, a)
         else:
-            if which == G_SLIP:
-                kind = STICKS
-                if m[TIP] != 0 or m[FAR] != 0:
-                    z[W] = z[VX] = z[VY] = 0.0
-                z[VX] = -math.cos(b.alpha - abs(z[THETA])) * z[W]
-                if m[FAMILY] == FLAT:
-                    z[VX] = 0.0
-            elif which == G_CONE_PLUS or which == G_CONE_MINUS:
-                kind = SLIPS
-            elif which == G_UPLIFT_PLUS or which == G_UPLIFT_MINUS:
-                kind = UPLIFT
-            elif which == G_PUSH and b.unilateral:
-                kind = LIFT_OFF
+            kind = _release(b, m, z, which)
             found = select(b, z, gh, gv, t, left, m, a)
         if not found:
             ending = NO_IMPACT if strikes else NO_MODE
@@ -367,6 +302,9 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             events -= 1  # nothing was struck: a block in flight passes theta = 0
         elif log.shape[0] >= events:
             _note(log, events, t, kind, before, mode_code(m), impulse[0] + impulse[1])
+            if strikes and mode_code(m) == 0 and log.shape[0] > events:
+                events += 1
+                _note(log, events, t, SETTLED, before, 0, 0.0)
     at_rest = m[FAMILY] == FLAT and m[FLOOR] == STICK
     if ending == DONE and not math.isfinite(z[THETA]):
         ending = NOT_FINITE
@@ -375,7 +313,85 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             out[rows] = z
             out_mode[rows] = mode_code(m)
             rows += 1
-    return Tally(ending, t, peak, at_rest, steps, series, events, wall_impacts, int(gains[0]), gains[1], rows, t_rest)
+    return Tally(ending, t, peak, at_rest, steps, events, wall_impacts, int(gains[0]), gains[1], rows, t_rest)
+
+
+@kernel
+def _expand(b, m, z, gh, gv, t, reach, control, a):
+    """Series of the mode's motion about t: their order, the place of a sticking pivot, and the step they are good for."""
+    if m[FAMILY] == FLAT:
+        order = flat_series(b, m, z, gh, gv, t, control.order, a)
+        return order, 0.0, _step_size(a, U, G, order, control.tolerance, reach)
+    order = tilt_series(b, m, z, gh, gv, t, control.order, 1e-2 * control.tolerance, reach, not b.no_slip or b.unilateral, a)
+    h = reach
+    if order == control.order:
+        h = _step_size(a, PHI, COS, order, control.tolerance, reach)
+        if m[FLOOR] != STICK or m[TIP] != 0 or m[FAR] != 0:
+            h = _step_size(a, XI, Y, order, control.tolerance, h)
+            h = _step_size(a, U, G, order, control.tolerance, h)  # forces follow the base acceleration
+    return order, m[S] * z[X] - a[SIN, 0], h
+
+
+@kernel
+def _first_event(b, m, order, pivot, h, a, stack):
+    """The first time within the step at which a guard ends the mode, and which guard; h and -1 where none does."""
+    rocks = m[FAMILY] == TILT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
+    if rocks and m[PULL] > 0 and rock_guards_hold(b, order, b.walls, h, a):
+        tau = first_root(a, PHI, order, h, NOISE, stack)
+        return (h, -1) if tau == NO_ROOT else (tau, G_PHI)
+    tau, which = h, -1
+    mask = guards_of(b, m)
+    for k in range(GUARDS):
+        degree = guard(b, m, k, order, pivot, a) if mask >> k & 1 else -1
+        if degree >= 0:
+            root = first_root(a, GUARD, degree, tau, SLIP_NOISE if k == G_SLIP else NOISE, stack)
+            if root != NO_ROOT:
+                tau, which = root, k
+    if G_PUSH <= which <= G_CONE_MINUS and tau > 0.25 * h:
+        # A force is the second derivative of a truncated series: its zero is found to rounding from nearby only.
+        return 0.9 * tau, -1
+    return tau, which
+
+
+@kernel
+def _impact(b, m, z, which, gh, t, resting, impulse, gains):
+    """Resolves the impact at the closing of a gap: the event's kind, whether a law fits, and whether m is already right."""
+    wall = which == G_TIP_GAP or which == G_FAR_GAP
+    _touch(b, m, z, which)
+    if which == G_FAR_GAP and m[FAMILY] == TILT and abs(z[THETA]) < _LANDED and m[S] * z[W] < 0.0 and closed_floor(b, z):
+        which, wall = G_PHI, False  # the corner meets the wall as the block lands: a floor event
+    if which == G_PHI:
+        _upright(b, m, z)
+    found, known = True, False
+    if b.unilateral:
+        found = _strike(b, m, z, resting, impulse, gains)
+    elif wall:
+        known = _wall_impact(b, m, z, which == G_TIP_GAP, gh, t, resting, impulse, gains)
+    else:
+        known = _floor_impact(b, m, z, impulse)
+    if z[THETA] == 0.0 and abs(z[W]) < SETTLE_SPIN:
+        v = slip_velocity(b, z)
+        z[VX] = v if abs(v) > resting else 0.0
+        z[W] = 0.0
+        if abs(z[HEIGHT] - b.cos_alpha) < _TOUCH and z[VY] < resting:
+            z[VY] = 0.0
+        known = False
+    return WALL_IMPACT if wall else (LANDS if which == G_LANDING else FLOOR_IMPACT), found, known
+
+
+@kernel
+def _release(b, m, z, which):
+    """Prepares the state for a change of mode without impact, and names it."""
+    if which == G_SLIP:
+        if m[TIP] != 0 or m[FAR] != 0:
+            z[W] = z[VX] = z[VY] = 0.0
+        z[VX] = -math.cos(b.alpha - abs(z[THETA])) * z[W] if m[FAMILY] == TILT else 0.0
+        return STICKS
+    if which == G_CONE_PLUS or which == G_CONE_MINUS:
+        return SLIPS
+    if which == G_UPLIFT_PLUS or which == G_UPLIFT_MINUS:
+        return UPLIFT
+    return LIFT_OFF if which == G_PUSH and b.unilateral else RELEASE
 
 
 @kernel
