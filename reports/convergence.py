@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 #: The name of the diagram's files, and the error (alpha) up to which it is drawn where a run failed.
 DIAGRAM, FAILED = "error-over-step", 3.0
+TITLES = {"ebm-unilateral": "Against the unilateral EBM: numerical error", "ebm": "Against the paper's EBM: model form remains"}
 
 
 def write_convergence(found: Convergence, folder: Path) -> Path:
@@ -53,11 +54,11 @@ def convergence_figure(found: Convergence) -> Figure:
                 colour = LOOKS[model].light
                 for case in found.cases:
                     line = [one for one in found.line(model, case.scene) if math.isfinite(one.error(reference))]
-                    ax.plot([one.step for one in line], [one.error(reference) for one in line], color=colour, linewidth=0.4, alpha=0.45)
+                    ax.plot([one.step for one in line], [one.error(reference) for one in line], color=colour, linewidth=0.5, alpha=0.55)
                 levels = [level for level in found.levels if (level.model, level.reference) == (model, reference)]
                 look = LOOKS[model].line | {"marker": LOOKS[model].marker, "linewidth": 1.8}
                 ax.plot([level.step for level in levels], [min(level.median, FAILED) for level in levels], **look)
-            ax.set(xscale="log", yscale="log", title=f"Against {LOOKS[reference].label}", xlabel="step, s")
+            ax.set(xscale="log", yscale="log", title=TITLES[reference], xlabel="step, s")
             _powers_of_ten(ax)
         panels[0].set_ylabel("RMS error of θ / α")
         steps = [min(one.step for one in found.plays), max(one.step for one in found.plays)]
