@@ -214,7 +214,24 @@ def _claims(spectra: Sequence[Spectrum], asked: Asked, tiles: Tiles, data: Path,
 
 
 def _agreement(panels: Sequence[Panel], asked: Asked, count: int, tiles: Tiles, data: Path, screen: Console) -> None:
-    raise InputError("not available yet", "--agreement")
+    from validation.agreement import CANDIDATES, agree
+
+    if asked.model != "ebm":
+        raise InputError("cannot be given together with --model or --pivot: all models are compared", "--agreement")
+    if not 2 <= count <= len(asked.frequencies) * len(asked.amplitudes):
+        raise InputError(f"{count} is not allowed: 2 up to the spectrum's nodes are asked for", "--agreement")
+    spectra = play_panels(panels, asked, tiles)
+    with _bar("agreement", count * len(CANDIDATES) * len(panels)) as advance:
+        tiles.progress = advance
+        found = agree(panels, spectra, asked, count, tiles)
+    write_whole(data / "agreement.json", found.model_dump_json(indent=1) + "\n")
+    write_whole(data / "agreement.csv", "\n".join(",".join(row) for row in (found.columns, *found.rows)) + "\n")
+    table = Table(box=None, pad_edge=False)
+    for n, column in enumerate(found.columns):
+        table.add_column(column, justify="right" if n > 1 else "left")
+    for row in found.rows[: len(CANDIDATES)]:
+        table.add_row(*row)
+    screen.print(table)
 
 
 def _fragility(panels: Sequence[Panel], asked: Asked, records: Sequence[Path], tiles: Tiles, data: Path, screen: Console) -> None:
