@@ -20,6 +20,8 @@ from reports.view import CHANNELS, scene_views
 from validation.results import Run, write_whole
 
 DATA = Path(str(resources.files("reports"))) / "data"
+#: The folder beside `index.html` that holds everything else.
+PAGES = "pages"
 #: What a verdict is called and the sign that goes with its colour.
 VERDICTS = {"pass": ("within tolerance", "✓"), "changed": ("changed", "△"), "fail": ("out of tolerance", "✕"), "error": ("failed", "!")}
 
@@ -42,8 +44,7 @@ class Site:
 
     def assets(self, models: Iterable[str]) -> None:
         """Write style sheets, scripts and the plotting library, once for all pages, and the colours of these models."""
-        target = self.folder / "assets"
-        target.mkdir(exist_ok=True)
+        target = _made(self.folder / PAGES / "assets")
         for source in sorted((DATA / "assets").iterdir()):
             shutil.copyfile(source, target / source.name)
         for source in sorted((DATA / "vendor").glob("*/*")):
@@ -56,17 +57,17 @@ def write_site(folder: Path) -> Path:
     """Write `index.html`, a page a scene, their figures and data into the folder of a finished run; returns the index."""
     run = Run.load(folder)
     views = scene_views(run, folder)
-    site = Site(folder, f"rockcheck: {run.suite}", tuple((view.name, f"scenes/{view.slug}.html") for view in views))
+    pages = folder / PAGES
+    site = Site(folder, f"rockcheck: {run.suite}", tuple((view.name, f"{PAGES}/{view.slug}.html") for view in views))
     site.assets(run.models)
     for n, view in enumerate(views):
-        write_figures(view, folder / "figures")
-        write_whole(_made(folder / "data") / f"{view.slug}.js", script(view))
-        files = write_scene_file(view.scene, _made(folder / "scenes"), view.slug)
+        write_figures(view, _made(pages / "figures"))
+        write_whole(_made(pages / "data") / f"{view.slug}.js", script(view))
         site.page(
-            f"scenes/{view.slug}.html",
+            f"{PAGES}/{view.slug}.html",
             "scene.html",
             view=view,
-            files=files,
+            files=write_scene_file(view.scene, _made(pages / "scene-files"), view.slug),
             previous=views[n - 1] if n else None,
             following=views[n + 1] if n + 1 < len(views) else None,
             **_common(run),
