@@ -16,8 +16,8 @@ from scenes.scene import Scene
 
 #: What is disturbed, relatively, and the separation in alpha up to which histories still say the same.
 PERTURBATION, ALLOWED = 1e-6, 1e-3
-#: Of the block's radius: how near to the wall a block lands that lands against it.
-FLUSH = 1e-9
+#: How near to the wall a block lands that lands against it (of R), and what impulse matters (of sqrt(g R), per unit mass).
+FLUSH, MATTERS = 1e-9, 1e-3
 START = ("initial_rotation", "initial_angular_velocity", "initial_velocity", "initial_height")
 
 
@@ -53,10 +53,11 @@ def _flush_landing(scene: Scene, history: History) -> float:
     """Time in s of the first landing on both floor and bouncing wall, infinite where there is none."""
     t, slip, mode = (history.channels[name] for name in ("t", "slip", "mode"))
     flush = [wall.gap * (1.0 if wall.side == "right" else -1.0) for wall in scene.walls if wall.restitution > 0.0]
+    matters = MATTERS * math.sqrt(scene.gravity * scene.block.radius)
     for event in history.event_list:
         before = int(np.searchsorted(t, event.t)) - 1
         # While it rocks, the pivot's slip is where the block will stand.
-        rocks = event.kind == "floor impact" and before >= 0 and mode[before] == "rock"
+        rocks = event.kind == "floor impact" and event.impulse > matters and before >= 0 and mode[before] == "rock"
         if rocks and any(abs(slip[before] - place) < FLUSH * scene.block.radius for place in flush):
             return event.t
     return math.inf

@@ -280,8 +280,6 @@ def evaluated(samples: Sequence[Sample], missing: Sequence[tuple[str, int, str, 
 def _point(samples: Sequence[Sample]) -> Point:
     good = [sample for sample in samples if not sample.failure]
     errors = [math.inf if sample.failure or math.isnan(sample.rms) else sample.rms for sample in samples]
-    # Quantiles as they stand in the sample, since an infinite error cannot be interpolated.
-    low, middle, high = np.quantile(errors, (0.1, 0.5, 0.9), method="averaged_inverted_cdf")
 
     def middling(name: str, *, a_second: bool = False) -> float:
         values = [getattr(s, name) / (s.horizon if a_second else 1.0) for s in good]
@@ -294,9 +292,9 @@ def _point(samples: Sequence[Sample]) -> Point:
         value=samples[0].value,
         runs=len(samples),
         failed=len(samples) - len(good),
-        rms=float(middle),
-        rms_10=float(low),
-        rms_90=float(high),
+        rms=quantile(errors, 0.5),
+        rms_10=quantile(errors, 0.1),
+        rms_90=quantile(errors, 0.9),
         largest=middling("largest"),
         peak=middling("peak"),
         first_impact=middling("first_impact"),
@@ -305,6 +303,14 @@ def _point(samples: Sequence[Sample]) -> Point:
         set_up=middling("set_up"),
         steps=middling("steps", a_second=True),
     )
+
+
+def quantile(values: Sequence[float], share: float) -> float:
+    """The value below which `share` of the sample lies, halfway between two where it lies between them; values may be infinite."""
+    ordered, place = sorted(values), share * len(values)
+    below = ordered[max(math.ceil(place - 1e-9) - 1, 0)]
+    above = ordered[min(math.floor(place + 1e-9), len(values) - 1)]
+    return 0.5 * (below + above)
 
 
 def order_of(line: Sequence[Point]) -> float:
