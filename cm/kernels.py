@@ -62,8 +62,8 @@ FINE, FINE_DAMPER = 0.02, 1.0
 SHORTEST = 1e-3
 #: Sweeps over surfaces and friction end when the forces change by less than this share of them, or after so many.
 SWEPT, MOST_SWEEPS = 1e-5, 50
-#: Contacts closing by less than this share of the depth under the block's weight, or more slowly than this share of
-#: g/sqrt(k/m), do so unnoticed: no step is cut for them.
+#: No step is cut for a contact that would close by less than this share of the depth under the block's weight; a contact that
+#: closes more slowly than this share of g/sqrt(k/m) is no impact.
 SHALLOW, GENTLE = 0.1, 0.01
 #: A run that gains this share of the work done on it out of nothing has blown up.
 ENERGY = 0.02
@@ -159,6 +159,15 @@ def closes(
 
 
 @njit(cache=True)
+def response(
+    k: float, damping: float, mobility: float, gap: float, before: float, rate: float, step: float, ahead: float
+) -> tuple[float, float]:
+    """Force that a closed contact would have if its own forces did not move it, and what a unit of velocity takes off it."""
+    share = felt_share(damping * mobility * step)
+    return -k * (gap + ahead * rate) - damping * (before + share * (rate - before)), step * (share * damping + k * ahead)
+
+
+@njit(cache=True)
 def closes_in(parameters: Parameters, gap: float, before: float, rate: float, step: float) -> float:
     """Time from the end of a step until an open contact closes, infinite if that is not soon or too gentle to matter.
 
@@ -212,16 +221,12 @@ def press(
             if memory[one, CLOSED] == 0.0:
                 slip = v[0] - v[2] * ay
                 fine = closes(memory, parameters, inverse, surface, 0, ax, ay, k11, k12, rate1, slip, gap2, rate2, t)
-            share = felt_share(memory[one, DAMPING] * k11 * step)
-            f1 = -k * (gap1 + ahead * rate1) - memory[one, DAMPING] * (before1 + share * (rate1 - before1))
-            d1 = step * (share * memory[one, DAMPING] + k * ahead)
+            f1, d1 = response(k, memory[one, DAMPING], k11, gap1, before1, rate1, step, ahead)
         if closed2:
             if memory[two, CLOSED] == 0.0:
                 slip = v[0] - v[2] * by
                 fine = min(fine, closes(memory, parameters, inverse, surface, 1, bx, by, k22, k12, rate2, slip, gap1, rate1, t))
-            share = felt_share(memory[two, DAMPING] * k22 * step)
-            f2 = -k * (gap2 + ahead * rate2) - memory[two, DAMPING] * (before2 + share * (rate2 - before2))
-            d2 = step * (share * memory[two, DAMPING] + k * ahead)
+            f2, d2 = response(k, memory[two, DAMPING], k22, gap2, before2, rate2, step, ahead)
         if surface != FLOOR:
             force1, force2 = normal_forces(f1, f2, d1, d2, k11, k12, k12, k22)
         else:
