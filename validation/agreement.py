@@ -114,7 +114,7 @@ def agree(
     about = (
         f"Share of equal outcomes at {count} nodes of each spectrum, half of them at most {NEAR} nodes from a boundary (near), the others"
         " further away, against the paper's bilateral event-based model and against the unilateral one, which lets the block hop as the"
-        " other models do. Runs of models other than the event-based ones end 6 s after the pulse; a block that has not overturned then counts"
+        " other models do. Runs of models other than the event-based ones end 6 s after the pulse; a block that then stands counts"
         " as safe."
     )
     columns, rows = table(shares)

@@ -235,7 +235,22 @@ def _agreement(panels: Sequence[Panel], asked: Asked, count: int, tiles: Tiles, 
 
 
 def _fragility(panels: Sequence[Panel], asked: Asked, records: Sequence[Path], tiles: Tiles, data: Path, screen: Console) -> None:
-    raise InputError("not available yet", "--fragility")
+    from reports.spectra import fragility_figure, write
+    from validation.fragility import PULSES, csv, fragility
+
+    if len(panels) != 1:
+        raise InputError("needs --scene", "--fragility")
+    warm_up(panels[0], asked)
+    motions = 2 * len(records) if records else 2 * PULSES
+    with _bar("fragility", motions * len(asked.amplitudes) * (1 + bool(panels[0].scene.walls))) as advance:
+        tiles.progress = advance
+        found = fragility(panels[0], asked, records, tiles)
+    write_whole(data / "fragility.json", found.model_dump_json(indent=1) + "\n")
+    write_whole(data / "fragility.csv", csv(found))
+    write(fragility_figure(found.model_dump()), data / "fragility")
+    for case in found.cases:
+        fit = "no curve fits" if case.median is None else f"median {case.median:.3g}, dispersion {case.dispersion:.3g}"
+        screen.print(f"{case.label}: {case.motions} motions, {fit}")
 
 
 @contextlib.contextmanager
