@@ -63,9 +63,8 @@ from ebm.motion import (
     tilt_series,
     tilt_state,
 )
-from ebm.series import MOST_TERMS, NO_ROOT, NOISE, SLIP_NOISE, first_root, leading, value
+from ebm.series import MOST_TERMS, NO_ROOT, NOISE, first_root, leading, value
 from ebm.trajectory import (
-    _LANDED,
     _QUIET_TIME,
     _RATTLE_BOUND,
     _RATTLE_IMPACTS,
@@ -79,7 +78,7 @@ from ebm.trajectory import (
     OVERTURNED,
     RELEASE,
     RIGHT,
-    SETTLE_SPIN,
+    SETTLED,
     SLIPS,
     STICKS,
     TOO_MANY_EVENTS,
@@ -88,28 +87,21 @@ from ebm.trajectory import (
     WALL_IMPACT,
     Control,
     Tally,
-    _floor_impact,
+    _first_event,
+    _impact,
     _note,
     _step_size,
-    _touch,
-    _upright,
-    _wall_impact,
 )
 from ebm.transitions import (
-    G_CONE_MINUS,
     G_CONE_PLUS,
-    G_FAR_GAP,
     G_FAR_PUSH,
-    G_PHI,
     G_PUSH,
     G_SLIP,
-    G_TIP_GAP,
     G_TIP_PUSH,
     G_TOPPLE,
     G_UPLIFT_PLUS,
     GUARDS,
     closed_wall,
-    guard,
     slip_velocity,
 )
 from scenes.compiled import kernel
@@ -180,7 +172,7 @@ def simulate(model: EventBasedModel, scene: Scene, tolerance: float) -> History:
             cpu_seconds=cpu,
             set_up=ready - start,
             steps=tally.steps,
-            evaluations=tally.series,
+            evaluations=tally.steps,
             energy_gains=tally.gains,
             largest_energy_gain=tally.largest_gain,
         ),
@@ -437,24 +429,13 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
             h = _step_size(a, XI, Z, order - 1, control.tolerance, h)
             if m[FAMILY] == TILT:
                 h = _step_size(a, PHI, COS, order, control.tolerance, h)
-        # --- the first event of the step
-        tau, which = h, -1
-        for k in range(GUARDS + 1):
-            if k < GUARDS:
-                degree = guard(b, m, k, order, 0.0, a)
-            else:
-                degree = -1
-                if moving and m[SLIP] * a[Z, 0] <= -1e-13:
-                    degree = order - 1
-                    for j in range(order):
-                        a[GUARD, j] = -m[SLIP] * a[Z, j]
-            if degree >= 0:
-                root = first_root(a, GUARD, degree, tau, SLIP_NOISE if k == G_SLIP else NOISE, stack)
-                if root != NO_ROOT:
-                    tau, which = root, k
-        if G_PUSH <= which <= G_CONE_MINUS and tau > 0.25 * h:
-            # A force is the second derivative of a truncated series: its zero is found to rounding from nearby only.
-            tau, which = 0.9 * tau, -1
+        tau, which = _first_event(b, m, order, 0.0, h, a, stack)
+        if moving and m[SLIP] * a[Z, 0] <= -1e-13:
+            for k in range(order):
+                a[GUARD, k] = -m[SLIP] * a[Z, k]
+            root = first_root(a, GUARD, order - 1, tau, NOISE, stack)
+            if root != NO_ROOT:
+                tau, which = root, _G_LOADS
         if not math.isfinite(tau):
             ending = NOT_FINITE
             break
@@ -516,22 +497,8 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
             yielded = abs(zeta) == 1.0
             kind = UPLIFT if m[FAMILY] == TILT else SLIPS
         elif which >= 0:
-            kind = WALL_IMPACT
-            if which == G_FAR_GAP and m[FAMILY] == TILT and abs(z[THETA]) < _LANDED and m[S] * z[W] < 0.0:
-                which = G_PHI  # the corner meets the wall as the block lands: a floor event
-            _touch(b, m, z, which)
-            resting = _resting_speed(rattle, t)
-            if which == G_PHI:
-                kind = FLOOR_IMPACT
-                _upright(b, m, z)
-                _floor_impact(b, m, z, impulse)
-            else:
-                wall_impacts += 1
-                _wall_impact(b, m, z, which == G_TIP_GAP, gh, t, resting, impulse, gains)
-            if z[THETA] == 0.0 and abs(z[W]) < SETTLE_SPIN:
-                v = slip_velocity(b, z)
-                z[VX] = v if abs(v) > resting else 0.0
-                z[W] = z[VY] = 0.0
+            kind, _, _ = _impact(b, m, z, which, gh, t, _resting_speed(rattle, t), impulse, gains)
+            wall_impacts += kind == WALL_IMPACT
             zeta = _begin(b, m, z, zeta, yield_displacement, gh, gv, t, a)
             yielded = _has_yielded(b, m, z, zeta)
         if kind >= 0:
@@ -541,6 +508,9 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
                 break
             if log.shape[0] >= events:
                 _note(log, events, t, kind, before, _label(m, yielded), impulse[0] + impulse[1])
+            if (kind == FLOOR_IMPACT or kind == WALL_IMPACT) and _label(m, yielded) == 0 and log.shape[0] > events:
+                events += 1
+                _note(log, events, t, SETTLED, before, 0, 0.0)
         if ending == OVERTURNED:
             break
     at_rest = m[FAMILY] == FLAT and m[FLOOR] == STICK
@@ -550,7 +520,7 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
         out[rows] = z
         out_mode[rows] = _label(m, yielded)
         rows += 1
-    return Tally(ending, t, peak, at_rest, steps, steps, events, wall_impacts, int(gains[0]), gains[1], rows, np.nan)
+    return Tally(ending, t, peak, at_rest, steps, events, wall_impacts, int(gains[0]), gains[1], rows, np.nan)
 
 
 @kernel
