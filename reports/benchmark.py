@@ -33,7 +33,7 @@ FLOOR = 1e-13
 def write_benchmark(found: Benchmark, folder: Path) -> Path:
     """Writes `index.html` with its diagrams into the folder of a benchmark; returns the page."""
     site = Site(folder, f"rockcheck: {found.suite}")
-    site.assets(LOOKS)
+    site.assets()
     figures = folder / "figures"
     sheets = []
     if found.models is not None:

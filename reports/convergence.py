@@ -24,7 +24,7 @@ def write_convergence(found: Convergence, folder: Path) -> Path:
     """Writes `index.html` with its diagram into the folder of a study; returns the page."""
     above = (("Report", "../index.html"),) if (folder.parent / "index.html").exists() else ()
     site = Site(folder, "rockcheck: convergence", above)
-    site.assets(LOOKS)
+    site.assets()
     save(convergence_figure(found), folder / "figures" / DIAGRAM)
     return site.page(
         "index.html",

@@ -90,9 +90,9 @@ def thumbnail(view: SceneView) -> Figure:
 
 
 def write_figures(view: SceneView, folder: Path) -> list[Path]:
-    """Write the figures of a scene into `folder`: one for each reference that its models are held against, and a thumbnail."""
+    """Write the figures of a scene into `folder`: one for each of its `figure_references`, and a thumbnail."""
     written = save(thumbnail(view), folder / f"{view.slug}-small", ["svg"])
-    for against in view.references or (None,):
+    for against in view.figure_references:
         written += save(histories_figure(view, against), folder / figure_stem(view, against))
     return written
 

@@ -49,7 +49,7 @@ def payload(view: SceneView) -> dict[str, Any]:
             {
                 "name": model,
                 "label": look.label,
-                "look": list(known).index(model),
+                "look": look.key,
                 "dash": look.dash,
                 "values": {name: packed(values) for name, values in view.values[model].items()},
                 "events": [[float(f"{e.t:.6f}"), e.kind, float(f"{e.impulse:.3g}")] for e in view.histories[model].event_list],

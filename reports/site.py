@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -15,7 +14,7 @@ from reports import tables, words
 from reports.figures import figure_stem, write_figures
 from reports.payload import script
 from reports.scene_file import write_scene_file
-from reports.style import Look, looks
+from reports.style import LOOKS, SPARE, looks
 from reports.view import CHANNELS, scene_views
 from validation.results import Run, write_whole
 
@@ -42,15 +41,15 @@ class Site:
         path.parent.mkdir(parents=True, exist_ok=True)
         return write_whole(path, text)
 
-    def assets(self, models: Iterable[str]) -> None:
-        """Write style sheets, scripts and the plotting library, once for all pages, and the colours of these models."""
+    def assets(self) -> None:
+        """Write style sheets, scripts and the plotting library, once for all pages."""
         target = _made(self.folder / PAGES / "assets")
         for source in sorted((DATA / "assets").iterdir()):
             shutil.copyfile(source, target / source.name)
         for source in sorted((DATA / "vendor").glob("*/*")):
             name = source.name if source.name != "LICENSE" else f"LICENSE.{source.parent.name}.txt"
             shutil.copyfile(source, target / name)
-        write_whole(target / "models.css", model_styles(looks(models).values()))
+        write_whole(target / "models.css", model_styles())
 
 
 def write_site(folder: Path) -> Path:
@@ -59,7 +58,7 @@ def write_site(folder: Path) -> Path:
     views = scene_views(run, folder)
     pages = folder / PAGES
     site = Site(folder, f"rockcheck: {run.suite}", tuple((view.name, f"{PAGES}/{view.slug}.html") for view in views))
-    site.assets(run.models)
+    site.assets()
     for n, view in enumerate(views):
         write_figures(view, _made(pages / "figures"))
         write_whole(_made(pages / "data") / f"{view.slug}.js", script(view))
@@ -89,9 +88,9 @@ def _made(folder: Path) -> Path:
     return folder
 
 
-def model_styles(models: Iterable[Look]) -> str:
-    """A style sheet with a class `look-<n>` for each model that sets its colour, by day and by night."""
-    rows = (f".look-{n} {{ --look: light-dark({look.light}, {look.dark}); }}" for n, look in enumerate(models))
+def model_styles() -> str:
+    """A style sheet with a class `look-<key>` for each look of a model that sets its colour, by day and by night."""
+    rows = (f".look-{look.key} {{ --look: light-dark({look.light}, {look.dark}); }}" for look in (*LOOKS.values(), *SPARE))
     return "\n".join(rows) + "\n"
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ebm.spectrum import COLOURS, Spectrum, draw
-from reports.site import Site
+from reports.site import PAGES, Site
 from reports.style import PAGE, figure_style, save
 from validation.results import RUN_FILE
 
@@ -171,7 +171,7 @@ def write_page(folder: Path) -> Path:
     ]
     own = [record for record in index.spectra if record.figure is None]
     site = Site(folder, "rockcheck: overturning spectra", (*_scene_links(folder), ("Spectra", PAGE_NAME)))
-    site.assets(())
+    site.assets()
     return site.page(
         PAGE_NAME,
         "spectra.html",
@@ -196,8 +196,8 @@ def write(figure: Figure, stem: Path) -> list[Path]:
 
 def _scene_links(folder: Path) -> tuple[tuple[str, str], ...]:
     """The navigation of the finished run that shares the folder, if any."""
-    pages = sorted((folder / "scenes").glob("*.html")) if (folder / RUN_FILE).exists() else []
-    return tuple((page.stem, f"scenes/{page.name}") for page in pages)
+    pages = sorted((folder / PAGES).glob("*.html")) if (folder / RUN_FILE).exists() else []
+    return tuple((page.stem, f"{PAGES}/{page.name}") for page in pages)
 
 
 def _read(path: Path) -> Any:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,8 +22,12 @@ FORMATS = ("svg", "png", "pdf")
 
 @dataclass(frozen=True)
 class Look:
-    """A model's label, its colour on white and on black (hex), its dash pattern (line widths on, off) and its marker."""
+    """A model's label, its colour on white and on black (hex), its dash pattern (line widths on, off) and its marker.
 
+    `key` names the colour in style sheets.
+    """
+
+    key: str
     label: str
     light: str
     dark: str
@@ -37,21 +41,24 @@ class Look:
 
 
 LOOKS = {
-    "ebm": Look("EBM", "#1b1b1b", "#f2f2f2", (), "o"),
-    "ebm-unilateral": Look("EBM, unilateral", "#0072b2", "#3d9fdc", (), "s"),
-    "ebm-bouc-wen": Look("EBM, Bouc-Wen", "#a87900", "#d19a10", (3.0, 1.0, 1.0, 1.0), "P"),
-    "cm": Look("CM", "#009168", "#00b583", (5.0, 1.5), "D"),
-    "mujoco": Look("MuJoCo", "#d55e00", "#e8762a", (2.0, 1.0), "^"),
-    "pybullet": Look("PyBullet", "#bf5f92", "#d98ab4", (4.0, 1.0, 1.0, 1.0), "v"),
-    "measured": Look("measured", "#6e6e6e", "#a0a0a0", (), "x"),
+    look.key: look
+    for look in (
+        Look("ebm", "EBM", "#1b1b1b", "#f2f2f2", (), "o"),
+        Look("ebm-unilateral", "EBM, unilateral", "#0072b2", "#3d9fdc", (), "s"),
+        Look("ebm-bouc-wen", "EBM, Bouc-Wen", "#a87900", "#d19a10", (3.0, 1.0, 1.0, 1.0), "P"),
+        Look("cm", "CM", "#009168", "#00b583", (5.0, 1.5), "D"),
+        Look("mujoco", "MuJoCo", "#d55e00", "#e8762a", (2.0, 1.0), "^"),
+        Look("pybullet", "PyBullet", "#bf5f92", "#d98ab4", (4.0, 1.0, 1.0, 1.0), "v"),
+        Look("measured", "measured", "#6e6e6e", "#a0a0a0", (), "x"),
+    )
 }
-#: For models that have no look of their own, in the order in which a run names them.
+#: For models that have no look of their own, in the order in which a run names them; their label is the model's name.
 SPARE = (
-    ("#5b4db3", "#978be8", (6.0, 2.0)),
-    ("#7d5a3c", "#b98f6b", (1.0, 1.0)),
-    ("#33798c", "#5fb3c9", (3.0, 2.0)),
-    ("#8a1f4b", "#e0719e", (8.0, 2.0, 2.0, 2.0)),
-    ("#4f6f1f", "#94bb57", (1.0, 2.0)),
+    Look("spare-1", "", "#5b4db3", "#978be8", (6.0, 2.0)),
+    Look("spare-2", "", "#7d5a3c", "#b98f6b", (1.0, 1.0)),
+    Look("spare-3", "", "#33798c", "#5fb3c9", (3.0, 2.0)),
+    Look("spare-4", "", "#8a1f4b", "#e0719e", (8.0, 2.0, 2.0, 2.0)),
+    Look("spare-5", "", "#4f6f1f", "#94bb57", (1.0, 2.0)),
 )
 
 
@@ -59,11 +66,8 @@ def looks(models: Iterable[str]) -> dict[str, Look]:
     """The look of each of a run's models; a model without one of its own gets a spare colour, by its place among such."""
     found: dict[str, Look] = {}
     for model in models:
-        if model in LOOKS:
-            found[model] = LOOKS[model]
-        else:
-            light, dark, dash = SPARE[sum(name not in LOOKS for name in found) % len(SPARE)]
-            found[model] = Look(model, light, dark, dash)
+        spare = SPARE[sum(name not in LOOKS for name in found) % len(SPARE)]
+        found[model] = LOOKS[model] if model in LOOKS else replace(spare, label=model)
     return found
 
 
@@ -105,7 +109,7 @@ def figure_style() -> Iterator[None]:
         "svg.fonttype": "path",
         "svg.hashsalt": "rockcheck",
         "pdf.fonttype": 42,
-        "savefig.dpi": 200,
+        "savefig.dpi": 150,
         "figure.dpi": 100,
     }
     with mpl.rc_context(settings):

@@ -129,6 +129,11 @@ class SceneView:
         named = [self.run.reference, self.run.model_form, *(f.against for cell in self.cells for f in cell.figures)]
         return tuple(model for model in dict.fromkeys(named) if model in self.histories)
 
+    @property
+    def figure_references(self) -> tuple[str | None, ...]:
+        """References that have a figure of their own: all where a wall makes them differ in form, else the first; None without any."""
+        return (self.references if self.model_form_matters else self.references[:1]) or (None,)
+
     def differences(self, channel: str, against: str) -> dict[str, Array]:
         """Candidate minus reference by model, in the channel's unit."""
         reference = self.values[against][channel]

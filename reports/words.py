@@ -32,7 +32,9 @@ def duration(seconds: float) -> str:
 
 def ratio(value: float | None) -> str:
     """A ratio with its sign of multiplication."""
-    return "–" if value is None else f"{number(value, 2 if value < 100 else 3)}×"
+    if value is None:
+        return "–"
+    return f"{value:,.0f}×".replace(",", "\u202f") if value >= 100.0 else f"{number(value, 2)}×"
 
 
 def window(figure: Figure) -> str:
