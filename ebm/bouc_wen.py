@@ -436,6 +436,9 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
             root = first_root(a, GUARD, order - 1, tau, NOISE, stack)
             if root != NO_ROOT:
                 tau, which = root, _G_LOADS
+        if which == G_SLIP and tau <= 0.0 and zero_steps > 0:
+            # Whichever sign is assumed, V leaves zero with the other: it is rounding, so any will do for a little while.
+            tau, which, zero_steps = min(h, 1e-2 * math.sqrt(yield_displacement)), -1, 0
         if not math.isfinite(tau):
             ending = NOT_FINITE
             break

@@ -101,6 +101,8 @@ _REST_BILATERAL, _REST_UNILATERAL = 2.5e-8, 2.5e-7
 _RATTLE_IMPACTS, _RATTLE_TIME, _RATTLE_BOUND, _QUIET_TIME = 100, 5e-3, 2.5e-3, 2.5e-2
 # With the bilateral pivot a block that rattles flush against a wall is settled below these.
 _FLUSH_SPIN, _FLUSH_SPEED, _FLUSH_GAP = 2e-4, 2.5e-4, 6e-7
+# On a floor without friction a block stands as long as the base accelerates less than this, g.
+_FRICTIONLESS = 1e-9
 _TOUCH = 1e-11
 # A pivot that slips more slowly than this after an impact stands: the impact law says so up to rounding.
 _STOPPED = 1e-10
@@ -185,7 +187,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         if m[FAMILY] == FLAT and m[FLOOR] == STICK and still:
             limit = b.sin_alpha / b.cos_alpha
             if not b.no_slip:
-                limit = min(limit, b.mu_s)
+                limit = min(limit, max(b.mu_s, _FRICTIONLESS))
             until = next_exceedance(gh, t, -np.inf if m[FAR] != 0 else -limit, np.inf if m[TIP] != 0 else limit)
             if math.isnan(t_rest):
                 t_rest = t

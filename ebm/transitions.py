@@ -315,6 +315,10 @@ def select(b, z, gh, gv, t, left, m, a):
     `left` is the mode that has just ended; it is taken again only where no other one fits. Larger contact sets come first,
     sticking before slipping.
     """
+    if abs(z[THETA]) < 1e-13 and abs(z[W]) < CLOSED_RATE and z[THETA] != 0.0:
+        v = slip_velocity(b, z)
+        z[THETA] = z[W] = 0.0  # upright and still but for rounding
+        z[VX] = v if abs(v) > CLOSED_RATE else 0.0
     flat = z[THETA] == 0.0 and z[W] == 0.0
     floor = closed_floor(b, z) or not b.unilateral
     stands = floor and b.walls and z[THETA] != 0.0 and abs(z[W]) < CLOSED_RATE
