@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from reports.site import Site
+from reports.site import PAGES, Site
 from reports.style import LOOKS, PAGE, figure_style, looks, save
 from validation.benchmark import Benchmark
 from validation.benchmark_ebm import CASES, EbmSpeed
@@ -34,7 +34,7 @@ def write_benchmark(found: Benchmark, folder: Path) -> Path:
     """Writes `index.html` with its diagrams into the folder of a benchmark; returns the page."""
     site = Site(folder, f"rockcheck: {found.suite}")
     site.assets()
-    figures = folder / "figures"
+    figures = folder / PAGES / "figures"
     sheets = []
     if found.models is not None:
         for name, title, starts in SHEETS:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 #: How an event is drawn on a model's track: kind, marker, size.
 TRACKED = (("floor impact", "|", 5.0), ("wall impact", "D", 2.6))
-#: Below this share of a channel's largest value differences are drawn on a linear scale where no tolerance says better.
+#: Below this share of a channel's largest value differences are drawn on a linear scale.
 FINE = 1e-3
 LEGEND_COLUMNS = 6
 TOLERANCE = "#009168"
@@ -105,16 +105,14 @@ def figure_stem(view: SceneView, against: str | None) -> str:
 
 
 def fineness(view: SceneView, channel: Channel, bands: Sequence[Band]) -> float:
-    """Where the scale of differences turns from linear to logarithmic, in the channel's unit: the tightest tolerance.
+    """Where the scale of differences turns from linear to logarithmic, in the channel's unit.
 
-    Where there is none, a thousandth of the channel's largest value.
+    The tightest tolerance that is not below a thousandth of the channel's largest value, else that thousandth: finer
+    scales would show nothing but decades.
     """
-    limits = [band.limit for band in bands if band.channel == channel.name and band.limit > 0.0]
-    if limits:
-        return min(limits)
-    with np.errstate(invalid="ignore"):
-        largest = max((_largest(columns[channel.name]) for columns in view.values.values()), default=0.0)
-    return float(f"{FINE * largest:.1g}") or 1e-12
+    largest = max((_largest(columns[channel.name]) for columns in view.values.values()), default=0.0)
+    least = float(f"{FINE * largest:.1g}") or 1e-12
+    return min((band.limit for band in bands if band.channel == channel.name and band.limit >= least), default=least)
 
 
 def _largest(values: np.ndarray) -> float:
@@ -184,7 +182,7 @@ def _tracks(ax: Axes, view: SceneView) -> None:
     ax.set_yticks(range(len(shown)), [_short(known[model].label) for model in shown], fontsize=6)
     ax.set_ylim(len(shown) - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
-    ax.text(0.995, 1.0, "impacts: | floor, ◆ wall", transform=ax.transAxes, ha="right", va="bottom", fontsize=6, color="#555555")
+    ax.text(0.998, 0.97, "impacts: | floor, ◆ wall", transform=ax.transAxes, ha="right", va="top", fontsize=6, color="#555555")
 
 
 def _short(label: str, most: int = 17) -> str:

@@ -122,25 +122,25 @@ def areas_figure(spectra: Sequence[Spectrum]) -> Figure:
             axes.set_title(f"Wall on the {side}")
             axes.set_xlabel("gap, mm")
             axes.set_xticks([3, 53, 103])
-            axes.set_ylim(0, None)
+        figure.axes[0].set_ylim(0.0, 105.0 * max(spectrum.safe_area for spectrum in spectra))
         figure.axes[0].set_ylabel("safe nodes, %")
         figure.axes[1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
 
 def fragility_figure(fragility: Mapping[str, Any]) -> Figure:
-    """Probability of overturning against intensity: observed shares, the fitted curve and its confidence band, case by case."""
+    """Probability of overturning against intensity: the share of the motions with its confidence band, and the lognormal fit, dotted."""
     from matplotlib.figure import Figure
 
-    looks = (("#1b1b1b", "o", ()), ("#0072b2", "s", (5.0, 1.5)), ("#d55e00", "^", (2.0, 1.0)))
+    looks = (("#d55e00", ()), ("#0072b2", (5.0, 1.5)))
     with figure_style():
         figure = Figure(figsize=(PAGE / 1.4, 3.2), layout="constrained")
         axes = figure.subplots()
-        for case, (colour, marker, dash) in zip(fragility["cases"], looks, strict=False):
+        for case, (colour, dash) in zip(fragility["cases"], looks, strict=False):
             points = np.array(case["points"])
-            axes.fill_between(points[:, 0], points[:, 3], points[:, 4], color=colour, alpha=0.15, linewidth=0)
-            axes.plot(points[:, 0], points[:, 2], color=colour, linestyle=(0, dash) if dash else "-", label=case["label"])
-            axes.plot(points[:, 0], points[:, 1], marker, color=colour, markersize=2.5, linestyle="none")
+            axes.fill_between(points[:, 0], points[:, 2], points[:, 3], color=colour, alpha=0.15, linewidth=0)
+            axes.plot(points[:, 0], points[:, 1], color=colour, linestyle=(0, dash) if dash else "-", label=case["label"])
+            axes.plot(points[:, 0], points[:, 4], color=colour, linestyle=(0, (0.7, 1.7)), linewidth=0.8)
         axes.set_xlabel(fragility["intensity"])
         axes.set_ylabel("probability of overturning")
         axes.set_ylim(-0.02, 1.02)

@@ -59,7 +59,9 @@ def motion(scene: Scene, model: str, delay: float, *, falls: bool = False) -> An
     zeros = [k * math.pi / 3.0 + delay for k in range(1, 11)]
     events = [Event(t=zero, kind="floor impact", mode_before="rock", mode_after="rock", impulse=0.4 / (1 + zero)) for zero in zeros]
     if scene.walls:
-        events += [Event(t=zero + 0.4, kind="wall impact", mode_before="rock", mode_after="slide-rock", impulse=0.2) for zero in zeros[1::2]]
+        events += [
+            Event(t=zero + 0.4, kind="wall impact", mode_before="rock", mode_after="slide-rock", impulse=0.2) for zero in zeros[1::2]
+        ]
     if falls:
         events.append(Event(t=float(late[-1]), kind="overturned left"))
     cost = Cost(wall_seconds=0.01 * (1 + 10 * delay), set_up=0.1, steps=1000, evaluations=4000)
@@ -77,8 +79,17 @@ def cell_of(folder: Path, scene: Scene, model: str, delay: float, falls: bool = 
     path = f"{HISTORIES}/{scene.name.replace(' ', '_')}--{model.replace(':', '_')}--0.csv"
     (folder / HISTORIES).mkdir(parents=True, exist_ok=True)
     history.save(folder / path)
-    checks = [Check(figure=figure("peak_rotation", history.peak_rotation, until=8.0, window="8s"), kind="absolute", verdict="pass",
-                    ideal=history.peak_rotation, expected=history.peak_rotation, limit=1e-3, why="as accepted")]  # fmt: skip
+    checks = [
+        Check(
+            figure=figure("peak_rotation", history.peak_rotation, until=8.0, window="8s"),
+            kind="absolute",
+            verdict="pass",
+            ideal=history.peak_rotation,
+            expected=history.peak_rotation,
+            limit=1e-3,
+            why="as accepted",
+        )
+    ]
     figures = [figure("highest_hop", 0.004, "m")]
     for against in ("ebm-unilateral", "ebm"):
         if model == against:
@@ -86,13 +97,37 @@ def cell_of(folder: Path, scene: Scene, model: str, delay: float, falls: bool = 
         form = against == "ebm" and bool(scene.walls)
         value = 0.3 * delay
         verdict: Any = "pass" if value < 0.8e-3 else "changed" if value < 2e-3 else "fail"
-        checks.append(Check(figure=figure("theta_rms", value, against=against, window="8s", until=8.0), kind="model form" if form else "numerical",
-                            verdict=verdict, reason={"pass": "", "changed": "0.0015 was 0.0001"}.get(verdict, f"{value:.3g} is more than 0.002 {NASTY}"),
-                            ideal=0.0, expected=1e-4, limit=2e-3, drift=5e-4, why="first-order step error"))  # fmt: skip
-        figures += [checks[-1].figure, figure("events_agree_until", 12.0 - 100 * delay, "s", against=against, note="floor impact only in " + model),
-                    figure("theta_rms", value, against=against, window="horizon", until=10.0)]  # fmt: skip
-    return Cell(scene=scene.name, model=model, settings=MODELS[model], key="0", status="done", history=path, outcome=history.outcome,
-                notes=history.notes, cost=CostRecord(**vars(history.cost), worker_seconds=0.5), figures=tuple(figures), checks=tuple(checks))  # fmt: skip
+        checks.append(
+            Check(
+                figure=figure("theta_rms", value, against=against, window="8s", until=8.0),
+                kind="model form" if form else "numerical",
+                verdict=verdict,
+                reason={"pass": "", "changed": "0.0015 was 0.0001"}.get(verdict, f"{value:.3g} is more than 0.002 {NASTY}"),
+                ideal=0.0,
+                expected=1e-4,
+                limit=2e-3,
+                drift=5e-4,
+                why="first-order step error",
+            )
+        )
+        figures += [
+            checks[-1].figure,
+            figure("events_agree_until", 12.0 - 100 * delay, "s", against=against, note="floor impact only in " + model),
+            figure("theta_rms", value, against=against, window="horizon", until=10.0),
+        ]
+    return Cell(
+        scene=scene.name,
+        model=model,
+        settings=MODELS[model],
+        key="0",
+        status="done",
+        history=path,
+        outcome=history.outcome,
+        notes=history.notes,
+        cost=CostRecord(**vars(history.cost), worker_seconds=0.5),
+        figures=tuple(figures),
+        checks=tuple(checks),
+    )
 
 
 DELAYS = {"ebm-unilateral": 0.0, "ebm": 0.0005, "cm": 0.001, "mujoco": 0.002, "pybullet": 0.005, "mine:Model": 0.02}
@@ -115,7 +150,9 @@ def make_run(folder: Path, duration: float = 12.0) -> Run:
         models=tuple(MODELS),
         cells=tuple(cells),
         faults=("tolerance [old.cm.ebm: theta_rms] has no cell in the suite",),
-        measures=(MeasureRecord(name="theta_rms", label="RMS difference of rotation", unit="angle", formula="sqrt <d^2> of theta, in alpha."),),
+        measures=(
+            MeasureRecord(name="theta_rms", label="RMS difference of rotation", unit="angle", formula="sqrt <d^2> of theta, in alpha."),
+        ),
         versions={"rockcheck": "0.1.0", "python": "3.11", "mujoco": "4.0.0"},
         hardware={"processor": f"made up {NASTY}", "cores": "2"},
         wall_seconds=3.0,

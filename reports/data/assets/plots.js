@@ -114,7 +114,6 @@ const Plots = (() => {
       const stop = () => { document.removeEventListener("mousemove", move); document.removeEventListener("mouseup", stop); };
       document.addEventListener("mousemove", move);
       document.addEventListener("mouseup", stop);
-      event.preventDefault();
     }
     const timeAt = clientX => u.posToVal(clientX - u.over.getBoundingClientRect().left, "x");
     u.over.addEventListener("mousemove", e => { if (!e.buttons && !store.playing) store.change({ time: timeAt(e.clientX) }); });

@@ -1,0 +1,260 @@
+"""The pages in a real browser, opened from the file system."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright import sync_api as playwright
+
+pytestmark = pytest.mark.browser
+
+CHROMIUM = Path("/usr/bin/chromium")
+ARGUMENTS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+PAGES = ("index.html", "pages/free.html", "pages/beside-a-wall.html", "pages/Free-2.html")
+WALL = "pages/beside-a-wall.html"
+
+
+@dataclass
+class Visit:
+    """An open page and what it did: complaints on the console, and addresses outside the site that it asked for."""
+
+    page: playwright.Page
+    site: Path
+    complaints: list[str] = field(default_factory=list)
+    strangers: list[str] = field(default_factory=list)
+
+    def open(self, address: str) -> playwright.Page:
+        """Go to a page of the site."""
+        self.page.goto((self.site / address).as_uri())
+        return self.page
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[playwright.Browser]:
+    if not CHROMIUM.exists():
+        missing = f"{CHROMIUM} is not installed"
+        pytest.fail(missing) if os.environ.get("CI") else pytest.skip(missing)
+    with playwright.sync_playwright() as driver:
+        running = driver.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
+        yield running
+        running.close()
+
+
+def visit_of(browser: playwright.Browser, site: Path, **settings: object) -> Visit:
+    for name in ("checks.csv", "figures.csv"):  # validation writes them beside the pages
+        (site / name).touch()
+    context = browser.new_context(**{"viewport": {"width": 1280, "height": 900}, **settings})
+    visit = Visit(context.new_page(), site)
+    visit.page.on("console", lambda message: visit.complaints.append(message.text) if message.type in ("error", "warning") else None)
+    visit.page.on("pageerror", lambda error: visit.complaints.append(str(error)))
+    visit.page.on("requestfailed", lambda request: visit.complaints.append(f"failed: {request.url}"))
+    home = site.as_uri()
+    visit.page.on("request", lambda request: None if request.url.startswith((home, "data:")) else visit.strangers.append(request.url))
+    return visit
+
+
+@pytest.fixture
+def visit(browser: playwright.Browser, site: Path) -> Iterator[Visit]:
+    """A page in the browser; in the end it must have complained of nothing and asked for nothing elsewhere."""
+    visit = visit_of(browser, site)
+    yield visit
+    visit.page.context.close()
+    assert visit.complaints == []
+    assert visit.strangers == []
+
+
+def until(page: playwright.Page, expression: str, seconds: float = 10.0) -> None:
+    """Wait for an expression to hold; the pages' policy forbids what playwright's own waiting does."""
+    for _ in range(int(seconds / 0.05)):
+        if page.evaluate(expression):
+            return
+        page.wait_for_timeout(50)
+    raise AssertionError(f"never came true: {expression}")
+
+
+def window(page: playwright.Page) -> list[float]:
+    return page.evaluate("rockcheckPage.store.window")
+
+
+@pytest.mark.parametrize("address", PAGES)
+def test_opens_and_draws(visit: Visit, address: str) -> None:
+    page = visit.open(address)
+    assert page.locator("h1").count() == 1
+    if address == "index.html":
+        return
+    assert page.locator("#plots canvas").count() == len(page.evaluate("rockcheckPage.drawn"))
+    inked = """() => [...document.querySelectorAll('#live canvas')].map(c =>
+        c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(v => v > 0))"""
+    until(page, f"({inked})().every(Boolean)")
+
+
+def test_every_link_leads_to_a_file(visit: Visit) -> None:
+    for address in PAGES:
+        page = visit.open(address)
+        for link in page.eval_on_selector_all("a[href]", "links => links.map(link => link.href)"):
+            assert link.startswith(visit.site.as_uri())
+            path = Path(unquote(urlsplit(link).path))
+            assert path.exists(), link
+    page = visit.open("index.html")
+    for name in ("free", "beside a wall", "Free"):
+        page.get_by_role("navigation").get_by_role("link", name=name, exact=True).click()
+        assert page.locator("h1").inner_text() == name
+    page.get_by_role("link", name="← beside a wall").click()
+    page.get_by_role("link", name="Overview").click()
+    assert "A model failed" in page.locator("h1").inner_text()
+
+
+def test_zoom_by_dragging_moves_all_plots(visit: Visit) -> None:
+    page = visit.open(WALL)
+    box = page.locator("#plots .u-over").nth(3)
+    box.scroll_into_view_if_needed()
+    place = box.bounding_box()
+    assert place is not None
+    y = place["y"] + place["height"] / 2
+    page.mouse.move(place["x"] + 0.25 * place["width"], y)
+    page.mouse.down()
+    page.mouse.move(place["x"] + 0.4 * place["width"], y, steps=4)
+    page.mouse.move(place["x"] + 0.5 * place["width"], y, steps=4)
+    page.mouse.up()
+    until(page, "rockcheckPage.store.window[0] > 2")
+    assert window(page) == pytest.approx([3.0, 6.0], abs=0.1)
+    spans = page.evaluate("rockcheckPage.drawn.slice(1).map(u => [u.scales.x.min, u.scales.x.max])")
+    assert all(span == pytest.approx(window(page)) for span in spans)
+    page.keyboard.down("Shift")
+    page.mouse.move(place["x"] + 0.5 * place["width"], y)
+    page.mouse.down()
+    page.mouse.move(place["x"] + 0.25 * place["width"], y, steps=4)
+    page.mouse.up()
+    page.keyboard.up("Shift")
+    assert window(page) == pytest.approx([3.75, 6.75], abs=0.15)
+    box.dblclick()
+    assert window(page) == pytest.approx([0.0, 12.0])
+
+
+def test_buttons_and_keys_zoom_and_move(visit: Visit) -> None:
+    page = visit.open(WALL)
+    page.evaluate("rockcheckPage.store.change({time: 6})")
+    page.get_by_role("button", name="Zoom in").click()
+    assert window(page) == pytest.approx([3.0, 9.0])
+    page.get_by_role("button", name="Later").click()
+    assert window(page) == pytest.approx([4.5, 10.5])
+    page.locator("#plots").focus()
+    page.keyboard.press("ArrowRight")
+    assert page.evaluate("rockcheckPage.store.time") == pytest.approx(6.03)
+    page.keyboard.press("Shift+ArrowLeft")
+    assert window(page) == pytest.approx([3.9, 9.9])
+    page.keyboard.press("-")
+    page.keyboard.press("0")
+    assert window(page) == pytest.approx([0.0, 12.0])
+
+
+def test_models_are_switched_everywhere(visit: Visit) -> None:
+    page = visit.open(WALL)
+    shown = "rockcheckPage.drawn.slice(2).map(u => u.series[3].show)"
+    assert all(page.evaluate(shown))
+    page.get_by_role("checkbox", name="CM").uncheck()
+    assert not any(page.evaluate(shown))
+    assert not page.locator('#block [data-model="cm"]').is_visible()
+    assert not page.locator('#values tr[data-model="cm"]').is_visible()
+    page.get_by_role("checkbox", name="CM").check()
+    assert all(page.evaluate(shown))
+
+
+def test_reference_of_the_differences_can_be_chosen(visit: Visit) -> None:
+    page = visit.open(WALL)
+    largest = "Math.max(...rockcheckPage.drawn[3].data[{}].map(v => Math.abs(v ?? 0)))"
+    assert page.evaluate(largest.format(1)) == 0.0  # the reference itself is left out
+    assert page.evaluate(largest.format(2)) > 0.0
+    page.get_by_label("Differences from").select_option("ebm")
+    assert page.evaluate(largest.format(2)) == 0.0
+    assert page.evaluate(largest.format(1)) > 0.0
+    assert "difference from EBM;" in page.locator("#plots").inner_text()
+
+
+def test_animation_moves_the_block_with_the_cursor(visit: Visit) -> None:
+    page = visit.open(WALL)
+    block = page.locator('#block [data-model="ebm-unilateral"]')
+    start = block.get_attribute("transform")
+    page.get_by_role("button", name="Play").click()
+    until(page, "rockcheckPage.store.time > 0.3")
+    page.get_by_role("button", name="Pause").click()
+    time = page.evaluate("rockcheckPage.store.time")
+    assert block.get_attribute("transform") != start
+    expected = page.evaluate("(m => rockcheckPage.store.at(m, 'theta', rockcheckPage.store.time))(rockcheck.models[0])")
+    angle = re.search(r"rotate\((\S+)\)", block.get_attribute("transform") or "")
+    assert angle is not None
+    assert float(angle[1]) == pytest.approx(expected * page.evaluate("rockcheck.alpha") * 180.0 / 3.141592653589793)
+    until(page, f"document.getElementById('now').textContent === '{time:.3f} s'")
+    page.locator("#time").fill("2000")
+    assert page.evaluate("rockcheckPage.store.time") == pytest.approx(10.0)
+    line = page.locator("#plots .plot").nth(2).locator(".cursor-line")
+    assert float(re.findall(r"[\d.]+", line.get_attribute("style") or "")[0]) == pytest.approx(
+        10.0 / 12.0 * page.evaluate("rockcheckPage.drawn[2].over.clientWidth"), abs=1.0
+    )
+
+
+def test_slow_motion_is_slow(visit: Visit) -> None:
+    page = visit.open(WALL)
+    page.get_by_label("Speed").select_option("0.01")
+    page.get_by_role("button", name="Play").click()
+    page.wait_for_timeout(400)
+    assert 0.0 < page.evaluate("rockcheckPage.store.time") < 0.1
+
+
+def test_a_falling_block_stays_where_it_fell(visit: Visit) -> None:
+    page = visit.open("pages/Free-2.html")
+    page.evaluate("rockcheckPage.store.change({time: 12})")
+    block = page.locator('#block [data-model="ebm"]')
+    assert "NaN" not in (block.get_attribute("transform") or "NaN")
+    assert block.evaluate("e => Number(e.style.opacity)") == 0.4
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("address", ["index.html", WALL])
+def test_accessible(browser: playwright.Browser, site: Path, address: str, scheme: str) -> None:
+    visit = visit_of(browser, site, color_scheme=scheme, bypass_csp=True)
+    page = visit.open(address)
+    page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
+    found = Axe().run(page).response["violations"]
+    page.context.close()
+    serious = [f"{v['id']}: {n['html'][:120]}" for v in found if v["impact"] in ("serious", "critical") for n in v["nodes"][:3]]
+    assert serious == []
+
+
+def test_a_phone_needs_no_sideways_scrolling(browser: playwright.Browser, site: Path) -> None:
+    visit = visit_of(browser, site, viewport={"width": 390, "height": 800})
+    for address in PAGES:
+        assert visit.open(address).evaluate("document.documentElement.scrollWidth") == 390, address
+    visit.page.context.close()
+
+
+def test_print_shows_the_figures_and_no_controls(visit: Visit) -> None:
+    page = visit.open(WALL)
+    page.emulate_media(media="print")
+    assert not page.locator("#explore").is_visible()
+    assert page.locator(".paper img").first.is_visible()
+
+
+def test_without_scripts_the_figures_remain(browser: playwright.Browser, site: Path) -> None:
+    visit = visit_of(browser, site, java_script_enabled=False)
+    page = visit.open(WALL)
+    assert "need JavaScript" in page.locator("noscript").inner_text()
+    assert not page.locator("#live").is_visible()
+    assert page.locator(".paper img").first.is_visible()
+    page.context.close()

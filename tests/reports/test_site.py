@@ -1,0 +1,251 @@
+"""Pages of a finished run: complete, escaped, offline; the scene file plays the same scene; figures are reproducible."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+
+from reports import write_site
+from reports.figures import histories_figure
+from reports.payload import packed
+from reports.scene_file import write_scene_file
+from reports.site import PAGES
+from reports.style import LOOKS, SPARE, looks, save
+from reports.tables import overrun, run_times, worst_first
+from reports.view import scene_views, slugs_of
+from reports.words import number, ratio
+from scenes import Block, Floor, InputError, Record, Scene, Sine, Wall, load_scene
+from validation.results import Check, Figure, Run
+
+
+class Addresses(HTMLParser):
+    """All addresses that a page asks for or links to, its tags, and its visible words."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: list[str] = []
+        self.tags: set[str] = set()
+        self.words: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+        self.found += [value for name, value in attrs if name in ("href", "src") and value]
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)
+
+
+def pages_of(site: Path) -> list[Path]:
+    return [site / "index.html", *sorted((site / PAGES).glob("*.html"))]
+
+
+def payload_of(site: Path, slug: str) -> dict:
+    text = (site / PAGES / "data" / f"{slug}.js").read_text(encoding="utf-8")
+    return json.loads(text.removeprefix("window.rockcheck = ").rstrip(";\n"))
+
+
+def test_every_scene_has_a_page(site: Path) -> None:
+    assert [page.stem for page in pages_of(site)] == ["index", "Free-2", "beside-a-wall", "free"]
+
+
+def test_every_address_is_a_file_of_the_folder(site: Path) -> None:
+    for name in ("checks.csv", "figures.csv"):  # validation writes them beside the pages
+        (site / name).touch()
+    for page in pages_of(site):
+        for address in Addresses(page.read_text(encoding="utf-8")).found:
+            if address.startswith(("#", "data:")):
+                continue
+            parts = urlsplit(address)
+            assert not parts.scheme, f"{page.name} asks for {address}"
+            assert not parts.netloc, f"{page.name} asks for {address}"
+            target = (page.parent / parts.path).resolve()
+            assert target.is_relative_to(site.resolve()), address
+            assert target.exists(), f"{page.name} asks for {address}"
+
+
+def test_hostile_text_stays_text(site: Path) -> None:
+    for page in pages_of(site):
+        read = Addresses(page.read_text(encoding="utf-8"))
+        assert "x" not in read.found
+        assert any("<img src=x onerror=alert(1)>&\"'</script>" in words for words in read.words), page.name
+    for script in (site / PAGES / "data").glob("*.js"):
+        assert "<" not in script.read_text(encoding="utf-8")
+
+
+def test_wall_scenes_say_what_the_ebm_forbids(site: Path) -> None:
+    said = {page.stem: "forbids the hop" in page.read_text(encoding="utf-8") for page in pages_of(site)}
+    assert said == {"index": False, "free": False, "Free-2": False, "beside-a-wall": True}
+    text = (site / PAGES / "beside-a-wall.html").read_text(encoding="utf-8")
+    assert "model form, not numerical error" in re.sub(r"\s+", " ", text)
+
+
+def test_index_lists_what_is_wrong_worst_first(site: Path) -> None:
+    run = Run.load(site)
+    order = [("error", cell.model) if check is None else (check.verdict, overrun(check)) for cell, check in worst_first(run)]
+    assert order[0] == ("error", "mujoco")
+    failing = [value for verdict, value in order if verdict == "fail"]
+    assert failing == sorted(failing, reverse=True)
+    assert len(failing) == sum(check.verdict == "fail" for _, check in run.checks()) > 0
+    assert [verdict for verdict, _ in order] == sorted((v for v, _ in order), key=["error", "fail", "changed"].index)
+    index = (site / "index.html").read_text(encoding="utf-8")
+    assert "A model failed" in index
+    assert "tolerance [old.cm.ebm: theta_rms] has no cell in the suite" in index
+
+
+def test_data_are_the_histories(site: Path) -> None:
+    run = Run.load(site)
+    view = next(view for view in scene_views(run, site) if view.name == "beside a wall")
+    data = payload_of(site, view.slug)
+    assert data["rows"] == len(view.t)
+    for model in data["models"]:
+        history = view.histories[model["name"]]
+        theta = np.frombuffer(base64.b64decode(model["values"]["theta"]), dtype="<f4")
+        assert theta == pytest.approx(history.channels["theta"] / view.scene.block.alpha, rel=1e-7)
+        assert [event[1] for event in model["events"]] == [event.kind for event in history.event_list]
+    assert data["horizon"] == 10.0
+    assert {(band["model"], band["limit"], band["until"]) for band in data["bands"] if band["against"] == "ebm"} == {
+        (model, 2e-3, 8.0) for model in run.models if model != "ebm"
+    }
+
+
+def test_a_history_that_ends_early_is_padded(site: Path) -> None:
+    data = payload_of(site, "Free-2")
+    theta = np.frombuffer(base64.b64decode(data["models"][0]["values"]["theta"]), dtype="<f4")
+    assert len(theta) == data["rows"]
+    assert np.isnan(theta[-1])
+    assert not np.isnan(theta[0])
+
+
+def test_a_large_run_shows_every_nth_row(run_folder: Path) -> None:
+    run = Run.load(run_folder)
+    [coarse, *_] = scene_views(run, run_folder, most_values=60_000)
+    [fine, *_] = scene_views(run, run_folder)
+    assert (fine.stride, coarse.stride) == (1, 5)
+    assert coarse.values["cm"]["theta"] == pytest.approx(fine.values["cm"]["theta"][::5], abs=0.0)
+
+
+def test_missing_and_foreign_histories_are_told(tmp_path: Path, run_folder: Path) -> None:
+    run = Run.load(run_folder)
+    [one, two, *rest] = run.cells
+    cells = (one.model_copy(update={"history": "histories/gone.csv"}), two.model_copy(update={"history": "../../etc/passwd"}), *rest)
+    [view, *_] = scene_views(run.model_copy(update={"cells": cells}), run_folder)
+    assert "gone.csv: cannot be read" in view.missing[one.model]
+    assert "outside the run's folder" in view.missing[two.model]
+    assert one.model not in view.histories
+
+
+def test_a_folder_without_run_is_bad_input(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no finished run here"):
+        write_site(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        Scene(
+            name="pulse",
+            block=Block(half_width=0.4, half_height=1.5),
+            floor=Floor(friction=0.3),
+            excitation=Sine(amplitude=2.0, period=1.0),
+            walls=(Wall(side="left", gap=0.1, restitution=0.5), Wall(side="right", gap=0.2)),
+            duration=3.0,
+            initial_rotation=0.01,
+        ),
+        Scene(
+            name="records",
+            block=Block(half_width=0.4, half_height=1.5, mass=12.0),
+            floor=Floor(friction=0.3, static_friction=0.4),
+            excitation=Record.from_samples([0.0, 1.0 / 3.0, -2e-7], 0.02, scale=1.5),
+            vertical=Record.from_samples([0.1, 0.2], 0.005),
+            duration=3.0,
+            gravity=9.8,
+            description='quotes " and \\ and <tags>',
+        ),
+    ],
+)
+def test_scene_file_plays_the_same_scene(tmp_path: Path, scene: Scene) -> None:
+    files = write_scene_file(scene, tmp_path, "again")
+    again = load_scene(tmp_path / next(iter(files)))
+    t = np.linspace(0.0, 3.0, 1000)
+    for which in ("excitation", "vertical"):
+        assert np.array_equal(getattr(again, which).acceleration(t), getattr(scene, which).acceleration(t))
+    hidden = {"excitation", "vertical"}
+    assert again.model_dump(exclude=hidden) == scene.model_dump(exclude=hidden)
+
+
+def test_slugs_differ_whatever_the_file_system() -> None:
+    slugs = slugs_of(["a b", "a,b", "A b", "a-b-2", "..", "x/../y"])
+    assert len({slug.lower() for slug in slugs.values()}) == 6
+    assert all(re.fullmatch(r"[A-Za-z0-9._-]+", slug) and slug not in (".", "..") for slug in slugs.values())
+
+
+def test_figures_are_reproducible_and_undated(tmp_path: Path, run_folder: Path) -> None:
+    [view, *_] = scene_views(Run.load(run_folder), run_folder)
+    written = [save(histories_figure(view), tmp_path / name / "figure") for name in ("one", "two")]
+    for first, second in zip(*written, strict=True):
+        assert first.read_bytes() == second.read_bytes(), first.suffix
+    assert {path.suffix for path in written[0]} == {".svg", ".png", ".pdf"}
+    assert b"<dc:date>" not in written[0][0].read_bytes()
+
+
+def test_differences_are_candidate_minus_reference(run_folder: Path) -> None:
+    view = next(view for view in scene_views(Run.load(run_folder), run_folder) if view.name == "beside a wall")
+    difference = view.differences("theta", "ebm-unilateral")["pybullet"]
+    expected = view.histories["pybullet"].channels["theta"] - view.histories["ebm-unilateral"].channels["theta"]
+    assert difference == pytest.approx(expected / view.scene.block.alpha, abs=1e-12)
+    assert view.figure_references == ("ebm-unilateral", "ebm")
+
+
+def test_run_times_are_ratios_to_the_reference(run_folder: Path) -> None:
+    times = {row.model: row for row in run_times(Run.load(run_folder))}
+    assert times["ebm-unilateral"].ratio == pytest.approx(1.0)
+    # 0.01 s (1 + 10 delay): 1.005 and 1.01 of the reference in the two scenes that the model played
+    assert times["cm"].ratio == pytest.approx((1.005 * 1.01) ** 0.5)
+
+
+def test_how_much_of_its_limit_a_check_uses() -> None:
+    def check(value: float | None, **more: object) -> Check:
+        figure = Figure(measure="m", label="m", unit="1", value=value)
+        return Check(figure=figure, kind="numerical", **{"verdict": "fail", "ideal": 0.0, "limit": 2.0, **more})
+
+    assert overrun(check(5.0)) == 2.5
+    assert overrun(check(5.0, ideal=4.0)) == 0.5
+    assert overrun(check(8.0, ideal=None, limit=12.0)) == 1.5
+    assert overrun(check(None)) == float("inf")
+    assert overrun(check(1.0, limit=None)) == float("inf")
+
+
+def contrast(first: str, second: str) -> float:
+    """Contrast ratio of two colours (WCAG 2.2, relative luminance)."""
+
+    def luminance(colour: str) -> float:
+        channels = (int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
+        red, green, blue = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels)
+        return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+    dark, bright = sorted((luminance(first), luminance(second)))
+    return (bright + 0.05) / (dark + 0.05)
+
+
+def test_models_can_be_seen_and_told_apart() -> None:
+    shown = [*LOOKS.values(), *SPARE]
+    assert min(contrast(look.light, "#ffffff") for look in shown) >= 3.0
+    assert min(contrast(look.dark, "#14171b") for look in shown) >= 3.0
+    assert len({look.light for look in shown}) == len(shown)
+    many = looks(["ebm", "a", "cm", "b", "mujoco-coarse"])
+    assert many["ebm"] is LOOKS["ebm"]
+    assert [many[name].key for name in ("a", "b", "mujoco-coarse")] == ["spare-1", "spare-2", "spare-3"]
+
+
+def test_numbers_for_people() -> None:
+    assert [number(v) for v in (None, 0.0, -0.5, 1.23456e-7, 5300.0)] == ["–", "0", "−0.5", "1.23·10⁻⁷", "5.3·10³"]
+    assert [ratio(v) for v in (None, 1.0, 0.054, 5876.0)] == ["–", "1×", "0.054×", "5\u202f876×"]
+    assert base64.b64decode(packed([1.0])) == b"\x00\x00\x80\x3f"
