@@ -168,6 +168,7 @@ def test_shipped_suites_load_and_their_tolerances_have_cells():
     for name in named_suites():
         suite = load_suite(name)
         cells = {(scene.name, part.label) for scene, part in suite.cells()}
+        cells |= {(ensemble.name, part.label) for ensemble, _, part in suite.crowds()}
         assert cells, name
         for place, line in suite.tolerances.items():
             assert (place.scene, place.model) in cells, str(place)
