@@ -170,8 +170,8 @@ def test_the_page_holds_every_table_and_asks_nothing_of_others(tmp_path: Path) -
     for name in ("runs", "work-precision", "orders-and-ratios", "batches", "savings"):
         assert len((tmp_path / f"{name}.csv").read_text(encoding="utf-8").splitlines()) > 1
     for name in ("ratios", "batches", "without-wall", "with-wall"):
-        assert (tmp_path / "figures" / f"{name}.svg").stat().st_size > 1000
-        assert f"figures/{name}.svg" in page
+        assert (tmp_path / "pages" / "figures" / f"{name}.svg").stat().st_size > 1000
+        assert f"pages/figures/{name}.svg" in page
     assert "nan" not in page
     assert "it blew up &lt;fast&gt;" in page
     assert "https://" not in page

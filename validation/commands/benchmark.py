@@ -11,6 +11,7 @@ from rich.table import Table
 
 from scenes.errors import unknown_name
 from validation.commands import OUT, JobsOption, OutOption, console, usable_folder
+from validation.results import write_whole
 
 if TYPE_CHECKING:
     from validation.benchmark import Benchmark
@@ -29,7 +30,7 @@ def run(
 ) -> None:
     """Run time against error, for every model.
 
-    Writes a page with diagrams and tables, and the tables as CSV. Whatever is left out is listed.
+    Writes a page with diagrams and tables, the tables as CSV, and a summary in Markdown. Whatever is left out is listed.
     """
     from validation import benchmark
 
@@ -38,9 +39,11 @@ def run(
     folder = usable_folder(out)
     with Console(stderr=True).status("benchmark") as status:
         found = benchmark.run_benchmark(what, quick=quick, jobs=jobs, minutes=minutes, progress=status.update)  # type: ignore[arg-type]
-        benchmark.save(found, folder)
         from reports.benchmark import write_benchmark
+        from validation.benchmark_tables import markdown
 
+        benchmark.save(found, folder)
+        write_whole(folder / "summary.md", markdown(found))
         index = write_benchmark(found, folder)
     show(found, console())
     console().print(f"report: {index}", soft_wrap=True)
