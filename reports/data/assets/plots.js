@@ -210,6 +210,7 @@ const Plots = (() => {
   function wallHits(u, store) {
     const [from, to] = store.window, ctx = u.ctx, r = 3.2 * devicePixelRatio;
     ctx.save();
+    ctx.setLineDash([]);
     ctx.lineWidth = 1.2 * devicePixelRatio;
     ctx.fillStyle = colour("--paper");
     for (const model of store.data.models) {
@@ -288,6 +289,7 @@ const Plots = (() => {
       const at = t => u.valToPos(t, "x", true), row = k => u.valToPos(k, "y", true);
       const half = 0.36 * Math.abs(row(1) - row(0) || 24 * dpr);
       ctx.save();
+      ctx.setLineDash([]);
       ctx.beginPath();
       ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
       ctx.clip();
