@@ -23,6 +23,8 @@ Floats = NDArray[np.float64]
 MOST_NODES = 50_000_000
 #: Of the model that plays a spectrum unless another is given: well below what moves a boundary by a node.
 TOLERANCE = 1e-8
+#: Of a refined spectrum: distance of the nodes that are run first, and the fewest cells an axis that they may leave.
+COARSEST, FEWEST_CELLS = 8, 12
 #: The outcome codes of a spectrum.
 LEFT, SAFE, RIGHT = -1, 0, 1
 _UNKNOWN = 9
@@ -118,8 +120,8 @@ def overturning_spectrum(
     `frequency_ratios` (omega_p/p) and `amplitude_ratios` (a_p/(g tan alpha)) are increasing, positive and finite. `scene`
     gives block, floor, walls and the kind of pulse (Ricker or sine); its duration and the pulse's own size are not used.
     Where the scene's excitation is a record, `frequency_ratios` are sizes of the block relative to its own (the gaps stay as
-    they are) and `amplitude_ratios` multiply the record. With `refine` only every eighth node is run at first, then those
-    between nodes that differ (and their neighbours). `jobs` threads, default all cores; `progress` is called with the number
+    they are) and `amplitude_ratios` multiply the record. With `refine` only every eighth node is run at first (more of a small
+    grid), then those between nodes that differ (and their neighbours). `jobs` threads, default all cores; `progress` is called with the number
     of runs just done. `play` runs the nodes elsewhere or by another model, instead of `model` here. Raises `InputError`.
     """
     frequencies, amplitudes = _axis(frequency_ratios, "frequency_ratios"), _axis(amplitude_ratios, "amplitude_ratios")
@@ -202,10 +204,15 @@ def check_excitation(scene: Scene) -> None:
         )
 
 
-def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None], coarsest: int = 8) -> None:
-    """Fills `outcomes`: a coarse grid, then at each halving only cells whose corners differ, with a ring around them."""
+def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None]) -> None:
+    """Fills `outcomes`: a coarse grid, then at each halving only cells whose corners differ, with a ring around them.
+
+    The coarse grid has every eighth node, or more of them where that would be fewer than a dozen cells an axis.
+    """
     rows, columns = outcomes.shape
-    step = coarsest
+    step = COARSEST
+    while step > 1 and min(rows, columns) - 1 < FEWEST_CELLS * step:
+        step //= 2
     lattice = _lattice(rows, columns, step)
     run(lattice)
     while step > 1:

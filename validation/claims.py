@@ -211,7 +211,7 @@ def _left_wall_high_frequency(paper: Paper) -> Claim:
     )
 
 
-def islands(paper: Paper, spectrum: Spectrum) -> list[NDArray[np.int64]]:
+def islands(spectrum: Spectrum) -> list[NDArray[np.int64]]:
     """The stable islands of a spectrum: connected safe nodes (i, j) that the safe nodes of the lowest amplitude do not reach."""
     from scipy import ndimage
 
@@ -224,7 +224,7 @@ def islands(paper: Paper, spectrum: Spectrum) -> list[NDArray[np.int64]]:
 def _islands(paper: Paper) -> Claim:
     rows = []
     for mu in (0.3, 0.6):
-        found = islands(paper, paper.walled["left", mu, GAPS[0], 0.0])
+        found = islands(paper.walled["left", mu, GAPS[0], 0.0])
         inside = []
         for nodes in found:
             f, a = paper.frequencies[nodes[:, 1]], paper.amplitudes[nodes[:, 0]]

@@ -15,15 +15,15 @@ from validation.spectra import Asked, Panel, Tiles
 
 #: Frequencies of the set of pulses, each played in both directions.
 PULSES = 50
-BOOTSTRAPS, CONFIDENCE = 400, 0.95
+BOOTSTRAPS, CONFIDENCE = 2000, 0.95
 FEWEST_MOTIONS = 4
 
 
 class Case(Stored):
-    """One curve. A point is intensity, share overturned, fitted probability, and the lower and upper end of its band.
+    """One curve. A point is intensity, share overturned, lower and upper end of its confidence band, fitted probability.
 
-    `median` is the intensity at which the fitted probability is one half, `dispersion` the standard deviation of its
-    logarithm; both None where no lognormal curve fits (all or none overturn).
+    The fit is a lognormal curve: `median` is the intensity at which its probability is one half, `dispersion` the standard
+    deviation of its logarithm; both None (and the probabilities NaN) where all or none overturn.
     """
 
     label: str
@@ -59,8 +59,8 @@ def fragility(panel: Panel, asked: Asked, records: Sequence[Path], tiles: Tiles)
         cases.append(_case(label, overturned, asked.amplitudes))
     motions = f"{len(records)} records" if records else f"{PULSES} pulses"
     about = (
-        f"{motions}, each in both directions. Points: share of the motions that overturn the block. Lines: lognormal curves of the greatest"
-        f" likelihood; bands: {CONFIDENCE:.0%} by drawing the set of motions anew {BOOTSTRAPS} times."
+        f"{motions}, each in both directions. Lines: share of the motions that overturn the block; bands: {CONFIDENCE:.0%}, by drawing the"
+        f" set of motions anew {BOOTSTRAPS} times; dots: the lognormal curve of the greatest likelihood."
     )
     return Fragility(title=f"{panel.title}, {motions}", about=about, intensity="peak acceleration / (g tan α)", cases=tuple(cases))
 
@@ -93,60 +93,48 @@ def _play_records(scene: Scene, asked: Asked, records: Sequence[Path], tiles: Ti
 def _case(label: str, overturned: NDArray[np.bool_], intensities: Floats) -> Case:
     """The curve of one case from the outcomes, motion by intensity."""
     random = np.random.default_rng(1)
+    drawn = random.integers(len(overturned), size=(BOOTSTRAPS, len(overturned)))
+    shares = [overturned[motions].mean(axis=0) for motions in drawn]
+    low, high = np.quantile(shares, [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2], axis=0)
     fit = fit_lognormal(intensities, overturned.sum(axis=0), len(overturned))
-    draws = []
-    for _ in range(BOOTSTRAPS):
-        drawn = overturned[random.integers(len(overturned), size=len(overturned))]
-        draws.append(lognormal(intensities, fit_lognormal(intensities, drawn.sum(axis=0), len(drawn))))
-    low, high = np.quantile(draws, [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2], axis=0)
-    columns = (intensities, overturned.mean(axis=0), lognormal(intensities, fit), low, high)
-    points = tuple((float(x), float(share), float(p), float(lo), float(hi)) for x, share, p, lo, hi in zip(*columns, strict=True))
-    median, dispersion = fit if fit else (None, None)
+    fitted = lognormal(intensities, *fit) if fit else np.full(len(intensities), np.nan)
+    columns = (intensities, overturned.mean(axis=0), low, high, fitted)
+    points = tuple((float(x), float(share), float(lo), float(hi), float(p)) for x, share, lo, hi, p in zip(*columns, strict=True))
+    median, dispersion = fit or (None, None)
     return Case(label=label, motions=len(overturned), median=median, dispersion=dispersion, points=points)
 
 
-def lognormal(intensities: Floats, fit: tuple[float, float] | None) -> Floats:
-    """Probability of overturning Phi(ln(x/median)/dispersion); zero without a fit."""
+def lognormal(intensities: Floats, median: float, dispersion: float) -> Floats:
+    """Probability of overturning Phi(ln(x/median)/dispersion)."""
     from scipy.special import ndtr
 
-    if fit is None:
-        return np.zeros(len(intensities))
-    p: Floats = ndtr(np.log(intensities / fit[0]) / fit[1])
+    p: Floats = ndtr(np.log(intensities / median) / dispersion)
     return p
 
 
 def fit_lognormal(intensities: Floats, overturned: NDArray[np.int64], motions: int) -> tuple[float, float] | None:
-    """Median and dispersion of the lognormal curve of the greatest likelihood (Baker 2015); None where nothing overturns.
+    """Median and dispersion of the lognormal curve of the greatest likelihood (Baker 2015); None where all or none overturn.
 
-    `overturned` counts the motions, of `motions`, that overturn the block at each intensity. Binomial likelihood, as a
-    probit regression on the logarithm of the intensity by Fisher's scoring.
+    `overturned` counts the motions, of `motions`, that overturn the block at each intensity.
     """
-    from scipy.special import ndtr
+    from scipy.optimize import minimize
+    from scipy.special import log_ndtr
 
-    if not overturned.any():
+    if not 0 < overturned.sum() < motions * len(overturned):
         return None
-    design = np.stack([np.ones(len(intensities)), np.log(intensities)], axis=1)
-    share = overturned / motions
-    guess = float(np.interp(0.5, np.maximum.accumulate(share), np.log(intensities)))
-    slope = np.array([-2.0 * guess, 2.0])
-    for _ in range(100):
-        linear = np.clip(design @ slope, -6.0, 6.0)
-        p = ndtr(linear)
-        density = np.exp(-0.5 * linear**2) / np.sqrt(2.0 * np.pi)
-        weight = motions * density**2 / (p * (1.0 - p))
-        step = np.linalg.solve(
-            (design.T * weight) @ design + 1e-9 * np.eye(2), design.T @ (motions * (share - p) * density / (p * (1.0 - p)))
-        )
-        slope = slope + np.clip(step, -5.0, 5.0)
-        if np.max(np.abs(step)) < 1e-10:
-            break
-    if slope[1] <= 1e-6:
-        return None
-    return float(np.exp(-slope[0] / slope[1])), float(1.0 / slope[1])
+
+    def unlikelihood(place: Floats) -> float:
+        linear = (np.log(intensities) - place[0]) / np.exp(place[1])
+        return -float(np.sum(overturned * log_ndtr(linear) + (motions - overturned) * log_ndtr(-linear)))
+
+    found = minimize(
+        unlikelihood, [float(np.mean(np.log(intensities))), -0.7], method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-9}
+    )
+    return float(np.exp(found.x[0])), float(np.exp(found.x[1]))
 
 
 def csv(found: Fragility) -> str:
     """The curves as a table."""
-    lines = ["case,intensity,share_overturned,fitted_probability,band_low,band_high"]
+    lines = ["case,intensity,share_overturned,band_low,band_high,lognormal_fit"]
     lines += [f"{case.label}," + ",".join(map(repr, point)) for case in found.cases for point in case.points]
     return "\n".join(lines) + "\n"

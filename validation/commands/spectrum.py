@@ -256,14 +256,16 @@ def _fragility(panels: Sequence[Panel], asked: Asked, records: Sequence[Path], t
 @contextlib.contextmanager
 def _bar(what: str, total: int) -> Iterator[Any]:
     """A progress bar on stderr with the time left; gives a function that advances it by a count, or `to` a place."""
+    screen = Console(stderr=True)
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         TaskProgressColumn(),
         TimeRemainingColumn(),
         TextColumn("left"),
-        console=Console(stderr=True),
+        console=screen,
         transient=True,
+        disable=not screen.is_terminal,  # a pipe would get an empty line
     )
     with bar:
         task = bar.add_task(what, total=total)

@@ -1,0 +1,142 @@
+"""Overturning spectra: against reference runs at their nodes, refinement against the full grid, records, and bad input."""
+
+from __future__ import annotations
+
+import csv
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ebm import EventBasedModel, overturning_spectrum
+from ebm.spectrum import node_scene, play_nodes
+from scenes import Block, Floor, InputError, Record, Ricker, Scene, Wall
+
+DATA = Path(__file__).parents[1] / "data" / "ebm_ricker_cases.csv"
+SIDES = {"safe": 0, "ccw": -1, "cw": 1}
+BLOCK = Block(half_width=0.397, half_height=1.555)
+
+
+def scene(*walls, friction=0.3, excitation=None):
+    pulse = excitation or Ricker(amplitude=1.0, period=1.0)
+    return Scene(name="spectrum", block=BLOCK, floor=Floor(friction=friction), walls=walls, excitation=pulse, duration=1.0)
+
+
+def reference_runs():
+    with DATA.open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+
+    def setting(row):
+        return row["side"], row["gap"], row["e_w"], row["mu"]
+
+    return [(key, list(group)) for key, group in groupby(sorted(rows, key=setting), key=setting)]
+
+
+@pytest.mark.parametrize(("setting", "rows"), reference_runs(), ids=["-".join(filter(None, key)) for key, _ in reference_runs()])
+def test_outcomes_agree_with_reference_runs(setting, rows):
+    side, gap, e, mu = setting
+    walls = [] if side == "none" else [Wall(side=side, gap=float(gap), restitution=float(e))]
+    frequencies, amplitudes = (sorted({float(row[name]) for row in rows}) for name in ("wp_over_p", "ap_ratio"))
+    spectrum = overturning_spectrum(scene(*walls, friction=float(mu)), frequencies, amplitudes)
+    for row in rows:
+        i, j = amplitudes.index(float(row["ap_ratio"])), frequencies.index(float(row["wp_over_p"]))
+        assert spectrum.outcomes[i, j] == SIDES[row["outcome"]], row
+
+
+def test_all_reference_runs_are_asked():
+    assert sum(len(rows) for _, rows in reference_runs()) == 390
+
+
+@pytest.mark.parametrize("walls", [(), (Wall(side="right", gap=0.103),)], ids=["free", "right"])
+def test_refinement_finds_the_full_grid_where_the_boundary_is_smooth(walls):
+    # Nodes below a_p/(g tan alpha) = 1.5 are left out: the tongues there are thinner than the coarse grid.
+    frequencies, amplitudes = np.linspace(2.0, 8.0, 97), np.linspace(2.0, 10.0, 97)
+    full = overturning_spectrum(scene(*walls), frequencies, amplitudes)
+    refined = overturning_spectrum(scene(*walls), frequencies, amplitudes, refine=True)
+    np.testing.assert_array_equal(refined.outcomes, full.outcomes)
+    assert refined.evaluations < 0.35 * full.evaluations
+
+
+@pytest.mark.parametrize("shape", [(257, 257), (100, 130), (9, 8), (2, 2)])
+def test_refinement_of_a_disc(shape):
+    played = []
+
+    def disc(scene, a, f):
+        played.extend(zip(a.tolist(), f.tolist(), strict=True))
+        return (np.hypot(a - 5.0, f - 5.0) < 3.0).astype(np.int8), np.zeros(len(a), dtype=bool)
+
+    amplitudes, frequencies = np.linspace(1.0, 9.0, shape[0]), np.linspace(1.0, 9.0, shape[1])
+    spectrum = overturning_spectrum(scene(), frequencies, amplitudes, refine=True, play=disc)
+    np.testing.assert_array_equal(spectrum.outcomes, np.hypot(amplitudes[:, None] - 5.0, frequencies - 5.0) < 3.0)
+    assert spectrum.evaluations == len(played) == len(set(played))
+    if shape[0] > 200:
+        assert spectrum.evaluations < 0.12 * spectrum.outcomes.size
+
+
+def test_a_node_is_what_the_model_simulates():
+    wall = Wall(side="left", gap=0.053, restitution=0.5)
+    a, f = np.array([1.2, 2.0, 3.0, 6.0]), np.array([0.8, 2.5, 4.0, 5.0])
+    sides, failed = play_nodes(scene(wall), a, f, model=EventBasedModel())
+    assert not failed.any()
+    outcomes = [EventBasedModel().simulate(node_scene(scene(wall), *node, settle=20.0)).outcome for node in zip(a, f, strict=True)]
+    assert [{"overturned left": -1, "overturned right": 1}.get(outcome, 0) for outcome in outcomes] == sides.tolist()
+    assert len(set(sides.tolist())) > 1
+
+
+def test_a_record_is_scaled_and_the_block_resized():
+    record = Record.from_samples(3.0 * np.sin(2.0 * np.pi * np.arange(0.0, 2.0, 0.02)), 0.02)
+    start = scene(excitation=record)
+    node = node_scene(start, 2.0, 0.5)
+    assert (node.block.half_width, node.block.half_height) == (0.5 * BLOCK.half_width, 0.5 * BLOCK.half_height)
+    np.testing.assert_allclose(node.excitation.samples, 2.0 * record.samples)
+    sizes, scales = np.array([0.3, 0.6, 1.2]), np.array([0.5, 1.0, 2.0, 4.0])
+    spectrum = overturning_spectrum(start, sizes, scales)
+    for i, scale in enumerate(scales):
+        for j, size in enumerate(sizes):
+            outcome = EventBasedModel(tolerance=1e-9).simulate(node_scene(start, scale, size, settle=20.0)).outcome
+            assert outcome.startswith("overturned") == bool(spectrum.outcomes[i, j])
+    assert 0 < np.count_nonzero(spectrum.outcomes) < spectrum.outcomes.size
+
+
+def test_the_mirror_image_and_the_number_of_threads():
+    wall = Wall(side="left", gap=0.053, restitution=1.0)
+    a, f = (axis.ravel() for axis in np.meshgrid(np.linspace(1.0, 12.0, 12), np.linspace(0.5, 8.0, 12)))
+    model = EventBasedModel(tolerance=1e-8)
+    sides, _ = play_nodes(scene(wall), a, f, model=model, jobs=1)
+    again, _ = play_nodes(scene(wall), a, f, model=model, jobs=3)
+    np.testing.assert_array_equal(sides, again)
+    mirrored, _ = play_nodes(scene(wall).mirrored(), -a, f, model=model)
+    np.testing.assert_array_equal(mirrored, -sides)
+
+
+def test_least_overturning_amplitude_and_area():
+    spectrum = overturning_spectrum(scene(), [2.0, 8.0], [1.0, 3.0, 6.0, 9.0])
+    assert spectrum.outcomes.shape == (4, 2)
+    assert spectrum.safe_area == np.mean(spectrum.outcomes == 0)
+    least = spectrum.least_overturning_amplitude()
+    assert least[0] == 3.0
+    assert np.isnan(least[1])
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "amplitudes", "said"),
+    [
+        ([], [1.0], "frequency_ratios"),
+        ([1.0, np.nan], [1.0], "positive finite"),
+        ([1.0], [2.0, 1.0], "amplitude_ratios: increasing"),
+        ([1.0], [0.0, 1.0], "positive"),
+        ([1.0], ["a"], "numbers are asked for"),
+        ([[1.0]], [1.0], "dimensions"),
+        (np.linspace(1.0, 2.0, 40_000), np.linspace(1.0, 2.0, 40_000), "more than"),
+    ],
+)
+def test_grids_that_cannot_be(frequencies, amplitudes, said):
+    with pytest.raises(InputError, match=said):
+        overturning_spectrum(scene(), frequencies, amplitudes)
+
+
+def test_a_base_at_rest_has_no_spectrum():
+    at_rest = Scene(name="still", block=BLOCK, floor=Floor(friction=0.3), duration=1.0)
+    with pytest.raises(InputError, match="ricker or sine pulse, or a record"):
+        overturning_spectrum(at_rest, [1.0], [1.0])

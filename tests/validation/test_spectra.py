@@ -1,0 +1,368 @@
+"""Spectra as a job: tiles that are kept, the command, claims, agreement, fragility."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from ebm import Spectrum
+from scenes import InputError, Ricker
+from validation import agreement, claims, fragility, spectra
+from validation.cli import main
+from validation.spectra import Asked, Panel, Tiles, axis, paper_panels, play_panels, tile_key
+
+SCENE = """duration = 1.0
+block = { half_width = 0.2, half_height = 1.0 }
+floor = { friction = 0.5 }
+walls = [{ side = "left", gap = 0.02 }]
+excitation = { kind = "ricker", amplitude = 1.0, period = 0.5 }
+"""
+
+
+@pytest.fixture(autouse=True)
+def in_an_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bookcase.toml").write_text(SCENE, encoding="utf-8")
+    (tmp_path / "still.toml").write_text(SCENE.replace(SCENE.splitlines()[-1], ""), encoding="utf-8")
+
+
+def small(size=8, **settings):
+    return Asked(axis(0.5, 8.0, size, "frequencies"), axis(1.0, 12.0, size, "amplitudes"), **settings)
+
+
+def test_the_papers_28_spectra():
+    walls = {}
+    for figure in (6, 7, 8, 9):
+        panels = paper_panels(figure)
+        assert len(panels) == 7
+        assert panels[0].wall is None
+        assert {(p.wall.gap, p.wall.restitution) for p in panels[1:]} == {(g, e) for g in (0.003, 0.053, 0.103) for e in (0.0, 1.0)}
+        walls[figure] = {(p.wall.side, p.scene.floor.friction) for p in panels[1:]}
+    assert walls == {6: {("left", 0.3)}, 7: {("left", 0.6)}, 8: {("right", 0.3)}, 9: {("right", 0.6)}}
+
+
+# Tiles
+
+
+def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
+    monkeypatch.setattr(spectra, "TILE", 20)
+    panel, asked = paper_panels(8)[1], small()
+    runs, play = [], spectra.play_nodes
+
+    def killed_at_the_third(scene, a, f, **rest):
+        runs.append(len(a))
+        if len(runs) == 3:
+            raise KeyboardInterrupt
+        return play(scene, a, f, **rest)
+
+    monkeypatch.setattr(spectra, "play_nodes", killed_at_the_third)
+    with pytest.raises(KeyboardInterrupt):
+        play_panels([panel], asked, Tiles(tmp_path / "tiles"))
+    tiles = Tiles(tmp_path / "tiles")
+    resumed = play_panels([panel], asked, tiles)[0]
+    assert runs == [20, 20, 20, 20, 4]  # two tiles, the one that was killed, and then only that and the last one
+    assert (tiles.read_back, tiles.played) == (40, 24)
+    whole = play_panels([panel], asked, Tiles(tmp_path / "other"))[0]
+    np.testing.assert_array_equal(resumed.outcomes, whole.outcomes)
+
+
+@pytest.mark.parametrize("damage", ["", "L", "x" * 64, "\x00" * 64])
+def test_a_damaged_tile_is_run_again(tmp_path, damage):
+    panel, asked = paper_panels(8)[0], small()
+    whole = play_panels([panel], asked, Tiles(tmp_path))[0]
+    (tile,) = tmp_path.glob("*.tile")
+    tile.write_text(damage, encoding="utf-8")
+    tiles = Tiles(tmp_path)
+    np.testing.assert_array_equal(play_panels([panel], asked, tiles)[0].outcomes, whole.outcomes)
+    assert (tiles.played, tiles.read_back) == (64, 0)
+
+
+def test_a_tile_depends_on_all_that_its_outcomes_do():
+    scene, a = paper_panels(8)[1].scene, np.array([1.0, 2.0])
+    key = tile_key(scene, a, a, "ebm", {"tolerance": 1e-8})
+    assert key == tile_key(scene.replace(name="other", duration=9.0), a, a, "ebm", {"tolerance": 1e-8})
+    others = [
+        tile_key(scene.replace(walls=()), a, a, "ebm", {"tolerance": 1e-8}),
+        tile_key(scene, 2.0 * a, a, "ebm", {"tolerance": 1e-8}),
+        tile_key(scene, a, 2.0 * a, "ebm", {"tolerance": 1e-8}),
+        tile_key(scene, a, a, "ebm", {"tolerance": 1e-9}),
+        tile_key(scene, a, a, "ebm-unilateral", {"tolerance": 1e-8}),
+        tile_key(scene.replace(excitation=Ricker(amplitude=1.0, period=1.0, symmetric=True)), a, a, "ebm", {"tolerance": 1e-8}),
+    ]
+    assert len({key, *others}) == 7
+
+
+def test_another_model_plays_in_processes(tmp_path):
+    panel = paper_panels(8)[1]
+    a, f = np.array([1.2, 3.0, 8.0]), np.array([6.0, 2.0, 2.0])
+    with Tiles(tmp_path, jobs=1) as tiles:
+        sides, failed = tiles.play(panel.scene, a, f, model="cm", settings={"penetration": 1e-6})
+    assert sides.tolist() == [0, -1, -1]
+    assert not failed.any()
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_that_loses_a_worker_gives_the_same(tmp_path, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(spectra, "TILE", 100)
+    panels, asked = paper_panels(8)[:3], small(40)
+    alone = play_panels(panels, asked, Tiles(tmp_path / "alone"))
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        pids = client.run(os.getpid)
+        assert len(pids) == 2
+        first = threading.Event()
+        killed = []
+
+        def kill():
+            first.wait(300.0)
+            killed.append(next(iter(pids.values())))
+            os.kill(killed[0], signal.SIGKILL)
+
+        killer = threading.Thread(target=kill)
+        killer.start()
+        tiles = Tiles(tmp_path / "cluster", client=client, progress=lambda count: first.set())
+        together = play_panels(panels, asked, tiles)
+        killer.join()
+        deadline = time.monotonic() + 60.0
+        while killed[0] in client.run(os.getpid).values() and time.monotonic() < deadline:
+            time.sleep(0.5)
+        assert killed[0] not in client.run(os.getpid).values()
+    assert tiles.played == 3 * 1600
+    for mine, theirs in zip(together, alone, strict=True):
+        np.testing.assert_array_equal(mine.outcomes, theirs.outcomes)
+
+
+# The command
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--figure", "5"], "--figure: unknown figure '5'"),
+        (["--figure", "8", "--scene", "bookcase.toml"], "--figure"),
+        (["--size", "0"], "--size: 0 is not allowed"),
+        (["--size", "31623"], "--size: 31623 is not allowed"),
+        (["--size", "nan"], "--size"),
+        (["--frequencies", "8", "0.5"], "--frequencies: 8 to 0.5 is not allowed: the lower end comes first"),
+        (["--amplitudes", "nan", "2"], "--amplitudes: nan to 2"),
+        (["--amplitudes", "0", "2"], "--amplitudes: 0 to 2"),
+        (["--amplitudes", "1", "inf"], "--amplitudes: 1 to inf"),
+        (["--pivot", "unilatral"], "did you mean 'unilateral'"),
+        (["--model", "mujcoo"], "did you mean 'mujoco'"),
+        (["--model", "cm", "--pivot", "unilateral"], "--pivot"),
+        (["--model", "cm", "--tolerance", "1e-8"], "--tolerance"),
+        (["--tolerance", "0"], "ebm.tolerance"),
+        (["--tolerance", "nan"], "--tolerance"),
+        (["--scene", "gone.toml"], "gone.toml: cannot be read"),
+        (["--scene", "still.toml"], "excitation.kind: 'rest' is not allowed"),
+        (["--record", "x.AT2"], "--record: needs --fragility"),
+        (["--fragility"], "--fragility: needs --scene"),
+        (["--fragility", "--scene", "bookcase.toml", "--record", "gone.AT2"], "gone.AT2"),
+        (["--agreement", "0"], "--agreement: 0 is not allowed"),
+        (["--scheduler", "local:0"], "--scheduler"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(words, said, capsys):
+    if "--scheduler" in words:
+        pytest.importorskip("distributed")
+    assert main(["spectrum", *words]) == 2
+    captured = capsys.readouterr()
+    assert said in captured.err
+    assert captured.err.count("\n") == 1
+    assert captured.err.startswith("rockcheck: ")
+
+
+def test_the_command_writes_figures_data_and_page(tmp_path, capsys):
+    assert main(["spectrum", "--figure", "8", "--size", "9", "--out", "out"]) == 0
+    folder = tmp_path / "out" / "spectra"
+    assert {f"figure-8.{kind}" for kind in ("svg", "png", "pdf")} <= {path.name for path in folder.iterdir()}
+    with np.load(folder / "figure-8-gap-3-e-0.npz") as data:
+        outcomes = data["outcomes"]
+        settings = json.loads(str(data["settings"]))
+    assert settings["scene"]["walls"] == [{"side": "right", "gap": 0.003, "restitution": 0.0}]
+    assert settings["settings"] == {"tolerance": 1e-8}
+    table = np.loadtxt(folder / "figure-8-gap-3-e-0.csv", delimiter=",", skiprows=2)
+    np.testing.assert_array_equal(table[:, 1:], outcomes)
+    np.testing.assert_allclose(table[:, 0], np.linspace(1.0, 12.0, 9))
+    out = capsys.readouterr().out
+    assert "567 runs, 0 read back" in out
+    assert "right-hand-side evaluation" in out
+    assert "Fig. 8" in (tmp_path / "out" / "spectra.html").read_text(encoding="utf-8")
+    assert main(["spectrum", "--figure", "8", "--size", "9", "--out", "out"]) == 0
+    assert "567 read back" in capsys.readouterr().out
+
+
+def test_ones_own_scene_and_fragility(tmp_path, capsys):
+    grid = ["--scene", "bookcase.toml", "--size", "10", "--amplitudes", "1", "6", "--out", "out"]
+    assert main(["spectrum", *grid, "--refine", "--pivot", "unilateral"]) == 0
+    assert (tmp_path / "out" / "spectra" / "bookcase--ebm-unilateral.svg").exists()
+    assert main(["spectrum", *grid, "--fragility"]) == 0
+    kept = json.loads((tmp_path / "out" / "spectra" / "fragility.json").read_text(encoding="utf-8"))
+    assert [case["label"] for case in kept["cases"]] == ["with the wall", "without a wall"]
+    page = (tmp_path / "out" / "spectra.html").read_text(encoding="utf-8")
+    assert "bookcase" in page
+    assert "Fragility" in page
+    assert "motions" in capsys.readouterr().out
+
+
+# Claims
+
+
+def made(panel, outcomes, size=40):
+    return Spectrum(
+        outcomes=np.asarray(outcomes, dtype=np.int8),
+        frequency_ratios=np.linspace(0.5, 8.0, size),
+        amplitude_ratios=np.linspace(1.0, 12.0, size),
+        evaluations=size * size,
+        undecided=np.zeros((0, 2), dtype=np.int64),
+        scene=panel.scene,
+        model=None,
+    )
+
+
+def synthetic(height, size=40):
+    """The 28 spectra, safe below a horizontal line at the share of the grid that `height` gives for (side, mu, gap, e) or (mu,)."""
+    spectra_made = []
+    for figure, (side, mu) in spectra.FIGURES.items():
+        for panel in paper_panels(figure):
+            key = (mu,) if panel.wall is None else (side, mu, panel.wall.gap, panel.wall.restitution)
+            outcomes = np.ones((size, size), dtype=np.int8)
+            outcomes[: round(size * height(*key))] = 0
+            spectra_made.append(made(panel, outcomes, size))
+    return spectra_made
+
+
+def verdicts(spectra_made, least=None):
+    least = least or {None: 10.0, (0.103, 0.0): 9.0, (0.103, 1.0): 8.0}
+    return {claim.name: claim.verdict for claim in claims.check_claims(spectra_made, least)}
+
+
+def test_claims_about_areas_hold_where_made_to():
+    def height(*key):
+        if len(key) == 1:
+            return {0.3: 0.5, 0.6: 0.4}[key[0]]
+        side, mu, gap, e = key
+        return 0.2 - 0.3 * (mu - 0.3) - 0.05 * e - 0.5 * gap + (0.5 if (side, gap, e) == ("right", 0.003, 0.0) else 0.0)
+
+    found = verdicts(synthetic(height, size=1000))
+    assert found["lower friction"] == found["lower restitution"] == found["smaller gap"] == "holds"
+    assert found["left wall, high frequency"] == found["right wall, near"] == found["right wall, far"] == "holds"
+    assert found["likelier side"] == "holds"  # all that overturns was made clockwise
+    assert found["stable islands"] == "does not hold"
+
+
+def test_claims_about_areas_fail_where_made_to():
+    def height(*key):
+        if len(key) == 1:
+            return {0.3: 0.4, 0.6: 0.5}[key[0]]
+        _, mu, gap, e = key
+        return 0.45 + 0.3 * (mu - 0.3) + 0.05 * e + 0.5 * gap
+
+    found = verdicts(synthetic(height, size=1000), {None: 8.0, (0.103, 0.0): 9.0, (0.103, 1.0): math.inf})
+    names = ("lower friction", "lower restitution", "smaller gap", "left wall, high frequency", "right wall, near", "right wall, far")
+    assert {name: found[name] for name in names} == dict.fromkeys(names, "does not hold")
+
+
+def test_an_island_is_cut_off_from_the_safe_nodes_below():
+    panel = next(p for p in paper_panels(6) if p.wall and (p.wall.gap, p.wall.restitution) == (0.003, 0.0))
+    outcomes = np.ones((40, 40), dtype=np.int8)
+    outcomes[:5] = 0
+    outcomes[20:23, 8:12] = 0  # omega_p/p 2.0 to 2.6
+    outcomes[30, 30] = 0  # too small
+    spectrum = made(panel, outcomes)
+    (found,) = claims.islands(spectrum)
+    assert len(found) == 12
+    peninsula = outcomes.copy()
+    peninsula[5:20, 9] = 0
+    assert claims.islands(made(panel, peninsula)) == []
+
+
+# Agreement
+
+
+def test_half_of_the_nodes_lie_near_the_boundary():
+    outcomes = np.zeros((60, 60), dtype=np.int8)
+    outcomes[:, 30:] = 1
+    nodes, near = agreement.choose_nodes(made(paper_panels(8)[0], outcomes, 60), 50, "name")
+    assert len(np.unique(nodes, axis=0)) == 50
+    assert near.sum() == 25
+    np.testing.assert_array_equal(near, (nodes[:, 1] >= 28) & (nodes[:, 1] <= 31))
+    again, _ = agreement.choose_nodes(made(paper_panels(8)[0], outcomes, 60), 50, "name")
+    np.testing.assert_array_equal(nodes, again)
+    whole, _ = agreement.choose_nodes(made(paper_panels(8)[0], outcomes, 60), 3600, "name")
+    assert len(np.unique(whole, axis=0)) == 3600
+
+
+def test_agreement_counts_equal_outcomes(tmp_path, monkeypatch):
+    monkeypatch.setattr(agreement, "CANDIDATES", ("ebm-unilateral", "cm"))
+    panel, asked = paper_panels(8)[0], small(20)
+    spectrum = play_panels([panel], asked, Tiles(tmp_path))[0]
+
+    class Player(Tiles):
+        def play(self, scene, amplitudes, frequencies, *, model, settings):
+            i, j = np.searchsorted(asked.amplitudes, amplitudes), np.searchsorted(asked.frequencies, frequencies)
+            sides, failed = spectrum.outcomes[i, j].copy(), np.zeros(len(i), dtype=bool)
+            if model == "cm":
+                sides[0], failed[-1] = 5, True  # one wrong, near the boundary, and one failed, away from it
+            return sides, failed
+
+    found = agreement.agree([panel], [spectrum], asked, 40, Player(tmp_path))
+    assert {(s.model, s.near): (s.equal["ebm"], s.nodes, s.failed) for s in found.shares} == {
+        ("ebm-unilateral", True): (20, 20, 0),
+        ("ebm-unilateral", False): (20, 20, 0),
+        ("cm", True): (19, 20, 0),
+        ("cm", False): (19, 20, 1),
+    }
+    assert found.rows[0][:4] == ("all", "ebm-unilateral", "100.0 %", "100.0 %")
+    assert found.rows[1] == ("all", "cm", "95.0 %", "95.0 %", "95.0 %", "95.0 %", "1")
+
+
+# Fragility
+
+
+def test_the_lognormal_curve_is_found_again():
+    intensities = np.linspace(0.5, 8.0, 60)
+    motions = 10**7
+    counts = np.round(motions * fragility.lognormal(intensities, 2.5, 0.4)).astype(np.int64)
+    median, dispersion = fragility.fit_lognormal(intensities, counts, motions)
+    assert median == pytest.approx(2.5, rel=1e-4)
+    assert dispersion == pytest.approx(0.4, rel=1e-3)
+    assert fragility.fit_lognormal(intensities, np.zeros(60, dtype=np.int64), 10) is None
+    assert fragility.fit_lognormal(intensities, np.full(60, 10), 10) is None
+
+
+def test_the_band_holds_the_binomial_spread():
+    overturned = np.zeros((100, 3), dtype=bool)
+    overturned[:50, 1] = overturned[:, 2] = True
+    case = fragility._case("made", overturned, np.array([1.0, 2.0, 3.0]))
+    (_, share, low, high, _) = case.points[1]
+    assert share == 0.5
+    assert low == pytest.approx(0.5 - 1.96 * 0.05, abs=0.015)  # the normal approximation of the binomial
+    assert high == pytest.approx(0.5 + 1.96 * 0.05, abs=0.015)
+    assert case.points[0][2:4] == (0.0, 0.0)
+
+
+def test_records_are_scaled_to_the_intensity(tmp_path, monkeypatch):
+    for n, gain in enumerate((1.0, 4.0)):
+        rows = "\n".join(f"{0.02 * k},{gain * math.sin(0.3 * k):.6f}" for k in range(80))
+        (tmp_path / f"{n}.csv").write_text(f"time_s,acceleration_m_s2\n{rows}\n", encoding="utf-8")
+    asked = Asked(np.array([1.0, 2.0]), np.linspace(0.5, 12.0, 8))
+    panel = Panel("case", "case", paper_panels(8)[0].scene)
+    found = fragility.fragility(panel, asked, [tmp_path / "0.csv", tmp_path / "1.csv"], Tiles(tmp_path / "tiles"))
+    (case,) = found.cases
+    assert case.motions == 4
+    # The two records differ only in their size, which the intensity takes out: both directions of each overturn together.
+    assert {point[1] for point in case.points} <= {0.0, 0.5, 1.0}
+    with pytest.raises(InputError, match="too few"):
+        fragility.fragility(panel, asked, [tmp_path / "0.csv"], Tiles(tmp_path / "tiles"))
