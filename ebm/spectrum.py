@@ -120,9 +120,10 @@ def overturning_spectrum(
     `frequency_ratios` (omega_p/p) and `amplitude_ratios` (a_p/(g tan alpha)) are increasing, positive and finite. `scene`
     gives block, floor, walls and the kind of pulse (Ricker or sine); its duration and the pulse's own size are not used.
     Where the scene's excitation is a record, `frequency_ratios` are sizes of the block relative to its own (the gaps stay as
-    they are) and `amplitude_ratios` multiply the record. With `refine` only every eighth node is run at first (more of a small
-    grid), then those between nodes that differ (and their neighbours). `jobs` threads, default all cores; `progress` is called with the number
-    of runs just done. `play` runs the nodes elsewhere or by another model, instead of `model` here. Raises `InputError`.
+    they are) and `amplitude_ratios` multiply the record. With `refine` only every eighth node is run at first (more of a
+    small grid), then those between nodes that differ (and their neighbours). `jobs` threads, default all cores; `progress` is
+    called with the number of runs just done. `play` runs the nodes elsewhere or by another model, instead of `model` here.
+    Raises `InputError`.
     """
     frequencies, amplitudes = _axis(frequency_ratios, "frequency_ratios"), _axis(amplitude_ratios, "amplitude_ratios")
     if len(frequencies) * len(amplitudes) > MOST_NODES:

@@ -156,7 +156,7 @@ def write_page(folder: Path) -> Path:
 
     data = folder / SPECTRA
     index = read_index(data)
-    kept = {name: _read(data / f"{name}.json") for name in ("claims", "agreement", "fragility", "refinement")}
+    kept = {name: _read(data / f"{name}.json") for name in ("claims", "agreement", "fragility")}
     figures = sorted({(record.figure, record.model) for record in index.spectra if record.figure}, key=lambda key: (key[0] or 0, key[1]))
     shown = [
         {

@@ -7,6 +7,7 @@ import math
 import os
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -58,6 +59,7 @@ def run(
     model: Annotated[str | None, typer.Option("--model", help="Another model: cm, mujoco, pybullet (slow: mind --size).")] = None,
     tolerance: Annotated[float | None, typer.Option("--tolerance", help="Of the event-based model.")] = None,
     refine: Annotated[bool, typer.Option("--refine", help="Run only what lies near a boundary.")] = False,
+    verify: Annotated[bool, typer.Option("--verify", help="Refine, run the full grid too, and count the nodes that differ.")] = False,
     agreement: Annotated[int | None, typer.Option("--agreement", help="Nodes a spectrum at which the other models are compared.")] = None,
     fragility: Annotated[
         bool, typer.Option("--fragility", help="Probability of overturning against intensity, with and without the wall.")
@@ -85,6 +87,8 @@ def run(
         tiles = stack.enter_context(Tiles(data / TILES, jobs=jobs, client=client, force=force))
         if fragility:
             _fragility(panels, asked, records or [], tiles, data, screen)
+        elif verify:
+            _verify(panels, asked, tiles, data, screen)
         elif agreement is not None:
             _agreement(panels, asked, agreement, tiles, data, screen)
         else:
@@ -210,6 +214,29 @@ def _claims(spectra: Sequence[Spectrum], asked: Asked, tiles: Tiles, data: Path,
         table.add_column(title)
     for claim in claims:
         table.add_row(claim.sentence, claim.verdict, claim.finding)
+    screen.print(table)
+
+
+def _verify(panels: Sequence[Panel], asked: Asked, tiles: Tiles, data: Path, screen: Console) -> None:
+    nodes = len(asked.frequencies) * len(asked.amplitudes)
+    warm_up(panels[0], asked)
+    rows = [("spectrum", "nodes", "runs of the refined", "nodes a run", "wrong nodes")]
+    runs = wrong = 0
+    with _bar("refined and full", 2 * nodes * len(panels)) as advance:
+        tiles.progress = advance
+        for n, panel in enumerate(panels):
+            full, refined = (play_panels([panel], replace(asked, refine=refine), tiles)[0] for refine in (False, True))
+            differ = int((full.outcomes != refined.outcomes).sum())
+            rows.append((panel.name, str(nodes), str(refined.evaluations), f"{nodes / refined.evaluations:.1f}", str(differ)))
+            runs, wrong = runs + refined.evaluations, wrong + differ
+            advance(to=2 * nodes * (n + 1))
+    rows.append(("all", str(nodes * len(panels)), str(runs), f"{nodes * len(panels) / runs:.1f}", str(wrong)))
+    write_whole(data / "refinement.csv", "\n".join(",".join(row) for row in rows) + "\n")
+    table = Table(box=None, pad_edge=False)
+    for number, column in enumerate(rows[0]):
+        table.add_column(column, justify="right" if number else "left")
+    for row in rows[1:]:
+        table.add_row(*row)
     screen.print(table)
 
 
