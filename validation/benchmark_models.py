@@ -25,7 +25,7 @@ Progress = Callable[[str], None]
 LEVEL = 1e-3
 #: Runs at least this long (s) are timed once, shorter ones `REPEATS` times.
 LONG_ENOUGH, REPEATS = 0.02, 3
-#: An engine's step below which its runs are played side by side in worker processes, after all others.
+#: An engine's step (s) below which its runs are played side by side in worker processes, after all others.
 SIDE_BY_SIDE = 1e-4
 #: Share of the time after which the longest runs get their turn.
 SHARE_OF_SHORT = 0.6
@@ -204,36 +204,45 @@ def work_precision(
     """Plays all lines in all families.
 
     Runs are interleaved: member by member, family by family, every model and setting in turn, so that whatever else the
-    machine does touches all alike; one at a time, but for the longest (`SIDE_BY_SIDE`), which follow in `jobs` processes.
+    machine does touches all alike; one at a time. An engine's runs at `SIDE_BY_SIDE` follow, and those below in `jobs` processes.
     What has not begun at `deadline` (of `time.monotonic`; the others: at `SHARE_OF_SHORT` of the time) is left out and listed.
     """
-    families = QUICK if quick else tuple(FAMILIES)
-    plays = [
-        (family, member, line.label, value)
-        for member in range(MEMBERS)
-        for family in families
-        for line in LINES.values()
-        for value in (line.quick if quick else line.values)
-    ]
-    long = [play for play in plays if _takes_long(play[2], play[3])]
+    plays = planned(quick=quick)
+    short = [play for play in plays if _stage(play) < 2]
     samples: list[Sample] = []
-    short = [play for play in plays if not _takes_long(play[2], play[3])]
     now = time.monotonic()
-    for n, play in enumerate(short):
+    for n, play in enumerate(sorted(short, key=_stage)):
         if time.monotonic() > now + SHARE_OF_SHORT * (deadline - now):
             break
         progress(f"{n + 1} of {len(short)} runs: {play[0]}, {play[2]}")
         samples.append(measure(*play))
-    samples += _side_by_side(long, jobs, deadline, progress)
+    samples += _side_by_side([play for play in plays if _stage(play) == 2], jobs, deadline, progress)
     done = {(s.family, s.member, s.line, s.value) for s in samples}
     return evaluated(samples, [play for play in plays if play not in done])
 
 
-def _takes_long(label: str, value: float) -> bool:
-    return LINES[label].knob == "time_step" and value < SIDE_BY_SIDE
+Play = tuple[str, int, str, float]
 
 
-def _side_by_side(plays: Sequence[tuple[str, int, str, float]], jobs: int, deadline: float, progress: Progress) -> Iterable[Sample]:
+def planned(*, quick: bool = False) -> list[Play]:
+    """All runs: family, member, line and value of its setting."""
+    return [
+        (family, member, line.label, value)
+        for member in range(MEMBERS)
+        for family in (QUICK if quick else tuple(FAMILIES))
+        for line in LINES.values()
+        for value in (line.quick if quick else line.values)
+    ]
+
+
+def _stage(play: Play) -> int:
+    """0: at once; 1: an engine's small steps; 2: its smallest, side by side. Where time is short, the dearest runs are left out."""
+    if LINES[play[2]].knob != "time_step" or play[3] > SIDE_BY_SIDE:
+        return 0
+    return 1 if play[3] == SIDE_BY_SIDE else 2
+
+
+def _side_by_side(plays: Sequence[Play], jobs: int, deadline: float, progress: Progress) -> Iterable[Sample]:
     """Plays in worker processes; nothing new begins after the deadline."""
     if not plays:
         return []
@@ -249,7 +258,7 @@ def _side_by_side(plays: Sequence[tuple[str, int, str, float]], jobs: int, deadl
     return samples
 
 
-def evaluated(samples: Sequence[Sample], missing: Sequence[tuple[str, int, str, float]]) -> WorkPrecision:
+def evaluated(samples: Sequence[Sample], missing: Sequence[Play]) -> WorkPrecision:
     """What the samples say; `missing` are runs that there was no time for."""
     groups: dict[tuple[str, str, float], list[Sample]] = {}
     for sample in samples:
@@ -335,13 +344,12 @@ def cost_at(line: Sequence[Point], level: float = LEVEL) -> tuple[float, bool]:
     return min(costs, default=(math.nan, False))
 
 
-def _missing(plays: Sequence[tuple[str, int, str, float]]) -> Iterable[str]:
-    """Runs that there was no time for, a line for each setting."""
-    groups: dict[tuple[str, float], list[str]] = {}
-    for family, _, label, value in plays:
-        groups.setdefault((label, value), []).append(family)
-    for (label, value), families in groups.items():
-        yield f"no time for {len(families)} runs of {label} at {LINES[label].knob} {value:g} in {len(set(families))} families of scenes"
+def _missing(plays: Sequence[Play]) -> Iterable[str]:
+    """Runs that there was no time for, a line for each line of the diagrams."""
+    for label in dict.fromkeys(play[2] for play in plays):
+        mine = [play for play in plays if play[2] == label]
+        values = ", ".join(f"{value:g}" for value in dict.fromkeys(play[3] for play in mine))
+        yield f"no time for {len(mine)} runs of {label} at {LINES[label].knob} {values}"
 
 
 def _failures(samples: Sequence[Sample]) -> Iterable[str]:

@@ -10,7 +10,7 @@ from reports.benchmark import power_of_ten, write_benchmark
 from validation import benchmark_models, provenance
 from validation.benchmark import Benchmark, save
 from validation.benchmark_ebm import CASES, LEVEL, EbmSpeed, _times
-from validation.benchmark_models import LINES, Point, Sample, cost_at, evaluated, measure, order_of, work_precision
+from validation.benchmark_models import LINES, Point, Sample, cost_at, evaluated, measure, order_of, planned, work_precision
 from validation.benchmark_scenes import FAMILIES, MEMBERS, prepared
 from validation.benchmark_skipping import Saving, skipping
 from validation.cli import main
@@ -121,12 +121,25 @@ def test_what_there_was_no_time_for_is_listed(monkeypatch: pytest.MonkeyPatch) -
     found = work_precision(quick=True, deadline=0.0)
     assert found.samples == ()
     for label, line in LINES.items():
-        for value in line.quick:
-            assert any(f"runs of {label} at {line.knob} {value:g}" in text for text in found.left_out)
-    monkeypatch.setattr(benchmark_models, "FAMILIES", {"free": FAMILIES["free"]})
-    monkeypatch.setattr(benchmark_models, "LINES", {"mujoco": LINES["mujoco"]})
-    whole = work_precision(deadline=0.0)
-    assert sum("runs of mujoco" in text for text in whole.left_out) == len(LINES["mujoco"].values)
+        values = ", ".join(f"{value:g}" for value in line.quick)
+        assert f"no time for {4 * MEMBERS * len(line.quick)} runs of {label} at {line.knob} {values}" in found.left_out
+
+
+def test_the_dearest_runs_come_last_and_none_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every member of every family meets every setting once; an engine's 1e-4 s after all longer steps."""
+    played: list[tuple[str, int, str, float]] = []
+
+    def note(family: str, member: int, line: str, value: float) -> Sample:
+        played.append((family, member, line, value))
+        return Sample(family, member, line, value, 3.0, rms=1e-3, cpu=0.1)
+
+    monkeypatch.setattr(benchmark_models, "measure", note)
+    found = work_precision(quick=True)
+    assert sorted(played) == sorted(planned(quick=True))
+    assert {point.runs for point in found.points} == {MEMBERS}
+    dear = [LINES[line].knob == "time_step" and value == 1e-4 for _, _, line, value in played]
+    assert dear == sorted(dear)
+    assert any(dear)
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
