@@ -52,12 +52,18 @@ class Site:
         write_whole(target / "models.css", model_styles())
 
 
+#: Studies of other commands that may stand beside a run.
+STUDIES = (("Convergence", "convergence/index.html"), ("Benchmark", "benchmark/index.html"), ("Overturning spectra", "spectra.html"))
+
+
 def write_site(folder: Path) -> Path:
     """Write `index.html`, a page a scene, their figures and data into the folder of a finished run; returns the index."""
     run = Run.load(folder)
     views = scene_views(run, folder)
     pages = folder / PAGES
-    site = Site(folder, f"rockcheck: {run.suite}", tuple((view.name, f"{PAGES}/{view.slug}.html") for view in views))
+    links = [(view.name, f"{PAGES}/{view.slug}.html") for view in views]
+    links += [(title, address) for title, address in STUDIES if (folder / address).exists()]
+    site = Site(folder, f"rockcheck: {run.suite}", tuple(links))
     site.assets()
     for n, view in enumerate(views):
         write_figures(view, _made(pages / "figures"))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+from importlib import resources
 from pathlib import Path
 
 from filelock import FileLock
@@ -29,7 +31,7 @@ def publish(run: Run, folder: Path) -> Path:
     with FileLock(folder / LOCK):
         cells = tuple(cell.model_copy(update={"read_back": False}) for cell in run.cells)
         same = run.model_copy(update={"created": "", "wall_seconds": 0.0, "cells": cells})
-        stamp = provenance.digest(same.model_dump_json() + provenance.code_digest("reports"))
+        stamp = provenance.digest(same.model_dump_json() + provenance.code_digest("reports") + _looks())
         index, stamped = folder / "index.html", folder / STAMP
         if index.exists() and stamped.exists() and stamped.read_text(encoding="utf-8") == stamp:
             return index
@@ -37,6 +39,12 @@ def publish(run: Run, folder: Path) -> Path:
         index = render(folder)
         write_whole(stamped, stamp)
         return index
+
+
+def _looks() -> str:
+    """Hash of the pages' templates, scripts and styles."""
+    files = sorted(path for path in (resources.files("reports") / "data").rglob("*") if path.is_file())  # type: ignore[attr-defined]
+    return provenance.digest("".join(f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n" for path in files))
 
 
 def render(folder: Path) -> Path:
