@@ -180,6 +180,7 @@ def batch_figure(speed: EbmSpeed) -> Figure:
         ax.axvline(BATCH_LEVEL, color="#6e6e6e", linewidth=0.8, linestyle=(0, (6, 3)))
         ax.set(xscale="log", yscale="log", xlabel="p95 error of the peak, rad (rotation)", ylabel="CPU μs a trajectory, one core")
         _log_scales(ax)
+        ax.set_ylim(3.0, 3000.0)
         ax.invert_xaxis()
         figure.legend(loc="outside right center")
     return figure
