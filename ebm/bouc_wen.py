@@ -78,6 +78,7 @@ from ebm.trajectory import (
     OVERTURNED,
     RELEASE,
     RIGHT,
+    SETTLE_SPIN,
     SETTLED,
     SLIPS,
     STICKS,
@@ -404,6 +405,7 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
     rows = min(1, out.shape[0])
     peak = abs(z[THETA])
     ending = DONE
+    flipped = False
     zeta = _begin(b, m, z, _initial_friction(b, m, z, gh, gv, t, a), yield_displacement, gh, gv, t, a)
     yielded = _has_yielded(b, m, z, zeta)
     if rows > 0:
@@ -436,9 +438,10 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
             root = first_root(a, GUARD, order - 1, tau, NOISE, stack)
             if root != NO_ROOT:
                 tau, which = root, _G_LOADS
-        if which == G_SLIP and tau <= 0.0 and zero_steps > 0:
+        if which == G_SLIP and tau <= 0.0 and flipped and m[FAMILY] == TILT:
             # Whichever sign is assumed, V leaves zero with the other: it is rounding, so any will do for a little while.
             tau, which, zero_steps = min(h, 1e-2 * math.sqrt(yield_displacement)), -1, 0
+        flipped = which == G_SLIP and tau <= 0.0
         if not math.isfinite(tau):
             ending = NOT_FINITE
             break
@@ -502,6 +505,8 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
         elif which >= 0:
             kind, _, _ = _impact(b, m, z, which, gh, t, _resting_speed(rattle, t), impulse, gains)
             wall_impacts += kind == WALL_IMPACT
+            if z[THETA] == 0.0 and z[W] == 0.0 and abs(z[VX]) < 4.0 * SETTLE_SPIN:
+                z[VX] = 0.0  # landed along a wall with less spin than counts
             zeta = _begin(b, m, z, zeta, yield_displacement, gh, gv, t, a)
             yielded = _has_yielded(b, m, z, zeta)
         if kind >= 0:
