@@ -70,7 +70,7 @@ def test_members_stay_up_and_end_at_their_horizon(family: str) -> None:
     """A member that fell would be compared over its fall only; without wall the two limits are one model."""
     for k in range(MEMBERS):
         ready = prepared(family, k)
-        assert 2.0 < ready.horizon <= 8.0
+        assert 1.5 < ready.horizon <= 8.0
         assert ready.scene.duration == ready.horizon
         for limit in ready.limits.values():
             assert not limit.outcome.startswith("overturned")
