@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ebm.spectrum import COLOURS, Spectrum, draw
-from reports.site import PAGES, Site
+from reports.site import PAGES, STUDIES, Site
 from reports.style import PAGE, figure_style, save
 from validation.results import RUN_FILE
 
@@ -170,18 +170,23 @@ def write_page(folder: Path) -> Path:
         if (data / f"{figure_stem(number, model)}.svg").exists()
     ]
     own = [record for record in index.spectra if record.figure is None]
-    site = Site(folder, "rockcheck: overturning spectra", (*_scene_links(folder), ("Spectra", PAGE_NAME)))
+    site = Site(folder, "rockcheck: overturning spectra", _links(folder))
     site.assets()
-    return site.page(
-        PAGE_NAME,
-        "spectra.html",
-        figures=shown,
-        own=own,
-        kept=kept,
-        areas=(data / "safe-areas.svg").exists(),
-        fragility_drawn=(data / "fragility.svg").exists(),
-        versions=provenance.versions(),
-    )
+    addresses = [PAGE_NAME] if (folder / RUN_FILE).exists() else ["index.html", PAGE_NAME]  # a folder has a page to open
+    pages = [
+        site.page(
+            address,
+            "spectra.html",
+            figures=shown,
+            own=own,
+            kept=kept,
+            areas=(data / "safe-areas.svg").exists(),
+            fragility_drawn=(data / "fragility.svg").exists(),
+            versions=provenance.versions(),
+        )
+        for address in addresses
+    ]
+    return pages[-1]
 
 
 def figure_stem(number: int | None, model: str) -> str:
@@ -194,10 +199,11 @@ def write(figure: Figure, stem: Path) -> list[Path]:
     return save(figure, stem)
 
 
-def _scene_links(folder: Path) -> tuple[tuple[str, str], ...]:
-    """The navigation of the finished run that shares the folder, if any."""
-    pages = sorted((folder / PAGES).glob("*.html")) if (folder / RUN_FILE).exists() else []
-    return tuple((page.stem, f"{PAGES}/{page.name}") for page in pages)
+def _links(folder: Path) -> tuple[tuple[str, str], ...]:
+    """The navigation: the scenes of the finished run that shares the folder, if any, and the studies beside it."""
+    scenes = sorted((folder / PAGES).glob("*.html")) if (folder / RUN_FILE).exists() else []
+    studies = [(title, address) for title, address in STUDIES if address == PAGE_NAME or (folder / address).exists()]
+    return (*((page.stem, f"{PAGES}/{page.name}") for page in scenes), *studies)
 
 
 def _read(path: Path) -> Any:
