@@ -208,9 +208,11 @@ def check_excitation(scene: Scene) -> None:
 def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None]) -> None:
     """Fills `outcomes`: a coarse grid, then at each halving only cells whose corners differ, with a ring around them.
 
-    The coarse grid has every eighth node, or more of them where that would be fewer than a dozen cells an axis.
+    The coarse grid has every eighth node, or more of them where that would be fewer than a dozen cells an axis. At last the
+    boundary is followed: no node beside one of another outcome is left to inference, so that a thin tongue is found to its tip.
     """
     rows, columns = outcomes.shape
+    inferred = np.zeros(outcomes.shape, dtype=bool)
     step = COARSEST
     while step > 1 and min(rows, columns) - 1 < FEWEST_CELLS * step:
         step //= 2
@@ -231,7 +233,23 @@ def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None]
         open_nodes = finer & (outcomes == _UNKNOWN)
         i, j = np.nonzero(open_nodes)
         outcomes[i, j] = outcomes[i // step * step, j // step * step]
+        inferred |= open_nodes
         step = half
+    while (doubtful := inferred & _beside_another(outcomes)).any():
+        inferred &= ~doubtful
+        outcomes[doubtful] = _UNKNOWN
+        run(doubtful)
+
+
+def _beside_another(outcomes: NDArray[np.int8]) -> NDArray[np.bool_]:
+    """Which nodes have a neighbour of another outcome, diagonals included."""
+    padded = np.pad(outcomes, 1, mode="edge")
+    rows, columns = outcomes.shape
+    found = np.zeros(outcomes.shape, dtype=bool)
+    for i in range(3):
+        for j in range(3):
+            found |= padded[i : i + rows, j : j + columns] != outcomes
+    return found
 
 
 def _lattice(rows: int, columns: int, step: int) -> NDArray[np.bool_]:

@@ -85,12 +85,14 @@ def _legend(figure: Figure, spectra: Iterable[Spectrum]) -> None:
         names += ["overturned"]
     labels = {
         "safe": "safe",
-        "clockwise": "no wall: overturned clockwise",
-        "counterclockwise": "no wall: overturned counterclockwise",
-        "overturned": "wall: overturned",
+        "clockwise": "overturned clockwise",
+        "counterclockwise": "overturned counterclockwise",
+        "overturned": "overturned",
     }
+    if len(names) == 4:
+        labels |= {name: f"no wall: {labels[name]}" for name in names[1:3]} | {"overturned": "wall: overturned"}
     patches = [Patch(facecolor=COLOURS[name], label=labels[name]) for name in names]
-    figure.legend(handles=patches, loc="outside lower center", ncols=4, fontsize=7)
+    figure.legend(handles=patches, loc="outside lower center", ncols=4, fontsize=7, handlelength=1.6)
 
 
 def areas_figure(spectra: Sequence[Spectrum]) -> Figure:

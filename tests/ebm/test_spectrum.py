@@ -50,8 +50,7 @@ def test_all_reference_runs_are_asked():
 
 @pytest.mark.parametrize("walls", [(), (Wall(side="right", gap=0.103),)], ids=["free", "right"])
 def test_refinement_finds_the_full_grid_where_the_boundary_is_smooth(walls):
-    # Nodes below a_p/(g tan alpha) = 1.5 are left out: the tongues there are thinner than the coarse grid.
-    frequencies, amplitudes = np.linspace(2.0, 8.0, 97), np.linspace(2.0, 10.0, 97)
+    frequencies, amplitudes = np.linspace(0.5, 8.0, 129), np.linspace(1.0, 12.0, 129)
     full = overturning_spectrum(scene(*walls), frequencies, amplitudes)
     refined = overturning_spectrum(scene(*walls), frequencies, amplitudes, refine=True)
     np.testing.assert_array_equal(refined.outcomes, full.outcomes)
@@ -72,6 +71,16 @@ def test_refinement_of_a_disc(shape):
     assert spectrum.evaluations == len(played) == len(set(played))
     if shape[0] > 200:
         assert spectrum.evaluations < 0.12 * spectrum.outcomes.size
+
+
+def test_refinement_follows_a_thin_tongue_to_its_tip():
+    def tongue(scene, a, f):
+        return ((a < 2.0) | (np.abs(a - f) < 0.05)).astype(np.int8), np.zeros(len(a), dtype=bool)
+
+    axis = np.linspace(1.0, 9.0, 257)
+    spectrum = overturning_spectrum(scene(), axis, axis, refine=True, play=tongue)
+    np.testing.assert_array_equal(spectrum.outcomes, tongue(None, *np.broadcast_arrays(axis[:, None], axis))[0])
+    assert spectrum.evaluations < 0.15 * spectrum.outcomes.size
 
 
 def test_a_node_is_what_the_model_simulates():
