@@ -155,9 +155,11 @@ class Tiles:
     read_back: int = 0
     _lock: Lock = field(default_factory=Lock, repr=False)
     _pool: ProcessPoolExecutor | None = field(default=None, repr=False)
+    _code: str = field(default="", init=False, repr=False)
 
     def __post_init__(self) -> None:
         self.folder.mkdir(parents=True, exist_ok=True)
+        self._code = _code()
 
     def play(
         self, scene: Scene, amplitudes: Floats, frequencies: Floats, *, model: str, settings: Mapping[str, Any]
@@ -168,7 +170,8 @@ class Tiles:
         parts = [slice(n, n + size) for n in range(0, len(amplitudes), size)]
         waiting: dict[Any, tuple[slice, str]] = {}
         for part in parts:
-            key = tile_key(scene, amplitudes[part], frequencies[part], model, settings)
+            with self._lock:  # Python 3.11 cannot parse source files in several threads at once
+                key = tile_key(scene, amplitudes[part], frequencies[part], model, settings)
             kept = None if self.force else self._kept(key, len(amplitudes[part]))
             if kept is not None:
                 sides[part], failed[part] = kept
@@ -182,7 +185,7 @@ class Tiles:
                 waiting[future] = part, key
         for future, (part, key) in waiting.items():
             found, code = self._gathered(future)
-            if code != _code():
+            if code != self._code:
                 raise InputError("a worker of the cluster runs another version of rockcheck", "--scheduler")
             sides[part], failed[part] = self._keep(key, found)
             self._report(len(found[0]))
