@@ -90,7 +90,12 @@ def save(found: Benchmark, folder: Path) -> None:
     write_whole(folder / "run.json", json.dumps(_plain(asdict(found)), indent=1) + "\n")
     tables: dict[str, Sequence[Any]] = {}
     if found.models is not None:
-        tables |= {"runs": found.models.samples, "work-precision": found.models.points, "orders-and-ratios": found.models.trends}
+        tables |= {
+            "runs": found.models.samples,
+            "work-precision": found.models.points,
+            "orders-and-ratios": found.models.trends,
+            "engines": found.models.pooled,
+        }
     if found.ebm is not None:
         tables |= {"batches": found.ebm.times, "cold-starts": found.ebm.cold_starts}
     if found.savings is not None:

@@ -73,6 +73,8 @@ LINES = {
         ),
     )
 }
+#: Kinds of scenes over which the engines' settings are summed up: how the families' names begin.
+KINDS = {"free, pulses": ("free", "pulse"), "slip, walls": ("slip", "wall"), "records": ("fig",), "all": ("",)}
 #: What is not measured, and why.
 LEFT_OUT = (
     "default settings at a step of 1e-5 s: at 1e-4 s they have stopped converging, or converge as at larger steps",
@@ -147,12 +149,32 @@ class Trend:
 
 
 @dataclass(frozen=True)
+class Pooled:
+    """An engine's line at one setting over all scenes of a kind: CPU time (s a simulated second) and errors (RMS, alpha).
+
+    `at_the_cost` is the error of the engine's adaptive line at this CPU time, interpolated; NaN outside its range.
+    """
+
+    kind: str
+    line: str
+    value: float
+    runs: int
+    failed: int
+    cpu: float
+    rms: float
+    rms_worst: float
+    at_the_cost: float
+
+
+@dataclass(frozen=True)
 class WorkPrecision:
     """All runs, and what they say."""
 
     samples: tuple[Sample, ...]
     points: tuple[Point, ...]
     trends: tuple[Trend, ...]
+    #: The engines' settings over whole kinds of scenes.
+    pooled: tuple[Pooled, ...]
     #: By family: horizons (s) and model-form error (RMS, alpha) of its members, medians.
     horizons: dict[str, float]
     model_form: dict[str, float]
@@ -280,6 +302,7 @@ def evaluated(samples: Sequence[Sample], missing: Sequence[Play]) -> WorkPrecisi
         samples=tuple(samples),
         points=points,
         trends=tuple(trends),
+        pooled=tuple(pooled(samples)),
         horizons={family: median(member.horizon for member in found) for family, found in members.items()},
         model_form={family: median(member.model_form for member in found) for family, found in members.items()},
         left_out=(*LEFT_OUT, *_missing(missing), *_failures(samples)),
@@ -312,6 +335,33 @@ def _point(samples: Sequence[Sample]) -> Point:
         set_up=middling("set_up"),
         steps=middling("steps", a_second=True),
     )
+
+
+def pooled(samples: Sequence[Sample]) -> Iterable[Pooled]:
+    """Every setting of the engines' lines over all scenes of each kind."""
+    for kind, starts in KINDS.items():
+        mine = [s for s in samples if s.family.startswith(starts)]
+        points = {
+            (label, value): _point(group)
+            for label, line in LINES.items()
+            if line.model in ("mujoco", "pybullet")
+            for value in line.values
+            if (group := [s for s in mine if (s.line, s.value) == (label, value)])
+        }
+        for (label, value), point in points.items():
+            adaptive = [p for (other, _), p in points.items() if other == f"{LINES[label].model} adaptive"]
+            good = [s.rms for s in mine if (s.line, s.value) == (label, value) and not s.failure]
+            worst = math.inf if point.failed else max(good)
+            yield Pooled(kind, label, value, point.runs, point.failed, point.cpu, point.rms, worst, error_at(adaptive, point.cpu))
+
+
+def error_at(line: Sequence[Point], cpu: float) -> float:
+    """Median error of a line, coarse to fine, at a CPU time, both interpolated on logarithmic axes; NaN outside its range."""
+    for a, b in itertools.pairwise(line):
+        if a.cpu <= cpu <= b.cpu and a.cpu < b.cpu and b.rms > 0.0 and math.isfinite(a.rms):
+            share = math.log(cpu / a.cpu) / math.log(b.cpu / a.cpu)
+            return float(a.rms * (b.rms / a.rms) ** share)
+    return math.nan
 
 
 def quantile(values: Sequence[float], share: float) -> float:

@@ -45,6 +45,14 @@ def _models(found: WorkPrecision) -> Iterable[str]:
         cells = ["" if t is None else "–" if math.isnan(t.ratio) else f"{'≤ ' if t.at_coarsest else ''}{_number(t.ratio)}" for t in mine]
         rows.append([label, *cells])
     yield _table(["model", *families], rows)
+    yield "## Engines over whole kinds of scenes"
+    yield "CPU: ms a simulated second. Error: RMS of θ, α. Adaptive: the error of adaptive steps at the same CPU time."
+    rows = [
+        [p.kind, p.line, f"{LINES[p.line].knob} {p.value:g}", str(p.runs), _number(1e3 * p.cpu), f"{p.rms:.1e}", f"{p.rms_worst:.1e}",
+         "" if math.isnan(p.at_the_cost) else f"{p.at_the_cost:.1e}"]
+        for p in found.pooled
+    ]  # fmt: skip
+    yield _table(["scenes", "line", "setting", "runs", "CPU", "median error", "worst", "adaptive"], rows)
     yield "## Order of convergence in the swept setting"
     rows = [
         [label, line.knob, *("" if (t := trends.get((label, f))) is None else _number(t.order) for f in families)]

@@ -10,7 +10,7 @@ from reports.benchmark import power_of_ten, write_benchmark
 from validation import benchmark_models, provenance
 from validation.benchmark import Benchmark, save
 from validation.benchmark_ebm import CASES, LEVEL, EbmSpeed, _times
-from validation.benchmark_models import LINES, Point, Sample, cost_at, evaluated, measure, order_of, planned, work_precision
+from validation.benchmark_models import LINES, Point, Sample, cost_at, error_at, evaluated, measure, order_of, planned, work_precision
 from validation.benchmark_scenes import FAMILIES, MEMBERS, prepared
 from validation.benchmark_skipping import Saving, skipping
 from validation.cli import main
@@ -94,6 +94,18 @@ def test_the_cost_of_a_level_is_interpolated_between_logarithms() -> None:
     assert math.isnan(cost_at(line[:1])[0])
     worse = point(1e-4, 1e-5, 3.0)
     assert cost_at([*line, worse]) == (3.0, False)
+
+
+def test_the_error_of_adaptive_steps_is_told_at_the_cost_of_fixed_ones() -> None:
+    line = [point(4e-3, 1e-2, 1.0), point(1e-3, 1e-4, 16.0)]
+    assert error_at(line, 4.0) == pytest.approx(1e-3)
+    assert math.isnan(error_at(line, 17.0))
+    runs = [sample(k, 5e-3) for k in range(10)]
+    for value, rms, cpu in ((2e-3, 1e-3, 0.15), (1e-3, 1e-5, 0.6)):
+        runs += [Sample("pulse a", k, "mujoco adaptive", value, 3.0, rms=rms * (1 + k % 3), cpu=cpu) for k in range(3)]
+    everything = {row.line: row for row in evaluated(runs, ()).pooled if row.kind == "all" and row.value == 1e-3}
+    assert everything["mujoco"].at_the_cost == pytest.approx(2e-4)
+    assert everything["mujoco adaptive"].rms_worst == pytest.approx(3e-5)
 
 
 def sample(member: int, rms: float, **change: object) -> Sample:
