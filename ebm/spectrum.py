@@ -29,8 +29,7 @@ COARSEST, FEWEST_CELLS = 8, 12
 LEFT, SAFE, RIGHT = -1, 0, 1
 _UNKNOWN = 9
 #: The paper's colours.
-COLOURS = {"safe": "#3b6fb6", "counterclockwise": "#e8833a", "clockwise": "#f2cf4a", "overturned": "#e8833a"}
-
+COLOURS = {"safe": "#3b6fb6", "counterclockwise": "#e8833a", "clockwise": "#f2cf4a", "overturned": "#e8833a", "undecided": "#9a9a9a"}
 
 #: Plays nodes of a spectrum: scene, amplitude ratios and frequency ratios (1-D, of one length) to sides and failures, see `play_nodes`.
 Player = Callable[[Scene, Floats, Floats], tuple[NDArray[np.int8], NDArray[np.bool_]]]
@@ -42,7 +41,7 @@ class Spectrum:
 
     `outcomes[i, j]` is -1 (overturned left, counterclockwise), 0 (safe) or +1 (right, clockwise) at `amplitude_ratios[i]`
     (a_p / (g tan alpha)) and `frequency_ratios[j]` (omega_p / p). `evaluations` counts the runs, fewer than nodes where only
-    the boundary was refined. `undecided` lists the nodes (i, j) whose run failed; they count as safe.
+    the boundary was refined. `undecided` lists the nodes (i, j) whose run failed: their outcome says 0, but `safe` excludes them.
     """
 
     outcomes: NDArray[np.int8]
@@ -54,9 +53,16 @@ class Spectrum:
     model: EventBasedModel | None
 
     @property
+    def safe(self) -> NDArray[np.bool_]:
+        """Which nodes are safe."""
+        safe: NDArray[np.bool_] = self.outcomes == SAFE
+        safe[tuple(self.undecided.T)] = False
+        return safe
+
+    @property
     def safe_area(self) -> float:
         """Share of nodes that are safe."""
-        return float(np.mean(self.outcomes == SAFE))
+        return float(np.mean(self.safe))
 
     def least_overturning_amplitude(self) -> Floats:
         """The lowest overturning amplitude ratio at each frequency ratio; NaN where none overturns."""
@@ -77,17 +83,20 @@ def draw(spectrum: Spectrum, axes: Any) -> None:
     """Draws a spectrum into matplotlib axes in the paper's colours.
 
     Blue is safe. Without a wall orange is overturned counterclockwise and yellow clockwise; with a wall orange is overturned.
+    Grey is undecided.
     """
     from matplotlib.colors import ListedColormap
 
-    colours = ListedColormap([COLOURS["counterclockwise"], COLOURS["safe"], COLOURS["overturned" if spectrum.scene.walls else "clockwise"]])
+    names = ("counterclockwise", "safe", "overturned" if spectrum.scene.walls else "clockwise", "undecided")
+    shown = spectrum.outcomes.copy()
+    shown[tuple(spectrum.undecided.T)] = 2
     axes.pcolormesh(
         spectrum.frequency_ratios,
         spectrum.amplitude_ratios,
-        spectrum.outcomes,
-        cmap=colours,
+        shown,
+        cmap=ListedColormap([COLOURS[name] for name in names]),
         vmin=-1,
-        vmax=1,
+        vmax=2,
         shading="nearest",
         rasterized=True,
     )
@@ -188,13 +197,13 @@ def node_scene(scene: Scene, amplitude_ratio: float, frequency_ratio: float, set
         return scene.replace(
             excitation=scene.excitation.model_copy(update={"scale": scene.excitation.scale * float(amplitude_ratio)}),
             block=Block(half_width=block.half_width * float(frequency_ratio), half_height=block.half_height * float(frequency_ratio)),
-            duration=scene.excitation.quiet_after + settle,
+            duration=max(scene.excitation.quiet_after, scene.vertical.quiet_after) + settle,
         )
     tan_alpha = scene.block.half_width / scene.block.half_height
     amplitude = float(amplitude_ratio) * scene.gravity * tan_alpha
     period = 2.0 * math.pi / (float(frequency_ratio) * scene.frequency_parameter)
     pulse = type(scene.excitation)(**scene.excitation.model_dump() | {"amplitude": amplitude, "period": period})
-    return scene.replace(excitation=pulse, duration=pulse.quiet_after + settle)
+    return scene.replace(excitation=pulse, duration=max(pulse.quiet_after, scene.vertical.quiet_after) + settle)
 
 
 def check_excitation(scene: Scene) -> None:

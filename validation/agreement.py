@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,10 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ebm import Spectrum
+from validation import provenance
 from validation.claims import percent
 from validation.results import Stored
-from validation.spectra import Asked, Panel, Tiles
+from validation.spectra import SETTLE, Asked, Panel, Tiles
 
 CANDIDATES = ("ebm-unilateral", "cm", "mujoco", "pybullet")
 REFERENCES = ("ebm", "ebm-unilateral")
@@ -39,8 +41,11 @@ class Share(Stored):
 class Agreement(Stored):
     """`agreement.json`: all shares, and the table that the page shows."""
 
-    format: int = 1
+    format: int = 2
     about: str
+    #: Day of the run, ISO 8601; of a machine's clock in UTC.
+    date: str
+    versions: dict[str, str]
     settings: dict[str, dict[str, Any]]
     shares: tuple[Share, ...]
     columns: tuple[str, ...]
@@ -50,11 +55,13 @@ class Agreement(Stored):
 def choose_nodes(spectrum: Spectrum, count: int, name: str) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """`count` nodes (i, j) of a spectrum and whether each is near the boundary: half of them are, where there are so many.
 
-    The choice is random but depends only on `name`.
+    The choice is random but depends only on `name`. Nodes that the reference could not decide are left out.
     """
     near = near_boundary(spectrum.outcomes)
     random = np.random.default_rng(zlib.crc32(name.encode()))
-    inside, outside = np.argwhere(near), np.argwhere(~near)
+    decided = np.ones(near.shape, dtype=bool)
+    decided[tuple(spectrum.undecided.T)] = False
+    inside, outside = np.argwhere(near & decided), np.argwhere(~near & decided)
     wanted = min(count // 2, len(inside))
     wanted = max(wanted, min(count - len(outside), len(inside)))
     chosen = [inside[random.permutation(len(inside))[:wanted]], outside[random.permutation(len(outside))[: count - wanted]]]
@@ -112,14 +119,22 @@ def agree(
         if done is not None:
             done(panel)
     about = (
-        f"Share of equal outcomes at {count} nodes of each spectrum, half of them at most {NEAR} nodes from a boundary (near), the others"
-        " further away, against the paper's bilateral event-based model and against the unilateral one, which lets the block hop as the"
-        " other models do. Runs of models other than the event-based ones end 6 s after the pulse; a block that then stands counts"
-        " as safe."
+        f"Share of equal outcomes at {count} nodes of each spectrum of {len(asked.amplitudes)} x {len(asked.frequencies)} nodes, half of"
+        f" them at most {NEAR} nodes from a boundary (near), the others further away, against the paper's bilateral event-based model and"
+        " against the unilateral one, which lets the block hop as the other models do. Runs of the other models end with the pulse where"
+        f" the block then lacks the energy to tip over, otherwise {SETTLE:g} s later; a block that then stands counts as safe."
     )
     columns, rows = table(shares)
-    plain = {model: dict(chosen) for model, chosen in settings.items()}
-    return Agreement(about=about, settings=plain, shares=tuple(shares), columns=columns, rows=rows)
+    plain = {asked.model: dict(asked.settings)} | {model: dict(chosen) for model, chosen in settings.items()}
+    return Agreement(
+        about=about,
+        date=datetime.now(UTC).date().isoformat(),
+        versions=provenance.versions(),
+        settings=plain,
+        shares=tuple(shares),
+        columns=columns,
+        rows=rows,
+    )
 
 
 def table(shares: Sequence[Share]) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:

@@ -8,6 +8,7 @@ import os
 import signal
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -243,9 +244,13 @@ def synthetic(height, size=40):
     return spectra_made
 
 
-def verdicts(spectra_made, least=None):
+def judged(spectra_made, least=None):
     least = least or {None: 10.0, (0.103, 0.0): 9.0, (0.103, 1.0): 8.0}
-    return {claim.name: claim.verdict for claim in claims.check_claims(spectra_made, least)}
+    return {claim.name: claim for claim in claims.check_claims(spectra_made, claims.Closer(least, {}))}
+
+
+def verdicts(spectra_made, least=None):
+    return {name: claim.verdict for name, claim in judged(spectra_made, least).items()}
 
 
 def test_claims_about_areas_hold_where_made_to():
@@ -283,9 +288,40 @@ def test_an_island_is_cut_off_from_the_safe_nodes_below():
     spectrum = made(panel, outcomes)
     (found,) = claims.islands(spectrum)
     assert len(found) == 12
+    assert claims.islands_there(spectrum) == ["12 nodes, ω_p/p 2.04 to 2.62, amplitude 6.6 to 7.2"]
     peninsula = outcomes.copy()
     peninsula[5:20, 9] = 0
     assert claims.islands(made(panel, peninsula)) == []
+    assert claims.islands(replace(spectrum, undecided=found)) == []
+
+
+def test_exceptions_are_named_and_found():
+    def height(*key):
+        return 0.5 if len(key) == 1 else 0.4 - 0.1 * key[3] - key[2] * (1.0 if key[:2] != ("right", 0.6) else 0.0)
+
+    spectra_made = synthetic(height)
+    claim = judged(spectra_made)["smaller gap"]
+    assert claim.verdict == "holds in part"
+    assert claim.finding == "Larger at the smaller gap in 12 of 16 pairs."  # four exceptions are too many to name
+    odd = next(s for s in spectra_made if s.scene.name == "figure-8-gap-53-e-0")
+    odd.outcomes[:, 10:] = 1  # less safe at high frequency
+    claim = judged(spectra_made)["lower restitution"]
+    assert claim.finding.endswith("Not so: right wall, μ 0.3, 53 mm.")
+    row = next(row for row in claim.rows if not row.holds)
+    assert "ω_p/p 2.4 to 8.0, amplitude 1.0 to 3.5" in row.value
+
+
+def test_sides_that_the_pulse_turns_round():
+    def height(*key):
+        return 0.5 if len(key) == 1 else 0.3
+
+    spectra_made = synthetic(height)
+    for spectrum in spectra_made:
+        if not spectrum.scene.walls:
+            spectrum.outcomes[spectrum.outcomes == 1] = -1
+    claim = judged(spectra_made)["likelier side"]
+    assert claim.verdict == "does not hold"
+    assert "not all sentences can hold" in claim.finding
 
 
 # Agreement

@@ -11,12 +11,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from ebm import Spectrum
+from ebm.spectrum import LEFT, RIGHT
 from scenes import InputError, load_scene
 from scenes.errors import unknown_name
 from validation.commands import OUT, JobsOption, OutOption, SchedulerOption, console, usable_folder
@@ -166,8 +168,9 @@ def _shares(panels: Sequence[Panel], spectra: Sequence[Spectrum]) -> Table:
     for title, justify in (("spectrum", "left"), ("safe", "right"), ("left", "right"), ("right", "right"), ("undecided", "right")):
         table.add_column(title, justify=justify)  # type: ignore[arg-type]
     for panel, spectrum in zip(panels, spectra, strict=True):
-        shares = (100.0 * float((spectrum.outcomes == side).mean()) for side in (0, -1, 1))
-        table.add_row(panel.name, *(f"{share:.2f} %" for share in shares), str(len(spectrum.undecided)))
+        left, right = (float(np.mean(spectrum.outcomes == side)) for side in (LEFT, RIGHT))
+        shares = (f"{100.0 * share:.2f} %" for share in (spectrum.safe_area, left, right))
+        table.add_row(panel.name, *shares, str(len(spectrum.undecided)))
     return table
 
 
@@ -203,10 +206,10 @@ def _draw(panels: Sequence[Panel], spectra: Sequence[Spectrum], asked: Asked, da
 
 
 def _claims(spectra: Sequence[Spectrum], asked: Asked, tiles: Tiles, data: Path, screen: Console) -> None:
-    from validation.claims import Claims, check_claims, least_amplitudes_at_six
+    from validation.claims import Claims, check_claims, look_closer
 
     tiles.progress = None
-    claims = check_claims(spectra, least_amplitudes_at_six(tiles, asked))
+    claims = check_claims(spectra, look_closer(tiles, asked))
     grid = f"{len(asked.amplitudes)} x {len(asked.frequencies)}"
     write_whole(data / "claims.json", Claims(grid=grid, model=asked.model, claims=claims).model_dump_json(indent=1) + "\n")
     table = Table(box=None, pad_edge=False, title="The paper's section 5", title_justify="left")
