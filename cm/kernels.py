@@ -32,20 +32,20 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from cm import contact
+from scenes.compiled import kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 #: Velocity of the block: vx, vy, w.
 Velocity = tuple[float, float, float]
 
-effective_mass = njit(cache=True)(contact.effective_mass)
-felt_share = njit(cache=True)(contact.felt_share)
-friction_force = njit(cache=True)(contact.friction_force)
-normal_forces = njit(cache=True)(contact.normal_forces)
+effective_mass = kernel(contact.effective_mass)
+felt_share = kernel(contact.felt_share)
+friction_force = kernel(contact.friction_force)
+normal_forces = kernel(contact.normal_forces)
 
 SURFACES = LEFT_WALL, RIGHT_WALL, FLOOR = 0, 1, 2
 #: Columns of a contact's memory; contact 2 i + j is corner j (on walls the lower, on the floor the left one is 0) at surface i.
@@ -88,7 +88,7 @@ class Parameters(NamedTuple):
     time_step: float
 
 
-@njit(cache=True)
+@kernel
 def sampled(samples: Floats, rate: float, t: float) -> float:
     """Linear interpolation in `samples`, `rate` of them a second, the first at t = 0; zero after the last."""
     place = t * rate
@@ -98,7 +98,7 @@ def sampled(samples: Floats, rate: float, t: float) -> float:
     return samples[left] + (place - left) * (samples[left + 1] - samples[left])
 
 
-@njit(cache=True)
+@kernel
 def facing(surface: int, lx: float, ly: float, rx: float, ry: float) -> tuple[float, float, float, float, float, float]:
     """Normal of a surface and offsets of the two corners that face it, from those of the bottom left and right corner."""
     if surface == FLOOR:
@@ -108,13 +108,13 @@ def facing(surface: int, lx: float, ly: float, rx: float, ry: float) -> tuple[fl
     return -1.0, 0.0, rx, ry, -lx, -ly
 
 
-@njit(cache=True)
+@kernel
 def kicked(v: Velocity, inverse: float, nx: float, ny: float, lever: float, impulse: float) -> Velocity:
     """Velocity after an impulse along n with that lever; `inverse` is 1/I = 3/R^2."""
     return v[0] + nx * impulse, v[1] + ny * impulse, v[2] + inverse * lever * impulse
 
 
-@njit(cache=True)
+@kernel
 def with_forces(
     memory: Floats, friction: Floats, inverse: float, surface: int, corners: tuple[float, float, float, float], v: Velocity, step: float
 ) -> Velocity:
@@ -127,7 +127,7 @@ def with_forces(
     return v
 
 
-@njit(cache=True)
+@kernel
 def closes(
     memory: Floats, parameters: Parameters, inverse: float, surface: int, corner: int, rx: float, ry: float, mobility: float,
     coupling: float, rate: float, slip: float, other_gap: float, other_rate: float, t: float,
@@ -158,7 +158,7 @@ def closes(
     return min(FINE * contact_time, FINE_DAMPER / (memory[one, DAMPING] * mobility + 1e-300))
 
 
-@njit(cache=True)
+@kernel
 def response(
     k: float, damping: float, mobility: float, gap: float, before: float, rate: float, step: float, ahead: float
 ) -> tuple[float, float]:
@@ -167,7 +167,7 @@ def response(
     return -k * (gap + ahead * rate) - damping * (before + share * (rate - before)), step * (share * damping + k * ahead)
 
 
-@njit(cache=True)
+@kernel
 def closes_in(parameters: Parameters, gap: float, before: float, rate: float, step: float) -> float:
     """Time from the end of a step until an open contact closes, infinite if that is not soon or too gentle to matter.
 
@@ -181,7 +181,7 @@ def closes_in(parameters: Parameters, gap: float, before: float, rate: float, st
     return (2.0 * gap / (arrival - rate) if rate < 0.0 else (arrival + rate) / -pull) - 0.5 * step
 
 
-@njit(cache=True)
+@kernel
 def press(
     memory: Floats, friction: Floats, parameters: Parameters, inverse: float, surface: int, x: float, y: float,
     corners: tuple[float, float, float, float], v: Velocity, v0: Velocity, step: float, ahead: float, t: float,
@@ -265,13 +265,13 @@ def press(
     return v, closing, fine
 
 
-@njit(cache=True)
+@kernel
 def wall_force(memory: Floats) -> float:
     """Sum of the forces of the walls."""
     return memory[0, FORCE] + memory[1, FORCE] + memory[2, FORCE] + memory[3, FORCE]
 
 
-@njit(cache=True)
+@kernel
 def flush(memory: Floats, until: float, events: Floats, n_events: int) -> int:
     """Write the strikes that began by `until` into `events` behind the first `n_events`; returns how many there are then."""
     for i in range(len(memory)):
@@ -282,7 +282,7 @@ def flush(memory: Floats, until: float, events: Floats, n_events: int) -> int:
     return n_events
 
 
-@njit(cache=True)
+@kernel
 def advance(
     parameters: Parameters,
     first_row: int,

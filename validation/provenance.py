@@ -111,6 +111,7 @@ def syntax(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
+@cache
 def _essence(path: Path) -> str:
     tree = ast.parse(path.read_text(encoding="utf-8"))
     for node in ast.walk(tree):
@@ -119,6 +120,7 @@ def _essence(path: Path) -> str:
     return ast.dump(tree)
 
 
+@cache
 def version_of(library: str) -> str:
     """A distribution's version, "absent" where it is not installed."""
     try:

@@ -128,7 +128,9 @@ def _not_finite(history: History) -> str:
 
 
 def _plain(settings: Any) -> dict[str, Any]:
-    return {str(key): value if isinstance(value, str | int | float | bool | None) else str(value) for key, value in settings.items()}
+    """Settings as JSON has them, in the order in which the store gives them back."""
+    plain = {str(key): value if isinstance(value, str | int | float | bool | None) else str(value) for key, value in settings.items()}
+    return dict(sorted(plain.items()))
 
 
 def local(tasks: Sequence[Task | BatchTask], *, jobs: int, seconds: Sequence[float], memory_mb: float) -> Iterator[tuple[int, Played]]:

@@ -95,6 +95,7 @@ def _reread(run, path):
     sys.modules.pop("faulty", None)
     provenance.code_digest.cache_clear()
     provenance.syntax.cache_clear()
+    provenance._essence.cache_clear()
     return run(path)
 
 
