@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from engines.base_motion import BaseVelocity, starts_of_motion
 from engines.contacts import Contact, contacts_of
 from scenes import ModelFailure, Scene
+from scenes.progress import tell
 
 FloatArray = NDArray[np.float64]
 Vector = tuple[float, float, float]  # along x, y and theta
@@ -111,6 +112,8 @@ def march_adaptively(scene: Scene, push: Push, longest: float) -> tuple[FloatArr
         times.append(t)
         states.append((*pose, *velocity))
         felt.append(feels)
+        if len(times) % 512 == 0:
+            tell(t / end)
         if not abs(velocity[2]) < 1e6 or len(times) > most_steps:  # nan, too
             raise ModelFailure(f"no end to the events, or a motion that blew up, after {len(times)} steps at t = {t:g} s")
     return np.array(times), np.array(states), np.array(felt).reshape(-1, 2)

@@ -22,6 +22,7 @@ from scenes import Block, Cost, History, InputError, ModelFailure, Record, Rest,
 from scenes.base import Frozen, Positive
 from scenes.errors import printable
 from scenes.observation import observe
+from scenes.progress import tell
 
 FloatArray = NDArray[np.float64]
 Marched = tuple[FloatArray, FloatArray, FloatArray]  # times (n) and states (n, 6) at step ends, felt accelerations (n-1, 2)
@@ -162,6 +163,7 @@ def _march(world: World, scene: Scene, times: FloatArray, felt: FloatArray) -> M
     pieces = [np.array(scene.initial_state)[None, :]]
     world.place(pieces[0][0])
     for first in range(0, len(felt), STEPS_AT_ONCE):
+        tell(first / len(felt))
         states = world.march(felt[first : first + STEPS_AT_ONCE], dt)
         tipped = np.flatnonzero(np.abs(states[:, 2]) >= math.pi / 2)
         if tipped.size:

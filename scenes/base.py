@@ -23,4 +23,4 @@ class Frozen(BaseModel):
         try:
             super().__init__(**data)
         except ValidationError as error:
-            raise from_validation(error) from None
+            raise from_validation(error, type(self).model_fields) from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 
@@ -26,10 +27,15 @@ class ModelFailure(RuntimeError):
 
 def unknown_name(what: str, name: str, allowed: Iterable[str]) -> InputError:
     """An `InputError` for a name that is not among `allowed`, suggesting the nearest one."""
+    return InputError(f"unknown {what} {printable(name)!r}{suggestion(name, allowed)}")
+
+
+def suggestion(name: str, allowed: Iterable[str]) -> str:
+    """What to say after a name that is not among `allowed`: the nearest one, and all of them."""
     names = sorted(allowed)
     near = get_close_matches(name, names, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
-    return InputError(f"unknown {what} {printable(name)!r}; {hint}allowed: {', '.join(names)}")
+    return f"; {hint}allowed: {', '.join(names)}" if names else ""
 
 
 def printable(value: object, limit: int = 80) -> str:
@@ -38,8 +44,8 @@ def printable(value: object, limit: int = 80) -> str:
     return text if len(text) <= limit else text[: limit - 3] + "..."
 
 
-def from_validation(error: ValidationError) -> InputError:
-    """The first fault that pydantic found, as one line: key, value, what is allowed."""
+def from_validation(error: ValidationError, keys: Iterable[str] = ()) -> InputError:
+    """The first fault that pydantic found, as one line: key, value, what is allowed. `keys` are those that could be given."""
     fault = error.errors(include_url=False)[0]
     path = [str(part) for part in fault["loc"]]
     if path[:1] in (["excitation"], ["vertical"]):
@@ -50,9 +56,12 @@ def from_validation(error: ValidationError) -> InputError:
     message = fault["msg"].removeprefix("Value error, ")
     key = ".".join(path)
     if fault["type"] == "extra_forbidden":
-        return InputError("unknown key", key)
+        return InputError(f"unknown key{suggestion(path[-1], keys)}", key)
     if fault["type"] == "missing":
         return InputError("is missing", key)
+    if fault["type"] == "union_tag_invalid":
+        known = re.findall(r"'([^']*)'", str(fault["ctx"]["expected_tags"]))
+        return InputError(str(unknown_name("kind", str(fault["ctx"]["tag"]), known)), key)
     if isinstance(fault["input"], int | float | str | bool):
         message = f"{printable(fault['input'])!s} is not allowed: {message[0].lower()}{message[1:]}"
     return InputError(message, key)

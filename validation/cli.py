@@ -5,24 +5,76 @@ Exit codes: 0 pass, 1 out of tolerance, 2 bad input, 3 a model failed.
 
 from __future__ import annotations
 
+import inspect
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any
 
 import typer
 
 from scenes import InputError, ModelFailure
 from scenes.errors import printable
-from validation.commands import accept, benchmark, compare, convergence, report, scenes, simulate, spectrum, stress, validate
+from validation.commands import (
+    accept,
+    benchmark,
+    compare,
+    convergence,
+    new,
+    report,
+    scenes,
+    simulate,
+    speaking,
+    spectrum,
+    stress,
+    validate,
+)
+
+#: The commands, in the order of the help, each with an example.
+COMMANDS = {
+    scenes: "rockcheck scenes",
+    new: "rockcheck new bookcase.toml",
+    simulate: "rockcheck simulate fig5a --model mujoco --set time_step=1e-3 -o mujoco.csv",
+    compare: "rockcheck compare ebm.csv mujoco.csv --until 8",
+    validate: "rockcheck validate smoke --out rockcheck-report",
+    accept: 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"',
+    spectrum: "rockcheck spectrum --figure 8 --size 50 --refine",
+    benchmark: "rockcheck benchmark --quick",
+    convergence: "rockcheck convergence --quick",
+    stress: "rockcheck stress",
+    report: "rockcheck report rockcheck-report",
+}
+
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Nothing but errors; the exit code tells.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="The result as JSON on stdout, instead of tables.")]
 
 app = typer.Typer(
     name="rockcheck",
     help="Simulate a rigid block on a shaking floor with several models, compare them, and judge them against tolerances.",
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for module in (scenes, simulate, compare, validate, accept, spectrum, benchmark, convergence, stress, report):
-    app.command(name=module.__name__.rpartition(".")[2])(module.run)
+
+
+def spoken(run: Callable[..., None]) -> Callable[..., None]:
+    """A command with the options that all of them have: --quiet and --json."""
+
+    def command(*, quiet: bool, as_json: bool, **arguments: Any) -> None:
+        with speaking("json" if as_json else "quiet" if quiet else "tables"):
+            run(**arguments)
+
+    signature = inspect.signature(run, eval_str=True)
+    common = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=option)
+        for name, option in (("quiet", QuietOption), ("as_json", JsonOption))
+    ]
+    command.__doc__ = run.__doc__
+    command.__signature__ = signature.replace(parameters=[*signature.parameters.values(), *common])  # type: ignore[attr-defined]
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in (*signature.parameters.values(), *common)}
+    return command
+
+
+for module, example in COMMANDS.items():
+    app.command(name=module.__name__.rpartition(".")[2], epilog=f"Example: {example}")(spoken(module.run))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

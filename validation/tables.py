@@ -6,6 +6,7 @@ import csv
 import io
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 from rich.table import Table
 from rich.text import Text
@@ -32,11 +33,34 @@ def verdict_table(run: Run) -> Table:
     return table
 
 
+def summary(run: Run) -> dict[str, Any]:
+    """The verdicts in a few plain values: of the run, of each cell, and why anything is not a pass."""
+    return {
+        "suite": run.suite,
+        "verdict": run.verdict,
+        "exit_code": run.exit_code,
+        "wall_seconds": run.wall_seconds,
+        "cells": [
+            {
+                "scene": cell.scene,
+                "model": cell.model,
+                "outcome": cell.outcome,
+                "checks": len(cell.checks),
+                "verdict": cell.verdict if cell.checks or cell.status == "failed" else None,
+            }
+            for cell in run.cells
+        ],
+        "reasons": list(verdict_lines(run)),
+    }
+
+
 def verdict_lines(run: Run) -> Iterator[str]:
     """Why anything is not a pass, a line each."""
     yield from run.faults
     for cell in run.cells:
         yield from cell_lines(cell)
+    if not any(cell.checks or cell.status == "failed" for cell in run.cells):
+        yield "nothing was judged: the suite requires no measure and has no tolerance"
 
 
 def cell_lines(cell: Cell) -> Iterator[str]:

@@ -1,15 +1,22 @@
-"""The commands of `rockcheck`, a module each, and the options that they share."""
+"""The commands of `rockcheck`, a module each, and what they share: options, tables on stdout, progress on stderr, JSON."""
 
 from __future__ import annotations
 
+import json
+import math
 import os
+import re
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 import typer
 from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from scenes import InputError
+from scenes import InputError, named_scenes
 from scenes.errors import printable
 
 OUT = Path("rockcheck-report")
@@ -20,10 +27,78 @@ SchedulerOption = Annotated[
     str | None, typer.Option("--scheduler", help="Run on a Dask cluster instead: its address, or local:N for N local workers.")
 ]
 
+#: What a command says: tables and progress, one JSON value instead, or nothing but errors.
+Voice = Literal["tables", "json", "quiet"]
+_voice: ContextVar[Voice] = ContextVar("voice", default="tables")
+
+
+@contextmanager
+def speaking(voice: Voice) -> Iterator[None]:
+    """Within this block commands speak like that."""
+    token = _voice.set(voice)
+    try:
+        yield
+    finally:
+        _voice.reset(token)
+
 
 def console() -> Console:
-    """Where tables go: stdout, at most as wide as the terminal, 80 columns where there is none."""
-    return Console(markup=False, highlight=False)
+    """Where tables go: stdout, at most as wide as the terminal, 80 columns where there is none; coloured on a terminal only."""
+    return Console(markup=False, highlight=False, quiet=_voice.get() != "tables")
+
+
+def answer(value: Any) -> None:
+    """The command's result as JSON on stdout, where `--json` asks for it; numbers that are not finite become null."""
+    if _voice.get() == "json":
+        print(json.dumps(_finite(value), indent=1, allow_nan=False, default=str))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+@contextmanager
+def progress(title: str) -> Iterator[Callable[..., None]]:
+    """A bar on stderr with the time left, on a terminal only.
+
+    Gives a function of the parts done, the parts in all, and a few words on the last one.
+    """
+    screen = Console(stderr=True)
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(20),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        TextColumn("left"),
+        console=screen,
+        transient=True,
+        disable=not screen.is_terminal or _voice.get() != "tables",  # a pipe would get an empty line
+    )
+    with bar:
+        task = bar.add_task(title, total=None)
+
+        def tell(done: float, of: float, what: str = "") -> None:
+            bar.update(task, completed=done, total=of, description=f"{title}: {printable(what, 24)}" if what else title)
+
+        yield tell
+
+
+@contextmanager
+def told(title: str) -> Iterator[Callable[[str], None]]:
+    """`progress` for studies that tell a line of words: "3 of 40 runs: ..." moves the bar."""
+    with progress(title) as tell:
+
+        def hear(words: str) -> None:
+            count = re.match(r"(\d+) of (\d+)", words)
+            done, of = (int(count[1]), int(count[2])) if count else (0, 1)
+            tell(done, of, words.partition(": ")[2] if count else words)
+
+        yield hear
 
 
 def usable_folder(path: Path) -> Path:
@@ -35,3 +110,26 @@ def usable_folder(path: Path) -> Path:
     if not os.access(path, os.W_OK | os.X_OK):
         raise InputError(f"{printable(path)}: not writable")
     return path
+
+
+def scene_names(incomplete: str) -> list[str]:
+    """For the shell's completion: scenes that come with the package, and scene files here."""
+    return [name for name in (*named_scenes(), *_files(".toml")) if name.startswith(incomplete)]
+
+
+def suite_names(incomplete: str) -> list[str]:
+    """For the shell's completion: suites that come with the package, and suite files here."""
+    from validation.suites import named_suites
+
+    return [name for name in (*named_suites(), *_files(".toml")) if name.startswith(incomplete)]
+
+
+def model_names(incomplete: str) -> list[str]:
+    """For the shell's completion."""
+    from validation.models import FAMILIES
+
+    return [name for name in FAMILIES if name.startswith(incomplete)]
+
+
+def _files(suffix: str) -> list[str]:
+    return sorted(path.name for path in Path().glob(f"*{suffix}"))

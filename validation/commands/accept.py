@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from validation.acceptance import accept
-from validation.commands import OUT, JobsOption, OutOption, SchedulerOption, console, usable_folder
+from validation.commands import OUT, JobsOption, OutOption, SchedulerOption, answer, console, usable_folder
 from validation.commands.validate import ForceOption, SuiteArgument, play_suite
 from validation.suites import load_suite
 
@@ -20,7 +20,10 @@ def run(
     force: ForceOption = False,
     scheduler: SchedulerOption = None,
 ) -> None:
-    """Write today's figures into the suite's tolerances, showing each change. Limits are loosened only with --reason."""
+    """Make today's figures the expected ones.
+
+    They are written into the suite's tolerances, each change is shown. Limits are loosened only with --reason.
+    """
     name = suite or "paper"
     finished = play_suite(name, usable_folder(out), jobs, force, False, scheduler)
     changes, refused = accept(load_suite(name), finished, reason)
@@ -30,5 +33,6 @@ def run(
     screen.print(f"{len(changes)} changes in {finished.tolerances_file}", soft_wrap=True)
     for line in refused:
         screen.print(f"not accepted: {line}", style="red", soft_wrap=True)
+    answer({"changes": changes, "refused": refused, "file": finished.tolerances_file})
     failed = any(cell.status == "failed" for cell in finished.cells)
     raise typer.Exit(3 if failed else int(bool(refused)))

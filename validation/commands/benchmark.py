@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from scenes.errors import unknown_name
-from validation.commands import OUT, JobsOption, OutOption, console, usable_folder
+from validation.commands import OUT, JobsOption, OutOption, answer, console, told, usable_folder
 from validation.results import write_whole
 
 if TYPE_CHECKING:
@@ -37,8 +37,8 @@ def run(
     if what not in get_args(benchmark.What):
         raise unknown_name("benchmark", what, get_args(benchmark.What))
     folder = usable_folder(out)
-    with Console(stderr=True).status("benchmark") as status:
-        found = benchmark.run_benchmark(what, quick=quick, jobs=jobs, minutes=minutes, progress=status.update)  # type: ignore[arg-type]
+    with told("benchmark") as tell:
+        found = benchmark.run_benchmark(what, quick=quick, jobs=jobs, minutes=minutes, progress=tell)  # type: ignore[arg-type]
         from reports.benchmark import write_benchmark
         from validation.benchmark_tables import markdown
 
@@ -47,6 +47,7 @@ def run(
         index = write_benchmark(found, folder)
     show(found, console())
     console().print(f"report: {index}", soft_wrap=True)
+    answer({"report": index, "tables": sorted(folder.glob("*.csv")), "data": sorted(folder.glob("*.json"))})
 
 
 def show(found: Benchmark, out: Console) -> None:

@@ -9,7 +9,7 @@ import typer
 from rich.table import Table
 
 from scenes import load_scene
-from validation.commands import console
+from validation.commands import answer, console, scene_names
 from validation.discrepancy import compare
 from validation.measured import read_measured
 
@@ -19,7 +19,7 @@ def run(
     candidate: Annotated[Path, typer.Argument(help="History of the candidate, CSV.")],
     offset: Annotated[float, typer.Option("--offset", help="Added to the candidate's times, s, to align a measured history.")] = 0.0,
     until: Annotated[float | None, typer.Option("--until", help="End of the window, s (default: the whole common time).")] = None,
-    scene: Annotated[str | None, typer.Option("--scene", help="Scene of both: its block and gravity.")] = None,
+    scene: Annotated[str | None, typer.Option("--scene", help="Scene of both: its block and gravity.", autocompletion=scene_names)] = None,
 ) -> None:
     """Compare two histories, measure by measure.
 
@@ -37,3 +37,13 @@ def run(
     out.print(table)
     if found.gap:
         out.print(f"not the whole time: {found.gap}")
+    answer(
+        {
+            "reference": found.reference,
+            "candidate": found.candidate,
+            "start": found.start,
+            "end": found.end,
+            "gap": found.gap,
+            "figures": [{"measure": f.measure, "value": f.value, "unit": f.unit, "note": f.note} for f in found.figures],
+        }
+    )

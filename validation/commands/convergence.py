@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
-from validation.commands import OUT, JobsOption, OutOption, console, usable_folder
+from validation.commands import OUT, JobsOption, OutOption, answer, console, told, usable_folder
 
 if TYPE_CHECKING:
     from validation.convergence import Convergence
@@ -19,21 +20,24 @@ def run(
     quick: Annotated[bool, typer.Option("--quick", help="Three scenes without the finest steps, below a minute.")] = False,
     jobs: JobsOption = None,
 ) -> None:
-    """What engines and CM converge to beside a wall, as their steps fall: the unilateral event-based model, not the paper's.
+    """What engines and CM converge to beside a wall.
+
+    As their steps fall they tend to the unilateral event-based model, not to the paper's.
 
     Writes a page with a diagram and tables, and the tables as CSV.
     """
     from validation import convergence
 
     folder = usable_folder(out)
-    with Console(stderr=True).status("convergence") as status:
-        found = convergence.run_convergence(quick=quick, jobs=jobs, progress=status.update)
+    with told("convergence") as tell:
+        found = convergence.run_convergence(quick=quick, jobs=jobs, progress=tell)
         convergence.save(found, folder)
         from reports.convergence import write_convergence
 
         index = write_convergence(found, folder)
     show(found, console())
     console().print(f"report: {index}", soft_wrap=True)
+    answer(asdict(found) | {"report": index})
 
 
 def show(found: Convergence, out: Console) -> None:

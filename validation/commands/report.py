@@ -7,12 +7,16 @@ from typing import Annotated
 
 import typer
 
-from validation.commands import console
-from validation.publish import render
+from scenes.progress import listening
+from validation.commands import answer, console, progress
+from validation.publish import publish
 from validation.results import Run
 
 
 def run(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a finished run.")]) -> None:
-    """Render the report of a finished run again."""
+    """Render the pages of a finished run again."""
     Run.load(folder)
-    console().print(f"report: {render(folder)}", soft_wrap=True)
+    with progress("pages") as tell, listening(lambda share: tell(share, 1.0)):
+        index = publish(folder, afresh=True)
+    console().print(f"report: {index}", soft_wrap=True)
+    answer({"report": index})

@@ -7,17 +7,21 @@ from collections.abc import Iterable
 from rich.table import Table
 
 from scenes import load_scene, named_scenes
-from validation.commands import console
+from validation.commands import answer, console
 from validation.models import FAMILIES
 from validation.suites import describe_suite, named_suites
 
 
 def run() -> None:
     """List the named scenes, suites and models, with a line each."""
-    out = console()
-    out.print(_listing("scene", ((name, load_scene(name).description) for name in named_scenes())))
-    out.print(_listing("suite", ((name, describe_suite(path)) for name, path in named_suites().items())))
-    out.print(_listing("model", ((name, family.summary) for name, family in FAMILIES.items())))
+    listings = {
+        "scene": {name: load_scene(name).description for name in named_scenes()},
+        "suite": {name: describe_suite(path) for name, path in named_suites().items()},
+        "model": {name: family.summary for name, family in FAMILIES.items()},
+    }
+    for title, rows in listings.items():
+        console().print(_listing(title, rows.items()))
+    answer({f"{title}s": rows for title, rows in listings.items()})
 
 
 def _listing(title: str, rows: Iterable[tuple[str, str]]) -> Table:

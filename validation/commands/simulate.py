@@ -11,31 +11,47 @@ import typer
 
 from scenes import InputError, load_scene
 from scenes.errors import printable
-from validation.commands import console
+from scenes.progress import listening
+from validation.commands import answer, console, model_names, progress, scene_names
 from validation.models import FAMILIES, build
 from validation.store import name_of
 
 
 def run(
-    scene: Annotated[str, typer.Argument(help="A named scene or a .toml file.")],
-    model: Annotated[str, typer.Option("--model", help=f"One of {', '.join(FAMILIES)}.")],
+    scene: Annotated[str, typer.Argument(help="A named scene or a .toml file.", autocompletion=scene_names)],
+    model: Annotated[str, typer.Option("--model", help=f"One of {', '.join(FAMILIES)}.", autocompletion=model_names)],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="CSV to write (default: SCENE--MODEL.csv).")] = None,
     settings: Annotated[list[str] | None, typer.Option("--set", help="A setting of the model, such as time_step=1e-4; repeatable.")] = None,
 ) -> None:
-    """Simulate one scene with one model and write its history (CSV; events go to a second file beside it)."""
+    """Simulate one scene with one model.
+
+    Writes the history as CSV; its events go to a second file beside it.
+    """
     sys.path.append(str(Path.cwd()))  # where a model of the user's own ("module:Class") may lie
     player = build(model, dict(_setting(text) for text in settings or []))
     what = load_scene(scene)
     path = output or Path(f"{name_of(what.name, model)}.csv")
     if not path.parent.is_dir():
         raise InputError(f"{printable(path.parent)}: no such folder", "--output")
-    history = player.simulate(what)
+    with progress(f"{what.name}, {model}") as tell, listening(lambda share: tell(share, 1.0)):
+        history = player.simulate(what)
     try:
         history.save(path)
     except OSError as error:
         raise InputError(f"{printable(path)}: cannot be written: {error.strerror}", "--output") from None
     peak = history.peak_rotation / what.block.alpha
     console().print(f"{what.name}, {model}: {history.outcome}, peak rotation {peak:.4g} alpha, {history.cost.wall_seconds:.2g} s -> {path}")
+    answer(
+        {
+            "scene": what.name,
+            "model": model,
+            "outcome": history.outcome,
+            "peak_rotation_alpha": peak,
+            "wall_seconds": history.cost.wall_seconds,
+            "notes": history.notes,
+            "history": path,
+        }
+    )
 
 
 def _setting(text: str) -> tuple[str, Any]:

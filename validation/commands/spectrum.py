@@ -7,21 +7,20 @@ import math
 import os
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
+from pydantic import BaseModel
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from ebm import Spectrum
 from ebm.spectrum import LEFT, RIGHT
 from scenes import InputError, load_scene
 from scenes.errors import unknown_name
-from validation.commands import OUT, JobsOption, OutOption, SchedulerOption, console, usable_folder
+from validation.commands import OUT, JobsOption, OutOption, SchedulerOption, answer, console, progress, scene_names, usable_folder
 from validation.results import write_whole
 from validation.spectra import (
     AMPLITUDES,
@@ -47,7 +46,10 @@ MOST_SIZE = 5000
 def run(
     figure: Annotated[str | None, typer.Option("--figure", help="6, 7, 8, 9 or all: the paper's figures.")] = None,
     scene: Annotated[
-        str | None, typer.Option("--scene", help="Your own block, walls, friction and pulse or record: a name or .toml file.")
+        str | None,
+        typer.Option(
+            "--scene", help="Your own block, walls, friction and pulse or record: a name or .toml file.", autocompletion=scene_names
+        ),
     ] = None,
     size: Annotated[int, typer.Option("--size", help="Nodes an axis.")] = 100,
     frequencies: Annotated[
@@ -72,7 +74,10 @@ def run(
     scheduler: SchedulerOption = None,
     force: Annotated[bool, typer.Option("--force", help="Run everything, also what is up to date.")] = False,
 ) -> None:
-    """Overturning spectra: the figures of the paper, or your own grid. What is finished is kept, and read back next time."""
+    """Overturning spectra: the paper's, or your own.
+
+    What is finished is kept, and read back next time.
+    """
     panels = _panels(figure, scene)
     asked = _asked(size, frequencies, amplitudes, pivot, model, tolerance, refine)
     if records and not fragility:
@@ -97,7 +102,9 @@ def run(
             _spectra(panels, asked, tiles, data, screen)
     from reports.spectra import write_page
 
-    screen.print(f"report: {write_page(folder)}", soft_wrap=True)
+    page = write_page(folder)
+    screen.print(f"report: {page}", soft_wrap=True)
+    answer({"report": page, "tables": sorted(data.glob("*.csv")), "data": sorted(data.glob("*.json"))})
 
 
 def _panels(figure: str | None, scene: str | None) -> list[Panel]:
@@ -221,47 +228,56 @@ def _claims(spectra: Sequence[Spectrum], asked: Asked, tiles: Tiles, data: Path,
 
 
 def _verify(panels: Sequence[Panel], asked: Asked, tiles: Tiles, data: Path, screen: Console) -> None:
+    from validation.refinement import COLUMNS, verify
+
     nodes = len(asked.frequencies) * len(asked.amplitudes)
     warm_up(panels[0], asked)
-    rows = [("spectrum", "nodes", "runs of the refined", "nodes a run", "wrong nodes")]
-    runs = wrong = 0
+    finished = 0
     with _bar("refined and full", 2 * nodes * len(panels)) as advance:
+
+        def done(panel: Panel) -> None:
+            nonlocal finished
+            finished += 1
+            advance(to=2 * nodes * finished)
+
         tiles.progress = advance
-        for n, panel in enumerate(panels):
-            full, refined = (play_panels([panel], replace(asked, refine=refine), tiles)[0] for refine in (False, True))
-            differ = int((full.outcomes != refined.outcomes).sum())
-            rows.append((panel.name, str(nodes), str(refined.evaluations), f"{nodes / refined.evaluations:.1f}", str(differ)))
-            runs, wrong = runs + refined.evaluations, wrong + differ
-            advance(to=2 * nodes * (n + 1))
-    rows.append(("all", str(nodes * len(panels)), str(runs), f"{nodes * len(panels) / runs:.1f}", str(wrong)))
-    write_whole(data / "refinement.csv", "\n".join(",".join(row) for row in rows) + "\n")
-    table = Table(box=None, pad_edge=False)
-    for number, column in enumerate(rows[0]):
-        table.add_column(column, justify="right" if number else "left")
-    for row in rows[1:]:
-        table.add_row(*row)
-    screen.print(table)
+        found = verify(panels, asked, tiles, done)
+    _write_table("refinement", found, (COLUMNS, *found.rows), data)
+    screen.print(_table(COLUMNS, found.rows, words=1))
 
 
 def _agreement(panels: Sequence[Panel], asked: Asked, count: int, tiles: Tiles, data: Path, screen: Console) -> None:
-    from validation.agreement import CANDIDATES, agree
+    from reports.spectra import MAPS, maps_figure, write
+    from validation.agreement import CANDIDATES, MAP_SIZE, agree, mapped
 
     if asked.model != "ebm":
         raise InputError("cannot be given together with --model or --pivot: all models are compared", "--agreement")
     if not 2 <= count <= len(asked.frequencies) * len(asked.amplitudes):
         raise InputError(f"{count} is not allowed: 2 up to the spectrum's nodes are asked for", "--agreement")
     spectra = play_panels(panels, asked, tiles)
-    with _bar("agreement", count * len(CANDIDATES) * len(panels)) as advance:
+    on_maps = MAP_SIZE**2 * len(mapped(panels)) * (1 + len(CANDIDATES))
+    with _bar("agreement", count * len(CANDIDATES) * len(panels) + on_maps) as advance:
         tiles.progress = advance
         found = agree(panels, spectra, asked, count, tiles)
-    write_whole(data / "agreement.json", found.model_dump_json(indent=1) + "\n")
-    write_whole(data / "agreement.csv", "\n".join(",".join(row) for row in (found.columns, *found.rows)) + "\n")
+    _write_table("agreement", found, (found.columns, *found.rows), data)
+    write(maps_figure(found, mapped(panels)), data / MAPS)
+    screen.print(_table(found.columns, found.rows[: len(CANDIDATES)], words=2))
+
+
+def _write_table(name: str, found: BaseModel, rows: Sequence[Sequence[str]], data: Path) -> None:
+    """Write what was found as JSON and its table as CSV."""
+    write_whole(data / f"{name}.json", found.model_dump_json(indent=1) + "\n")
+    write_whole(data / f"{name}.csv", "\n".join(",".join(row) for row in rows) + "\n")
+
+
+def _table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, words: int) -> Table:
+    """A table whose first `words` columns are words, the others numbers."""
     table = Table(box=None, pad_edge=False)
-    for n, column in enumerate(found.columns):
-        table.add_column(column, justify="right" if n > 1 else "left")
-    for row in found.rows[: len(CANDIDATES)]:
+    for n, column in enumerate(columns):
+        table.add_column(column, justify="right" if n >= words else "left")
+    for row in rows:
         table.add_row(*row)
-    screen.print(table)
+    return table
 
 
 def _fragility(panels: Sequence[Panel], asked: Asked, records: Sequence[Path], tiles: Tiles, data: Path, screen: Console) -> None:
@@ -285,22 +301,14 @@ def _fragility(panels: Sequence[Panel], asked: Asked, records: Sequence[Path], t
 
 @contextlib.contextmanager
 def _bar(what: str, total: int) -> Iterator[Any]:
-    """A progress bar on stderr with the time left; gives a function that advances it by a count, or `to` a place."""
-    screen = Console(stderr=True)
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-        TextColumn("left"),
-        console=screen,
-        transient=True,
-        disable=not screen.is_terminal,  # a pipe would get an empty line
-    )
-    with bar:
-        task = bar.add_task(what, total=total)
+    """`progress` as a function that advances it by a count, or `to` a place."""
+    place = 0
+    with progress(what) as tell:
+        tell(0, total)
 
         def advance(count: int = 0, *, to: int | None = None) -> None:
-            bar.update(task, advance=count) if to is None else bar.update(task, completed=to)
+            nonlocal place
+            place = place + count if to is None else to
+            tell(place, total)
 
         yield advance

@@ -7,19 +7,19 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from scenes import InputError
+from scenes.progress import listening
 from validation import remote, workers
-from validation.commands import OUT, JobsOption, OutOption, SchedulerOption, console, usable_folder
+from validation.commands import OUT, JobsOption, OutOption, SchedulerOption, answer, console, progress, suite_names, usable_folder
 from validation.publish import keep, publish
 from validation.results import Run
 from validation.runner import run_suite
 from validation.suites import load_suite
-from validation.tables import verdict_lines, verdict_table
+from validation.tables import summary, verdict_lines, verdict_table
 
 ForceOption = Annotated[bool, typer.Option("--force", help="Run every cell, also those whose results are up to date.")]
-SuiteArgument = Annotated[str | None, typer.Argument(help="A named suite or a .toml file (default: paper).")]
+SuiteArgument = Annotated[str | None, typer.Argument(help="A named suite or a .toml file (default: paper).", autocompletion=suite_names)]
 
 
 def run(
@@ -32,7 +32,9 @@ def run(
     scheduler: SchedulerOption = None,
     report: Annotated[bool, typer.Option("--report/--no-report", help="Render the pages; without them only run.json and tables.")] = True,
 ) -> None:
-    """Run every model of a suite on every scene, compare, judge, and write the report.
+    """Run a suite, compare, judge, write the report.
+
+    Every model on every scene; cells whose results are up to date are read back.
 
     Exit 0: within tolerance. 1: out of tolerance. 2: bad input. 3: a model failed.
     """
@@ -42,29 +44,23 @@ def run(
     finished = play_suite(suite or ("smoke" if quick else "paper"), folder, jobs, force, strict, scheduler)
     kept = keep(finished, folder)
     show(finished, console())
-    console().print(f"report: {publish(finished, folder) if report else kept}", soft_wrap=True)
+    page = _published(folder, jobs) if report else kept
+    console().print(f"report: {page}", soft_wrap=True)
+    answer(summary(finished) | {"report": page})
     raise typer.Exit(finished.exit_code)
 
 
 def play_suite(suite: str, folder: Path, jobs: int | None, force: bool, strict: bool, scheduler: str | None) -> Run:
     """Run a suite with a progress bar on stderr."""
     loaded = load_suite(suite)
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    )
-    with bar:
-        task = bar.add_task(loaded.name, total=None)
+    play = workers.local if scheduler is None else remote.OnCluster(scheduler)
+    with progress(loaded.name) as tell:
+        return run_suite(loaded, folder, jobs=jobs, force=force, strict=strict, play=play, progress=tell)
 
-        def progress(done: int, of: int, what: str) -> None:
-            bar.update(task, completed=done, total=of, description=f"{loaded.name}: {what[:40]}")
 
-        play = workers.local if scheduler is None else remote.OnCluster(scheduler)
-        return run_suite(loaded, folder, jobs=jobs, force=force, strict=strict, play=play, progress=progress)
+def _published(folder: Path, jobs: int | None) -> Path:
+    with progress("pages") as tell, listening(lambda share: tell(share, 1.0)):
+        return publish(folder, jobs=jobs)
 
 
 def show(finished: Run, out: Console) -> None:
