@@ -5,14 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 
-def write_site(folder: str | Path) -> Path:
+def write_site(folder: str | Path, *, jobs: int = 1, afresh: bool = True) -> Path:
     """Write `index.html` and a page a scene for the finished run in `folder` (`run.json`, `histories/`); returns the index.
 
-    The pages open from the file system and ask nothing of any other place. Raises `InputError` where there is no run.
+    The pages open from the file system and ask nothing of any other place. They are drawn in up to `jobs` processes, and
+    unless `afresh` only where they would show something else. Raises `InputError` where there is no run.
     """
     from reports.site import write_site as write
 
-    return write(Path(folder))
+    return write(Path(folder), jobs=jobs, afresh=afresh)
 
 
 __all__ = ["write_site"]

@@ -67,17 +67,29 @@ class Band:
 class SceneView:
     """One scene of a finished run, ready to be drawn.
 
-    `t` is every `stride`-th output time (s); `histories` those that could be read, in the run's order, and `missing` says
-    by model why one could not.
+    `t` is every `stride`-th output time (s). Histories are read from the run's `folder` when they are asked for.
     """
 
     run: Run
     name: str
     slug: str
     scene: Scene
-    histories: dict[str, History]
-    missing: dict[str, str]
+    folder: Path
     stride: int
+
+    @property
+    def histories(self) -> dict[str, History]:
+        """By model, in the run's order: the histories that could be read."""
+        return self._read[0]
+
+    @property
+    def missing(self) -> dict[str, str]:
+        """By model: why there is no history."""
+        return self._read[1]
+
+    @cached_property
+    def _read(self) -> tuple[dict[str, History], dict[str, str]]:
+        return _read(self.cells, self.folder)
 
     @property
     def cells(self) -> tuple[Cell, ...]:
@@ -212,9 +224,9 @@ def scene_views(run: Run, folder: Path, most_values: int = 2_000_000) -> list[Sc
     views = []
     for name in run.scenes:
         scene = run.load_scene(name)
-        histories, missing = _read(run.of_scene(name), folder)
-        values = len(scene.output_times) * (len(CHANNELS) + 2) * max(1, len(histories))
-        views.append(SceneView(run, name, slugs[name], scene, histories, missing, max(1, math.ceil(values / max(share, 20_000.0)))))
+        columns = (len(CHANNELS) + 2) * max(1, sum(cell.status == "done" for cell in run.of_scene(name)))
+        values = (scene.duration / scene.output_step + 1.0) * columns
+        views.append(SceneView(run, name, slugs[name], scene, folder, max(1, math.ceil(values / max(share, 20_000.0)))))
     return views
 
 

@@ -169,6 +169,12 @@ def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture
+def finished(tmp_path: Path) -> Run:
+    """A finished run in `tmp_path`, for tests that change it."""
+    return make_run(tmp_path)
+
+
 @pytest.fixture(scope="session")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a finished run and its pages."""

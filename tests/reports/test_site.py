@@ -249,3 +249,43 @@ def test_numbers_for_people() -> None:
     assert [number(v) for v in (None, 0.0, -0.5, 1.23456e-7, 5300.0)] == ["–", "0", "−0.5", "1.23·10⁻⁷", "5.3·10³"]
     assert [ratio(v) for v in (None, 1.0, 0.054, 5876.0)] == ["–", "1×", "0.054×", "5\u202f876×"]
     assert base64.b64decode(packed([1.0])) == b"\x00\x00\x80\x3f"
+
+
+def files_of(site: Path) -> dict[str, tuple[int, bytes]]:
+    """By name: time of writing and content of all that belongs to the scenes' pages."""
+    found = (path for path in (site / PAGES).rglob("*") if path.is_file() and path.parent.name != "assets")
+    return {path.relative_to(site / PAGES).as_posix(): (path.stat().st_mtime_ns, path.read_bytes()) for path in found}
+
+
+def test_only_what_would_show_something_else_is_written_again(tmp_path: Path, site: Path, finished: Run) -> None:
+    write_site(tmp_path, jobs=2)
+    first = files_of(tmp_path)
+    assert {name: content for name, (_, content) in first.items()} == {name: content for name, (_, content) in files_of(site).items()}
+
+    cells = tuple(cell.model_copy(update={"read_back": True}) for cell in finished.cells)
+    finished.model_copy(update={"created": "2026-01-02T00:00:00+00:00", "wall_seconds": 1.0, "cells": cells}).save(tmp_path)
+    write_site(tmp_path, afresh=False)
+    assert files_of(tmp_path) == first
+    assert "2026-01-02" in (tmp_path / "index.html").read_text(encoding="utf-8")
+
+    slower = finished.cells[0].model_copy(update={"cost": finished.cells[0].cost.model_copy(update={"wall_seconds": 9.0})})
+    finished.model_copy(update={"cells": (slower, *finished.cells[1:])}).save(tmp_path)
+    write_site(tmp_path, afresh=False)
+    again = files_of(tmp_path)
+    assert again.keys() == first.keys()
+    assert {name for name in first if again[name][1] != first[name][1]} == {"free.html"}
+    assert all(again[name] == first[name] for name in first if "beside-a-wall" in name)
+
+
+def test_pages_of_scenes_that_are_gone_go(tmp_path: Path, finished: Run) -> None:
+    write_site(tmp_path)
+    (tmp_path / PAGES / "figures" / "study.svg").touch()  # of another command, in the same folder
+    left = {"scenes": {"free": finished.scenes["free"]}, "cells": finished.of_scene("free")}
+    finished.model_copy(update=left).save(tmp_path)
+    write_site(tmp_path, afresh=False)
+    assert sorted(files_of(tmp_path)) == [
+        "data/free.js",
+        *(f"figures/{name}" for name in ("free-small.svg", "free.pdf", "free.png", "free.svg", "study.svg")),
+        "free.html",
+        "scene-files/free.toml",
+    ]
