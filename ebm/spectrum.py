@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ebm.model import EventBasedModel
+from scenes.display import html_table, number, scene_facts
 from scenes.errors import InputError
 from scenes.excitations import Record
 from scenes.scene import Block, Scene
@@ -72,11 +73,17 @@ class Spectrum:
 
     def plot(self) -> Figure:
         """The spectrum as a matplotlib figure, in the paper's colours."""
-        from matplotlib.figure import Figure
+        from scenes.drawing import new_figure
 
-        figure = Figure(figsize=(4.5, 3.6), layout="constrained")
+        figure = new_figure(4.5, 3.6)
         draw(self, figure.subplots())
         return figure
+
+    def _repr_html_(self) -> str:
+        shares = (f"{number(100.0 * float(np.mean(self.outcomes == side)))} %" for side in (SAFE, -1, 1))
+        facts = [*zip(("safe", "overturned left", "overturned right"), shares, strict=True)]
+        facts += [("nodes", f"{self.outcomes.size}, from {self.evaluations} runs"), ("undecided", str(len(self.undecided)))]
+        return html_table(f"Overturning spectrum: {self.scene.name}", [*facts, *scene_facts(self.scene)[:4]])
 
 
 def draw(spectrum: Spectrum, axes: Any) -> None:

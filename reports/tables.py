@@ -8,7 +8,7 @@ from statistics import geometric_mean
 
 from reports.view import SceneView
 from reports.words import number
-from scenes.excitations import Record, Ricker, Sine
+from scenes import display
 from validation.results import Cell, Check, Figure, Run
 
 
@@ -94,37 +94,7 @@ def _enter(found: dict[tuple[str, str], dict[str, Measured]], model: str, figure
 
 def scene_facts(view: SceneView) -> list[tuple[str, str]]:
     """A scene in a few words: block, floor, walls, excitation, duration."""
-    scene, block = view.scene, view.scene.block
-    floor = f"μ {number(scene.floor.friction)}"
-    if scene.floor.mu_s != scene.floor.friction:
-        floor += f" (static {number(scene.floor.mu_s)})"
-    if scene.floor.restitution:
-        floor += f", restitution {number(scene.floor.restitution)}"
-    walls = ", ".join(f"{wall.side}, gap {number(1e3 * wall.gap)} mm, restitution {number(wall.restitution)}" for wall in scene.walls)
-    facts = [
-        ("block", f"{number(2 * block.half_width, 4)} m × {number(2 * block.half_height, 4)} m, α = {number(block.alpha)} rad"),
-        ("p", f"{number(scene.frequency_parameter)} rad/s"),
-        ("floor", floor),
-        ("wall" if len(scene.walls) < 2 else "walls", walls or "none"),
-        ("base", _excitation(scene.excitation)),
-        ("duration", f"{number(scene.duration)} s, a row each {number(1e3 * scene.output_step)} ms"),
-    ]
-    if scene.vertical.kind != "rest":
-        facts.insert(5, ("vertical", _excitation(scene.vertical)))
-    if scene.initial_rotation:
-        facts.append(("starts at", f"θ = {number(scene.initial_rotation / block.alpha)} α"))
-    return facts
-
-
-def _excitation(excitation: object) -> str:
-    if isinstance(excitation, Record):
-        return f"{excitation.source} × {number(excitation.scale)}, peak {number(excitation.peak)} g"
-    if isinstance(excitation, Ricker):
-        shape = "symmetric" if excitation.symmetric else "antisymmetric"
-        return f"{shape} Ricker pulse, {number(excitation.amplitude)} m/s², period {number(excitation.period)} s"
-    if isinstance(excitation, Sine):
-        return f"sine, {number(excitation.amplitude)} m/s², period {number(excitation.period)} s, {excitation.cycles} cycles"
-    return "at rest"
+    return display.scene_facts(view.scene)
 
 
 def summary(view: SceneView) -> str:

@@ -5,19 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from reports.style import Look
+from scenes.display import number
 from validation.results import Check, Figure, MeasureRecord
 from validation.tables import used
-
-
-def number(value: float | None, digits: int = 3) -> str:
-    """A number for people: a few digits, a true minus sign, powers of ten where it is very large or small."""
-    if value is None:
-        return "–"
-    text = f"{value:.{digits}g}"
-    if "e" in text:
-        mantissa, power = text.split("e")
-        return f"{mantissa}·10{str(int(power)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}".replace("-", "−")
-    return text.replace("-", "−")
 
 
 def unit(name: str) -> str:

@@ -50,7 +50,20 @@ def kernel(function: Callable[..., Any]) -> Any:
     The compiled code releases the interpreter's lock, so that batches run on threads, and divides as IEEE 754 does (no
     exception for a zero divisor).
     """
-    compiled = numba.njit(nogil=True, error_model="numpy")(function)
+    return _compiled(function, counts_references=True)
+
+
+def inner_kernel(function: Callable[..., Any]) -> Any:
+    """A `kernel` that neither makes nor returns an array, but works on those that it is given.
+
+    It is compiled without the counting of references, atomic operations that cost as much as a short loop. numba refuses
+    to compile one that makes an array; one that returns an array would free it too early.
+    """
+    return _compiled(function, counts_references=False)
+
+
+def _compiled(function: Callable[..., Any], *, counts_references: bool) -> Any:
+    compiled = numba.njit(nogil=True, error_model="numpy", _nrt=counts_references)(function)
     before = config.CACHE_DIR
     config.CACHE_DIR = _cache_folder(Path(function.__code__.co_filename).parent)
     try:

@@ -18,6 +18,7 @@ from scenes.errors import InputError, printable
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 COLUMNS = ("t", "x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate", "mode")
 EVENT_COLUMNS = ("t", "kind", "mode_before", "mode_after", "impulse")
@@ -101,6 +102,17 @@ class History:
     def peak_rotation(self) -> float:
         """Largest |theta| on the output grid, rad."""
         return float(np.max(np.abs(self.channels["theta"])))
+
+    def plot(self) -> Figure:
+        """Rotation, slip of the pivot and events over time, as a matplotlib figure."""
+        from scenes.drawing import history_figure
+
+        return history_figure(self)
+
+    def _repr_html_(self) -> str:
+        from scenes.display import history_facts, html_table
+
+        return html_table(f"{self.name}, {self.model}", history_facts(self))
 
     def save(self, path: str | Path) -> None:
         """Write a CSV whose remarks (#) hold outcome, model and settings; its events go to `<stem>.events.csv` beside it."""

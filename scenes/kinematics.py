@@ -14,7 +14,7 @@ def slip(block: Block, x: Any, theta: Any) -> Any:
 
     A function of the state: x - S (R sin(alpha - |theta|) - B), continuous through theta = 0.
     """
-    return x - np.where(np.asarray(theta) < 0, -1.0, 1.0) * (block.radius * np.sin(block.alpha - np.abs(theta)) - block.half_width)
+    return x - np.sign(theta) * (block.radius * np.sin(block.alpha - np.abs(theta)) - block.half_width)
 
 
 def slip_rate(block: Block, theta: Any, x_dot: Any, theta_dot: Any) -> Any:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, StringConstraints, field_validator, model_validator
 
+from scenes import display
 from scenes.base import Finite, Frozen, NonNegative, Positive, Restitution
 from scenes.errors import InputError
 from scenes.excitations import Excitation, Rest, mirrored
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 MOST_SAMPLES = 5_000_000
 #: At mu = 4/3 the pivot of a slender block can jam while it slips (Painleve); physics beyond it is not unique.
@@ -167,6 +171,15 @@ class Scene(Frozen):
             initial_angular_velocity=-self.initial_angular_velocity,
             initial_velocity=-self.initial_velocity,
         )
+
+    def plot(self) -> Figure:
+        """The block beside its walls, and the acceleration of the base, as a matplotlib figure."""
+        from scenes.drawing import scene_figure
+
+        return scene_figure(self)
+
+    def _repr_html_(self) -> str:
+        return display.html_table(self.name, display.scene_facts(self))
 
     def replace(self, **change: object) -> Scene:
         """A copy with some fields changed, validated like any scene."""

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from scenes import History, InputError, Scene
+from scenes.display import html_table, number
 from validation import closed_forms as _closed_forms  # noqa: F401 - registers them
 from validation.measures import DIFFERENCES, FIGURES, TURNS, Measure, Motion, Pair, Unavailable
 from validation.results import Figure
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure as Drawing
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,8 @@ class Discrepancy:
     start: float
     end: float
     gap: str = ""
+    #: The reference's history and the candidate's.
+    histories: tuple[History, History] | None = field(default=None, repr=False, compare=False)
 
     def __getitem__(self, measure: str) -> float:
         """The value of a measure; NaN where it could not be computed."""
@@ -52,6 +56,33 @@ class Discrepancy:
         rows = [(f.measure, math.nan if f.value is None else f.value, f.unit, f.note) for f in self.figures]
         return pd.DataFrame(rows, columns=["measure", "value", "unit", "note"])
 
+    def plot(self) -> Drawing:
+        """Rotation of both, and their difference over the time that was compared, as a matplotlib figure."""
+        from reports.style import SPARE, looks
+        from scenes.drawing import SHADE, new_figure, rotation_lines
+
+        if self.histories is None:
+            raise InputError("this comparison has not kept its histories")
+        reference, candidate = self.histories
+        found = looks([reference.model, candidate.model])
+        mine = found[reference.model]
+        other = found[candidate.model] if candidate.model != reference.model else SPARE[0]
+        drawing = new_figure(7.0, 4.0)
+        above, below = drawing.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+        rotation_lines(above, [reference, candidate], [mine.light, other.light])
+        above.legend(frameon=False, ncols=2)
+        pair = Pair(reference, candidate, None, self.end)
+        theta = pair.theta
+        below.plot(pair.time, theta[1] - theta[0], color=other.light, linewidth=0.9)
+        below.set(xlabel="t, s", ylabel="difference, α" if pair.alpha else "difference, rad")
+        below.grid(color=SHADE, linewidth=0.5)
+        return drawing
+
+    def _repr_html_(self) -> str:
+        rows = [(f.label, number(f.value), f.unit, f.note) for f in self.figures]
+        caption = f"{self.candidate} against {self.reference}, {self.start:g} to {self.end:g} s"
+        return html_table(f"{caption}; not the whole time: {self.gap}" if self.gap else caption, rows, ("measure", "value", "unit", ""))
+
 
 def compare(
     reference: History,
@@ -63,9 +94,9 @@ def compare(
 ) -> Discrepancy:
     """Compare two histories over their common time, up to `until` (s), by the `measures` of `validation.measures`.
 
-        By default by all but those that are `on_request`.
-    The candidate is interpolated linearly onto the reference's times. `scene` adds its gravity (9.81 m/s^2 otherwise).
-        A measure that cannot be computed is NaN and says why. Raises `InputError` if the histories have no time in common.
+    By default by all but those that are `on_request`. The candidate is interpolated linearly onto the reference's times.
+    `scene` adds its gravity (9.81 m/s^2 otherwise). A measure that cannot be computed is NaN and says why. Raises
+    `InputError` if the histories have no time in common.
     """
     if until is not None and not until > 0.0:
         raise InputError(f"{until:g} is not allowed: a positive time in s is asked for", "until")
@@ -78,7 +109,7 @@ def compare(
         evaluate(measure, pair, "rad" if pair.alpha is None else "alpha", against=reference.model, window=window, until=until)
         for measure in chosen
     )
-    return Discrepancy(reference.model, candidate.model, figures, pair.start, pair.end, _gap(pair, until))
+    return Discrepancy(reference.model, candidate.model, figures, pair.start, pair.end, _gap(pair, until), histories=(reference, candidate))
 
 
 def describe(

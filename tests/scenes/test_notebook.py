@@ -1,0 +1,122 @@
+"""What a notebook shows: escaped tables, and figures made without pyplot."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from ebm import EventBasedModel, overturning_spectrum
+from scenes import Block, Floor, History, Ricker, Scene, Wall
+from validation import compare
+
+NASTY = "<img src=x onerror=alert(1)>&\"'"
+
+
+class Tags(HTMLParser):
+    """Tags and text of a piece of HTML; fails where a tag is not closed."""
+
+    def __init__(self, html):
+        super().__init__()
+        self.open, self.tags, self.text = [], set(), ""
+        self.feed(html)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, tag, attrs):
+        self.open.append(tag)
+        self.tags.add(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return Scene(
+        name="bookcase",
+        block=Block(half_width=0.2, half_height=1.0),
+        floor=Floor(friction=0.4),
+        walls=[Wall(side="left", gap=0.03, restitution=0.3)],
+        excitation=Ricker(amplitude=4.0, period=0.6),
+        duration=4.0,
+    )
+
+
+@pytest.fixture(scope="module")
+def history(scene):
+    return EventBasedModel(pivot="unilateral").simulate(scene)
+
+
+@pytest.fixture(scope="module")
+def things(scene, history):
+    return {
+        "scene": scene,
+        "history": history,
+        "discrepancy": compare(history, EventBasedModel().simulate(scene), scene=scene),
+        "spectrum": overturning_spectrum(scene, [2.0, 4.0, 6.0], [2.0, 8.0]),
+    }
+
+
+NAMES = ("scene", "history", "discrepancy", "spectrum")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_shows_itself_as_a_table(things, name):
+    shown = Tags(things[name]._repr_html_())
+    assert shown.tags <= {"table", "caption", "b", "tr", "th", "td"}
+    expected = {"scene": "4 m/s²", "history": "at rest", "discrepancy": "RMS difference of rotation", "spectrum": "6, from 6 runs"}
+    assert expected[name] in shown.text
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_plot_returns_a_figure_that_shows_itself(things, name):
+    from matplotlib.figure import Figure
+
+    figure = things[name].plot()
+    assert isinstance(figure, Figure)
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    assert all(axes.get_xlabel() or axes.get_ylabel() for axes in figure.axes)
+
+
+def test_the_lines_are_the_history(history):
+    rotation = history.plot().axes[0].lines[0]
+    np.testing.assert_array_equal(rotation.get_xdata(), history.channels["t"])
+    np.testing.assert_allclose(rotation.get_ydata() * history.alpha, history.channels["theta"])
+
+
+def test_the_difference_is_the_candidate_less_the_reference(things):
+    line = things["discrepancy"].plot().axes[1].lines[0]
+    rms = float(np.sqrt(np.mean(np.square(line.get_ydata()))))
+    assert rms == pytest.approx(things["discrepancy"]["theta_rms"], rel=0.02)  # the measure integrates in time
+
+
+def test_one_model_twice_has_two_colours(history):
+    lines = compare(history, history).plot().axes[0].lines
+    assert lines[0].get_color() != lines[1].get_color()
+
+
+def test_text_is_escaped():
+    made = History(
+        name=NASTY, model=NASTY, channels={"t": np.arange(3.0), "theta": np.zeros(3)}, event_list=(), outcome=NASTY, notes=(NASTY,)
+    )
+    for thing in (made, compare(made, made)):
+        shown = Tags(thing._repr_html_())
+        assert "img" not in shown.tags
+        assert NASTY in shown.text
+        assert thing.plot()
+
+
+def test_nothing_heavy_is_imported_to_show_a_table():
+    code = (
+        "import sys; from scenes import Block, Floor, Scene;"
+        "Scene(name='a', block=Block(half_width=1.0, half_height=2.0), floor=Floor(friction=0.5), duration=1.0)._repr_html_();"
+        "print(sorted({'matplotlib', 'pandas', 'numba', 'mujoco', 'pybullet'} & sys.modules.keys()))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
