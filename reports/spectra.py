@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ebm.spectrum import COLOURS, Spectrum, draw
+from ebm.spectrum import COLOURS, Spectrum, axis_labels, draw
 from reports.site import PAGES, STUDIES, Site
-from reports.style import PAGE, figure_style, save
-from validation.results import RUN_FILE
+from reports.style import LOOKS, PAGE, figure_style, save
+from validation.results import RUN_FILE, Stored
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from validation.agreement import Agreement
     from validation.spectra import Panel
 
 TITLES = {
@@ -26,6 +27,8 @@ TITLES = {
     9: "Wall on the right, μ = 0.6",
 }
 PAGE_NAME = "spectra.html"
+#: The name of the files of the figure of all models' maps.
+MAPS = "models"
 
 
 def paper_figure(panels: Sequence[Panel], spectra: Sequence[Spectrum], *, of: str = "") -> Figure:
@@ -38,15 +41,22 @@ def paper_figure(panels: Sequence[Panel], spectra: Sequence[Spectrum], *, of: st
     gaps = sorted({panel.wall.gap for panel in panels if panel.wall})
     restitutions = sorted({panel.wall.restitution for panel in panels if panel.wall})
     with figure_style():
-        figure = Figure(figsize=(PAGE, 3.75), layout="constrained")
+        figure = Figure(figsize=(PAGE, 4.0), layout="constrained")
         grid = figure.add_gridspec(2 * len(restitutions), 1 + len(gaps))
         for panel, spectrum in zip(panels, spectra, strict=True):
             if panel.wall is None:
                 axes = figure.add_subplot(grid[1:3, 0])
+                _panel(axes, spectrum, panel.title)
             else:
-                row = 2 * restitutions.index(panel.wall.restitution)
-                axes = figure.add_subplot(grid[row : row + 2, 1 + gaps.index(panel.wall.gap)])
-            _panel(axes, spectrum, panel.title)
+                row, column = restitutions.index(panel.wall.restitution), gaps.index(panel.wall.gap)
+                axes = figure.add_subplot(grid[2 * row : 2 * row + 2, 1 + column])
+                _panel(axes, spectrum, panel.title)
+                if row + 1 < len(restitutions):
+                    axes.set_xlabel("")
+                    axes.tick_params(labelbottom=False)
+                if column:
+                    axes.set_ylabel("")
+                    axes.tick_params(labelleft=False)
         number = panels[0].figure or 0
         figure.suptitle(f"Fig. {number}: {TITLES[number]}{f' ({of})' if of else ''}", fontsize=9, x=0.01, ha="left")
         _legend(figure, spectra)
@@ -73,26 +83,47 @@ def _panel(axes: Any, spectrum: Spectrum, title: str) -> None:
         axes.spines[spine].set_visible(True)
     if spectrum.scene.excitation.kind != "record" and spectrum.frequency_ratios[-1] <= 12:
         axes.set_xticks(np.arange(np.ceil(spectrum.frequency_ratios[0]), spectrum.frequency_ratios[-1] + 1e-9))
+        axes.yaxis.get_major_locator().set_params(integer=True)
 
 
 def _legend(figure: Figure, spectra: Iterable[Spectrum]) -> None:
     from matplotlib.patches import Patch
 
-    names = ["safe"]
-    if any(not spectrum.scene.walls for spectrum in spectra):
-        names += ["clockwise", "counterclockwise"]
-    if any(spectrum.scene.walls for spectrum in spectra):
-        names += ["overturned"]
-    labels = {
-        "safe": "safe",
-        "clockwise": "overturned clockwise",
-        "counterclockwise": "overturned counterclockwise",
-        "overturned": "overturned",
-    }
-    if len(names) == 4:
-        labels |= {name: f"no wall: {labels[name]}" for name in names[1:3]} | {"overturned": "wall: overturned"}
-    patches = [Patch(facecolor=COLOURS[name], label=labels[name]) for name in names]
+    spectra = list(spectra)
+    free, walled = (any(bool(spectrum.scene.walls) == wall for spectrum in spectra) for wall in (False, True))
+    labels = {"safe": "safe"}
+    if free:
+        labels |= {"clockwise": "overturned clockwise", "counterclockwise": "overturned counterclockwise"}
+    if free and walled:
+        labels |= {"clockwise": "no wall: overturned clockwise", "counterclockwise": "overturned; no wall: counterclockwise"}
+    elif walled:
+        labels["overturned"] = "overturned"
+    if any(len(spectrum.undecided) for spectrum in spectra):
+        labels["undecided"] = "undecided"
+    patches = [Patch(facecolor=COLOURS[name], label=label) for name, label in labels.items()]
     figure.legend(handles=patches, loc="outside lower center", ncols=4, fontsize=7, handlelength=1.6)
+
+
+def maps_figure(found: Agreement, panels: Sequence[Panel]) -> Figure:
+    """The figure's spectra by every model, a row each, in the paper's colours."""
+    from matplotlib.figure import Figure
+
+    from validation.agreement import map_spectra
+
+    with figure_style():
+        figure = Figure(figsize=(PAGE, 0.4 + 0.92 * len(found.maps)), layout="constrained")
+        grid = figure.subplots(len(found.maps), len(panels), sharex=True, sharey=True, squeeze=False)
+        for axes, panel in zip(grid[0], panels, strict=True):
+            axes.set_title(panel.title.replace(", ", "\n"), fontsize=6.5)
+        for row, one in zip(grid, found.maps, strict=True):
+            for axes, spectrum in zip(row, map_spectra(found, one, panels), strict=True):
+                draw(spectrum, axes)
+                axes.set(xlabel="", ylabel="")
+            row[0].set_ylabel(LOOKS[one.model].label)
+        horizontal, vertical = axis_labels(panels[0].scene)
+        figure.supxlabel(horizontal, fontsize=7.5)
+        figure.supylabel(vertical, fontsize=7.5)
+    return figure
 
 
 def areas_figure(spectra: Sequence[Spectrum]) -> Figure:
@@ -152,13 +183,17 @@ def fragility_figure(fragility: Mapping[str, Any]) -> Figure:
 
 
 def write_page(folder: Path) -> Path:
-    """Write `spectra.html` into the report's folder from what its `spectra/` holds; returns the page."""
+    """Write `spectra.html` into the report's folder from what its `spectra/` holds; returns the page.
+
+    Beside the paper's figures stand the long studies, agreement of models and refinement, as they were last computed here, or
+    else as they came with the package.
+    """
     from validation import provenance
     from validation.spectra import SPECTRA, read_index
 
     data = folder / SPECTRA
     index = read_index(data)
-    kept = {name: _read(data / f"{name}.json") for name in ("claims", "agreement", "fragility")}
+    found = {name: _read(data / f"{name}.json") for name in ("claims", "fragility")}
     figures = sorted({(record.figure, record.model) for record in index.spectra if record.figure}, key=lambda key: (key[0] or 0, key[1]))
     shown = [
         {
@@ -171,7 +206,6 @@ def write_page(folder: Path) -> Path:
         for number, model in figures
         if (data / f"{figure_stem(number, model)}.svg").exists()
     ]
-    own = [record for record in index.spectra if record.figure is None]
     site = Site(folder, "rockcheck: overturning spectra", _links(folder))
     site.assets()
     addresses = [PAGE_NAME] if (folder / RUN_FILE).exists() else ["index.html", PAGE_NAME]  # a folder has a page to open
@@ -180,8 +214,9 @@ def write_page(folder: Path) -> Path:
             address,
             "spectra.html",
             figures=shown,
-            own=own,
-            kept=kept,
+            own=[record for record in index.spectra if record.figure is None],
+            **found,
+            **_studies(data, bool(figures)),
             areas=(data / "safe-areas.svg").exists(),
             fragility_drawn=(data / "fragility.svg").exists(),
             versions=provenance.versions(),
@@ -189,6 +224,32 @@ def write_page(folder: Path) -> Path:
         for address in addresses
     ]
     return pages[-1]
+
+
+def _studies(data: Path, papers: bool) -> dict[str, Any]:
+    """Agreement and refinement for the page: those in the folder, or with the `papers` figures those that came with the package."""
+    from validation import agreement as agreements
+    from validation import refinement
+    from validation.spectra import KEPT, paper_panels
+
+    context: dict[str, Any] = {"maps": (data / f"{MAPS}.svg").exists()}
+    context |= {"agreement_columns": agreements.COLUMNS, "refinement_columns": refinement.COLUMNS}
+    for name, kind in (("agreement", agreements.Agreement), ("refinement", refinement.Refinement)):
+        found = _stored(data, name, kind)
+        context[f"{name}_kept"] = found is None
+        context[name] = found or (_stored(KEPT, name, kind) if papers else None)
+    agreement = context["agreement"]
+    if agreement and context["agreement_kept"]:
+        write(maps_figure(agreement, agreements.mapped([panel for number in TITLES for panel in paper_panels(number)])), data / MAPS)
+        context["maps"] = True
+    return context
+
+
+def _stored(folder: Path, name: str, kind: type[Stored]) -> Any:
+    try:
+        return kind.model_validate_json((folder / f"{name}.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
 
 
 def figure_stem(number: int | None, model: str) -> str:

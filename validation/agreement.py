@@ -15,12 +15,15 @@ from ebm import Spectrum
 from validation import provenance
 from validation.claims import percent
 from validation.results import Stored
-from validation.spectra import SETTLE, Asked, Panel, Tiles
+from validation.spectra import CODES, SETTLE, UNDECIDED, Asked, Panel, Tiles, play_panels
 
 CANDIDATES = ("ebm-unilateral", "cm", "mujoco", "pybullet")
 REFERENCES = ("ebm", "ebm-unilateral")
+COLUMNS = ("spectrum", "model", "near, bilateral", "away, bilateral", "near, unilateral", "away, unilateral", "failed")
 #: A node is near the boundary if a node of another outcome is among those at most this many nodes away, diagonals included.
 NEAR = 2
+#: The paper's figure of which every model draws a map, and the map's nodes an axis.
+MAPPED, MAP_SIZE = 8, 25
 
 
 class Share(Stored):
@@ -38,8 +41,20 @@ class Share(Stored):
     equal: dict[str, int]
 
 
+class Map(Stored):
+    """The spectra of one figure by one model, coarsely: by panel, rows of `validation.spectra` codes, lowest amplitude first.
+
+    `equal` are the nodes, of `nodes`, at which the outcome is the unilateral event-based model's.
+    """
+
+    model: str
+    nodes: int
+    equal: int
+    outcomes: dict[str, tuple[str, ...]]
+
+
 class Agreement(Stored):
-    """`agreement.json`: all shares, and the table that the page shows."""
+    """`agreement.json`: all shares, and a map by each model."""
 
     format: int = 2
     about: str
@@ -48,8 +63,18 @@ class Agreement(Stored):
     versions: dict[str, str]
     settings: dict[str, dict[str, Any]]
     shares: tuple[Share, ...]
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
+    map_frequencies: tuple[float, ...]
+    map_amplitudes: tuple[float, ...]
+    maps: tuple[Map, ...]
+
+    @property
+    def rows(self) -> tuple[tuple[str, ...], ...]:
+        """The table with `COLUMNS`: all spectra together first, then a row for each spectrum and model."""
+        models = list(dict.fromkeys(share.model for share in self.shares))
+        rows = [_row("all", model, [share for share in self.shares if share.model == model]) for model in models]
+        for name in dict.fromkeys(share.spectrum for share in self.shares):
+            rows += [_row(name, model, [s for s in self.shares if (s.spectrum, s.model) == (name, model)]) for model in models]
+        return tuple(rows)
 
 
 def choose_nodes(spectrum: Spectrum, count: int, name: str) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
@@ -86,7 +111,7 @@ def agree(
     tiles: Tiles,
     done: Callable[[Panel], None] | None = None,
 ) -> Agreement:
-    """Plays `count` nodes of each (paper's) spectrum by the other models, and counts equal outcomes."""
+    """Plays `count` nodes of each spectrum by the other models and counts equal outcomes; then a map of one figure by each model."""
     shares: list[Share] = []
     settings = {model: Asked(asked.frequencies, asked.amplitudes, model).settings for model in CANDIDATES}
     for panel, spectrum in zip(panels, spectra, strict=True):
@@ -124,27 +149,68 @@ def agree(
         " against the unilateral one, which lets the block hop as the other models do. Runs of the other models end with the pulse where"
         f" the block then lacks the energy to tip over, otherwise {SETTLE:g} s later; a block that then stands counts as safe."
     )
-    columns, rows = table(shares)
     plain = {asked.model: dict(asked.settings)} | {model: dict(chosen) for model, chosen in settings.items()}
+    across, up = (np.linspace(axis[0], axis[-1], MAP_SIZE) for axis in (asked.frequencies, asked.amplitudes))
     return Agreement(
         about=about,
         date=datetime.now(UTC).date().isoformat(),
         versions=provenance.versions(),
         settings=plain,
         shares=tuple(shares),
-        columns=columns,
-        rows=rows,
+        map_frequencies=tuple(across.tolist()),
+        map_amplitudes=tuple(up.tolist()),
+        maps=_maps(mapped(panels), [Asked(across, up, model, chosen) for model, chosen in plain.items()], tiles),
     )
 
 
-def table(shares: Sequence[Share]) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
-    """Columns and rows: all spectra together first, then a row for each spectrum and model."""
-    columns = ("spectrum", "model", *(f"{where}, {reference}" for reference in REFERENCES for where in ("near", "away")), "failed")
-    models = list(dict.fromkeys(share.model for share in shares))
-    rows = [_row("all", model, [share for share in shares if share.model == model]) for model in models]
-    for name in dict.fromkeys(share.spectrum for share in shares):
-        rows += [_row(name, model, [s for s in shares if (s.spectrum, s.model) == (name, model)]) for model in models]
-    return columns, tuple(rows)
+def mapped(panels: Sequence[Panel]) -> list[Panel]:
+    """The panels of which every model draws a map: those of one figure."""
+    figure = MAPPED if any(panel.figure == MAPPED for panel in panels) else panels[0].figure
+    return [panel for panel in panels if panel.figure == figure]
+
+
+def _maps(panels: Sequence[Panel], asked: Sequence[Asked], tiles: Tiles) -> tuple[Map, ...]:
+    played = {one.model: play_panels(panels, one, tiles) for one in asked}
+    truth = played["ebm-unilateral"]
+    return tuple(
+        Map(
+            model=model,
+            nodes=sum(spectrum.outcomes.size for spectrum in spectra),
+            equal=sum(int(np.sum(mine.outcomes == true.outcomes)) for mine, true in zip(spectra, truth, strict=True)),
+            outcomes={panel.name: encoded(spectrum) for panel, spectrum in zip(panels, spectra, strict=True)},
+        )
+        for model, spectra in played.items()
+    )
+
+
+def encoded(spectrum: Spectrum) -> tuple[str, ...]:
+    """Outcomes as rows of text, lowest amplitude first: L left, R right, . safe, ? undecided."""
+    rows = [[CODES[int(side)] for side in row] for row in spectrum.outcomes]
+    for i, j in spectrum.undecided:
+        rows[i][j] = UNDECIDED
+    return tuple("".join(row) for row in rows)
+
+
+def map_spectra(found: Agreement, one: Map, panels: Sequence[Panel]) -> list[Spectrum]:
+    """A model's map as spectra, one a panel."""
+    spectra = []
+    for panel in panels:
+        codes = np.array([list(row) for row in one.outcomes[panel.name]])
+        outcomes = np.zeros(codes.shape, dtype=np.int8)
+        for side, code in CODES.items():
+            outcomes[codes == code] = side
+        spectra.append(
+            Spectrum(
+                outcomes=outcomes,
+                frequency_ratios=np.array(found.map_frequencies),
+                amplitude_ratios=np.array(found.map_amplitudes),
+                evaluations=codes.size,
+                undecided=np.argwhere(codes == UNDECIDED),
+                scene=panel.scene,
+                model=None,
+            )
+        )
+    return spectra
 
 
 def _row(name: str, model: str, shares: Sequence[Share]) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
+from importlib import resources
 from pathlib import Path
 from threading import Lock
 from typing import Any, Literal, Self, TypeGuard
@@ -48,8 +49,11 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "pybullet": {"time_step": "adaptive", "largest_step": 2e-3},
 }
 SPECTRA, TILES = "spectra", "tiles"
-_CODES = {LEFT: "L", SAFE: ".", RIGHT: "R"}
-_SIDES = {code: side for side, code in _CODES.items()}
+#: Results of the long studies of spectra, as they come with the package.
+KEPT = Path(str(resources.files("validation"))) / "data" / "spectra"
+#: Outcomes in text.
+CODES, UNDECIDED = {LEFT: "L", SAFE: ".", RIGHT: "R"}, "?"
+_SIDES = {code: side for side, code in CODES.items()}
 
 
 @dataclass(frozen=True)
@@ -241,7 +245,7 @@ class Tiles:
 
     def _keep(self, key: str, found: tuple[NDArray[np.int8], NDArray[np.bool_]]) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
         sides, failed = found
-        text = "".join("?" if fault else _CODES[int(side)] for side, fault in zip(sides, failed, strict=True))
+        text = "".join(UNDECIDED if fault else CODES[int(side)] for side, fault in zip(sides, failed, strict=True))
         write_whole(self.folder / f"{key}.tile", text)
         self._note(len(sides), read_back=False)
         return sides, failed
@@ -251,9 +255,9 @@ class Tiles:
             text = (self.folder / f"{key}.tile").read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError):
             return None
-        if len(text) != count or set(text) - {*_SIDES, "?"}:
+        if len(text) != count or set(text) - {*_SIDES, UNDECIDED}:
             return None
-        return np.array([_SIDES.get(code, SAFE) for code in text], dtype=np.int8), np.array([code == "?" for code in text])
+        return np.array([_SIDES.get(code, SAFE) for code in text], dtype=np.int8), np.array([code == UNDECIDED for code in text])
 
     def _note(self, count: int, *, read_back: bool) -> None:
         with self._lock:
@@ -317,7 +321,8 @@ def side_of(outcome: str) -> int:
 def tile_key(scene: Scene, amplitudes: Floats, frequencies: Floats, model: str, settings: Mapping[str, Any]) -> str:
     """Hash of all that a tile's outcomes depend on."""
     neutral = scene.replace(name="tile", description="", duration=1.0, output_step=0.02)
-    nodes = json.dumps([amplitudes.tolist(), frequencies.tolist()])
+    how = provenance.code_digest("ebm.spectrum") if _compiled(build(model, settings)) else [SETTLE, ENOUGH]
+    nodes = json.dumps([amplitudes.tolist(), frequencies.tolist(), how])
     return provenance.digest(provenance.cell_key(neutral, model, settings) + provenance.digest(nodes))
 
 

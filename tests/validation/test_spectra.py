@@ -15,7 +15,7 @@ import pytest
 
 from ebm import Spectrum
 from scenes import InputError, Ricker
-from validation import agreement, claims, fragility, spectra
+from validation import agreement, claims, fragility, refinement, spectra
 from validation.cli import main
 from validation.spectra import Asked, Panel, Tiles, axis, paper_panels, play_panels, tile_key
 
@@ -342,6 +342,7 @@ def test_half_of_the_nodes_lie_near_the_boundary():
 
 def test_agreement_counts_equal_outcomes(tmp_path, monkeypatch):
     monkeypatch.setattr(agreement, "CANDIDATES", ("ebm-unilateral", "cm"))
+    monkeypatch.setattr(agreement, "MAP_SIZE", 5)
     panel, asked = paper_panels(8)[0], small(20)
     spectrum = play_panels([panel], asked, Tiles(tmp_path))[0]
 
@@ -350,7 +351,7 @@ def test_agreement_counts_equal_outcomes(tmp_path, monkeypatch):
             i, j = np.searchsorted(asked.amplitudes, amplitudes), np.searchsorted(asked.frequencies, frequencies)
             sides, failed = spectrum.outcomes[i, j].copy(), np.zeros(len(i), dtype=bool)
             if model == "cm":
-                sides[0], failed[-1] = 5, True  # one wrong, near the boundary, and one failed, away from it
+                sides[0], failed[-1] = 1 - abs(sides[0]), True  # one wrong, near the boundary, and one failed, away from it
             return sides, failed
 
     found = agreement.agree([panel], [spectrum], asked, 40, Player(tmp_path))
@@ -360,8 +361,44 @@ def test_agreement_counts_equal_outcomes(tmp_path, monkeypatch):
         ("cm", True): (19, 20, 0),
         ("cm", False): (19, 20, 1),
     }
-    assert found.rows[0][:4] == ("all", "ebm-unilateral", "100.0 %", "100.0 %")
+    assert found.rows[0] == ("all", "ebm-unilateral", "100.0 %", "100.0 %", "–", "–", "0")
     assert found.rows[1] == ("all", "cm", "95.0 %", "95.0 %", "95.0 %", "95.0 %", "1")
+    again = agreement.Agreement.model_validate_json(found.model_dump_json())
+    assert again == found
+    maps = {one.model: one for one in found.maps}
+    assert {name: (one.equal, one.nodes) for name, one in maps.items()} == {"ebm": (25, 25), "ebm-unilateral": (25, 25), "cm": (24, 25)}
+    (drawn,) = agreement.map_spectra(found, maps["cm"], [panel])
+    assert agreement.encoded(drawn) == maps["cm"].outcomes[panel.name]
+    assert drawn.undecided.tolist() == [[4, 4]]
+
+
+# Refinement
+
+
+@pytest.mark.parametrize(
+    ("inside", "dimension"),
+    [
+        (lambda i, j: i**2 + j**2 < 300**2, 1.0),
+        (lambda i, j: j > 0.37 * i + 20, 1.0),
+        (lambda i, j: (i & j) == 0, math.log2(3.0)),  # Sierpinski's triangle
+        (lambda i, j: (i + j) % 2 == 0, 2.0),
+        (lambda i, j: i < 0, 0.0),
+    ],
+)
+def test_the_dimension_of_a_boundary(inside, dimension):
+    outcomes = inside(*np.indices((512, 512))).astype(np.int8)
+    assert refinement.boundary_dimension(outcomes) == pytest.approx(dimension, abs=0.05)
+
+
+def test_wrong_nodes_are_counted(tmp_path):
+    asked = small(33)
+    found = refinement.verify(paper_panels(8)[:2], asked, Tiles(tmp_path))
+    assert [one.wrong for one in found.spectra] == [0, 0]
+    assert found.rows[0][:2] == ("all", str(found.runs))
+    assert 0 < found.runs < found.nodes == 2 * 33**2
+    full = play_panels(paper_panels(8)[:1], asked, Tiles(tmp_path))[0]
+    other = replace(full, outcomes=np.where(np.arange(33) == 3, 7, full.outcomes).astype(np.int8))
+    assert refinement.compared("x", full, other).wrong == 33
 
 
 # Fragility

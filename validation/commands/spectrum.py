@@ -248,7 +248,7 @@ def _verify(panels: Sequence[Panel], asked: Asked, tiles: Tiles, data: Path, scr
 
 def _agreement(panels: Sequence[Panel], asked: Asked, count: int, tiles: Tiles, data: Path, screen: Console) -> None:
     from reports.spectra import MAPS, maps_figure, write
-    from validation.agreement import CANDIDATES, MAP_SIZE, agree, mapped
+    from validation.agreement import CANDIDATES, COLUMNS, MAP_SIZE, agree, mapped
 
     if asked.model != "ebm":
         raise InputError("cannot be given together with --model or --pivot: all models are compared", "--agreement")
@@ -259,15 +259,15 @@ def _agreement(panels: Sequence[Panel], asked: Asked, count: int, tiles: Tiles, 
     with _bar("agreement", count * len(CANDIDATES) * len(panels) + on_maps) as advance:
         tiles.progress = advance
         found = agree(panels, spectra, asked, count, tiles)
-    _write_table("agreement", found, (found.columns, *found.rows), data)
+    _write_table("agreement", found, (COLUMNS, *found.rows), data)
     write(maps_figure(found, mapped(panels)), data / MAPS)
-    screen.print(_table(found.columns, found.rows[: len(CANDIDATES)], words=2))
+    screen.print(_table(COLUMNS[1:], [row[1:] for row in found.rows[: len(CANDIDATES)]], words=1))
 
 
 def _write_table(name: str, found: BaseModel, rows: Sequence[Sequence[str]], data: Path) -> None:
     """Write what was found as JSON and its table as CSV."""
     write_whole(data / f"{name}.json", found.model_dump_json(indent=1) + "\n")
-    write_whole(data / f"{name}.csv", "\n".join(",".join(row) for row in rows) + "\n")
+    write_whole(data / f"{name}.csv", "\n".join(",".join(f'"{cell}"' if "," in cell else cell for cell in row) for row in rows) + "\n")
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, words: int) -> Table:

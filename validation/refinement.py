@@ -1,0 +1,117 @@
+"""What boundary refinement saves and what it misses: refined spectra against the full grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ebm.spectrum import Spectrum
+from validation import provenance
+from validation.results import Stored
+from validation.spectra import Asked, Panel, Tiles, play_panels
+
+#: Sizes of the boxes, in nodes, over which a boundary's dimension is measured; the boundary counts as smooth below `FRACTAL`.
+BOXES = (1, 2, 4, 8, 16)
+FRACTAL = 1.1
+
+
+class Refined(Stored):
+    """One spectrum: nodes of the full grid, runs of the refined one, its wrong nodes, and the dimension of the boundary."""
+
+    spectrum: str
+    nodes: int
+    runs: int
+    wrong: int
+    dimension: float
+
+    @property
+    def smooth(self) -> bool:
+        """Whether the boundary is a line, not a fractal."""
+        return self.dimension < FRACTAL
+
+
+class Refinement(Stored):
+    """`refinement.json`."""
+
+    format: int = 1
+    date: str
+    versions: dict[str, str]
+    grid: str
+    model: str
+    settings: dict[str, Any]
+    spectra: tuple[Refined, ...]
+
+    @property
+    def runs(self) -> int:
+        """Runs of all refined spectra."""
+        return sum(spectrum.runs for spectrum in self.spectra)
+
+    @property
+    def nodes(self) -> int:
+        """Nodes of all full grids."""
+        return sum(spectrum.nodes for spectrum in self.spectra)
+
+    @property
+    def rows(self) -> tuple[tuple[str, ...], ...]:
+        """The table: all spectra together first, then one each."""
+        wrong = sum(spectrum.wrong for spectrum in self.spectra)
+        rows = [("all", str(self.runs), f"{self.nodes / self.runs:.1f}", str(wrong), "")]
+        rows += [(s.spectrum, str(s.runs), f"{s.nodes / s.runs:.1f}", str(s.wrong), f"{s.dimension:.2f}") for s in self.spectra]
+        return tuple(rows)
+
+
+COLUMNS = ("spectrum", "runs", "nodes a run", "wrong nodes", "boundary's dimension")
+
+
+def verify(panels: Sequence[Panel], asked: Asked, tiles: Tiles, done: Callable[[Panel], None] | None = None) -> Refinement:
+    """Plays each spectrum on the full grid and refined, and counts the nodes that differ."""
+    found = []
+    for panel in panels:
+        full, refined = (play_panels([panel], replace(asked, refine=refine), tiles)[0] for refine in (False, True))
+        found.append(compared(panel.name, full, refined))
+        if done is not None:
+            done(panel)
+    return Refinement(
+        date=datetime.now(UTC).date().isoformat(),
+        versions=provenance.versions(),
+        grid=f"{len(asked.amplitudes)} x {len(asked.frequencies)}",
+        model=asked.model,
+        settings=dict(asked.settings),
+        spectra=tuple(found),
+    )
+
+
+def compared(name: str, full: Spectrum, refined: Spectrum) -> Refined:
+    """A refined spectrum against the full grid."""
+    return Refined(
+        spectrum=name,
+        nodes=full.outcomes.size,
+        runs=refined.evaluations,
+        wrong=int((full.outcomes != refined.outcomes).sum()),
+        dimension=boundary_dimension(full.outcomes),
+    )
+
+
+def boundary_dimension(outcomes: NDArray[np.int8]) -> float:
+    """Box-counting dimension of the boundary between outcomes: 1 of a line, up to 2 of one that fills the plane.
+
+    Counted are the boxes of `BOXES` nodes across that hold more than one outcome; 0 where there is no boundary.
+    """
+    mixed = np.zeros((outcomes.shape[0] - 1, outcomes.shape[1] - 1), dtype=bool)
+    corner = outcomes[:-1, :-1]
+    for other in (outcomes[1:, :-1], outcomes[:-1, 1:], outcomes[1:, 1:]):
+        mixed |= corner != other
+    counts = []
+    for box in BOXES:
+        rows, columns = (-(-length // box) for length in mixed.shape)
+        whole = np.zeros((rows * box, columns * box), dtype=bool)
+        whole[: mixed.shape[0], : mixed.shape[1]] = mixed
+        counts.append(whole.reshape(rows, box, columns, box).any(axis=(1, 3)).sum())
+    if counts[0] == 0:
+        return 0.0
+    return float(-np.polyfit(np.log(BOXES), np.log(counts), 1)[0])
