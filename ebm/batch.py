@@ -24,7 +24,7 @@ from scenes.errors import ModelFailure
 from scenes.scene import Scene
 
 Floats = NDArray[np.float64]
-_CHUNK = 64
+_CHUNK = 256
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -105,7 +105,7 @@ from ebm.transitions import (
     closed_wall,
     slip_velocity,
 )
-from scenes.compiled import kernel
+from scenes.compiled import inner_kernel, kernel
 from scenes.errors import InputError, ModelFailure
 from scenes.history import Cost, History
 from scenes.observation import observe
@@ -181,7 +181,7 @@ def simulate(model: EventBasedModel, scene: Scene, tolerance: float) -> History:
     )
 
 
-@kernel
+@inner_kernel
 def _product(a, x, y, k):
     """Coefficient k of the product of two rows."""
     total = 0.0
@@ -190,7 +190,7 @@ def _product(a, x, y, k):
     return total
 
 
-@kernel
+@inner_kernel
 def _fill_z(a, k, loads, yielded, yield_displacement):
     """Coefficient k + 1 of z by (9) with beta = gamma = 1/2 and n = 2, given those of V and z up to k."""
     if yielded:
@@ -203,7 +203,7 @@ def _fill_z(a, k, loads, yielded, yield_displacement):
     a[Z, k + 1] = rate / (yield_displacement * (k + 1))
 
 
-@kernel
+@inner_kernel
 def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order, a):
     """Fills the workspace with the series of a block whose pivot, or base, carries the friction force -mu_k |P| z.
 
@@ -279,7 +279,7 @@ def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order
         _fill_z(a, k, loads, yielded, yield_displacement)
 
 
-@kernel
+@inner_kernel
 def _held(b, z, gh, gv, t):
     """Whether a flat block without speed stays at rest: the base neither lifts nor slides it, or presses it on a wall."""
     limit = min(b.sin_alpha / b.cos_alpha, b.mu_s) * (1.0 + acceleration(gv, t))
@@ -287,7 +287,7 @@ def _held(b, z, gh, gv, t):
     return (u <= limit or closed_wall(b, z, 1, False)) and (u >= -limit or closed_wall(b, z, -1, False))
 
 
-@kernel
+@inner_kernel
 def _rest(b, m, z):
     """The mode of a block at rest on its base."""
     m[:] = 0
@@ -295,7 +295,7 @@ def _rest(b, m, z):
     m[TIP], m[FAR] = closed_wall(b, z, 1, False), closed_wall(b, z, -1, False)
 
 
-@kernel
+@inner_kernel
 def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, a):
     """The block at rest starts to slide, or to tilt, as u of sign `sense` grows; returns z = -u/(mu_k G0), +-1 if it slides."""
     u, g = acceleration(gh, t), 1.0 + acceleration(gv, t)
@@ -310,7 +310,7 @@ def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, a):
     return zeta
 
 
-@kernel
+@inner_kernel
 def _begin(b, m, z, zeta, yield_displacement, gh, gv, t, a):
     """The contacts of a block that starts, or goes on after an impact, into m; returns z, changed only where it was at rest."""
     v = slip_velocity(b, z)
@@ -330,7 +330,7 @@ def _begin(b, m, z, zeta, yield_displacement, gh, gv, t, a):
     return zeta
 
 
-@kernel
+@inner_kernel
 def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a):
     """Lets the corners of a tilting block rest on the walls that they touch and that would push them."""
     m[TIP], m[FAR] = closed_wall(b, z, m[S], False), closed_wall(b, z, -m[S], True)
@@ -348,7 +348,7 @@ def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a):
         _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a)
 
 
-@kernel
+@inner_kernel
 def _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a):
     """Sets the sign of P, which does not depend on the sign that is assumed for it; the workspace then holds the series."""
     m[PULL] = 1
@@ -358,7 +358,7 @@ def _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a):
         friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
 
 
-@kernel
+@inner_kernel
 def _initial_friction(b, m, z, gh, gv, t, a):
     """z at the start: sgn V for a pivot that slips, else the value that lets it stand still (at most 1 in size)."""
     v = slip_velocity(b, z)
@@ -378,13 +378,13 @@ def _initial_friction(b, m, z, gh, gv, t, a):
     return -sense * a[Q, 0] / most if abs(a[Q, 0]) < most else -math.copysign(1.0, sense * a[Q, 0])
 
 
-@kernel
+@inner_kernel
 def _has_yielded(b, m, z, zeta):
     """Whether the pivot slips with z = +-1."""
     return m[FLOOR] == SLIPPING and abs(zeta) == 1.0 and zeta * slip_velocity(b, z) > _STOPPED
 
 
-@kernel
+@inner_kernel
 def _label(m, yielded):
     """Index into trajectory.MODE_NAMES: rest, slide, rock, slide-rock, lean, ladder."""
     if m[FAMILY] == FLAT:
@@ -531,7 +531,7 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
     return Tally(ending, t, peak, at_rest, steps, events, wall_impacts, int(gains[0]), gains[1], rows, np.nan)
 
 
-@kernel
+@inner_kernel
 def _state(b, m, order, tau, a, z):
     """The state at tau after the start of the step."""
     if m[FAMILY] == FLAT:
@@ -540,7 +540,7 @@ def _state(b, m, order, tau, a, z):
         tilt_state(b, m, order, tau, m[S] * z[X] - a[SIN, 0], a, z)
 
 
-@kernel
+@inner_kernel
 def _resting_speed(rattle, t):
     """The speed below which a contact that is struck at time t stays closed: impacts that rattle on raise it tenfold."""
     resting, since, last, count = rattle

@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from ebm.motion import inverse_of
-from scenes.compiled import kernel
+from scenes.compiled import inner_kernel, kernel
 
 F, E, TIP_TOP, TIP_BOTTOM, FAR_BOTTOM, FAR_TOP = range(6)
 CONTACTS = 6
@@ -42,12 +42,12 @@ def contact_rows(alpha, phi):
     return rows
 
 
-@kernel
+@inner_kernel
 def _dot(row, v):
     return row[0] * v[0] + row[1] * v[1] + row[2] * v[2]
 
 
-@kernel
+@inner_kernel
 def kinetic_energy(v):
     """Kinetic energy of velocities (xi, y, phi), per unit mass."""
     return 0.5 * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] / 3.0)
@@ -135,7 +135,7 @@ def _strike(rows, taking, target, mu_s, mu_k, v, after, impulse):
     return best < np.inf
 
 
-@kernel
+@inner_kernel
 def _well_posed(matrix, n):
     """Whether the inverse (rows 3 to 5) of the small matrix is finite and not mere rounding (parallel contacts give none)."""
     size = 0.0

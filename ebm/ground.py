@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.compiled import kernel
+from scenes.compiled import inner_kernel
 from scenes.excitations import Record, Rest, Ricker, Sine
 
 STILL, GAUSSIAN, SINE, SAMPLED = range(4)
@@ -56,13 +56,13 @@ def ground_of(excitation: Rest | Ricker | Sine | Record, gravity: float, time_un
     return Ground(STILL, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _NO_SAMPLES)
 
 
-@kernel
+@inner_kernel
 def interval(g, t):
     """Index of the sample interval that holds t; its right end belongs to the next one."""
     return int(math.floor(t / g.step + 1e-9))
 
 
-@kernel
+@inner_kernel
 def acceleration(g, t):
     """Acceleration at time t."""
     if g.kind == GAUSSIAN:
@@ -78,7 +78,7 @@ def acceleration(g, t):
     return 0.0
 
 
-@kernel
+@inner_kernel
 def fill_series(g, t, sign, n, a, row):
     """Taylor coefficients 0..n of sign * acceleration about t, to the right of t, into a[row]."""
     if g.kind == GAUSSIAN:
@@ -112,7 +112,7 @@ def fill_series(g, t, sign, n, a, row):
                 a[row, 1] = sign * rise / g.step
 
 
-@kernel
+@inner_kernel
 def next_kink(g, t):
     """The next time after t at which the motion is not smooth."""
     if g.kind == SAMPLED:
@@ -123,7 +123,7 @@ def next_kink(g, t):
     return NEVER
 
 
-@kernel
+@inner_kernel
 def _next_extremum(g, t):
     """The next time after t up to which the motion is monotone; NEVER where it is monotone (and dying out) for good."""
     if g.kind == SAMPLED:
@@ -155,7 +155,7 @@ def _next_extremum(g, t):
     return best + g.centre if best < NEVER else NEVER
 
 
-@kernel
+@inner_kernel
 def largest_ahead(g, t):
     """A bound on |acceleration| from time t on: its value now and at the extrema to come; a record's largest sample."""
     if t > g.quiet or g.kind == STILL:
@@ -173,7 +173,20 @@ def largest_ahead(g, t):
     return largest
 
 
-@kernel
+@inner_kernel
+def impulse_ahead(g, t):
+    """A bound on the integral of |acceleration| from time t on: exact in a pulse's last lobe, infinite before it."""
+    if t > g.quiet or g.kind == STILL:
+        return 0.0
+    tau = t - g.centre
+    if g.kind != GAUSSIAN or tau < 0.0 or g.rate * tau * tau < 1.5:  # the last zero, which a symmetric pulse has before it
+        return NEVER
+    v2 = -g.c3 / (2.0 * g.rate)  # the velocity of the base is (v0 + v1 tau + v2 tau^2) exp(-rate tau^2)
+    v0 = (2.0 * v2 - g.c1) / (2.0 * g.rate)
+    return abs(v0 + tau * (g.c0 + tau * v2)) * math.exp(-g.rate * tau * tau)
+
+
+@inner_kernel
 def next_exceedance(g, t, low, high):
     """The first time from t on at which the acceleration is below `low` or above `high`, on that side; else NEVER."""
     here = acceleration(g, t)

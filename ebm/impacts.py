@@ -10,21 +10,21 @@ from __future__ import annotations
 
 import math
 
-from scenes.compiled import kernel
+from scenes.compiled import inner_kernel
 
 STICK, SLIP, FLAT_END = 0, 1, 2
 #: The wall cascade's branches, as the paper's Fig. 3 letters them.
 A_STICK, B_STICK, C_STICK, D_SLIP, E_SLIP, NO_BRANCH = range(6)
 
 
-@kernel
+@inner_kernel
 def floor_stick(s, c, S2, w1, v1):
     """Floor impact on the other corner, which sticks (e_g = 0): w2, P, Q. With v1 = 0 this is Housner's ratio 1 - 1.5 s^2."""
     w2 = (1.0 - 1.5 * s * s) * w1 - 0.75 * c * v1
     return w2, S2 * s * (w1 + w2), c * (w1 - w2) - v1
 
 
-@kernel
+@inner_kernel
 def floor_slip(s, c, S2, d, mu_k, w1, v1):
     """Floor impact on the other corner, which slips toward d (e_g = 0): w2, v2, P."""
     share = s * s + mu_k * d * S2 * s * c
@@ -33,7 +33,7 @@ def floor_slip(s, c, S2, d, mu_k, w1, v1):
     return w2, v1 + c * (w2 - w1) - mu_k * d * p, p
 
 
-@kernel
+@inner_kernel
 def floor_impact(s, c, S1, w1, v1, mu_s, mu_k):
     """Floor impact as theta passes zero, from pivot S1 to -S1: form (STICK, SLIP, FLAT_END), w2, v2, P.
 
@@ -60,7 +60,7 @@ def floor_impact(s, c, S1, w1, v1, mu_s, mu_k):
     return FLAT_END, 0.0, (0.0 if abs(xdot) <= mu_s * p else xdot - math.copysign(mu_k * p, xdot)), p
 
 
-@kernel
+@inner_kernel
 def wall_stick(S, Sw, s, c, C, w1, xdot1, e):
     """(25), (26): the corner rebounds with e, the pivot sticks: w2, xdot2, P, Q."""
     w2 = e * (xdot1 - C * w1) / (C + c)
@@ -69,7 +69,7 @@ def wall_stick(S, Sw, s, c, C, w1, xdot1, e):
     return w2, xdot2, p, (S * s * p + C * (xdot2 - xdot1) + (w2 - w1) / 3.0) / (c + C)
 
 
-@kernel
+@inner_kernel
 def wall_slip(S, s, c, C, w1, xdot1, e, mu_k, Sr, sy):
     """(30): the corner rebounds with e, the pivot slips toward Sr under a P of sign sy: w2, xdot2, P, Q."""
     k = S * s + (c + C) * mu_k * Sr * sy
@@ -78,7 +78,7 @@ def wall_slip(S, s, c, C, w1, xdot1, e, mu_k, Sr, sy):
     return w2, C * w2 - e * (xdot1 - C * w1), p, -mu_k * Sr * sy * p
 
 
-@kernel
+@inner_kernel
 def wall_impact(S, Sw, s, c, c_prime, w1, xdot1, e, mu_s, mu_k, no_slip):
     """A corner strikes the wall, case I (top, S = Sw) or II (bottom): branch, w2, xdot2, N, P, v2, after the cascade of Fig. 3.
 

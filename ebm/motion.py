@@ -27,7 +27,7 @@ import numpy as np
 
 from ebm.ground import STILL, fill_series
 from ebm.series import MOST_TERMS, slope, value
-from scenes.compiled import kernel
+from scenes.compiled import inner_kernel, kernel
 
 
 class Setting(NamedTuple):
@@ -85,14 +85,14 @@ def workspace():
     return series, np.zeros((48, MOST_TERMS))
 
 
-@kernel
+@inner_kernel
 def delta(b, m, tip):
     """Distance from the initial centroid to the wall on the tip side (or the far side), R."""
     left = (m[S] > 0) == tip
     return b.sin_alpha + (b.gap_left if left else b.gap_right)
 
 
-@kernel
+@inner_kernel
 def tilt_series(b, m, z, gh, gv, t, order, enough, reach, need_forces, a):
     """Fills the workspace with the series of a tilted block's motion about time t; returns their order.
 
@@ -117,7 +117,7 @@ def tilt_series(b, m, z, gh, gv, t, order, enough, reach, need_forces, a):
     return _contact_series(b, m, order, enough, reach, a)
 
 
-@kernel
+@inner_kernel
 def _rock_series(still_vertical, order, enough, reach, need_forces, a):
     """ROCK, (3): theta'' = (3/4)(u c - S s G0), the pivot sticking; xi and y are s and c up to a constant."""
     scale = 1.0
@@ -155,7 +155,7 @@ def _rock_series(still_vertical, order, enough, reach, need_forces, a):
     return order
 
 
-@kernel
+@inner_kernel
 def _turn(a, k):
     """Order k + 1 of phi and of the sine and cosine of alpha - phi, from the orders up to k of its rate."""
     ds = 0.0
@@ -170,7 +170,7 @@ def _turn(a, k):
     a[COS, k + 1] = dc * RECIPROCAL[k + 1]
 
 
-@kernel
+@inner_kernel
 def _contact_rows(b, kappa, floor, stick, tip, far, a):
     """Constraint rows, force columns (xi, y, moment) and the inverse of their matrix at the start; returns their number."""
     s, c = a[SIN, 0], a[COS, 0]
@@ -196,7 +196,7 @@ def _contact_rows(b, kappa, floor, stick, tip, far, a):
     return n
 
 
-@kernel
+@inner_kernel
 def _contact_series(b, m, order, enough, reach, a):
     """Newton-Euler with the mode's constraints, solved term by term: the matrix of the unknown forces is the same each time."""
     floor, tip, far = m[FLOOR] != OFF, m[TIP] != 0, m[FAR] != 0
@@ -289,7 +289,7 @@ def _contact_series(b, m, order, enough, reach, a):
     return order
 
 
-@kernel
+@inner_kernel
 def inverse_of(a, matrix, inverse, n):
     """Inverse of the n x n matrix (n <= 3) in the rows from `matrix` on, by cofactors, into the rows from `inverse` on.
 
@@ -313,7 +313,7 @@ def inverse_of(a, matrix, inverse, n):
                 a[inverse + i, j] /= d
 
 
-@kernel
+@inner_kernel
 def flat_series(b, m, z, gh, gv, t, order, a):
     """Fills the workspace with the series of a block that only translates (world frame); returns their order.
 
@@ -341,7 +341,7 @@ def flat_series(b, m, z, gh, gv, t, order, a):
     return order
 
 
-@kernel
+@inner_kernel
 def tilt_state(b, m, order, tau, pivot, a, z):
     """Writes the state at tau after the start of the series into z, on the contacts to rounding.
 
@@ -368,7 +368,7 @@ def tilt_state(b, m, order, tau, pivot, a, z):
     z[X], z[HEIGHT], z[THETA], z[VX], z[VY], z[W] = sign * xi, y, sign * phi, sign * v, vy, sign * w
 
 
-@kernel
+@inner_kernel
 def flat_state(b, m, order, tau, a, z):
     """Writes the state of a translating block at tau after the start of the series into z."""
     if m[TIP] == 0 and m[FAR] == 0 and m[FLOOR] != STICK:

@@ -7,7 +7,7 @@ step, so an event is the root of a polynomial and can be located to rounding, wi
 
 from __future__ import annotations
 
-from scenes.compiled import kernel
+from scenes.compiled import inner_kernel
 
 #: Width of the arrays that hold a polynomial: orders up to 28, and two numbers that the root search keeps behind them.
 MOST_TERMS = 32
@@ -20,7 +20,7 @@ _DEEPEST = 44
 _LEVEL, _START = 30, 31  # where the root search keeps an interval's depth and left end
 
 
-@kernel
+@inner_kernel
 def value(a, row, n, tau):
     """c(tau) for a polynomial of degree n."""
     total = a[row, n]
@@ -29,7 +29,7 @@ def value(a, row, n, tau):
     return total
 
 
-@kernel
+@inner_kernel
 def slope(a, row, n, tau):
     """dc/dtau at tau for a polynomial of degree n >= 1."""
     total = n * a[row, n]
@@ -38,7 +38,7 @@ def slope(a, row, n, tau):
     return total
 
 
-@kernel
+@inner_kernel
 def leading(a, row, n, h, floor):
     """The sign with which c leaves tau = 0 on a step h: +1, -1, or 0 where it is zero throughout.
 
@@ -59,7 +59,7 @@ def leading(a, row, n, h, floor):
     return 0
 
 
-@kernel
+@inner_kernel
 def first_root(a, row, n, h, floor, stack):
     """The first tau in [0, h] at which c turns negative, or NO_ROOT.
 
@@ -92,7 +92,7 @@ def first_root(a, row, n, h, floor, stack):
     return NO_ROOT if z < 0.0 else z * h
 
 
-@kernel
+@inner_kernel
 def _isolate(stack, n):
     """First root on [0, 1] of the polynomial in stack[0], positive at 0; halves intervals, left ones first."""
     top = 0
@@ -114,7 +114,7 @@ def _isolate(stack, n):
             top -= 1
             continue
         if high_slope < 0.0:
-            return begin + 0.5**level * _falling_root(stack, top, n)
+            return begin + 0.5**level * _falling_root(stack, top, n, end)
         if level == _DEEPEST or top + 2 >= stack.shape[0]:
             top -= 1
             continue
@@ -134,22 +134,31 @@ def _isolate(stack, n):
     return NO_ROOT
 
 
-@kernel
-def _falling_root(stack, row, n):
-    """The root in [0, 1] of a polynomial that falls from positive to not positive: Newton, kept inside its bracket."""
+@inner_kernel
+def _falling_root(stack, row, n, end):
+    """The root in [0, 1] of a polynomial that falls from positive to `end` <= 0: Newton from the chord, kept inside its bracket.
+
+    It ends where the step after the next one, if they go on shrinking quadratically, would be below rounding.
+    """
     a, b = 0.0, 1.0
-    z = 0.5
+    z = stack[row, 0] / (stack[row, 0] - end)
+    last = 0.0
     for _ in range(100):
-        f = value(stack, row, n, z)
+        f, gradient = stack[row, n], 0.0
+        for k in range(n - 1, -1, -1):
+            gradient = gradient * z + f
+            f = f * z + stack[row, k]
         if f > 0.0:
             a = z
         else:
             b = z
-        gradient = slope(stack, row, n, z)
-        new = z - f / gradient if gradient < 0.0 else 0.5 * (a + b)
-        if not a < new < b:
+        new = z - f / gradient
+        newton = a <= new <= b
+        if not newton:
             new = 0.5 * (a + b)
-        if abs(new - z) <= 2e-16 * (abs(z) + 1e-3 * b):
+        step = abs(new - z)
+        rounding = 2e-16 * (abs(new) + 1e-3 * b)
+        if step <= rounding or step * step * step <= rounding * last * last:
             return new
-        z = new
+        z, last = new, step if newton else 0.0
     return z

@@ -9,7 +9,7 @@ import numpy as np
 
 from ebm import impacts
 from ebm.contact_impacts import CONTACTS, FAR_BOTTOM, FAR_TOP, TIP_BOTTOM, TIP_TOP, E, F, contact_impact
-from ebm.ground import GAUSSIAN, STILL, acceleration, largest_ahead, next_exceedance, next_kink
+from ebm.ground import GAUSSIAN, STILL, acceleration, impulse_ahead, largest_ahead, next_exceedance, next_kink
 from ebm.motion import (
     COS,
     FAMILY,
@@ -64,7 +64,7 @@ from ebm.transitions import (
     select,
     slip_velocity,
 )
-from scenes.compiled import kernel
+from scenes.compiled import inner_kernel, kernel
 
 #: Names of the mode codes that `mode_code` gives, and of the event codes.
 MODE_NAMES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight")
@@ -140,7 +140,7 @@ class Tally(NamedTuple):
     t_rest: float
 
 
-@kernel
+@inner_kernel
 def mode_code(m):
     """Index into MODE_NAMES."""
     if m[FLOOR] == OFF:
@@ -171,7 +171,8 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
     a[G, 0] = 1.0
     quiet = max(gh.quiet, gv.quiet)
     if control.until_decided and smooth:
-        quiet = gh.centre + math.sqrt(32.0 / gh.rate) if gh.kind == GAUSSIAN else 0.0  # 1e-12 of the pulse is left
+        # A pulse is over when less than the tolerance is left of it.
+        quiet = gh.centre + math.sqrt(-math.log(1e-3 * control.tolerance) / gh.rate) if gh.kind == GAUSSIAN else 0.0
     base_rest = _REST_UNILATERAL if b.unilateral else _REST_BILATERAL
     resting, window_start, last_impact, in_window = base_rest, -1.0, -1.0, 0
     t = 0.0
@@ -217,8 +218,11 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             continue
         if t >= t_end:
             break
-        if control.until_decided and (t >= quiet or abs(z[THETA]) > b.alpha):
-            verdict = _decided(b, m, z, gh, peak) if t >= quiet else _falls(b, m, z, gh, t, still)
+        if control.until_decided:
+            ahead = 0.0 if t >= quiet else (impulse_ahead(gh, t) if still else math.inf)
+            verdict = _decided(b, m, z, ahead, peak)
+            if verdict <= 0.0 and ahead > 0.0 and abs(z[THETA]) > b.alpha:
+                verdict = _falls(b, m, z, gh, t, still)
             if verdict > 0.0:
                 peak = verdict
                 if peak >= 0.5 * math.pi:
@@ -318,7 +322,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
     return Tally(ending, t, peak, at_rest, steps, events, wall_impacts, int(gains[0]), gains[1], rows, t_rest)
 
 
-@kernel
+@inner_kernel
 def _expand(b, m, z, gh, gv, t, reach, control, a):
     """Series of the mode's motion about t: their order, the place of a sticking pivot, and the step they are good for."""
     if m[FAMILY] == FLAT:
@@ -334,7 +338,7 @@ def _expand(b, m, z, gh, gv, t, reach, control, a):
     return order, m[S] * z[X] - a[SIN, 0], h
 
 
-@kernel
+@inner_kernel
 def _first_event(b, m, order, pivot, h, a, stack):
     """The first time within the step at which a guard ends the mode, and which guard; h and -1 where none does."""
     rocks = m[FAMILY] == TILT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
@@ -355,7 +359,7 @@ def _first_event(b, m, order, pivot, h, a, stack):
     return tau, which
 
 
-@kernel
+@inner_kernel
 def _impact(b, m, z, which, gh, t, resting, impulse, gains):
     """Resolves the impact at the closing of a gap: the event's kind, whether a law fits, and whether m is already right."""
     wall = which == G_TIP_GAP or which == G_FAR_GAP
@@ -381,7 +385,7 @@ def _impact(b, m, z, which, gh, t, resting, impulse, gains):
     return WALL_IMPACT if wall else (LANDS if which == G_LANDING else FLOOR_IMPACT), found, known
 
 
-@kernel
+@inner_kernel
 def _release(b, m, z, which):
     """Prepares the state for a change of mode without impact, and names it."""
     if which == G_SLIP:
@@ -396,26 +400,26 @@ def _release(b, m, z, which):
     return LIFT_OFF if which == G_PUSH and b.unilateral else RELEASE
 
 
-@kernel
+@inner_kernel
 def _note(log, count, t, kind, before, after, impulse):
     row = log[count - 1]
     row[0], row[1], row[2], row[3], row[4] = t, kind, before, after, impulse
 
 
-@kernel
+@inner_kernel
 def _step_size(a, first, second, order, tolerance, reach):
     """The step at which the last two terms of the series stay below the tolerance, at most `reach`."""
     last = abs(a[first, order]) + abs(a[second, order])
     before = abs(a[first, order - 1]) + abs(a[second, order - 1])
-    h = reach
+    longest = math.inf  # its logarithm
     if last > 0.0:
-        h = min(h, math.exp(math.log(tolerance / last) / order))
+        longest = math.log(tolerance / last) / order
     if before > 0.0:
-        h = min(h, math.exp(math.log(tolerance / before) / (order - 1)))
-    return h
+        longest = min(longest, math.log(tolerance / before) / (order - 1))
+    return min(reach, math.exp(longest))
 
 
-@kernel
+@inner_kernel
 def _touch(b, m, z, which):
     """Puts the block onto the contact whose gap has just closed: the series knows the gap to the tolerance only."""
     phi = abs(z[THETA])
@@ -428,7 +432,7 @@ def _touch(b, m, z, which):
         z[X] = x if left else -x
 
 
-@kernel
+@inner_kernel
 def _upright(b, m, z):
     """Sets theta from nearly to exactly zero, the pivot keeping its place; a side that then touches a wall touches it exactly."""
     sign = float(m[S])
@@ -443,7 +447,7 @@ def _upright(b, m, z):
         z[X] = b.gap_right
 
 
-@kernel
+@inner_kernel
 def _floor_impact(b, m, z, impulse):
     """Bilateral pivot: the block lands at theta = 0. Returns whether it is already known to rock on in m."""
     w1, v1 = z[W], slip_velocity(b, z)
@@ -473,7 +477,7 @@ def _floor_impact(b, m, z, impulse):
     return False
 
 
-@kernel
+@inner_kernel
 def _wall_impact(b, m, z, tip, gh, t, resting, impulse, gains):
     """Bilateral pivot: a corner (case I, II) or the side (case III) strikes a wall. Returns whether m is already right."""
     if m[FAMILY] == FLAT:
@@ -521,7 +525,7 @@ def _wall_impact(b, m, z, tip, gh, t, resting, impulse, gains):
     return False
 
 
-@kernel
+@inner_kernel
 def _presses(b, gh, t, side):
     """Whether the base acceleration holds a flush block against the wall on `side` beyond what would lift or slide it."""
     level = side * acceleration(gh, t)
@@ -557,32 +561,35 @@ def _strike(b, m, z, resting, impulse, gains):
     return found
 
 
-@kernel
-def _decided(b, m, z, gh, peak):
-    """After the excitation: the final peak rotation (>= pi/2: overturns) if the rest of the motion is certain, else -1.
+@inner_kernel
+def _decided(b, m, z, ahead, peak):
+    """The final peak rotation (>= pi/2: overturns) if the rest of the motion is certain, else -1.
 
-    Without excitation the energy of block and floor cannot grow, and a block whose energy is below that of standing on its
-    corner cannot overturn: it is safe once that energy cannot lift it above the peak it has had. A block that only rocks
-    conserves its energy up to its next impact, so that its peak is known at once.
+    `ahead` bounds the integral of |u| to come, I. The energy E of block and floor, counted from standing, grows by no other
+    work: dE/dt <= |u| sqrt(2 E), so that sqrt(2 E) grows by at most I. A block that can never reach the energy of standing on
+    its corner cannot overturn: it is safe once that energy cannot lift it above the peak it has had. After the excitation a
+    block that only rocks conserves its energy up to its next impact, so that its peak is known at once.
     """
     phi = abs(z[THETA])
-    energy = 0.5 * (z[VX] * z[VX] + z[VY] * z[VY] + z[W] * z[W] / 3.0) + z[HEIGHT]
-    rocks = m[FAMILY] == TILT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0 and not b.walls
+    if ahead > 0.0 and (b.walls or phi >= peak):
+        return -1.0
+    energy = 0.5 * (z[VX] * z[VX] + z[VY] * z[VY] + z[W] * z[W] / 3.0) + z[HEIGHT] - b.cos_alpha
+    corner = 1.0 - b.cos_alpha
+    most = 0.5 * (math.sqrt(2.0 * max(energy, 0.0)) + ahead) ** 2
+    margin = 0.9 if b.walls else 1.0  # the wall cascade may add a little energy
+    rocks = m[FAMILY] == TILT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0 and not b.walls and ahead == 0.0
     rocks = rocks and (b.no_slip or _sticks_for_good(b, energy))
-    if energy < 1.0 and phi < b.alpha:
-        highest = b.alpha - math.acos(min(energy, 1.0))
-        margin = 0.9 if b.walls else 1.0  # the wall cascade may add a little energy
+    if most < corner and phi < b.alpha:
+        highest = b.alpha - math.acos(min(b.cos_alpha + most, 1.0))
         if rocks:
             return max(peak, highest if m[S] * z[W] > 0.0 else phi)
-        if highest <= peak and energy - b.cos_alpha < margin * (1.0 - b.cos_alpha):
-            return max(peak, 1e-300)
-        return -1.0
-    if rocks and m[S] * z[W] >= 0.0 and (phi > b.alpha or energy > 1.0):
+        return max(peak, 1e-300) if highest <= peak and most < margin * corner else -1.0
+    if rocks and m[S] * z[W] >= 0.0 and (phi > b.alpha or energy > corner):
         return 0.5 * math.pi
     return -1.0
 
 
-@kernel
+@inner_kernel
 def _falls(b, m, z, gh, t, still):
     """pi/2 if a block past its balance point falls whatever the rest of the excitation does, else -1.
 
@@ -598,15 +605,15 @@ def _falls(b, m, z, gh, t, still):
     return 0.5 * math.pi
 
 
-@kernel
+@inner_kernel
 def _sticks_for_good(b, energy):
     """Whether a pivot cannot slip in free rocking of this energy (up to its balance point), impacts included.
 
-    |Q| <= max(3/4 s c, s w^2) and P >= 1 - 3/4 s^2 - w^2, with w^2 <= 3/2 (energy - cos alpha); the landing sticks if
+    |Q| <= max(3/4 s c, s w^2) and P >= 1 - 3/4 s^2 - w^2, with w^2 <= 3/2 energy; the landing sticks if
     mu >= 3 t/(4 + t^2), t = tan alpha.
     """
     s, c = b.sin_alpha, b.cos_alpha
-    square = 1.5 * (energy - c)
+    square = 1.5 * energy
     push = 1.0 - 0.75 * s * s - square
     # s c rises with s only up to 45 degrees.
     pull = 0.75 * (s * c if b.alpha < 0.25 * math.pi else 0.5)

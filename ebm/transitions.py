@@ -50,7 +50,7 @@ from ebm.motion import (
     tilt_series,
 )
 from ebm.series import NOISE, SLIP_NOISE, leading
-from scenes.compiled import kernel
+from scenes.compiled import inner_kernel
 
 # The guards, in the order in which ties are decided: floor before walls, contacts before friction.
 (
@@ -75,7 +75,7 @@ CLOSED_GAP = 1e-10
 CLOSED_RATE = 1e-9
 
 
-@kernel
+@inner_kernel
 def guards_of(b, m):
     """The guards that mode m may have, as bits: what a scene or a mode does not need is not looked at."""
     walls = 1 << G_TIP_GAP | 1 << G_FAR_GAP | 1 << G_TIP_PUSH | 1 << G_FAR_PUSH if b.walls else 0
@@ -91,7 +91,7 @@ def guards_of(b, m):
     return walls | floor | 1 << G_PHI | 1 << G_TOPPLE
 
 
-@kernel
+@inner_kernel
 def guard(b, m, which, order, pivot, a):
     """Writes guard `which` of mode m into the workspace and returns its degree, or -1 where the mode has no such guard."""
     if m[FAMILY] == FLAT:
@@ -146,7 +146,7 @@ def guard(b, m, which, order, pivot, a):
     return -1
 
 
-@kernel
+@inner_kernel
 def _gap(b, m, tip, order, pivot, a):
     """The clear gap of the corner that faces the tip wall, or the far wall."""
     if m[TIP if tip else FAR] != 0:
@@ -167,14 +167,14 @@ def _gap(b, m, tip, order, pivot, a):
     return order
 
 
-@kernel
+@inner_kernel
 def _settle_touch(a):
     """A contact that touches and closes more slowly than CLOSED_RATE counts as resting: its acceleration decides."""
     if abs(a[GUARD, 0]) < 1e-12 and a[GUARD, 1] < 0.0 and a[GUARD, 1] > -CLOSED_RATE:
         a[GUARD, 0] = a[GUARD, 1] = 0.0
 
 
-@kernel
+@inner_kernel
 def _flat_guard(b, m, which, order, a):
     """The guards of a translating block; the tip wall is the left one, the far wall the right one."""
     if which == G_LANDING:
@@ -230,7 +230,7 @@ def _flat_guard(b, m, which, order, a):
     return -1
 
 
-@kernel
+@inner_kernel
 def rock_guards_hold(b, order, pivot_walls, h, a):
     """A cheap proof that a rocking block keeps every guard of ROCK but G_PHI through a step h, or False where it is open.
 
@@ -252,7 +252,7 @@ _LOOK = 6  # order of the series that a selection looks at
 _AHEAD = 1e-2  # natural time over which it weighs their terms
 
 
-@kernel
+@inner_kernel
 def consistent(b, m, z, gh, gv, t, a):
     """Whether mode m can begin at state z: every guard leaves zero upward, and what must begin to move does."""
     if m[FAMILY] == FLAT:
@@ -276,13 +276,13 @@ def consistent(b, m, z, gh, gv, t, a):
     return True
 
 
-@kernel
+@inner_kernel
 def slip_velocity(b, z):
     """V of the lower corner."""
     return z[VX] + math.cos(b.alpha - abs(z[THETA])) * z[W]
 
 
-@kernel
+@inner_kernel
 def closed_wall(b, z, side, lower):
     """Whether the corner facing the wall on `side` (+1 left, -1 right) rests on it.
 
@@ -300,7 +300,7 @@ def closed_wall(b, z, side, lower):
     return abs(clear) < CLOSED_GAP and abs(rate) < CLOSED_RATE
 
 
-@kernel
+@inner_kernel
 def closed_floor(b, z):
     """Whether the lower corner rests on the floor."""
     phi = abs(z[THETA])
@@ -308,7 +308,7 @@ def closed_floor(b, z):
     return abs(z[HEIGHT] - math.cos(b.alpha - phi)) < CLOSED_GAP and abs(rate) < CLOSED_RATE
 
 
-@kernel
+@inner_kernel
 def select(b, z, gh, gv, t, left, m, a):
     """Writes into m the mode that is consistent at state z, and returns whether there is one.
 
@@ -348,7 +348,7 @@ def select(b, z, gh, gv, t, left, m, a):
     return False
 
 
-@kernel
+@inner_kernel
 def _accept(b, m, z, gh, gv, t, left, a, again):
     same = True
     for k in range(m.size):
@@ -356,7 +356,7 @@ def _accept(b, m, z, gh, gv, t, left, a, again):
     return same == again and consistent(b, m, z, gh, gv, t, a)
 
 
-@kernel
+@inner_kernel
 def _select_flat(b, z, gh, gv, t, floor, left, m, a, again):
     m[:] = 0
     m[FAMILY], m[S], m[PULL] = FLAT, 1, 1
@@ -381,7 +381,7 @@ def _select_flat(b, z, gh, gv, t, floor, left, m, a, again):
     return False
 
 
-@kernel
+@inner_kernel
 def _select_tilt(b, z, gh, gv, t, sense, floor, left, m, a, again):
     m[:] = 0
     m[FAMILY], m[S] = TILT, sense
