@@ -2,9 +2,87 @@
 
 from __future__ import annotations
 
-from scenes import InputError
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from scenes.errors import unknown_name
+from validation.commands import OUT, JobsOption, OutOption, console, usable_folder
+
+if TYPE_CHECKING:
+    from validation.stress.study import Stress
 
 
-def run() -> None:
-    """Numerical stability: where the models break."""
-    raise InputError("stress is not available yet")
+def run(
+    out: OutOption = OUT / "stress",
+    quick: Annotated[bool, typer.Option("--quick", help="Some thousand runs, below a minute.")] = False,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the random scenes; scene k of a seed is always the same.")] = 1,
+    runs: Annotated[int | None, typer.Option("--runs", min=1, help="Runs of each model (100,000 of event-based ones, else 2,000).")] = None,
+    model: Annotated[list[str] | None, typer.Option("--model", help="Only this model; repeatable.")] = None,
+    jobs: JobsOption = None,
+) -> None:
+    """Numerical stability: random scenes over all that can be written, held against invariants; where engines break.
+
+    Writes a page, the tables as CSV, a summary in Markdown, and of failures the smallest scene files that show them.
+    Exit 1 where an event-based model breaks an invariant.
+    """
+    from validation.stress import study
+    from validation.stress.players import PLAYERS
+
+    for name in model or ():
+        if name not in PLAYERS:
+            raise unknown_name("model", name, PLAYERS)
+    folder = usable_folder(out)
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    with bar:
+        task = bar.add_task("stress", total=None)
+
+        def progress(done: int, of: int, what: str) -> None:
+            bar.update(task, completed=done, total=of, description=f"stress: {what}")
+
+        found = study.run_stress(seed=seed, quick=quick, runs=runs, jobs=jobs, models=model, folder=folder, progress=progress)
+    study.save(found, folder)
+    from reports.stress import write_stress
+
+    index = write_stress(found, folder)
+    show(found, console())
+    console().print(f"report: {index}", soft_wrap=True)
+    if not found.complete:
+        raise KeyboardInterrupt
+    raise typer.Exit(int(bool(found.broken)))
+
+
+def show(found: Stress, out: Console) -> None:
+    """For each model runs, failures by invariant and the worst figures; then the failures with their files."""
+    from validation.stress.study import summary_rows
+
+    table = Table(box=None, pad_edge=False)
+    for column in ("model", "invariant"):
+        table.add_column(column)
+    for column in ("runs", "failures", "worst", "in run", "bound"):
+        table.add_column(column, justify="right")
+    last = ""
+    for row in summary_rows(found):
+        figures = str(row["runs"]), str(row["failures"]), f"{row['worst']:.1e}", str(row["in run"]), f"{row['bound']:g}"
+        table.add_row(row["model"] if row["model"] != last else "", row["invariant"], *figures, style="red" if row["failures"] else None)
+        last = row["model"]
+    out.print(table)
+    for failure in [one for one in found.failures if one.file]:
+        out.print(f"{failure.model}, {failure.invariant}, run {failure.number}: {failure.file} {failure.words}", soft_wrap=True)
+    for label, batch in found.batches.items():
+        if batch.gaining:
+            out.print(f"{label}: an impact adds energy in {batch.gaining} runs, at most {100.0 * batch.largest_gain:.2g} %, by its law")
+    runs = sum(batch.runs for batch in found.batches.values())
+    broken = len(found.broken)
+    verdict = "no failure of an event-based model" if not broken else f"{broken} failures of event-based models"
+    out.print(f"seed {found.seed}: {runs} runs, {verdict}; {found.wall_seconds:.0f} s with {found.jobs} processes")

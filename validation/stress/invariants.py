@@ -1,0 +1,486 @@
+"""What must hold of every history, whatever the scene: each invariant gives a figure and the bound that it has to keep.
+
+Figures are in natural units (lengths in R, accelerations in g, times in sqrt(R/g)), energies relative to what was at play.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ebm import EventBasedModel
+from scenes import Block, History, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from validation.stress.mechanics import BOOLE, GROUP, integrals, tilted_forces
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Invariant:
+    """A condition: its name, what its figure means, and the largest value that is allowed."""
+
+    name: str
+    words: str
+    bound: float
+
+
+INVARIANTS = {
+    one.name: one
+    for one in (
+        Invariant("ends", "the run ends within its caps, in a mode of motion (1: it does not)", 0.0),
+        Invariant("finite", "values that are not finite", 0.0),
+        Invariant("outcome", "rows, last event and outcome contradict each other (1: they do)", 0.0),
+        Invariant("penetration", "depth of a corner in floor or wall, R", 1e-9),
+        Invariant("floor", "height of the pivot over the floor in modes that have it there, R", 1e-9),
+        Invariant("stick", "slip rate of a pivot that stands, sqrt(g R)", 1e-9),
+        Invariant("coulomb", "friction beyond the cone of a pivot that stands, of the acceleration at play", 1e-7),
+        Invariant("push", "tension in a contact that can only push, of the acceleration at play", 1e-7),
+        Invariant("energy", "energy less the work of base and friction, between events, of the energy at play", 1e-9),
+        Invariant("impacts", "relative energy that an impact without restitution, or with the energy cap, adds", 0.0),
+        Invariant("mirror", "bits that differ in the mirror image", 0.0),
+        Invariant("similarity", "rotation of the scene at another scale, within the horizon, rad", 1e-6),
+        Invariant("tolerance", "rotation at tolerance/100, within the horizon, rad", 1e-6),
+        # of models that approximate contact
+        Invariant("depth", "penetration over twice the way that a step, or the contact's spring, takes at this motion", 1.0),
+        Invariant("source", "energy beyond that of the start and the work of the base, of all work done", 0.05),
+    )
+}
+#: The horizon of predictability of a run here: a relative disturbance of the scene's data by DISTURBANCE turns the block by SEEN rad.
+DISTURBANCE, SEEN, DISTURBED = 1e-8, 1e-6, 6
+#: Rows of an audited history: this fraction of the shortest time in the scene, and at most this many.
+FINE, MOST_ROWS = 64, 4000
+#: A contact counts as closed, a slip as seen, beyond these; conditions are not asked for within this time of an event or a jump.
+CLOSED, SLIPS, NEAR = 1e-8, 1e-9, 1e-9
+#: An integral is believed where a rule of order 6 gives the same to this, relatively: that of order 10 is then off by far less.
+RESOLVED = 1e-8
+#: Kinds of motion by the contacts they have.
+ON_FLOOR = ("rest", "slide", "rock", "slide-rock", "lean", "ladder")
+STANDS = ("rest", "rock", "lean")
+
+EVEN = ("t", "y", "y_dot", "mode")
+ODD = ("x", "theta", "x_dot", "theta_dot", "slip", "slip_rate")
+SWAPPED = {"overturned left": "overturned right", "overturned right": "overturned left"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Played:
+    """What was found of one run: the figure of each invariant that was looked at, and how it failed to end."""
+
+    figures: dict[str, float]
+    failure: str = ""
+    outcome: str = ""
+    events: int = 0
+    #: Impacts that added energy where the impact law is known to (see `rules`), and the most that one added.
+    gains: int = 0
+    largest_gain: float = 0.0
+    #: Whether the horizon of predictability had to be found, and whether it ended the comparison.
+    horizons: int = 0
+
+    @property
+    def broken(self) -> list[str]:
+        """Names of the invariants that do not hold."""
+        return [name for name, value in self.figures.items() if not value <= INVARIANTS[name].bound]
+
+
+def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: bool = False, only: str = "") -> Played:
+    """Plays a scene and checks every invariant, or only one. With `audit` also those that ask for many rows: energy."""
+    played = audited(scene) if audit else scene
+    figures: dict[str, float] = {}
+    try:
+        history = model.simulate(played)
+    except ModelFailure as error:
+        return Played(figures={"ends": 1.0}, failure=str(error))
+    figures["ends"] = 0.0
+    figures["finite"] = _not_finite(history)
+    if figures["finite"]:
+        return Played(figures=figures, outcome=history.outcome)
+    figures["outcome"] = float(_contradicts(played, history))
+    figures |= conditions(model, played, history)
+    if audit:  # at the finer tolerance, so that its error is not taken for one of the balance
+        with suppress(ModelFailure):
+            figures["energy"] = energy_error(model, played, finer(model).simulate(played))
+    capped = model.energy_cap or not _bounces(scene)
+    gains = history.cost.energy_gains
+    if model.pivot == "unilateral":
+        figures["impacts"] = history.cost.largest_energy_gain if capped and gains else 0.0
+    horizon = _Horizon(model, played, seed)
+    if only in ("", "mirror"):
+        figures["mirror"] = _mirror(model, played, history)
+    if only in ("", "similarity"):
+        figures["similarity"] = horizon.apart(history, similar(played, seed))
+    if only in ("", "tolerance"):
+        figures["tolerance"] = horizon.apart(history, played, finer(model))
+    return Played(
+        figures=figures if not only else {only: figures.get(only, 0.0)},
+        outcome=history.outcome,
+        events=len(history.event_list),
+        gains=gains,
+        largest_gain=history.cost.largest_energy_gain,
+        horizons=horizon.found,
+        failure=horizon.failure,
+    )
+
+
+def finer(model: EventBasedModel) -> EventBasedModel:
+    """The same model at a hundredth of its tolerance."""
+    return model.model_copy(update={"tolerance": model.tolerance / 100.0})
+
+
+def audited(scene: Scene) -> Scene:
+    """The scene with rows so near to each other that integrals over them are exact to 1e-10, and no longer than affordable."""
+    unit = math.sqrt(scene.block.radius / scene.gravity)
+    step = 0.03 * unit
+    for excitation in (scene.excitation, scene.vertical):
+        if isinstance(excitation, Ricker | Sine):
+            step = min(step, excitation.period / FINE)
+    for excitation in (scene.excitation, scene.vertical):
+        if isinstance(excitation, Record):
+            step = excitation.time_step / (GROUP * max(1, math.ceil(excitation.time_step / (GROUP * step))))
+            break
+    return scene.replace(output_step=step, duration=min(scene.duration, MOST_ROWS * step))
+
+
+def _bounces(scene: Scene) -> bool:
+    return scene.floor.restitution > 0.0 or any(wall.restitution > 0.0 for wall in scene.walls)
+
+
+def _not_finite(history: History) -> float:
+    return float(sum(np.sum(~np.isfinite(column)) for column in history.channels.values() if column.dtype.kind == "f"))
+
+
+def _contradicts(scene: Scene, history: History) -> bool:
+    """Whether the run ends otherwise than it says."""
+    falls = [event for event in history.event_list if event.kind.startswith("overturned")]
+    rows, theta = len(history.channels["t"]), history.channels["theta"]
+    times = [event.t for event in history.event_list]
+    if any(b < a for a, b in itertools.pairwise(times)) or (times and times[-1] > scene.duration * (1.0 + 1e-12)):
+        return True
+    if history.outcome.startswith("overturned"):
+        return [event.kind for event in falls] != [history.outcome] or history.event_list[-1] is not falls[0]
+    return bool(falls) or rows != len(scene.output_times) or bool(np.any(np.abs(theta) >= math.pi / 2))
+
+
+def conditions(model: EventBasedModel, scene: Scene, history: History) -> dict[str, float]:
+    """Contacts, Coulomb's law and the signs of forces in every row, away from events."""
+    block, radius, gravity = scene.block, scene.block.radius, scene.gravity
+    unit = math.sqrt(radius / gravity)
+    channels = history.channels
+    t, theta, mode = channels["t"], channels["theta"], channels["mode"]
+    height = kinematics.pivot_height(block, channels["y"], theta) / radius
+    gaps = _gaps(scene, channels["x"], theta)
+    # What x is off by its own rounding is not depth.
+    rounding = 4e-16 * np.abs(channels["x"]) / radius
+    depth = [float(np.max(-height)), *(float(np.max(-gap - rounding)) for gap in gaps.values())]
+    on_floor, stands = np.isin(mode, ON_FLOOR), np.isin(mode, STANDS)
+    speed = np.abs(channels["slip_rate"]) * unit / radius
+    scale = 1.0 + 1e-6 * np.abs(channels["x_dot"]) * unit / radius + np.abs(channels["theta_dot"]) * unit
+    found = {
+        "penetration": max(0.0, *depth),
+        "floor": float(np.max(np.abs(height[on_floor]), initial=0.0)),
+    }
+    if model.friction == "bouc-wen":  # its pivot creeps, and its friction is not in a history
+        return found
+    found["stick"] = float(np.max((speed / scale)[stands], initial=0.0))
+    clear = _clear(scene, history, t)
+    friction, push = _force_conditions(model, scene, history, gaps, clear)
+    return found | {"coulomb": friction, "push": push}
+
+
+def _gaps(scene: Scene, x: Floats, theta: Floats) -> dict[str, Floats]:
+    """Clear distance to each wall, R."""
+    return {wall.side: kinematics.wall_gap(scene, wall.side, x, theta) / scene.block.radius for wall in scene.walls}
+
+
+def _touches(gaps: dict[str, Floats], rows: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """In which rows the block touches the left wall, and the right one."""
+    nowhere = np.full(rows, math.inf)
+    return gaps.get("left", nowhere) < CLOSED, gaps.get("right", nowhere) < CLOSED
+
+
+def _clear(scene: Scene, history: History, t: Floats) -> NDArray[np.bool_]:
+    """Rows that are neither at an event nor at a jump of the base acceleration."""
+    jumps = [event.t for event in history.event_list]
+    for excitation in (scene.excitation, scene.vertical):
+        if excitation.kind != "rest":
+            jumps += [0.0, excitation.quiet_after]
+    places = np.sort(np.array([*jumps, -math.inf, math.inf]))
+    after = np.searchsorted(places, t)
+    unit = math.sqrt(scene.block.radius / scene.gravity)
+    near = NEAR * unit + 1e-12 * np.abs(t)
+    return np.asarray((t - places[after - 1] > near) & (places[after] - t > near))
+
+
+def _force_conditions(
+    model: EventBasedModel, scene: Scene, history: History, gaps: dict[str, Floats], clear: NDArray[np.bool_]
+) -> tuple[float, float]:
+    """Largest friction beyond the cone, and largest tension, relative to 1 + |u| + |vg| + w^2."""
+    channels = history.channels
+    unit = math.sqrt(scene.block.radius / scene.gravity)
+    u = scene.excitation.acceleration(channels["t"]) / scene.gravity
+    g = 1.0 + scene.vertical.acceleration(channels["t"]) / scene.gravity
+    mode, theta = channels["mode"], channels["theta"]
+    w = channels["theta_dot"] * unit
+    slip = channels["slip_rate"] * unit / scene.block.radius
+    scale = 1.0 + np.abs(u) + np.abs(g) + w * w
+    mu_s, slope = scene.floor.mu_s, math.tan(scene.block.alpha)
+    excess = tension = 0.0
+    left, right = _touches(gaps, len(theta))
+    unilateral = model.pivot == "unilateral"
+
+    rest = clear & (mode == "rest") & ~left & ~right
+    limit = slope if model.friction == "no-slip" else min(slope, max(mu_s, 1e-9))
+    excess = max(excess, float(np.max(((np.abs(u) - limit * np.abs(g)) / scale)[rest], initial=0.0)))
+    flat = clear & np.isin(mode, ("rest", "slide"))
+    if unilateral:
+        tension = max(tension, float(np.max((-g / scale)[flat], initial=0.0)))
+
+    sign = _pivots(theta)
+    tip, far = np.where(sign > 0, left, right), np.where(sign > 0, right, left)
+    walls = np.isin(mode, ("lean", "ladder"))
+    tilted = clear & np.isin(mode, ("rock", "slide-rock", "lean", "ladder")) & (theta != 0.0) & ~(walls & (tip == far))
+    slides = np.isin(mode, ("slide-rock", "ladder"))
+    tilted &= ~(slides & (np.abs(slip) < SLIPS))
+    if not tilted.any():
+        return excess, tension
+    direction = np.where(slides, np.sign(sign * slip), 0.0).astype(np.int8)[tilted]
+    on = np.ones(int(tilted.sum()), dtype=bool)
+    forces = tilted_forces(
+        scene.block.alpha,
+        scene.floor.friction,
+        np.abs(theta)[tilted],
+        (sign * w)[tilted],
+        (sign * u)[tilted],
+        g[tilted],
+        (on, (tip & walls)[tilted], (far & walls)[tilted]),
+        direction,
+    )
+    size = scale[tilted]
+    if model.friction != "no-slip":
+        over = (np.abs(forces.friction) - mu_s * np.abs(forces.normal)) / size
+        excess = max(excess, float(np.max(over[direction == 0], initial=0.0)))
+    pulls = np.maximum(-forces.tip, -forces.far) / size
+    if unilateral:
+        pulls = np.maximum(pulls, -forces.normal / size)
+    return excess, max(tension, float(np.max(pulls, initial=0.0)))
+
+
+def energy_error(model: EventBasedModel, scene: Scene, history: History) -> float:
+    """Largest change of energy, over eight rows without event or kink, that the work of base and friction does not account for.
+
+    Relative to the energy and the work at play in the run, at least g R. Where friction is not known (Bouc-Wen): what
+    energy gains beyond the work of the base and what the friction spring can hold.
+    """
+    channels, radius, gravity = history.channels, scene.block.radius, scene.gravity
+    if len(channels["t"]) <= GROUP:
+        return 0.0
+    unit = math.sqrt(radius / gravity)
+    t = channels["t"]
+    energy = kinematics.energy(scene.block, gravity, *(channels[c] for c in ("y", "x_dot", "y_dot", "theta_dot"))) / (gravity * radius)
+    u = scene.excitation.acceleration(t) / gravity
+    vg = scene.vertical.acceleration(t) / gravity
+    speed = radius / unit
+    power = -(u * channels["x_dot"] + vg * channels["y_dot"]) / speed
+    if model.friction != "bouc-wen":
+        power = power + _friction_power(scene, history, u, 1.0 + vg)
+    whole, quiet = _whole_groups(scene, history)
+    if not whole.any():
+        return 0.0
+    step = scene.output_step / unit
+    work, moved = integrals(step, power), integrals(step, np.abs(power))
+    rough = integrals(step, power, BOOLE)
+    change = energy[GROUP::GROUP][: len(work)] - energy[:-1:GROUP][: len(work)]
+    size = 1.0 + np.maximum(energy[GROUP::GROUP][: len(work)], moved)
+    off = (change - work) / size
+    whole &= np.abs(work - rough) < RESOLVED * size
+    if model.friction == "bouc-wen":
+        held = scene.floor.friction * model.yield_displacement / radius * (2.0 + np.max(np.abs(vg)))
+        return float(np.max((off - held / size)[whole], initial=0.0))
+    return float(np.max(np.abs(off)[whole & quiet], initial=0.0))
+
+
+def _pivots(theta: Floats) -> Floats:
+    """The sign of theta in each row; of the next row where it is zero, as a block that is about to tilt has its pivot already."""
+    sign = np.sign(theta)
+    standing = np.flatnonzero(sign[:-1] == 0.0)
+    sign[standing] = sign[standing + 1]
+    return np.where(sign < 0.0, -1.0, 1.0)
+
+
+def _friction_power(scene: Scene, history: History, u: Floats, g: Floats) -> Floats:
+    """Power of the floor's friction, natural units."""
+    channels = history.channels
+    unit = math.sqrt(scene.block.radius / scene.gravity)
+    mode, theta = channels["mode"], channels["theta"]
+    slip = channels["slip_rate"] * unit / scene.block.radius
+    w = channels["theta_dot"] * unit
+    mu = scene.floor.friction
+    power = np.where(mode == "slide", -mu * np.abs(g) * np.abs(slip), 0.0)
+    tilted = np.isin(mode, ("slide-rock", "ladder"))
+    if tilted.any():
+        sign = _pivots(theta)
+        gaps = {
+            wall.side: kinematics.wall_gap(scene, wall.side, channels["x"], theta) / scene.block.radius < CLOSED for wall in scene.walls
+        }
+        nowhere = np.zeros(len(theta), dtype=bool)
+        left, right = gaps.get("left", nowhere), gaps.get("right", nowhere)
+        ladder = mode == "ladder"
+        tip, far = np.where(sign > 0, left, right) & ladder, np.where(sign > 0, right, left) & ladder
+        forces = tilted_forces(
+            scene.block.alpha,
+            mu,
+            np.abs(theta)[tilted],
+            (sign * w)[tilted],
+            (sign * u)[tilted],
+            g[tilted],
+            (np.ones(int(tilted.sum()), dtype=bool), tip[tilted], far[tilted]),
+            np.where(sign * slip >= 0.0, 1, -1).astype(np.int8)[tilted],
+        )
+        power[tilted] = forces.friction * (sign * slip)[tilted]
+    return power
+
+
+def _whole_groups(scene: Scene, history: History) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which groups of eight steps have neither event nor kink inside, and in which the mode of motion is the same in all rows."""
+    t, mode = history.channels["t"], history.channels["mode"]
+    groups = (len(t) - 1) // GROUP
+    edges = t[: groups * GROUP + 1 : GROUP]
+    breaks = [event.t for event in history.event_list]
+    for excitation in (scene.excitation, scene.vertical):
+        if isinstance(excitation, Record):
+            breaks += list(excitation.time_step * np.arange(len(excitation.unscaled)))
+        elif not isinstance(excitation, Rest):
+            breaks.append(excitation.quiet_after)
+    near = 1e-9 * scene.output_step
+    places = np.sort(np.array([*breaks, math.inf]))
+    whole = np.searchsorted(places, edges[:-1] + near) == np.searchsorted(places, edges[1:] - near)
+    # An event at an edge itself: the row there is from before or after it.
+    events = np.sort(np.array([event.t for event in history.event_list] + [math.inf]))
+    whole &= np.searchsorted(events, edges[:-1] - 1e3 * near) == np.searchsorted(events, edges[1:] + 1e3 * near)
+    for excitation in (scene.excitation, scene.vertical):  # the base acceleration jumps where a record ends
+        if isinstance(excitation, Record):
+            end = excitation.quiet_after
+            whole &= ~((edges[:-1] - 1e3 * near <= end) & (end <= edges[1:] + 1e3 * near))
+    nodes = mode[np.arange(groups)[:, None] * GROUP + np.arange(GROUP + 1)]
+    return whole, np.all(nodes == nodes[:, :1], axis=1)
+
+
+def _mirror(model: EventBasedModel, scene: Scene, history: History) -> float:
+    """How many values differ from those of the mirror image, to the bit."""
+    try:
+        image = model.simulate(scene.mirrored())
+    except ModelFailure:
+        return math.inf
+    if len(image.channels["t"]) != len(history.channels["t"]) or len(image.event_list) != len(history.event_list):
+        return math.inf
+    differ = sum(int(np.sum(history.channels[name] != image.channels[name])) for name in EVEN)
+    differ += sum(int(np.sum(history.channels[name] != -image.channels[name])) for name in ODD)
+    for a, b in zip(history.event_list, image.event_list, strict=True):
+        differ += (a.t, SWAPPED.get(a.kind, a.kind), a.mode_before, a.mode_after, a.impulse) != (
+            b.t, b.kind, b.mode_before, b.mode_after, b.impulse
+        )  # fmt: skip
+    return float(differ + (image.outcome != SWAPPED.get(history.outcome, history.outcome)))
+
+
+def similar(scene: Scene, seed: int) -> Scene:
+    """The scene at another scale: lengths times k, times sqrt(k), accelerations the same; k is random in 0.01 to 100."""
+    k = float(np.exp(np.random.default_rng([seed, 1]).uniform(math.log(1e-2), math.log(1e2))))
+    root = math.sqrt(k)
+
+    def stretched(excitation: Rest | Ricker | Sine | Record) -> Rest | Ricker | Sine | Record:
+        name = {"record": "time_step", "rest": ""}.get(excitation.kind, "period")
+        return excitation.model_copy(update={name: root * getattr(excitation, name)}) if name else excitation
+
+    return scene.replace(
+        block=Block(half_width=k * scene.block.half_width, half_height=k * scene.block.half_height),
+        walls=tuple(Wall(side=wall.side, gap=k * wall.gap, restitution=wall.restitution) for wall in scene.walls),
+        excitation=stretched(scene.excitation),
+        vertical=stretched(scene.vertical),
+        duration=root * scene.duration,
+        output_step=root * scene.output_step,
+        initial_angular_velocity=scene.initial_angular_velocity / root,
+        initial_velocity=root * scene.initial_velocity,
+        initial_height=k * scene.initial_height,
+    )
+
+
+class _Horizon:
+    """Compares histories of a scene up to where a small disturbance of its data shows; finds that only where it is needed."""
+
+    def __init__(self, model: EventBasedModel, scene: Scene, seed: int) -> None:
+        self.model, self.scene, self.seed = model, scene, seed
+        self._row: int | None = None
+        self.found, self.failure = 0, ""
+
+    def apart(self, history: History, scene: Scene, model: EventBasedModel | None = None) -> float:
+        """Largest |difference of theta| in rad within the horizon; infinite where the other run fails within it."""
+        played = model or self.model
+        if played.friction == "bouc-wen" and scene.block.radius != self.scene.block.radius:
+            size = played.yield_displacement * scene.block.radius / self.scene.block.radius
+            played = played.model_copy(update={"yield_displacement": size})
+        try:
+            other = played.simulate(scene)
+        except ModelFailure as error:
+            self.failure = f"{self.failure}; {error}".strip("; ")
+            return math.inf
+        rows, difference = _differences(history, other)
+        if rows == len(history.channels["t"]) == len(other.channels["t"]) and not np.any(difference > SEEN):
+            return float(np.max(difference, initial=0.0))
+        return float(np.max(difference[: self.row(history)], initial=0.0))
+
+    def row(self, history: History) -> int:
+        """The first row that differs by more than `SEEN` between the scene and a disturbed one."""
+        if self._row is None:
+            self.found = 1
+            self._row = len(history.channels["t"])
+            for disturbed in _disturbed(self.scene, self.seed):
+                try:
+                    other = self.model.simulate(disturbed)
+                except ModelFailure:
+                    continue
+                rows, difference = _differences(history, other)
+                apart = np.flatnonzero(difference > SEEN)
+                self._row = min(self._row, int(apart[0]) if apart.size else rows)
+        return self._row
+
+
+def _differences(a: History, b: History) -> tuple[int, Floats]:
+    rows = min(len(a.channels["t"]), len(b.channels["t"]))
+    return rows, np.abs(a.channels["theta"][:rows] - b.channels["theta"][:rows])
+
+
+def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
+    """The scene with all its data changed by up to a relative `DISTURBANCE`, in random directions."""
+    r = np.random.default_rng([seed, 2])
+
+    def by(value: float) -> float:
+        return value * (1.0 + DISTURBANCE * float(r.choice([-1.0, 1.0])) * float(r.uniform(0.5, 1.0)))
+
+    def stronger(excitation: Rest | Ricker | Sine | Record) -> Rest | Ricker | Sine | Record:
+        name = {"record": "scale", "rest": ""}.get(excitation.kind, "amplitude")
+        return excitation.model_copy(update={name: by(getattr(excitation, name))}) if name else excitation
+
+    for _ in range(DISTURBED):
+        floor = scene.floor
+        kinetic = by(floor.friction)
+        static = None if floor.static_friction is None else max(by(floor.static_friction), kinetic)
+        friction = (("friction", kinetic), ("static_friction", static), ("restitution", min(by(floor.restitution), 1.0)))
+        change: dict[str, object] = {
+            "block": Block(half_width=by(scene.block.half_width), half_height=scene.block.half_height),
+            "floor": floor.model_copy(update={name: value for name, value in friction if value is not None}),
+            "walls": tuple(Wall(side=w.side, gap=by(w.gap), restitution=min(by(w.restitution), 1.0)) for w in scene.walls),
+            "excitation": stronger(scene.excitation),
+            "vertical": stronger(scene.vertical),
+        }
+        change |= {name: by(getattr(scene, name)) for name in ("initial_angular_velocity", "initial_velocity", "initial_height")}
+        for rotation in (by(scene.initial_rotation), scene.initial_rotation * (1.0 - DISTURBANCE)):
+            try:
+                yield scene.replace(**change, initial_rotation=rotation)
+            except InputError:
+                continue
+            break

@@ -1,0 +1,83 @@
+"""Newton-Euler for a block with given contacts, once more and by other means than `ebm`: what its histories are held against.
+
+Natural units: lengths in R, accelerations in g, unit mass, moment of inertia 1/3. As in `ebm.motion`, a tilted block is seen in
+the frame of its pivot, which is then the lower-left corner: with S = sign theta, phi = |theta|, s, c = sin, cos(alpha - phi),
+s', c' = sin, cos(alpha + phi). Four contact forces can act: P and Q of the floor on the pivot, N of the wall that the top corner
+touches, M of the wall that the lifted bottom corner touches. The gap of each contact, its row J (xi, y, phi) and the part of its
+acceleration that the velocities alone give:
+
+    P  y - c             (0, 1, -s)      c w^2
+    Q  xi - s            (1, 0, c)       s w^2
+    N  xi + delta - s'   (1, 0, -c')     s' w^2
+    M  delta - xi - s'   (-1, 0, -c')    s' w^2
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Contact forces per unit mass in units of g, one value a row; zero where there is no contact."""
+
+    normal: Floats
+    friction: Floats
+    tip: Floats
+    far: Floats
+
+
+def tilted_forces(
+    alpha: float, mu: float, phi: Floats, w: Floats, u: Floats, g: Floats, touching: tuple[Mask, Mask, Mask], slip: NDArray[np.int8]
+) -> Forces:
+    """Forces of a tilted block.
+
+    `phi`, `w`: rotation and rate; `u`, `g`: base acceleration and gravity felt, all in the pivot's frame. `touching`: pivot on the
+    floor, top corner on its wall, bottom corner on its wall. `slip`: direction in which the pivot slips, 0 where it sticks. A slipping
+    pivot has Q = -mu d |P|: where P would pull, the sign of its friction turns with it.
+    """
+    s, c, sp, cp = np.sin(alpha - phi), np.cos(alpha - phi), np.sin(alpha + phi), np.cos(alpha + phi)
+    zero, one = np.zeros_like(phi), np.ones_like(phi)
+    rows = np.stack([_triple(zero, one, -s), _triple(one, zero, c), _triple(one, zero, -cp), _triple(-one, zero, -cp)], axis=1)
+    bias = np.stack([c, s, sp, sp], axis=1) * (w * w)[:, None]
+    floor, tip, far = touching
+    closed = np.stack([floor, floor & (slip == 0), tip, far], axis=1)
+    # J M^-1 J^T lambda = -(J a0 + bias), with an open contact's row replaced by "no force".
+    inverse_mass = np.array([1.0, 1.0, 3.0])
+    matrix = np.einsum("nik,k,njk->nij", rows, inverse_mass, rows)
+    free = _triple(-u, -g, zero)
+    right = -(np.einsum("nik,nk->ni", rows, free) + bias)
+    matrix = np.where(closed[:, :, None], matrix, np.eye(4))
+    right = np.where(closed, right, 0.0)
+    slipping = floor & (slip != 0)
+    matrix[slipping, 1, 0] = mu * slip[slipping]
+    forces = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
+    pulls = slipping & (forces[:, 0] < 0.0)
+    if pulls.any():
+        matrix[pulls, 1, 0] *= -1.0
+        forces[pulls] = np.linalg.solve(matrix[pulls], right[pulls][:, :, None])[:, :, 0]
+    return Forces(*forces.T)
+
+
+def _triple(x: Floats, y: Floats, turn: Floats) -> Floats:
+    return np.stack([x, y, turn], axis=1)
+
+
+#: Weights of the closed Newton-Cotes rule with nine nodes: exact up to degree 9.
+NEWTON_COTES = np.array([989.0, 5888.0, -928.0, 10496.0, -4540.0, 10496.0, -928.0, 5888.0, 989.0]) * 4.0 / 14175.0
+GROUP = len(NEWTON_COTES) - 1
+#: The same interval by Boole's rule twice, exact up to degree 5: what the two differ by says how far the first is to be trusted.
+BOOLE = np.array([7.0, 32.0, 12.0, 32.0, 14.0, 32.0, 12.0, 32.0, 7.0]) * 2.0 / 45.0
+
+
+def integrals(step: float, values: Floats, rule: Floats = NEWTON_COTES) -> Floats:
+    """Integrals of `values`, given at multiples of `step`, over each group of eight steps; what is over is left out."""
+    groups = (len(values) - 1) // GROUP
+    nodes = values[np.arange(groups)[:, None] * GROUP + np.arange(GROUP + 1)]
+    return np.asarray(step * (nodes @ rule))

@@ -1,0 +1,164 @@
+"""The models that are stressed: with which settings each plays which scenes, and which invariants it is held to."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ebm import EventBasedModel
+from scenes import History, InputError, ModelFailure, Scene, kinematics
+from validation.models import build
+from validation.stress.generator import Kind, random_scene
+from validation.stress.invariants import Played, check_run
+
+#: Caps of an event-based run. The longest of a hundred thousand needs a tenth of them.
+MOST_STEPS, MOST_EVENTS = 200_000, 50_000
+#: Every so many runs one is audited, that is, sampled so finely that its energy can be integrated.
+AUDIT = 10
+
+
+@dataclass(frozen=True)
+class Player:
+    """A model under stress: its label, the kind of scenes that it can play, how many in a whole run, and in a quick one."""
+
+    label: str
+    kind: Kind
+    runs: int
+    quick: int
+    words: str
+
+    @property
+    def event_based(self) -> bool:
+        """Whether a broken invariant fails the command."""
+        return self.label.startswith("ebm")
+
+    def command(self, scene: Scene, number: int) -> str:
+        """The options of `rockcheck simulate` with which this run can be made again."""
+        raise NotImplementedError
+
+    def scene(self, seed: int, number: int) -> Scene:
+        """Its scene of that number."""
+        return random_scene(seed, number, self.kind)
+
+    def check(self, scene: Scene, seed: int, number: int, only: str = "") -> Played:
+        """Plays the scene and checks what the model is held to."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class EventBased(Player):
+    """A variant of the event-based model."""
+
+    friction: Literal["coulomb", "bouc-wen", "no-slip"] = "coulomb"
+
+    def model(self, scene: Scene, number: int) -> EventBasedModel:
+        """The model as it plays this scene: every other unilateral run has the energy cap, Bouc-Wen yields within R/1000."""
+        return EventBasedModel(
+            pivot="unilateral" if self.kind == "unilateral" else "bilateral",
+            friction=self.friction,
+            energy_cap=self.kind == "unilateral" and number % 2 == 1,
+            yield_displacement=1e-3 * scene.block.radius,
+            most_steps=MOST_STEPS,
+            most_events=MOST_EVENTS,
+        )
+
+    def check(self, scene: Scene, seed: int, number: int, only: str = "") -> Played:
+        """Every invariant; energy in each tenth run."""
+        audit = only == "energy" or (not only and number % AUDIT == 0)
+        return check_run(self.model(scene, number), scene, seed=seed, audit=audit, only=only)
+
+    def command(self, scene: Scene, number: int) -> str:
+        """The options of `rockcheck simulate` with which this run can be made again."""
+        name = {"unilateral": "ebm-unilateral", "bouc-wen": "ebm-bouc-wen"}.get(self.kind, "ebm")
+        options = [f"--model {name}" if self.friction != "no-slip" else "--model ebm:EventBasedModel --set friction=no-slip"]
+        if self.kind == "unilateral" and number % 2 == 1:
+            options.append("--set energy_cap=true")
+        if self.friction == "bouc-wen":
+            options.append(f"--set yield_displacement={1e-3 * scene.block.radius!r}")
+        return " ".join(options)
+
+
+@dataclass(frozen=True)
+class Approximate(Player):
+    """The continuous model or an engine: it is held to its own stated depth, and to energy that only the base can bring.
+
+    Lengths and times of its settings are in R and sqrt(R/g), so that they mean the same for every block; runs last at most `longest`.
+    """
+
+    family: str = ""
+    longest: float = 5.0
+    step: float = 2e-3
+
+    def scene(self, seed: int, number: int) -> Scene:
+        """The scene of that number, no longer than affordable, with rows for the work of the base."""
+        scene = random_scene(seed, number, self.kind)
+        unit = math.sqrt(scene.block.radius / scene.gravity)
+        duration = min(scene.duration, self.longest * unit)
+        return scene.replace(duration=duration, output_step=duration / 500)
+
+    def settings(self, scene: Scene) -> dict[str, float]:
+        """What the model is built with for this scene."""
+        unit = math.sqrt(scene.block.radius / scene.gravity)
+        return {"penetration": DEPTH * scene.block.radius} if self.family == "cm" else {"time_step": self.step * unit}
+
+    def command(self, scene: Scene, number: int) -> str:
+        """The options of `rockcheck simulate` with which this run can be made again."""
+        return " ".join([f"--model {self.family}", *(f"--set {key}={value!r}" for key, value in self.settings(scene).items())])
+
+    def check(self, scene: Scene, seed: int, number: int, only: str = "") -> Played:
+        """Ends, finite numbers, depth and energy."""
+        try:
+            history = build(self.family, self.settings(scene)).simulate(scene)
+        except (ModelFailure, InputError) as error:
+            return Played(figures={"ends": 1.0}, failure=str(error))
+        bad = sum(float(np.sum(~np.isfinite(column))) for column in history.channels.values() if column.dtype.kind == "f")
+        figures = {"ends": 0.0, "finite": bad}
+        if not bad:
+            figures |= {"depth": self.depth(scene, history), "source": energy_without_source(scene, history)}
+        return Played(figures=figures, outcome=history.outcome, events=len(history.event_list))
+
+    def depth(self, scene: Scene, history: History) -> float:
+        """Deepest penetration over what the model states: for an engine the way of a step, for the CM that of a spring."""
+        channels, radius = history.channels, scene.block.radius
+        unit = math.sqrt(radius / scene.gravity)
+        speed = sum(np.max(np.abs(channels[name])) for name in ("x_dot", "y_dot")) * unit / radius
+        speed += float(np.max(np.abs(channels["theta_dot"]))) * unit
+        level = 1.0 + sum(np.max(np.abs(e.acceleration(channels["t"]))) for e in (scene.excitation, scene.vertical)) / scene.gravity
+        level += float(np.max(np.abs(channels["theta_dot"]))) ** 2 * unit**2
+        if self.family == "cm":
+            stated = speed * math.sqrt(DEPTH) + level * DEPTH
+        else:
+            stated = speed * self.step + level * self.step**2
+        deep = [-kinematics.pivot_height(scene.block, channels["y"], channels["theta"])]
+        deep += [-kinematics.wall_gap(scene, wall.side, channels["x"], channels["theta"]) for wall in scene.walls]
+        return max(float(np.max(one)) for one in deep) / radius / (2.0 * stated + 1e-5)
+
+
+def energy_without_source(scene: Scene, history: History) -> float:
+    """Largest energy above the start's and the work of the base up to then, relative to all work done, at least g R."""
+    channels, block, gravity = history.channels, scene.block, scene.gravity
+    u, vg = scene.excitation.acceleration(channels["t"]), scene.vertical.acceleration(channels["t"])
+    energy = kinematics.energy(block, gravity, *(channels[name] for name in ("y", "x_dot", "y_dot", "theta_dot")))
+    parts = [-0.5 * (a[1:] + a[:-1]) * np.diff(channels[name]) for a, name in ((u, "x"), (vg, "y"))]
+    work = np.concatenate([[0.0], np.cumsum(parts[0] + parts[1])])
+    size = gravity * block.radius + np.abs(energy[0]) + np.concatenate([[0.0], np.cumsum(np.abs(parts[0]) + np.abs(parts[1]))])
+    return float(np.max((energy - energy[0] - work) / size))
+
+
+#: Penetration of the CM under the block's weight, R.
+DEPTH = 1e-8
+PLAYERS: dict[str, Player] = {
+    player.label: player
+    for player in (
+        EventBased("ebm", "bilateral", 100_000, 1000, "the paper's pivot, Coulomb friction"),
+        EventBased("ebm no-slip", "no-slip", 100_000, 500, "the paper's pivot, which never slips", "no-slip"),
+        EventBased("ebm-unilateral", "unilateral", 100_000, 1000, "a floor that can only push; every other run with the energy cap"),
+        EventBased("ebm-bouc-wen", "bouc-wen", 100_000, 300, "regularised friction, which yields within R/1000", "bouc-wen"),
+        Approximate("cm", "unilateral", 2000, 40, "continuous model, standing 1e-8 R deep", "cm"),
+        Approximate("mujoco", "unilateral", 2000, 40, "MuJoCo, best settings, steps of 0.002 sqrt(R/g)", "mujoco"),
+        Approximate("pybullet", "unilateral", 2000, 40, "PyBullet, best settings, steps of 0.002 sqrt(R/g)", "pybullet"),
+    )
+}

@@ -1,0 +1,125 @@
+"""The smallest scene that still shows a failure: fields are dropped or rounded as long as it stays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from scenes import Block, Floor, InputError, Record, Rest, Scene
+from validation.results import write_whole
+
+Shows = Callable[[Scene], bool]
+#: Most scenes that are tried: a second or a few.
+MOST_TRIALS = 400
+
+
+def shrink(scene: Scene, shows: Shows, *, trials: int = MOST_TRIALS) -> Scene:
+    """A scene that `shows` the failure as `scene` does, and from which no single simplification can be taken without losing it.
+
+    Gives up after so many `trials` with what it has then.
+    """
+    again = True
+    while again:
+        again = False
+        for simpler in simplifications(scene):
+            if trials == 0:
+                return scene
+            trials -= 1
+            if shows(simpler):
+                scene, again = simpler, True
+                break
+    return scene
+
+
+def simplifications(scene: Scene) -> Iterator[Scene]:
+    """Valid scenes that are simpler in one respect, the greatest simplification first."""
+    for change in _changes(scene):
+        try:
+            simpler = scene.replace(**change)
+        except InputError:
+            continue
+        if simpler != scene:
+            yield simpler
+
+
+def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
+    for key in ("vertical", "excitation"):
+        if getattr(scene, key).kind != "rest":
+            yield {key: Rest()}
+    for n in range(len(scene.walls)):
+        yield {"walls": scene.walls[:n] + scene.walls[n + 1 :]}
+    starts = ("initial_height", "initial_velocity", "initial_angular_velocity", "initial_rotation")
+    for key in starts:
+        if getattr(scene, key) != 0.0:
+            yield {key: 0.0}
+    floor = scene.floor
+    if floor.restitution > 0.0:
+        yield {"floor": Floor(friction=floor.friction, static_friction=floor.static_friction)}
+    if floor.static_friction is not None:
+        yield {"floor": Floor(friction=floor.friction, restitution=floor.restitution)}
+    for n, wall in enumerate(scene.walls):
+        for change in ({"restitution": 0.0}, {"gap": 0.0}):
+            yield {"walls": (*scene.walls[:n], wall.model_copy(update=change), *scene.walls[n + 1 :])}
+    unit = math.sqrt(scene.block.radius / scene.gravity)
+    for factor in (0.25, 0.5, 0.9):
+        if factor * scene.duration > 0.01 * unit:
+            yield {"duration": factor * scene.duration, "output_step": factor * scene.output_step}
+    for key in ("excitation", "vertical"):
+        excitation = getattr(scene, key)
+        if isinstance(excitation, Record):
+            for samples in _shorter(excitation.unscaled):
+                yield {key: excitation.model_copy(update={"unscaled": samples})}
+    radius = scene.block.radius
+    if not math.isclose(radius, 1.0, rel_tol=1e-2):
+        yield {"block": Block(half_width=scene.block.half_width / radius, half_height=scene.block.half_height / radius)}
+    if scene.gravity != 9.81:
+        yield {"gravity": 9.81}
+    yield from _rounded(scene)
+
+
+def _shorter(samples: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
+    half = len(samples) // 2
+    if half:
+        yield samples[:half]
+        yield samples[:-1]
+    if 8 >= len(samples) > 1:
+        for n in range(len(samples)):
+            yield (*samples[:n], 0.0, *samples[n + 1 :])
+
+
+def _rounded(scene: Scene) -> Iterator[dict[str, Any]]:
+    """One number with fewer digits."""
+    for digits in (1, 2, 4, 8):
+        for key in ("duration", "gravity", "initial_rotation", "initial_angular_velocity", "initial_velocity", "initial_height"):
+            yield {key: _digits(getattr(scene, key), digits)}
+        for key in ("block", "floor", "excitation", "vertical"):
+            part = getattr(scene, key)
+            for name, value in part:
+                if isinstance(value, float):
+                    yield {key: part.model_copy(update={name: _digits(value, digits)})}
+                elif isinstance(value, tuple) and len(value) <= 8:
+                    yield {key: part.model_copy(update={name: tuple(_digits(one, digits) for one in value)})}
+        for n, wall in enumerate(scene.walls):
+            for name in ("gap", "restitution"):
+                change = {name: _digits(getattr(wall, name), digits)}
+                yield {"walls": (*scene.walls[:n], wall.model_copy(update=change), *scene.walls[n + 1 :])}
+
+
+def _digits(value: float, digits: int) -> float:
+    return float(f"{value:.{digits}g}")
+
+
+def write_scene(scene: Scene, path: Path, remarks: str) -> Path:
+    """Writes a scene file that `load_scene` reads back to the bit (samples stand in the file itself), with remarks on top."""
+    tables: dict[str, Any] = scene.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
+    for key in ("excitation", "vertical"):
+        if key in tables:
+            tables[key] = {"kind": getattr(scene, key).kind} | tables[key]
+    tables.pop("name", None)  # the file's own
+    plain = {key: value for key, value in tables.items() if not isinstance(value, dict | list)}
+    lines = "".join(f"# {line}\n" for line in remarks.splitlines())
+    return write_whole(path, lines + tomlkit.dumps(plain | {key: value for key, value in tables.items() if key not in plain}))
