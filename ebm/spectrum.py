@@ -24,8 +24,9 @@ Floats = NDArray[np.float64]
 MOST_NODES = 50_000_000
 #: Of the model that plays a spectrum unless another is given: well below what moves a boundary by a node.
 TOLERANCE = 1e-8
-#: Of a refined spectrum: distance of the nodes that are run first, and the fewest cells an axis that they may leave.
-COARSEST, FEWEST_CELLS = 8, 12
+#: Of a refined spectrum: distance of the nodes that are run first, the fewest cells an axis that they may leave, and how far (in
+#: nodes) around a boundary nothing is inferred: hairs thinner than the nodes' distance break into dots, which are found so.
+COARSEST, FEWEST_CELLS, FOLLOWED = 8, 12, 3
 #: The outcome codes of a spectrum.
 LEFT, SAFE, RIGHT = -1, 0, 1
 _UNKNOWN = 9
@@ -225,7 +226,7 @@ def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None]
     """Fills `outcomes`: a coarse grid, then at each halving only cells whose corners differ, with a ring around them.
 
     The coarse grid has every eighth node, or more of them where that would be fewer than a dozen cells an axis. At last the
-    boundary is followed: no node beside one of another outcome is left to inference, so that a thin tongue is found to its tip.
+    boundary is followed: no node near one of another outcome is left to inference, so that a thin tongue is found to its tip.
     """
     rows, columns = outcomes.shape
     inferred = np.zeros(outcomes.shape, dtype=bool)
@@ -251,21 +252,20 @@ def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None]
         outcomes[i, j] = outcomes[i // step * step, j // step * step]
         inferred |= open_nodes
         step = half
-    while (doubtful := inferred & _beside_another(outcomes)).any():
+    while (doubtful := inferred & _near_another(outcomes)).any():
         inferred &= ~doubtful
         outcomes[doubtful] = _UNKNOWN
         run(doubtful)
 
 
-def _beside_another(outcomes: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Which nodes have a neighbour of another outcome, diagonals included."""
-    padded = np.pad(outcomes, 1, mode="edge")
-    rows, columns = outcomes.shape
-    found = np.zeros(outcomes.shape, dtype=bool)
-    for i in range(3):
-        for j in range(3):
-            found |= padded[i : i + rows, j : j + columns] != outcomes
-    return found
+def _near_another(outcomes: NDArray[np.int8]) -> NDArray[np.bool_]:
+    """Which nodes have one of another outcome within `FOLLOWED` nodes, diagonals included."""
+    from scipy import ndimage
+
+    width = 2 * FOLLOWED + 1
+    least, most = (extreme(outcomes, width, mode="nearest") for extreme in (ndimage.minimum_filter, ndimage.maximum_filter))
+    near: NDArray[np.bool_] = least != most
+    return near
 
 
 def _lattice(rows: int, columns: int, step: int) -> NDArray[np.bool_]:

@@ -9,30 +9,31 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
-from ebm.spectrum import Spectrum
+from ebm.spectrum import LEFT, RIGHT, SAFE, Spectrum
 from validation import provenance
 from validation.results import Stored
 from validation.spectra import Asked, Panel, Tiles, play_panels
 
-#: Sizes of the boxes, in nodes, over which a boundary's dimension is measured; the boundary counts as smooth below `FRACTAL`.
+#: Sizes of the boxes, in nodes, over which a boundary's dimension is measured.
 BOXES = (1, 2, 4, 8, 16)
-FRACTAL = 1.1
+COLUMNS = ("spectrum", "runs", "nodes a run", "wrong nodes", "areas", "boundary's dimension")
 
 
 class Refined(Stored):
-    """One spectrum: nodes of the full grid, runs of the refined one, its wrong nodes, and the dimension of the boundary."""
+    """One spectrum: nodes of the full grid, runs of the refined one and its wrong nodes.
+
+    `areas` counts the connected nodes of one outcome: two or three where the boundary is a line, many where it breaks into
+    hairs; `dimension` is the boundary's.
+    """
 
     spectrum: str
     nodes: int
     runs: int
     wrong: int
+    areas: int
     dimension: float
-
-    @property
-    def smooth(self) -> bool:
-        """Whether the boundary is a line, not a fractal."""
-        return self.dimension < FRACTAL
 
 
 class Refinement(Stored):
@@ -60,12 +61,11 @@ class Refinement(Stored):
     def rows(self) -> tuple[tuple[str, ...], ...]:
         """The table: all spectra together first, then one each."""
         wrong = sum(spectrum.wrong for spectrum in self.spectra)
-        rows = [("all", str(self.runs), f"{self.nodes / self.runs:.1f}", str(wrong), "")]
-        rows += [(s.spectrum, str(s.runs), f"{s.nodes / s.runs:.1f}", str(s.wrong), f"{s.dimension:.2f}") for s in self.spectra]
+        rows = [("all", str(self.runs), f"{self.nodes / self.runs:.1f}", str(wrong), "", "")]
+        rows += [
+            (s.spectrum, str(s.runs), f"{s.nodes / s.runs:.1f}", str(s.wrong), str(s.areas), f"{s.dimension:.2f}") for s in self.spectra
+        ]
         return tuple(rows)
-
-
-COLUMNS = ("spectrum", "runs", "nodes a run", "wrong nodes", "boundary's dimension")
 
 
 def verify(panels: Sequence[Panel], asked: Asked, tiles: Tiles, done: Callable[[Panel], None] | None = None) -> Refinement:
@@ -93,6 +93,7 @@ def compared(name: str, full: Spectrum, refined: Spectrum) -> Refined:
         nodes=full.outcomes.size,
         runs=refined.evaluations,
         wrong=int((full.outcomes != refined.outcomes).sum()),
+        areas=sum(ndimage.label(full.outcomes == side, np.ones((3, 3)))[1] for side in (LEFT, SAFE, RIGHT)),
         dimension=boundary_dimension(full.outcomes),
     )
 

@@ -83,6 +83,18 @@ def test_refinement_follows_a_thin_tongue_to_its_tip():
     assert spectrum.evaluations < 0.15 * spectrum.outcomes.size
 
 
+def test_refinement_finds_the_dots_of_a_hair():
+    def hair(scene, a, f):
+        return ((a < 2.0) | ((np.abs(a - 1.5 - 0.36 * f) < 0.006) & (a < 4.0))).astype(np.int8), np.zeros(len(a), dtype=bool)
+
+    axis = np.linspace(1.0, 9.0, 257)
+    spectrum = overturning_spectrum(scene(), axis, axis, refine=True, play=hair)
+    full = hair(None, *np.broadcast_arrays(axis[:, None], axis))[0]
+    dots = np.count_nonzero(full[axis >= 2.0])
+    assert dots == 64  # of some 180 columns that the hair crosses
+    np.testing.assert_array_equal(spectrum.outcomes, full)
+
+
 def test_a_node_is_what_the_model_simulates():
     wall = Wall(side="left", gap=0.053, restitution=0.5)
     a, f = np.array([1.2, 2.0, 3.0, 6.0]), np.array([0.8, 2.5, 4.0, 5.0])
