@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
 from scenes.errors import unknown_name
-from validation.commands import OUT, JobsOption, OutOption, console, usable_folder
+from validation.commands import OUT, JobsOption, OutOption, answer, console, progress, usable_folder
 
 if TYPE_CHECKING:
     from validation.stress.study import Stress
@@ -36,27 +35,15 @@ def run(
         if name not in PLAYERS:
             raise unknown_name("model", name, PLAYERS)
     folder = usable_folder(out)
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    )
-    with bar:
-        task = bar.add_task("stress", total=None)
-
-        def progress(done: int, of: int, what: str) -> None:
-            bar.update(task, completed=done, total=of, description=f"stress: {what}")
-
-        found = study.run_stress(seed=seed, quick=quick, runs=runs, jobs=jobs, models=model, folder=folder, progress=progress)
+    with progress("stress") as tell:
+        found = study.run_stress(seed=seed, quick=quick, runs=runs, jobs=jobs, models=model, folder=folder, progress=tell)
     study.save(found, folder)
     from reports.stress import write_stress
 
     index = write_stress(found, folder)
     show(found, console())
     console().print(f"report: {index}", soft_wrap=True)
+    answer(study.as_data(found) | {"report": index})
     if not found.complete:
         raise KeyboardInterrupt
     raise typer.Exit(int(bool(found.broken)))

@@ -363,7 +363,10 @@ def save(found: Stress, folder: Path) -> None:
     failures = pd.DataFrame([asdict(failure) for failure in found.failures], columns=columns)
     write_whole(folder / "failures.csv", failures.to_csv(index=False, float_format="%.6g"))
     write_whole(folder / "summary.md", markdown(found))
-    batches = {
-        label: {**vars(batch), "failures": [asdict(failure) for failure in batch.failures]} for label, batch in found.batches.items()
-    }
-    write_whole(folder / "run.json", json.dumps(vars(found) | {"batches": batches}, indent=1) + "\n")
+    write_whole(folder / "run.json", json.dumps(as_data(found), indent=1) + "\n")
+
+
+def as_data(found: Stress) -> dict[str, Any]:
+    """The whole run as plain data."""
+    batches = {label: vars(batch) | {"failures": [asdict(failure) for failure in batch.failures]} for label, batch in found.batches.items()}
+    return vars(found) | {"batches": batches}
