@@ -18,11 +18,12 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from reports import tables, words
+from reports.ensembles import EnsembleView, ensemble_views, write_ensemble_figures
 from reports.figures import figure_stem, write_figures
 from reports.payload import script
 from reports.scene_file import write_scene_file
 from reports.style import LOOKS, SPARE, looks
-from reports.view import CHANNELS, SceneView, scene_views
+from reports.view import CHANNELS, SceneView, scene_views, slugs_of
 from scenes.progress import tell
 from validation import provenance
 from validation.results import Run, write_whole
@@ -30,6 +31,15 @@ from validation.results import Run, write_whole
 DATA = Path(str(resources.files("reports"))) / "data"
 #: The folder beside `index.html` that holds everything else.
 PAGES = "pages"
+#: Columns of an ensemble's table: measure and title.
+STATISTICS_SHOWN = (
+    ("overturning_accuracy", "agreement"),
+    ("overturning_precision", "precision"),
+    ("overturning_recall", "recall"),
+    ("ks_distance", "KS distance"),
+    ("peak_bias", "bias"),
+    ("peak_scatter", "scatter"),
+)
 #: Fewer pages than this are written by the process itself.
 FEW = 3
 #: What a verdict is called and the sign that goes with its colour.
@@ -64,103 +74,123 @@ class Site:
 
 
 #: Studies of other commands that may stand beside a run.
-STUDIES = (("Convergence", "convergence/index.html"), ("Benchmark", "benchmark/index.html"), ("Overturning spectra", "spectra.html"))
+STUDIES = (
+    ("Convergence", "convergence/index.html"),
+    ("Benchmark", "benchmark/index.html"),
+    ("Stress", "stress/index.html"),
+    ("Overturning spectra", "spectra.html"),
+)
+
+
+View = SceneView | EnsembleView
 
 
 def write_site(folder: Path, *, jobs: int = 1, afresh: bool = True) -> Path:
-    """Write `index.html`, a page a scene, their figures and data into the folder of a finished run; returns the index.
+    """Write `index.html` and a page a scene and an ensemble, with figures and data, beside a finished run; returns the index.
 
-    Scenes are drawn in up to `jobs` processes. Unless `afresh`, a scene's page stays that shows the same as it would now.
-    What belonged to scenes that the run does not have any more is removed.
+    Pages are made in up to `jobs` processes. Unless `afresh`, one stays that shows the same as it would now. What belonged
+    to scenes that the run does not have any more is removed.
     """
-    run = Run.load(folder)
-    views = scene_views(run, folder)
-    site = _site(run, views, folder)
-    site.assets()
-    waiting = [view.name for view in views if afresh or _stamp_of(folder / _address(view)) != _stamp(site, view)]
-    for done, _ in enumerate(_write_scenes(folder, waiting, jobs)):
+    pages = _Pages(folder)
+    pages.site.assets()
+    waiting = [view.name for view in pages.views.values() if afresh or _stamp_of(folder / _address(view)) != pages.stamp(view)]
+    for done, _ in enumerate(_write_pages(pages, waiting, jobs)):
         tell(done / len(waiting))
-    current = {f"{view.slug}.html" for view in views}
+    current = {f"{view.slug}.html" for view in pages.views.values()}
     for page in (folder / PAGES).glob("*.html"):
         if page.name not in current and _stamp_of(page):
             for name in (page.name, *_belongings(page)):
                 (folder / PAGES / name).unlink(missing_ok=True)
-    return site.page("index.html", "index.html", views=views, worst=tables.worst_first(run), times=tables.run_times(run), **_common(run))
+    return pages.write_index()
 
 
-def _site(run: Run, views: Sequence[SceneView], folder: Path) -> Site:
-    links = [(view.name, _address(view)) for view in views]
-    links += [(title, address) for title, address in STUDIES if (folder / address).exists()]
-    return Site(folder, f"rockcheck: {run.suite}", tuple(links))
-
-
-def _address(view: SceneView) -> str:
-    return f"{PAGES}/{view.slug}.html"
-
-
-def _write_scenes(folder: Path, names: Sequence[str], jobs: int) -> Iterator[None]:
-    """Write the pages of these scenes; a process of its own costs a second, so a few pages do not get one."""
+def _write_pages(pages: _Pages, names: Sequence[str], jobs: int) -> Iterator[None]:
+    """Write these pages; a process of its own costs a second, so a few pages do not get one."""
     if min(jobs, len(names)) < 2 or len(names) < FEW:
-        yield from map(_SceneWriter(folder), names)
+        yield from map(pages.write, names)
         return
-    with ProcessPoolExecutor(min(jobs, len(names)), get_context("spawn"), _begin_process, (folder,)) as pool:
+    with ProcessPoolExecutor(min(jobs, len(names)), get_context("spawn"), _begin_process, (pages.folder,)) as pool:
         yield from pool.map(_write_in_process, names)
 
 
-class _SceneWriter:
-    """Writes pages of a run's scenes by name."""
+class _Pages:
+    """The pages of a finished run, by name of the scene or the ensemble."""
 
     def __init__(self, folder: Path) -> None:
+        self.folder = folder
         self.run = Run.load(folder)
-        self.views = {view.name: view for view in scene_views(self.run, folder)}
-        self.site = _site(self.run, list(self.views.values()), folder)
+        slugs = slugs_of([*self.run.scenes, *(ensemble.name for ensemble in self.run.ensembles)])
+        found: list[View] = [*scene_views(self.run, folder), *ensemble_views(self.run, folder, slugs)]
+        self.views = {view.name: view for view in found}
+        links = [(view.name, _address(view)) for view in found]
+        links += [(title, address) for title, address in STUDIES if (folder / address).exists()]
+        self.site = Site(folder, f"rockcheck: {self.run.suite}", tuple(links))
 
-    def __call__(self, name: str) -> None:
-        """Figures, data, scene file, and last the page, which names the stamp of what it shows."""
-        view, names = self.views[name], list(self.views)
-        place = names.index(name)
-        pages, page = view.folder / PAGES, view.folder / _address(view)
+    def write(self, name: str) -> None:
+        """Figures, data, and last the page, which names the stamp of what it shows."""
+        view = self.views[name]
+        page = self.folder / _address(view)
         before = _belongings(page)
+        self._write_ensemble(view) if isinstance(view, EnsembleView) else self._write_scene(view)
+        for old in before - _belongings(page):
+            (self.folder / PAGES / old).unlink(missing_ok=True)
+
+    def _write_scene(self, view: SceneView) -> None:
+        pages = self.folder / PAGES
         write_figures(view, _made(pages / "figures"))
         write_whole(_made(pages / "data") / f"{view.slug}.js", script(view))
-        self.site.page(
-            _address(view),
-            "scene.html",
-            view=view,
-            stamp=_stamp(self.site, view),
-            files=write_scene_file(view.scene, _made(pages / "scene-files"), view.slug),
-            previous=self.views[names[place - 1]] if place else None,
-            following=self.views[names[place + 1]] if place + 1 < len(names) else None,
-            **_common(self.run),
-        )
-        for old in before - _belongings(page):
-            (pages / old).unlink(missing_ok=True)
+        files = write_scene_file(view.scene, _made(pages / "scene-files"), view.slug)
+        scenes = list(self.run.scenes)
+        place = scenes.index(view.name)
+        beside = {
+            "previous": self.views[scenes[place - 1]] if place else None,
+            "following": self.views[scenes[place + 1]] if place + 1 < len(scenes) else None,
+        }
+        self._page(view, "scene.html", files=files, **beside)
+
+    def _write_ensemble(self, view: EnsembleView) -> None:
+        pages = self.folder / PAGES
+        write_ensemble_figures(view, _made(pages / "figures"))
+        write_whole(_made(pages / "data") / f"{view.slug}.csv", view.table())
+        self._page(view, "ensemble.html", columns=STATISTICS_SHOWN)
+
+    def _page(self, view: View, template: str, **context: Any) -> None:
+        self.site.page(_address(view), template, view=view, stamp=self.stamp(view), **context, **_common(self.run))
+
+    def write_index(self) -> Path:
+        """The page to open, which shows when the run was."""
+        scenes = [view for view in self.views.values() if isinstance(view, SceneView)]
+        ensembles = [view for view in self.views.values() if isinstance(view, EnsembleView)]
+        worst, times = tables.worst_first(self.run), tables.run_times(self.run)
+        return self.site.page("index.html", "index.html", scenes=scenes, ensembles=ensembles, worst=worst, times=times, **_common(self.run))
+
+    def stamp(self, view: View) -> str:
+        """Hash of all that a page shows and of the code that draws it; not when the run was, nor what was read back."""
+        run = self.run
+        shown = {
+            "what": view.record.model_dump(mode="json") if isinstance(view, EnsembleView) else [run.scenes[view.name], view.stride],
+            "cells": [cell.model_dump(mode="json", exclude={"read_back"}) for cell in view.cells],
+            "run": run.model_dump(mode="json", include={"suite", "reference", "model_form", "models", "measures", "versions", "hardware"}),
+            "links": self.site.links,
+            "drawn by": _appearance(),
+        }
+        return provenance.digest(json.dumps(shown, sort_keys=True))
 
 
-_writer: _SceneWriter
+def _address(view: View) -> str:
+    return f"{PAGES}/{view.slug}.html"
+
+
+_pages: _Pages
 
 
 def _begin_process(folder: Path) -> None:
-    global _writer
-    _writer = _SceneWriter(folder)
+    global _pages
+    _pages = _Pages(folder)
 
 
 def _write_in_process(name: str) -> None:
-    _writer(name)
-
-
-def _stamp(site: Site, view: SceneView) -> str:
-    """Hash of all that a scene's page shows and of the code that draws it; not when the run was, nor what was read back."""
-    run = view.run
-    shown = {
-        "scene": run.scenes[view.name],
-        "cells": [cell.model_dump(mode="json", exclude={"read_back"}) for cell in view.cells],
-        "run": run.model_dump(mode="json", include={"suite", "reference", "model_form", "models", "measures", "versions", "hardware"}),
-        "links": site.links,
-        "stride": view.stride,
-        "drawn by": _appearance(),
-    }
-    return provenance.digest(json.dumps(shown, sort_keys=True))
+    _pages.write(name)
 
 
 @cache

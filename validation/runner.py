@@ -18,9 +18,10 @@ import numpy as np
 from scenes import History, InputError, Scene
 from validation import provenance, workers
 from validation.discrepancy import compare, describe, evaluate, too_short
-from validation.ensembles import STATISTICS, Ensemble, Sample, Samples
+from validation.ensembles import Ensemble
 from validation.measures import DIFFERENCES, FIGURES
 from validation.results import HISTORIES, Cell, CostRecord, EnsembleRecord, Figure, MeasureRecord, Run
+from validation.statistics import STATISTICS, Sample, Samples
 from validation.store import Store, name_of
 from validation.suites import Part, Suite
 from validation.tolerances import HORIZON, MEASURES, OWN_FIGURES, Place, Windowed, judge

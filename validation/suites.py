@@ -52,10 +52,11 @@ from scenes import InputError, Scene, load_scene
 from scenes.base import Frozen, Positive
 from scenes.errors import printable, unknown_name
 from scenes.files import named_scenes, read_toml, scene_from
-from validation.ensembles import STATISTICS, Ensemble
+from validation.ensembles import Ensemble
 from validation.measures import DIFFERENCES, FIGURES
 from validation.models import Family, build, family
 from validation.results import Kind
+from validation.statistics import STATISTICS
 from validation.tolerances import OWN_FIGURES, Place, Tolerances, Windowed, parse_tolerances
 
 DATA = Path(str(resources.files("validation"))) / "data"

@@ -23,9 +23,9 @@ from typing import Any
 from scenes import InputError
 from scenes.base import Finite, Frozen, NonNegative
 from scenes.errors import printable, unknown_name
-from validation.ensembles import STATISTICS
 from validation.measures import DIFFERENCES, FIGURES, Measure
 from validation.results import Check, CheckVerdict, Figure, Kind
+from validation.statistics import STATISTICS
 
 MEASURES: Mapping[str, Measure] = ChainMap(DIFFERENCES, FIGURES, STATISTICS)
 #: The third name of a table that is not a reference model.

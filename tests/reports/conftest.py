@@ -12,7 +12,9 @@ import pytest
 
 from scenes import Block, Cost, Event, Floor, Ricker, Scene, Wall
 from scenes.observation import observe
-from validation.results import HISTORIES, Cell, Check, CostRecord, Figure, MeasureRecord, Run
+from validation.discrepancy import evaluate
+from validation.results import HISTORIES, Cell, Check, CostRecord, EnsembleRecord, Figure, MeasureRecord, Run
+from validation.statistics import STATISTICS, Sample, Samples
 
 NASTY = "<img src=x onerror=alert(1)>&\"'</script>"
 MODELS: Mapping[str, dict[str, Any]] = {
@@ -133,6 +135,38 @@ def cell_of(folder: Path, scene: Scene, model: str, delay: float, falls: bool = 
 DELAYS = {"ebm-unilateral": 0.0, "ebm": 0.0005, "cm": 0.001, "mujoco": 0.002, "pybullet": 0.005, "mine:Model": 0.02}
 
 
+def crowd(scatter: float) -> tuple[EnsembleRecord, list[Cell]]:
+    """An ensemble of 40 scenes by three models: peaks from 0.02 to 2 alpha, the largest fall; one scatters, one has failed."""
+    peaks = np.geomspace(0.02, 2.0, 40)
+    other = peaks * np.exp(scatter * np.sin(np.arange(40.0)))
+    samples = {
+        model: Sample(values, tuple("overturned left" if value > 1.0 else "at rest" for value in values))
+        for model, values in (("ebm-unilateral", peaks), ("cm", other))
+    }
+    record = EnsembleRecord(
+        name="crowd",
+        description=f"made up {NASTY}",
+        definition={
+            "name": "crowd",
+            "count": 40,
+            "friction": {"uniform": [0.3, 0.8]},
+            "pulse": {"period": {"uniform": [0.4, 1.5]}, "amplitude": {"lognormal": [6.0, 0.4]}},
+            "scene": {"duration": 6.0, "block": {"half_width": 0.4, "half_height": 1.5}, "floor": {"friction": 0.5}},
+        },
+        peaks={model: tuple(map(float, sample.peaks)) for model, sample in samples.items()} | {"mujoco": (None,) * 40},
+        outcomes={model: tuple(sample.outcomes) for model, sample in samples.items()} | {"mujoco": (NASTY,) * 40},
+    )
+    pair = Samples(samples["ebm-unilateral"], samples["cm"])
+    figures = tuple(evaluate(measure, pair, "alpha", against="ebm-unilateral") for measure in STATISTICS.values())
+    checks = (Check(figure=figures[0], kind="numerical", verdict="pass", ideal=0.0, expected=0.0, limit=0.5, drift=0.5, why="made up"),)
+    cells = [
+        Cell(scene="crowd", model="ebm-unilateral", status="done", outcome="6 of 40 overturned"),
+        Cell(scene="crowd", model="cm", status="done", outcome="6 of 40 overturned", figures=figures, checks=checks),
+        Cell(scene="crowd", model="mujoco", status="failed", reason=f"40 of 40 scenes failed {NASTY}"),
+    ]
+    return record, cells
+
+
 def make_run(folder: Path, duration: float = 12.0) -> Run:
     """Write a finished run of three scenes into `folder`: one passes, one fails, one has failed cells and a falling block."""
     scenes = [scene("free", False, duration), scene("beside a wall", True, duration), scene("Free", False, duration)]
@@ -140,6 +174,7 @@ def make_run(folder: Path, duration: float = 12.0) -> Run:
     cells += [cell_of(folder, scenes[1], model, delay) for model, delay in DELAYS.items()]
     cells += [cell_of(folder, scenes[2], model, DELAYS[model], falls=True) for model in ("ebm-unilateral", "ebm")]
     cells.append(Cell(scene="Free", model="mujoco", status="failed", reason=f"blew up at 3.2 s {NASTY}"))
+    ensemble, of_ensemble = crowd(0.2)
     run = Run(
         suite="made-up",
         description=f"for the tests {NASTY}",
@@ -148,7 +183,8 @@ def make_run(folder: Path, duration: float = 12.0) -> Run:
         model_form="ebm",
         scenes={s.name: s.model_dump(mode="json") for s in scenes},
         models=tuple(MODELS),
-        cells=tuple(cells),
+        cells=(*cells, *of_ensemble),
+        ensembles=(ensemble,),
         faults=("tolerance [old.cm.ebm: theta_rms] has no cell in the suite",),
         measures=(
             MeasureRecord(name="theta_rms", label="RMS difference of rotation", unit="angle", formula="sqrt <d^2> of theta, in alpha."),

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from reports import write_site
+from reports.ensembles import distributions_figure, ensemble_views
 from reports.figures import histories_figure
 from reports.payload import packed
 from reports.scene_file import write_scene_file
@@ -53,7 +54,7 @@ def payload_of(site: Path, slug: str) -> dict:
 
 
 def test_every_scene_has_a_page(site: Path) -> None:
-    assert [page.stem for page in pages_of(site)] == ["index", "Free-2", "beside-a-wall", "free"]
+    assert [page.stem for page in pages_of(site)] == ["index", "Free-2", "beside-a-wall", "crowd", "free"]
 
 
 def test_every_address_is_a_file_of_the_folder(site: Path) -> None:
@@ -82,7 +83,7 @@ def test_hostile_text_stays_text(site: Path) -> None:
 
 def test_wall_scenes_say_what_the_ebm_forbids(site: Path) -> None:
     said = {page.stem: "forbids the hop" in page.read_text(encoding="utf-8") for page in pages_of(site)}
-    assert said == {"index": False, "free": False, "Free-2": False, "beside-a-wall": True}
+    assert said == {"index": False, "crowd": False, "free": False, "Free-2": False, "beside-a-wall": True}
     text = (site / PAGES / "beside-a-wall.html").read_text(encoding="utf-8")
     assert "model form, not numerical error" in re.sub(r"\s+", " ", text)
 
@@ -280,7 +281,7 @@ def test_only_what_would_show_something_else_is_written_again(tmp_path: Path, si
 def test_pages_of_scenes_that_are_gone_go(tmp_path: Path, finished: Run) -> None:
     write_site(tmp_path)
     (tmp_path / PAGES / "figures" / "study.svg").touch()  # of another command, in the same folder
-    left = {"scenes": {"free": finished.scenes["free"]}, "cells": finished.of_scene("free")}
+    left = {"scenes": {"free": finished.scenes["free"]}, "cells": finished.of_scene("free"), "ensembles": ()}
     finished.model_copy(update=left).save(tmp_path)
     write_site(tmp_path, afresh=False)
     assert sorted(files_of(tmp_path)) == [
@@ -289,3 +290,35 @@ def test_pages_of_scenes_that_are_gone_go(tmp_path: Path, finished: Run) -> None
         "free.html",
         "scene-files/free.toml",
     ]
+
+
+def test_an_ensemble_is_shown_by_its_distributions(site: Path) -> None:
+    run = Run.load(site)
+    view = ensemble_views(run, site, {"crowd": "crowd"})[0]
+    falls = view.overturning("cm", "ebm-unilateral")
+    reference, other = (np.array(run.ensembles[0].peaks[model]) > 1.0 for model in ("ebm-unilateral", "cm"))
+    assert (falls.both, falls.only_reference) == (np.sum(reference & other), np.sum(reference & ~other))
+    assert falls.both + falls.only_reference + falls.only_candidate + falls.neither == 40
+    words = " ".join(Addresses((site / PAGES / "crowd.html").read_text(encoding="utf-8")).words)
+    for said in ("uniform 0.3 to 0.8", "lognormal, median 6, σ 0.4", "KS distance", "p = ", "precision", "recall", "scatter"):
+        assert said in words, said
+    for measure in ("overturning_accuracy", "peak_bias", "peak_scatter"):
+        figure = view.figure("cm", measure, "ebm-unilateral")
+        assert number(figure.value) in words
+        assert figure.note in words, "its confidence interval"
+    rows = (site / PAGES / "data" / "crowd.csv").read_text(encoding="utf-8").splitlines()
+    assert rows[0] == ",".join(["scene", *(f"{what} {m}" for m in run.ensembles[0].peaks for what in ("peak_rotation_alpha", "outcome"))])
+    assert len(rows) == 41
+    assert float(rows[1].split(",")[1]) == run.ensembles[0].peaks["ebm-unilateral"][0]
+
+
+def test_the_drawn_distribution_is_that_of_the_peaks(site: Path) -> None:
+    view = ensemble_views(Run.load(site), site, {"crowd": "crowd"})[0]
+    above, below = distributions_figure(view).axes
+    curve = next(line for line in above.get_lines() if line.get_label() == "CM")
+    sample = view.samples["cm"]
+    for peak, share in zip(curve.get_xdata(), curve.get_ydata(), strict=True):
+        assert share == pytest.approx(np.mean((sample.peaks <= peak) & ~sample.fallen), abs=1e-12)
+    apart = next(line for line in below.get_lines() if len(line.get_xdata()) > 2)
+    distance = view.figure("cm", "ks_distance", "ebm-unilateral").value
+    assert np.max(np.abs(apart.get_ydata())) == pytest.approx(distance, abs=1e-12)

@@ -12,8 +12,9 @@ import pytest
 
 from scenes import InputError
 from validation import workers
-from validation.ensembles import STATISTICS, Distribution, Sample, Samples
+from validation.ensembles import Distribution
 from validation.runner import run_suite
+from validation.statistics import STATISTICS, Sample, Samples
 from validation.suites import load_suite
 
 SUITE = """
