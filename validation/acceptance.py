@@ -41,7 +41,7 @@ def _accept(suite: Suite, run: Run, reason: str | None, changes: list[str], refu
     tables: Any = document.setdefault("tolerances", tomlkit.table()) if path == suite.path else document
     before = len(changes)
     for cell, check in run.checks():
-        if cell.scene not in suite.scenes:
+        if cell.scene not in suite.scenes and cell.scene not in suite.ensembles:
             continue
         figure = check.figure
         against, key = figure.against or OWN_FIGURES, str(Windowed(figure.measure, figure.window))

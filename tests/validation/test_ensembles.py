@@ -12,6 +12,7 @@ import pytest
 
 from scenes import InputError
 from validation import workers
+from validation.acceptance import accept
 from validation.ensembles import Distribution
 from validation.runner import run_suite
 from validation.statistics import STATISTICS, Sample, Samples
@@ -129,6 +130,19 @@ def test_an_ensemble_is_judged_and_read_back(suite_file, tmp_path):
     assert again.cells == tuple(cell.model_copy(update={"read_back": True}) for cell in run.cells)
     run.save(tmp_path / "out")
     assert type(run).load(tmp_path / "out") == run
+
+
+def test_accept_writes_what_an_ensemble_is_judged_by(suite_file, tmp_path):
+    suite_file.write_text(SUITE.partition("[tolerances")[0], encoding="utf-8")
+    first = run_suite(load_suite(suite_file), tmp_path / "out", play=in_this_process)
+    assert first.cell("crowd", "near").verdict == "fail"
+    changes, refused = accept(load_suite(suite_file), first, None)
+    assert [change.partition(":")[0] for change in changes] == [
+        f"[crowd.near.still] {measure}" for measure in ("ks_distance", "overturning_accuracy")
+    ]
+    assert not refused
+    again = run_suite(load_suite(suite_file), tmp_path / "out", play=in_this_process)
+    assert [check.verdict for check in again.cell("crowd", "near").checks] == ["pass", "pass"]
 
 
 @pytest.mark.parametrize("given", [{}, {"uniform": (0.0, 1.0), "lognormal": (1.0, 1.0)}, {"lognormal": (-1.0, 1.0)}])
