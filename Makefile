@@ -3,7 +3,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: validate test test-all lint format clean
+.PHONY: install validate test test-all lint format docs gallery wheel clean
+
+install: $(VENV)/.ready ## the command `rockcheck` in .venv/bin
 
 validate: $(VENV)/.ready ## run the suite `paper` and write rockcheck-report/index.html
 	$(BIN)/rockcheck validate paper
@@ -23,11 +25,21 @@ format: $(VENV)/.ready
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+docs: $(VENV)/.ready ## the documentation, into site/
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo site/index.html
+
+gallery: $(VENV)/.ready ## the pictures of docs/gallery.md
+	$(BIN)/python docs/site_tools/gallery.py
+
+wheel: ## build the wheel, install it into a clean environment, and validate with it outside of the repository
+	PYTHON=$(PYTHON) .ci/wheel
+
 clean:
-	rm -rf $(VENV) build dist *.egg-info rockcheck-report
+	rm -rf $(VENV) build dist *.egg-info rockcheck-report site
 
 $(VENV)/.ready: pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "rockcheck needs Python 3.11 or newer: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,lint]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,docs,lint]'
 	touch $@

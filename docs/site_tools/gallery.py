@@ -1,0 +1,108 @@
+"""Makes the pictures of docs/gallery.md: `make gallery`, or `python docs/site_tools/gallery.py FOLDER`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cm import ContinuousModel
+from ebm import EventBasedModel, overturning_spectrum
+from ebm.spectrum import draw
+from engines import MuJoCo, PyBullet
+from reports.style import PAGE, figure_style, looks, save
+from scenes import Block, Floor, History, Ricker, Scene, Wall, load_scene
+from scenes.kinematics import pivot_height
+
+FOLDER = Path(__file__).parents[1] / "images" / "gallery"
+
+
+def bookcase(gap: float | None = 0.053, **change: object) -> Scene:
+    """The paper's block, beside a left wall unless `gap` is None."""
+    walls = () if gap is None else (Wall(side="left", gap=gap, restitution=0.5),)
+    return Scene(
+        name="block beside a wall",
+        block=Block(half_width=0.397, half_height=1.555),
+        floor=Floor(friction=0.3),
+        walls=walls,
+        excitation=Ricker(amplitude=6.0, period=0.75),
+        duration=4.0,
+    ).replace(**change)
+
+
+def scene() -> Figure:
+    """A scene shows itself."""
+    return bookcase().plot()
+
+
+def history() -> Figure:
+    """A history shows itself: El Centro beside a wall."""
+    return EventBasedModel(pivot="unilateral").simulate(load_scene("fig5a")).plot()
+
+
+def models() -> list[History]:
+    """The models beside the wall, just before and after its first hit."""
+    close = bookcase(duration=2.6, output_step=0.001)
+    players = (EventBasedModel(), EventBasedModel(pivot="unilateral"), ContinuousModel(), MuJoCo(time_step=1e-4), PyBullet(time_step=1e-4))
+    return [player.simulate(close) for player in players]
+
+
+def hop() -> Figure:
+    """Where the floor can only push, the block hops after a hit; the paper's model excludes it."""
+    block, found = bookcase().block, models()
+    figure = Figure(figsize=(PAGE, 3.4), layout="constrained")
+    above, below = figure.subplots(2, 1, sharex=True)
+    for one, look in zip(found, looks(one.model for one in found).values(), strict=True):
+        t, theta = one.channels["t"], one.channels["theta"]
+        above.plot(t, theta / block.alpha, **look.line)
+        below.plot(t, 1e3 * pivot_height(block, one.channels["y"], theta), **look.line)
+    hit = next(event.t for event in found[1].event_list if event.kind == "wall impact")
+    above.set(ylabel="θ / α", title="Beside a wall: rotation, and height of the pivot above the floor", xlim=(hit - 0.2, hit + 0.6))
+    below.set(xlabel="t, s", ylabel="height of the pivot, mm")
+    above.legend(ncols=3)
+    return figure
+
+
+def spectra() -> Figure:
+    """Overturning spectra without and with a wall (blue: safe)."""
+    figure = Figure(figsize=(PAGE, 2.9), layout="constrained")
+    axes = figure.subplots(1, 2, sharey=True)
+    grid = np.linspace(0.5, 8.0, 120), np.linspace(1.0, 12.0, 120)
+    for ax, gap in zip(axes, (None, 0.053), strict=True):
+        draw(overturning_spectrum(bookcase(gap), *grid), ax)
+        ax.set_title("no wall" if gap is None else f"left wall at {1e3 * gap:g} mm, e = 0.5")
+    axes[1].set_ylabel("")
+    return figure
+
+
+def chaos() -> Figure:
+    """One record, its scale a thousandth more from block to block."""
+    figure = Figure(figsize=(PAGE, 2.4), layout="constrained")
+    ax = figure.subplots()
+    shaken = load_scene("fig4a").replace(duration=20.0)
+    for n in range(10):
+        record = shaken.excitation.model_copy(update={"scale": 1.84 * (1.0 + 1e-3 * n)})
+        one = EventBasedModel(pivot="unilateral").simulate(shaken.replace(excitation=record))
+        ax.plot(one.channels["t"], one.channels["theta"] / shaken.block.alpha, color="#0072b2", alpha=0.6, linewidth=0.6)
+    ax.set(xlabel="t, s", ylabel="θ / α", ylim=(-1.5, 1.5), title="El Centro x 1.84, ten times, a thousandth more each time")
+    return figure
+
+
+PICTURES: Iterable[Callable[[], Figure]] = (scene, history, hop, spectra, chaos)
+
+
+def make(folder: Path) -> list[Path]:
+    """All pictures, as PNG; the same code makes the same bytes."""
+    written = []
+    for picture in PICTURES:
+        with figure_style():
+            written += save(picture(), folder / picture.__name__, ["png"])
+    return written
+
+
+if __name__ == "__main__":
+    for path in make(Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER):
+        print(path)

@@ -1,0 +1,158 @@
+"""Every code block of the README and of docs/ is run, in order, each page in a folder of its own.
+
+- python: executed; the blocks of a page share their names, as in a notebook.
+- a block with `title="file"`: written to that file, and loaded as what it is.
+- bash, and indented commands: run; one that fails, fails the page. `make` targets are looked up instead of run.
+
+Pages of studies hold commands of many minutes; these are run with `@pytest.mark.slow`, the longest in their `--quick` form.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from markdown_it import MarkdownIt
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+LANGUAGES = {"python", "bash", "toml", "csv", "yaml", "text"}
+#: Commands that take minutes, and the form of them that takes less, where there is one.
+LONG = {"benchmark": "--quick", "convergence": "--quick", "spectrum": "", "validate": "", "stress": "--quick"}
+
+
+@dataclass(frozen=True)
+class Block:
+    """A code block: its language, the file that it shows, its text, and the line of its page."""
+
+    language: str
+    file: str
+    text: str
+    line: int
+
+
+def blocks_of(page: Path) -> Iterator[Block]:
+    """The fenced and indented blocks of a page; an indented one is a shell's."""
+    for token in MarkdownIt().parse(page.read_text(encoding="utf-8")):
+        line = token.map[0] + 2 if token.map else 0
+        if token.type == "fence":
+            language, _, rest = token.info.strip().partition(" ")
+            title = re.fullmatch(r'title="([^"]+)"', rest)
+            assert bool(title) == bool(rest), f"{page.name}, line {line}: {token.info}"
+            yield Block(language, title[1] if title else "", token.content, line)
+        elif token.type == "code_block":
+            yield Block("bash", "", token.content, line)
+
+
+def commands_of(text: str) -> list[str]:
+    """The commands of a shell block, without their remarks; a word list after two spaces is a remark, too."""
+    lines = (line.split(" #")[0].rstrip() for line in text.splitlines())
+    return [re.split(r"(?<=\S)  +", line)[0] for line in lines if line and not line.startswith("#")]
+
+
+def is_long(command: str) -> bool:
+    """Whether a command takes minutes: a study, or a named suite; a page's own suites and scenes are short."""
+    words = shlex.split(command)
+    return words[0] == "rockcheck" and words[1] in LONG and not any(word.endswith(".toml") or word == "smoke" for word in words)
+
+
+def run_python(block: Block, page: Path, names: dict[str, object]) -> None:
+    """Execute it; a traceback points into the page."""
+    exec(compile("\n" * (block.line - 1) + block.text, str(page), "exec"), names)
+
+
+def run_shell(command: str, folder: Path) -> None:
+    """Run one command; the interpreter of the tests is the first on the path."""
+    words = shlex.split(command)
+    if words[0] == "make":  # the whole set-up: what runs the tests
+        subprocess.run(["make", "-n", *words[1:]], cwd=ROOT, check=True, capture_output=True)
+        return
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    done = subprocess.run(
+        ["bash", "-c", command], cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, f"{command}: exit {done.returncode}: {done.stderr or done.stdout}"
+
+
+def show_file(block: Block, folder: Path) -> None:
+    """Write the file that a block shows, and read it as what it is."""
+    path = folder / block.file
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(block.text, encoding="utf-8")
+    if block.language == "toml":
+        tomllib.loads(block.text)
+    elif block.language == "yaml":
+        import yaml
+
+        jobs = yaml.safe_load(block.text)["jobs"]
+        for step in (step for job in jobs.values() for step in job["steps"] if "run" in step):
+            if step["run"].startswith("rockcheck"):
+                run_shell(step["run"], folder)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_every_block_has_a_language(page):
+    for block in blocks_of(page):
+        assert block.language in LANGUAGES, f"{page.name}, line {block.line}: {block.language!r}"
+        assert block.file or block.language in ("python", "bash"), f"{page.name}, line {block.line}: a file without a name is not run"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_blocks_run(page, tmp_path, monkeypatch):
+    blocks = list(blocks_of(page))
+    if not blocks:
+        return
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    names: dict[str, object] = {"__name__": "__main__"}
+    for block in blocks:
+        if block.file:
+            show_file(block, tmp_path)
+        elif block.language == "python":
+            run_python(block, page, names)
+        else:
+            for command in commands_of(block.text):
+                if not is_long(command):
+                    run_shell(command, tmp_path)
+
+
+LONG_COMMANDS = sorted(
+    {
+        command
+        for page in PAGES
+        for block in blocks_of(page)
+        for command in commands_of(block.text)
+        if block.language == "bash" and is_long(command)
+    }
+)
+
+
+@pytest.mark.parametrize("command", LONG_COMMANDS)
+def test_long_commands_are_understood(command, tmp_path):
+    """Their words are all known: with one more that is not, only that one is complained of."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    done = subprocess.run(
+        ["bash", "-c", f"{command.replace(' [SUITE]', '')} --no-such-option"],
+        cwd=tmp_path,
+        env={**os.environ, "PATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "--no-such-option" in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", LONG_COMMANDS)
+def test_long_commands_run(command, tmp_path):
+    quick = LONG[shlex.split(command)[1]]
+    run_shell(f"{command} {quick}" if quick and quick not in command else command, tmp_path)

@@ -1,0 +1,114 @@
+"""The documentation as a site: builds strictly, and a real browser opens every page from the file system."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright import sync_api as playwright
+
+ROOT = Path(__file__).parents[2]
+CHROMIUM = Path("/usr/bin/chromium")
+SOURCES = sorted(path.stem for path in (ROOT / "docs").glob("*.md"))
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env={**os.environ, "NO_MKDOCS_2_WARNING": "1"}, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[playwright.Browser]:
+    if not CHROMIUM.exists():
+        missing = f"{CHROMIUM} is not installed"
+        pytest.fail(missing) if os.environ.get("CI") else pytest.skip(missing)
+    with playwright.sync_playwright() as driver:
+        running = driver.chromium.launch(executable_path=str(CHROMIUM), args=["--headless", "--no-sandbox", "--disable-gpu"])
+        yield running
+        running.close()
+
+
+@pytest.fixture
+def page(browser, site) -> Iterator[playwright.Page]:
+    """A page that in the end must have complained of nothing and asked for nothing outside of the site."""
+    page = browser.new_page()
+    complaints: list[str] = []
+    page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("requestfailed", lambda request: complaints.append(f"failed: {request.url}"))
+    home = site.as_uri()
+    page.on("request", lambda request: None if request.url.startswith((home, "data:", "about:")) else complaints.append(request.url))
+    yield page
+    page.close()
+    assert complaints == []
+
+
+def test_every_page_is_in_the_navigation(site):
+    index = (site / "index.html").read_text(encoding="utf-8")
+    for name in SOURCES:
+        assert f'href="{name}.html' in index or name == "index", name
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("name", SOURCES)
+def test_pages_open_from_the_file_system_and_ask_for_nothing(site, page, name):
+    page.goto((site / f"{name}.html").as_uri())
+    assert page.locator("h1").count() == 1
+    broken = page.evaluate("[...document.images].filter(i => !i.complete || !i.naturalWidth).map(i => i.src)")
+    assert broken == []
+
+
+@pytest.mark.browser
+def test_equations_are_drawn(site, page):
+    page.goto((site / "theory.html").as_uri())
+    shapes = page.evaluate("[...document.querySelectorAll('math')].map(m => [m.textContent, m.getBoundingClientRect().height])")
+    assert len(shapes) > 100
+    assert all(height > 5 for _, height in shapes)
+    left_over = [text for text, _ in shapes if "\\" in text]
+    assert left_over == []
+    assert "\\(" not in page.inner_text("article")
+
+
+@pytest.mark.browser
+def test_the_search_finds_without_a_server(site, page):
+    page.goto((site / "index.html").as_uri())
+    page.fill("input[name=query]", "Housner")
+    page.wait_for_selector(".md-search-result__link")
+    assert "Theory" in page.inner_text(".md-search-result__list")
+
+
+def test_the_api_page_has_every_public_name(site):
+    text = (site / "api.html").read_text(encoding="utf-8")
+    import cm
+    import ebm
+    import engines
+    import scenes
+    import validation
+
+    for package in (scenes, ebm, cm, engines, validation):
+        for name in package.__all__:
+            assert f'id="{package.__name__}.{name}"' in text, f"{package.__name__}.{name}"
+
+
+def test_pictures_of_the_gallery_are_those_that_the_code_makes(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs" / "site_tools")
+    import gallery
+
+    made = {f"{picture.__name__}.png" for picture in gallery.PICTURES}
+    assert {path.name for path in (ROOT / "docs" / "images" / "gallery").iterdir()} == made
+    page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    assert all(f"images/gallery/{name}" in page for name in made)
+
+
+@pytest.mark.slow
+def test_the_gallery_can_be_made(tmp_path):
+    subprocess.run([sys.executable, str(ROOT / "docs" / "site_tools" / "gallery.py"), str(tmp_path)], check=True)
+    assert len(list(tmp_path.iterdir())) == len(list((ROOT / "docs" / "images" / "gallery").iterdir()))
