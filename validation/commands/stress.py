@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast, get_args
 
 import typer
 from rich.console import Console
@@ -12,10 +12,15 @@ from scenes.errors import unknown_name
 from validation.commands import OUT, JobsOption, OutOption, answer, console, progress, usable_folder
 
 if TYPE_CHECKING:
+    from validation.stress.stability import Stability
     from validation.stress.study import Stress
 
 
+WhatArgument = Annotated[str, typer.Argument(metavar="[WHAT]", help="all, runs (random scenes) or maps (where engines break).")]
+
+
 def run(
+    what: WhatArgument = "all",
     out: OutOption = OUT / "stress",
     quick: Annotated[bool, typer.Option("--quick", help="Some thousand runs, below a minute.")] = False,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the random scenes; scene k of a seed is always the same.")] = 1,
@@ -31,12 +36,16 @@ def run(
     from validation.stress import study
     from validation.stress.players import PLAYERS
 
+    if what not in get_args(study.What):
+        raise unknown_name("stress", what, get_args(study.What))
     for name in model or ():
         if name not in PLAYERS:
             raise unknown_name("model", name, PLAYERS)
     folder = usable_folder(out)
     with progress("stress") as tell:
-        found = study.run_stress(seed=seed, quick=quick, runs=runs, jobs=jobs, models=model, folder=folder, progress=tell)
+        found = study.run_stress(
+            cast("study.What", what), seed=seed, quick=quick, runs=runs, jobs=jobs, models=model, folder=folder, progress=tell
+        )
     study.save(found, folder)
     from reports.stress import write_stress
 
@@ -53,6 +62,11 @@ def show(found: Stress, out: Console) -> None:
     """For each model runs, failures by invariant and the worst figures; then the failures with their files."""
     from validation.stress.study import summary_rows
 
+    if found.stability is not None:
+        out.print(stable_table(found.stability))
+        out.print(still_table(found.stability))
+    if not found.batches:
+        return
     table = Table(box=None, pad_edge=False)
     for column in ("model", "invariant"):
         table.add_column(column)
@@ -73,3 +87,28 @@ def show(found: Stress, out: Console) -> None:
     broken = len(found.broken)
     verdict = "no failure of an event-based model" if not broken else f"{broken} failures of event-based models"
     out.print(f"seed {found.seed}: {runs} runs, {verdict}; {found.wall_seconds:.0f} s with {found.jobs} processes")
+
+
+def stable_table(found: Stability) -> Table:
+    """A row a model with settings, a column an axis: the least of the largest stable steps along it, and what comes beyond."""
+    from validation.stress.stability import AXIS_WORDS
+
+    table = Table(box=None, pad_edge=False, title="largest stable step, sqrt(R/g): least of an axis", title_justify="left")
+    table.add_column("model")
+    for words in AXIS_WORDS.values():
+        table.add_column(words)
+    for label in dict.fromkeys(one.line for one in found.stable):
+        least = [min((s for s in found.stable if (s.line, s.axis) == (label, axis)), key=lambda s: s.step) for axis in AXIS_WORDS]
+        table.add_row(label, *(f"{one.step:g}" + (f" ({one.fault} at {one.value:g})" if one.fault else "") for one in least))
+    return table
+
+
+def still_table(found: Stability) -> Table:
+    """A row a case and model: what moves of a block that should stand."""
+    table = Table(box=None, pad_edge=False)
+    names = ("creep", "sinking", "rotation", "uplift", "jitter")
+    for column in ("block", "model", "for, s", *names):
+        table.add_column(column, justify="left" if column in ("block", "model") else "right")
+    for one in found.still:
+        table.add_row(one.case, one.line, f"{one.simulated:g}", *(f"{getattr(one, name):.0e}" for name in names), one.fault)
+    return table

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from scenes.errors import printable
 from validation import provenance
@@ -21,9 +21,11 @@ from validation.results import write_whole
 from validation.stress.invariants import INVARIANTS
 from validation.stress.players import PLAYERS
 from validation.stress.shrinking import shrink, write_scene
+from validation.stress.stability import AXIS_WORDS, Stability, run_stability
 from validation.workers import ONE_THREAD, death, prepare
 
 Progress = Callable[[int, int, str], None]
+What = Literal["all", "runs", "maps"]
 #: Runs that one task of a worker holds, how long one run may take on the average (s), and what compiling may take once (s).
 CHUNK, APPROXIMATE_CHUNK, SECONDS_A_RUN, COMPILING = 250, 20, 2.0, 600.0
 #: Memory that a worker may take, MB.
@@ -101,6 +103,7 @@ class Stress:
     versions: dict[str, str]
     hardware: dict[str, str]
     batches: dict[str, Batch]
+    stability: Stability | None = None
 
     @property
     def broken(self) -> list[Failure]:
@@ -184,6 +187,7 @@ def chunks(seed: int, runs: int | None, quick: bool, models: Sequence[str]) -> l
 
 
 def run_stress(
+    what: What = "all",
     *,
     seed: int = 1,
     quick: bool = False,
@@ -195,24 +199,27 @@ def run_stress(
 ) -> Stress:
     """Plays `runs` scenes with each of the `models` (default: all, as many as `PLAYERS` says) in `jobs` processes (one a core).
 
-    The smallest scenes of failures go to `failures/` in `folder`. Interrupted (Ctrl-C), it gives what was finished till then;
-    `complete` is then false.
+    Then ("all", or "maps" alone) it maps where engines and the continuous model break. The smallest scenes of failures go to
+    `failures/` in `folder`. Interrupted (Ctrl-C), it gives what was finished till then; `complete` is then false.
     """
     began, jobs = time.monotonic(), jobs or os.cpu_count() or 1
-    labels = list(models or PLAYERS)
+    labels = list(models or PLAYERS) if what != "maps" else []
     work = chunks(seed, runs, quick, labels)
     batches = {label: Batch(model=label) for label in labels}
     total, done, complete = sum(chunk.count for chunk in work), 0, True
+    stability: Stability | None = None
     try:
         for batch in _side_by_side(work, jobs):
             batches[batch.model] += batch
             done += batch.runs
             progress(done, total, batch.model)
+        if folder is not None:
+            progress(done, max(total, 1), "smallest scenes")
+            most = SHRUNK_QUICK if quick else SHRUNK
+            batches = {label: replace(batch, failures=tuple(_shrunk(batch, folder, most))) for label, batch in batches.items()}
+        stability = run_stability(quick=quick, jobs=jobs, progress=progress) if what != "runs" else None
     except KeyboardInterrupt:
         complete = False
-    if folder is not None and complete:
-        progress(done, total, "smallest scenes")
-        batches = {label: replace(b, failures=tuple(_shrunk(b, folder, SHRUNK_QUICK if quick else SHRUNK))) for label, b in batches.items()}
     return Stress(
         suite=f"stress{', quick' if quick else ''}",
         created=datetime.now(UTC).isoformat(timespec="seconds"),
@@ -224,6 +231,7 @@ def run_stress(
         versions=provenance.versions(),
         hardware=provenance.hardware(),
         batches=batches,
+        stability=stability,
     )
 
 
@@ -351,7 +359,28 @@ def markdown(found: Stress) -> str:
             failures = batch.failed(name)
             cells.append(f"{worst:.1e}" + (f", **{failures} fail**" if failures else ""))
         lines.append(f"| {invariant.words} | {invariant.bound:g} | " + " | ".join(cells) + " |")
+    if found.stability is not None:
+        lines += ["", *stability_markdown(found.stability)]
     return "\n".join(lines) + "\n"
+
+
+def stability_markdown(found: Stability) -> list[str]:
+    """The maps as tables: largest stable step by axis, and what moves that should stand still."""
+    lines = []
+    labels = list(dict.fromkeys(one.line for one in found.stable))
+    for axis, words in AXIS_WORDS.items():
+        values = list(dict.fromkeys(one.value for one in found.stable if one.axis == axis))
+        lines += [f"| {words} | " + " | ".join(f"{value:g}" for value in values) + " |", "|---|" + "---|" * len(values)]
+        for label in labels:
+            here = [found.step(label, axis, value) for value in values]
+            lines.append(f"| {label} | " + " | ".join(f"{one.step:g} {one.fault}".strip() if one else "" for one in here) + " |")
+        lines.append("")
+    names = ("creep", "sinking", "rotation", "uplift", "jitter")
+    lines += ["| case | model | simulated, s | step, s | " + " | ".join(names) + " |", "|---|---|" + "---|" * (2 + len(names))]
+    for one in found.still:
+        figures = [f"{getattr(one, name):.1e}" for name in names] if not one.fault else [one.fault, *[""] * (len(names) - 1)]
+        lines.append(f"| {one.case} | {one.line} | {one.simulated:g} | {one.step:.2g} | " + " | ".join(figures) + " |")
+    return lines
 
 
 def save(found: Stress, folder: Path) -> None:
@@ -362,6 +391,9 @@ def save(found: Stress, folder: Path) -> None:
     columns = list(Failure.__dataclass_fields__)
     failures = pd.DataFrame([asdict(failure) for failure in found.failures], columns=columns)
     write_whole(folder / "failures.csv", failures.to_csv(index=False, float_format="%.6g"))
+    if found.stability is not None:
+        for name, rows in (("stable-steps", found.stability.stable), ("stand-still", found.stability.still)):
+            write_whole(folder / f"{name}.csv", pd.DataFrame(list(rows)).to_csv(index=False, float_format="%.6g"))
     write_whole(folder / "summary.md", markdown(found))
     write_whole(folder / "run.json", json.dumps(as_data(found), indent=1) + "\n")
 
@@ -369,4 +401,4 @@ def save(found: Stress, folder: Path) -> None:
 def as_data(found: Stress) -> dict[str, Any]:
     """The whole run as plain data."""
     batches = {label: vars(batch) | {"failures": [asdict(failure) for failure in batch.failures]} for label, batch in found.batches.items()}
-    return vars(found) | {"batches": batches}
+    return vars(found) | {"batches": batches, "stability": found.stability and asdict(found.stability)}

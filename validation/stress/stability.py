@@ -1,0 +1,239 @@
+"""Where engines and the continuous model break: the largest stable step, and what a block does that should stand still.
+
+Lengths are in R, times in sqrt(R/g): the same step is asked of a domino and of a tower.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from typing import Any, Literal
+
+import numpy as np
+
+from scenes import Block, Floor, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from scenes.errors import printable
+from validation.models import build
+from validation.stress.players import energy_without_source
+from validation.workers import prepare
+
+Progress = Callable[[int, int, str], None]
+Axis = Literal["size", "friction", "restitution", "shaking"]
+
+SLOPE = math.tan(0.25)
+#: Values along each axis, and the others at the paper's block beside a wall: R in m, friction, restitution of the wall, a_p/(g tan alpha).
+AXES: dict[Axis, tuple[float, ...]] = {
+    "size": (1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1000.0),
+    "friction": (0.0, 0.1, 0.3, 0.6, 0.9, 1.2),
+    "restitution": (0.0, 0.25, 0.5, 0.75, 0.95),
+    "shaking": (0.5, 1.5, 3.0, 10.0, 30.0, 100.0),
+}
+USUAL: dict[Axis, float] = {"size": 1.6, "friction": 0.3, "restitution": 0.5, "shaking": 3.0}
+AXIS_WORDS: dict[Axis, str] = {
+    "size": "half diagonal R, m",
+    "friction": "friction of the floor",
+    "restitution": "restitution of the wall",
+    "shaking": "peak acceleration, g tan α",
+}
+#: Steps that are tried, sqrt(R/g), coarse to fine, and what a stable run keeps to: depth in R, energy without source.
+STEPS = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4)
+DEEPEST, MOST_ENERGY = 0.02, 0.1
+#: Stand-still runs: a block left alone, one that is pushed or shaken, and in a quick run, s; and the step (s).
+HOUR, PUSHED, QUICK_REST, REST_STEP = 3600.0, 300.0, 10.0, 5e-3
+QUICK_STEPS, QUICK_VALUES = STEPS[1:-1:2], 2
+
+
+@dataclass(frozen=True)
+class Line:
+    """A model with settings as they come ("default") or at their best; `knob` is what the step is called there."""
+
+    label: str
+    family: str
+    settings: tuple[tuple[str, Any], ...]
+    knob: str = "time_step"
+
+    def built(self, scene: Scene, step: float) -> Any:
+        """The model with a step in s; the CM's contact is as stiff as the block's size asks for."""
+        settings = dict(self.settings) | {self.knob: step}
+        if self.family == "cm":
+            settings["penetration"] = 1e-7 * scene.block.radius
+        return build(self.family, settings)
+
+
+LINES = {
+    line.label: line
+    for line in (
+        Line("mujoco default", "mujoco", (("settings", "default"),)),
+        Line("mujoco", "mujoco", ()),
+        Line("mujoco adaptive", "mujoco", (("time_step", "adaptive"),), "largest_step"),
+        Line("pybullet default", "pybullet", (("settings", "default"),)),
+        Line("pybullet", "pybullet", ()),
+        Line("pybullet adaptive", "pybullet", (("time_step", "adaptive"),), "largest_step"),
+        Line("cm paper", "cm", (("damping_rule", "paper"),)),
+        Line("cm", "cm", ()),
+    )
+}
+
+
+@dataclass(frozen=True)
+class Stable:
+    """The largest step (sqrt(R/g)) from which on a model is stable, 0 where none was; and what the next coarser one does."""
+
+    line: str
+    axis: Axis
+    value: float
+    step: float
+    fault: str = ""
+
+
+@dataclass(frozen=True)
+class Still:
+    """What a block does that should stand still: the largest of each, R, alpha or sqrt(g R); `fault` where the run did not end."""
+
+    line: str
+    case: str
+    simulated: float
+    step: float
+    creep: float = math.nan
+    sinking: float = math.nan
+    rotation: float = math.nan
+    uplift: float = math.nan
+    jitter: float = math.nan
+    fault: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stability:
+    """The maps."""
+
+    stable: tuple[Stable, ...]
+    still: tuple[Still, ...]
+
+    def step(self, line: str, axis: Axis, value: float) -> Stable | None:
+        """What was found there."""
+        return next((one for one in self.stable if (one.line, one.axis, one.value) == (line, axis, value)), None)
+
+
+def scene_at(axis: Axis, value: float) -> Scene:
+    """The paper's shape of block beside a wall under a pulse, with one thing changed."""
+    at = USUAL | {axis: value}
+    radius, unit = at["size"], math.sqrt(at["size"] / 9.81)
+    own = 2.0 * math.pi * unit / math.sqrt(0.75)
+    return Scene(
+        name=f"{axis} {value:g}",
+        block=Block(half_width=radius * math.sin(0.25), half_height=radius * math.cos(0.25)),
+        floor=Floor(friction=at["friction"]),
+        walls=(Wall(side="left", gap=0.03 * radius, restitution=at["restitution"]),),
+        excitation=Ricker(amplitude=9.81 * SLOPE * at["shaking"], period=0.3 * own),
+        duration=8.0 * unit,
+        output_step=0.02 * unit,
+    )
+
+
+def fault_of(line: Line, scene: Scene, step: float) -> str:
+    """How a run of that step (sqrt(R/g)) breaks: "blows up", "sinks", "gains energy"; empty where it does not."""
+    unit, radius = math.sqrt(scene.block.radius / scene.gravity), scene.block.radius
+    scene = scene.replace(output_step=max(scene.output_step, step * unit))  # the CM ends a step at each row
+    try:
+        history = line.built(scene, step * unit).simulate(scene)
+    except ModelFailure as error:
+        return "sinks" if "through the floor" in str(error) else "blows up"
+    except InputError as error:
+        return printable(error, 60)
+    channels = history.channels
+    if not all(np.all(np.isfinite(column)) for column in channels.values() if column.dtype.kind == "f"):
+        return "blows up"
+    deepest = max(float(np.max(-gap)) for gap in _gaps(scene, channels)) / radius
+    # A step's own way is no fault.
+    if deepest > DEEPEST + 2.0 * step * float(np.max(np.hypot(channels["x_dot"], channels["y_dot"]))) * unit / radius:
+        return "sinks"
+    return "gains energy" if energy_without_source(scene, history) > MOST_ENERGY else ""
+
+
+def _gaps(scene: Scene, channels: Any) -> Iterable[Any]:
+    yield kinematics.pivot_height(scene.block, channels["y"], channels["theta"])
+    for wall in scene.walls:
+        yield kinematics.wall_gap(scene, wall.side, channels["x"], channels["theta"])
+
+
+def largest_stable(label: str, axis: Axis, value: float, steps: Sequence[float] = STEPS) -> Stable:
+    """Tries steps from the finest up to the first one that breaks."""
+    scene = scene_at(axis, value)
+    best = 0.0
+    for step in reversed(steps):
+        fault = fault_of(LINES[label], scene, step)
+        if fault:
+            return Stable(label, axis, value, best, fault)
+        best = step
+    return Stable(label, axis, value, best)
+
+
+#: What pushes or shakes (at 1 Hz) a block that should nevertheless stand: how hard, of what would move it.
+CASES = {"left alone": 0.0, "pushed": 0.5, "shaken": 0.8}
+
+
+def stand_still(label: str, case: str, duration: float, step: float = REST_STEP) -> Still:
+    """Plays a block that should not move; the paper's."""
+    block, mu = Block(half_width=0.397, half_height=1.555), 0.3
+    push = CASES[case] * 9.81 * min(SLOPE, mu)
+    excitation: Rest | Record | Sine = Rest()
+    if case == "pushed":
+        excitation = Record.from_samples([push, push], time_step=duration + 1.0)
+    elif case == "shaken":
+        excitation = Sine(amplitude=push, period=1.0, cycles=int(min(1000, max(duration - 1, 1))))
+    scene = Scene(
+        name=case, block=block, floor=Floor(friction=mu), excitation=excitation, duration=duration, output_step=max(step, duration / 4000)
+    )
+    line = LINES[label]
+    settings = dict(line.settings)
+    if line.family != "cm":  # whose own step it is that makes an hour cheap
+        settings |= {line.knob: step}
+    try:
+        history = build(line.family, settings).simulate(scene)
+    except (ModelFailure, InputError) as error:
+        return Still(label, case, duration, step, fault=printable(error, 120))
+    channels, radius = history.channels, block.radius
+    late = channels["t"] > 0.5 * channels["t"][-1]
+    height = kinematics.pivot_height(block, channels["y"], channels["theta"])
+    lifted = height + 2.0 * block.half_width * np.abs(np.sin(channels["theta"]))
+    speed = np.sqrt(channels["x_dot"] ** 2 + channels["y_dot"] ** 2 + (radius * channels["theta_dot"]) ** 2)
+    return Still(
+        label,
+        case,
+        float(channels["t"][-1]),
+        float(history.settings.get("time_step", step)) if line.family == "cm" else step,
+        creep=float(np.max(np.abs(channels["slip"]))) / radius,
+        sinking=max(0.0, float(np.max(-height))) / radius,
+        rotation=float(np.max(np.abs(channels["theta"]))) / block.alpha,
+        uplift=max(0.0, float(np.max(lifted))) / radius,
+        jitter=float(np.sqrt(np.mean(speed[late] ** 2))) / math.sqrt(9.81 * radius) if late.any() else math.nan,
+        fault="" if not history.outcome.startswith("overturned") else history.outcome,
+    )
+
+
+def run_stability(*, quick: bool = False, jobs: int | None = None, progress: Progress = lambda done, of, text: None) -> Stability:
+    """The maps of all `LINES`; `quick` has fewer values and steps, and a minute for the hour."""
+    steps = QUICK_STEPS if quick else STEPS
+    values = {axis: some[:: max(1, len(some) // QUICK_VALUES)] if quick else some for axis, some in AXES.items()}
+    stills = [
+        (label, case, QUICK_REST if quick else PUSHED if CASES[case] else HOUR, REST_STEP)
+        for case, label in itertools.product(CASES, LINES)
+    ]
+    asked = [(label, axis, value, steps) for axis in AXES for value in values[axis] for label in LINES]
+    still: list[Still] = []
+    stable: list[Stable] = []
+    with ProcessPoolExecutor(jobs or os.cpu_count(), mp_context=get_context("spawn"), initializer=prepare, initargs=(4096.0,)) as pool:
+        resting, searching = [pool.submit(stand_still, *one) for one in stills], [pool.submit(largest_stable, *one) for one in asked]
+        total = len(resting) + len(searching)
+        for n, rest in enumerate(resting):
+            still.append(rest.result())
+            progress(n + 1, total, f"{still[-1].line}, {still[-1].case}")
+        for n, search in enumerate(searching):
+            stable.append(search.result())
+            progress(len(resting) + n + 1, total, f"{stable[-1].line}, {stable[-1].axis}")
+    return Stability(stable=tuple(stable), still=tuple(still))
