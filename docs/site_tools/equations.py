@@ -6,7 +6,7 @@ import re
 from html import unescape
 from typing import Any
 
-from latex2mathml.converter import convert
+from math_core import LatexToMathML
 
 #: What `pymdownx.arithmatex` (generic) leaves: \( inline \) in a span, \[ display \] in a div.
 EQUATION = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
@@ -18,5 +18,5 @@ def on_page_content(html: str, **_: Any) -> str:
 
 
 def _as_mathml(found: re.Match[str]) -> str:
-    kind, source = "block" if found[2] == "[" else "inline", unescape(found[3]).strip()
-    return f'<{found[1]} class="equation">{convert(source, display=kind)}</{found[1]}>'
+    mathml = LatexToMathML().convert_with_local_state(unescape(found[3]).strip(), displaystyle=found[2] == "[")
+    return f'<{found[1]} class="equation">{mathml}</{found[1]}>'
