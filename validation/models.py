@@ -79,6 +79,11 @@ def family(name: str) -> Family:
     return FAMILIES[name]
 
 
+def is_own(name: str) -> bool:
+    """Whether that is a model of the user's own, which may lie beside the suite or in the working directory."""
+    return ":" in name
+
+
 def home(name: str) -> str:
     """The module in which the model of that name is defined."""
     return str(_class_of(name).__module__)

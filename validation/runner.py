@@ -20,6 +20,7 @@ from validation import provenance, workers
 from validation.discrepancy import compare, describe, evaluate, too_short
 from validation.ensembles import Ensemble
 from validation.measures import DIFFERENCES, FIGURES
+from validation.models import is_own
 from validation.results import HISTORIES, Cell, CostRecord, EnsembleRecord, Figure, MeasureRecord, Run
 from validation.statistics import STATISTICS, Sample, Samples
 from validation.store import Store, name_of
@@ -156,7 +157,7 @@ def _task(item: Spot | Batch, folder: Path) -> workers.Task | workers.BatchTask:
         "label": part.label,
         "family": part.family_name,
         "settings": dict(part.settings),
-        "search_path": (str(folder),),
+        "search_path": (str(folder),) if is_own(part.family_name) else (),
     }
     if isinstance(item, Spot):
         return workers.Task(scene=item.scene, **model)

@@ -54,7 +54,7 @@ from scenes.errors import printable, unknown_name
 from scenes.files import named_scenes, read_toml, scene_from
 from validation.ensembles import Ensemble
 from validation.measures import DIFFERENCES, FIGURES
-from validation.models import Family, build, family
+from validation.models import Family, build, family, is_own
 from validation.results import Kind
 from validation.statistics import STATISTICS
 from validation.tolerances import OWN_FIGURES, Place, Tolerances, Windowed, parse_tolerances
@@ -232,8 +232,9 @@ def load_suite(source: str | Path) -> Suite:
 def _suite(given: SuiteFile, path: Path, shipped: bool) -> Suite:
     if given.include:
         return _joined(given, path)
-    if str(path.parent) not in sys.path:
-        sys.path.append(str(path.parent))  # a suite's own models ("module:Class") may lie beside it
+    own = any(is_own(str(settings.get("model", label))) for label, settings in given.models.items())
+    if own and str(path.parent) not in sys.path:
+        sys.path.append(str(path.parent))
     models = {label: _part(label, settings, path.parent) for label, settings in given.models.items()}
     for key, label in (("reference", given.reference), ("model_form", given.model_form)):
         if label and label not in models:

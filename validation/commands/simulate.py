@@ -13,7 +13,7 @@ from scenes import InputError, load_scene
 from scenes.errors import printable
 from scenes.progress import listening
 from validation.commands import answer, console, model_names, progress, scene_names
-from validation.models import FAMILIES, build
+from validation.models import FAMILIES, build, is_own
 from validation.store import name_of
 
 
@@ -27,7 +27,8 @@ def run(
 
     Writes the history as CSV; its events go to a second file beside it.
     """
-    sys.path.append(str(Path.cwd()))  # where a model of the user's own ("module:Class") may lie
+    if is_own(model):
+        sys.path.append(str(Path.cwd()))
     player = build(model, dict(_setting(text) for text in settings or []))
     what = load_scene(scene)
     path = output or Path(f"{name_of(what.name, model)}.csv")
