@@ -1,0 +1,264 @@
+"""Edges by name: scenes in which two things happen at once, or exactly at a limit."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from ebm import EventBasedModel
+from scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+
+BLOCK = Block(half_width=0.397, half_height=1.555)
+SLOPE = BLOCK.half_width / BLOCK.half_height
+G = 9.81
+PIVOTS = ("bilateral", "unilateral")
+pivots = pytest.mark.parametrize("pivot", PIVOTS)
+
+
+def scene_of(**change: object) -> Scene:
+    return Scene(**{"name": "edge", "block": BLOCK, "floor": Floor(friction=0.8), "duration": 3.0, "output_step": 0.01} | change)
+
+
+def play(scene: Scene, pivot: str = "bilateral", **settings: object) -> History:
+    return EventBasedModel(pivot=pivot, **settings).simulate(scene)
+
+
+def kinds(history: History) -> list[str]:
+    return [event.kind for event in history.event_list]
+
+
+def constant(acceleration: float, duration: float = 10.0) -> Record:
+    return Record.from_samples([acceleration, acceleration], time_step=duration)
+
+
+def assert_contacts_hold(scene: Scene, history: History) -> None:
+    motion = history.channels
+    assert np.min(kinematics.pivot_height(BLOCK, motion["y"], motion["theta"])) > -1e-9
+    for wall in scene.walls:
+        assert np.min(kinematics.wall_gap(scene, wall.side, motion["x"], motion["theta"])) > -1e-9
+
+
+def grazing_gap(tilt: float) -> float:
+    """Gap at which the top corner of a block that is released from `tilt` (to the right) just reaches the left wall.
+
+    Its next rotation follows from Housner's impact, r = 1 - 3/2 sin^2 alpha, and energy.
+    """
+    r = 1.0 - 1.5 * math.sin(BLOCK.alpha) ** 2
+    # Height of the centroid, R cos(alpha - phi), is all the energy there is at a turning point.
+    depth = r**2 * (math.cos(BLOCK.alpha - tilt) - math.cos(BLOCK.alpha))
+    peak = BLOCK.alpha - math.acos(math.cos(BLOCK.alpha) + depth)
+    return BLOCK.radius * (math.sin(BLOCK.alpha + peak) - math.sin(BLOCK.alpha - peak))
+
+
+@pivots
+def test_grazing_wall_contact(pivot):
+    """A corner that turns back a billionth of the gap before the wall does not touch it; a billionth after, it does, softly."""
+    tilt, gap = 0.15, grazing_gap(0.15)
+    start = {"initial_rotation": -tilt, "duration": 2.5}
+    free = play(scene_of(**start), pivot, tolerance=1e-13)
+    misses = play(scene_of(**start, walls=[Wall(side="left", gap=gap * (1.0 + 1e-9))]), pivot, tolerance=1e-13)
+    touches = play(scene_of(**start, walls=[Wall(side="left", gap=gap * (1.0 - 1e-9))]), pivot, tolerance=1e-13)
+    assert "wall impact" not in kinds(misses)
+    np.testing.assert_array_equal(misses.channels["theta"], free.channels["theta"])
+    (impact,) = [event for event in touches.event_list if event.kind == "wall impact"]
+    assert 0.0 < impact.impulse < 1e-3
+    assert np.max(np.abs(touches.channels["theta"] - free.channels["theta"])) < 1e-3
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5])
+@pivots
+def test_impact_on_floor_and_wall_at_once(pivot, e):
+    """A block beside a wall, tilted away and let go, lands flush against it."""
+    scene = scene_of(walls=[Wall(side="left", gap=0.0, restitution=e)], initial_rotation=-0.1)
+    history = play(scene, pivot, tolerance=1e-12)
+    assert_contacts_hold(scene, history)
+    motion = history.channels
+    assert np.max(motion["theta"]) < 1e-9
+    energy = kinematics.energy(BLOCK, G, *(motion[name] for name in ("y", "x_dot", "y_dot", "theta_dot")))
+    assert np.max(np.diff(energy)) < 1e-8
+    if e == 0.0:
+        assert history.outcome == "at rest"
+    elif pivot == "bilateral":
+        first = next(event.t for event in history.event_list if event.kind == "floor impact")
+        after = motion["theta"][motion["t"] > first]
+        turned = energy[motion["t"] > first][0] / energy[0]
+        assert turned == pytest.approx((e * (1.0 - 1.5 * math.sin(BLOCK.alpha) ** 2)) ** 2, rel=1e-6)
+        assert np.min(after) < -1e-3
+
+
+@pivots
+def test_uplift_at_exactly_the_slope(pivot):
+    """|u| = g tan alpha is the limit itself: less does not lift, more does, and at the limit nothing happens in a hurry."""
+    below, at, above = (play(scene_of(excitation=constant(factor * G * SLOPE)), pivot) for factor in (1.0 - 1e-12, 1.0, 1.0 + 1e-9))
+    assert not kinds(below)
+    assert not below.channels["theta"].any()
+    assert kinds(above)[0] == "uplift"
+    for limit in (at, barely):
+        assert np.max(np.abs(limit.channels["theta"])) < 1e-9
+
+
+@pivots
+def test_slip_at_exactly_the_friction(pivot):
+    floor = Floor(friction=0.2)
+    below, at, barely, above = (
+        play(scene_of(floor=floor, excitation=constant(factor * G * 0.2)), pivot) for factor in (1.0 - 1e-12, 1.0, 1.0 + 1e-12, 1.0 + 1e-7)
+    )
+    assert not kinds(below)
+    assert kinds(above)[0] == "slip"
+    for limit in (at, barely):
+        assert np.max(np.abs(limit.channels["x"])) < 1e-9
+    assert above.channels["x"][-1] == pytest.approx(-0.5 * 1e-7 * G * 0.2 * 9.0, rel=1e-5)
+
+
+@pivots
+def test_balance_point(pivot):
+    """At theta = alpha the block stands on its corner; a little less and it comes back, a little more and it falls."""
+    back, on, over = (
+        play(scene_of(initial_rotation=BLOCK.alpha * factor, duration=20.0), pivot) for factor in (1.0 - 1e-6, 1.0, 1.0 + 1e-6)
+    )
+    assert on.outcome in ("moving", "overturned left", "at rest")
+    assert np.all(np.isfinite(on.channels["theta"]))
+    assert np.min(on.channels["theta"][:300]) == pytest.approx(BLOCK.alpha, abs=1e-9)
+    assert np.min(back.channels["theta"]) <= 0.0
+    assert over.outcome == "overturned left"
+
+
+@pivots
+def test_start_past_the_balance_point(pivot):
+    for side in (1.0, -1.0):
+        history = play(scene_of(initial_rotation=side * 1.3 * BLOCK.alpha), pivot)
+        assert history.outcome == ("overturned left" if side > 0 else "overturned right")
+        assert np.all(np.diff(side * history.channels["theta"]) > 0.0)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+@pivots
+def test_wall_that_is_touched_from_the_start(pivot, e):
+    for amplitude in (3.0 * G * SLOPE, -3.0 * G * SLOPE):
+        scene = scene_of(
+            walls=[Wall(side="left", gap=0.0, restitution=e)], excitation=Ricker(amplitude=amplitude, period=0.8), duration=5.0
+        )
+        history = play(scene, pivot)
+        assert_contacts_hold(scene, history)
+        assert "uplift" in kinds(history)
+
+
+@pivots
+def test_walls_on_both_sides_at_no_distance(pivot):
+    """It cannot move, however hard it is shaken."""
+    walls = [Wall(side="left", gap=0.0), Wall(side="right", gap=0.0)]
+    history = play(scene_of(walls=walls, excitation=Sine(amplitude=30.0, period=0.7, cycles=4)), pivot)
+    for name in ("x", "theta", "slip"):
+        assert np.max(np.abs(history.channels[name])) < 1e-9
+    assert history.outcome == "at rest"
+
+
+@pivots
+def test_rattling_at_restitution_one(pivot):
+    """Pressed on an elastic wall, the block rattles, and that ends."""
+    walls = [Wall(side="left", gap=0.001, restitution=1.0)]
+    scene = scene_of(walls=walls, excitation=constant(1.5 * G * SLOPE), duration=5.0)
+    history = play(scene, pivot)
+    assert_contacts_hold(scene, history)
+    assert kinds(history).count("wall impact") > 0
+    assert len(history.event_list) < 20_000
+
+
+def test_zeno_sequence_of_a_bouncing_block():
+    """Dropped flat at e = 0.999 it bounces sqrt(2 h/g) (1 + e)/(1 - e) s, thousands of times, and then rests."""
+    height, e = 1e-4, 0.999
+    end = math.sqrt(2.0 * height / G) * (1.0 + e) / (1.0 - e)
+    scene = scene_of(floor=Floor(friction=0.5, restitution=e), initial_height=height, duration=1.2 * end, output_step=0.1)
+    history = play(scene, "unilateral")
+    assert history.outcome == "at rest"
+    landings = [event.t for event in history.event_list if event.impulse > 0.0]
+    assert len(landings) > 2000
+    assert landings[-1] == pytest.approx(end, rel=0.02)
+    assert landings[-1] < end
+    assert np.max(np.abs(history.channels["theta"])) < 1e-9
+
+
+@pivots
+def test_zeno_sequence_of_a_rocking_block(pivot):
+    """A slender block loses little at an impact; its hundreds of impacts pile up at a time, and it rests after it."""
+    block = Block(half_width=0.1, half_height=1.0)
+    history = play(scene_of(block=block, initial_rotation=0.5 * block.alpha, duration=200.0, floor=Floor(friction=0.5)), pivot)
+    impacts = [event.t for event in history.event_list if event.kind == "floor impact"]
+    assert history.outcome == "at rest"
+    assert len(impacts) > 500
+    # Quarter periods fall by the ratio of speeds where rotations are small: t_n+1/t_n tends to 1 - 3/2 sin^2 alpha.
+    late = np.diff(impacts)[400:500]
+    np.testing.assert_allclose(late[1:] / late[:-1], 1.0 - 1.5 * math.sin(block.alpha) ** 2, atol=2e-4)
+
+
+@pivots
+def test_record_of_one_sample(pivot):
+    """One sample lasts no time: nothing happens. Found by `rockcheck stress`: no mode was consistent at t = 0."""
+    for strength in (0.1, 20.0, -20.0):
+        shaken = play(scene_of(excitation=Record.from_samples([strength], time_step=0.01)), pivot)
+        assert shaken.outcome == "at rest"
+        assert not shaken.channels["theta"].any()
+
+
+@pivots
+def test_record_that_ends_with_a_jump(pivot):
+    """After its last sample the base is at rest at once."""
+    scene = scene_of(excitation=constant(3.0 * G * SLOPE, 0.4))
+    longer = scene.replace(excitation=Record.from_samples([3.0 * G * SLOPE, 3.0 * G * SLOPE, 0.0], time_step=0.4))
+    ends, falls = play(scene, pivot, tolerance=1e-12), play(longer, pivot, tolerance=1e-12)
+    rows = int(0.4 / 0.01)
+    np.testing.assert_allclose(ends.channels["theta"][:rows], falls.channels["theta"][:rows], rtol=0.0, atol=1e-12)
+    assert ends.channels["theta"][rows + 5] < falls.channels["theta"][rows + 5]
+
+
+@pytest.mark.parametrize("symmetric", [False, True])
+@pytest.mark.parametrize("vertical", [False, True])
+@pivots
+def test_pulse_that_is_shorter_than_a_step(pivot, vertical, symmetric):
+    """A pulse of a thousandth of the block's time is not stepped over, at rest nor in rocking.
+
+    Found by `rockcheck stress`: the tail of a symmetric pulse is too thin for a Taylor series to tell that it is there.
+    """
+    pulse = Ricker(amplitude=4000.0 * G * SLOPE, period=2e-3, symmetric=symmetric)
+    more = {"vertical": Sine(amplitude=0.5, period=1.0, cycles=3)} if vertical else {}
+    for start in ({}, {"initial_rotation": 0.3 * BLOCK.alpha}):
+        scene = scene_of(floor=Floor(friction=1.2), excitation=pulse, duration=0.5, **start, **more)
+        usual, fine = play(scene, pivot), play(scene, pivot, tolerance=1e-13)
+        np.testing.assert_allclose(usual.channels["theta"], fine.channels["theta"], rtol=0.0, atol=1e-7)
+        without = play(scene.replace(excitation=Rest()), pivot)
+        assert np.max(np.abs(fine.channels["theta"] - without.channels["theta"])) > 1e-5
+
+
+@pivots
+def test_duration_that_ends_at_an_impact(pivot):
+    """Whether the run stops just before, at or just after an impact: it ends, with all its rows."""
+    scene = scene_of(initial_rotation=0.1, output_step=0.05)
+    impact = next(event.t for event in play(scene, pivot).event_list if event.kind == "floor impact")
+    for end in (math.nextafter(impact, 0.0), impact, math.nextafter(impact, 9.0), impact * (1.0 - 1e-13), impact * (1.0 + 1e-13)):
+        stops = scene.replace(duration=end, output_step=end / 8.0)
+        history = play(stops, pivot)
+        assert len(history.channels["t"]) == 9
+        assert history.outcome == "moving"
+        assert abs(history.channels["theta"][-1]) < 1e-9
+        assert len(history.event_list) <= 1
+
+
+def test_mirror_image_of_sliding_between_walls():
+    """The mirror image of a slide that bounces between walls is its mirror image to the bit.
+
+    Found by `rockcheck stress`: it differed in the last bit.
+    """
+    block = Block(half_width=0.45239232010061675, half_height=0.891819033612751)
+    walls = [
+        Wall(side="left", gap=0.0, restitution=0.42153884661618235),
+        Wall(side="right", gap=0.00013319196436825637, restitution=0.7813616),
+    ]
+    scene = scene_of(
+        block=block, floor=Floor(friction=0.0772), walls=walls, initial_velocity=1.0375582304532138, duration=0.08, output_step=1e-3
+    )
+    for pivot in PIVOTS:
+        a, b = play(scene, pivot).channels, play(scene.mirrored(), pivot).channels
+        for name in ("x", "x_dot", "slip", "slip_rate"):
+            np.testing.assert_array_equal(a[name], -b[name], err_msg=f"{pivot}, {name}")
