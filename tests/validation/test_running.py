@@ -60,11 +60,11 @@ def in_this_process(tasks, **limits):
 
 def test_every_kind_of_failure_fails_its_cell_alone(tmp_path, run):
     faults = {name: f'model = "faulty:{name}"' for name in ("Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")}
-    path = write_suite(tmp_path, {**faults, "again": 'model = "faulty:Still"'}, FINE.format(model="again"), seconds=6.0)
+    path = write_suite(tmp_path, {**faults, "again": 'model = "faulty:Still"'}, FINE.format(model="again"), seconds=15.0)
     done = run(path, play=workers.local)
     reasons = {cell.model: cell.reason for cell in done.cells}
     assert reasons["Segfault"] == "crashed: SIGSEGV"
-    assert reasons["Hang"] == "did not end within 6 s"
+    assert reasons["Hang"] == "did not end within 15 s"
     assert "memory" in reasons["Hog"].lower()
     assert reasons["Fails"] == "more than 10 events"
     assert reasons["Bug"] == "ZeroDivisionError: a bug?of two lines"
