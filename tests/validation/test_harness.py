@@ -62,37 +62,62 @@ def project(tmp_path_factory):
     return copy
 
 
-#: What is done wrong, in which file, by replacing what (a regular expression) with what. Compiled code last: it takes a minute.
+#: What is done wrong, in which file, by replacing what (a regular expression) with what, and how many of the 25 cells cannot
+#: depend on that file. Compiled code last: it takes a minute.
 FAULTS = [
-    ("gravity 9.8", "scenes/scene.py", r"gravity: Positive = 9\.81", "gravity: Positive = 9.8"),
-    ("the record's last sample dropped", "scenes/excitations.py", r"tuple\(samples\.tolist\(\)\)", "tuple(samples[:-1].tolist())"),
-    ("output shifted by one sample", "scenes/observation.py", r"name: state\[:, column\] for", "name: np.roll(state[:, column], 1) for"),
-    ("NaN at the end", "scenes/observation.py", r"    rows = max\(rows, 1\)\n", "    rows = max(rows, 1)\n    state[rows - 1] = np.nan\n"),
-    ("wall 1 mm off", "engines/contacts.py", r"distance=b \+ wall\.gap", "distance=b + wall.gap + 0.001 / 1.605"),
-    ("e ignored", "engines/contacts.py", r"restitution=wall\.restitution", "restitution=0.0"),
-    ("a swapped left and right", "engines/contacts.py", r'inward = 1\.0 if wall\.side == "left"', 'inward = 1.0 if wall.side == "right"'),
-    ("dt off by 1e-3", "engines/engine.py", r"\], dt\)", "], 1.001 * dt)"),
-    ("a lost impact", "engines/events.py", r"in _rises\(flags\):", "in _rises(flags)[1:]:"),
-    ("friction 5 % low", "ebm/natural.py", r"mu_k=scene\.floor\.friction", "mu_k=0.95 * scene.floor.friction"),
-    ("Housner's ratio off by 1 %", "ebm/impacts.py", r"w2 = \(1\.0 - 1\.5 \* s \* s\) \* w1", "w2 = 1.01 * (1.0 - 1.5 * s * s) * w1"),
-    ("a sign in (3)", "ebm/motion.py", r"0\.75 \* \(push - weight\)", "0.75 * (push + weight)"),
+    ("gravity 9.8", "scenes/scene.py", r"gravity: Positive = 9\.81", "gravity: Positive = 9.8", 0),
+    ("the record's last sample dropped", "scenes/excitations.py", r"tuple\(samples\.tolist\(\)\)", "tuple(samples[:-1].tolist())", 0),
+    ("output shifted by one sample", "scenes/observation.py", r"name: state\[:, column\] for", "name: np.roll(state[:, column], 1) for", 0),
+    (
+        "NaN at the end",
+        "scenes/observation.py",
+        r"    rows = max\(rows, 1\)\n",
+        "    rows = max(rows, 1)\n    state[rows - 1] = np.nan\n",
+        0,
+    ),
+    ("wall 1 mm off", "engines/contacts.py", r"distance=b \+ wall\.gap", "distance=b + wall.gap + 0.001 / 1.605", 15),
+    ("e ignored", "engines/contacts.py", r"restitution=wall\.restitution", "restitution=0.0", 15),
+    (
+        "a swapped left and right",
+        "engines/contacts.py",
+        r'inward = 1\.0 if wall\.side == "left"',
+        'inward = 1.0 if wall.side == "right"',
+        15,
+    ),
+    ("dt off by 1e-3", "engines/engine.py", r"\], dt\)", "], 1.001 * dt)", 15),
+    ("a lost impact", "engines/events.py", r"in _rises\(flags\):", "in _rises(flags)[1:]:", 15),
+    ("friction 5 % low", "ebm/natural.py", r"mu_k=scene\.floor\.friction", "mu_k=0.95 * scene.floor.friction", 15),
+    ("Housner's ratio off by 1 %", "ebm/impacts.py", r"w2 = \(1\.0 - 1\.5 \* s \* s\) \* w1", "w2 = 1.01 * (1.0 - 1.5 * s * s) * w1", 15),
+    ("a sign in (3)", "ebm/motion.py", r"0\.75 \* \(push - weight\)", "0.75 * (push + weight)", 15),
 ]
 
 
-@pytest.mark.parametrize(("fault", "file", "old", "new"), FAULTS, ids=[fault[0] for fault in FAULTS])
-def test_a_deliberate_fault_fails_the_smoke_suite(project, fault, file, old, new):
+@pytest.mark.parametrize(("fault", "file", "old", "new", "untouched"), FAULTS, ids=[fault[0] for fault in FAULTS])
+def test_a_deliberate_fault_fails_the_smoke_suite(project, fault, file, old, new, untouched):
     with project.changed(file, old, new):
         code, out = project.run("validate", "smoke", "--strict")
     assert code in (1, 3), f"{fault}: {out}"
+    assert f"{untouched} of 25 cells were up to date" in out
     assert "Traceback" not in out
 
 
-def test_exactly_what_depends_on_a_changed_file_runs_again(project):
+CHANGES = [
+    ("an engine's module", "engines/pybullet_engine.py", r"\Z", "\nUNUSED = 1\n", 20),
+    ("a remark", "engines/pybullet_engine.py", r"\Z", "\n# unused\n", 25),
+    ("an engine's setting", "validation/data/suites/smoke.toml", r"(\[models\.mujoco\]\ntime_step = )2e-4", r"\g<1>1.9e-4", 20),
+    ("the continuous model's", "cm/restitution.py", r"\Z", "\nUNUSED = 1\n", 20),
+    ("a measure", "validation/measures.py", r"\Z", "\nUNUSED = 1\n", 25),
+    ("a page", "reports/site.py", r"\Z", "\nUNUSED = 1\n", 25),
+]
+
+
+@pytest.mark.parametrize(("file", "old", "new", "untouched"), [change[1:] for change in CHANGES], ids=[change[0] for change in CHANGES])
+def test_exactly_what_depends_on_a_change_runs_again(project, file, old, new, untouched):
     project.run("validate", "smoke")
     assert "25 of 25 cells were up to date" in project.run("validate", "smoke")[1]
-    with project.changed("engines/pybullet_engine.py", r"\Z", "\nUNUSED = 1\n"):
+    with project.changed(file, old, new):
         _, out = project.run("validate", "smoke")
-    assert "20 of 25 cells were up to date" in out
+    assert f"{untouched} of 25 cells were up to date" in out
 
 
 def test_a_killed_run_goes_on_and_ends_the_same(project, tmp_path):
