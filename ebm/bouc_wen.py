@@ -336,7 +336,7 @@ def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a):
     m[TIP], m[FAR] = closed_wall(b, z, m[S], False), closed_wall(b, z, -m[S], True)
     if m[TIP] != 0 and m[FAR] != 0:
         m[FLOOR], m[PULL] = STICK, 1
-        tilt_series(b, m, z, gh, gv, t, _LOOK, 0.0, 0.0, True, a)
+        tilt_series(b, m, z, gh, gv, t, _LOOK, 0.0, 0.0, a)
         if a[NA, 0] >= 0.0 and a[NB, 0] >= 0.0:  # wedged between the walls
             z[W] = z[VX] = z[VY] = 0.0
             return
@@ -370,10 +370,10 @@ def _initial_friction(b, m, z, gh, gv, t, a):
     m[:] = 0
     m[FAMILY], m[S], m[PULL], m[FLOOR] = TILT, sense, 1, STICK
     m[TIP] = closed_wall(b, z, sense, False)
-    tilt_series(b, m, z, gh, gv, t, _LOOK, 0.0, 0.0, True, a)
+    tilt_series(b, m, z, gh, gv, t, _LOOK, 0.0, 0.0, a)
     if m[TIP] != 0 and a[NA, 0] < 0.0:
         m[TIP] = 0
-        tilt_series(b, m, z, gh, gv, t, _LOOK, 0.0, 0.0, True, a)
+        tilt_series(b, m, z, gh, gv, t, _LOOK, 0.0, 0.0, a)
     most = b.mu_k * abs(a[P, 0])
     return -sense * a[Q, 0] / most if abs(a[Q, 0]) < most else -math.copysign(1.0, sense * a[Q, 0])
 
@@ -425,7 +425,7 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
         elif m[FAMILY] == FLAT:
             order = flat_series(b, m, z, gh, gv, t, order, a)
         else:
-            order = tilt_series(b, m, z, gh, gv, t, order, 0.0, reach, True, a)
+            order = tilt_series(b, m, z, gh, gv, t, order, 0.0, reach, a)
         h = _step_size(a, U, G, order - 1, control.tolerance, reach)
         if moving:
             h = _step_size(a, XI, Z, order - 1, control.tolerance, h)

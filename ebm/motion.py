@@ -93,11 +93,11 @@ def delta(b, m, tip):
 
 
 @inner_kernel
-def tilt_series(b, m, z, gh, gv, t, order, enough, reach, need_forces, a):
+def tilt_series(b, m, z, gh, gv, t, order, enough, reach, a):
     """Fills the workspace with the series of a tilted block's motion about time t; returns their order.
 
     The order is `order`, or less where the terms fall below `enough` within `reach` (the longest step there can be).
-    `need_forces` asks for P and Q also in ROCK, where motion does not depend on them.
+    ROCK, whose motion does not depend on P and Q, has them where the setting asks for a guard on them.
     """
     sign = float(m[S])
     fill_series(gh, t, sign, order, a, U)
@@ -109,7 +109,7 @@ def tilt_series(b, m, z, gh, gv, t, order, enough, reach, need_forces, a):
     a[SIN, 0] = np.sin(b.alpha - a[PHI, 0])
     a[COS, 0] = np.cos(b.alpha - a[PHI, 0])
     if m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0:
-        return _rock_series(gv.kind == STILL, order, enough, reach, need_forces, a)
+        return _rock_series(gv.kind == STILL, order, enough, reach, b.unilateral or not b.no_slip, a)
     a[XI, 0] = sign * z[X]
     a[XI, 1] = sign * z[VX]
     a[Y, 0] = z[HEIGHT]

@@ -328,7 +328,7 @@ def _expand(b, m, z, gh, gv, t, reach, control, a):
     if m[FAMILY] == FLAT:
         order = flat_series(b, m, z, gh, gv, t, control.order, a)
         return order, 0.0, _step_size(a, U, G, order, control.tolerance, reach)
-    order = tilt_series(b, m, z, gh, gv, t, control.order, 1e-2 * control.tolerance, reach, not b.no_slip or b.unilateral, a)
+    order = tilt_series(b, m, z, gh, gv, t, control.order, 1e-2 * control.tolerance, reach, a)
     h = reach
     if order == control.order:
         h = _step_size(a, PHI, COS, order, control.tolerance, reach)

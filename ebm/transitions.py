@@ -49,7 +49,7 @@ from ebm.motion import (
     flat_series,
     tilt_series,
 )
-from ebm.series import NOISE, SLIP_NOISE, leading
+from ebm.series import MOST_TERMS, NOISE, SLIP_NOISE, leading
 from scenes.compiled import inner_kernel
 
 # The guards, in the order in which ties are decided: floor before walls, contacts before friction.
@@ -255,11 +255,12 @@ _AHEAD = 1e-2  # natural time over which it weighs their terms
 @inner_kernel
 def consistent(b, m, z, gh, gv, t, a):
     """Whether mode m can begin at state z: every guard leaves zero upward, and what must begin to move does."""
+    look = min(_LOOK, MOST_TERMS)  # the plain constant would make numba compile all series once more, for it alone
     if m[FAMILY] == FLAT:
-        order = flat_series(b, m, z, gh, gv, t, _LOOK, a)
+        order = flat_series(b, m, z, gh, gv, t, look, a)
         pivot = 0.0
     else:
-        order = tilt_series(b, m, z, gh, gv, t, _LOOK, 0.0, 0.0, True, a)
+        order = tilt_series(b, m, z, gh, gv, t, look, 0.0, 0.0, a)
         pivot = m[S] * z[X] - a[SIN, 0]
     mask = guards_of(b, m)
     for which in range(GUARDS):

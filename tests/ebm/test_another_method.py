@@ -498,7 +498,7 @@ def test_series_begin_with_the_closed_forms(name, side, case):
         m[motion.TIP], m[motion.FAR] = mode.Sw == S, mode.Sw == -S
         s = math.sin(paper.alpha - abs(theta))
         z = np.array([x / R, c, theta, v * unit / R, S * s * w * unit, w * unit])
-        order = motion.tilt_series(b, m, z, *natural.grounds_of(scene), t / unit, 8, 0.0, 0.0, True, a)
+        order = motion.tilt_series(b, m, z, *natural.grounds_of(scene), t / unit, 8, 0.0, 0.0, a)
         assert order == 8
         x2 = S * 2.0 * a[motion.XI, 2] if name != "rock" else S * 2.0 * a[motion.SIN, 2]
         push = a[motion.NA, 0] + a[motion.NB, 0] if mode.Sw else 0.0
