@@ -13,21 +13,23 @@ from scenes import InputError, Record, Scene
 from validation.results import Stored
 from validation.spectra import Asked, Panel, Tiles
 
-#: Frequencies of the set of pulses, each played in both directions.
+#: Frequencies of the set of pulses.
 PULSES = 50
 BOOTSTRAPS, CONFIDENCE = 2000, 0.95
-FEWEST_MOTIONS = 4
+FEWEST = 2
 
 
 class Case(Stored):
     """One curve. A point is intensity, share overturned, lower and upper end of its confidence band, fitted probability.
 
     The fit is a lognormal curve: `median` is the intensity at which its probability is one half, `dispersion` the standard
-    deviation of its logarithm; both None (and the probabilities NaN) where all or none overturn.
+    deviation of its logarithm; both None (and the probabilities NaN) where all or none overturn. `motions` are the records or
+    pulses, each in both directions; `undecided` runs, which failed, count as safe.
     """
 
     label: str
     motions: int
+    undecided: int
     median: float | None
     dispersion: float | None
     points: tuple[tuple[float, float, float, float, float], ...]
@@ -47,61 +49,70 @@ def fragility(panel: Panel, asked: Asked, records: Sequence[Path], tiles: Tiles)
     """The curves of a scene for a set of records, or, without any, for pulses of the scene's kind over the frequencies asked.
 
     Each motion is played in both directions at every intensity: its peak acceleration over g tan(alpha), the amplitudes
-    asked. Raises `InputError` for a set of fewer than `FEWEST_MOTIONS`.
+    asked. Raises `InputError` for a set of fewer than `FEWEST`.
     """
     scene = panel.scene
     walls = [("with the wall", scene)] if scene.walls else []
     cases = []
+    if 0 < len(records) < FEWEST:
+        raise InputError(f"{len(records)} is too few: give at least {FEWEST} records", "--record")
     for label, case in [*walls, ("without a wall", scene.replace(walls=()))]:
-        overturned = _play_records(case, asked, records, tiles) if records else _play_pulses(case, asked, tiles)
-        if len(overturned) < FEWEST_MOTIONS:
-            raise InputError(f"{len(overturned) // 2} motion(s) are too few: give at least {FEWEST_MOTIONS // 2} records", "--record")
-        cases.append(_case(label, overturned, asked.amplitudes))
+        sides, failed = _play_records(case, asked, records, tiles) if records else _play_pulses(case, asked, tiles)
+        cases.append(case_of(label, sides != SAFE, int(failed.sum()), asked.amplitudes))
     motions = f"{len(records)} records" if records else f"{PULSES} pulses"
     about = (
-        f"{motions}, each in both directions. Lines: share of the motions that overturn the block; bands: {CONFIDENCE:.0%}, by drawing the"
-        f" set of motions anew {BOOTSTRAPS} times; dots: the lognormal curve of the greatest likelihood."
+        f"{motions}, each in both directions. Lines: share of the runs that overturn the block; bands: {CONFIDENCE:.0%}, by drawing the"
+        f" {'records' if records else 'pulses'} anew {BOOTSTRAPS} times; dots: the lognormal curve of the greatest likelihood."
     )
+    if undecided := sum(case.undecided for case in cases):
+        about += f" {undecided} runs failed and count as safe."
     return Fragility(title=f"{panel.title}, {motions}", about=about, intensity="peak acceleration / (g tan α)", cases=tuple(cases))
 
 
-def _play_pulses(scene: Scene, asked: Asked, tiles: Tiles) -> NDArray[np.bool_]:
+Runs = tuple[NDArray[np.int8], NDArray[np.bool_]]
+
+
+def _play_pulses(scene: Scene, asked: Asked, tiles: Tiles) -> Runs:
+    """Sides and failures (pulse, direction, intensity)."""
     if scene.excitation.kind not in ("ricker", "sine"):
         raise InputError("is needed: the scene's excitation is no pulse", "--record")
     frequencies = np.geomspace(asked.frequencies[0], asked.frequencies[-1], PULSES)
-    nodes = [(sign * a, f) for sign in (1.0, -1.0) for f in frequencies for a in asked.amplitudes]
-    a, f = np.array(nodes).T
-    sides, _ = tiles.play(scene, a, f, model=asked.model, settings=asked.settings)
-    return (sides != SAFE).reshape(2 * PULSES, len(asked.amplitudes))
+    f, sign, a = np.meshgrid(frequencies, [1.0, -1.0], asked.amplitudes, indexing="ij")
+    sides, failed = tiles.play(scene, (sign * a).ravel(), f.ravel(), model=asked.model, settings=asked.settings)
+    return sides.reshape(a.shape), failed.reshape(a.shape)
 
 
-def _play_records(scene: Scene, asked: Asked, records: Sequence[Path], tiles: Tiles) -> NDArray[np.bool_]:
-    rows = []
+def _play_records(scene: Scene, asked: Asked, records: Sequence[Path], tiles: Tiles) -> Runs:
+    """Sides and failures (record, direction, intensity)."""
+    found = []
     for path in records:
         record = Record.from_file(path)
         peak = float(np.max(np.abs(record.samples)))
         if peak == 0.0:
             raise InputError(f"{path.name}: a record without motion has no intensity", "--record")
         scales = asked.amplitudes * scene.gravity * scene.block.half_width / scene.block.half_height / peak
-        moved = scene.replace(excitation=record)
-        for sign in (1.0, -1.0):
-            sides, _ = tiles.play(moved, sign * scales, np.ones(len(scales)), model=asked.model, settings=asked.settings)
-            rows.append(sides != SAFE)
-    return np.array(rows)
+        both = np.concatenate([scales, -scales])
+        played = tiles.play(scene.replace(excitation=record), both, np.ones(len(both)), model=asked.model, settings=asked.settings)
+        found.append([runs.reshape(2, len(scales)) for runs in played])
+    sides, failed = zip(*found, strict=True)
+    return np.array(sides), np.array(failed)
 
 
-def _case(label: str, overturned: NDArray[np.bool_], intensities: Floats) -> Case:
-    """The curve of one case from the outcomes, motion by intensity."""
-    random = np.random.default_rng(1)
-    drawn = random.integers(len(overturned), size=(BOOTSTRAPS, len(overturned)))
-    shares = [overturned[motions].mean(axis=0) for motions in drawn]
-    low, high = np.quantile(shares, [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2], axis=0)
-    fit = fit_lognormal(intensities, overturned.sum(axis=0), len(overturned))
+def case_of(label: str, overturned: NDArray[np.bool_], undecided: int, intensities: Floats) -> Case:
+    """The curve of one case from its runs (motion, direction, intensity).
+
+    The two directions of a motion are drawn together for the band, since they tell of the same motion.
+    """
+    motions, directions, _ = overturned.shape
+    drawn = np.random.default_rng(1).integers(motions, size=(BOOTSTRAPS, motions))
+    each = overturned.mean(axis=1)
+    low, high = np.quantile([each[chosen].mean(axis=0) for chosen in drawn], [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2], axis=0)
+    fit = fit_lognormal(intensities, overturned.sum(axis=(0, 1)), motions * directions)
     fitted = lognormal(intensities, *fit) if fit else np.full(len(intensities), np.nan)
-    columns = (intensities, overturned.mean(axis=0), low, high, fitted)
+    columns = (intensities, each.mean(axis=0), low, high, fitted)
     points = tuple((float(x), float(share), float(lo), float(hi), float(p)) for x, share, lo, hi, p in zip(*columns, strict=True))
     median, dispersion = fit or (None, None)
-    return Case(label=label, motions=len(overturned), median=median, dispersion=dispersion, points=points)
+    return Case(label=label, motions=motions, undecided=undecided, median=median, dispersion=dispersion, points=points)
 
 
 def lognormal(intensities: Floats, median: float, dispersion: float) -> Floats:

@@ -77,6 +77,12 @@ def run(
     """Overturning spectra: the paper's, or your own.
 
     What is finished is kept, and read back next time.
+
+    \b
+    --figure all                                    the paper's figures and claims
+    --figure all --agreement 200                    against the other models
+    --scene shelf.toml --amplitudes 1 6 --refine    your own block and pulse
+    --scene shelf.toml --fragility --record a.AT2 --record b.AT2
     """
     panels = _panels(figure, scene)
     asked = _asked(size, frequencies, amplitudes, pivot, model, tolerance, refine)
@@ -191,8 +197,8 @@ def _speed(spectra: Sequence[Spectrum], asked: Asked, tiles: Tiles, taken: float
         one = right_hand_side_seconds()
         each = cpu / tiles.played
         screen.print(
-            f"{tiles.played / taken:,.0f} trajectories/s on {tiles.jobs or os.cpu_count()} threads; one takes {1e6 * each:.1f} us of CPU,"
-            f" {each / one:,.0f} times one right-hand-side evaluation ({1e9 * one:.1f} ns)",
+            f"{tiles.played / taken:,.0f} trajectories/s on {tiles.jobs or os.cpu_count()} threads; {cpu:.1f} s of CPU,"
+            f" {1e6 * each:.1f} us a trajectory, {each / one:,.0f} times one right-hand-side evaluation ({1e9 * one:.1f} ns)",
             soft_wrap=True,
         )
 
