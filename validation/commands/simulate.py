@@ -13,7 +13,7 @@ from scenes import InputError, load_scene
 from scenes.errors import printable
 from scenes.progress import listening
 from validation.commands import answer, console, model_names, progress, scene_names
-from validation.models import FAMILIES, build, is_own
+from validation.models import FAMILIES, build, family, is_own
 from validation.store import name_of
 
 
@@ -34,7 +34,8 @@ def run(
     path = output or Path(f"{name_of(what.name, model)}.csv")
     if not path.parent.is_dir():
         raise InputError(f"{printable(path.parent)}: no such folder", "--output")
-    with progress(f"{what.name}, {model}") as tell, listening(lambda share: tell(share, 1.0)):
+    compiles = ", a first run compiles" if family(model).compiled else ""
+    with progress(f"{what.name}, {model}{compiles}") as tell, listening(lambda share: tell(share, 1.0)):
         history = player.simulate(what)
     try:
         history.save(path)
