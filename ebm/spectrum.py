@@ -185,7 +185,25 @@ def play_nodes(
     jobs: int | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
-    """The outcomes at nodes of a spectrum (1-D arrays of one length): sides (-1, 0, +1), and whether the run failed."""
+    """The outcomes at nodes of a spectrum (1-D arrays of one length): sides (-1, 0, +1), and whether the run failed.
+
+    A run that fails is made once more at a hundredth of the tolerance.
+    """
+    sides, failed = _batch_of(scene, amplitude_ratios, frequency_ratios, model, jobs, progress)
+    if failed.any():
+        finer = model.model_copy(update={"tolerance": max(1e-2 * model.tolerance, 1e-15)})
+        sides[failed], failed[failed] = _batch_of(scene, amplitude_ratios[failed], frequency_ratios[failed], finer, jobs, None)
+    return sides, failed
+
+
+def _batch_of(
+    scene: Scene,
+    amplitude_ratios: Floats,
+    frequency_ratios: Floats,
+    model: EventBasedModel,
+    jobs: int | None,
+    progress: Callable[[int], None] | None,
+) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
     from ebm import batch
 
     if scene.excitation.kind == "record":

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ebm import EventBasedModel, overturning_spectrum
+from ebm import EventBasedModel, batch, overturning_spectrum
 from ebm.spectrum import node_scene, play_nodes
+from ebm.trajectory import TOO_MANY_STEPS
 from scenes import Block, Floor, InputError, Record, Ricker, Scene, Wall
 
 DATA = Path(__file__).parents[1] / "data" / "ebm_ricker_cases.csv"
@@ -103,6 +104,26 @@ def test_a_node_is_what_the_model_simulates():
     outcomes = [EventBasedModel().simulate(node_scene(scene(wall), *node, settle=20.0)).outcome for node in zip(a, f, strict=True)]
     assert [{"overturned left": -1, "overturned right": 1}.get(outcome, 0) for outcome in outcomes] == sides.tolist()
     assert len(set(sides.tolist())) > 1
+
+
+def test_a_run_that_fails_is_made_again_at_a_finer_tolerance(monkeypatch):
+    a, f, model = np.array([2.0, 4.0, 6.0]), np.array([1.0, 2.0, 2.0]), EventBasedModel(tolerance=1e-8)
+    whole, _ = play_nodes(scene(), a, f, model=model)
+    run, tolerances = batch.run_batch, []
+
+    def failing(packed, model, **rest):
+        found = run(packed, model, **rest)
+        tolerances.append((len(packed), model.tolerance))
+        if len(tolerances) == 1:
+            found.ending[1], found.side[1] = TOO_MANY_STEPS, 0
+        return found
+
+    monkeypatch.setattr(batch, "run_batch", failing)
+    sides, failed = play_nodes(scene(), a, f, model=model)
+    assert tolerances == [(3, 1e-8), (1, 1e-10)]
+    assert not failed.any()
+    np.testing.assert_array_equal(sides, whole)
+    assert whole[1] != 0
 
 
 def test_a_record_is_scaled_and_the_block_resized():
