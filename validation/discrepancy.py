@@ -24,7 +24,8 @@ class Discrepancy:
     """The figures of one comparison.
 
     `start` and `end` (s) bound the time that was compared. `gap` says which part of the asked time could not be
-    compared, empty where all was; a comparison with a gap never passes a tolerance.
+    compared, empty where all was; a comparison with a gap never passes a tolerance. `fall` says that one block's fall is
+    why: then the two models answer differently, which a difference in form may do.
     """
 
     reference: str
@@ -33,6 +34,7 @@ class Discrepancy:
     start: float
     end: float
     gap: str = ""
+    fall: bool = False
     #: The reference's history and the candidate's.
     histories: tuple[History, History] | None = field(default=None, repr=False, compare=False)
 
@@ -109,7 +111,8 @@ def compare(
         evaluate(measure, pair, "rad" if pair.alpha is None else "alpha", against=reference.model, window=window, until=until)
         for measure in chosen
     )
-    return Discrepancy(reference.model, candidate.model, figures, pair.start, pair.end, _gap(pair, until), histories=(reference, candidate))
+    gap, fall = _gap(pair, until)
+    return Discrepancy(reference.model, candidate.model, figures, pair.start, pair.end, gap, fall, histories=(reference, candidate))
 
 
 def describe(
@@ -152,20 +155,24 @@ def too_short(history: History, until: float | None) -> str:
     return f"{history.model} ends at {end:g} s, before {until:g} s"
 
 
-def _gap(pair: Pair, until: float | None) -> str:
-    """What part of the asked time is missing from the comparison; nothing is where both fell to the same side."""
+def _gap(pair: Pair, until: float | None) -> tuple[str, bool]:
+    """What part of the asked time is missing from the comparison, and whether because one block fell.
+
+    Nothing is missing where both fell to the same side.
+    """
     starts, ends = ([float(h.channels["t"][k]) for h in (pair.reference, pair.candidate)] for k in (0, -1))
     step = 1.5 * float(max(_step(pair.reference), _step(pair.candidate)))
     if max(starts) - min(starts) > step:
         late = pair.reference if starts[0] > starts[1] else pair.candidate
-        return f"{late.model} starts only at {max(starts):g} s"
+        return f"{late.model} starts only at {max(starts):g} s", False
     if pair.reference.outcome == pair.candidate.outcome and pair.reference.outcome in TURNS:
-        return ""
+        return "", False
     asked = max(ends) if until is None else until
     if asked - min(ends) > step:
         short = pair.reference if ends[0] < ends[1] else pair.candidate
-        return f"{short.model} ends at {min(ends):g} s, before {asked:g} s"
-    return ""
+        fall = short.outcome in TURNS
+        return f"{short.model} {'falls' if fall else 'ends'} at {min(ends):g} s, before {asked:g} s", fall
+    return "", False
 
 
 def _step(history: History) -> float:

@@ -254,7 +254,7 @@ def _cell(
     asked = suite.asked(scene.name, label)
     own = suite.part_of(scene.name)
     figures: list[Figure] = []
-    gaps: dict[tuple[str, str], str] = {}
+    gaps: dict[tuple[str, str], tuple[str, bool]] = {}
     for name in dict.fromkeys([OWN_FIGURES, own.reference, own.model_form, *(place.against for place in asked)]):
         reference = spots.get((scene.name, name))
         if name != OWN_FIGURES and (reference is None or reference is spot or reference not in records):
@@ -263,11 +263,12 @@ def _cell(
         horizon = _horizon(store, scene) if any(what.window == HORIZON for what in extra) else None
         found = _compared(store, scene, spot, reference, extra, horizon)
         figures += [Figure(**figure) for figure in found["figures"]]
-        gaps |= {(name, window): gap for window, gap in found["gaps"].items()}
+        gaps |= {(name, window): (text, fall) for window, (text, fall) in found["gaps"].items()}
     checks = []
     for place, kind in asked.items():
         figure = _figure(figures, place)
-        gap = gaps.get((place.against, place.what.window), "")
+        text, fall = gaps.get((place.against, place.what.window), ("", False))
+        gap = "" if fall and kind == "model form" else text
         checks.append(judge(figure, own.tolerances.get(place), kind=kind, measure=place.what.definition, gap=gap))
     return Cell(
         **about,
@@ -313,7 +314,8 @@ def _compared(
 ) -> dict[str, Any]:
     """All figures over the whole time, and those asked for over a window; kept in the store.
 
-    Figures of the cell itself where `reference` is None. "gaps" says by window what could not be compared.
+    Figures of the cell itself where `reference` is None. "gaps" says by window what could not be compared,
+    and whether because one block fell.
     """
     code = provenance.code_digest("validation.discrepancy")
     key = provenance.digest(json.dumps([spot.key, reference.key if reference else "", list(map(str, windowed)), horizon, code]))
@@ -331,16 +333,17 @@ def _compute(
     candidate = History.load(store.history(spot.name))
     yardstick = History.load(store.history(reference.name)) if reference else None
     figures: list[Figure] = []
-    gaps: dict[str, str] = {}
+    gaps: dict[str, tuple[str, bool]] = {}
     asked: dict[str, list[str]] = {"": [m.name for m in (DIFFERENCES if reference else FIGURES).values() if not m.on_request]}
     for what in windowed:
         asked.setdefault(what.window, []).append(what.measure)
     for window, measures in asked.items():
         until = horizon if window == HORIZON else float(window[:-1]) if window else None
         if yardstick is None:
-            found, gaps[window] = describe(candidate, until=until, scene=scene, measures=measures), too_short(candidate, until)
+            found = describe(candidate, until=until, scene=scene, measures=measures)
+            gaps[window] = too_short(candidate, until), False
         else:
             discrepancy = compare(yardstick, candidate, until=until, scene=scene, measures=measures)
-            found, gaps[window] = discrepancy.figures, discrepancy.gap
+            found, gaps[window] = discrepancy.figures, (discrepancy.gap, discrepancy.fall)
         figures += [figure.model_copy(update={"window": window}) for figure in found]
     return {"figures": [figure.model_dump(mode="json") for figure in figures], "gaps": gaps}

@@ -103,6 +103,11 @@ def test_what_was_not_compared_is_a_gap(made):
     assert compare(short, whole).gap == "short ends at 5 s, before 10 s"
     assert compare(whole, short, until=5.0).gap == ""
     assert compare(whole, short, until=8.0).gap == "short ends at 5 s, before 8 s"
+    assert not compare(whole, short).fall
+    fallen = made(WAVE[:2001], T[:2001], model="fallen", outcome="overturned left")
+    assert compare(whole, fallen).gap == "fallen falls at 5 s, before 10 s"
+    assert compare(whole, fallen).fall
+    assert compare(whole, fallen, until=4.0).gap == ""
     assert "starts only" in compare(whole, made(WAVE[2000:], T[2000:])).gap
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -118,6 +119,37 @@ def test_a_failed_reference_fails_what_needs_it(tmp_path, run):
     cell = run(path).cell("short", "a")
     assert cell.verdict == "fail"
     assert cell.checks[0].reason == "still failed in this scene"
+
+
+FORM = """
+reference = "ebm-unilateral"
+[models.ebm-unilateral]
+[models.ebm]
+[[scene]]
+name = "hit"
+duration = 5.0
+block = { half_width = 0.397, half_height = 1.555 }
+floor = { friction = 0.6 }
+walls = [{ side = "left", gap = 0.053, restitution = 1.0 }]
+excitation = { kind = "ricker", amplitude = 9.0, period = 0.5 }
+[tolerances.hit.ebm.ebm-unilateral]
+outcome_agrees = { expected = 0.0, limit = 1.0, drift = 0.0, why = "without flight it falls" }
+"theta_rms@5s" = { expected = 2.0, limit = 2.1, drift = 1.0, why = "without flight it falls" }
+"""
+
+
+def test_models_of_different_form_may_fall_apart_where_that_is_accepted(tmp_path, run):
+    path = tmp_path / "mine.toml"
+    path.write_text(FORM, encoding="utf-8")
+    done = run(path)
+    assert [cell.outcome for cell in done.cells] == ["at rest", "overturned right"]
+    assert [(check.kind, check.verdict) for _, check in done.checks()] == [("model form", "pass")] * 2
+    shutil.copy(Path(__file__).parent / "models" / "faulty.py", tmp_path / "faulty.py")
+    falling = re.sub(r"walls = .*", "initial_rotation = -0.3", FORM)
+    path.write_text(falling.replace("[models.ebm]", '[models.ebm]\nmodel = "faulty:Still"'), encoding="utf-8")
+    done = run(path)
+    assert [cell.outcome for cell in done.cells] == ["overturned right", "at rest"]
+    assert [(check.kind, check.verdict) for _, check in done.checks()] == [("numerical", "fail")] * 2
 
 
 def test_missing_tolerance_missing_cell_and_nothing_judged_do_not_pass(tmp_path, run):
