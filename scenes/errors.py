@@ -47,7 +47,7 @@ def printable(value: object, limit: int = 80) -> str:
 def from_validation(error: ValidationError, keys: Iterable[str] = ()) -> InputError:
     """The first fault that pydantic found, as one line: key, value, what is allowed. `keys` are those that could be given."""
     fault = error.errors(include_url=False)[0]
-    path = [str(part) for part in fault["loc"]]
+    path = [printable(part) for part in fault["loc"]]
     if path[:1] in (["excitation"], ["vertical"]):
         del path[1:2]  # the excitation's kind, which pydantic adds
     inner = fault.get("ctx", {}).get("error")

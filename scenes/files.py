@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -51,10 +52,24 @@ def _record_path(name: str, folder: Path) -> Path:
     return shipped if not beside.exists() and Path(name).name == name and shipped.exists() else beside
 
 
+#: Largest TOML file, and a key of so many parts that the parser's memory, which goes with their square, would be at stake.
+MOST_BYTES = 10_000_000
+_DEEP_KEY = re.compile(r"(?:[^\s.,=\[\]]+\s*\.\s*){50}")
+
+
 def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a TOML file, or an `InputError` that names file and line."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        if path.exists() and not path.is_file():
+            raise InputError(f"{printable(path)}: not a file")
+        if path.stat().st_size > MOST_BYTES:
+            raise InputError(f"{printable(path)}: larger than {MOST_BYTES} bytes")
+        text = path.read_text(encoding="utf-8")
+        if _DEEP_KEY.search(text):
+            raise InputError(f"{printable(path)}: a key of more than 50 parts")
+        return tomllib.loads(text)
+    except InputError:
+        raise
     except UnicodeDecodeError:
         raise InputError(f"{printable(path)}: not a text file") from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:

@@ -29,16 +29,16 @@ def read_record(path: Path) -> tuple[NDArray[np.float64], float]:
     Raises `InputError`, naming the file and the line, when the file is missing, has another format, a wrong count,
     no stated units, a time step that is not positive or not uniform, or a value that is not finite.
     """
-    text = _read_text(path)
-    if path.suffix.lower() == ".at2":
-        return _read_at2(path, text)
-    if path.suffix.lower() == ".csv":
-        return _read_csv(path, text)
-    raise InputError(f"{printable(path)}: not a record file; a .AT2 or .csv file is asked for")
+    readers = {".at2": _read_at2, ".csv": _read_csv}
+    if path.suffix.lower() not in readers:
+        raise InputError(f"{printable(path)}: not a record file; a .AT2 or .csv file is asked for")
+    return readers[path.suffix.lower()](path, _read_text(path))
 
 
 def _read_text(path: Path) -> str:
     try:
+        if path.exists() and not path.is_file():  # such as a device, which has no end
+            raise InputError(f"{printable(path)}: cannot be read: not a file")
         if path.stat().st_size > MOST_BYTES:
             raise InputError(f"{printable(path)}: larger than {MOST_BYTES} bytes")
         return path.read_text(encoding="utf-8", errors="strict")

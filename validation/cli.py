@@ -90,6 +90,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         sys.stderr.close()  # the reader of a pipe has gone: nobody is left to be told
         return 141
+    except OSError as error:  # a disk that is full, a folder that has gone: what was written before is whole
+        return _told(f"{printable(error.filename or 'output')}: cannot be used: {error.strerror or error}", 2)
+    except MemoryError:
+        return _told("out of memory; what was finished is kept", 3)
     return code if isinstance(code, int) else 0
 
 

@@ -15,10 +15,10 @@ import json
 import os
 import tempfile
 from collections.abc import Iterator
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any, Literal
 
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field, ValidationError, field_validator
 
 from scenes import InputError, Scene
 from scenes.base import Frozen
@@ -129,6 +129,13 @@ class Cell(Stored):
     cost: CostRecord = CostRecord()
     figures: tuple[Figure, ...] = ()
     checks: tuple[Check, ...] = ()
+
+    @field_validator("history")
+    @classmethod
+    def _inside(cls, history: str | None) -> str | None:
+        if history is not None and (PurePath(history).is_absolute() or ".." in PurePath(history).parts or not history.isprintable()):
+            raise InputError(f"{printable(history)} is not allowed: a path within the run's folder is asked for")
+        return history
 
     @property
     def verdict(self) -> Verdict:
