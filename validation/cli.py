@@ -40,9 +40,12 @@ COMMANDS = {
     spectrum: "rockcheck spectrum --figure 8 --size 50 --refine",
     benchmark: "rockcheck benchmark --quick",
     convergence: "rockcheck convergence --quick",
-    stress: "rockcheck stress",
+    stress: "rockcheck stress --quick",
     report: "rockcheck report rockcheck-report",
 }
+
+#: Exit code of a run that Ctrl-C ended.
+INTERRUPTED = 130
 
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Nothing but errors; the exit code tells.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="The result as JSON on stdout, instead of tables.")]
@@ -86,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ModelFailure as error:
         return _told(str(error), 3)
     except (KeyboardInterrupt, typer.Abort):
-        return _told("interrupted; what was finished is kept", 130)
+        return _told("interrupted; what was finished is kept", INTERRUPTED)
     except BrokenPipeError:
         sys.stderr.close()  # the reader of a pipe has gone: nobody is left to be told
         return 141
@@ -94,6 +97,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _told(f"{printable(error.filename or 'output')}: cannot be used: {error.strerror or error}", 2)
     except MemoryError:
         return _told("out of memory; what was finished is kept", 3)
+    if code == INTERRUPTED:  # Typer has caught it
+        return _told("interrupted; what was finished is kept", INTERRUPTED)
     return code if isinstance(code, int) else 0
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -15,17 +14,6 @@ from playwright import sync_api as playwright
 
 pytestmark = pytest.mark.browser
 
-CHROMIUM = Path("/usr/bin/chromium")
-ARGUMENTS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 PAGES = ("index.html", "pages/free.html", "pages/beside-a-wall.html", "pages/Free-2.html")
 WALL = "pages/beside-a-wall.html"
 
@@ -43,17 +31,6 @@ class Visit:
         """Go to a page of the site."""
         self.page.goto((self.site / address).as_uri())
         return self.page
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[playwright.Browser]:
-    if not CHROMIUM.exists():
-        missing = f"{CHROMIUM} is not installed"
-        pytest.fail(missing) if os.environ.get("CI") else pytest.skip(missing)
-    with playwright.sync_playwright() as driver:
-        running = driver.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS)
-        yield running
-        running.close()
 
 
 def visit_of(browser: playwright.Browser, site: Path, **settings: object) -> Visit:

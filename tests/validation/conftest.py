@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -46,3 +49,12 @@ def synthetic(
 def made() -> Callable[..., History]:
     """`synthetic`, for tests."""
     return synthetic
+
+
+@pytest.fixture
+def in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The working folder is an empty one, but for the models of `faulty.py`, imported afresh."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(Path(__file__).parent / "models" / "faulty.py", tmp_path / "faulty.py")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "faulty", raising=False)

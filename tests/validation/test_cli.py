@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import shutil
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,22 +10,8 @@ import pytest
 from scenes import History
 from validation.cli import main
 
-COMMANDS = ("scenes", "simulate", "compare", "validate", "accept", "spectrum", "benchmark", "stress", "report")
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 SCENE = "duration = 0.2\nblock = { half_width = 0.4, half_height = 1.5 }\nfloor = { friction = 0.5 }\n"
-
-
-@pytest.fixture(autouse=True)
-def in_an_empty_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    shutil.copy(Path(__file__).parent / "models" / "faulty.py", tmp_path / "faulty.py")
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "faulty", raising=False)
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_help(command, capsys):
-    assert main([command, "--help"]) == 0
-    assert "Usage: rockcheck" in capsys.readouterr().out
 
 
 def write(name, text):

@@ -6,7 +6,6 @@ import json
 import os
 import pty
 import re
-import shutil
 import subprocess
 import sys
 import tomllib
@@ -18,6 +17,7 @@ from scenes import Block, Floor, InputError, Scene, Wall, load_scene
 from scenes.progress import listening, tell
 from validation.cli import COMMANDS, app, main
 
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 NAMES = [module.__name__.rpartition(".")[2] for module in COMMANDS]
 SUITE = """
 reference = "still"
@@ -29,14 +29,6 @@ duration = 0.2
 block = { half_width = 0.4, half_height = 1.5 }
 floor = { friction = 0.5 }
 """
-
-
-@pytest.fixture(autouse=True)
-def in_an_empty_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    shutil.copy(Path(__file__).parent / "models" / "faulty.py", tmp_path / "faulty.py")
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "faulty", raising=False)
 
 
 def rockcheck(*words, **environment):

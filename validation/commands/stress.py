@@ -28,9 +28,9 @@ def run(
     model: Annotated[list[str] | None, typer.Option("--model", help="Only this model; repeatable.")] = None,
     jobs: JobsOption = None,
 ) -> None:
-    """Numerical stability: random scenes over all that can be written, held against invariants; where engines break.
+    """Numerical stability: where the models break.
 
-    Writes a page, the tables as CSV, a summary in Markdown, and of failures the smallest scene files that show them.
+    Random scenes over all that can be written, held against invariants, and the steps at which engines break. Writes a page, the tables as CSV, a summary in Markdown, and of failures the smallest scene files that show them.
     Exit 1 where an event-based model breaks an invariant.
     """
     from validation.stress import study
