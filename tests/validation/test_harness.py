@@ -104,7 +104,7 @@ CHANGES = [
     ("an engine's module", "engines/pybullet_engine.py", r"\Z", "\nUNUSED = 1\n", 20),
     ("a remark", "engines/pybullet_engine.py", r"\Z", "\n# unused\n", 25),
     ("an engine's setting", "validation/data/suites/smoke.toml", r"(\[models\.mujoco\]\ntime_step = )2e-4", r"\g<1>1.9e-4", 20),
-    ("the continuous model's", "cm/restitution.py", r"\Z", "\nUNUSED = 1\n", 20),
+    ("the continuous model's", "cm/contact.py", r"\Z", "\nUNUSED = 1\n", 20),
     ("a measure", "validation/measures.py", r"\Z", "\nUNUSED = 1\n", 25),
     ("a page", "reports/site.py", r"\Z", "\nUNUSED = 1\n", 25),
 ]
