@@ -31,7 +31,8 @@ def run(
     """Numerical stability: where the models break.
 
     Random scenes over all that can be written, held against invariants, and the steps at which engines break. Writes a page, the
-    tables as CSV, a summary in Markdown, and of failures the smallest scene files that show them. Exit 1 where an event-based model breaks an invariant.
+    tables as CSV, a summary in Markdown, and of failures the smallest scene files that show them.
+    Exit 1 where an event-based model breaks an invariant.
     """
     from validation.stress import study
     from validation.stress.players import PLAYERS
