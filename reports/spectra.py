@@ -115,11 +115,12 @@ def maps_figure(found: Agreement, panels: Sequence[Panel]) -> Figure:
         grid = figure.subplots(len(found.maps), len(panels), sharex=True, sharey=True, squeeze=False)
         for axes, panel in zip(grid[0], panels, strict=True):
             axes.set_title(panel.title.replace(", ", "\n"), fontsize=6.5)
+            axes.locator_params(integer=True)
         for row, one in zip(grid, found.maps, strict=True):
             for axes, spectrum in zip(row, map_spectra(found, one, panels), strict=True):
                 draw(spectrum, axes)
                 axes.set(xlabel="", ylabel="")
-            row[0].set_ylabel(LOOKS[one.model].label)
+            row[0].set_ylabel(LOOKS[one.model].label.replace(", ", ",\n"))
         horizontal, vertical = axis_labels(panels[0].scene)
         figure.supxlabel(horizontal, fontsize=7.5)
         figure.supylabel(vertical, fontsize=7.5)

@@ -318,7 +318,7 @@ def _restitution_rules(paper: Paper) -> Claim:
     return _judged(
         "only restitution matters",
         "At μ = 0.6 only the coefficient of restitution matters.",
-        "The gap matters less than e on {held} of {all} sides.",
+        "e changes the area more than the gap does on {held} of {all} sides.",
         "largest change of the safe area with the gap (at one e) against the largest with e (at one gap)",
         (7, 9),
         rows,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 from matplotlib.colors import to_rgba
@@ -11,7 +12,9 @@ from ebm import Spectrum
 from ebm.spectrum import COLOURS, draw
 from reports.spectra import paper_figure, write_page
 from reports.style import save
-from validation.spectra import SPECTRA, Asked, paper_panels
+from validation.agreement import Agreement
+from validation.refinement import Refined, Refinement
+from validation.spectra import KEPT, SPECTRA, Asked, paper_panels
 from validation.spectra import save as save_spectra
 
 SIZE = 12
@@ -60,6 +63,34 @@ def test_the_page_shows_what_the_folder_holds(tmp_path):
     save(paper_figure(panels, spectra), folder / "figure-7")
     text = write_page(tmp_path).read_text(encoding="utf-8")
     assert "Fig. 7" in text
-    assert "Fig. 8" not in text
+    assert "Fig. 8: " not in text
+    # The long studies came with the package, and the page says so.
+    assert text.count("came with the package") == 2
+    assert "84.6 %" in text
+    assert (folder / "models.svg").exists()
     for link in re.findall(r'(?:href|src)="([^"#:]+)"', text):
         assert (tmp_path / link).exists(), link
+
+
+def test_studies_of_the_folder_come_first(tmp_path):
+    folder = tmp_path / SPECTRA
+    folder.mkdir()
+    one = Refined(spectrum="mine", nodes=100, runs=7, wrong=3, areas=2, dimension=1.0)
+    study = Refinement(date="2031-01-02", versions={"rockcheck": "0"}, grid="10 x 10", model="ebm", settings={}, spectra=(one,))
+    (folder / "refinement.json").write_text(study.model_dump_json(), encoding="utf-8")
+    text = write_page(tmp_path).read_text(encoding="utf-8")
+    assert "Computed on 2031-01-02" in text
+    assert "14.3 times fewer" in text
+    assert "came with the package" not in text  # nor is agreement shown: there is none of the paper's figures
+
+
+def test_the_documentation_shows_the_kept_studies():
+    page = (Path(__file__).parents[2] / "docs" / "spectra.md").read_text(encoding="utf-8")
+    shown = {tuple(cell.strip() for cell in line.strip("|").split("|")) for line in page.splitlines() if line.startswith("|")}
+    agreement = Agreement.model_validate_json((KEPT / "agreement.json").read_text(encoding="utf-8"))
+    refinement = Refinement.model_validate_json((KEPT / "refinement.json").read_text(encoding="utf-8"))
+    assert {row[1:] for row in agreement.rows if row[0] == "all"} <= shown
+    assert set(refinement.rows) <= shown
+    assert len(refinement.spectra) == len({share.spectrum for share in agreement.shares}) == 28
+    assert refinement.runs < refinement.nodes / 8
+    assert all(share.nodes == 100 for share in agreement.shares)
