@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Callable, Sequence
+from importlib.metadata import version
 from typing import Annotated, Any
 
 import typer
@@ -52,7 +53,6 @@ JsonOption = Annotated[bool, typer.Option("--json", help="The result as JSON on 
 
 app = typer.Typer(
     name="rockcheck",
-    help="Simulate a rigid block on a shaking floor with several models, compare them, and judge them against tolerances.",
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
@@ -74,6 +74,19 @@ def spoken(run: Callable[..., None]) -> Callable[..., None]:
     command.__signature__ = signature.replace(parameters=[*signature.parameters.values(), *common])  # type: ignore[attr-defined]
     command.__annotations__ = {parameter.name: parameter.annotation for parameter in (*signature.parameters.values(), *common)}
     return command
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        print(f"rockcheck {version('rockcheck')}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    _: Annotated[bool, typer.Option("--version", is_eager=True, callback=_version, help="Show the version and exit.")] = False,
+) -> None:
+    """Simulate a rigid block on a shaking floor with several models, compare them, and judge them against tolerances."""
 
 
 for module, example in COMMANDS.items():

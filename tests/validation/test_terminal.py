@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -138,6 +139,7 @@ def test_json_is_all_that_is_on_stdout(capsys):
     found = result("compare", "b.csv", "a.csv")
     rms = next(figure for figure in found["figures"] if figure["measure"] == "theta_rms")
     assert rms["value"] == pytest.approx(0.001 / load_scene("mine.toml").block.alpha)
+    assert result("spectrum", "--scene", "mine.toml", "--size", "3")["report"] == "rockcheck-report/spectra.html"
     Path("suite.toml").write_text(SUITE)
     run = result("validate", "suite.toml", "--no-report", "--jobs", "1", code=1)
     assert run["verdict"] == "fail"
@@ -202,6 +204,11 @@ def test_completion(line, offered):
     assert set(done.stdout.split()) == offered
 
 
+def test_version(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"rockcheck {version('rockcheck')}\n"
+
+
 def test_completion_can_be_installed(capsys):
     assert main(["--help"]) == 0
     assert "--install-completion" in capsys.readouterr().out
@@ -225,3 +232,8 @@ def test_nearest_names_in_scene_files(tables, said):
     with pytest.raises(InputError) as caught:
         Scene(**given)
     assert said in str(caught.value)
+
+
+def test_nearest_names_of_settings(capsys):
+    assert main(["simulate", "fig4a", "--model", "mujoco", "--set", "time_stp=1e-3"]) == 2
+    assert "mujoco.time_stp: unknown key; did you mean 'time_step'?" in capsys.readouterr().err
