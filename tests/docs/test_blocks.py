@@ -61,7 +61,7 @@ def commands_of(text: str) -> list[str]:
 def is_long(command: str) -> bool:
     """Whether a command takes minutes: a study, or a named suite; a page's own suites and scenes are short."""
     words = shlex.split(command)
-    return words[0] == "rockcheck" and words[1] in LONG and not any(word.endswith(".toml") or word == "smoke" for word in words)
+    return words[0] == "rockcheck" and words[1] in LONG and not any(word.endswith(".toml") for word in words)
 
 
 def run_python(block: Block, page: Path, names: dict[str, object]) -> None:
