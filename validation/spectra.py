@@ -289,16 +289,18 @@ def play_tile(
 
 
 def _side(player: Model, scene: Scene, amplitude: float, frequency: float) -> int:
-    """The outcome at one node. A block that has too little energy left to tip over when the base comes to rest is safe.
+    """The outcome at one node.
 
-    Where it has enough, the run is made again and goes on for `SETTLE` s; what then stands is safe.
+    A block that has not tipped past its balance when the base comes to rest, and has too little energy left to do so, is safe.
+    Any other run is made again and goes on for `SETTLE` s; what then stands is safe.
     """
     for settle in (0.0, SETTLE):
         node = node_scene(scene, amplitude, frequency, settle).replace(output_step=0.02)  # few rows: only the outcome is asked
         history = player.simulate(node)
-        y, *rates = (history.channels[name][-1] for name in ("y", "x_dot", "y_dot", "theta_dot"))
+        theta, y, *rates = (history.channels[name][-1] for name in ("theta", "y", "x_dot", "y_dot", "theta_dot"))
         needed = node.gravity * (node.block.radius - node.block.half_height)
-        if history.outcome.startswith("overturned") or kinematics.energy(node.block, node.gravity, y, *rates) < ENOUGH * needed:
+        weak = kinematics.energy(node.block, node.gravity, y, *rates) < ENOUGH * needed
+        if history.outcome.startswith("overturned") or (weak and abs(theta) < node.block.alpha):
             break
     return side_of(history.outcome)
 

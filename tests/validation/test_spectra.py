@@ -11,11 +11,14 @@ import sys
 import threading
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from cm import ContinuousModel
 from ebm import Spectrum
+from ebm.spectrum import node_scene
 from scenes import InputError, Ricker
 from validation import agreement, claims, fragility, refinement, spectra
 from validation.cli import main
@@ -109,6 +112,18 @@ def test_another_model_plays_in_processes(tmp_path):
         sides, failed = tiles.play(panel.scene, a, f, model="cm", settings={"penetration": 1e-6})
     assert sides.tolist() == [0, -1, -1]
     assert not failed.any()
+
+
+def test_a_block_past_its_balance_is_not_safe_for_want_of_energy(tmp_path):
+    """Fig. 6, 103 mm, e = 0: it overturns 0.2 s after the pulse and has lost much of its energy by sliding."""
+    panel = next(p for p in paper_panels(6) if p.name == "figure-6-gap-103-e-0")
+    a, f = np.array([1.0 + 19 * 11.0 / 99.0]), np.array([0.5 + 32 * 7.5 / 99.0])
+    ended = ContinuousModel().simulate(node_scene(panel.scene, a[0], f[0], settle=0.0))
+    assert ended.outcome == "moving"
+    assert abs(ended.channels["theta"][-1]) > panel.scene.block.alpha
+    with Tiles(tmp_path, jobs=1) as tiles:
+        sides, _ = tiles.play(panel.scene, a, f, model="cm", settings={})
+    assert sides.tolist() == [1]
 
 
 @pytest.mark.slow
@@ -339,6 +354,17 @@ def test_sides_that_the_pulse_turns_round():
     claim = judged(spectra_made)["likelier side"]
     assert claim.verdict == "does not hold"
     assert "not all sentences can hold" in claim.finding
+
+
+@pytest.mark.slow
+def test_the_documentation_says_what_is_found(tmp_path):
+    asked = small(100, refine=True)
+    panels = [panel for figure in spectra.FIGURES for panel in paper_panels(figure)]
+    tiles = Tiles(tmp_path)
+    found = claims.check_claims(play_panels(panels, asked, tiles), claims.look_closer(tiles, asked))
+    page = (Path(__file__).parents[2] / "docs" / "spectra.md").read_text(encoding="utf-8").split("## What the paper says")[1]
+    rows = [line.split("|")[2].strip() for line in page.split("\n## ")[0].splitlines() if line.startswith("| ")]
+    assert rows == ["verdict", *(claim.verdict for claim in found)]
 
 
 # Agreement
