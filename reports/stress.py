@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from reports.site import Site
 from reports.style import LOOKS, PAGE, figure_style, looks, save
-from validation.stress.invariants import INVARIANTS
+from validation.stress.invariants import EXCEPTIONS, INVARIANTS
 from validation.stress.players import PLAYERS
 from validation.stress.stability import AXIS_WORDS, STEPS, Stability
 from validation.stress.study import Stress
@@ -34,6 +34,7 @@ def write_stress(found: Stress, folder: Path) -> Path:
         maps=MAPS,
         looks=looks(LOOKS),
         invariants=INVARIANTS,
+        exceptions=EXCEPTIONS,
         players=PLAYERS,
         finite=math.isfinite,
     )

@@ -61,6 +61,7 @@ def run(
 
 def show(found: Stress, out: Console) -> None:
     """For each model runs, failures by invariant and the worst figures; then the failures with their files."""
+    from validation.stress.invariants import EXCEPTIONS
     from validation.stress.study import summary_rows
 
     if found.stability is not None:
@@ -84,6 +85,9 @@ def show(found: Stress, out: Console) -> None:
     for label, batch in found.batches.items():
         if batch.gaining:
             out.print(f"{label}: an impact adds energy in {batch.gaining} runs, at most {100.0 * batch.largest_gain:.2g} %, by its law")
+    for label, batch in found.batches.items():
+        for name, count in batch.exceptions.items():
+            out.print(f"{label}: {count} runs excepted, {name}: {EXCEPTIONS[name]}", soft_wrap=True)
     runs = sum(batch.runs for batch in found.batches.values())
     broken = len(found.broken)
     verdict = "no failure of an event-based model" if not broken else f"{broken} failures of event-based models"

@@ -32,7 +32,8 @@ def random_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
     gravity = 9.81 if r.random() < 0.8 else _log(r, 1.0, 30.0)
     block = Block(half_width=radius * math.sin(alpha), half_height=radius * math.cos(alpha))
     unit = math.sqrt(radius / gravity)
-    mu = _edge(r, 0.05, (0.0, FRICTION[1], math.tan(min(alpha, 0.9)))) or float(r.uniform(*FRICTION))
+    edge = _edge(r, 0.05, (0.0, FRICTION[1], math.tan(min(alpha, 0.9))))
+    mu = float(r.uniform(*FRICTION)) if edge is None else edge
     mu_s = min(mu * float(r.uniform(1.0, 1.5)), FRICTION[1]) if r.random() < 0.3 else mu
     bounce = 0.0 if r.random() < 0.5 else float(r.uniform(0.0, 0.999))
     walls = _walls(r, radius)

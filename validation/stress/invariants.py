@@ -63,6 +63,12 @@ RESOLVED = 1e-8
 ON_FLOOR = ("rest", "slide", "rock", "slide-rock", "lean", "ladder")
 STANDS = ("rest", "rock", "lean")
 
+#: What the paper's model cannot keep, by name: such runs are counted, not hidden.
+EXCEPTIONS = {
+    "hangs": "the floor falls away faster than g under a pivot that cannot let go: the block hangs, and which corner it hangs on is a tie, "
+    "which the mirror image cannot break the other way",
+}
+
 EVEN = ("t", "y", "y_dot", "mode")
 ODD = ("x", "theta", "x_dot", "theta_dot", "slip", "slip_rate")
 SWAPPED = {"overturned left": "overturned right", "overturned right": "overturned left"}
@@ -79,8 +85,10 @@ class Played:
     #: Impacts that added energy where the impact law is known to (see `rules`), and the most that one added.
     gains: int = 0
     largest_gain: float = 0.0
-    #: Whether the horizon of predictability had to be found, and whether it ended the comparison.
+    #: Whether the horizon of predictability had to be found.
     horizons: int = 0
+    #: Name of an exception of the model by which an invariant is not asked of this run, see EXCEPTIONS.
+    exception: str = ""
 
     @property
     def broken(self) -> list[str]:
@@ -109,9 +117,12 @@ def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: boo
     gains = history.cost.energy_gains
     if model.pivot == "unilateral":
         figures["impacts"] = history.cost.largest_energy_gain if capped and gains else 0.0
-    horizon = _Horizon(model, played, seed)
+    horizon, exception = _Horizon(model, played, seed), ""
     if only in ("", "mirror"):
-        figures["mirror"] = _mirror(model, played, history)
+        differ = _mirror(model, played, history)
+        exception = "hangs" if differ and _hangs(model, played) else ""
+        if not exception:
+            figures["mirror"] = differ
     if only in ("", "similarity"):
         figures["similarity"] = horizon.apart(history, similar(played, seed))
     if only in ("", "tolerance"):
@@ -124,6 +135,7 @@ def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: boo
         largest_gain=history.cost.largest_energy_gain,
         horizons=horizon.found,
         failure=horizon.failure,
+        exception=exception,
     )
 
 
@@ -385,6 +397,12 @@ def _mirror(model: EventBasedModel, scene: Scene, history: History) -> float:
             b.t, b.kind, b.mode_before, b.mode_after, b.impulse
         )  # fmt: skip
     return float(differ + (image.outcome != SWAPPED.get(history.outcome, history.outcome)))
+
+
+def _hangs(model: EventBasedModel, scene: Scene) -> bool:
+    """Whether gravity is felt upward at some time, in a model whose pivot holds the block down."""
+    samples = scene.vertical.samples if isinstance(scene.vertical, Record) else scene.vertical.acceleration(scene.output_times)
+    return model.pivot == "bilateral" and float(np.min(samples, initial=0.0)) < -scene.gravity
 
 
 def similar(scene: Scene, seed: int) -> Scene:

@@ -26,8 +26,9 @@ from validation.workers import ONE_THREAD, death, prepare
 
 Progress = Callable[[int, int, str], None]
 What = Literal["all", "runs", "maps"]
-#: Runs that one task of a worker holds, how long one run may take on the average (s), and what compiling may take once (s).
-CHUNK, APPROXIMATE_CHUNK, SECONDS_A_RUN, COMPILING = 250, 20, 2.0, 600.0
+#: Runs that one task of a worker holds, how long (s) one run may take on the average, a
+#: chunk in addition, and compiling once.
+CHUNK, APPROXIMATE_CHUNK, SECONDS_A_RUN, PATIENCE, COMPILING = 250, 20, 2.0, 10.0, 600.0
 #: Memory that a worker may take, MB.
 MEMORY = 2048.0
 #: Failures of a model and an invariant of which the smallest scene is sought.
@@ -65,6 +66,8 @@ class Batch:
     largest_gain: float = 0.0
     #: Runs whose comparison had to be ended by the horizon of predictability.
     horizons: int = 0
+    #: Runs that an exception of the model excuses from an invariant, by its name.
+    exceptions: Counter[str] = field(default_factory=Counter)
 
     def __add__(self, other: Batch) -> Batch:
         worst = dict(self.worst)
@@ -82,6 +85,7 @@ class Batch:
             gaining=self.gaining + other.gaining,
             largest_gain=max(self.largest_gain, other.largest_gain),
             horizons=self.horizons + other.horizons,
+            exceptions=self.exceptions + other.exceptions,
         )
 
     def failed(self, invariant: str) -> int:
@@ -122,6 +126,7 @@ def play_some(label: str, seed: int, first: int, count: int) -> Batch:
     began = time.process_time()
     looked_at: Counter[str] = Counter()
     outcomes: Counter[str] = Counter()
+    exceptions: Counter[str] = Counter()
     worst: dict[str, tuple[float, int]] = {}
     failures: list[Failure] = []
     events = gaining = horizons = 0
@@ -142,6 +147,8 @@ def play_some(label: str, seed: int, first: int, count: int) -> Batch:
         gaining += played.gains > 0
         largest_gain = max(largest_gain, played.largest_gain)
         horizons += played.horizons
+        if played.exception:
+            exceptions[played.exception] += 1
     return Batch(
         model=label,
         runs=count,
@@ -154,6 +161,7 @@ def play_some(label: str, seed: int, first: int, count: int) -> Batch:
         gaining=gaining,
         largest_gain=largest_gain,
         horizons=horizons,
+        exceptions=exceptions,
     )
 
 
@@ -251,7 +259,7 @@ def _side_by_side(work: Sequence[Chunk], jobs: int) -> Iterator[Batch]:
                     while waiting and len(running) < jobs + 1:
                         chunk = waiting.pop()
                         # Each worker may have to compile what it plays.
-                        seconds = SECONDS_A_RUN * chunk.count + 10.0 + (0.0 if chunk.label in started else COMPILING)
+                        seconds = SECONDS_A_RUN * chunk.count + PATIENCE + (0.0 if chunk.label in started else COMPILING)
                         arguments = (chunk.label, chunk.seed, chunk.first, chunk.count)
                         running[pool.schedule(play_some, args=arguments, timeout=seconds)] = chunk
                     for future in wait(running, return_when=FIRST_COMPLETED).done:
@@ -341,13 +349,14 @@ def markdown(found: Stress) -> str:
     lines = [
         f"Seed {found.seed}, {found.wall_seconds / 60.0:.1f} min with {found.jobs} processes; {', '.join(found.hardware.values())}.",
         "",
-        "| model | runs | failures | events | runs with energy gained in an impact (most) | horizon needed |",
-        "|---|---|---|---|---|---|",
+        "| model | runs | failures | events | runs with energy gained in an impact (most) | horizon needed | excepted |",
+        "|---|---|---|---|---|---|---|",
     ]
     for label, batch in found.batches.items():
         broken = len({failure.number for failure in batch.failures})
         gains = f"{batch.gaining} ({100.0 * batch.largest_gain:.2g} %)" if batch.gaining else "0"
-        lines.append(f"| {label} | {batch.runs} | {broken} | {batch.events} | {gains} | {batch.horizons} |")
+        excepted = ", ".join(f"{count} {name}" for name, count in batch.exceptions.items()) or "0"
+        lines.append(f"| {label} | {batch.runs} | {broken} | {batch.events} | {gains} | {batch.horizons} | {excepted} |")
     lines += ["", "| invariant | bound | " + " | ".join(found.batches) + " |", "|---|---|" + "---|" * len(found.batches)]
     for name, invariant in INVARIANTS.items():
         cells = []

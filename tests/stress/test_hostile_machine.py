@@ -1,0 +1,168 @@
+"""Machines that fail: a full disk, folders that cannot be written, jumping clocks, lost workers, Ctrl-C.
+
+Each time: a clear end in one line, nothing that was computed is lost, and the next run is right.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from validation import store as stores
+from validation.cli import main
+from validation.results import HISTORIES, write_whole
+from validation.store import Store
+from validation.stress import study
+from validation.stress.study import Chunk
+
+ROCKCHECK = [sys.executable, "-m", "validation.cli"]
+posix = pytest.mark.skipif(sys.platform == "win32", reason="limits and signals as POSIX has them")
+
+SMALL_RUN = ["stress", "runs", "--model", "ebm no-slip", "--runs", "30", "--jobs", "1"]
+
+#: A process that can write files of at most so many bytes: what a full disk does, without one.
+_LIMITED = """
+import resource, signal, sys
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)
+from validation.cli import main
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+def one_line(stderr: str) -> str:
+    (line,) = stderr.splitlines()
+    assert line.startswith("rockcheck: ")
+    return line
+
+
+def leavings(folder: Path) -> list[Path]:
+    return list(folder.rglob("*.part"))
+
+
+@posix
+def test_disk_full(tmp_path):
+    """A history that does not fit: one line, exit 2, and no half file under its name."""
+    out = tmp_path / "out.csv"
+    command = [sys.executable, "-c", _LIMITED, "4096", "simulate", "fig4a", "--model", "ebm", "-o", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 2
+    assert "File too large" in one_line(done.stderr)
+    assert main(["simulate", "fig4a", "--model", "ebm", "-o", str(out), "--quiet"]) == 0
+
+
+@posix
+def test_disk_full_while_a_study_is_written(tmp_path):
+    """Tables that were written stay whole; the file that does not fit leaves nothing; the next run writes all."""
+    command = [sys.executable, "-c", _LIMITED, "3000", *SMALL_RUN, "--out", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 2
+    one_line(done.stderr)
+    assert not leavings(tmp_path)
+    assert not (tmp_path / "index.html").exists()
+    assert (tmp_path / "invariants.csv").read_text().endswith("\n")
+    assert main([*SMALL_RUN, "--out", str(tmp_path), "--quiet"]) in (0, 1)
+    assert (tmp_path / "index.html").exists()
+
+
+def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+    """A crash between writing and naming leaves the old content."""
+    path = write_whole(tmp_path / "a.json", "old")
+
+    def crash(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", crash)
+    with pytest.raises(OSError, match="No space"):
+        write_whole(path, "new")
+    assert path.read_text() == "old"
+    assert not leavings(tmp_path)
+
+
+@pytest.mark.parametrize("command", ["stress", "validate", "benchmark", "convergence"])
+def test_folder_that_cannot_be_written(tmp_path, capsys, command):
+    """Said before anything is computed."""
+    file = tmp_path / "file"
+    file.write_text("")
+    places = [file, file / "below"]
+    if os.path.isdir("/proc/self"):
+        places.append(Path("/proc/self/here"))
+    if os.name == "posix" and os.getuid() != 0:
+        locked = tmp_path / "locked"
+        locked.mkdir(mode=0o500)
+        places.append(locked)
+    for place in places:
+        began = time.monotonic()
+        assert main([command, "--out", str(place)]) == 2
+        assert str(place) in one_line(capsys.readouterr().err)
+        assert time.monotonic() - began < 30.0
+
+
+def test_clock_that_jumps(tmp_path, monkeypatch):
+    """Years forward or back: what a run has used is kept, and read back."""
+    store = Store(tmp_path)
+    files = {".csv": "t,theta\n0,0\n", ".events.csv": ""}
+    now = time.time()
+    for jump in (0.0, 10.0 * 365 * 86400.0, -10.0 * 365 * 86400.0):
+        monkeypatch.setattr(stores.time, "time", lambda jump=jump: now + jump)
+        store.put("a", files, {"outcome": "at rest"})
+        for path in (tmp_path / HISTORIES).iterdir():
+            os.utime(path, (now + jump, now + jump))
+        store.prune()
+        assert store.get("a") == {"outcome": "at rest"}
+
+
+def test_two_versions_share_a_store(tmp_path):
+    """Each reads what it wrote; a record of another layout is as good as none, and a newer run.json is told."""
+    old, new = Store(tmp_path), Store(tmp_path)
+    old.put("s--ebm--1111", {".csv": "old"}, {"outcome": "at rest"})
+    new.put("s--ebm--2222", {".csv": "new"}, {"outcome": "moving", "something": {"new": [1]}})
+    assert old.get("s--ebm--1111") == {"outcome": "at rest"}
+    assert new.get("s--ebm--1111") == {"outcome": "at rest"}
+    assert old.history("s--ebm--1111").read_text() == "old"
+    (tmp_path / HISTORIES / "s--ebm--2222.json").write_text(json.dumps({"version": 9, "files": ["a", "list"]}))
+    assert new.get("s--ebm--2222") is None
+    (tmp_path / "run.json").write_text(json.dumps({"format": 99}))
+    assert main(["report", str(tmp_path)]) == 2
+
+
+def test_worker_lost_or_hanging(tmp_path, monkeypatch):
+    """Of runs whose process dies or hangs only the one that does it fails; all others are played."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent / "runs"))
+    import deadly
+
+    monkeypatch.setattr(study, "play_some", deadly.play_some)
+    monkeypatch.setattr(study, "SECONDS_A_RUN", 0.0)
+    monkeypatch.setattr(study, "COMPILING", 0.0)
+    monkeypatch.setattr(study, "PATIENCE", 6.0)
+    batches = list(study._side_by_side([Chunk("ebm", 1, 0, 4), Chunk("ebm", 1, 13, 1), Chunk("ebm", 1, 14, 2)], 2))
+    assert sum(batch.runs for batch in batches) == 7
+    failures = {failure.number: failure.words for batch in batches for failure in batch.failures}
+    assert failures == {3: "the process ended with code 9", 13: "hangs"}
+
+
+@posix
+def test_interrupted(tmp_path):
+    """Ctrl-C ends a study in one line; what was finished is written, and says that it is not all."""
+    command = [*ROCKCHECK, "stress", "runs", "--model", "ebm no-slip", "--runs", "60000", "--jobs", "1", "--out", str(tmp_path)]
+    running = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, start_new_session=True)
+    try:
+        time.sleep(6.0)
+        os.killpg(running.pid, signal.SIGINT)
+        _, said = running.communicate(timeout=60)
+    finally:
+        running.kill()
+    assert running.returncode == 130
+    assert "interrupted" in one_line(said)
+    data = json.loads((tmp_path / "run.json").read_text())
+    assert data["complete"] is False
+    assert data["batches"]["ebm no-slip"]["runs"] < 60000
+    assert "interrupted" in (tmp_path / "index.html").read_text()
+    assert not leavings(tmp_path)

@@ -1,0 +1,300 @@
+"""The stress run itself: scenes that can be made again, invariants that notice faults, small scenes that still show them."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+
+from ebm import EventBasedModel
+from scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
+from validation.cli import main
+from validation.stress import study
+from validation.stress.generator import ALPHA, FRICTION, RADIUS, random_scene
+from validation.stress.invariants import INVARIANTS, Played, audited, check_run, energy_error, similar
+from validation.stress.mechanics import BOOLE, integrals, tilted_forces
+from validation.stress.players import PLAYERS, Approximate
+from validation.stress.shrinking import shrink, write_scene
+from validation.stress.stability import LINES, fault_of, largest_stable, scene_at, stand_still
+from validation.stress.study import Chunk, chunks, play_some, run_stress
+
+ALPHA_PAPER = 0.25
+BLOCK = Block(half_width=0.397, half_height=1.555)
+SLIDES_AND_HITS = Scene(
+    name="hits",
+    block=BLOCK,
+    floor=Floor(friction=0.3),
+    walls=[Wall(side="left", gap=0.05, restitution=0.5)],
+    excitation=Ricker(amplitude=8.0, period=1.2),
+    duration=4.0,
+    output_step=0.04,
+)
+
+
+def test_a_scene_of_a_seed_can_be_made_alone():
+    assert random_scene(5, 1234) == random_scene(5, 1234)
+    assert random_scene(5, 1234) != random_scene(5, 1235)
+    assert random_scene(5, 1234) != random_scene(6, 1234)
+
+
+def test_scenes_cover_what_a_user_could_write():
+    """The corners of the ranges are reached, and every kind of excitation, wall and start occurs."""
+    scenes = [random_scene(1, n) for n in range(2000)]
+    alphas, radii, friction = (
+        np.array(one) for one in zip(*((s.block.alpha, s.block.radius, s.floor.friction) for s in scenes), strict=True)
+    )
+    for values, (low, high) in ((alphas, ALPHA), (radii, RADIUS)):
+        assert low * (1 - 1e-9) <= values.min() < 2.0 * low
+        assert 0.9 * high < values.max() <= high * (1 + 1e-9)
+    assert friction.min() == 0.0
+    assert friction.max() > 0.98 * FRICTION[1]
+    assert {s.excitation.kind for s in scenes} == {s.vertical.kind for s in scenes} == {"rest", "ricker", "sine", "record"}
+    assert {tuple(w.side for w in s.walls) for s in scenes} == {(), ("left",), ("right",), ("left", "right")}
+    assert {w.restitution for s in scenes for w in s.walls} >= {0.0, 1.0}
+    assert any(w.gap == 0.0 for s in scenes for w in s.walls)
+    assert any(abs(s.initial_rotation) == pytest.approx(s.block.alpha) for s in scenes)
+    assert any(s.floor.mu_s > s.floor.friction for s in scenes)
+    assert any(isinstance(s.excitation, Record) and len(s.excitation.unscaled) == 1 for s in scenes)
+    level = [np.max(np.abs(s.vertical.acceleration(s.output_times))) / s.gravity for s in scenes]
+    assert max(level) > 1.0
+    assert any(s.initial_height > 0.0 for s in scenes)
+    for kind in ("bilateral", "bouc-wen", "no-slip"):
+        for n in range(300):
+            scene = random_scene(1, n, kind)
+            assert scene.floor.restitution == scene.initial_height == 0.0
+            assert kind != "bouc-wen" or scene.floor.static_friction is None
+
+
+def test_forces_of_housners_block():
+    """ROCK: (3), and a block that stands on its corner without speed presses with what lifts its centroid."""
+    phi, u = np.array([0.1]), np.array([0.2])
+    on, off = np.array([True]), np.array([False])
+    forces = tilted_forces(ALPHA_PAPER, 0.3, phi, np.zeros(1), u, np.ones(1), (on, off, off), np.zeros(1, dtype=np.int8))
+    s, c = math.sin(ALPHA_PAPER - 0.1), math.cos(ALPHA_PAPER - 0.1)
+    spin = 0.75 * (0.2 * c - s)
+    assert forces.normal[0] == pytest.approx(1.0 + s * spin, rel=1e-13)
+    assert forces.friction[0] == pytest.approx(0.2 - c * spin, rel=1e-13)
+    slips = tilted_forces(ALPHA_PAPER, 0.3, phi, np.zeros(1), u, np.ones(1), (on, off, off), np.ones(1, dtype=np.int8))
+    eta = 0.3
+    assert slips.normal[0] == pytest.approx(1.0 / (1.0 + 3.0 * s * s + 3.0 * eta * s * c), rel=1e-13)
+    assert slips.friction[0] == pytest.approx(-0.3 * slips.normal[0], rel=1e-13)
+
+
+def test_rules_of_integration():
+    x = np.linspace(0.0, 2.0, 17)
+    exact = 2.0**10 / 10.0
+    assert np.sum(integrals(x[1], x**9)) == pytest.approx(exact, rel=1e-13)
+    assert np.sum(integrals(x[1], x**5, BOOLE)) == pytest.approx(2.0**6 / 6.0, rel=1e-13)
+    assert np.sum(integrals(x[1], x**9, BOOLE)) != pytest.approx(exact, rel=1e-6)
+
+
+@pytest.mark.parametrize("label", ["ebm", "ebm-unilateral", "ebm no-slip", "ebm-bouc-wen"])
+def test_a_run_that_keeps_all_invariants(label):
+    """Sliding, rocking, wall and floor impacts: every figure is well inside its bound."""
+    player = PLAYERS[label]
+    played = player.check(SLIDES_AND_HITS, 1, 0)  # run 0 is audited
+    assert played.broken == []
+    assert played.events > 5
+    assert {"energy", "mirror", "similarity", "tolerance", "penetration"} <= played.figures.keys()
+
+
+class Spoilt:
+    """A model whose histories have one thing changed."""
+
+    def __init__(self, **change: object) -> None:
+        self.model = EventBasedModel(pivot="unilateral")
+        self.change = change
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self.model, name)
+
+    def model_copy(self, **_: object) -> Spoilt:
+        return self
+
+    def simulate(self, scene: Scene) -> History:
+        history = self.model.simulate(scene)
+        channels = {name: column.copy() for name, column in history.channels.items()}
+        for name, change in self.change.items():
+            if name in channels:
+                channels[name] = change(channels[name])  # type: ignore[operator]
+        outcome = self.change.get("outcome", history.outcome)
+        return dataclasses.replace(history, channels=channels, outcome=outcome)
+
+
+def bent(column: np.ndarray) -> np.ndarray:
+    column[len(column) // 2] += 1e-6
+    return column
+
+
+FAULTS = {
+    "finite": {"theta": lambda c: np.where(np.arange(len(c)) == 7, np.nan, c)},
+    "outcome": {"outcome": "overturned left"},
+    "penetration": {"y": lambda c: c - 1e-6},
+    "floor": {"y": lambda c: np.where(np.arange(len(c)) == 3, c + 1e-6, c)},
+    "mirror": {"x": bent},
+    "stick": {"slip_rate": lambda c: c + 1e-6},
+    "coulomb": {"mode": lambda c: np.where(c == "slide-rock", "rock", c)},
+    "energy": {"theta_dot": lambda c: c * (1.0 + 1e-5 * np.sin(np.arange(len(c))))},
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_each_invariant_notices_its_fault(name):
+    played = check_run(Spoilt(**FAULTS[name]), SLIDES_AND_HITS, audit=name == "energy")
+    assert name in played.broken
+
+
+def test_tension_in_a_floor_that_only_pushes_is_noticed():
+    """The paper's pivot, judged as if the floor could only push: after a wall impact it pulls."""
+    scene = SLIDES_AND_HITS.replace(
+        excitation=Rest(), walls=(), initial_rotation=0.02, initial_angular_velocity=3.2, duration=0.1, output_step=1e-3
+    )
+    paper = EventBasedModel().simulate(scene)
+
+    class Unfair(Spoilt):
+        def simulate(self, scene: Scene) -> History:
+            return paper
+
+    assert "push" in check_run(Unfair(), scene).broken
+
+
+def test_a_coarse_model_breaks_the_comparison_with_a_finer_one():
+    """A tolerance of 1e-3 is not 1e-10: within the horizon the rotations differ."""
+    played = check_run(EventBasedModel(tolerance=1e-2), SLIDES_AND_HITS)
+    assert played.figures["tolerance"] > INVARIANTS["tolerance"].bound
+
+
+def test_energy_balance_is_exact_to_rounding():
+    for scene in (SLIDES_AND_HITS, SLIDES_AND_HITS.replace(vertical=Sine(amplitude=3.0, period=0.4, cycles=5))):
+        fine = audited(scene)
+        model = EventBasedModel(tolerance=1e-13)
+        assert energy_error(model, fine, model.simulate(fine)) < 1e-11
+
+
+def test_a_block_that_hangs_is_counted_by_name():
+    """At rest, symmetric, and the floor falls away faster than g: the paper's pivot has to choose a corner."""
+    hangs = SLIDES_AND_HITS.replace(
+        walls=(), excitation=Rest(), vertical=Record.from_samples([0.0, -20.0, -20.0], time_step=0.1), duration=0.3, output_step=0.01
+    )
+    played = check_run(EventBasedModel(), hangs)
+    assert played.exception == "hangs"
+    assert "mirror" not in played.figures
+    assert check_run(EventBasedModel(pivot="unilateral"), hangs).broken == []
+    assert check_run(EventBasedModel(), SLIDES_AND_HITS).exception == ""
+
+
+def test_similar_scenes_have_the_same_numbers():
+    other = similar(SLIDES_AND_HITS, 3)
+    k = other.block.radius / BLOCK.radius
+    assert k != pytest.approx(1.0)
+    assert other.walls[0].gap == pytest.approx(k * 0.05)
+    assert other.excitation.amplitude == 8.0
+    assert other.excitation.period == pytest.approx(math.sqrt(k) * 1.2)
+
+
+def test_shrinking_drops_all_that_does_not_matter(tmp_path):
+    """Of a scene with everything in it, only what shows the "failure" is left, and the file is that scene again."""
+    scene = random_scene(1, 0).replace(
+        walls=(Wall(side="left", gap=0.5, restitution=0.3), Wall(side="right", gap=0.7)),
+        vertical=Sine(amplitude=1.234567, period=1.0),
+        excitation=Record.from_samples(np.arange(50.0) / 7.0, time_step=0.0123456789),
+        initial_rotation=0.0,
+    )
+
+    def shows(one: Scene) -> bool:
+        return isinstance(one.excitation, Record) and max(one.excitation.unscaled) > 2.0 and one.wall("right") is not None
+
+    small = shrink(scene, shows, trials=2000)
+    assert shows(small)
+    assert len(small.excitation.unscaled) < 20
+    assert [wall.side for wall in small.walls] == ["right"]
+    assert small.walls[0].gap == small.walls[0].restitution == 0.0
+    assert small.vertical == Rest()
+    assert small.floor.restitution == small.initial_height == small.initial_angular_velocity == 0.0
+    read = load_scene(write_scene(small, tmp_path / "small.toml", "a remark\nanother"))
+    assert read.replace(name=small.name) == small
+
+
+def test_a_batch_counts_what_it_saw():
+    """Two halves are the whole, and the worst figure names its run."""
+    whole, halves = play_some("ebm", 1, 0, 8), play_some("ebm", 1, 0, 4) + play_some("ebm", 1, 4, 4)
+    for name in ("runs", "looked_at", "worst", "failures", "outcomes", "events", "gaining", "largest_gain", "horizons", "exceptions"):
+        assert getattr(whole, name) == getattr(halves, name), name
+    assert whole.runs == 8
+    assert whole.looked_at["ends"] == 8
+
+
+def test_work_is_all_runs_once():
+    for runs, quick in ((1003, False), (None, True)):
+        work = chunks(1, runs, quick, list(PLAYERS))
+        for label, player in PLAYERS.items():
+            numbers = [n for chunk in work if chunk.label == label for n in range(chunk.first, chunk.first + chunk.count)]
+            assert sorted(numbers) == list(range(runs or player.quick))
+    assert [half.count for half in Chunk("ebm", 1, 10, 5).halves] == [2, 3]
+
+
+def test_a_failure_is_shown_with_its_smallest_scene(tmp_path, monkeypatch, capsys):
+    """An event-based model that breaks an invariant: exit 1, counted, and a scene file that a user can play."""
+    player = dataclasses.replace(PLAYERS["ebm"], runs=4)
+
+    def check(self: object, scene: Scene, seed: int, number: int, only: str = "") -> Played:
+        return Played(figures={"ends": 0.0, "mirror": 3.0 if scene.walls else 0.0}, outcome="at rest")
+
+    monkeypatch.setattr(type(player), "check", check)
+    monkeypatch.setattr(study, "_side_by_side", lambda work, jobs: (play_some(c.label, c.seed, c.first, c.count) for c in work))
+    assert main(["stress", "runs", "--model", "ebm", "--runs", "12", "--out", str(tmp_path)]) == 1
+    said = capsys.readouterr().out
+    found = json.loads((tmp_path / "run.json").read_text())["batches"]["ebm"]
+    assert 0 < len(found["failures"]) < 12
+    assert "mirror" in said
+    file = tmp_path / next(failure["file"] for failure in found["failures"] if failure["file"])
+    small = load_scene(file)
+    assert len(small.walls) == 1
+    assert file.name in (tmp_path / "index.html").read_text()
+    assert (tmp_path / "failures.csv").read_text().count("\n") == len(found["failures"]) + 1
+    assert main(["simulate", str(file), "--model", "ebm", "-o", str(tmp_path / "o.csv")]) == 0
+
+
+@pytest.mark.parametrize("label", ["cm", "mujoco", "pybullet"])
+def test_approximate_models_keep_what_they_state(label):
+    player = PLAYERS[label]
+    assert isinstance(player, Approximate)
+    for number in (1, 2, 3):
+        played = player.check(player.scene(1, number), 1, number)
+        assert played.broken == []
+        assert {"depth", "source"} <= played.figures.keys()
+
+
+def test_where_an_engine_breaks_is_found():
+    """MuJoCo's own contact lets a block of a millimetre sink; at its best it holds it. Creep under a push is seen, too."""
+    assert fault_of(LINES["mujoco default"], scene_at("size", 1e-3), 0.01) == "sinks"
+    assert fault_of(LINES["mujoco"], scene_at("size", 1e-3), 0.01) == ""
+    found = largest_stable("mujoco default", "size", 1e-3, steps=(0.03, 0.01))
+    assert (found.step, found.fault) == (0.0, "sinks")
+    creeps, stands = stand_still("mujoco default", "pushed", 5.0), stand_still("mujoco adaptive", "pushed", 5.0)
+    assert creeps.creep > 1e-4
+    assert stands.creep < 1e-6
+    assert stand_still("cm", "left alone", 5.0).jitter < 1e-9
+
+
+def test_the_page_and_the_tables(tmp_path):
+    """All that a run has is on its page and in its files."""
+    assert main(["stress", "runs", "--model", "ebm", "--runs", "6", "--jobs", "1", "--out", str(tmp_path), "--quiet", "--seed", "4"]) == 0
+    page = (tmp_path / "index.html").read_text()
+    for invariant in INVARIANTS:
+        assert invariant in page
+    summary = (tmp_path / "summary.md").read_text()
+    assert summary.startswith("Seed 4,")
+    assert "| ebm | 6 | 0 |" in summary
+    assert (tmp_path / "invariants.csv").read_text().count("\nebm,") >= 10
+
+
+@pytest.mark.slow
+def test_quick_run():
+    """All models: no event-based one breaks an invariant."""
+    found = run_stress("runs", quick=True, seed=11)
+    assert found.complete
+    assert found.broken == []
