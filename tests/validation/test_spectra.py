@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 import os
@@ -413,6 +414,25 @@ def test_agreement_counts_equal_outcomes(tmp_path, monkeypatch):
     (drawn,) = agreement.map_spectra(found, maps["cm"], [panel])
     assert agreement.encoded(drawn) == maps["cm"].outcomes[panel.name]
     assert drawn.undecided.tolist() == [[4, 4]]
+
+
+def test_the_command_compares_models_and_refinement(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(agreement, "CANDIDATES", ("ebm-unilateral",))
+    monkeypatch.setattr(agreement, "MAP_SIZE", 5)
+    grid = ["--figure", "8", "--size", "12", "--out", "out"]
+    assert main(["spectrum", *grid, "--agreement", "6"]) == 0
+    assert main(["spectrum", *grid, "--verify"]) == 0
+    folder = tmp_path / "out" / "spectra"
+    assert {"agreement.json", "agreement.csv", "models.svg", "refinement.json", "refinement.csv"} <= {
+        path.name for path in folder.iterdir()
+    }
+    page = (tmp_path / "out" / "spectra.html").read_text(encoding="utf-8")
+    assert page.count("Computed on") == 2
+    assert "ebm-unilateral" in capsys.readouterr().out
+    with (folder / "agreement.csv").open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.reader(stream))
+    assert tuple(rows[0]) == agreement.COLUMNS
+    assert {len(row) for row in rows} == {len(agreement.COLUMNS)}
 
 
 # Refinement
