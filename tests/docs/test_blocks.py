@@ -151,8 +151,13 @@ def test_long_commands_are_understood(command, tmp_path):
     assert "--no-such-option" in done.stderr
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("command", LONG_COMMANDS)
-def test_long_commands_run(command, tmp_path):
+def shortest(command: str) -> str:
+    """The form of a long command that takes the least time."""
     quick = LONG[shlex.split(command)[1]]
-    run_shell(f"{command} {quick}" if quick and quick not in command else command, tmp_path)
+    return command if quick in command else f"{command} {quick}"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", sorted({shortest(command) for command in LONG_COMMANDS}))
+def test_long_commands_run(command, tmp_path):
+    run_shell(command, tmp_path)
