@@ -11,6 +11,7 @@ import os
 import signal
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
@@ -185,6 +186,8 @@ def leaders(tasks: Sequence[Work]) -> dict[int, int]:
 def prepare(memory_mb: float) -> None:
     """Make this worker die with the run, and fail where it takes more memory than it may (where the system can say so)."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run itself ends its workers
+    if (run := multiprocessing.parent_process()) is not None:
+        threading.Thread(target=_follow, args=(run,), daemon=True).start()
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):  # the terminal is the run's; engines greet on it from C
         os.dup2(nowhere, stream)
@@ -196,6 +199,12 @@ def prepare(memory_mb: float) -> None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     except (ImportError, ValueError, OSError):
         pass
+
+
+def _follow(run: Any) -> None:
+    """End this process, whatever it is doing, once the run has ended in whatever way."""
+    run.join()
+    os._exit(1)
 
 
 def _outcome(future: Any, seconds: float) -> Played:

@@ -166,3 +166,27 @@ def test_interrupted(tmp_path):
     assert data["batches"]["ebm no-slip"]["runs"] < 60000
     assert "interrupted" in (tmp_path / "index.html").read_text()
     assert not leavings(tmp_path)
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="children are found as Linux tells them")
+def test_killed(tmp_path):
+    """A run that is killed leaves no worker behind, however busy, and the next run in its folder is whole."""
+    command = [*ROCKCHECK, "stress", "runs", "--model", "ebm no-slip", "--runs", "60000", "--jobs", "1", "--out", str(tmp_path)]
+    running = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True)
+    children: list[str] = []
+    try:
+        until = time.monotonic() + 60.0
+        while len(children) < 2 and time.monotonic() < until:  # the worker, and multiprocessing's tracker
+            time.sleep(0.2)
+            children = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
+        time.sleep(3.0)
+    finally:
+        running.kill()
+        running.wait()
+    assert len(children) >= 2
+    until = time.monotonic() + 30.0
+    while any(Path(f"/proc/{child}").exists() for child in children) and time.monotonic() < until:
+        time.sleep(0.2)
+    assert not any(Path(f"/proc/{child}").exists() for child in children)
+    assert main([*SMALL_RUN, "--out", str(tmp_path), "--quiet"]) in (0, 1)
+    assert json.loads((tmp_path / "run.json").read_text())["complete"] is True

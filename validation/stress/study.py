@@ -26,9 +26,11 @@ from validation.workers import ONE_THREAD, death, prepare
 
 Progress = Callable[[int, int, str], None]
 What = Literal["all", "runs", "maps"]
-#: Runs that one task of a worker holds, how long (s) one run may take on the average, a
-#: chunk in addition, and compiling once.
-CHUNK, APPROXIMATE_CHUNK, SECONDS_A_RUN, PATIENCE, COMPILING = 250, 20, 2.0, 10.0, 600.0
+#: Runs that one task of a worker holds, and how long (s) one of them may take on the average: event-based runs, others.
+CHUNK, APPROXIMATE_CHUNK = 250, 20
+SECONDS_A_RUN, SECONDS_AN_APPROXIMATE_RUN = 0.2, 2.0
+#: How long (s) a task may take in addition, and the first one of a model, which may have to compile.
+PATIENCE, COMPILING = 20.0, 600.0
 #: Memory that a worker may take, MB.
 MEMORY = 2048.0
 #: Failures of a model and an invariant of which the smallest scene is sought.
@@ -175,6 +177,11 @@ class Chunk:
     count: int
 
     @property
+    def seconds(self) -> float:
+        """How long it may take: far more than it does, and little enough for a hang to be found soon."""
+        return PATIENCE + self.count * (SECONDS_A_RUN if PLAYERS[self.label].event_based else SECONDS_AN_APPROXIMATE_RUN)
+
+    @property
     def halves(self) -> list[Chunk]:
         """The same runs as two chunks."""
         half = self.count // 2
@@ -258,8 +265,7 @@ def _side_by_side(work: Sequence[Chunk], jobs: int) -> Iterator[Batch]:
                 while waiting or running:
                     while waiting and len(running) < jobs + 1:
                         chunk = waiting.pop()
-                        # Each worker may have to compile what it plays.
-                        seconds = SECONDS_A_RUN * chunk.count + PATIENCE + (0.0 if chunk.label in started else COMPILING)
+                        seconds = chunk.seconds + (0.0 if chunk.label in started else COMPILING)
                         arguments = (chunk.label, chunk.seed, chunk.first, chunk.count)
                         running[pool.schedule(play_some, args=arguments, timeout=seconds)] = chunk
                     for future in wait(running, return_when=FIRST_COMPLETED).done:
