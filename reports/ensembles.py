@@ -166,9 +166,9 @@ def distributions_figure(view: EnsembleView) -> Drawing:
         below.axhline(0.0, color="#888888", linewidth=0.5)
         above.set_ylim(0.0, 1.0)
         above.set_ylabel("share of scenes\nbelow the peak")
-        below.set_ylabel("difference from\nthe reference", fontsize=6.5)
+        below.set_ylabel("difference")
         below.set_xlabel("peak rotation |θ|/α of blocks that stay; the rest has overturned")
-        below.set_xlim(0.0, float(grid[-1]))
+        below.set_xlim(0.0, min(float(grid[-1]), MOST * 1.5))  # beyond: blocks that were still falling at the end
         below.legend([band], [f"no difference at the {CONFIDENCE:.0%} level"], loc="lower right")
         title = f"{view.name}: peak rotation in {max(counts)} scenes"
         figure.text(0.012, 0.985, title, va="top", weight="bold", fontsize=8.5)
@@ -233,7 +233,7 @@ def _standing(sample: Sample) -> np.ndarray:
 
 def _cloud(ax: Axes, samples: Samples, color: str) -> None:
     fallen = MOST * 3.2
-    x, y = (np.where(s.fallen, fallen, np.clip(s.peaks, LEAST, None)) for s in (samples.reference, samples.candidate))
+    x, y = (np.where(s.fallen, fallen, np.clip(s.peaks, LEAST, MOST * 1.6)) for s in (samples.reference, samples.candidate))
     apart = samples.reference.fallen != samples.candidate.fallen
     ax.plot([LEAST, MOST], [LEAST, MOST], color="#999999", linewidth=0.6, zorder=1)
     ax.plot(x[~apart], y[~apart], ".", color=color, markersize=2.0, markeredgewidth=0, alpha=0.7)

@@ -75,7 +75,7 @@ class _Child:
     def __init__(self, run: str, memory_mb: float) -> None:
         self.run = run
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "validation.remote", str(memory_mb)],
+            [sys.executable, "-P", "-m", "validation.remote", str(memory_mb)],  # -P: a folder here may be called "engines"
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},

@@ -305,7 +305,7 @@ def test_an_ensemble_is_shown_by_its_distributions(site: Path) -> None:
     for measure in ("overturning_accuracy", "peak_bias", "peak_scatter"):
         figure = view.figure("cm", measure, "ebm-unilateral")
         assert number(figure.value) in words
-        assert figure.note in words, "its confidence interval"
+        assert figure.note.replace("], ", "]\n") in words, "its confidence interval"
     rows = (site / PAGES / "data" / "crowd.csv").read_text(encoding="utf-8").splitlines()
     assert rows[0] == ",".join(["scene", *(f"{what} {m}" for m in run.ensembles[0].peaks for what in ("peak_rotation_alpha", "outcome"))])
     assert len(rows) == 41
