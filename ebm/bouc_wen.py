@@ -63,7 +63,7 @@ from ebm.motion import (
     tilt_series,
     tilt_state,
 )
-from ebm.series import MOST_TERMS, NO_ROOT, NOISE, first_root, leading, value
+from ebm.series import FORCE_NOISE, MOST_TERMS, NO_ROOT, POSITION_NOISE, first_root, leading, value
 from ebm.trajectory import (
     _QUIET_TIME,
     _RATTLE_BOUND,
@@ -78,7 +78,6 @@ from ebm.trajectory import (
     OVERTURNED,
     RELEASE,
     RIGHT,
-    SETTLE_SPIN,
     SETTLED,
     SLIPS,
     STICKS,
@@ -94,6 +93,7 @@ from ebm.trajectory import (
     _step_size,
 )
 from ebm.transitions import (
+    AHEAD,
     G_CONE_PLUS,
     G_FAR_PUSH,
     G_PUSH,
@@ -122,10 +122,8 @@ _ROWS = ROWS + 15
 _G_LOADS = GUARDS
 # A pivot that slips more slowly than this after an impact stands.
 _STOPPED = 1e-10
-_LOOK, _AHEAD = 6, 1e-2
+_LOOK = 6
 _MOST_ZERO_STEPS = 60
-# Static friction of a frictionless floor: with less, the rounding of a base acceleration that dies out moves a resting block.
-_LEAST_HOLD = 1e-12
 
 
 def simulate(model: EventBasedModel, scene: Scene, tolerance: float) -> History:
@@ -144,7 +142,6 @@ def simulate(model: EventBasedModel, scene: Scene, tolerance: float) -> History:
     from ebm import model as exact
 
     b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
-    b = b._replace(mu_s=max(b.mu_s, _LEAST_HOLD))
     horizontal, vertical = natural.grounds_of(scene)
     unit = natural.time_unit(scene)
     times = scene.output_times
@@ -343,7 +340,7 @@ def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a):
         m[FAR if a[NB, 0] < a[NA, 0] else TIP] = 0
     m[FLOOR] = SLIPPING
     _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a)
-    if m[TIP] + m[FAR] > 0 and leading(a, NA if m[TIP] != 0 else NB, _LOOK - 2, _AHEAD, NOISE) < 0:
+    if m[TIP] + m[FAR] > 0 and leading(a, NA if m[TIP] != 0 else NB, _LOOK - 2, AHEAD, FORCE_NOISE) < 0:
         m[TIP] = m[FAR] = 0
         _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a)
 
@@ -435,7 +432,7 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
         if moving and m[SLIP] * a[Z, 0] <= -1e-13:
             for k in range(order):
                 a[GUARD, k] = -m[SLIP] * a[Z, k]
-            root = first_root(a, GUARD, order - 1, tau, NOISE, stack)
+            root = first_root(a, GUARD, order - 1, tau, POSITION_NOISE, stack)
             if root != NO_ROOT:
                 tau, which = root, _G_LOADS
         if which == G_SLIP and tau <= 0.0 and flipped and m[FAMILY] == TILT:
@@ -505,8 +502,6 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
         elif which >= 0:
             kind, _, _ = _impact(b, m, z, which, gh, t, _resting_speed(rattle, t), impulse, gains)
             wall_impacts += kind == WALL_IMPACT
-            if z[THETA] == 0.0 and z[W] == 0.0 and abs(z[VX]) < 4.0 * SETTLE_SPIN:
-                z[VX] = 0.0  # landed along a wall with less spin than counts
             zeta = _begin(b, m, z, zeta, yield_displacement, gh, gv, t, a)
             yielded = _has_yielded(b, m, z, zeta)
         if kind >= 0:

@@ -161,7 +161,7 @@ def contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, tally):
     after = np.zeros(3)
     part = np.zeros(CONTACTS)
     approach = np.zeros(CONTACTS)
-    for _ in range(_MOST_STAGES):
+    for stage in range(_MOST_STAGES):
         group = -1
         for j in range(CONTACTS):
             approach[j] = _dot(rows[j], v) if touching[j] else 0.0
@@ -171,6 +171,8 @@ def contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, tally):
             _close(rows, touching, resting, v)
             return True
         e = b.e_floor if group == 0 else (e_tip if group == 1 else e_far)
+        if 2 * stage >= _MOST_STAGES:
+            e = 0.0  # what goes to and fro between floor and wall ends plastic
         scale = 1.0
         before = kinetic_energy(v)
         for trial in range(60):

@@ -38,6 +38,7 @@ class Ground(NamedTuple):
 
 
 _NO_SAMPLES = np.zeros(1)
+STILL_GROUND = Ground(STILL, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _NO_SAMPLES)
 _RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, 40)])
 
 
@@ -52,8 +53,10 @@ def ground_of(excitation: Rest | Ricker | Sine | Record, gravity: float, time_un
         return Ground(SINE, excitation.amplitude / gravity, 0.0, 0.0, 0.0, rate, 0.0, quiet, 0.0, _NO_SAMPLES)
     if isinstance(excitation, Record):
         samples = np.ascontiguousarray(excitation.samples / gravity)
+        if not samples.any():
+            return STILL_GROUND
         return Ground(SAMPLED, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, quiet, excitation.time_step / time_unit, samples)
-    return Ground(STILL, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _NO_SAMPLES)
+    return STILL_GROUND
 
 
 @inner_kernel
@@ -64,7 +67,7 @@ def interval(g, t):
 
 @inner_kernel
 def acceleration(g, t):
-    """Acceleration at time t."""
+    """Acceleration at time t; where it jumps (a record that ends) that just after."""
     if g.kind == GAUSSIAN:
         tau = t - g.centre
         return (g.c0 + tau * (g.c1 + tau * (g.c2 + tau * g.c3))) * math.exp(-g.rate * tau * tau)
@@ -73,7 +76,7 @@ def acceleration(g, t):
     if g.kind == SAMPLED:
         i = interval(g, t)
         if i + 1 >= g.samples.size:
-            return g.samples[i] if i + 1 == g.samples.size and t <= g.quiet else 0.0
+            return 0.0
         return g.samples[i] + (t / g.step - i) * (g.samples[i + 1] - g.samples[i])
     return 0.0
 
@@ -114,7 +117,15 @@ def fill_series(g, t, sign, n, a, row):
 
 @inner_kernel
 def next_kink(g, t):
-    """The next time after t at which the motion is not smooth."""
+    """The next time after t at which the motion is not smooth, or up to which its series can be trusted.
+
+    In the rise of a pulse exp(-rate tau^2) the terms of a series still grow where it is cut off, unless it is a short one.
+    """
+    if g.kind == GAUSSIAN:
+        tau = t - g.centre
+        if tau >= 0.0 or g.rate * tau * tau < 4.0:
+            return NEVER
+        return g.centre - 6.0 / math.sqrt(g.rate) if g.rate * tau * tau > 36.0001 else t - 4.0 / (g.rate * tau)
     if g.kind == SAMPLED:
         i = interval(g, t)
         return (i + 1) * g.step if i + 1 < g.samples.size else NEVER
@@ -196,7 +207,7 @@ def next_exceedance(g, t, low, high):
         end = _next_extremum(g, t)
         if end == NEVER:
             return NEVER
-        there = acceleration(g, end)
+        there = g.samples[interval(g, end)] if g.kind == SAMPLED else acceleration(g, end)  # just before it, where a record ends
         if there < low or there > high:
             level = low if there < low else high
             rising = there > level
@@ -225,4 +236,4 @@ def next_exceedance(g, t, low, high):
             return b
         if end <= t:
             return NEVER
-        t, here = end, there
+        t, here = end, acceleration(g, end)

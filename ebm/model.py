@@ -54,6 +54,8 @@ class EventBasedModel(Frozen):
 
     def check(self, scene: Scene) -> None:
         """Raises `InputError` where the scene asks for physics that this model excludes."""
+        if self.friction == "no-slip" and scene.initial_velocity != 0.0:
+            raise InputError(f'{scene.initial_velocity:g} is not allowed with friction="no-slip": it never slips', "initial_velocity")
         if self.pivot == "bilateral":
             if scene.floor.restitution > 0.0:
                 raise InputError(

@@ -11,6 +11,9 @@ from ebm.ground import GAUSSIAN, Ground, ground_of
 from ebm.motion import Setting
 from scenes.scene import Scene
 
+#: Static friction of a frictionless floor: with less, the rounding of a base acceleration that dies out moves a resting block.
+LEAST_FRICTION = 1e-9
+
 __all__ = ["GAUSSIAN", "grounds_of", "setting_of", "state_of", "time_unit", "to_si"]
 
 
@@ -29,7 +32,7 @@ def setting_of(scene: Scene, *, unilateral: bool, no_slip: bool, energy_cap: boo
         cos_alpha=math.cos(alpha),
         sin_2alpha=math.sin(2.0 * alpha),
         cos_2alpha=math.cos(2.0 * alpha),
-        mu_s=scene.floor.mu_s,
+        mu_s=max(scene.floor.mu_s, LEAST_FRICTION),
         mu_k=scene.floor.friction,
         e_floor=scene.floor.restitution,
         gap_left=left.gap / radius if left else math.inf,

@@ -11,10 +11,11 @@ from scenes.compiled import inner_kernel
 
 #: Width of the arrays that hold a polynomial: orders up to 28, and two numbers that the root search keeps behind them.
 MOST_TERMS = 32
-#: A coefficient below this (in natural units, scaled to the step) is rounding noise; forces and gaps.
-NOISE = 1e-14
-#: The same for slip velocities, which start from friction forces that cancel.
-SLIP_NOISE = 1e-12
+#: A coefficient below this (in natural units, scaled to the step) is rounding noise: of a position, a velocity, a force. They
+#: fit each other over the 2e-2 that a selection looks ahead: what a force of 1e-10 moves is more than 1e-14.
+POSITION_NOISE, RATE_NOISE, FORCE_NOISE = 1e-14, 1e-12, 1e-10
+#: A guard that is negative, but will not be after this time, is at its zero: the time of an event is not known better.
+INSTANT = 1e-9
 NO_ROOT = -1.0
 _DEEPEST = 44
 _LEVEL, _START = 30, 31  # where the root search keeps an interval's depth and left end
@@ -40,10 +41,19 @@ def slope(a, row, n, tau):
 
 @inner_kernel
 def leading(a, row, n, h, floor):
-    """The sign with which c leaves tau = 0 on a step h: +1, -1, or 0 where it is zero throughout.
+    """The sign with which c leaves tau = 0 on a step h: +1, -1, or 0 where it is zero throughout."""
+    k = _order_of_zero(a, row, n, h, floor)
+    if k > n:
+        return 0
+    return 1 if a[row, k] > 0.0 else -1
 
-    Coefficients that are rounding noise on the scale of the step (below `floor`, see NOISE) are taken as zero, so that a
-    guard that has just fired (and is zero by construction) does not fire again.
+
+@inner_kernel
+def _order_of_zero(a, row, n, h, floor):
+    """The index of the first coefficient of c that counts on a step h; n + 1 where there is none.
+
+    Coefficients that are rounding noise on the scale of the step (below `floor`, see POSITION_NOISE), or turn positive within
+    an INSTANT, are taken as zero, so that a guard that has just fired (and is zero by construction) does not fire again.
     """
     largest = 0.0
     scale = 1.0
@@ -54,9 +64,11 @@ def leading(a, row, n, h, floor):
     scale = 1.0
     for k in range(n + 1):
         if abs(a[row, k]) * scale > noise:
-            return 1 if a[row, k] > 0.0 else -1
+            rises = k < n and a[row, k] < 0.0 and a[row, k] + (k + 1) * a[row, k + 1] * INSTANT > 0.0
+            if not rises:
+                return k
         scale *= h
-    return 0
+    return n + 1
 
 
 @inner_kernel
@@ -72,22 +84,15 @@ def first_root(a, row, n, h, floor, stack):
         low = (low + min(a[row, k], 0.0)) * h
     if a[row, 0] > floor and a[row, 0] + low > 1e-13 * a[row, 0]:
         return NO_ROOT
-    scale = 1.0
-    largest = 0.0
-    for k in range(n + 1):
-        stack[0, k] = a[row, k] * scale
-        scale *= h
-        largest = max(largest, abs(stack[0, k]))
-    noise = max(floor, 1e-13 * largest)
-    zeros = 0
-    while zeros <= n and abs(stack[0, zeros]) <= noise:
-        zeros += 1
+    zeros = _order_of_zero(a, row, n, h, floor)
     if zeros > n:
         return NO_ROOT
-    if stack[0, zeros] < 0.0:
+    if a[row, zeros] < 0.0:
         return 0.0
+    scale = 1.0
     for k in range(n + 1 - zeros):
-        stack[0, k] = stack[0, k + zeros]
+        stack[0, k] = a[row, k + zeros] * scale
+        scale *= h
     z = _isolate(stack, n - zeros)
     return NO_ROOT if z < 0.0 else z * h
 

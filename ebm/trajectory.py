@@ -42,8 +42,10 @@ from ebm.motion import (
     tilt_series,
     tilt_state,
 )
-from ebm.series import NO_ROOT, NOISE, SLIP_NOISE, first_root, value
+from ebm.series import FORCE_NOISE, INSTANT, NO_ROOT, POSITION_NOISE, first_root, leading, value
 from ebm.transitions import (
+    AHEAD,
+    CLOSED_RATE,
     G_CONE_MINUS,
     G_CONE_PLUS,
     G_FAR_GAP,
@@ -60,6 +62,7 @@ from ebm.transitions import (
     consistent,
     guard,
     guards_of,
+    noise_of,
     rock_guards_hold,
     select,
     slip_velocity,
@@ -101,14 +104,15 @@ _REST_BILATERAL, _REST_UNILATERAL = 2.5e-8, 2.5e-7
 _RATTLE_IMPACTS, _RATTLE_TIME, _RATTLE_BOUND, _QUIET_TIME = 100, 5e-3, 2.5e-3, 2.5e-2
 # With the bilateral pivot a block that rattles flush against a wall is settled below these.
 _FLUSH_SPIN, _FLUSH_SPEED, _FLUSH_GAP = 2e-4, 2.5e-4, 6e-7
-# On a floor without friction a block stands as long as the base accelerates less than this, g.
-_FRICTIONLESS = 1e-9
+# This far beyond the limits of rest, g, the guards of what follows are above their noise.
+_BEYOND = 4.0 * FORCE_NOISE
 _TOUCH = 1e-11
 # A pivot that slips more slowly than this after an impact stands: the impact law says so up to rounding.
 _STOPPED = 1e-10
 # Near phi = 0 the far gap goes with phi^2, so that its root says phi to the square root of rounding only.
 _LANDED = 1e-7
-_MOST_ZERO_STEPS = 60
+# After so many events without a step the modes hand over to each other for rounding; after so many more the run fails.
+_HANDED_OVER, _MOST_ZERO_STEPS = 20, 36
 
 
 class Control(NamedTuple):
@@ -183,12 +187,18 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
     stands = z[THETA] == 0.0 and z[VX] == 0.0 and z[W] == 0.0 and z[HEIGHT] == b.cos_alpha and not b.walls
     if not (stands and consistent(b, m, z, gh, gv, t, a)) and not select(b, z, gh, gv, t, left, m, a):
         return Tally(NO_MODE, t, peak, False, 0, 0, 0, 0, 0.0, 0, t_rest)
+    if z[THETA] == 0.0 and z[W] == 0.0 and z[VX] == 0.0 and z[VY] == 0.0 and closed_floor(b, z) and mode_code(m) != 0:
+        events += 1  # it cannot stay at rest
+        if log.shape[0] >= events:
+            _note(log, events, t, SLIPS if m[FAMILY] == FLAT else UPLIFT, 0, mode_code(m), 0.0)
     while True:
         # --- rest: straight to the next uplift or slip
         if m[FAMILY] == FLAT and m[FLOOR] == STICK and still:
             limit = b.sin_alpha / b.cos_alpha
             if not b.no_slip:
-                limit = min(limit, max(b.mu_s, _FRICTIONLESS))
+                limit = min(limit, b.mu_s)
+            if zero_steps > 0:  # rest goes on: what exceeds its limit is noise
+                limit += _BEYOND
             until = next_exceedance(gh, t, -np.inf if m[FAR] != 0 else -limit, np.inf if m[TIP] != 0 else limit)
             if math.isnan(t_rest):
                 t_rest = t
@@ -234,12 +244,16 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             break
         # --- one step of the series, to its end or to the first event in it
         steps += 1
-        end = t_end if smooth else min(min(next_kink(gh, t), next_kink(gv, t)), t_end)
+        end = min(min(next_kink(gh, t), next_kink(gv, t)), t_end)
         reach = end - t
         order, pivot, h = _expand(b, m, z, gh, gv, t, reach, control, a)
         tau, which = _first_event(b, m, order, pivot, h, a, stack)
-        if not math.isfinite(tau):
-            ending = NOT_FINITE
+        if zero_steps >= _HANDED_OVER and tau <= 0.0 and which > G_FAR_GAP:
+            # Modes that hand over to each other at one instant differ by rounding: any will do for a little while.
+            zero_steps += 1
+            tau, which = min(h, INSTANT * 2.0 ** (zero_steps - _HANDED_OVER)), -1
+        if not math.isfinite(tau) or zero_steps > _MOST_ZERO_STEPS:
+            ending = NO_MODE if math.isfinite(tau) else NOT_FINITE
             break
         until = t + tau if which >= 0 or tau < reach else end
         while rows < out.shape[0] and rows * control.output_step < until:
@@ -253,7 +267,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             flat_state(b, m, order, tau, a, z)
         else:
             if a[OMEGA, 0] > 0.0 and value(a, OMEGA, order - 1, tau) < 0.0:
-                top = first_root(a, OMEGA, order - 1, tau, NOISE, stack)
+                top = first_root(a, OMEGA, order - 1, tau, POSITION_NOISE, stack)
                 if top > 0.0:
                     peak = max(peak, value(a, PHI, order, top))
             tilt_state(b, m, order, tau, pivot, a, z)
@@ -265,6 +279,8 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         if which < 0:
             continue
         # --- an event
+        if which > G_FAR_GAP and m[FAMILY] == TILT and abs(z[THETA]) < 1e-13 and m[S] * z[W] < -CLOSED_RATE:
+            which = G_PHI  # whatever else happens at that instant, the block lands
         zero_steps = zero_steps + 1 if tau <= 0.0 else 0
         events += 1
         if zero_steps > _MOST_ZERO_STEPS:
@@ -301,6 +317,9 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         else:
             kind = _release(b, m, z, which)
             found = select(b, z, gh, gv, t, left, m, a)
+            if not found and zero_steps < _HANDED_OVER:
+                m[:] = left  # none follows, but for rounding: it goes on for a little while
+                zero_steps, found = _HANDED_OVER, True
         if not found:
             ending = NO_IMPACT if strikes else NO_MODE
             break
@@ -343,15 +362,19 @@ def _first_event(b, m, order, pivot, h, a, stack):
     """The first time within the step at which a guard ends the mode, and which guard; h and -1 where none does."""
     rocks = m[FAMILY] == TILT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
     if rocks and m[PULL] > 0 and rock_guards_hold(b, order, b.walls, h, a):
-        tau = first_root(a, PHI, order, h, NOISE, stack)
+        tau = first_root(a, PHI, order, h, POSITION_NOISE, stack)
         return (h, -1) if tau == NO_ROOT else (tau, G_PHI)
     tau, which = h, -1
     mask = guards_of(b, m)
     for k in range(GUARDS):
         degree = guard(b, m, k, order, pivot, a) if mask >> k & 1 else -1
         if degree >= 0:
-            root = first_root(a, GUARD, degree, tau, SLIP_NOISE if k == G_SLIP else NOISE, stack)
-            if root != NO_ROOT:
+            root = first_root(a, GUARD, degree, h, noise_of(k), stack)  # in h, not tau: the mirror image has another order
+            if root == 0.0 and leading(a, GUARD, degree, AHEAD, noise_of(k)) >= 0:
+                # What a selection takes for zero is no event yet.
+                if tau > AHEAD:
+                    tau, which = AHEAD, -1
+            elif root != NO_ROOT and root < tau:
                 tau, which = root, k
     if G_PUSH <= which <= G_CONE_MINUS and tau > 0.25 * h:
         # A force is the second derivative of a truncated series: its zero is found to rounding from nearby only.
@@ -375,9 +398,11 @@ def _impact(b, m, z, which, gh, t, resting, impulse, gains):
         known = _wall_impact(b, m, z, which == G_TIP_GAP, gh, t, resting, impulse, gains)
     else:
         known = _floor_impact(b, m, z, impulse)
+    if not known and not b.unilateral and abs(slip_velocity(b, z)) < _STOPPED:
+        z[VX] = -math.cos(b.alpha - abs(z[THETA])) * z[W]
     if z[THETA] == 0.0 and abs(z[W]) < SETTLE_SPIN:
         v = slip_velocity(b, z)
-        z[VX] = v if abs(v) > resting else 0.0
+        z[VX] = v if abs(v) > max(resting, 4.0 * SETTLE_SPIN) else 0.0  # along a wall the spin that does not count slips too
         z[W] = 0.0
         if abs(z[HEIGHT] - b.cos_alpha) < _TOUCH and z[VY] < resting:
             z[VY] = 0.0
@@ -408,14 +433,16 @@ def _note(log, count, t, kind, before, after, impulse):
 
 @inner_kernel
 def _step_size(a, first, second, order, tolerance, reach):
-    """The step at which the last two terms of the series stay below the tolerance, at most `reach`."""
-    last = abs(a[first, order]) + abs(a[second, order])
-    before = abs(a[first, order - 1]) + abs(a[second, order - 1])
+    """The step at which the last two terms of the series stay below the tolerance, at most `reach`.
+
+    In a step shorter than the unit of time the error of the velocity, h times fewer, is the larger one.
+    """
     longest = math.inf  # its logarithm
-    if last > 0.0:
-        longest = math.log(tolerance / last) / order
-    if before > 0.0:
-        longest = min(longest, math.log(tolerance / before) / (order - 1))
+    for k in (order, order - 1):
+        size = abs(a[first, k]) + abs(a[second, k])
+        if size > 0.0:
+            spare = math.log(tolerance / size)
+            longest = min(longest, spare / k if spare > 0.0 else spare / (k - 1))
     return min(reach, math.exp(longest))
 
 
@@ -480,6 +507,9 @@ def _floor_impact(b, m, z, impulse):
 @inner_kernel
 def _wall_impact(b, m, z, tip, gh, t, resting, impulse, gains):
     """Bilateral pivot: a corner (case I, II) or the side (case III) strikes a wall. Returns whether m is already right."""
+    if b.gap_left + b.gap_right < _TOUCH:  # it fills the space between its walls
+        z[W] = z[VX] = z[VY] = 0.0
+        return False
     if m[FAMILY] == FLAT:
         e = b.e_left if tip else b.e_right
         impulse[1] = (1.0 + e) * abs(z[VX])
@@ -554,6 +584,8 @@ def _strike(b, m, z, resting, impulse, gains):
     v[0], v[1], v[2] = sign * z[VX], z[VY], sign * z[W]
     e_tip = b.e_left if sign > 0 else b.e_right
     e_far = b.e_right if sign > 0 else b.e_left
+    if touching[TIP_TOP] and touching[FAR_BOTTOM]:
+        e_tip = e_far = 0.0  # between both walls at once nothing rebounds
     found = contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, gains)
     z[VX], z[VY], z[W] = sign * v[0], v[1], sign * v[2]
     if touching[F] and abs(slip_velocity(b, z)) < _STOPPED:

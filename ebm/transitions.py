@@ -49,7 +49,7 @@ from ebm.motion import (
     flat_series,
     tilt_series,
 )
-from ebm.series import MOST_TERMS, NOISE, SLIP_NOISE, leading
+from ebm.series import FORCE_NOISE, MOST_TERMS, POSITION_NOISE, RATE_NOISE, leading
 from scenes.compiled import inner_kernel
 
 # The guards, in the order in which ties are decided: floor before walls, contacts before friction.
@@ -172,6 +172,8 @@ def _settle_touch(a):
     """A contact that touches and closes more slowly than CLOSED_RATE counts as resting: its acceleration decides."""
     if abs(a[GUARD, 0]) < 1e-12 and a[GUARD, 1] < 0.0 and a[GUARD, 1] > -CLOSED_RATE:
         a[GUARD, 0] = a[GUARD, 1] = 0.0
+    elif -1e-12 < a[GUARD, 0] < 0.0:
+        a[GUARD, 0] = 0.0
 
 
 @inner_kernel
@@ -248,8 +250,16 @@ def rock_guards_hold(b, order, pivot_walls, h, a):
     return b.mu_s * a[P, 0] - abs(a[Q, 0]) > spread and a[P, 0] > push
 
 
+@inner_kernel
+def noise_of(which):
+    """The rounding noise of a guard: it is a position, a velocity or a force."""
+    if which <= G_FAR_GAP:
+        return POSITION_NOISE
+    return RATE_NOISE if which == G_SLIP else FORCE_NOISE
+
+
 _LOOK = 6  # order of the series that a selection looks at
-_AHEAD = 1e-2  # natural time over which it weighs their terms
+AHEAD = 2e-2  # natural time over which it weighs their terms
 
 
 @inner_kernel
@@ -269,7 +279,7 @@ def consistent(b, m, z, gh, gv, t, a):
             continue
         if which <= G_FAR_GAP and a[GUARD, 1] < -CLOSED_RATE:
             continue  # not this mode's fault: an impact comes next
-        sign = leading(a, GUARD, degree, _AHEAD, SLIP_NOISE if which == G_SLIP else NOISE)
+        sign = leading(a, GUARD, degree, AHEAD, noise_of(which))
         if sign < 0 or not math.isfinite(a[GUARD, 0]):
             return False
         if sign == 0 and (which == G_SLIP or (which == G_PHI and m[FLOOR] != OFF)):

@@ -27,7 +27,7 @@ from validation.benchmark_scenes import BLOCK
 Progress = Callable[[str], None]
 #: The grid of Ricker pulses: omega_p/p, a_p/(g tan alpha), and its nodes along each axis.
 FREQUENCY_RATIOS, AMPLITUDE_RATIOS, NODES = (0.5, 8.0), (1.0, 12.0), 100
-TOLERANCES = (1e-6, 1e-7, 1e-8, 3e-9, 1e-9, 1e-10, 1e-12)
+TOLERANCES = (1e-6, 1e-7, 2e-8, 1e-8, 1e-9, 1e-10, 1e-12)
 REFERENCE_TOLERANCE, ROUNDS = 1e-14, 3
 #: The error for which a trajectory's cost is told: 95th percentile of the peak's, rad.
 LEVEL = 1e-8
