@@ -350,11 +350,9 @@ def summary_rows(found: Stress) -> list[dict[str, Any]]:
     return rows
 
 
-def markdown(found: Stress) -> str:
-    """The tables of a run for a page of documentation."""
+def invariants_markdown(found: Stress) -> list[str]:
+    """The random runs as tables: a row a model, a row an invariant."""
     lines = [
-        f"Seed {found.seed}, {found.wall_seconds / 60.0:.1f} min with {found.jobs} processes; {', '.join(found.hardware.values())}.",
-        "",
         "| model | runs | failures | events | runs with energy gained in an impact (most) | horizon needed | excepted |",
         "|---|---|---|---|---|---|---|",
     ]
@@ -374,6 +372,14 @@ def markdown(found: Stress) -> str:
             failures = batch.failed(name)
             cells.append(f"{worst:.1e}" + (f", **{failures} fail**" if failures else ""))
         lines.append(f"| {invariant.words} | {invariant.bound:g} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def markdown(found: Stress) -> str:
+    """The tables of a run for a page of documentation."""
+    lines = [f"Seed {found.seed}, {found.wall_seconds / 60.0:.1f} min with {found.jobs} processes; {', '.join(found.hardware.values())}."]
+    if found.batches:
+        lines += ["", *invariants_markdown(found)]
     if found.stability is not None:
         lines += ["", *stability_markdown(found.stability)]
     return "\n".join(lines) + "\n"
