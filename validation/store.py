@@ -20,6 +20,8 @@ from typing import Any
 
 from validation.results import COMPARISONS, HISTORIES, write_whole
 
+#: What a history's files are called after its name.
+SUFFIXES = {".csv", ".events.csv"}
 #: A result that no run has used for so long is removed, s.
 KEEP = 14 * 86400.0
 
@@ -55,7 +57,7 @@ class Store:
         base = self.folder / HISTORIES
         record = _read(base / f"{name}.json")
         files = record.pop("files", None) if record else None
-        if record is None or not isinstance(files, dict) or ".csv" not in files:
+        if record is None or not isinstance(files, dict) or ".csv" not in files or not files.keys() <= SUFFIXES:
             return None
         for suffix, expected in files.items():
             path = base / f"{name}{suffix}"

@@ -487,3 +487,15 @@ def test_nothing_received_is_executed():
         imports |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
         assert not names & {"eval", "exec", "compile", "__import__"}, path
         assert path.name == "remote.py" or not imports & {"pickle", "marshal", "shelve", "dill", "cloudpickle"}, path
+
+
+def test_a_record_names_no_file_but_its_own(tmp_path, stored):
+    """Found by fuzzing: a record that names a file with a name too long, or elsewhere, is as good as none."""
+    store = Store(tmp_path)
+    store.put("a", {suffix: stored[suffix] for suffix in (".csv", ".events.csv")}, {})
+    assert store.get("a") == {}
+    record = tmp_path / "histories" / "a.json"
+    files = json.loads(record.read_text())["files"]
+    for name in ("x" * 5000, "/../../../../etc/passwd", "\0", "\ud800"):
+        record.write_text(json.dumps({"files": {**files, name: "0"}}))
+        assert store.get("a") is None
