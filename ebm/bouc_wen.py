@@ -103,6 +103,7 @@ from ebm.transitions import (
     G_UPLIFT_PLUS,
     GUARDS,
     closed_wall,
+    guards_of,
     slip_velocity,
 )
 from scenes.compiled import inner_kernel, kernel
@@ -428,7 +429,7 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
             h = _step_size(a, XI, Z, order - 1, control.tolerance, h)
             if m[FAMILY] == TILT:
                 h = _step_size(a, PHI, COS, order, control.tolerance, h)
-        tau, which = _first_event(b, m, order, 0.0, h, a, stack)
+        tau, which = _first_event(b, m, order, 0.0, h, guards_of(b, m), a, stack)
         if moving and m[SLIP] * a[Z, 0] <= -1e-13:
             for k in range(order):
                 a[GUARD, k] = -m[SLIP] * a[Z, k]

@@ -107,12 +107,16 @@ _FLUSH_SPIN, _FLUSH_SPEED, _FLUSH_GAP = 2e-4, 2.5e-4, 6e-7
 # This far beyond the limits of rest, g, the guards of what follows are above their noise.
 _BEYOND = 4.0 * FORCE_NOISE
 _TOUCH = 1e-11
+# A block that lands this near to a wall lands flush against it: the root of its far gap says no more (see _LANDED).
+_FLUSH = 1e-9
 # A pivot that slips more slowly than this after an impact stands: the impact law says so up to rounding.
 _STOPPED = 1e-10
 # Near phi = 0 the far gap goes with phi^2, so that its root says phi to the square root of rounding only.
 _LANDED = 1e-7
 # After so many events without a step the modes hand over to each other for rounding; after so many more the run fails.
 _HANDED_OVER, _MOST_ZERO_STEPS = 20, 36
+# The guards of open contacts, which hold even then.
+_OPEN_CONTACTS = (1 << G_FAR_GAP + 1) - 1
 
 
 class Control(NamedTuple):
@@ -183,6 +187,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
     rows = steps = events = wall_impacts = zero_steps = 0
     peak, t_rest = abs(z[THETA]), np.nan
     ending = DONE
+    held = False
     m[FAMILY], m[S], m[FLOOR], m[PULL] = FLAT, 1, STICK, 1  # most often it stands
     stands = z[THETA] == 0.0 and z[VX] == 0.0 and z[W] == 0.0 and z[HEIGHT] == b.cos_alpha and not b.walls
     if not (stands and consistent(b, m, z, gh, gv, t, a)) and not select(b, z, gh, gv, t, left, m, a):
@@ -199,7 +204,9 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
                 limit = min(limit, b.mu_s)
             if zero_steps > 0:  # rest goes on: what exceeds its limit is noise
                 limit += _BEYOND
-            until = next_exceedance(gh, t, -np.inf if m[FAR] != 0 else -limit, np.inf if m[TIP] != 0 else limit)
+            # After an exceedance that is over within an instant it looks from there on.
+            after = t if zero_steps == 0 else t + INSTANT
+            until = next_exceedance(gh, after, -np.inf if m[FAR] != 0 else -limit, np.inf if m[TIP] != 0 else limit)
             if math.isnan(t_rest):
                 t_rest = t
             stop = min(until, t_end)
@@ -210,10 +217,10 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             if until >= t_end:
                 t = t_end if not control.until_decided else t
                 break
-            if until == t and zero_steps > _MOST_ZERO_STEPS:
+            if zero_steps > _MOST_ZERO_STEPS:
                 ending = NO_MODE
                 break
-            zero_steps = zero_steps + 1 if until == t else 0
+            zero_steps = zero_steps + 1 if until <= t + 2.0 * INSTANT else 0
             t = until
             left[:] = m
             m[:] = 0  # most often it rocks
@@ -247,11 +254,13 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         end = min(min(next_kink(gh, t), next_kink(gv, t)), t_end)
         reach = end - t
         order, pivot, h = _expand(b, m, z, gh, gv, t, reach, control, a)
-        tau, which = _first_event(b, m, order, pivot, h, a, stack)
-        if zero_steps >= _HANDED_OVER and tau <= 0.0 and which > G_FAR_GAP:
+        tau, which = _first_event(b, m, order, pivot, h, guards_of(b, m), a, stack)
+        held = zero_steps >= _HANDED_OVER and tau <= 0.0 and which > G_FAR_GAP and not held
+        if held:
             # Modes that hand over to each other at one instant differ by rounding: any will do for a little while.
             zero_steps += 1
-            tau, which = min(h, INSTANT * 2.0 ** (zero_steps - _HANDED_OVER)), -1
+            h = min(h, INSTANT * 2.0 ** (zero_steps - _HANDED_OVER))
+            tau, which = _first_event(b, m, order, pivot, h, guards_of(b, m) & _OPEN_CONTACTS, a, stack)
         if not math.isfinite(tau) or zero_steps > _MOST_ZERO_STEPS:
             ending = NO_MODE if math.isfinite(tau) else NOT_FINITE
             break
@@ -358,14 +367,13 @@ def _expand(b, m, z, gh, gv, t, reach, control, a):
 
 
 @inner_kernel
-def _first_event(b, m, order, pivot, h, a, stack):
-    """The first time within the step at which a guard ends the mode, and which guard; h and -1 where none does."""
+def _first_event(b, m, order, pivot, h, mask, a, stack):
+    """The first time within the step at which a guard among `mask` ends the mode, and which; h and -1 where none does."""
     rocks = m[FAMILY] == TILT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
     if rocks and m[PULL] > 0 and rock_guards_hold(b, order, b.walls, h, a):
         tau = first_root(a, PHI, order, h, POSITION_NOISE, stack)
         return (h, -1) if tau == NO_ROOT else (tau, G_PHI)
     tau, which = h, -1
-    mask = guards_of(b, m)
     for k in range(GUARDS):
         degree = guard(b, m, k, order, pivot, a) if mask >> k & 1 else -1
         if degree >= 0:
@@ -376,7 +384,7 @@ def _first_event(b, m, order, pivot, h, a, stack):
                     tau, which = AHEAD, -1
             elif root != NO_ROOT and root < tau:
                 tau, which = root, k
-    if G_PUSH <= which <= G_CONE_MINUS and tau > 0.25 * h:
+    if which >= G_PUSH and which != G_SLIP and tau > 0.25 * h:
         # A force is the second derivative of a truncated series: its zero is found to rounding from nearby only.
         return 0.9 * tau, -1
     return tau, which
@@ -468,9 +476,9 @@ def _upright(b, m, z):
     if m[FLOOR] != OFF or closed_floor(b, z):
         z[HEIGHT] = b.cos_alpha
     z[THETA] = 0.0
-    if abs(z[X] + b.gap_left) < _TOUCH:
+    if abs(z[X] + b.gap_left) < _FLUSH:
         z[X] = -b.gap_left
-    elif abs(b.gap_right - z[X]) < _TOUCH:
+    elif abs(b.gap_right - z[X]) < _FLUSH:
         z[X] = b.gap_right
 
 

@@ -1,0 +1,177 @@
+"""Scenes, by name, in which a model once found no mode or no impact to go on with: they run, and their contacts hold."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from ebm import EventBasedModel
+from ebm.batch import pack, run_batch
+from scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+
+PAPER = Block(half_width=0.397, half_height=1.555)
+SQUARE = Block(half_width=7.069, half_height=7.069)
+
+
+def both(left: float, right: float, e: float) -> tuple[Wall, Wall]:
+    return Wall(side="left", gap=left, restitution=e), Wall(side="right", gap=right, restitution=e)
+
+
+def scene_of(block: Block, friction: float, duration: float, **more: object) -> Scene:
+    return Scene(name="rare", block=block, floor=Floor(friction=friction), duration=duration, output_step=duration / 200.0, **more)
+
+
+SCENES = {
+    # The corner lets go of the wall at the instant at which the floor's force turns.
+    "release on the ladder": scene_of(
+        PAPER,
+        0.3,
+        4.0,
+        walls=[Wall(side="left", gap=0.003)],
+        excitation=Ricker(amplitude=27.828295819935693, period=1.030200737875156),
+    ),
+    "no room between walls": scene_of(SQUARE, 0.3, 1.0, walls=both(0.0, 0.0, 0.9), initial_velocity=1.33),
+    "no room, elastic walls": scene_of(PAPER, 0.3, 1.0, walls=both(0.0, 0.0, 1.0), initial_velocity=-0.5, initial_angular_velocity=0.2),
+    "wedged": scene_of(
+        Block(half_width=0.2767571700542464, half_height=1.842522521858856),
+        1.0755489589847906,
+        0.0423,
+        walls=[Wall(side="left", gap=0.0), Wall(side="right", gap=4.4275213258795984e-05)],
+        excitation=Record.from_samples([17.01251771455549, 3.1933179172065307, 0.0], 0.02356894360863881),
+        initial_angular_velocity=0.49573088587126474,
+        initial_velocity=1.072157064841811,
+        gravity=10.0,
+    ),
+    "no friction, shaken both ways": scene_of(
+        PAPER, 0.0, 6.0, excitation=Ricker(amplitude=8.0, period=0.9), vertical=Ricker(amplitude=-6.0, period=0.6)
+    ),
+    "no friction, a wall that is touched": scene_of(
+        PAPER,
+        0.0,
+        6.0,
+        walls=[Wall(side="right", gap=0.0)],
+        excitation=Ricker(amplitude=8.0, period=0.9),
+        vertical=Ricker(amplitude=6.0, period=0.6),
+    ),
+    # mu = 0.6 is the slip limit of a square block that lands: cone and landing are one instant.
+    "square block that lands at its slip limit": scene_of(
+        Block(half_width=0.5, half_height=0.5), 0.6, 4.0, initial_rotation=0.5, excitation=Rest()
+    ),
+    "weight that turns around": scene_of(
+        PAPER, 0.5, 3.0, excitation=Ricker(amplitude=3.0, period=1.0), vertical=Sine(amplitude=14.0, period=1.1, cycles=2)
+    ),
+    "spikes from below": scene_of(
+        Block(half_width=0.088, half_height=0.996),
+        0.354,
+        0.003,
+        vertical=Record.from_samples([0.0] * 18 + [1017.0, 0.0, -223.0, 0.0], 0.000126),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("settings", [{}, {"tolerance": 1e-8}, {"pivot": "unilateral"}, {"friction": "bouc-wen"}], ids=str)
+def test_it_runs(name, settings):
+    scene = SCENES[name]
+    history = EventBasedModel(**settings).simulate(scene)
+    motion, length = history.channels, scene.block.radius
+    assert all(np.all(np.isfinite(motion[channel])) for channel in ("x", "y", "theta"))
+    assert np.min(kinematics.pivot_height(scene.block, motion["y"], motion["theta"])) > -1e-9 * length
+    for wall in scene.walls:
+        assert np.min(kinematics.wall_gap(scene, wall.side, motion["x"], motion["theta"])) > -1e-9 * length
+
+
+@pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
+@pytest.mark.parametrize("name", ["no room between walls", "no room, elastic walls"])
+def test_without_room_nothing_moves(name, pivot):
+    motion = EventBasedModel(pivot=pivot).simulate(SCENES[name]).channels
+    assert np.max(np.abs(motion["x"])) < 1e-9
+    assert np.max(np.abs(motion["theta"])) < 1e-9
+
+
+def test_a_landing_at_the_slip_limit_takes_its_energy():
+    """Housner's ratio for 45 degrees is 1/4: the tilt falls with each landing, and the block comes to rest."""
+    history = EventBasedModel().simulate(SCENES["square block that lands at its slip limit"])
+    assert history.outcome == "at rest"
+    assert len(history.event_list) < 60
+
+
+def test_a_pivot_that_cannot_slip_has_no_slip_velocity():
+    with pytest.raises(InputError, match="initial_velocity"):
+        EventBasedModel(friction="no-slip").simulate(scene_of(PAPER, 0.3, 1.0, initial_velocity=0.1))
+
+
+def test_a_vertical_record_of_zeros_is_none():
+    """It costs no step at each of its samples."""
+    scene = scene_of(PAPER, 0.5, 5.0, excitation=Ricker(amplitude=4.0, period=1.0))
+    flat = scene.replace(vertical=Record.from_samples(np.zeros(1000), 0.005))
+    one, other = (EventBasedModel().simulate(each) for each in (scene, flat))
+    assert other.cost.steps == one.cost.steps
+    np.testing.assert_array_equal(other.channels["theta"], one.channels["theta"])
+
+
+@pytest.mark.parametrize("settings", [{}, {"pivot": "unilateral"}, {"friction": "no-slip"}], ids=str)
+def test_random_pulses_between_walls(settings):
+    """A thousand pulses between walls that are touched or nearly so: every one is played to its end."""
+    random = np.random.default_rng(7)
+    model = EventBasedModel(tolerance=1e-8, **settings)
+    gaps = (0.0, 0.003, 0.053)
+    scenes = [
+        scene_of(
+            PAPER,
+            float(random.choice([0.0, 0.1, 0.3, 1.2])),
+            6.0,
+            walls=both(float(random.choice(gaps)), float(random.choice(gaps)), float(random.choice([0.0, 0.5, 1.0]))),
+            excitation=Ricker(amplitude=float(random.uniform(-30.0, 30.0)), period=float(random.uniform(0.4, 4.0))),
+        )
+        for _ in range(1000)
+    ]
+    assert not run_batch(pack(scenes, model), model, until_decided=False, strict=False).failed.any()
+
+
+@pytest.mark.parametrize(("amplitude", "period", "friction"), [(6.0, 1.0, 0.3), (-9.0, 0.7, 1.0), (5.0, 1.5, 0.6)])
+def test_a_decided_run_has_the_peak_of_the_whole_run(amplitude, period, friction):
+    """Deciding early, when what is left of the pulse cannot lift the block above its peak, changes no peak."""
+    model = EventBasedModel(tolerance=1e-11)
+    scene = scene_of(PAPER, friction, 15.0, excitation=Ricker(amplitude=amplitude, period=period))
+    packed = pack([scene], model)
+    early, whole = run_batch(packed, model), run_batch(packed, model, until_decided=False)
+    assert early.series[0] < whole.series[0]
+    assert early.side[0] == whole.side[0]
+    assert early.peak[0] == pytest.approx(whole.peak[0], abs=1e-11)
+
+
+@pytest.mark.parametrize("symmetric", [False, True])
+def test_impulse_ahead_is_the_integral(symmetric):
+    from scipy.integrate import quad
+
+    from ebm.ground import acceleration, ground_of, impulse_ahead
+
+    ground = ground_of(Ricker(amplitude=5.0, period=1.3, symmetric=symmetric), 9.81, 0.4)
+    for share in (1.3, 1.6, 2.2):
+        t = ground.centre + share / math.sqrt(ground.rate)
+        there, _ = quad(lambda s: abs(acceleration(ground, s)), t, ground.quiet, epsabs=1e-15, epsrel=1e-12)
+        assert impulse_ahead(ground, t) == pytest.approx(there, rel=1e-9)
+    assert impulse_ahead(ground, ground.centre) == math.inf
+
+
+def test_inner_kernels_return_no_arrays():
+    """They are compiled without reference counts, so that an array that they returned would be freed too early."""
+    from numba.core.types import Array, BaseTuple
+
+    from ebm import contact_impacts, ground, impacts, motion, series, trajectory, transitions
+
+    EventBasedModel().simulate(SCENES["wedged"])
+    checked = 0
+    for module in (contact_impacts, ground, impacts, motion, series, trajectory, transitions):
+        for function in vars(module).values():
+            if getattr(function, "targetoptions", {}).get("_nrt") is not False:
+                continue
+            for compiled in function.overloads.values():
+                result = compiled.signature.return_type
+                parts = list(result) if isinstance(result, BaseTuple) else [result]
+                assert not any(isinstance(part, Array) for part in parts), function.__name__
+                checked += 1
+    assert checked > 0
