@@ -58,7 +58,7 @@ FINE, MOST_ROWS = 64, 4000
 #: A contact counts as closed, a slip as seen, beyond these; conditions are not asked for within this time of an event or a jump.
 CLOSED, SLIPS, NEAR = 1e-8, 1e-9, 1e-9
 #: An integral is believed where a rule of order 6 gives the same to this, relatively: that of order 10 is then off by far less.
-RESOLVED = 1e-9
+RESOLVED = 1e-10
 #: Kinds of motion by the contacts they have.
 ON_FLOOR = ("rest", "slide", "rock", "slide-rock", "lean", "ladder")
 STANDS = ("rest", "rock", "lean")
