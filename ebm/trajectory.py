@@ -114,7 +114,7 @@ _STOPPED = 1e-10
 # Near phi = 0 the far gap goes with phi^2, so that its root says phi to the square root of rounding only.
 _LANDED = 1e-7
 # After so many events without a step the modes hand over to each other for rounding; after so many more the run fails.
-_HANDED_OVER, _MOST_ZERO_STEPS = 20, 36
+_HANDED_OVER, _MOST_ZERO_STEPS = 20, 54
 # The guards of open contacts, which hold even then.
 _OPEN_CONTACTS = (1 << G_FAR_GAP + 1) - 1
 
@@ -259,7 +259,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         if held:
             # Modes that hand over to each other at one instant differ by rounding: any will do for a little while.
             zero_steps += 1
-            h = min(h, INSTANT * 2.0 ** (zero_steps - _HANDED_OVER))
+            h = min(h, INSTANT * 2.0 ** (0.5 * (zero_steps - _HANDED_OVER)))
             tau, which = _first_event(b, m, order, pivot, h, guards_of(b, m) & _OPEN_CONTACTS, a, stack)
         if not math.isfinite(tau) or zero_steps > _MOST_ZERO_STEPS:
             ending = NO_MODE if math.isfinite(tau) else NOT_FINITE
