@@ -187,7 +187,6 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
     rows = steps = events = wall_impacts = zero_steps = 0
     peak, t_rest = abs(z[THETA]), np.nan
     ending = DONE
-    held = False
     m[FAMILY], m[S], m[FLOOR], m[PULL] = FLAT, 1, STICK, 1  # most often it stands
     stands = z[THETA] == 0.0 and z[VX] == 0.0 and z[W] == 0.0 and z[HEIGHT] == b.cos_alpha and not b.walls
     if not (stands and consistent(b, m, z, gh, gv, t, a)) and not select(b, z, gh, gv, t, left, m, a):
@@ -255,8 +254,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         reach = end - t
         order, pivot, h = _expand(b, m, z, gh, gv, t, reach, control, a)
         tau, which = _first_event(b, m, order, pivot, h, guards_of(b, m), a, stack)
-        held = zero_steps >= _HANDED_OVER and tau <= 0.0 and which > G_FAR_GAP and not held
-        if held:
+        if zero_steps >= _HANDED_OVER and tau <= 0.0 and which > G_FAR_GAP:
             # Modes that hand over to each other at one instant differ by rounding: any will do for a little while.
             zero_steps += 1
             h = min(h, INSTANT * 2.0 ** (0.5 * (zero_steps - _HANDED_OVER)))
