@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from difflib import get_close_matches
+from pathlib import PurePath
 
 from pydantic import ValidationError
 
@@ -39,9 +40,9 @@ def suggestion(name: str, allowed: Iterable[str]) -> str:
 
 
 def printable(value: object, limit: int = 80) -> str:
-    """`value` as one short line without control characters, safe to write to a terminal."""
+    """`value` as one short line without control characters, safe to write to a terminal; a path is never shortened."""
     text = "".join(c if c.isprintable() else "?" for c in str(value))
-    return text if len(text) <= limit else text[: limit - 3] + "..."
+    return text if len(text) <= limit or isinstance(value, PurePath) else text[: limit - 3] + "..."
 
 
 def from_validation(error: ValidationError, keys: Iterable[str] = ()) -> InputError:

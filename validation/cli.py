@@ -6,9 +6,11 @@ Exit codes: 0 pass, 1 out of tolerance, 2 bad input, 3 a model failed.
 from __future__ import annotations
 
 import inspect
+import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -107,7 +109,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.close()  # the reader of a pipe has gone: nobody is left to be told
         return 141
     except OSError as error:  # a disk that is full, a folder that has gone: what was written before is whole
-        return _told(f"{printable(error.filename or 'output')}: cannot be used: {error.strerror or error}", 2)
+        return _told(f"{printable(Path(os.fsdecode(error.filename or 'output')))}: cannot be used: {error.strerror or error}", 2)
     except MemoryError:
         return _told("out of memory; what was finished is kept", 3)
     if code == INTERRUPTED:  # Typer has caught it
@@ -116,7 +118,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _told(message: str, code: int) -> int:
-    print(f"rockcheck: {printable(message, 500)}", file=sys.stderr)
+    print(f"rockcheck: {printable(message, 5000)}", file=sys.stderr)
     return code
 
 

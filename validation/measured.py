@@ -18,6 +18,7 @@ import numpy as np
 from scenes import History, InputError, Scene
 from scenes.base import Finite, Frozen
 from scenes.errors import printable
+from scenes.history import outcome_of
 
 TIMES = {"s": 1.0, "ms": 1e-3}
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
@@ -83,7 +84,8 @@ def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
         if name in history.channels:
             channels[name] = history.channels[name] if factor == 1.0 else factor * history.channels[name]
     channels["t"] = channels["t"] + offset
-    return dataclasses.replace(history, channels=channels)
+    si = all(factor == 1.0 for _, factor in columns.values())
+    return dataclasses.replace(history, channels=channels, outcome=history.outcome if si else outcome_of(channels))
 
 
 def _meaning(column: str, shown: str) -> tuple[str, float]:
