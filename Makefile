@@ -11,7 +11,7 @@ validate: $(VENV)/.ready ## run the suite `paper` and write rockcheck-report/ind
 	$(BIN)/rockcheck validate paper
 
 test: $(VENV)/.ready ## the everyday tests
-	$(BIN)/python -m pytest -q -m "not slow"
+	$(BIN)/python -m pytest -q -m "not slow" -n auto --dist loadfile
 
 test-all: $(VENV)/.ready ## also the slow ones
 	$(BIN)/python -m pytest -q
