@@ -118,7 +118,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _told(message: str, code: int) -> int:
-    print(f"rockcheck: {printable(message, 5000)}", file=sys.stderr)
+    print(f"rockcheck: {printable(message, 1400)}", file=sys.stderr)
     return code
 
 
