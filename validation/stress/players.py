@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Literal
 
@@ -21,7 +22,7 @@ AUDIT = 10
 
 
 @dataclass(frozen=True)
-class Player:
+class Player(ABC):
     """A model under stress: its label, the kind of scenes that it can play, how many in a whole run, and in a quick one."""
 
     label: str
@@ -35,17 +36,17 @@ class Player:
         """Whether a broken invariant fails the command."""
         return self.label.startswith("ebm")
 
+    @abstractmethod
     def command(self, scene: Scene, number: int) -> str:
         """The options of `rockcheck simulate` with which this run can be made again."""
-        raise NotImplementedError
 
     def scene(self, seed: int, number: int) -> Scene:
         """Its scene of that number."""
         return random_scene(seed, number, self.kind)
 
+    @abstractmethod
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> Played:
         """Plays the scene and checks what the model is held to."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)

@@ -325,7 +325,7 @@ def write_smallest(failure: Failure, folder: Path) -> str:
     def shows(scene: Any) -> bool:
         try:
             played = player.check(scene, seed, number, name)
-        except Exception:
+        except Exception:  # a smaller scene that fails in another way does not show this one
             return False
         return name in played.broken and played.figures[name] >= least
 
