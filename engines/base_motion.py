@@ -41,19 +41,28 @@ class BaseVelocity:
         return self.sums[index] + self.interval * part * (here + 0.5 * part * (self.samples[index + 1] - here))
 
 
-def felt_acceleration(scene: Scene, edges: FloatArray) -> FloatArray:
-    """What the block feels, -u and -(g + vg) in m/s^2, as means over the steps between the times `edges`; shape (steps, 2)."""
-    lengths, times = np.diff(edges), edges.tolist()
-    across, up = (np.diff([*map(BaseVelocity(e), times)]) / lengths for e in (scene.excitation, scene.vertical))
-    return -np.column_stack([across, scene.gravity + up])
+class BaseMotion:
+    """The base motion of a scene along both axes; `starts` are times at which it may set a resting block in motion."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.across, self.up, self.gravity = BaseVelocity(scene.excitation), BaseVelocity(scene.vertical), scene.gravity
+        self.starts = _starts_of_motion(scene, np.unique(np.concatenate([self.across.times, self.up.times])))
+
+    def velocity(self, t: float) -> tuple[float, float]:
+        """Velocity of the base to the right and up in m/s at the time `t` >= 0 in s."""
+        return self.across(t), self.up(t)
+
+    def felt_acceleration(self, edges: FloatArray) -> FloatArray:
+        """What the block feels, -u and -(g + vg) in m/s^2, as means over the steps between the times `edges`; shape (steps, 2)."""
+        gained = np.diff([self.velocity(t) for t in edges.tolist()], axis=0)
+        return -gained / np.diff(edges)[:, None] - np.array([0.0, self.gravity])
 
 
-def starts_of_motion(scene: Scene) -> list[float]:
+def _starts_of_motion(scene: Scene, times: FloatArray) -> list[float]:
     """Times in order at which a block at rest, flat on the floor, may start or stop to slide or to tip, s.
 
-    There |u| passes mu (g + vg) or tan(alpha) (g + vg).
+    There |u| passes mu (g + vg) or tan(alpha) (g + vg); accelerations are taken to be linear between `times`.
     """
-    times = np.unique(np.concatenate([BaseVelocity(e).times for e in (scene.excitation, scene.vertical)]))
     pushing = np.abs(scene.excitation.acceleration(times))
     holding = scene.gravity + scene.vertical.acceleration(times)
     found = []

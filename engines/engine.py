@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import field_validator, model_validator
 
 from engines.adaptive import Push, march_adaptively
-from engines.base_motion import felt_acceleration
+from engines.base_motion import BaseMotion
 from engines.contacts import contacts_of
 from engines.events import events_of
 from scenes import Block, Cost, History, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall
@@ -108,17 +108,18 @@ class Engine(Frozen):
         start = time.perf_counter()
         unit = scene.block.radius if self.settings == "best" else 1.0  # of length, m
         played = in_units_of(unit, scene)
+        base = BaseMotion(played)
         march: Callable[[], Marched]
         with ExitStack() as stack:
             if self.time_step == "adaptive":
                 rigid = self.rigid_world(played)
                 stack.callback(rigid.close)
-                march = partial(march_adaptively, played, rigid.push, step)
+                march = partial(march_adaptively, played, base, rigid.push, step)
             else:
                 world = self.rigid_world(played) if self.settings == "best" else self.stock_world(played)
                 stack.callback(world.close)
                 times = step * np.arange(math.ceil(scene.output_times[-1] / step - 1e-9) + 1)
-                march = partial(_march, world, played, times, felt_acceleration(played, times))
+                march = partial(_march, world, played, times, base.felt_acceleration(times))
             begin, begin_cpu = time.perf_counter(), time.process_time()
             times, states, felt = march()
             cost = Cost(
