@@ -15,12 +15,15 @@ from pathlib import Path
 
 import pytest
 
+from scenes import Scene, load_scene
 from validation import store as stores
 from validation.cli import main
 from validation.results import HISTORIES, write_whole
 from validation.store import Store
 from validation.stress import study
-from validation.stress.study import Chunk
+from validation.stress.invariants import Played
+from validation.stress.players import PLAYERS, EventBased
+from validation.stress.study import Batch, Chunk, Failure
 
 ROCKCHECK = [sys.executable, "-m", "validation.cli"]
 posix = pytest.mark.skipif(sys.platform == "win32", reason="limits and signals as POSIX has them")
@@ -146,6 +149,58 @@ def test_worker_lost_or_hanging(tmp_path, monkeypatch):
     assert sum(batch.runs for batch in batches) == 7
     failures = {failure.number: failure.words for batch in batches for failure in batch.failures}
     assert failures == {3: "the process ended with code 9", 13: "hangs"}
+
+
+def test_shrinking_that_hangs(tmp_path, monkeypatch):
+    """However long the trials of a failing scene take: shrinking ends, and each scene is as small as was found till then."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent / "runs"))
+    import deadly
+
+    numbers = (3, 4, 5, 13)
+    failures = tuple(Failure("ebm", "mirror", 1, number, 1.0) for number in numbers)
+    batch = study.write_failures({"ebm": Batch(model="ebm", runs=20, failures=failures)}, tmp_path)["ebm"]
+    found = {number: load_scene(tmp_path / failure.file) for number, failure in zip(numbers, batch.failures, strict=True)}
+    assert found[3].excitation == PLAYERS["ebm"].scene(1, 3).excitation
+    monkeypatch.setattr(study, "shrink_file", deadly.shrink_file)
+    monkeypatch.setattr(study, "HANGING", 1.0)
+    began = time.monotonic()
+    study._shrink(batch.failures, tmp_path, 2, 12.0, lambda *_: None)
+    assert time.monotonic() - began < 60.0
+    files = {number: tmp_path / failure.file for number, failure in zip(numbers, batch.failures, strict=True)}
+    small = {number: load_scene(file) for number, file in files.items()}
+    assert small[3].excitation.kind == "rest"
+    assert len(small[3].walls) == 1  # the trial without it is the one that hangs
+    assert small[4] != found[4]
+    assert small[5].duration < 0.1 * found[5].duration
+    assert small[13] == found[13]
+    remarks = {number: file.read_text().partition("rockcheck simulate")[0] for number, file in files.items()}
+    assert {number for number in numbers if "not the smallest" in remarks[number]} == {3, 4}
+    assert {number for number in numbers if "not shrunk" in remarks[number]} == {13}
+
+
+def test_shrinking_interrupted(tmp_path, monkeypatch, capsys):
+    """Ctrl-C while failures are shrunk: all of them are saved, each with its scene."""
+
+    def check(self: object, scene: Scene, seed: int, number: int, only: str = "") -> Played:
+        return Played(figures={"ends": 0.0, "mirror": 1.0}, outcome="at rest")
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(EventBased, "check", check)
+    monkeypatch.setattr(study, "_side_by_side", lambda work, jobs: (study.play_some(c.label, c.seed, c.first, c.count) for c in work))
+    monkeypatch.setattr(study, "_shrink", interrupt)
+    assert main(["stress", "runs", "--model", "ebm", "--runs", "30", "--out", str(tmp_path)]) == 130
+    assert "interrupted" in capsys.readouterr().err
+    data = json.loads((tmp_path / "run.json").read_text())
+    assert data["complete"] is False
+    failures = data["batches"]["ebm"]["failures"]
+    assert len(failures) == 30
+    files = [failure["file"] for failure in failures if failure["file"]]
+    assert len(files) == study.MOST_FILES
+    for file in files:
+        assert "not shrunk" in (tmp_path / file).read_text()
+        load_scene(tmp_path / file)
 
 
 @posix

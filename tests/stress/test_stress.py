@@ -207,8 +207,15 @@ def test_shrinking_drops_all_that_does_not_matter(tmp_path):
     def shows(one: Scene) -> bool:
         return isinstance(one.excitation, Record) and max(one.excitation.unscaled) > 2.0 and one.wall("right") is not None
 
-    small = shrink(scene, shows, trials=2000)
-    assert shows(small)
+    told: list[Scene] = []
+    small, complete = shrink(scene, shows, trials=2000, smaller=told.append)
+    assert complete
+    assert all(map(shows, told))
+    assert told[-1] == small
+    early, complete = shrink(scene, shows, trials=3)
+    assert early in told
+    assert not complete
+    assert shrink(scene, shows, seconds=-1.0) == (scene, False)
     assert len(small.excitation.unscaled) < 20
     assert [wall.side for wall in small.walls] == ["right"]
     assert small.walls[0].gap == small.walls[0].restitution == 0.0
@@ -238,13 +245,13 @@ def test_work_is_all_runs_once():
 
 def test_a_failure_is_shown_with_its_smallest_scene(tmp_path, monkeypatch, capsys):
     """An event-based model that breaks an invariant: exit 1, counted, and a scene file that a user can play."""
-    player = dataclasses.replace(PLAYERS["ebm"], runs=4)
 
     def check(self: object, scene: Scene, seed: int, number: int, only: str = "") -> Played:
         return Played(figures={"ends": 0.0, "mirror": 3.0 if scene.walls else 0.0}, outcome="at rest")
 
-    monkeypatch.setattr(type(player), "check", check)
+    monkeypatch.setattr(type(PLAYERS["ebm"]), "check", check)
     monkeypatch.setattr(study, "_side_by_side", lambda work, jobs: (play_some(c.label, c.seed, c.first, c.count) for c in work))
+    monkeypatch.setattr(study, "_shrink", lambda failures, folder, *_: [study.shrink_file(one, folder, 10.0) for one in failures])
     assert main(["stress", "runs", "--model", "ebm", "--runs", "12", "--out", str(tmp_path)]) == 1
     said = capsys.readouterr().out
     found = json.loads((tmp_path / "run.json").read_text())["batches"]["ebm"]

@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, as_completed
 from dataclasses import dataclass
-from multiprocessing import get_context
 from typing import Any, Literal
 
 import numpy as np
@@ -20,9 +18,8 @@ from scenes import Block, Floor, InputError, ModelFailure, Record, Rest, Ricker,
 from scenes.errors import printable
 from validation.models import build
 from validation.stress.players import energy_without_source
-from validation.workers import prepare
+from validation.stress.processes import loss_of, workers
 
-Progress = Callable[[int, int, str], None]
 Axis = Literal["size", "friction", "restitution", "shaking"]
 
 SLOPE = math.tan(0.25)
@@ -46,6 +43,8 @@ DEEPEST, MOST_ENERGY = 0.02, 0.1
 #: Stand-still runs: a block left alone, one that is pushed or shaken, and in a quick run, s; and the step (s).
 HOUR, PUSHED, QUICK_REST, REST_STEP = 3600.0, 300.0, 10.0, 5e-3
 QUICK_STEPS, QUICK_VALUES = STEPS[1:-1:2], 2
+#: Memory that a worker may take, MB.
+MEMORY = 4096.0
 
 
 @dataclass(frozen=True)
@@ -216,24 +215,49 @@ def stand_still(label: str, case: str, duration: float, step: float = REST_STEP)
     )
 
 
-def run_stability(*, quick: bool = False, jobs: int | None = None, progress: Progress = lambda done, of, text: None) -> Stability:
-    """The maps of all `LINES`; `quick` has fewer values and steps, and a minute for the hour."""
+@dataclass(frozen=True)
+class Task:
+    """One place of a map for one worker; it may take so many `seconds`, far more than it needs."""
+
+    find: Callable[..., Still | Stable]
+    arguments: tuple[Any, ...]
+    seconds: float = 600.0
+
+    def lost(self, fault: str) -> Still | Stable:
+        """What stands in its place where its process hangs or dies."""
+        label, case_or_axis, value, step = self.arguments
+        if self.find is stand_still:
+            return Still(label, case_or_axis, value, step, fault=fault)
+        return Stable(label, case_or_axis, value, math.nan, fault)
+
+
+def tasks(quick: bool = False) -> list[Task]:
+    """The maps of all `LINES`, the longest tasks first; `quick` has fewer values and steps, and seconds for the hour."""
     steps = QUICK_STEPS if quick else STEPS
     values = {axis: some[:: max(1, len(some) // QUICK_VALUES)] if quick else some for axis, some in AXES.items()}
-    stills = [
-        (label, case, QUICK_REST if quick else PUSHED if CASES[case] else HOUR, REST_STEP)
+    still = [
+        Task(stand_still, (label, case, QUICK_REST if quick else PUSHED if CASES[case] else HOUR, REST_STEP))
         for case, label in itertools.product(CASES, LINES)
     ]
-    asked = [(label, axis, value, steps) for axis in AXES for value in values[axis] for label in LINES]
-    still: list[Still] = []
-    stable: list[Stable] = []
-    with ProcessPoolExecutor(jobs or os.cpu_count(), mp_context=get_context("spawn"), initializer=prepare, initargs=(4096.0,)) as pool:
-        resting, searching = [pool.submit(stand_still, *one) for one in stills], [pool.submit(largest_stable, *one) for one in asked]
-        total = len(resting) + len(searching)
-        for n, rest in enumerate(resting):
-            still.append(rest.result())
-            progress(n + 1, total, f"{still[-1].line}, {still[-1].case}")
-        for n, search in enumerate(searching):
-            stable.append(search.result())
-            progress(len(resting) + n + 1, total, f"{stable[-1].line}, {stable[-1].axis}")
-    return Stability(stable=tuple(stable), still=tuple(still))
+    return still + [Task(largest_stable, (label, axis, value, steps)) for axis in AXES for value in values[axis] for label in LINES]
+
+
+def play(work: Sequence[Task], jobs: int) -> Iterator[tuple[int, Still | Stable]]:
+    """Plays tasks in processes; yields (index, result) as they end."""
+    if not work:
+        return
+    with workers(jobs, MEMORY) as pool:
+        running: dict[Future[Any], int] = {
+            pool.schedule(task.find, args=task.arguments, timeout=task.seconds): n for n, task in enumerate(work)
+        }
+        for future in as_completed(running):
+            n, fault = running[future], loss_of(future)
+            yield n, work[n].lost(fault) if fault else future.result()
+
+
+def stability_of(found: Iterable[Still | Stable]) -> Stability:
+    """The maps of what was found."""
+    found = list(found)
+    return Stability(
+        stable=tuple(one for one in found if isinstance(one, Stable)), still=tuple(one for one in found if isinstance(one, Still))
+    )

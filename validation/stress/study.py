@@ -8,21 +8,22 @@ import os
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Future, as_completed, wait
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Literal
 
+from scenes import Scene
 from scenes.errors import printable
 from validation import provenance
 from validation.results import write_whole
-from validation.stress.invariants import INVARIANTS
+from validation.stress import stability
+from validation.stress.invariants import INVARIANTS, Played
 from validation.stress.players import PLAYERS
+from validation.stress.processes import loss_of, workers
 from validation.stress.shrinking import shrink, write_scene
-from validation.stress.stability import AXIS_WORDS, Stability, run_stability
-from validation.workers import ONE_THREAD, death, prepare
+from validation.stress.stability import AXIS_WORDS, Stability
 
 Progress = Callable[[int, int, str], None]
 What = Literal["all", "runs", "maps"]
@@ -33,13 +34,18 @@ SECONDS_A_RUN, SECONDS_AN_APPROXIMATE_RUN = 0.2, 2.0
 PATIENCE, COMPILING = 20.0, 600.0
 #: Memory that a worker may take, MB.
 MEMORY = 2048.0
-#: Failures of a model and an invariant of which the smallest scene is sought.
-SHRUNK, SHRUNK_QUICK = 3, 1
+#: Failures of a model and an invariant that are written as scenes; how long (s) all of them may be shrunk, in a whole run and in a
+#: quick one, after the processes have started, and the part of that for one of them. A process whose trial hangs is ended so much later.
+MOST_FILES = 20
+SHRINKING, SHRINKING_QUICK, ONE_FAILURE = 120.0, 10.0, 0.25
+STARTING, HANGING = 10.0, 5.0
+#: How often (s) what was found is saved during the runs.
+SAVING = 60.0
 
 
 @dataclass(frozen=True)
 class Failure:
-    """A run that breaks an invariant; `file` holds the smallest scene that shows it, where that was sought."""
+    """A run that breaks an invariant; `file` holds its scene, as small as was found in time."""
 
     model: str
     invariant: str
@@ -122,6 +128,14 @@ class Stress:
         return [failure for batch in self.batches.values() for failure in batch.failures]
 
 
+def _checked(label: str, scene: Scene, seed: int, number: int, only: str = "") -> Played:
+    """What a run shows; a fault of the program itself is a failure like any other."""
+    try:
+        return PLAYERS[label].check(scene, seed, number, only)
+    except Exception as error:
+        return Played(figures={"ends": math.inf}, failure=printable(f"{type(error).__name__}: {error}", 300))
+
+
 def play_some(label: str, seed: int, first: int, count: int) -> Batch:
     """Plays runs `first` to `first + count - 1` of a model under a seed."""
     player = PLAYERS[label]
@@ -134,11 +148,7 @@ def play_some(label: str, seed: int, first: int, count: int) -> Batch:
     events = gaining = horizons = 0
     largest_gain = 0.0
     for number in range(first, first + count):
-        try:
-            played = player.check(player.scene(seed, number), seed, number)
-        except Exception as error:  # a fault of the program itself is a failure like any other
-            failures.append(Failure(label, "ends", seed, number, math.inf, printable(f"{type(error).__name__}: {error}", 300)))
-            continue
+        played = _checked(label, player.scene(seed, number), seed, number)
         for name, figure in played.figures.items():
             looked_at[name] += 1
             size = math.inf if math.isnan(figure) else figure
@@ -214,90 +224,85 @@ def run_stress(
 ) -> Stress:
     """Plays `runs` scenes with each of the `models` (default: all, as many as `PLAYERS` says) in `jobs` processes (one a core).
 
-    Then ("all", or "maps" alone) it maps where engines and the continuous model break. The smallest scenes of failures go to
-    `failures/` in `folder`. Interrupted (Ctrl-C), it gives what was finished till then; `complete` is then false.
+    Then ("all", or "maps" alone) it maps where engines and the continuous model break. Interrupted (Ctrl-C), it gives what was
+    finished till then; `complete` is then false. In `folder` it saves what was found on the way, and the scenes of failures, which
+    it shrinks as long as `SHRINKING` says.
     """
     began, jobs = time.monotonic(), jobs or os.cpu_count() or 1
     labels = list(models or PLAYERS) if what != "maps" else []
-    work = chunks(seed, runs, quick, labels)
+    work, maps = chunks(seed, runs, quick, labels), stability.tasks(quick) if what != "runs" else []
     batches = {label: Batch(model=label) for label in labels}
-    total, done, complete = sum(chunk.count for chunk in work), 0, True
-    stability: Stability | None = None
+    places: dict[int, stability.Still | stability.Stable] = {}
+
+    def found(complete: bool = False) -> Stress:
+        return Stress(
+            suite=f"stress{', quick' if quick else ''}",
+            created=datetime.now(UTC).isoformat(timespec="seconds"),
+            seed=seed,
+            quick=quick,
+            jobs=jobs,
+            wall_seconds=time.monotonic() - began,
+            complete=complete,
+            versions=provenance.versions(),
+            hardware=provenance.hardware(),
+            batches=batches,
+            stability=stability.stability_of(place for _, place in sorted(places.items())) if places else None,
+        )
+
+    def keep() -> None:
+        nonlocal batches
+        if folder is not None and batches:
+            batches = write_failures(batches, folder)
+            save(found(), folder)
+
     try:
+        total, done, saved = sum(chunk.count for chunk in work), 0, time.monotonic()
         for batch in _side_by_side(work, jobs):
             batches[batch.model] += batch
             done += batch.runs
             progress(done, total, batch.model)
-        if folder is not None:
-            progress(done, max(total, 1), "smallest scenes")
-            most = SHRUNK_QUICK if quick else SHRUNK
-            batches = {label: replace(batch, failures=tuple(_shrunk(batch, folder, most))) for label, batch in batches.items()}
-        stability = run_stability(quick=quick, jobs=jobs, progress=progress) if what != "runs" else None
+            if folder is not None and time.monotonic() > saved + SAVING:
+                save(found(), folder)
+                saved = time.monotonic()
     except KeyboardInterrupt:
-        complete = False
-    return Stress(
-        suite=f"stress{', quick' if quick else ''}",
-        created=datetime.now(UTC).isoformat(timespec="seconds"),
-        seed=seed,
-        quick=quick,
-        jobs=jobs,
-        wall_seconds=time.monotonic() - began,
-        complete=complete,
-        versions=provenance.versions(),
-        hardware=provenance.hardware(),
-        batches=batches,
-        stability=stability,
-    )
+        keep()
+        return found()
+    keep()
+    try:
+        if folder is not None:
+            _shrink(found().failures, folder, jobs, SHRINKING_QUICK if quick else SHRINKING, progress)
+        for n, place in stability.play(maps, jobs):
+            places[n] = place
+            progress(len(places), len(maps), f"map of {place.line}")
+    except KeyboardInterrupt:
+        return found()
+    return found(complete=True)
 
 
 def _side_by_side(work: Sequence[Chunk], jobs: int) -> Iterator[Batch]:
     """Plays chunks in processes. A chunk whose process hangs or dies is halved until the run that did it stands alone."""
-    from pebble import ProcessPool
-
-    before = {key: os.environ.get(key) for key in ONE_THREAD}
-    os.environ.update(ONE_THREAD)
     waiting = list(reversed(work))
     running: dict[Future[Batch], Chunk] = {}
     started: set[str] = set()
-    try:
-        with ProcessPool(max_workers=jobs, context=get_context("spawn"), initializer=prepare, initargs=(MEMORY,)) as pool:
-            try:
-                while waiting or running:
-                    while waiting and len(running) < jobs + 1:
-                        chunk = waiting.pop()
-                        seconds = chunk.seconds + (0.0 if chunk.label in started else COMPILING)
-                        arguments = (chunk.label, chunk.seed, chunk.first, chunk.count)
-                        running[pool.schedule(play_some, args=arguments, timeout=seconds)] = chunk
-                    for future in wait(running, return_when=FIRST_COMPLETED).done:
-                        chunk = running.pop(future)
-                        fault = _fault(future)
-                        if not fault:
-                            started.add(chunk.label)
-                            yield future.result()
-                        elif chunk.count > 1:
-                            waiting += chunk.halves
-                        else:
-                            yield _lost(chunk, fault)
-            except BaseException:
-                pool.stop()
-                raise
-    finally:
-        for key, value in before.items():
-            os.environ.pop(key, None) if value is None else os.environ.update({key: value})
-
-
-def _fault(future: Future[Batch]) -> str:
-    """Why a process gave nothing back; empty where it did."""
-    from pebble import ProcessExpired
-
-    error = future.exception()
-    if error is None:
-        return ""
-    if isinstance(error, TimeoutError):
-        return "hangs"
-    if isinstance(error, ProcessExpired):
-        return death(int(error.exitcode or 0))
-    return printable(f"{type(error).__name__}: {error}", 300)
+    if not work:
+        return
+    with workers(jobs, MEMORY) as pool:
+        while waiting or running:
+            while waiting and len(running) < jobs + 1:
+                chunk = waiting.pop()
+                seconds = chunk.seconds + (0.0 if chunk.label in started else COMPILING)
+                arguments = (chunk.label, chunk.seed, chunk.first, chunk.count)
+                running[pool.schedule(play_some, args=arguments, timeout=seconds)] = chunk
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                chunk = running.pop(future)
+                fault = loss_of(future)
+                if not fault:
+                    started.add(chunk.label)
+                    yield future.result()
+                elif chunk.count > 1:
+                    waiting += chunk.halves
+                else:
+                    yield _lost(chunk, fault)
 
 
 def _lost(chunk: Chunk, fault: str) -> Batch:
@@ -305,36 +310,78 @@ def _lost(chunk: Chunk, fault: str) -> Batch:
     return Batch(model=chunk.label, runs=1, failures=(failure,), outcomes=Counter({"failed": 1}))
 
 
-def _shrunk(batch: Batch, folder: Path, most: int) -> Iterator[Failure]:
-    """The failures, the first few of each invariant with the smallest scene that shows them."""
-    sought: Counter[str] = Counter()
-    for failure in batch.failures:
-        sought[failure.invariant] += 1
-        if sought[failure.invariant] > most or (failure.figure == math.inf and failure.invariant == "ends"):
-            yield failure
-            continue
-        yield replace(failure, file=write_smallest(failure, folder))
+def write_failures(batches: dict[str, Batch], folder: Path) -> dict[str, Batch]:
+    """Writes the scenes of the first failures of each model and invariant, as they are, to `failures/`; the batches name them."""
+    place = folder / "failures"
+    place.mkdir(exist_ok=True)
+    for old in place.glob("*.toml"):
+        old.unlink()
+    kept = {}
+    for label, batch in batches.items():
+        written: Counter[str] = Counter()
+        failures = []
+        for failure in sorted(batch.failures, key=lambda one: one.number):
+            written[failure.invariant] += 1
+            if written[failure.invariant] <= MOST_FILES:
+                name = f"{label.replace(' ', '-')}-{failure.invariant}-{failure.seed}-{failure.number}.toml"
+                failure = replace(failure, file=f"failures/{name}")
+                _write(failure, PLAYERS[label].scene(failure.seed, failure.number), folder, "as it was found: not shrunk in time")
+            failures.append(failure)
+        kept[label] = replace(batch, failures=tuple(failures))
+    return kept
 
 
-def write_smallest(failure: Failure, folder: Path) -> str:
-    """Shrinks a failing run and writes it to `failures/`; returns the file's name."""
-    player = PLAYERS[failure.model]
-    name, number, seed = failure.invariant, failure.number, failure.seed
-    least = min(failure.figure, 100.0 * INVARIANTS[name].bound) if INVARIANTS[name].bound > 0.0 else 0.0
+def _write(failure: Failure, scene: Scene, folder: Path, remark: str = "") -> None:
+    file = folder / failure.file
+    command = f"rockcheck simulate {file.name} {PLAYERS[failure.model].command(scene, failure.number)}"
+    words = (f"{failure.invariant}: {INVARIANTS[failure.invariant].words}", printable(failure.words, 200), remark, command)
+    write_scene(scene, file, "\n".join(line for line in words if line))
 
-    def shows(scene: Any) -> bool:
+
+def _shrink(failures: Sequence[Failure], folder: Path, jobs: int, seconds: float, progress: Progress) -> None:
+    """Shrinks the scenes in `failures/` where they stand, in processes, for so long: what is small is there whatever ends it."""
+    turns: Counter[tuple[str, str]] = Counter()
+    queue = []
+    for failure in (one for one in failures if one.file):
+        turns[failure.model, failure.invariant] += 1
+        queue.append((not PLAYERS[failure.model].event_based, turns[failure.model, failure.invariant], failure))
+    if not queue:
+        return
+    each = ONE_FAILURE * seconds
+    with workers(jobs, MEMORY) as pool:
+        running = [
+            pool.schedule(shrink_file, args=(failure, folder, each), timeout=each + HANGING)
+            for *_, failure in sorted(queue, key=lambda entry: entry[:2])
+        ]
         try:
-            played = player.check(scene, seed, number, name)
-        except Exception:  # a smaller scene that fails in another way does not show this one
-            return False
-        return name in played.broken and played.figures[name] >= least
+            for done, _ in enumerate(as_completed(running, timeout=STARTING + seconds), 1):
+                progress(done, len(running), "smallest scenes")
+        except TimeoutError:
+            pool.stop()
 
-    scene = shrink(player.scene(seed, number), shows)
-    file = folder / "failures" / f"{failure.model.replace(' ', '-')}-{name}-{seed}-{number}.toml"
-    file.parent.mkdir(exist_ok=True)
-    remarks = f"{name}: {INVARIANTS[name].words}\n{printable(failure.words, 200)}".strip()
-    write_scene(scene, file, f"{remarks}\nrockcheck simulate {file.name} {player.command(scene, number)}")
-    return f"failures/{file.name}"
+
+def shrink_file(failure: Failure, folder: Path, seconds: float) -> None:
+    """Replaces the scene of a failing run by smaller and smaller ones that fail in the same way, until none is, or time is over."""
+    name = failure.invariant
+    least = (
+        min(failure.figure, 100.0 * INVARIANTS[name].bound) if INVARIANTS[name].bound > 0.0 else failure.figure if name == "ends" else 0.0
+    )
+    fault = failure.words.partition(":")[0]
+
+    def shows(scene: Scene) -> bool:
+        played = _checked(failure.model, scene, failure.seed, failure.number, name)
+        if name not in played.broken or not played.figures[name] >= least:
+            return False
+        return failure.figure < math.inf or played.failure.partition(":")[0] == fault  # of the program: the same one
+
+    def keep(scene: Scene) -> None:
+        _write(failure, scene, folder, "not the smallest: time was over before all that is simpler was tried")
+
+    scene = PLAYERS[failure.model].scene(failure.seed, failure.number)
+    if shows(scene):
+        smallest, complete = shrink(scene, shows, seconds=seconds, smaller=keep)
+        if complete:
+            _write(failure, smallest, folder)
 
 
 def summary_rows(found: Stress) -> list[dict[str, Any]]:

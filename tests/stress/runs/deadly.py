@@ -1,12 +1,17 @@
-"""Stands in for `validation.stress.study.play_some`, in worker processes: some runs kill their process, or never end."""
+"""Stands in for functions of `validation.stress.study`, in worker processes: some runs kill their process, or never end."""
 
 from __future__ import annotations
 
 import os
 import time
 from collections import Counter
+from pathlib import Path
 
-from validation.stress.study import Batch
+from scenes import Scene
+from validation.stress import study
+from validation.stress.invariants import Played
+from validation.stress.players import EventBased
+from validation.stress.study import Batch, Failure
 
 
 def play_some(label: str, seed: int, first: int, count: int) -> Batch:
@@ -17,3 +22,19 @@ def play_some(label: str, seed: int, first: int, count: int) -> Batch:
         if number == 13:
             time.sleep(600.0)
     return Batch(model=label, runs=count, looked_at=Counter({"ends": count}))
+
+
+def shrink_file(failure: Failure, folder: Path, seconds: float) -> None:
+    """Every scene fails. Run 13 kills its process, run 4 takes its time, run 3 never ends once it has no walls."""
+
+    def check(self: EventBased, scene: Scene, seed: int, number: int, only: str = "") -> Played:
+        if number == 13:
+            os._exit(9)
+        if number == 4:
+            time.sleep(0.5)
+        if number == 3 and not scene.walls:
+            time.sleep(600.0)
+        return Played(figures={"mirror": 1.0})
+
+    EventBased.check = check  # type: ignore[method-assign]
+    study.shrink_file(failure, folder, seconds)
