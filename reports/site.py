@@ -26,6 +26,7 @@ from reports.style import LOOKS, SPARE, looks
 from reports.view import CHANNELS, SceneView, scene_views, slugs_of
 from scenes.progress import tell
 from validation import provenance
+from validation.models import FAMILIES
 from validation.results import Run, write_whole
 
 DATA = Path(str(resources.files("reports"))) / "data"
@@ -162,7 +163,9 @@ class _Pages:
         scenes = [view for view in self.views.values() if isinstance(view, SceneView)]
         ensembles = [view for view in self.views.values() if isinstance(view, EnsembleView)]
         worst, times = tables.worst_first(self.run), tables.run_times(self.run)
-        return self.site.page("index.html", "index.html", scenes=scenes, ensembles=ensembles, worst=worst, times=times, **_common(self.run))
+        summaries = {model: FAMILIES[model].summary for model in self.run.models if model in FAMILIES}
+        shown = {"scenes": scenes, "ensembles": ensembles, "worst": worst, "times": times, "summaries": summaries}
+        return self.site.page("index.html", "index.html", **shown, **_common(self.run))
 
     def stamp(self, view: View) -> str:
         """Hash of all that a page shows and of the code that draws it; not when the run was, nor what was read back."""
@@ -198,7 +201,7 @@ def _appearance() -> str:
     """Hash of the code, templates, scripts and styles that make the pages."""
     files = sorted(path for path in DATA.rglob("*") if path.is_file())
     hashes = [f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}" for path in files]
-    return provenance.digest("\n".join([provenance.code_digest("reports"), provenance.version_of("matplotlib"), *hashes]))
+    return provenance.digest("\n".join([provenance.code_digest("reports", looks=True), provenance.version_of("matplotlib"), *hashes]))
 
 
 def _stamp_of(page: Path) -> str:
@@ -242,7 +245,7 @@ def _environment() -> Environment:
     environment = Environment(
         loader=FileSystemLoader(DATA / "templates"), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    for filter in (words.number, words.unit, words.duration, words.ratio, words.window, words.dash_array):
+    for filter in (words.number, words.unit, words.duration, words.moment, words.ratio, words.window, words.dash_array):
         environment.filters[filter.__name__] = filter
     for function in (words.share, words.formula, tables.overrun, tables.measure_table, tables.scene_facts, tables.summary, figure_stem):
         environment.globals[function.__name__] = function

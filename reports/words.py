@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from datetime import datetime
 
 from reports.style import Look
 from scenes.display import number
@@ -18,6 +19,11 @@ def unit(name: str) -> str:
 def duration(seconds: float) -> str:
     """A time in s or ms."""
     return f"{seconds:.1f} s" if seconds >= 1.0 else f"{1e3 * seconds:.3g} ms"
+
+
+def moment(created: str) -> str:
+    """A time of creation, as ISO 8601 has it, to the minute."""
+    return f"{datetime.fromisoformat(created):%Y-%m-%d %H:%M %Z}"
 
 
 def ratio(value: float | None) -> str:

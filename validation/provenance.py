@@ -19,6 +19,8 @@ from validation.models import FAMILIES, family, home
 
 #: Packages whose code counts where it can be reached; the package of the model itself always does.
 OWN_PACKAGES = ("scenes", "ebm", "cm", "engines", "validation")
+#: Modules that only show what others computed; no figure depends on them.
+SHOWING = frozenset({"scenes.display", "scenes.drawing"})
 
 
 def cell_key(scene: Scene, name: str, settings: Mapping[str, Any]) -> str:
@@ -47,12 +49,14 @@ def digest(text: str) -> str:
 
 
 @cache
-def code_digest(module: str) -> str:
+def code_digest(module: str, *, looks: bool = False) -> str:
     """Hash of the code of a module and of all project modules that it imports, at its top or inside functions.
 
-    Of the syntax trees without docstrings: comments, layout and documentation do not count.
+    Of the syntax trees without docstrings: comments, layout and documentation do not count, and neither does `SHOWING`
+    unless `looks` asks for it, so that another look plays no cell again.
     """
-    return digest("".join(f"{name}\n{_essence(path)}\n" for name, path in sorted(reachable(module).items())))
+    code = {name: path for name, path in reachable(module).items() if looks or name not in SHOWING}
+    return digest("".join(f"{name}\n{_essence(path)}\n" for name, path in sorted(code.items())))
 
 
 def reachable(module: str) -> dict[str, Path]:
@@ -113,7 +117,7 @@ def syntax(path: Path) -> ast.Module:
 
 @cache
 def _essence(path: Path) -> str:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = ast.parse(path.read_text(encoding="utf-8"))  # a tree of its own, since it is changed
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and ast.get_docstring(node, clean=False):
             node.body = node.body[1:] or [ast.Pass()]

@@ -242,7 +242,8 @@ class Run(Stored):
         except (ValueError, RecursionError) as error:
             raise InputError(f"{printable(path)}: not a run written by rockcheck: {printable(error)}") from None
         if isinstance(data, dict) and data.get("format") != FORMAT:
-            raise InputError(f"{printable(path)}: format {printable(data.get('format'))}; this version reads {FORMAT}")
+            found = f"format {printable(data['format'])}; this version reads {FORMAT}" if "format" in data else "not the run of a suite"
+            raise InputError(f"{printable(path)}: {found}")
         try:
             return cls.model_validate(data)
         except ValidationError as error:

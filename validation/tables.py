@@ -17,18 +17,19 @@ COLOURS = {"pass": "green", "changed": "yellow", "fail": "red", "error": "red"}
 
 
 def verdict_table(run: Run) -> Table:
-    """A row a cell, within 80 columns: its outcome, the check that is nearest to its limit, and the verdict."""
+    """A row a cell, within 80 columns: the check that is nearest to its limit, how much of that it uses, and the verdict."""
     table = Table(box=None, pad_edge=False, expand=False)
     table.add_column("scene", overflow="ellipsis", no_wrap=True, max_width=22)
     table.add_column("model", overflow="ellipsis", no_wrap=True, max_width=14)
-    table.add_column("nearest to its limit", overflow="ellipsis", no_wrap=True, max_width=32)
+    table.add_column("nearest to its limit", overflow="ellipsis", no_wrap=True, max_width=24)
+    table.add_column("used", justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     before = ""
     for cell in run.cells:
         near = nearest(cell)
-        words = f"{cell.reason or 'failed'}" if cell.status == "failed" else share(near) if near else "nothing judged"
+        words = f"{cell.reason or 'failed'}" if cell.status == "failed" else windowed(near) if near else "nothing judged"
         verdict = Text("-") if cell.status == "done" and not cell.checks else Text(cell.verdict, COLOURS[cell.verdict])
-        table.add_row("" if cell.scene == before else cell.scene, cell.model, Text(words), verdict)
+        table.add_row("" if cell.scene == before else cell.scene, cell.model, Text(words), percent(near) if near else "", verdict)
         before = cell.scene
     return table
 
@@ -74,9 +75,13 @@ def cell_lines(cell: Cell) -> Iterator[str]:
 
 def title(check: Check) -> str:
     """The check as tolerances name it: measure, window, and what it is held against."""
-    figure = check.figure
-    against = f" against {figure.against}" if figure.against else ""
-    return f"{figure.measure}{'@' if figure.window else ''}{figure.window}{against}"
+    against = f" against {check.figure.against}" if check.figure.against else ""
+    return f"{windowed(check)}{against}"
+
+
+def windowed(check: Check) -> str:
+    """What is checked, as tolerances name it: measure and window."""
+    return f"{check.figure.measure}{'@' if check.figure.window else ''}{check.figure.window}"
 
 
 def used(check: Check) -> float:
@@ -89,6 +94,11 @@ def used(check: Check) -> float:
     return abs(value - check.ideal) / limit if limit > 0.0 else 0.0
 
 
+def percent(check: Check) -> str:
+    """`used` in words."""
+    return f"{100.0 * used(check):.0f} %" if math.isfinite(used(check)) else "beyond"
+
+
 def nearest(cell: Cell) -> Check | None:
     """The check that failed, else the one nearest to its limit."""
     return max(cell.checks, key=used, default=None)
@@ -99,7 +109,7 @@ def share(check: Check) -> str:
     figure = check.figure
     value = "-" if figure.value is None else f"off {abs(figure.value - check.ideal):.1e}" if check.ideal else f"{figure.value:.2e}"
     limit = "none" if check.limit is None else f"{check.limit:.2g}"
-    return f"{figure.measure}{'@' if figure.window else ''}{figure.window} {value} / {limit}"
+    return f"{windowed(check)} {value} / {limit}"
 
 
 def checks_csv(run: Run) -> str:

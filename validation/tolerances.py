@@ -138,7 +138,9 @@ def judge(figure: Figure, tolerance: Tolerance | None, *, kind: Kind, measure: M
         reason = f"{value:.4g} is below the limit {tolerance.limit:.4g}"
     elif measure.sense == "at most" and (ideal is None or not abs(value - ideal) <= tolerance.limit):
         away = "" if not ideal else f" from {ideal:.6g}"
-        reason = f"{value:.4g} is more than {tolerance.limit:.4g}{away}"
+        reason = f"{value:.4g} is more than {tolerance.limit:.4g}{away}" if tolerance.limit else f"{value:.6g}, not {ideal:.6g}"
+        if not tolerance.limit and figure.note:
+            reason += f" ({figure.note})"
     elif tolerance.expected is not None and tolerance.drift is not None and not abs(value - tolerance.expected) <= tolerance.drift:
         verdict, reason = "changed", f"{value:.6g} was {tolerance.expected:.6g} (drift allowed {tolerance.drift:.2g})"
     else:

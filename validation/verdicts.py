@@ -54,7 +54,7 @@ def markdown(run: Run) -> str:
     lines = [
         f"## {MARKS[run.verdict]} rockcheck {run.suite}: {run.verdict}",
         "",
-        f"{len(run.cells)} cells, {run.up_to_date} up to date, {sum(1 for _ in run.checks())} checks, {run.wall_seconds:.1f} s.",
+        f"{len(run.cells)} simulations, {run.up_to_date} up to date, {sum(1 for _ in run.checks())} checks, {run.wall_seconds:.1f} s.",
         "",
     ]
     reasons = list(verdict_lines(run))

@@ -96,7 +96,7 @@ def test_a_deliberate_fault_fails_the_smoke_suite(project, fault, file, old, new
     with project.changed(file, old, new):
         code, out = project.run("validate", "smoke", "--strict")
     assert code in (1, 3), f"{fault}: {out}"
-    assert f"{untouched} of 25 cells were up to date" in out
+    assert f"{untouched} of 25 simulations were up to date" in out
     assert "Traceback" not in out
 
 
@@ -113,10 +113,10 @@ CHANGES = [
 @pytest.mark.parametrize(("file", "old", "new", "untouched"), [change[1:] for change in CHANGES], ids=[change[0] for change in CHANGES])
 def test_exactly_what_depends_on_a_change_runs_again(project, file, old, new, untouched):
     project.run("validate", "smoke")
-    assert "25 of 25 cells were up to date" in project.run("validate", "smoke")[1]
+    assert "25 of 25 simulations were up to date" in project.run("validate", "smoke")[1]
     with project.changed(file, old, new):
         _, out = project.run("validate", "smoke")
-    assert f"{untouched} of 25 cells were up to date" in out
+    assert f"{untouched} of 25 simulations were up to date" in out
 
 
 def test_a_killed_run_goes_on_and_ends_the_same(project, tmp_path):

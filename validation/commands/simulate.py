@@ -42,7 +42,9 @@ def run(
     except OSError as error:
         raise InputError(f"{printable(path)}: cannot be written: {error.strerror}", "--output") from None
     peak = history.peak_rotation / what.block.alpha
-    console().print(f"{what.name}, {model}: {history.outcome}, peak rotation {peak:.4g} alpha, {history.cost.wall_seconds:.2g} s -> {path}")
+    took = f"simulated in {history.cost.wall_seconds:.2g} s"
+    console().print(f"{what.name}, {model}: {history.outcome}, peak rotation {peak:.4g} alpha, {took}")
+    console().print(f"history: {path}", soft_wrap=True)
     answer(
         {
             "scene": what.name,

@@ -190,7 +190,8 @@ def _shares(panels: Sequence[Panel], spectra: Sequence[Spectrum]) -> Table:
 def _speed(spectra: Sequence[Spectrum], asked: Asked, tiles: Tiles, taken: float, cpu: float, screen: Console) -> None:
     nodes, evaluations = sum(s.outcomes.size for s in spectra), sum(s.evaluations for s in spectra)
     share = f" ({nodes / evaluations:.1f} times fewer than nodes)" if asked.refine else ""
-    screen.print(f"{len(spectra)} spectra, {nodes} nodes, {evaluations} runs{share}, {tiles.read_back} read back; {taken:.1f} s")
+    what = "spectrum" if len(spectra) == 1 else "spectra"
+    screen.print(f"{len(spectra)} {what}, {nodes} nodes, {evaluations} runs{share}, {tiles.read_back} read back; {taken:.1f} s")
     if tiles.played and tiles.client is None and asked.model in ("ebm", "ebm-unilateral"):
         from validation.benchmark_ebm import right_hand_side_seconds
 

@@ -240,14 +240,26 @@ const Plots = (() => {
     for (let power = Math.min(low, top); power <= top; power++) steps.push(10 ** power);
     return [...steps.map(v => -v).reverse(), 0, ...steps];
   }
+  // Their labels; those that would touch the one before, counted from zero, are left out. A label needs `room` of `half` the axis.
+  function labels(splits, fine, largest, half, room = 10) {
+    const at = value => half * Math.asinh(Math.abs(value) / fine) / Math.asinh(largest / fine), told = new Set([0]);
+    let before = 0;
+    for (const size of splits.filter(value => value > 0)) if (at(size) - before >= room) { told.add(size); before = at(size); }
+    return splits.map(value => told.has(Math.abs(value)) ? power(value) : "");
+  }
   const power = value => value === 0 ? "0" : `${value < 0 ? "−" : ""}10${superscript(Math.round(Math.log10(Math.abs(value))))}`;
 
   function differences(parent, store, channel) {
     const bands = () => store.data.bands.filter(b => b.channel === channel.name && b.against === store.against && store.on.has(b.model));
     const label = () => store.data.models.find(model => model.name === store.against)?.label;
     const title = () => {
-      const limits = [...new Set(bands().map(b => `${b.kind === "rms" ? "RMS" : "peak"} at most ${words(b.limit)} in the first ${words(b.until)} s`))];
-      return `difference from ${label()}` + (limits.length ? `; shaded: tolerance, ${limits.join(", ")}` : "; no tolerance is set on it");
+      const limits = new Map();  // what is asked, and of which models
+      for (const model of store.data.models) {
+        const own = bands().filter(b => b.model === model.name).map(b => `${words(b.limit)} (${b.kind === "rms" ? "RMS" : "peak"}, first ${words(b.until)} s)`);
+        if (own.length) limits.set(own.join(", "), [...(limits.get(own.join(", ")) ?? []), model.label]);
+      }
+      const told = [...limits].map(([asked, labels]) => `${labels.join(", ")} at most ${asked}`);
+      return `difference from ${label()}` + (told.length ? `; shaded: tolerance, ${told.join("; ")}` : "; no tolerance is set on it");
     };
     const [box, heading] = host(parent, title(), true, `Difference of ${channel.label} from the reference over time`);
     const columns = () => {
@@ -263,7 +275,7 @@ const Plots = (() => {
         const largest = 1.4 * Math.max(channel.fine, Math.abs(min ?? 0), Math.abs(max ?? 0));
         return [-largest, largest];
       } },
-      axis: { splits: (u, axis, min, max) => decades(channel.fine, max), filter: (u, splits) => splits, values: (u, splits) => splits.map(power) },
+      axis: { splits: (u, axis, min, max) => decades(channel.fine, max), filter: (u, splits) => splits, values: (u, splits) => labels(splits, channel.fine, u.scales.y.max, 35) },
       draw: { below: u => {
         for (const { limit, until } of uniqueBands(bands())) shade(u, 0, until, colour("--tolerance"), -limit, limit);
       } },
@@ -333,11 +345,12 @@ const Plots = (() => {
       data: [store.t, ...models.map(() => new Array(store.t.length).fill(null))],
       series: models.map(model => seriesOf(store, model, 1)),
       scale: { range: () => [-0.6, models.length - 0.4], dir: -1 },
-      axis: { splits: () => models.map((_, k) => k), values: () => models.map(model => box.clientWidth < 520 ? model.label.slice(0, 9) : model.label.slice(0, 16)) },
+      axis: { splits: () => models.map((_, k) => k), values: () => models.map(model => cut(model.label, box.clientWidth < 520 ? 9 : 16)) },
       draw: { above: draw },
     });
   }
 
+  const cut = (text, length) => text.length > length ? `${text.slice(0, length - 1)}…` : text;
   const segment = (ctx, x0, y0, x1, y1) => { ctx.beginPath(); ctx.moveTo(x0, y0); ctx.lineTo(x1, y1); ctx.stroke(); };
 
   // Rotation rate against rotation, over the window.

@@ -152,7 +152,10 @@
     for (const [model, row] of rows) {
       if (!model) continue;
       row.hidden = !store.on.has(model.name);
-      data.channels.forEach((channel, k) => { row.cells[k + 1].textContent = Plots.words(store.time > model.end + 1e-9 ? null : store.at(model, channel.name, store.time)); });
+      data.channels.forEach((channel, k) => {
+        const value = store.time > model.end + 1e-9 ? null : store.at(model, channel.name, store.time);
+        row.cells[k + 1].textContent = Plots.words(value !== null && Math.abs(value) < 1e-6 * channel.fine ? 0 : value);  // rounding is no motion
+      });
       const mode = lastBefore(model.modes, store.time), event = lastBefore(model.events, store.time);
       row.cells[data.channels.length + 1].textContent = mode ? mode[1] : "–";
       row.cells[data.channels.length + 2].textContent = event ? `${event[1]} at ${event[0].toFixed(3)} s` : "–";
