@@ -12,11 +12,11 @@ import pytest
 from ebm import EventBasedModel
 from scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
 from validation.cli import main
-from validation.stress import study
+from validation.stress import players, study
 from validation.stress.generator import ALPHA, FRICTION, RADIUS, random_scene
 from validation.stress.invariants import INVARIANTS, Played, audited, check_run, energy_error, similar
 from validation.stress.mechanics import BOOLE, integrals, tilted_forces
-from validation.stress.players import PLAYERS, Approximate
+from validation.stress.players import PLAYERS, Approximate, energy_without_source
 from validation.stress.shrinking import shrink, write_scene
 from validation.stress.stability import LINES, fault_of, largest_stable, scene_at, stand_still
 from validation.stress.study import Chunk, chunks, play_some, run_stress
@@ -275,6 +275,32 @@ def test_approximate_models_keep_what_they_state(label):
         assert {"depth", "source"} <= played.figures.keys()
 
 
+def test_work_of_the_base_on_a_block_that_stands_or_flies():
+    """A record finer than the rows, with a jump where it ends: the energy of a block that feels only the base is the base's work."""
+    scene = SLIDES_AND_HITS.replace(
+        floor=Floor(friction=0.0),
+        walls=(),
+        excitation=Record.from_samples([0.0, 30.0, -50.0, 7.0, 20.0], time_step=0.013),
+        duration=0.2,
+        output_step=0.05,
+    )
+    slides = EventBasedModel().simulate(scene)
+    assert np.ptp(slides.channels["x_dot"]) > 0.05
+    assert abs(energy_without_source(scene, slides)) < 1e-14
+    faster = dataclasses.replace(slides, channels={**slides.channels, "x_dot": 1.1 * slides.channels["x_dot"]})
+    assert energy_without_source(scene, faster) > 1e-5
+
+
+def test_of_an_engine_that_gains_energy_half_the_step_is_told(monkeypatch):
+    """Energy from nowhere that falls with the step is the step's; the words of the failure say so."""
+    player = PLAYERS["mujoco"]
+    scene = player.scene(1, 2)
+    monkeypatch.setattr(players, "energy_without_source", lambda played, history: 0.08 * played.output_step / scene.output_step)
+    played = player.check(scene, 1, 2)
+    assert played.broken == ["source"]
+    assert played.failure == "source 0.08, with half the step 0.04"
+
+
 def test_where_an_engine_breaks_is_found():
     """MuJoCo's own contact lets a block of a millimetre sink; at its best it holds it. Creep under a push is seen, too."""
     assert fault_of(LINES["mujoco default"], scene_at("size", 1e-3), 0.01) == "sinks"
@@ -294,7 +320,8 @@ def test_the_page_and_the_tables(tmp_path):
     for invariant in INVARIANTS:
         assert invariant in page
     summary = (tmp_path / "summary.md").read_text()
-    assert summary.startswith("Seed 4,")
+    assert summary.startswith("## Figures of one whole run\n")
+    assert "`rockcheck stress --seed 4`" in summary
     assert "| ebm | 6 | 0 |" in summary
     assert (tmp_path / "invariants.csv").read_text().count("\nebm,") >= 10
 

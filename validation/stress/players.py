@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -113,7 +113,16 @@ class Approximate(Player):
         return " ".join([f"--model {self.family}", *(f"--set {key}={value!r}" for key, value in self.settings(scene).items())])
 
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> Played:
-        """Ends, finite numbers, depth and energy."""
+        """Ends, finite numbers, depth and energy. Of an engine that breaks the last two it is said what half the step does."""
+        played = self._check(scene)
+        broken = [name for name in played.broken if name in ("depth", "source")]
+        if broken and self.family != "cm":
+            finer = replace(self, step=0.5 * self.step)._check(scene.replace(output_step=0.5 * scene.output_step))
+            words = [f"{name} {played.figures[name]:.2g}, with half the step {finer.figures.get(name, math.nan):.2g}" for name in broken]
+            played = replace(played, failure="; ".join(words))
+        return played
+
+    def _check(self, scene: Scene) -> Played:
         try:
             history = build(self.family, self.settings(scene)).simulate(scene)
         except (ModelFailure, InputError) as error:

@@ -423,10 +423,25 @@ def invariants_markdown(found: Stress) -> list[str]:
 
 
 def markdown(found: Stress) -> str:
-    """The tables of a run for a page of documentation."""
-    lines = [f"Seed {found.seed}, {found.wall_seconds / 60.0:.1f} min with {found.jobs} processes; {', '.join(found.hardware.values())}."]
+    """What was found as a section for a page of documentation."""
+    command = " ".join(["rockcheck stress", *(["--quick"] if found.quick else []), f"--seed {found.seed}"])
+    runs = sum(batch.runs for batch in found.batches.values())
+    broken = len({(failure.model, failure.number) for failure in found.broken})
+    lines = [
+        f"## Figures of one {'quick' if found.quick else 'whole'} run",
+        "",
+        f"{found.created[:10]}, `{command}`, rockcheck {found.versions.get('rockcheck', '')}: "
+        f"{found.wall_seconds / 60.0:.1f} min with {found.jobs} processes; {', '.join(found.hardware.values())}."
+        + (f" {runs:,} runs; event-based models fail in {broken}." if runs else "")
+        + ("" if found.complete else " The run was interrupted."),
+    ]
     if found.batches:
         lines += ["", *invariants_markdown(found)]
+    if shown := [failure for failure in found.failures if failure.file]:
+        lines += ["", "| failure of | invariant | run | figure | in words |", "|---|---|---|---|---|"]
+        for one in shown:
+            words = one.words.replace("|", "\\|")
+            lines.append(f"| {one.model} | {one.invariant} | {one.number} | {one.figure:.2g} | {words} |")
     if found.stability is not None:
         lines += ["", *stability_markdown(found.stability)]
     return "\n".join(lines) + "\n"

@@ -1,0 +1,43 @@
+"""Coverage-guided fuzzing of one reader: `python tests/stress/fuzz.py scene_toml -runs=100000`.
+
+libFuzzer (through atheris: `pip install 'rockcheck[fuzz]'`) breeds inputs that reach new lines of the readers, from a valid one and
+from the nasty words of `test_hostile_input`. An input that is answered with neither a result nor one clear line, takes longer than
+10 s or more than 1 GiB of memory ends the run with exit 1 and is written beside; options after the reader's name are libFuzzer's.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+import atheris
+
+sys.path.insert(0, str(Path(__file__).parent))
+# What is compiled (ebm, cm) must not be instrumented.
+with atheris.instrument_imports(include=["scenes", "validation", "tomllib", "json", "csv"], exclude=["scenes.compiled"]):
+    from test_hostile_input import NASTY, READERS, WORDS
+
+
+def quoted(word: str) -> str:
+    """As a line of libFuzzer's dictionary."""
+    return '"' + "".join(f"\\x{byte:02x}" for byte in word.encode("utf-8", "surrogatepass")[:64]) + '"\n'
+
+
+def main(reader: str, *options: str) -> None:
+    """Feeds a reader until libFuzzer has enough; it ends the process."""
+    feed, valid = READERS[reader]
+    with tempfile.TemporaryDirectory() as place:
+        corpus, folder, words = Path(place, "corpus"), Path(place, "folder"), Path(place, "words")
+        corpus.mkdir()
+        folder.mkdir()
+        (corpus / "valid").write_text(valid(), encoding="utf-8")
+        words.write_text("".join(map(quoted, filter(None, (*NASTY, *WORDS)))), encoding="ascii")
+        feed(valid().encode(), folder)  # what it imports and compiles takes no part
+        arguments = ["fuzz.py", f"-dict={words}", "-timeout=10", "-rss_limit_mb=1024", "-max_len=20000", *options, str(corpus)]
+        atheris.Setup(arguments, lambda content: feed(content, folder))
+        atheris.Fuzz()
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
