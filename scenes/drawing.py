@@ -35,7 +35,7 @@ def scene_figure(scene: Scene) -> Figure:
     """The block on its floor, beside its walls, and the acceleration of the base."""
     figure = new_figure(7.0, 3.0)
     sketch, base = figure.subplots(1, 2, width_ratios=(1, 2))
-    _sketch(sketch, scene)
+    draw_block(sketch, scene)
     time = np.linspace(0.0, scene.duration, 2001)
     base.plot(time, scene.excitation.acceleration(time), color=INK, linewidth=0.8, label="horizontal")
     if scene.vertical.kind != "rest":
@@ -46,7 +46,7 @@ def scene_figure(scene: Scene) -> Figure:
     return figure
 
 
-def _sketch(axes: Any, scene: Scene) -> None:
+def draw_block(axes: Any, scene: Scene) -> None:
     """Block (tilted as it starts), floor and walls to scale, in m."""
     block = scene.block
     x, y, theta = scene.initial_state[:3]

@@ -15,6 +15,7 @@ from ebm.spectrum import draw
 from engines import MuJoCo, PyBullet
 from reports.style import PAGE, figure_style, looks, save
 from scenes import Block, Floor, History, Ricker, Scene, Wall, load_scene
+from scenes.drawing import draw_block
 from scenes.kinematics import pivot_height
 
 FOLDER = Path(__file__).parents[1] / "images" / "gallery"
@@ -43,16 +44,44 @@ def history() -> Figure:
     return EventBasedModel(pivot="unilateral").simulate(load_scene("fig5a")).plot()
 
 
-def models() -> list[History]:
-    """The models beside the wall, just before and after its first hit."""
-    close = bookcase(duration=2.6, output_step=0.001)
+def models(scene: Scene) -> list[History]:
+    """A scene by each model, the paper's first, the unilateral one second."""
     players = (EventBasedModel(), EventBasedModel(pivot="unilateral"), ContinuousModel(), MuJoCo(time_step=1e-4), PyBullet(time_step=1e-4))
-    return [player.simulate(close) for player in players]
+    return [player.simulate(scene) for player in players]
+
+
+def front() -> Figure:
+    """The project in one picture: block and wall, the rotation by each model, and its distance from the unilateral one so far."""
+    shaken = bookcase(floor=Floor(friction=0.5), excitation=Ricker(amplitude=5.0, period=0.9), duration=6.0)
+    found = models(shaken)
+    reference, alpha = found[1], shaken.block.alpha
+    figure = Figure(figsize=(PAGE, 3.3), layout="constrained")
+    axes = figure.subplot_mosaic([["place", "rotation"], ["place", "difference"]], width_ratios=(1, 2.6))
+    place, rotation, difference = axes["place"], axes["rotation"], axes["difference"]
+    draw_block(place, shaken.replace(initial_rotation=float(reference.channels["theta"].min())))
+    place.set(xlim=(-1.0, 1.4), ylim=(-0.3, 3.6))
+    place.set_axis_off()
+    for one, look in zip(found, looks(one.model for one in found).values(), strict=True):
+        t, theta = one.channels["t"], one.channels["theta"] / alpha
+        rotation.plot(t, theta, **look.line)
+        if one is not reference:
+            off = np.abs(theta - reference.channels["theta"][: len(theta)] / alpha)
+            difference.plot(t, np.maximum.accumulate(off), **look.line)
+    rotation.set(ylabel="rotation θ / α", xlim=(1.0, shaken.duration), ylim=(-1.25, 0.5))
+    rotation.text(3.5, -1.12, "the paper's model: no hop, it falls")
+    rotation.tick_params(labelbottom=False)
+    difference.set(xlabel="t, s", ylabel="largest difference\nso far, α", xlim=(1.0, shaken.duration), yscale="log", ylim=(1e-6, 20.0))
+    difference.set_yticks([1e-6, 1e-4, 1e-2, 1.0], ["10⁻⁶", "10⁻⁴", "0.01", "1"])
+    difference.minorticks_off()
+    difference.text(3.1, 1.5, "model form", rotation=14)
+    difference.text(4.6, 1e-2, "numerical error")
+    figure.legend(*rotation.get_legend_handles_labels(), loc="outside upper left", ncols=5)
+    return figure
 
 
 def hop() -> Figure:
     """Where the floor can only push, the block hops after a hit; the paper's model excludes it."""
-    block, found = bookcase().block, models()
+    block, found = bookcase().block, models(bookcase(duration=2.6, output_step=0.001))  # just before and after the first hit
     figure = Figure(figsize=(PAGE, 3.4), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True)
     for one, look in zip(found, looks(one.model for one in found).values(), strict=True):
@@ -91,7 +120,7 @@ def chaos() -> Figure:
     return figure
 
 
-PICTURES: Iterable[Callable[[], Figure]] = (scene, history, hop, spectra, chaos)
+PICTURES: Iterable[Callable[[], Figure]] = (front, scene, history, hop, spectra, chaos)
 
 
 def make(folder: Path) -> list[Path]:
