@@ -40,7 +40,7 @@ from __future__ import annotations
 
 import itertools
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
@@ -147,10 +147,8 @@ class Suite:
     def cells(self) -> Iterator[tuple[Scene, Part]]:
         """All cells, scene by scene."""
         for part in self.parts or (self,):
-            for scene in part.scenes.values():
-                for model in part.models.values():
-                    if scene.name in model.settings.get("files", {scene.name: ""}):
-                        yield scene, model
+            for scene, model in _played(part.scenes, part.models):
+                yield part.scenes[scene], part.models[model]
 
     def crowds(self) -> Iterator[tuple[Ensemble, Scene, Part]]:
         """All ensembles with the scene that they are drawn from, model by model."""
@@ -252,7 +250,7 @@ def _suite(given: SuiteFile, path: Path, shipped: bool) -> Suite:
             _required(key, text)
     tolerances_path, tables = _tolerance_tables(given, path, shipped)
     try:
-        tolerances = parse_tolerances(tables)
+        tolerances = parse_tolerances(tables, _played(scenes, models))
         for place in tolerances:
             if place.against not in (OWN_FIGURES, *models):
                 raise unknown_name(f"reference of [{place.scene}.{place.model}]", place.against, [OWN_FIGURES, *models])
@@ -272,6 +270,12 @@ def _suite(given: SuiteFile, path: Path, shipped: bool) -> Suite:
         tolerances=tolerances,
         tolerances_path=tolerances_path,
     )
+
+
+def _played(scenes: Iterable[str], models: Mapping[str, Part]) -> Iterator[tuple[str, str]]:
+    """Names of scenes and models that make a cell: all, but a measured history belongs to the scenes that it names."""
+    for scene in scenes:
+        yield from ((scene, label) for label, model in models.items() if scene in model.settings.get("files", {scene: ""}))
 
 
 def _joined(given: SuiteFile, path: Path) -> Suite:

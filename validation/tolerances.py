@@ -6,7 +6,14 @@ A tolerance file is TOML; a table a scene, model and reference, a line a measure
     "theta_rms@8s" = { expected = 2.3e-4, limit = 2e-3, drift = 1e-4, why = "first-order step error, prototype 2e-4" }
 
 The third name is the reference model, or "figures" for a figure of the cell itself, its distance from a closed form among
-them. `@` bounds the window: seconds, or `@horizon`. `limit` bounds the distance from the perfect value (from `expected`
+them. The first may be "*", every scene that the model plays: such a line holds where a scene has none of its own, and gives
+what a scene's own line leaves out:
+
+    ["*".mujoco.ebm-unilateral]
+    outcome_agrees = { expected = 1.0, limit = 0.0, drift = 0.0, why = "the same outcome" }
+    "theta_rms@8s" = { why = "first-order step error" }
+
+`@` bounds the window: seconds, or `@horizon`. `limit` bounds the distance from the perfect value (from `expected`
 for figures of the cell itself; for "at least" measures the value itself). Within the limit, but further than `drift` from
 `expected`, is *changed*. All in the measure's unit.
 """
@@ -16,7 +23,7 @@ from __future__ import annotations
 import math
 import re
 from collections import ChainMap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +38,8 @@ MEASURES: Mapping[str, Measure] = ChainMap(DIFFERENCES, FIGURES, STATISTICS)
 #: The third name of a table that is not a reference model.
 OWN_FIGURES = "figures"
 HORIZON = "horizon"
+#: The first name of a table that holds for every scene.
+EVERY = "*"
 
 
 @dataclass(frozen=True, order=True)
@@ -87,12 +96,16 @@ class Place:
 
 
 Tolerances = dict[Place, Tolerance]
+_Path = tuple[str, ...]
 
 
-def parse_tolerances(tables: Mapping[str, Any]) -> Tolerances:
-    """The tolerances in the tables of a file; raises `InputError` naming the place of whatever is not usable."""
+def parse_tolerances(tables: Mapping[str, Any], cells: Iterable[tuple[str, str]] = ()) -> Tolerances:
+    """The tolerances in the tables of a file; a line for every scene becomes one for each of `cells` (scene, model).
+
+    Raises `InputError` naming the place of whatever is not usable.
+    """
     found: Tolerances = {}
-    for (scene, model, against, key), line in _lines(tables, depth=4):
+    for (scene, model, against, key), line in _spread(dict(_lines(tables, depth=4)), cells):
         where = f"[{scene}.{model}.{against}] {key}"
         try:
             place = Place(scene, model, against, Windowed.parse(key))
@@ -108,6 +121,23 @@ def parse_tolerances(tables: Mapping[str, Any]) -> Tolerances:
             raise InputError(f"{printable(where)}: {error}") from None
         found[place] = tolerance
     return found
+
+
+def _spread(lines: Mapping[_Path, Any], cells: Iterable[tuple[str, str]]) -> Iterator[tuple[_Path, Any]]:
+    """The lines with those for every scene at each of the model's cells, below what the scene itself says."""
+    played = list(cells)
+    common = {path: line for path, line in lines.items() if path[0] == EVERY}
+    for path, line in lines.items():
+        below = common.get((EVERY, *path[1:]))
+        if path[0] != EVERY:
+            yield path, {**below, **line} if isinstance(below, Mapping) and isinstance(line, Mapping) else line
+    for (_, *rest), line in common.items():
+        scenes = [scene for scene, model in played if model == rest[0]]
+        completes = any(path[0] != EVERY and path[1:] == tuple(rest) for path in lines)
+        if completes and isinstance(line, Mapping) and "limit" not in line:
+            continue
+        # Where nothing is played it stays what it is, and is told as a tolerance without a cell.
+        yield from (((scene, *rest), line) for scene in scenes or [EVERY] if (scene, *rest) not in lines or scene == EVERY)
 
 
 def _lines(tables: Mapping[str, Any], depth: int, above: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:

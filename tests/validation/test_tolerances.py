@@ -177,6 +177,49 @@ def test_shipped_suites_load_and_their_tolerances_have_cells():
             assert line.drift is not None, str(place)
 
 
+EVERYWHERE = """
+["*".m.r]
+outcome_agrees = { expected = 1.0, limit = 0.0, drift = 0.0, why = "the same" }
+theta_rms = { why = "the step" }
+[a.m.r]
+theta_rms = { expected = 0.001, limit = 0.002, drift = 0.0001 }
+[b.m.r]
+theta_rms = { expected = 0.003, limit = 0.004, drift = 0.0001, why = "another" }
+outcome_agrees = { expected = 0.0, limit = 1.0, drift = 0.0, why = "one falls" }
+"""
+
+
+def test_a_line_for_every_scene():
+    lines = parse_tolerances(tomllib.loads(EVERYWHERE), [("a", "m"), ("b", "m"), ("c", "m"), ("a", "r")])
+    assert {(place.scene, str(place.what)): (line.limit, line.why) for place, line in lines.items()} == {
+        ("a", "theta_rms"): (0.002, "the step"),
+        ("b", "theta_rms"): (0.004, "another"),
+        ("a", "outcome_agrees"): (0.0, "the same"),
+        ("b", "outcome_agrees"): (1.0, "one falls"),
+        ("c", "outcome_agrees"): (0.0, "the same"),
+    }
+    assert {place.scene for place in parse_tolerances(tomllib.loads(EVERYWHERE))} == {"*", "a", "b"}, "without a cell it is told as a fault"
+    with pytest.raises(InputError, match="theta_rms: limit: is missing"):
+        parse_tolerances({"*": {"m": {"r": {"theta_rms": {"why": "of what?"}}}}}, [("a", "m")])
+
+
+def test_accept_writes_a_scene_s_own_line_beside_one_for_every_scene(tmp_path):
+    path = tmp_path / "mine.tolerances.toml"
+    path.write_text(EVERYWHERE.replace("[a.m.r]", "[s.m.r]"), encoding="utf-8")
+    lines = {
+        str(place.what): line
+        for place, line in parse_tolerances(tomllib.loads(path.read_text()), [("s", "m")]).items()
+        if place.scene == "s"
+    }
+    same = made_run(check(1.0e-3, lines["theta_rms"]), check(1.0, lines["outcome_agrees"], "outcome_agrees"))
+    assert accepted(path, same) == ([], [])
+    changes, refused = accepted(path, made_run(check(0.0, lines["outcome_agrees"], "outcome_agrees")), "one falls now")
+    assert (len(changes), refused) == (1, [])
+    written = tomllib.loads(path.read_text())
+    assert written["s"]["m"]["r"]["outcome_agrees"] == {"expected": 0.0, "limit": 2.0, "drift": 0.0, "why": "one falls now"}
+    assert written["*"] == tomllib.loads(EVERYWHERE)["*"]
+
+
 def test_windows():
     assert str(Windowed.parse("theta_rms@8s")) == "theta_rms@8s"
     assert Windowed.parse("theta_rms@1.5s").seconds == 1.5
