@@ -15,7 +15,8 @@ from ebm import Spectrum
 from validation import provenance
 from validation.claims import percent
 from validation.results import Stored
-from validation.spectra import CODES, SETTLE, UNDECIDED, Asked, Panel, Tiles, play_panels
+from validation.spectra import Asked, Panel, play_panels
+from validation.tiles import CODES, SETTLE, UNDECIDED, Tiles
 
 CANDIDATES = ("ebm-unilateral", "cm", "mujoco", "pybullet")
 REFERENCES = ("ebm", "ebm-unilateral")

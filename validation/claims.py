@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ebm import Spectrum
 from ebm.spectrum import LEFT, RIGHT, SAFE
 from validation.results import Stored
-from validation.spectra import AMPLITUDES, FIGURES, GAPS, RESTITUTIONS, Asked, Tiles, paper_panels, play_panels
+from validation.spectra import AMPLITUDES, FIGURES, GAPS, RESTITUTIONS, Asked, paper_panels, play_panels
+from validation.tiles import Tiles
 
 ClaimVerdict = Literal["holds", "holds in part", "does not hold"]
 #: A change of the safe area of less than this share of the nodes is no change: a band one node wide along the boundary.

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from ebm.spectrum import SAFE, Floats
 from scenes import InputError, Record, Scene
 from validation.results import Stored
-from validation.spectra import Asked, Panel, Tiles
+from validation.spectra import Asked, Panel
+from validation.tiles import Tiles
 
 #: Frequencies of the set of pulses.
 PULSES = 50

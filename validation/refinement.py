@@ -14,7 +14,8 @@ from scipy import ndimage
 from ebm.spectrum import LEFT, RIGHT, SAFE, Spectrum
 from validation import provenance
 from validation.results import Stored
-from validation.spectra import Asked, Panel, Tiles, play_panels
+from validation.spectra import Asked, Panel, play_panels
+from validation.tiles import Tiles
 
 #: Sizes of the boxes, in nodes, over which a boundary's dimension is measured.
 BOXES = (1, 2, 4, 8, 16)

@@ -22,8 +22,10 @@ from ebm import Spectrum
 from ebm.spectrum import node_scene
 from scenes import InputError, Ricker
 from validation import agreement, claims, fragility, refinement, spectra
+from validation import tiles as tiling
 from validation.cli import main
-from validation.spectra import Asked, Panel, Tiles, axis, paper_panels, play_panels, tile_key
+from validation.spectra import Asked, Panel, axis, paper_panels, play_panels
+from validation.tiles import Tiles, tile_key
 
 SCENE = """duration = 1.0
 block = { half_width = 0.2, half_height = 1.0 }
@@ -59,9 +61,9 @@ def test_the_papers_28_spectra():
 
 
 def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
-    monkeypatch.setattr(spectra, "TILE", 20)
+    monkeypatch.setattr(tiling, "TILE", 20)
     panel, asked = paper_panels(8)[1], small()
-    runs, play = [], spectra.play_nodes
+    runs, play = [], tiling.play_nodes
 
     def killed_at_the_third(scene, a, f, **rest):
         runs.append(len(a))
@@ -69,7 +71,7 @@ def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return play(scene, a, f, **rest)
 
-    monkeypatch.setattr(spectra, "play_nodes", killed_at_the_third)
+    monkeypatch.setattr(tiling, "play_nodes", killed_at_the_third)
     with pytest.raises(KeyboardInterrupt):
         play_panels([panel], asked, Tiles(tmp_path / "tiles"))
     tiles = Tiles(tmp_path / "tiles")
@@ -147,7 +149,7 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path, capsys):
 @pytest.mark.filterwarnings("ignore")
 def test_a_cluster_that_loses_a_worker_gives_the_same(tmp_path, monkeypatch):
     distributed = pytest.importorskip("distributed")
-    monkeypatch.setattr(spectra, "TILE", 100)
+    monkeypatch.setattr(tiling, "TILE", 100)
     panels, asked = paper_panels(8)[:3], small(40)
     alone = play_panels(panels, asked, Tiles(tmp_path / "alone"))
     with (

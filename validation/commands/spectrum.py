@@ -30,7 +30,6 @@ from validation.spectra import (
     TILES,
     Asked,
     Panel,
-    Tiles,
     axis,
     paper_panels,
     play_panels,
@@ -39,6 +38,7 @@ from validation.spectra import (
     warm_up,
 )
 from validation.store import name_of
+from validation.tiles import Tiles
 
 MOST_SIZE = 5000
 
