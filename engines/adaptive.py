@@ -32,8 +32,8 @@ EMBEDDED = 5e-9  # how deep the engine sees a corner that touches
 IMPACT_STEP = 2e-6
 PROBE_STEP = 6e-5  # the longest step where the acceleration is not known, that is, after an event
 SHORTEST_STEP = 2e-7
-LONG_APPROACH = 6e-4  # from farther away a prediction is only trusted to 95 %
-RESTING = 0.005  # of g times the longest step: slower approaches and departures are not told from rest
+LONG_APPROACH = 6e-4  # from farther away the prediction of an event is only trusted to 95 %
+RESTING = 0.001  # of g times the longest step: slower approaches and departures are not told from rest
 SETTLING_GAP = 2e-6
 SETTLING_TIME = 0.15  # of the longest step: a corner that is back on the floor within twice that time is taken to stay
 
@@ -71,6 +71,10 @@ class _Limits:
             long_approach=LONG_APPROACH * moment,
             resting=RESTING * longest * scene.gravity,
         )
+
+    def trusted(self, predicted: float) -> float:
+        """How much of the predicted time to an event one step may take, s."""
+        return 0.95 * predicted if predicted > self.long_approach else predicted
 
 
 class _Plan(NamedTuple):
@@ -143,15 +147,15 @@ def _plan(
     impact = stops = False
     touching: Touching = ([], [])
     cos, sin = math.cos(theta), math.sin(theta)
-    for contacts, closed in zip(sides, touching, strict=True):
-        for contact in contacts:
+    for side, closed in enumerate(touching):
+        for contact in sides[side]:
             arm = contact.arm(cos, sin)
             gap, rate = contact.gap(x, y, arm), contact.rate(vx, vy, w, arm)
             if gap > CLOSED or rate > resting:
                 curvature = 0.0 if acceleration is None else contact.acceleration(*acceleration, w, arm)
                 closing = _time_to_close(gap, rate, curvature)
                 if closing < dt:
-                    dt, stops = max(0.95 * closing if closing > limits.long_approach else closing, limits.shortest), False
+                    dt, stops = max(limits.trusted(closing), limits.shortest), False
                 continue
             closed.append(contact)
             if rate < -resting:
@@ -160,7 +164,9 @@ def _plan(
                 slip = vx - w * arm[1]
                 slowing = acceleration[0] - acceleration[2] * arm[1] - w * w * arm[0]
                 if slip * slowing < 0.0 and 0.2 * resting < abs(slip) < abs(slowing) * dt:
-                    dt, stops = abs(slip / slowing), True
+                    stopping = abs(slip / slowing)
+                    dt = limits.trusted(stopping)
+                    stops = dt == stopping
     return _Plan(limits.impact if impact else dt, touching, impact, stops)
 
 
@@ -186,15 +192,17 @@ def _drift_kick_drift(
     cos, sin = math.cos(mean), math.sin(mean)
     for closed in plan.touching:
         if closed:
-            arms = [contact.arm(cos, sin) for contact in closed]
-            depth = EMBEDDED + max(contact.gap(px, py, arm) for contact, arm in zip(closed, arms, strict=True))
-            nx, nz = closed[0].normal
-            px, py = px - nx * depth, py - nz * depth
+            highest = -math.inf
+            for contact in closed:
+                arm = contact.arm(cos, sin)
+                highest = max(highest, contact.gap(px, py, arm))
+            nx, nz = contact.normal
+            px, py = px - nx * (highest + EMBEDDED), py - nz * (highest + EMBEDDED)
             final = theta + half * (w + later)
-            ends = closed[0].arm(math.cos(final), math.sin(final))
-            carry_x = -later * (ends[1] - arms[0][1])
+            ends = contact.arm(math.cos(final), math.sin(final))
+            carry_x = -later * (ends[1] - arm[1])
             if nz:
-                carry_y = later * (ends[0] - arms[0][0])
+                carry_y = later * (ends[0] - arm[0])
     kicked = push((px, py, mean), (vx + carry_x, vy + carry_y, w), dt, felt, plan.impact)
     new_vx, new_vy, new_w = kicked[0] - carry_x, kicked[1] - carry_y, kicked[2]
     new_ax, new_ay, new_spin = (new_vx - vx) / dt, (new_vy - vy) / dt, (new_w - w) / dt

@@ -114,6 +114,7 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
         self.stiffness[:] = 0.0
         restitutions = np.array([contact.restitution for contact in contacts])
         self.stopping, self.bouncing = np.full(len(contacts), -1.0), -1.0 - restitutions
+        self.tuned: tuple[float, bool] | None = None  # step and `bouncing` of the push that the damping is for
         # Not of a penetration that would come back as a bounce: no weight presses the block on a wall.
         self.pushing_out = np.where([contact.surface == "floor" for contact in contacts] & (restitutions == 0.0), -PUSHED_OUT, 0.0)
 
@@ -122,6 +123,7 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
         # Reference acceleration: -(1+e)/dt times the velocity, less a share of the penetration.
         self.stiffness[:] = self.pushing_out / dt**2
         self.damping[:] = self.bouncing / dt
+        self.tuned = None
         return super().march(felt, dt)
 
     def step(self) -> None:
@@ -141,7 +143,9 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
         self.qpos[:] = pose
         self.qvel[:] = velocity
         self.force[:] = felt
-        self.damping[:] = (self.bouncing if bouncing else self.stopping) * (IMPEDANCE[0] / dt)
+        if (dt, bouncing) != self.tuned:
+            self.damping[:] = (self.bouncing if bouncing else self.stopping) * (IMPEDANCE[0] / dt)
+            self.tuned = dt, bouncing
         self.mujoco.mj_step1(model, data)
         data.efc_D[:] = RIGID  # MuJoCo caps the impedance, and with it the share of an impact that its contacts take up
         self.mujoco.mj_fwdAcceleration(model, data)
