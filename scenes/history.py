@@ -154,6 +154,8 @@ class History:
             raise InputError(f"{shown}: cannot be read: {error.strerror}") from None
         except (ValueError, OverflowError) as error:  # pandas' own parser errors are ValueErrors
             raise InputError(f"{shown}: not a CSV table: {printable(error)}") from None
+        if len(frame) and not isinstance(frame.index, pd.RangeIndex):  # pandas would take the first column for names of rows
+            raise InputError(f"{shown}: rows have more values than the heading has columns")
         about = _header(first, shown)
         channels = _checked_channels(frame, shown)
         try:

@@ -67,16 +67,11 @@ def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
     Raises `InputError`, naming file and column, for whatever is missing, unknown, doubled or not finite.
     """
     shown = printable(path)
-    try:
-        with Path(path).open(encoding="utf-8") as stream:
-            heading = next((line for line in stream if line.strip() and not line.startswith("#")), "")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{shown}: cannot be read: {getattr(error, 'strerror', None) or 'not a text file'}") from None
     columns: dict[str, tuple[str, float]] = {}
-    for column in (word.strip() for word in heading.split(",")):
+    for column in _heading(Path(path), shown):
         name, factor = _meaning(column, shown)
         if name in (known for known, _ in columns.values()):
-            raise InputError(f"{shown}: column {printable(column)!r} gives {name} a second time")
+            raise InputError(f"{shown}: column {printable(column)!r} gives {printable(name)} a second time")
         columns[column] = (name, factor)
     history = History.load(path, columns={column: name for column, (name, _) in columns.items()})
     channels: dict[str, Any] = {}
@@ -86,6 +81,19 @@ def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
     channels["t"] = channels["t"] + offset
     si = all(factor == 1.0 for _, factor in columns.values())
     return dataclasses.replace(history, channels=channels, outcome=history.outcome if si else outcome_of(channels))
+
+
+def _heading(path: Path, shown: str) -> list[str]:
+    """Names of the columns, with quotes and remarks read as those of the rows are."""
+    import pandas as pd
+
+    try:
+        row = pd.read_csv(path, comment="#", header=None, nrows=1, dtype=str, keep_default_na=False)
+    except OSError as error:
+        raise InputError(f"{shown}: cannot be read: {error.strerror}") from None
+    except (ValueError, OverflowError) as error:  # pandas' own parser errors are ValueErrors
+        raise InputError(f"{shown}: not a CSV table: {printable(error)}") from None
+    return [column.strip() for column in row.iloc[0]]
 
 
 def _meaning(column: str, shown: str) -> tuple[str, float]:

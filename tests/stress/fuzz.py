@@ -2,7 +2,8 @@
 
 libFuzzer (through atheris: `pip install 'rockcheck[fuzz]'`) breeds inputs that reach new lines of the readers, from a valid one and
 from the nasty words of `test_hostile_input`. An input that is answered with neither a result nor one clear line, takes longer than
-10 s or more than 1 GiB of memory ends the run with exit 1 and is written beside; options after the reader's name are libFuzzer's.
+10 s or more than 1 GiB of memory ends the run with an error and is written to the working directory; options after the reader's name
+are libFuzzer's.
 """
 
 from __future__ import annotations
@@ -35,7 +36,15 @@ def main(reader: str, *options: str) -> None:
         words.write_text("".join(map(quoted, filter(None, (*NASTY, *WORDS)))), encoding="ascii")
         feed(valid().encode(), folder)  # what it imports and compiles takes no part
         arguments = ["fuzz.py", f"-dict={words}", "-timeout=10", "-rss_limit_mb=1024", "-max_len=20000", *options, str(corpus)]
-        atheris.Setup(arguments, lambda content: feed(content, folder))
+
+        def fed(content: bytes) -> None:
+            try:
+                feed(content, folder)
+            except BaseException:
+                Path(f"failed-{reader}").write_bytes(content)
+                raise
+
+        atheris.Setup(arguments, fed)
         atheris.Fuzz()
 
 

@@ -487,3 +487,28 @@ def test_a_record_names_no_file_but_its_own(tmp_path, stored):
     for name in ("x" * 5000, "/../../../../etc/passwd", "\0", "\ud800"):
         record.write_text(json.dumps({"files": {**files, name: "0"}}))
         assert store.get("a") is None
+
+
+def test_a_heading_in_quotes(tmp_path):
+    """Found by fuzzing: a measured history whose heading is quoted, as some programs write it, ended in a traceback."""
+    path = tmp_path / "h.csv"
+    path.write_text('\ufeff"t_s","theta_deg" # a remark\n0.0,90.0\n0.5,0.0\n', encoding="utf-8")
+    assert read_measured(path).channels["theta"].tolist() == [math.pi / 2, 0.0]
+
+
+def test_a_heading_with_control_characters(tmp_path):
+    """Found by fuzzing: what a heading has twice is told without the characters that would steer a terminal."""
+    path = tmp_path / "h.csv"
+    path.write_bytes(b"t,theta,\x1b[2Jx,\x1b[2Jx\n0,0,0,0\n")
+    with pytest.raises(InputError) as error:
+        read_measured(path)
+    assert_one_clear_line(str(error.value))
+
+
+def test_rows_longer_than_the_heading(tmp_path):
+    """Found by fuzzing: their first value was left out, and all others were taken for the column before theirs."""
+    path = tmp_path / "h.csv"
+    path.write_text("t,theta\n0.0,0.1,7\n0.5,0.2,7\n")
+    for read in (History.load, read_measured):
+        with pytest.raises(InputError, match="rows have more values than the heading has columns"):
+            read(path)
