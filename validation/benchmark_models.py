@@ -54,7 +54,7 @@ class Line:
 
 _TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 _STEPS = (1e-2, 1e-3, 1e-4, 1e-5)
-_LARGEST = (4e-3, 2e-3, 1e-3, 5e-4)
+_LARGEST = (8e-3, 4e-3, 2e-3, 1e-3)
 LINES = {
     line.label: line
     for line in (

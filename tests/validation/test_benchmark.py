@@ -52,10 +52,12 @@ def test_every_model_converges_to_its_limit(family: str, line: str, coarse: floa
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
-@pytest.mark.parametrize("family", ["free", "slip a", "wall 53 mm e 0.5"])
-def test_adaptive_engines_are_within_a_ten_thousandth_of_alpha(engine: str, family: str) -> None:
-    samples = [measure(family, k, f"{engine} adaptive", 2e-3, repeats=1) for k in SOME]
-    assert evaluated(samples, ()).points[0].rms < 1e-4
+@pytest.mark.parametrize("family", ["pulse b", "slip b", "wall 3 mm e 0.5", "wall 53 mm e 0"])
+def test_adaptive_engines_are_within_a_twenty_thousandth_of_alpha(engine: str, family: str) -> None:
+    """At steps of at most 4 ms, which cost less than fixed ones of 1 ms."""
+    samples = [measure(family, k, f"{engine} adaptive", 4e-3, repeats=1) for k in SOME]
+    assert evaluated(samples, ()).points[0].rms < 5e-5
+    assert all(sample.steps < 450 * sample.horizon for sample in samples)
 
 
 def test_mujocos_default_contact_does_not_converge_beside_a_wall() -> None:
