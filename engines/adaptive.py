@@ -1,10 +1,10 @@
-"""Adaptive stepping: an engine's contact solver inside an integrator of second order whose steps end at the events.
+"""Adaptive stepping: an engine's contact solver inside an integrator of third order whose steps end at the events.
 
 With a fixed step, the error of an engine is the time of its impacts and a drift along the arcs of its contacts, both of
 first order in the step. Here the engine only turns velocities into velocities, at the mean pose of a step (drift, kick, drift);
 step ends are placed where gaps close, where slip stops and where a block at rest may start to move; an impact has a step of
-its own, so short that nothing else happens in it. Between the events, the change of the acceleration from step to step takes
-most of what is left of the error out of the drift: that of a pulse falls tenfold.
+its own, so short that nothing else happens in it. Between events, where the acceleration changes smoothly from step to step,
+that change corrects the drift, which is then of third order.
 """
 
 from __future__ import annotations
