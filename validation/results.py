@@ -215,6 +215,11 @@ class Run(Stored):
         """The cells of one scene, in the models' order."""
         return tuple(cell for cell in self.cells if cell.scene == scene)
 
+    @property
+    def without_tolerance(self) -> int:
+        """How many figures are asked for but have no tolerance yet, which none of them passes."""
+        return sum(check.limit is None for _, check in self.checks())
+
     def checks(self) -> Iterator[tuple[Cell, Check]]:
         """All checks with their cells."""
         for cell in self.cells:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -25,18 +24,8 @@ def site(tmp_path_factory) -> Path:
 
 
 @pytest.fixture
-def page(browser, site) -> Iterator[playwright.Page]:
-    """A page that in the end must have complained of nothing and asked for nothing outside of the site."""
-    page = browser.new_page()
-    complaints: list[str] = []
-    page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("requestfailed", lambda request: complaints.append(f"failed: {request.url}"))
-    home = site.as_uri()
-    page.on("request", lambda request: None if request.url.startswith((home, "data:", "about:")) else complaints.append(request.url))
-    yield page
-    page.close()
-    assert complaints == []
+def page(visitor, site) -> playwright.Page:
+    return visitor(site)
 
 
 def test_every_page_is_in_the_navigation(site):

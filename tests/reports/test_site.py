@@ -23,6 +23,7 @@ from reports.tables import overrun, run_times, worst_first
 from reports.view import scene_views, slugs_of
 from reports.words import number, ratio
 from scenes import Block, Floor, InputError, Record, Scene, Sine, Wall, load_scene
+from validation.models import FAMILIES
 from validation.results import Check, Figure, Run
 
 
@@ -99,6 +100,26 @@ def test_index_lists_what_is_wrong_worst_first(site: Path) -> None:
     index = (site / "index.html").read_text(encoding="utf-8")
     assert "A model failed" in index
     assert "tolerance [old.cm.ebm: theta_rms] has no cell in the suite" in index
+
+
+def test_index_says_what_the_models_are(site: Path) -> None:
+    index = re.sub(r"\s+", " ", (site / "index.html").read_text(encoding="utf-8"))
+    assert f"{FAMILIES['ebm-unilateral'].summary}. <strong>The reference</strong>" in index
+    assert f"{FAMILIES['ebm'].summary}. What separates it from the reference is <strong>model form</strong>" in index
+
+
+def test_a_run_without_tolerances_says_how_to_get_them(tmp_path: Path, finished: Run) -> None:
+    missing = {"limit": None, "expected": None, "drift": None, "verdict": "fail", "reason": "no tolerance is written down"}
+    cells = [
+        cell.model_copy(update={"checks": tuple(check.model_copy(update=missing) for check in cell.checks)})
+        for cell in finished.of_scene("free")
+    ]
+    alone = {"scenes": {"free": finished.scenes["free"]}, "cells": tuple(cells), "ensembles": (), "faults": ()}
+    finished.model_copy(update=alone).save(tmp_path)
+    index = write_site(tmp_path).read_text(encoding="utf-8")
+    assert "No tolerance yet" in index
+    assert f"{sum(len(cell.checks) for cell in cells)} figures have no tolerance yet" in index
+    assert "rockcheck accept" in index
 
 
 def test_data_are_the_histories(site: Path) -> None:

@@ -158,8 +158,10 @@ def test_missing_tolerance_missing_cell_and_nothing_judged_do_not_pass(tmp_path,
     missing = run(write_suite(tmp_path, {"a": 'model = "faulty:Still"'}))
     assert missing.cell("short", "a").checks[0].reason == "no tolerance is written down"
     assert missing.exit_code == 1
+    assert missing.without_tolerance == 1
     alone = run(write_suite(tmp_path, {}))
     assert not any(cell.checks for cell in alone.cells)
+    assert alone.without_tolerance == 0
     assert alone.exit_code == 1
     absent = FINE.format(model="a") + FINE.format(model="a").replace("short", "long")
     faulty = run(write_suite(tmp_path, {"a": 'model = "faulty:Still"'}, absent))

@@ -68,5 +68,7 @@ def show(finished: Run, out: Console) -> None:
     out.print(verdict_table(finished))
     for line in verdict_lines(finished):
         out.print(line, style="red" if finished.exit_code else "yellow")
+    if finished.without_tolerance:
+        out.print(f"{finished.without_tolerance} figures have no tolerance yet: `rockcheck accept` makes today's the expected ones")
     out.print(f"{finished.up_to_date} of {len(finished.cells)} simulations were up to date; {finished.wall_seconds:.1f} s")
     out.print(f"verdict: {finished.verdict}", style="bold")

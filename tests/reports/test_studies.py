@@ -1,0 +1,132 @@
+"""The pages of the studies, made of made-up figures, in a real browser."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+
+from ebm import Spectrum
+from reports.benchmark import write_benchmark
+from reports.convergence import write_convergence
+from reports.spectra import paper_figure, write_page
+from reports.stress import write_stress
+from reports.style import save
+from validation import benchmark, benchmark_models, convergence, spectra
+from validation.benchmark_skipping import Saving
+from validation.stress.study import Batch, Failure, Stress
+
+pytestmark = pytest.mark.browser
+
+MADE = MappingProxyType(
+    {
+        "created": "2026-01-01T00:00:00+00:00",
+        "quick": True,
+        "jobs": 1,
+        "wall_seconds": 3.0,
+        "versions": {"rockcheck": "0.1.0", "python": "3.11", "mujoco": "4.0.0"},
+        "hardware": {"processor": "made up", "cores": "2"},
+    }
+)
+PHONE = {"viewport": {"width": 390, "height": 800}}
+
+
+def benchmark_page(folder: Path) -> Path:
+    lines = (("ebm", 1e-6, 1e-6, 1e-5), ("ebm", 1e-8, 1e-8, 2e-5), ("cm", 1e-5, 1e-3, 1e-3), ("cm", 1e-6, 1e-4, 3e-3))
+    samples = [
+        benchmark_models.Sample(family, member, line, value, 3.0, error, 2.0 * error, error, 0.1 * error, cpu, cpu, 0.1, 1000)
+        for family in ("free", "wall 53 mm e 0")
+        for member in range(3)
+        for line, value, error, cpu in lines
+    ]
+    failed = benchmark_models.Sample("free", 0, "pybullet", 1e-2, 3.0, failure="it blew up")
+    models = benchmark_models.evaluated([*samples, failed], [("free", 0, "mujoco", 1e-4)])
+    savings = (Saving("cm", "wall", "ms", 2.0, 1.0),)
+    return write_benchmark(benchmark.Benchmark(suite="benchmark all", models=models, savings=savings, **MADE), folder)
+
+
+def benchmark_page_without_time(folder: Path) -> Path:
+    models = benchmark_models.evaluated([], [("free", 0, "ebm", 1e-4)])
+    return write_benchmark(benchmark.Benchmark(suite="benchmark models", models=models, **MADE), folder)
+
+
+def convergence_page(folder: Path) -> Path:
+    names = ("long 53 mm e 0.5", "short 3 mm e 0")
+    cases = [convergence.Case(name, 5.0, 0.1, {"ebm-unilateral": "at rest", "ebm": "overturned left"}) for name in names]
+    plays = [
+        convergence.Play(name, model, 10.0**-n, 10.0**-n, 10.0 ** (1 - n), 0.1, 1.0)
+        for name in names
+        for model in ("mujoco", "pybullet", "cm")
+        for n in (3, 4)
+    ]
+    failed = convergence.Play(names[0], "pybullet", 1e-5, failure="it blew up")
+    return write_convergence(convergence.evaluated(cases, [*plays, failed], quick=True), folder)
+
+
+def stress_page(folder: Path) -> Path:
+    failure = Failure("ebm", "ends", 1, 7, math.inf, "no mode is consistent", file="failures/ebm-ends-1-7.toml")
+    (folder / "failures").mkdir()
+    (folder / failure.file).touch()
+    looked, worst = Counter(ends=10, finite=10, mirror=9), {"ends": (math.inf, 7), "finite": (0.0, 9), "mirror": (0.0, 9)}
+    batches = {
+        model: Batch(model=model, runs=10, looked_at=looked, worst=worst, exceptions=Counter(hangs=2), failures=faults)
+        for model, faults in (("ebm", (failure,)), ("ebm-unilateral", ()))
+    }
+    return write_stress(Stress(suite="stress", seed=1, complete=True, batches=batches, **MADE), folder)
+
+
+def spectra_page(folder: Path) -> Path:
+    panels, data, axes = spectra.paper_panels(8), folder / spectra.SPECTRA, (np.linspace(0.5, 8.0, 12), np.linspace(1.0, 12.0, 12))
+    data.mkdir()
+    outcomes = np.zeros((12, 12), dtype=np.int8)
+    outcomes[6:] = 1
+    about = {"frequency_ratios": axes[0], "amplitude_ratios": axes[1], "evaluations": 144, "undecided": np.zeros((0, 2), dtype=np.int64)}
+    found = [Spectrum(outcomes=outcomes, scene=panel.scene, model=None, **about) for panel in panels]
+    spectra.save(panels, found, spectra.Asked(*axes), data)
+    save(paper_figure(panels, found), data / "figure-8")
+    return write_page(folder)
+
+
+STUDIES = {
+    "benchmark": (benchmark_page, "Run time against error"),
+    "benchmark-without-time": (benchmark_page_without_time, "before any model had been played"),
+    "convergence": (convergence_page, "What does not converge"),
+    "stress": (stress_page, "Runs: 2 of EBM, 2 of EBM, unilateral"),
+    "spectra": (spectra_page, "Fig. 8"),
+}
+
+
+@pytest.fixture(scope="module")
+def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("studies")
+    for name, (write, _) in STUDIES.items():
+        (folder / name).mkdir()
+        write(folder / name).rename(folder / name / "index.html")
+    return folder
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_opens_on_a_desk_and_on_a_phone_and_asks_for_nothing(visitor, studies, name):
+    for settings in ({}, PHONE, PHONE | {"color_scheme": "dark"}):
+        page = visitor(studies, **settings)
+        page.goto((studies / name / "index.html").as_uri())
+        assert page.locator("h1").count() == 1
+        assert STUDIES[name][1] in page.locator("main").inner_text()
+        page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
+        assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_accessible(browser, studies, name):
+    for scheme in ("light", "dark"):
+        page = browser.new_page(color_scheme=scheme, bypass_csp=True)
+        page.goto((studies / name / "index.html").as_uri())
+        page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
+        found = Axe().run(page).response["violations"]
+        page.close()
+        assert [v["id"] + ": " + v["nodes"][0]["html"][:120] for v in found if v["impact"] in ("serious", "critical")] == []
