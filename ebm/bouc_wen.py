@@ -63,12 +63,11 @@ from ebm.motion import (
     tilt_series,
     tilt_state,
 )
-from ebm.series import FORCE_NOISE, MOST_TERMS, NO_ROOT, POSITION_NOISE, first_root, leading, value
+from ebm.series import FORCE_NOISE, INSTANT, MOST_TERMS, NO_ROOT, POSITION_NOISE, first_root, leading, value
 from ebm.trajectory import (
-    _QUIET_TIME,
-    _RATTLE_BOUND,
-    _RATTLE_IMPACTS,
-    _RATTLE_TIME,
+    _HANDED_OVER,
+    _MOST_ZERO_STEPS,
+    _OPEN_CONTACTS,
     _REST_BILATERAL,
     DONE,
     FLOOR_IMPACT,
@@ -91,10 +90,11 @@ from ebm.trajectory import (
     _impact,
     _note,
     _step_size,
+    resting_speed,
 )
 from ebm.transitions import (
-    AHEAD,
-    G_CONE_PLUS,
+    CREEP,
+    G_FAR_GAP,
     G_FAR_PUSH,
     G_PUSH,
     G_SLIP,
@@ -105,6 +105,7 @@ from ebm.transitions import (
     closed_wall,
     guards_of,
     slip_velocity,
+    tips_first,
 )
 from scenes.compiled import inner_kernel, kernel
 from scenes.errors import InputError, ModelFailure
@@ -121,10 +122,7 @@ _ROWS = ROWS + 15
 
 # A guard besides those of ebm.transitions: z comes to the sign of V, from where the pivot loads.
 _G_LOADS = GUARDS
-# A pivot that slips more slowly than this after an impact stands.
-_STOPPED = 1e-10
 _LOOK = 6
-_MOST_ZERO_STEPS = 60
 
 
 def simulate(model: EventBasedModel, scene: Scene, tolerance: float) -> History:
@@ -280,16 +278,19 @@ def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order
 @inner_kernel
 def _held(b, z, gh, gv, t):
     """Whether a flat block without speed stays at rest: the base neither lifts nor slides it, or presses it on a wall."""
-    limit = min(b.sin_alpha / b.cos_alpha, b.mu_s) * (1.0 + acceleration(gv, t))
-    u = acceleration(gh, t)
-    return (u <= limit or closed_wall(b, z, 1, False)) and (u >= -limit or closed_wall(b, z, -1, False))
+    slope, g, u = b.sin_alpha / b.cos_alpha, 1.0 + acceleration(gv, t), acceleration(gh, t)
+    left, right = closed_wall(b, z, 1, False), closed_wall(b, z, -1, False)
+    if g < 0.0:  # hanging: only a wall on which it is pressed holds it flat
+        return (left and u >= -slope * g) or (right and u <= slope * g)
+    limit = min(slope, b.mu_s) * g
+    return (u <= limit or left) and (u >= -limit or right)
 
 
 @inner_kernel
-def _rest(b, m, z):
+def _rest(b, m, z, gv, t):
     """The mode of a block at rest on its base."""
     m[:] = 0
-    m[FAMILY], m[S], m[PULL], m[FLOOR] = FLAT, 1, 1, STICK
+    m[FAMILY], m[S], m[PULL], m[FLOOR] = FLAT, 1, 1 if acceleration(gv, t) > -1.0 else -1, STICK
     m[TIP], m[FAR] = closed_wall(b, z, 1, False), closed_wall(b, z, -1, False)
 
 
@@ -299,13 +300,27 @@ def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, a):
     u, g = acceleration(gh, t), 1.0 + acceleration(gv, t)
     m[:] = 0
     m[PULL], m[FLOOR] = 1, SLIPPING
-    if b.mu_k * b.cos_alpha <= b.sin_alpha:
+    if b.mu_k * b.cos_alpha <= b.sin_alpha and g > 0.0:
         m[FAMILY], m[S], m[SLIP] = FLAT, 1, -sense
         return -float(sense)
-    m[FAMILY], m[S], m[SLIP] = TILT, sense, -1
-    zeta = min(max(-u / (b.mu_k * abs(g)), -1.0), 1.0)
-    _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a)
-    return zeta
+    zeta = min(max(-u / max(b.mu_k * abs(g), 1e-300), -1.0), 1.0)
+    if _tip(b, m, z, sense, zeta, yield_displacement, gh, gv, t, a):
+        return zeta
+    _rest(b, m, z, gv, t)
+    return 0.0
+
+
+@inner_kernel
+def _tip(b, m, z, first, zeta, yield_displacement, gh, gv, t, a):
+    """Lets a flat block tilt to the side on which its rotation grows, `first` if it can; returns whether there is one."""
+    v = slip_velocity(b, z)
+    for sense in (first, -first):
+        m[:] = 0
+        m[FAMILY], m[S], m[SLIP] = TILT, sense, 1 if sense * v > 0.0 else -1
+        _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a)
+        if leading(a, PHI, _LOOK, POSITION_NOISE) > 0:
+            return True
+    return False
 
 
 @inner_kernel
@@ -315,8 +330,8 @@ def _begin(b, m, z, zeta, yield_displacement, gh, gv, t, a):
     if z[THETA] == 0.0 and z[W] == 0.0:
         if v == 0.0:
             if not _held(b, z, gh, gv, t):
-                return _leave_rest(b, m, z, 1 if acceleration(gh, t) > 0.0 else -1, yield_displacement, gh, gv, t, a)
-            _rest(b, m, z)
+                return _leave_rest(b, m, z, tips_first(b, z, gh, t), yield_displacement, gh, gv, t, a)
+            _rest(b, m, z, gv, t)
             return 0.0
         m[:] = 0
         m[FAMILY], m[S], m[PULL], m[FLOOR], m[SLIP] = FLAT, 1, 1, SLIPPING, 1 if v > 0.0 else -1
@@ -336,12 +351,13 @@ def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a):
         m[FLOOR], m[PULL] = STICK, 1
         tilt_series(b, m, z, gh, gv, t, _LOOK, 0.0, 0.0, a)
         if a[NA, 0] >= 0.0 and a[NB, 0] >= 0.0:  # wedged between the walls
+            m[PULL] = 1 if a[P, 0] >= 0.0 else -1
             z[W] = z[VX] = z[VY] = 0.0
             return
         m[FAR if a[NB, 0] < a[NA, 0] else TIP] = 0
     m[FLOOR] = SLIPPING
     _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a)
-    if m[TIP] + m[FAR] > 0 and leading(a, NA if m[TIP] != 0 else NB, _LOOK - 2, AHEAD, FORCE_NOISE) < 0:
+    if m[TIP] + m[FAR] > 0 and leading(a, NA if m[TIP] != 0 else NB, _LOOK - 2, FORCE_NOISE) < 0:
         m[TIP] = m[FAR] = 0
         _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a)
 
@@ -360,7 +376,7 @@ def _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a):
 def _initial_friction(b, m, z, gh, gv, t, a):
     """z at the start: sgn V for a pivot that slips, else the value that lets it stand still (at most 1 in size)."""
     v = slip_velocity(b, z)
-    if abs(v) > _STOPPED:
+    if abs(v) > CREEP:
         return 1.0 if v > 0.0 else -1.0
     if z[THETA] == 0.0 and z[W] == 0.0:
         return 0.0
@@ -379,7 +395,7 @@ def _initial_friction(b, m, z, gh, gv, t, a):
 @inner_kernel
 def _has_yielded(b, m, z, zeta):
     """Whether the pivot slips with z = +-1."""
-    return m[FLOOR] == SLIPPING and abs(zeta) == 1.0 and zeta * slip_velocity(b, z) > _STOPPED
+    return m[FLOOR] == SLIPPING and abs(zeta) == 1.0 and zeta * slip_velocity(b, z) > CREEP
 
 
 @inner_kernel
@@ -395,9 +411,9 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
     """Simulates from state z (changed in place) at t = 0 to t_end; returns a Tally. Arguments as of trajectory.run."""
     a, stack = np.zeros((_ROWS, MOST_TERMS)), np.zeros((48, MOST_TERMS))
     a[G, 0] = 1.0
-    m = np.zeros(MODE_SIZE, dtype=np.int64)
+    m, left = np.zeros(MODE_SIZE, dtype=np.int64), np.zeros(MODE_SIZE, dtype=np.int64)
     impulse, gains = np.zeros(2), np.zeros(2)
-    rattle = np.array([_REST_BILATERAL, -1.0, -1.0, 0.0])
+    rattle = np.array([_REST_BILATERAL, -1.0, -1.0, 0.0, 0.0])
     t = 0.0
     steps = events = wall_impacts = zero_steps = 0
     rows = min(1, out.shape[0])
@@ -430,6 +446,10 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
             if m[FAMILY] == TILT:
                 h = _step_size(a, PHI, COS, order, control.tolerance, h)
         tau, which = _first_event(b, m, order, 0.0, h, guards_of(b, m), a, stack)
+        if zero_steps >= _HANDED_OVER and tau <= 0.0 and which > G_FAR_GAP:  # as in trajectory.run
+            zero_steps += 1
+            h = min(h, INSTANT * 2.0 ** (0.5 * (zero_steps - _HANDED_OVER)))
+            tau, which = _first_event(b, m, order, 0.0, h, guards_of(b, m) & _OPEN_CONTACTS, a, stack)
         if moving and m[SLIP] * a[Z, 0] <= -1e-13:
             for k in range(order):
                 a[GUARD, k] = -m[SLIP] * a[Z, k]
@@ -485,23 +505,22 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
             if m[FAMILY] == FLAT and _held(b, z, gh, gv, t):
                 z[VX] = 0.0
                 kind = STICKS
-                _rest(b, m, z)
+                _rest(b, m, z, gv, t)
         elif which == G_TIP_PUSH or which == G_FAR_PUSH:
             kind = RELEASE
             m[TIP if which == G_TIP_PUSH else FAR] = 0
             m[FLOOR] = SLIPPING
         elif which >= G_UPLIFT_PLUS and moving:  # tilts while it slides
             kind = UPLIFT
-            m[FAMILY], m[S] = TILT, 1 if which == G_UPLIFT_PLUS else -1
-            m[SLIP] = m[S] * m[SLIP]
-            _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a)
+            left[:] = m
+            if not _tip(b, m, z, -1 if z[VX] > 0.0 else 1, zeta, yield_displacement, gh, gv, t, a):
+                m[:], zero_steps = left, max(zero_steps, _HANDED_OVER)
         elif which > G_FAR_PUSH:  # the cone, or uplift from rest
-            sense = 1 if which == G_CONE_PLUS or which == G_UPLIFT_PLUS else -1
-            zeta = _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, a)
+            zeta = _leave_rest(b, m, z, tips_first(b, z, gh, t), yield_displacement, gh, gv, t, a)
             yielded = abs(zeta) == 1.0
             kind = UPLIFT if m[FAMILY] == TILT else SLIPS
         elif which >= 0:
-            kind, _, _ = _impact(b, m, z, which, gh, t, _resting_speed(rattle, t), impulse, gains)
+            kind, _, _ = _impact(b, m, z, which, gh, t, resting_speed(rattle, t, _REST_BILATERAL), impulse, gains)
             wall_impacts += kind == WALL_IMPACT
             zeta = _begin(b, m, z, zeta, yield_displacement, gh, gv, t, a)
             yielded = _has_yielded(b, m, z, zeta)
@@ -534,18 +553,3 @@ def _state(b, m, order, tau, a, z):
         flat_state(b, m, order, tau, a, z)
     else:
         tilt_state(b, m, order, tau, m[S] * z[X] - a[SIN, 0], a, z)
-
-
-@inner_kernel
-def _resting_speed(rattle, t):
-    """The speed below which a contact that is struck at time t stays closed: impacts that rattle on raise it tenfold."""
-    resting, since, last, count = rattle
-    if t - last > _QUIET_TIME:
-        resting = _REST_BILATERAL
-    if t - since > _RATTLE_TIME:
-        since, count = t, 0.0
-    count += 1.0
-    if count >= _RATTLE_IMPACTS:
-        resting, count = min(10.0 * resting, _RATTLE_BOUND), 0.0
-    rattle[0], rattle[1], rattle[2], rattle[3] = resting, since, t, count
-    return resting

@@ -11,9 +11,11 @@ from scenes.compiled import inner_kernel
 
 #: Width of the arrays that hold a polynomial: orders up to 28, and two numbers that the root search keeps behind them.
 MOST_TERMS = 32
-#: A coefficient below this (in natural units, scaled to the step) is rounding noise: of a position, a velocity, a force. They
-#: fit each other over the 2e-2 that a selection looks ahead: what a force of 1e-10 moves is more than 1e-14.
-POSITION_NOISE, RATE_NOISE, FORCE_NOISE = 1e-14, 1e-12, 1e-10
+#: Natural time over which the first coefficients of a guard are weighed against each other.
+AHEAD = 2e-2
+#: A coefficient below this, scaled to AHEAD, is rounding noise: of a position, a velocity, a force. They fit each other: what
+#: a force of 1e-10 moves in that time is less than 1e-13.
+POSITION_NOISE, RATE_NOISE, FORCE_NOISE = 1e-13, 1e-12, 1e-10
 #: A guard that is negative, but will not be after this time, is at its zero: the time of an event is not known better.
 INSTANT = 1e-9
 NO_ROOT = -1.0
@@ -40,34 +42,33 @@ def slope(a, row, n, tau):
 
 
 @inner_kernel
-def leading(a, row, n, h, floor):
-    """The sign with which c leaves tau = 0 on a step h: +1, -1, or 0 where it is zero throughout."""
-    k = _order_of_zero(a, row, n, h, floor)
+def leading(a, row, n, floor):
+    """The sign with which c leaves tau = 0: +1, -1, or 0 where it is zero throughout."""
+    k = _order_of_zero(a, row, n, floor)
     if k > n:
         return 0
     return 1 if a[row, k] > 0.0 else -1
 
 
 @inner_kernel
-def _order_of_zero(a, row, n, h, floor):
-    """The index of the first coefficient of c that counts on a step h; n + 1 where there is none.
+def _order_of_zero(a, row, n, floor):
+    """The index of the first coefficient of c that counts; n + 1 where there is none.
 
-    Coefficients that are rounding noise on the scale of the step (below `floor`, see POSITION_NOISE), or turn positive within
-    an INSTANT, are taken as zero, so that a guard that has just fired (and is zero by construction) does not fire again.
+    Coefficients that are rounding noise (below `floor`, see POSITION_NOISE), or turn positive within an INSTANT, are taken
+    as zero, so that a guard that has just fired (and is zero by construction) does not fire again.
     """
-    largest = 0.0
-    scale = 1.0
-    for k in range(n + 1):
-        largest = max(largest, abs(a[row, k]) * scale)
-        scale *= h
-    noise = max(floor, 1e-13 * largest)
+    noise = floor
+    scale = 1e-13
+    for k in range(min(n, 2) + 1):  # later terms may grow without bound where friction nearly jams the pivot (Painleve)
+        noise = max(noise, abs(a[row, k]) * scale)
+        scale *= AHEAD
     scale = 1.0
     for k in range(n + 1):
         if abs(a[row, k]) * scale > noise:
             rises = k < n and a[row, k] < 0.0 and a[row, k] + (k + 1) * a[row, k + 1] * INSTANT > 0.0
             if not rises:
                 return k
-        scale *= h
+        scale *= AHEAD
     return n + 1
 
 
@@ -84,7 +85,7 @@ def first_root(a, row, n, h, floor, stack):
         low = (low + min(a[row, k], 0.0)) * h
     if a[row, 0] > floor and a[row, 0] + low > 1e-13 * a[row, 0]:
         return NO_ROOT
-    zeros = _order_of_zero(a, row, n, h, floor)
+    zeros = _order_of_zero(a, row, n, floor)
     if zeros > n:
         return NO_ROOT
     if a[row, zeros] < 0.0:

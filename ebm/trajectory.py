@@ -42,10 +42,10 @@ from ebm.motion import (
     tilt_series,
     tilt_state,
 )
-from ebm.series import FORCE_NOISE, INSTANT, NO_ROOT, POSITION_NOISE, first_root, leading, value
+from ebm.series import FORCE_NOISE, INSTANT, NO_ROOT, POSITION_NOISE, first_root, value
 from ebm.transitions import (
-    AHEAD,
     CLOSED_RATE,
+    CREEP,
     G_CONE_MINUS,
     G_CONE_PLUS,
     G_FAR_GAP,
@@ -66,6 +66,7 @@ from ebm.transitions import (
     rock_guards_hold,
     select,
     slip_velocity,
+    tips_first,
 )
 from scenes.compiled import inner_kernel, kernel
 
@@ -100,8 +101,9 @@ FAILURES = {
 # slowly than this stays on it. Natural units; 5e-8 is 1e-7 rad/s for the paper's block.
 SETTLE_SPIN = 5e-8
 _REST_BILATERAL, _REST_UNILATERAL = 2.5e-8, 2.5e-7
-# Rattling: this many impacts within this time raise the settling speed tenfold, up to a bound, until it is quiet.
-_RATTLE_IMPACTS, _RATTLE_TIME, _RATTLE_BOUND, _QUIET_TIME = 100, 5e-3, 2.5e-3, 2.5e-2
+# Rattling: this many impacts within this time raise the settling speed tenfold, up to a bound, until it is quiet. What rattles on
+# for this many times more (a block between two walls that hardly fits) ends plastic.
+_RATTLE_IMPACTS, _RATTLE_TIME, _RATTLE_BOUND, _QUIET_TIME, _RATTLES = 100, 5e-3, 2.5e-3, 2.5e-2, 50
 # With the bilateral pivot a block that rattles flush against a wall is settled below these.
 _FLUSH_SPIN, _FLUSH_SPEED, _FLUSH_GAP = 2e-4, 2.5e-4, 6e-7
 # This far beyond the limits of rest, g, the guards of what follows are above their noise.
@@ -109,8 +111,6 @@ _BEYOND = 4.0 * FORCE_NOISE
 _TOUCH = 1e-11
 # A block that lands this near to a wall lands flush against it: the root of its far gap says no more (see _LANDED).
 _FLUSH = 1e-9
-# A pivot that slips more slowly than this after an impact stands: the impact law says so up to rounding.
-_STOPPED = 1e-10
 # Near phi = 0 the far gap goes with phi^2, so that its root says phi to the square root of rounding only.
 _LANDED = 1e-7
 # After so many events without a step the modes hand over to each other for rounding; after so many more the run fails.
@@ -182,14 +182,14 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         # A pulse is over when less than the tolerance is left of it.
         quiet = gh.centre + math.sqrt(-math.log(1e-3 * control.tolerance) / gh.rate) if gh.kind == GAUSSIAN else 0.0
     base_rest = _REST_UNILATERAL if b.unilateral else _REST_BILATERAL
-    resting, window_start, last_impact, in_window = base_rest, -1.0, -1.0, 0
+    rattle = np.array([base_rest, -1.0, -1.0, 0.0, 0.0])
     t = 0.0
     rows = steps = events = wall_impacts = zero_steps = 0
     peak, t_rest = abs(z[THETA]), np.nan
     ending = DONE
     m[FAMILY], m[S], m[FLOOR], m[PULL] = FLAT, 1, STICK, 1  # most often it stands
     stands = z[THETA] == 0.0 and z[VX] == 0.0 and z[W] == 0.0 and z[HEIGHT] == b.cos_alpha and not b.walls
-    if not (stands and consistent(b, m, z, gh, gv, t, a)) and not select(b, z, gh, gv, t, left, m, a):
+    if not (stands and consistent(b, m, z, gh, gv, t, a, False)) and not select(b, z, gh, gv, t, left, m, a):
         return Tally(NO_MODE, t, peak, False, 0, 0, 0, 0, 0.0, 0, t_rest)
     if z[THETA] == 0.0 and z[W] == 0.0 and z[VX] == 0.0 and z[VY] == 0.0 and closed_floor(b, z) and mode_code(m) != 0:
         events += 1  # it cannot stay at rest
@@ -224,7 +224,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             left[:] = m
             m[:] = 0  # most often it rocks
             m[FAMILY], m[S], m[FLOOR], m[PULL] = TILT, 1 if acceleration(gh, t) > 0.0 else -1, STICK, 1
-            if not consistent(b, m, z, gh, gv, t, a) and not select(b, z, gh, gv, t, left, m, a):
+            if not consistent(b, m, z, gh, gv, t, a, False) and not select(b, z, gh, gv, t, left, m, a):
                 ending = NO_MODE
                 break
             t_rest = np.nan
@@ -308,14 +308,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         impulse[:] = 0.0
         strikes = which == G_TIP_GAP or which == G_FAR_GAP or which == G_LANDING or which == G_PHI
         if strikes:
-            if t - last_impact > _QUIET_TIME:
-                resting = base_rest
-            if t - window_start > _RATTLE_TIME:
-                window_start, in_window = t, 0
-            in_window += 1
-            if in_window >= _RATTLE_IMPACTS:
-                resting, in_window = min(10.0 * resting, _RATTLE_BOUND), 0
-            last_impact = t
+            resting = resting_speed(rattle, t, base_rest)
             kind, found, known = _impact(b, m, z, which, gh, t, resting, impulse, gains)
             wall_impacts += kind == WALL_IMPACT
             if not known:
@@ -376,16 +369,31 @@ def _first_event(b, m, order, pivot, h, mask, a, stack):
         degree = guard(b, m, k, order, pivot, a) if mask >> k & 1 else -1
         if degree >= 0:
             root = first_root(a, GUARD, degree, h, noise_of(k), stack)  # in h, not tau: the mirror image has another order
-            if root == 0.0 and leading(a, GUARD, degree, AHEAD, noise_of(k)) >= 0:
-                # What a selection takes for zero is no event yet.
-                if tau > AHEAD:
-                    tau, which = AHEAD, -1
-            elif root != NO_ROOT and root < tau:
+            if root != NO_ROOT and root < tau:
                 tau, which = root, k
     if which >= G_PUSH and which != G_SLIP and tau > 0.25 * h:
         # A force is the second derivative of a truncated series: its zero is found to rounding from nearby only.
         return 0.9 * tau, -1
     return tau, which
+
+
+@inner_kernel
+def resting_speed(rattle, t, base):
+    """The speed below which a contact that is struck at time t stays closed: `base`, unless it rattles.
+
+    `rattle` keeps that speed, when the count of impacts began, the last impact, the count, and how often it was full.
+    """
+    resting, since, last, count, full = rattle
+    if t - last > _QUIET_TIME:
+        resting, full = base, 0.0
+    if t - since > _RATTLE_TIME:
+        since, count = t, 0.0
+    count += 1.0
+    if count >= _RATTLE_IMPACTS:
+        count, full = 0.0, full + 1.0
+        resting = min(10.0 * resting, _RATTLE_BOUND) if full < _RATTLES else np.inf
+    rattle[0], rattle[1], rattle[2], rattle[3], rattle[4] = resting, since, t, count, full
+    return resting
 
 
 @inner_kernel
@@ -399,12 +407,12 @@ def _impact(b, m, z, which, gh, t, resting, impulse, gains):
         _upright(b, m, z)
     found, known = True, False
     if b.unilateral:
-        found = _strike(b, m, z, resting, impulse, gains)
+        found = _strike(b, m, z, gh, t, resting, impulse, gains)
     elif wall:
         known = _wall_impact(b, m, z, which == G_TIP_GAP, gh, t, resting, impulse, gains)
     else:
         known = _floor_impact(b, m, z, impulse)
-    if not known and not b.unilateral and abs(slip_velocity(b, z)) < _STOPPED:
+    if not known and not b.unilateral and abs(slip_velocity(b, z)) < CREEP:
         z[VX] = -math.cos(b.alpha - abs(z[THETA])) * z[W]
     if z[THETA] == 0.0 and abs(z[W]) < SETTLE_SPIN:
         v = slip_velocity(b, z)
@@ -513,7 +521,9 @@ def _floor_impact(b, m, z, impulse):
 @inner_kernel
 def _wall_impact(b, m, z, tip, gh, t, resting, impulse, gains):
     """Bilateral pivot: a corner (case I, II) or the side (case III) strikes a wall. Returns whether m is already right."""
-    if b.gap_left + b.gap_right < _TOUCH:  # it fills the space between its walls
+    phi = abs(z[THETA])
+    space = b.gap_left + b.gap_right - 2.0 * (math.sin(b.alpha + phi) - b.sin_alpha)
+    if space < _TOUCH or m[TIP] != 0 or m[FAR] != 0:  # wedged: between both walls at once nothing rebounds
         z[W] = z[VX] = z[VY] = 0.0
         return False
     if m[FAMILY] == FLAT:
@@ -524,12 +534,8 @@ def _wall_impact(b, m, z, tip, gh, t, resting, impulse, gains):
     sign = float(m[S])
     e = b.e_left if (m[S] > 0) == tip else b.e_right
     sw = 1.0 if tip else -1.0
-    phi = abs(z[THETA])
     s, c, cp = math.sin(b.alpha - phi), math.cos(b.alpha - phi), math.cos(b.alpha + phi)
     w1, xdot1 = sign * z[W], sign * z[VX]
-    if m[TIP] != 0 or m[FAR] != 0:  # sliding down one wall it meets the other: wedged
-        z[W] = z[VX] = z[VY] = 0.0
-        return False
     before = xdot1 * xdot1 + (s * w1) ** 2 + w1 * w1 / 3.0
     branch, w2, xdot2, n, p, v2 = impacts.wall_impact(1.0, sw, s, c, cp, w1, xdot1, e, b.mu_s, b.mu_k, b.no_slip)
     after = xdot2 * xdot2 + (s * w2) ** 2 + w2 * w2 / 3.0
@@ -543,7 +549,7 @@ def _wall_impact(b, m, z, tip, gh, t, resting, impulse, gains):
     stays = stays or rebound < resting
     if stays:
         xdot2 = C * w2
-    if abs(xdot2 + c * w2) < _STOPPED:
+    if abs(xdot2 + c * w2) < CREEP:
         xdot2 = -c * w2
     z[W], z[VX], z[VY] = sign * w2, sign * xdot2, s * w2
     if b.no_slip and stays:
@@ -569,11 +575,9 @@ def _presses(b, gh, t, side):
 
 
 @kernel
-def _strike(b, m, z, resting, impulse, gains):
+def _strike(b, m, z, gh, t, resting, impulse, gains):
     """Unilateral: resolves all contacts touched at this instant. Returns False where no impact law fits."""
-    sign = float(m[S])
-    if m[FAMILY] == FLAT:
-        sign = 1.0
+    sign = float(tips_first(b, z, gh, t) if m[FAMILY] == FLAT else m[S])
     phi = abs(z[THETA])
     c, reach = math.cos(b.alpha - phi), math.sin(b.alpha + phi)
     flat = z[THETA] == 0.0
@@ -594,7 +598,7 @@ def _strike(b, m, z, resting, impulse, gains):
         e_tip = e_far = 0.0  # between both walls at once nothing rebounds
     found = contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, gains)
     z[VX], z[VY], z[W] = sign * v[0], v[1], sign * v[2]
-    if touching[F] and abs(slip_velocity(b, z)) < _STOPPED:
+    if touching[F] and abs(slip_velocity(b, z)) < CREEP:
         z[VX] = -c * z[W]
     return found
 

@@ -49,7 +49,7 @@ from ebm.motion import (
     flat_series,
     tilt_series,
 )
-from ebm.series import FORCE_NOISE, MOST_TERMS, POSITION_NOISE, RATE_NOISE, leading
+from ebm.series import AHEAD, FORCE_NOISE, MOST_TERMS, POSITION_NOISE, RATE_NOISE, leading
 from scenes.compiled import inner_kernel
 
 # The guards, in the order in which ties are decided: floor before walls, contacts before friction.
@@ -73,13 +73,15 @@ GUARDS = 13
 # A contact is closed if its gap and its gap's rate are below these (natural units).
 CLOSED_GAP = 1e-10
 CLOSED_RATE = 1e-9
+# A pivot that slips more slowly than this stands, if it can: so little is rounding of an impact, or of a mode that just began.
+CREEP = 1e-10
 
 
 @inner_kernel
 def guards_of(b, m):
     """The guards that mode m may have, as bits: what a scene or a mode does not need is not looked at."""
     walls = 1 << G_TIP_GAP | 1 << G_FAR_GAP | 1 << G_TIP_PUSH | 1 << G_FAR_PUSH if b.walls else 0
-    push = 1 << G_PUSH if b.unilateral or m[FLOOR] == SLIPPING else 0
+    push = 1 << G_PUSH if b.unilateral or m[FLOOR] == SLIPPING or m[FAMILY] == FLAT else 0
     if m[FLOOR] == OFF:
         floor = 1 << G_LANDING
     elif m[FLOOR] == SLIPPING:
@@ -196,21 +198,21 @@ def _flat_guard(b, m, which, order, a):
         a[GUARD, 0] += gap
         return order
     if which == G_TIP_PUSH:
-        if m[FLOOR] != OFF or m[TIP] == m[FAR]:
+        if (m[FLOOR] != OFF and m[PULL] > 0) or m[TIP] == m[FAR]:
             return -1
-        for k in range(order - 1):
-            a[GUARD, k] = a[NA, k]
+        for k in range(order - 1):  # on the floor, Q is the base acceleration that the wall takes
+            a[GUARD, k] = a[NA, k] if m[FLOOR] == OFF else (m[TIP] - m[FAR]) * a[Q, k]
         return order - 2
     if m[FLOOR] == OFF:
         return -1
     if which == G_PUSH:
-        if not b.unilateral:
+        if not b.unilateral and m[TIP] == 0 and m[FAR] == 0:
             return -1
         for k in range(order - 1):
-            a[GUARD, k] = a[P, k]
+            a[GUARD, k] = m[PULL] * a[P, k]
         return order - 2
     if which == G_CONE_PLUS or which == G_CONE_MINUS:
-        if m[FLOOR] != STICK or b.no_slip or m[TIP if which == G_CONE_PLUS else FAR] != 0:
+        if m[FLOOR] != STICK or b.no_slip or m[PULL] < 0 or m[TIP if which == G_CONE_PLUS else FAR] != 0:
             return -1
         sense = 1.0 if which == G_CONE_PLUS else -1.0
         for k in range(order - 1):
@@ -258,12 +260,12 @@ def noise_of(which):
     return RATE_NOISE if which == G_SLIP else FORCE_NOISE
 
 
+_OTHER, _SAME, _CREEPING = range(3)  # attempts of a selection
 _LOOK = 6  # order of the series that a selection looks at
-AHEAD = 2e-2  # natural time over which it weighs their terms
 
 
 @inner_kernel
-def consistent(b, m, z, gh, gv, t, a):
+def consistent(b, m, z, gh, gv, t, a, creeping):
     """Whether mode m can begin at state z: every guard leaves zero upward, and what must begin to move does."""
     look = min(_LOOK, MOST_TERMS)  # the plain constant would make numba compile all series once more, for it alone
     if m[FAMILY] == FLAT:
@@ -279,10 +281,10 @@ def consistent(b, m, z, gh, gv, t, a):
             continue
         if which <= G_FAR_GAP and a[GUARD, 1] < -CLOSED_RATE:
             continue  # not this mode's fault: an impact comes next
-        sign = leading(a, GUARD, degree, AHEAD, noise_of(which))
+        sign = leading(a, GUARD, degree, noise_of(which))
         if sign < 0 or not math.isfinite(a[GUARD, 0]):
             return False
-        if sign == 0 and (which == G_SLIP or (which == G_PHI and m[FLOOR] != OFF)):
+        if sign == 0 and ((which == G_SLIP and not creeping) or (which == G_PHI and m[FLOOR] != OFF)):
             return False
     return True
 
@@ -323,8 +325,8 @@ def closed_floor(b, z):
 def select(b, z, gh, gv, t, left, m, a):
     """Writes into m the mode that is consistent at state z, and returns whether there is one.
 
-    `left` is the mode that has just ended; it is taken again only where no other one fits. Larger contact sets come first,
-    sticking before slipping.
+    Larger contact sets come first, sticking before slipping. `left`, the mode that has just ended, is taken again only where no
+    other one fits, and a slip that does not begin only where that does not either.
     """
     if abs(z[THETA]) < 1e-13 and abs(z[W]) < CLOSED_RATE and z[THETA] != 0.0:
         v = slip_velocity(b, z)
@@ -332,68 +334,95 @@ def select(b, z, gh, gv, t, left, m, a):
         z[VX] = v if abs(v) > CLOSED_RATE else 0.0
     flat = z[THETA] == 0.0 and z[W] == 0.0
     floor = closed_floor(b, z) or not b.unilateral
+    if floor and abs(slip_velocity(b, z)) < CREEP:
+        z[VX] = -math.cos(b.alpha - abs(z[THETA])) * z[W]
     stands = floor and b.walls and z[THETA] != 0.0 and abs(z[W]) < CLOSED_RATE
     if stands and (closed_wall(b, z, 1, False) or closed_wall(b, z, -1, False)):
         z[W] = z[VX] = z[VY] = 0.0  # on floor and wall a block that does not turn stands
-    for attempt in range(2):
+    for attempt in (_OTHER, _SAME, _CREEPING):
         if flat:
-            # Both senses of tilting; where both fit (they do not, but for rounding) the base acceleration decides.
-            first = 1 if acceleration(gh, t) >= 0.0 else -1
+            first = tips_first(b, z, gh, t)
             if floor and z[VX] == 0.0 and not b.walls:
                 # Static friction above kinetic can leave both rocking and sliding consistent: it holds as long as it can.
                 m[:] = 0
-                m[S], m[FLOOR], m[PULL] = first, STICK, 1
+                m[FLOOR], m[PULL] = STICK, 1
                 for family in (FLAT, TILT):
-                    m[FAMILY] = family
-                    if _accept(b, m, z, gh, gv, t, left, a, attempt == 1):
+                    m[FAMILY], m[S] = family, 1 if family == FLAT else first
+                    if _accept(b, m, z, gh, gv, t, left, a, attempt):
                         return True
-            if _select_flat(b, z, gh, gv, t, floor, left, m, a, attempt == 1):
+            if _select_flat(b, z, gh, gv, t, first, floor, left, m, a, attempt):
                 return True
             for sense in (first, -first):
-                if _select_tilt(b, z, gh, gv, t, sense, floor, left, m, a, attempt == 1):
+                if _select_tilt(b, z, gh, gv, t, sense, floor, left, m, a, attempt):
                     return True
         else:
             lean = z[THETA] if z[THETA] != 0.0 else z[W]
-            if _select_tilt(b, z, gh, gv, t, 1 if lean > 0.0 else -1, floor, left, m, a, attempt == 1):
+            if _select_tilt(b, z, gh, gv, t, 1 if lean > 0.0 else -1, floor, left, m, a, attempt):
                 return True
     return False
 
 
 @inner_kernel
-def _accept(b, m, z, gh, gv, t, left, a, again):
-    same = True
-    for k in range(m.size):
-        same = same and m[k] == left[k]
-    return same == again and consistent(b, m, z, gh, gv, t, a)
+def tips_first(b, z, gh, t):
+    """The side to which a flat block is first asked to tip, +1 left or -1 right: the sense in which all of it is calculated.
+
+    Both fit only for rounding, or where the floor falls away faster than g under a pivot that cannot let go: then the base
+    acceleration decides, now or soon, or the friction, or the block's place between its walls: a mirror image does alike.
+    """
+    toward = acceleration(gh, t)
+    if toward == 0.0:
+        toward = acceleration(gh, t + AHEAD)
+    if toward == 0.0:
+        toward = -z[VX]
+    if toward == 0.0:
+        toward = z[X]
+    if toward == 0.0 and b.gap_left != b.gap_right:
+        toward = b.gap_left - b.gap_right
+    return 1 if toward >= 0.0 else -1
 
 
 @inner_kernel
-def _select_flat(b, z, gh, gv, t, floor, left, m, a, again):
-    m[:] = 0
+def _accept(b, m, z, gh, gv, t, left, a, attempt):
+    same = True
+    for k in range(m.size):
+        same = same and m[k] == left[k]
+    return same == (attempt == _SAME) and consistent(b, m, z, gh, gv, t, a, attempt == _CREEPING)
+
+
+@inner_kernel
+def _select_flat(b, z, gh, gv, t, first, floor, left, m, a, attempt):
+    m[:] = 0  # `first` is the side to which the base acceleration tips the block; it presses on that wall, slips that way
     m[FAMILY], m[S], m[PULL] = FLAT, 1, 1
     at_left = b.walls and closed_wall(b, z, 1, False)
     at_right = b.walls and closed_wall(b, z, -1, False)
     if floor:
-        for slip in (0, 1, -1):
+        for slip in (0, -first, first):
             if (slip == 0 and z[VX] != 0.0) or slip * z[VX] < 0.0 or (slip != 0 and b.no_slip):
                 continue
             m[FLOOR], m[SLIP] = STICK if slip == 0 else SLIPPING, slip
             m[TIP], m[FAR] = at_left and slip == 0, at_right and slip == 0
-            if _accept(b, m, z, gh, gv, t, left, a, again):
-                return True
+            for pull in (1, -1):  # what a wall holds a floor can pull at
+                m[PULL] = pull
+                if pull < 0 and (b.unilateral or (m[TIP] == 0 and m[FAR] == 0)):
+                    continue
+                if _accept(b, m, z, gh, gv, t, left, a, attempt):
+                    return True
     if b.unilateral or not floor:
-        m[FLOOR], m[SLIP] = OFF, 0
-        for press in (1, -1, 0):
+        m[FLOOR], m[SLIP], m[PULL] = OFF, 0, 1
+        if at_left and at_right:  # it fills the space between its walls
+            m[TIP] = m[FAR] = 1
+            return _accept(b, m, z, gh, gv, t, left, a, attempt)
+        for press in (first, -first, 0):
             m[TIP], m[FAR] = press == 1, press == -1
             if (press == 1 and not at_left) or (press == -1 and not at_right):
                 continue
-            if _accept(b, m, z, gh, gv, t, left, a, again):
+            if _accept(b, m, z, gh, gv, t, left, a, attempt):
                 return True
     return False
 
 
 @inner_kernel
-def _select_tilt(b, z, gh, gv, t, sense, floor, left, m, a, again):
+def _select_tilt(b, z, gh, gv, t, sense, floor, left, m, a, attempt):
     m[:] = 0
     m[FAMILY], m[S] = TILT, sense
     tip_closed = b.walls and closed_wall(b, z, sense, False)
@@ -404,7 +433,7 @@ def _select_tilt(b, z, gh, gv, t, sense, floor, left, m, a, again):
         m[TIP], m[FAR] = walls & 1, walls >> 1
         v = sense * (slip_velocity(b, z) if walls == 0 else z[W])  # along a wall the pivot slips as the block turns
         for pull in (1, -1):  # a floor that pulls is rare
-            if pull < 0 and (b.unilateral or walls == 3):
+            if pull < 0 and b.unilateral:
                 continue
             m[PULL] = pull
             for slip in (0, 1, -1):
@@ -412,10 +441,10 @@ def _select_tilt(b, z, gh, gv, t, sense, floor, left, m, a, again):
                     continue
                 m[FLOOR] = STICK if slip == 0 else SLIPPING
                 m[SLIP] = slip
-                if _accept(b, m, z, gh, gv, t, left, a, again):
+                if _accept(b, m, z, gh, gv, t, left, a, attempt):
                     return True
         if b.unilateral or not floor:
             m[FLOOR], m[SLIP], m[PULL] = OFF, 0, 1
-            if _accept(b, m, z, gh, gv, t, left, a, again):
+            if _accept(b, m, z, gh, gv, t, left, a, attempt):
                 return True
     return False
