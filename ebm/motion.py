@@ -66,10 +66,10 @@ OFF, STICK, SLIPPING = 0, 1, 2
 # the right wall; on the floor a block at rest is then held on that side, whatever the base does.
 
 # Rows of the workspace that hold series.
-PHI, OMEGA, SIN, COS, U, G, XI, Y, P, Q, NA, NB, GUARD, KNOWN, FORCE = range(15)
+PHI, OMEGA, SIN, COS, U, G, XI, Y, P, Q, NA, NB, GUARD, KNOWN, FORCE, FLOOR_ARM, WALL_ARM, WALL_PUSH = range(18)
 # Rows in which the small linear system of the contacts is put together, three each.
-ROW, COLUMN, MATRIX, INVERSE = range(15, 27, 3)
-ROWS = 27
+ROW, COLUMN, MATRIX, INVERSE = range(18, 30, 3)
+ROWS = 30
 
 RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, MOST_TERMS + 2)])
 
@@ -156,21 +156,6 @@ def _rock_series(still_vertical, order, enough, reach, need_forces, a):
 
 
 @inner_kernel
-def _turn(a, k):
-    """Order k + 1 of phi and of the sine and cosine of alpha - phi, from the orders up to k of its rate."""
-    ds = 0.0
-    dc = 0.0
-    i = k
-    for j in range(k + 1):
-        ds += a[OMEGA, j] * a[COS, i]
-        dc += a[OMEGA, j] * a[SIN, i]
-        i -= 1
-    a[PHI, k + 1] = a[OMEGA, k] * RECIPROCAL[k + 1]
-    a[SIN, k + 1] = -ds * RECIPROCAL[k + 1]
-    a[COS, k + 1] = dc * RECIPROCAL[k + 1]
-
-
-@inner_kernel
 def _contact_rows(b, kappa, floor, stick, tip, far, a):
     """Constraint rows, force columns (xi, y, moment) and the inverse of their matrix at the start; returns their number."""
     s, c = a[SIN, 0], a[COS, 0]
@@ -210,30 +195,32 @@ def _contact_series(b, m, order, enough, reach, a):
     small = 0
     for k in range(order + 1):
         a[P, k] = a[Q, k] = a[NA, k] = a[NB, k] = 0.0
+    a[PHI, 1], a[SIN, 1], a[COS, 1] = a[OMEGA, 0], -a[OMEGA, 0] * c0, a[OMEGA, 0] * s0
     for k in range(order - 1):
         i = k + 2
         per = float(i * (i - 1))
-        _turn(a, k)
-        # The sine and cosine at order i lack only the term of phi's acceleration at order k, the unknown.
-        ks = 0.0
-        kc = 0.0
+        # The rates of sine and cosine at order k + 1 lack only the term of phi's acceleration at order k, the unknown.
+        ds = 0.0
+        dc = 0.0
         for j in range(k + 1):
-            ks -= a[OMEGA, j] * a[COS, k + 1 - j]
-            kc += a[OMEGA, j] * a[SIN, k + 1 - j]
-        ks *= i - 1.0
-        kc *= i - 1.0
+            ds -= a[OMEGA, j] * a[COS, k + 1 - j]
+            dc += a[OMEGA, j] * a[SIN, k + 1 - j]
+        ks = ds * (i - 1.0)
+        kc = dc * (i - 1.0)
         kp = b.sin_2alpha * kc - b.cos_2alpha * ks  # of s' = sin(alpha + phi)
         # Moments of the forces' lower orders.
         moment = 0.0
         if floor:
+            a[FLOOR_ARM, k] = a[SIN, k] + kappa * a[COS, k]
             for j in range(1, k + 1):
-                moment -= (a[SIN, j] + kappa * a[COS, j]) * a[P, k - j]
+                moment -= a[FLOOR_ARM, j] * a[P, k - j]
         if stick:
             for j in range(1, k + 1):
                 moment += a[COS, j] * a[Q, k - j]
         if tip or far:
+            a[WALL_ARM, k] = b.sin_2alpha * a[SIN, k] + b.cos_2alpha * a[COS, k]
             for j in range(1, k + 1):
-                moment -= (b.sin_2alpha * a[SIN, j] + b.cos_2alpha * a[COS, j]) * (a[NA, k - j] + a[NB, k - j])
+                moment -= a[WALL_ARM, j] * a[WALL_PUSH, k - j]
         ax, ay, aphi = -a[U, k], -a[G, k], 3.0 * moment
         r = 0
         if floor:
@@ -269,12 +256,16 @@ def _contact_series(b, m, order, enough, reach, a):
             r += 1
         if far:
             a[NB, k] = a[FORCE, r]
+        a[WALL_PUSH, k] = a[NA, k] + a[NB, k]
         if static:
             ax = aphi = 0.0
             ay = 0.0 if floor else ay
         a[XI, i] = ax / per
         a[Y, i] = ay / per
         a[OMEGA, k + 1] = aphi * RECIPROCAL[k + 1]
+        a[PHI, i] = a[OMEGA, k + 1] * RECIPROCAL[i]
+        a[SIN, i] = (ds - a[OMEGA, k + 1] * c0) * RECIPROCAL[i]
+        a[COS, i] = (dc + a[OMEGA, k + 1] * s0) * RECIPROCAL[i]
         scale *= reach
         size = abs(aphi) + abs(ax) + abs(ay) + abs(a[SIN, k + 1]) + abs(a[COS, k + 1])
         size += abs(a[P, k]) + abs(a[Q, k]) + abs(a[NA, k]) + abs(a[NB, k])
@@ -283,7 +274,6 @@ def _contact_series(b, m, order, enough, reach, a):
             order = i
             break
     i = order
-    _turn(a, i - 1)
     a[OMEGA, i] = 0.0
     a[P, i] = a[P, i - 1] = a[Q, i] = a[Q, i - 1] = a[NA, i] = a[NA, i - 1] = a[NB, i] = a[NB, i - 1] = 0.0
     return order

@@ -19,8 +19,8 @@ POSITION_NOISE, RATE_NOISE, FORCE_NOISE = 1e-13, 1e-12, 1e-10
 #: A guard that is negative, but will not be after this time, is at its zero: the time of an event is not known better.
 INSTANT = 1e-9
 NO_ROOT = -1.0
-_DEEPEST = 44
-_LEVEL, _START = 30, 31  # where the root search keeps an interval's depth and left end
+_NARROWEST = 2.0**-44
+_WIDTH, _START = 30, 31  # where the root search keeps an interval's width and left end
 
 
 @inner_kernel
@@ -100,44 +100,43 @@ def first_root(a, row, n, h, floor, stack):
 
 @inner_kernel
 def _isolate(stack, n):
-    """First root on [0, 1] of the polynomial in stack[0], positive at 0; halves intervals, left ones first."""
+    """First root on [0, 1] of the polynomial in stack[0], positive at 0; halves intervals, left ones first.
+
+    Below the top, the stack holds left halves whose right halves are still to be looked at.
+    """
     top = 0
-    stack[0, _LEVEL] = stack[0, _START] = 0.0
-    while top >= 0:
-        level = stack[top, _LEVEL]
-        begin = stack[top, _START]
-        low = stack[top, 0]
+    stack[0, _WIDTH], stack[0, _START] = 1.0, 0.0
+    while True:
+        width, begin = stack[top, _WIDTH], stack[top, _START]
+        if stack[top, 0] <= 0.0:
+            return begin
+        low = end = stack[top, 0]
         high_slope = stack[top, 1] if n >= 1 else 0.0
-        end = stack[top, 0]
         for k in range(1, n + 1):
             low += min(stack[top, k], 0.0)
             end += stack[top, k]
             if k > 1:
                 high_slope += k * max(stack[top, k], 0.0)
-        if stack[top, 0] <= 0.0:
-            return begin
-        if low > 0.0 or (high_slope < 0.0 and end > 0.0):
+        rootless = low > 0.0 or (high_slope < 0.0 and end > 0.0)
+        if not rootless and high_slope < 0.0:
+            return begin + width * _falling_root(stack, top, n, end)
+        if rootless or width == _NARROWEST or top + 2 >= stack.shape[0]:
             top -= 1
-            continue
-        if high_slope < 0.0:
-            return begin + 0.5**level * _falling_root(stack, top, n, end)
-        if level == _DEEPEST or top + 2 >= stack.shape[0]:
-            top -= 1
-            continue
-        half = 1.0
-        for k in range(n + 1):
-            stack[top + 1, k] = stack[top, k] * half
-            half *= 0.5
-        for k in range(n + 1):
-            stack[top, k] = stack[top + 1, k]
-        for i in range(n):  # Taylor shift by one half-interval
-            for k in range(n - 1, i - 1, -1):
-                stack[top, k] += stack[top, k + 1]
-        stack[top, _START] = begin + 0.5 ** (level + 1.0)
-        stack[top + 1, _START] = begin
-        stack[top, _LEVEL] = stack[top + 1, _LEVEL] = level + 1.0
-        top += 1
-    return NO_ROOT
+            if top < 0:
+                return NO_ROOT
+            for i in range(n):  # Taylor shift by one interval, to the right half
+                for k in range(n - 1, i - 1, -1):
+                    stack[top, k] += stack[top, k + 1]
+            stack[top, _START] += stack[top, _WIDTH]
+        else:
+            half = 1.0
+            for k in range(n + 1):
+                stack[top, k] *= half
+                stack[top + 1, k] = stack[top, k]
+                half *= 0.5
+            stack[top, _WIDTH] = stack[top + 1, _WIDTH] = 0.5 * width
+            stack[top + 1, _START] = begin
+            top += 1
 
 
 @inner_kernel
