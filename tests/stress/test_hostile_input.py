@@ -11,7 +11,6 @@ import functools
 import io
 import json
 import math
-import os
 import subprocess
 import sys
 import tempfile
@@ -32,7 +31,7 @@ from validation.store import Store, name_of
 from validation.suites import load_suite
 
 fuzzed = settings(
-    max_examples=int(os.environ.get("ROCKCHECK_FUZZ", "1000")),
+    max_examples=1000,
     deadline=5000,
     database=None,
     derandomize=True,
