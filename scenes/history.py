@@ -225,6 +225,9 @@ def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]
     missing = [name for name in ("t", "theta") if name not in frame.columns]
     if missing:
         raise InputError(f"{shown}: no column {missing[0]!r}; t and theta are needed, of {', '.join(COLUMNS)}")
+    doubled = [name for name in COLUMNS if list(frame.columns).count(name) > 1]
+    if doubled:
+        raise InputError(f"{shown}: two columns {doubled[0]!r}")
     if len(frame) == 0:
         raise InputError(f"{shown}: no rows")
     channels: dict[str, NDArray[Any]] = {}

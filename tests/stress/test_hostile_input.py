@@ -511,3 +511,13 @@ def test_rows_longer_than_the_heading(tmp_path):
     for read in (History.load, read_measured):
         with pytest.raises(InputError, match="rows have more values than the heading has columns"):
             read(path)
+
+
+def test_a_column_that_is_there_twice(tmp_path):
+    """Found by fuzzing: names that differ only in blanks around them ended in a traceback."""
+    path = tmp_path / "h.csv"
+    path.write_text("t,theta, t\n0.0,0.1,nan\n0.5,0.2,nan\n")
+    with pytest.raises(InputError, match="two columns 't'"):
+        History.load(path)
+    with pytest.raises(InputError, match="gives t a second time"):
+        read_measured(path)
