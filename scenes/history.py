@@ -167,14 +167,14 @@ class History:
         except (AttributeError, TypeError, ValueError):
             raise InputError(f"{printable(_events_path(path))}: not an events table written by rockcheck") from None
         return cls(
-            name=str(about.get("name", path.stem)),
-            model=str(about.get("model", "measured")),
+            name=printable(about.get("name", path.stem), 200),
+            model=printable(about.get("model", "measured"), 200),
             channels=channels,
             event_list=event_list,
             outcome=str(about["outcome"]) if about.get("outcome") in OUTCOMES else outcome_of(channels),
             cost=cost,
             settings=about.get("settings", {}),
-            notes=tuple(str(note) for note in about.get("notes", ())),
+            notes=tuple(printable(note, 1000) for note in about.get("notes", ())),
             half_width=_size(about, "half_width", shown),
             half_height=_size(about, "half_height", shown),
         )

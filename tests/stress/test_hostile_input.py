@@ -521,3 +521,14 @@ def test_a_column_that_is_there_twice(tmp_path):
         History.load(path)
     with pytest.raises(InputError, match="gives t a second time"):
         read_measured(path)
+
+
+def test_a_path_does_not_steer_the_terminal(tmp_path, monkeypatch, capsys):
+    """Found by fuzzing: what a file is called was written to the terminal as it is; so was the name in a history's header."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["simulate", "fig4a", "--model", "ebm", "-o", "a\x1b]0;x\x07\udcff.csv"]) == 0
+    (tmp_path / "h.csv").write_text('# rockcheck history {"name": "\\u001b[2J", "model": "\\u001b[2J"}\n' + HISTORY)
+    assert main(["compare", "h.csv", "h.csv"]) in (0, 1)
+    heard = capsys.readouterr()
+    assert "history: a?]0;x??.csv" in heard.out
+    assert "\x1b" not in heard.out + heard.err

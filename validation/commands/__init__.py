@@ -42,9 +42,20 @@ def speaking(voice: Voice) -> Iterator[None]:
         _voice.reset(token)
 
 
+class _Screen(Console):
+    """A console whose text steers no terminal: paths, and names in files that somebody sent, may hold any characters."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        super().print(*(_harmless(one) if isinstance(one, str) else one for one in objects), **options)
+
+
+def _harmless(text: str) -> str:
+    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
+
+
 def console() -> Console:
     """Where tables go: stdout, at most as wide as the terminal, 80 columns where there is none; coloured on a terminal only."""
-    return Console(markup=False, highlight=False, quiet=_voice.get() != "tables")
+    return _Screen(markup=False, highlight=False, quiet=_voice.get() != "tables")
 
 
 def answer(value: Any) -> None:
