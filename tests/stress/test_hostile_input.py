@@ -26,6 +26,7 @@ from scenes import History, InputError, load_scene
 from scenes.records import read_record
 from validation.cli import main
 from validation.measured import read_measured
+from validation.models import build
 from validation.results import Run
 from validation.store import Store, name_of
 from validation.suites import load_suite
@@ -278,6 +279,8 @@ def feed_command_line(content: bytes, folder: Path) -> None:
         inside.mkdir()
         (inside / "a.toml").write_text(SCENE)
         (inside / "h.csv").write_text(HISTORY)
+        for model in ("ebm", "ebm-unilateral", "cm"):  # compiled now, not while an input has its time
+            build(model, {}).simulate(load_scene(inside / "a.toml"))
     words = [word for word in content.decode("utf-8", "replace").split(BETWEEN) if word not in LONG or word == "accept"]
     if "accept" in words:
         words = ["accept", "no-such-suite", *[word for word in words if word != "accept"]]
