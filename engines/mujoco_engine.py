@@ -15,7 +15,7 @@ from scenes import ModelFailure, Scene
 from scenes.errors import printable
 
 FloatArray = NDArray[np.float64]
-CORNER_RADIUS = 1e-6  # of the block's radius; contacts are points, and MuJoCo has no contact of a point with a plane
+CORNER_RADIUS = 1e-8  # of the block's radius; contacts are points, and MuJoCo has no contact of a point with a plane
 PUSHED_OUT = 0.01  # share of a penetration that one step removes
 IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 1.0)
 RIGID = 1e7  # inverse regularisation of a contact, kg, where MuJoCo gives at most 1.5e4 to a block of 1 kg
