@@ -68,6 +68,7 @@ from ebm.trajectory import (
     _HANDED_OVER,
     _MOST_ZERO_STEPS,
     _OPEN_CONTACTS,
+    _PASSED,
     _REST_BILATERAL,
     DONE,
     FLOOR_IMPACT,
@@ -98,11 +99,13 @@ from ebm.transitions import (
     G_FAR_PUSH,
     G_PUSH,
     G_SLIP,
+    G_TIP_GAP,
     G_TIP_PUSH,
     G_TOPPLE,
     G_UPLIFT_PLUS,
     GUARDS,
     closed_wall,
+    guard,
     guards_of,
     slip_velocity,
     tips_first,
@@ -298,16 +301,16 @@ def _rest(b, m, z, gv, t):
 def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, a):
     """The block at rest starts to slide, or to tilt, as u of sign `sense` grows; returns z = -u/(mu_k G0), +-1 if it slides."""
     u, g = acceleration(gh, t), 1.0 + acceleration(gv, t)
+    if b.mu_k * b.cos_alpha > b.sin_alpha or g <= 0.0:
+        zeta = min(max(-u / max(b.mu_k * abs(g), 1e-300), -1.0), 1.0)
+        if _tip(b, m, z, sense, zeta, yield_displacement, gh, gv, t, a):
+            return zeta
+    if g <= 0.0:
+        _rest(b, m, z, gv, t)
+        return 0.0
     m[:] = 0
-    m[PULL], m[FLOOR] = 1, SLIPPING
-    if b.mu_k * b.cos_alpha <= b.sin_alpha and g > 0.0:
-        m[FAMILY], m[S], m[SLIP] = FLAT, 1, -sense
-        return -float(sense)
-    zeta = min(max(-u / max(b.mu_k * abs(g), 1e-300), -1.0), 1.0)
-    if _tip(b, m, z, sense, zeta, yield_displacement, gh, gv, t, a):
-        return zeta
-    _rest(b, m, z, gv, t)
-    return 0.0
+    m[FAMILY], m[S], m[PULL], m[FLOOR], m[SLIP] = FLAT, 1, 1, SLIPPING, -sense
+    return -float(sense)
 
 
 @inner_kernel
@@ -344,22 +347,52 @@ def _begin(b, m, z, zeta, yield_displacement, gh, gv, t, a):
 
 
 @inner_kernel
+def _wedged_series(b, m, z, zeta, gh, gv, t, order, reach, a):
+    """The series of a block that both walls hold (see ebm.motion), and the share of its friction in what they carry."""
+    order = tilt_series(b, m, z, gh, gv, t, order, 0.0, reach, a)
+    lever = a[COS, 0] / (b.sin_2alpha * a[SIN, 0] + b.cos_2alpha * a[COS, 0])  # of friction over that of the walls' forces
+    friction = b.mu_k * m[S] * zeta * math.copysign(1.0, a[P, 0])
+    for k in range(order + 1):
+        a[Q, k] = -friction * a[P, k]
+        a[NA, k] += 0.5 * (lever - 1.0) * a[Q, k]
+        a[NB, k] += 0.5 * (lever + 1.0) * a[Q, k]
+    return order
+
+
+@inner_kernel
 def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a):
-    """Lets the corners of a tilting block rest on the walls that they touch and that would push them."""
-    m[TIP], m[FAR] = closed_wall(b, z, m[S], False), closed_wall(b, z, -m[S], True)
-    if m[TIP] != 0 and m[FAR] != 0:
-        m[FLOOR], m[PULL] = STICK, 1
-        tilt_series(b, m, z, gh, gv, t, _LOOK, 0.0, 0.0, a)
-        if a[NA, 0] >= 0.0 and a[NB, 0] >= 0.0:  # wedged between the walls
+    """Lets the corners of a tilting block rest on the walls that they touch and that would push them; more of them come first."""
+    touched = (1 if closed_wall(b, z, m[S], False) else 0) + (2 if closed_wall(b, z, -m[S], True) else 0)
+    for attempt in range(5):  # where none fits, but for rounding, it rests on all that it touches
+        walls = 3 - attempt if attempt < 4 else touched
+        if walls & touched != walls:
+            continue
+        m[TIP], m[FAR] = walls & 1, walls >> 1
+        if walls == 3:  # wedged
+            m[FLOOR], m[PULL] = STICK, 1
+            _wedged_series(b, m, z, zeta, gh, gv, t, _LOOK, 0.0, a)
             m[PULL] = 1 if a[P, 0] >= 0.0 else -1
-            z[W] = z[VX] = z[VY] = 0.0
+        else:
+            m[FLOOR] = SLIPPING
+            _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a)
+        if attempt == 4 or _walls_hold(b, m, touched, a):
+            if walls == 3:
+                z[W] = z[VX] = z[VY] = 0.0
             return
-        m[FAR if a[NB, 0] < a[NA, 0] else TIP] = 0
-    m[FLOOR] = SLIPPING
-    _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a)
-    if m[TIP] + m[FAR] > 0 and leading(a, NA if m[TIP] != 0 else NB, _LOOK - 2, FORCE_NOISE) < 0:
-        m[TIP] = m[FAR] = 0
-        _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a)
+
+
+@inner_kernel
+def _walls_hold(b, m, touched, a):
+    """Whether the walls of the mode push and those that are touched besides are left."""
+    for which in range(2):
+        if m[TIP if which == 0 else FAR] != 0:
+            if leading(a, NA if which == 0 else NB, _LOOK - 2, FORCE_NOISE) < 0:
+                return False
+        elif touched >> which & 1:
+            guard(b, m, G_TIP_GAP if which == 0 else G_FAR_GAP, _LOOK, 0.0, a)
+            if leading(a, GUARD, _LOOK, POSITION_NOISE) < 0:
+                return False
+    return True
 
 
 @inner_kernel
@@ -419,7 +452,7 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
     rows = min(1, out.shape[0])
     peak = abs(z[THETA])
     ending = DONE
-    flipped = False
+    flipped = waits = False
     zeta = _begin(b, m, z, _initial_friction(b, m, z, gh, gv, t, a), yield_displacement, gh, gv, t, a)
     yielded = _has_yielded(b, m, z, zeta)
     if rows > 0:
@@ -439,14 +472,15 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
         elif m[FAMILY] == FLAT:
             order = flat_series(b, m, z, gh, gv, t, order, a)
         else:
-            order = tilt_series(b, m, z, gh, gv, t, order, 0.0, reach, a)
+            order = _wedged_series(b, m, z, zeta, gh, gv, t, order, reach, a)
         h = _step_size(a, U, G, order - 1, control.tolerance, reach)
         if moving:
             h = _step_size(a, XI, Z, order - 1, control.tolerance, h)
             if m[FAMILY] == TILT:
                 h = _step_size(a, PHI, COS, order, control.tolerance, h)
         tau, which = _first_event(b, m, order, 0.0, h, guards_of(b, m), a, stack)
-        if zero_steps >= _HANDED_OVER and tau <= 0.0 and which > G_FAR_GAP:  # as in trajectory.run
+        waits = zero_steps >= _HANDED_OVER and tau <= 0.0 and which > G_FAR_GAP and not waits
+        if waits:  # as in trajectory.run
             zero_steps += 1
             h = min(h, INSTANT * 2.0 ** (0.5 * (zero_steps - _HANDED_OVER)))
             tau, which = _first_event(b, m, order, 0.0, h, guards_of(b, m) & _OPEN_CONTACTS, a, stack)
@@ -460,8 +494,8 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
             # Whichever sign is assumed, V leaves zero with the other: it is rounding, so any will do for a little while.
             tau, which, zero_steps = min(h, 1e-2 * math.sqrt(yield_displacement)), -1, 0
         flipped = which == G_SLIP and tau <= 0.0
-        if not math.isfinite(tau):
-            ending = NOT_FINITE
+        if not math.isfinite(tau) or zero_steps > _MOST_ZERO_STEPS:
+            ending = NO_MODE if math.isfinite(tau) else NOT_FINITE
             break
         whole = which < 0 and tau >= reach
         end = min(kink, t_end) if whole else t + tau
@@ -483,9 +517,8 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
                 kind = SLIPS
         if which >= 0:
             zero_steps = zero_steps + 1 if tau <= 0.0 else 0
-            if zero_steps > _MOST_ZERO_STEPS:
-                ending = NO_MODE
-                break
+        elif not waits and tau > _PASSED:
+            zero_steps = 0
         # --- what follows it
         impulse[:] = 0.0
         if which == G_TOPPLE:
@@ -508,12 +541,14 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
                 _rest(b, m, z, gv, t)
         elif which == G_TIP_PUSH or which == G_FAR_PUSH:
             kind = RELEASE
-            m[TIP if which == G_TIP_PUSH else FAR] = 0
-            m[FLOOR] = SLIPPING
+            if m[FAMILY] == FLAT:
+                m[TIP], m[FAR], m[FLOOR] = 0, 0, SLIPPING
+            else:
+                _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a)
         elif which >= G_UPLIFT_PLUS and moving:  # tilts while it slides
             kind = UPLIFT
             left[:] = m
-            if not _tip(b, m, z, -1 if z[VX] > 0.0 else 1, zeta, yield_displacement, gh, gv, t, a):
+            if not _tip(b, m, z, -m[SLIP], zeta, yield_displacement, gh, gv, t, a):
                 m[:], zero_steps = left, max(zero_steps, _HANDED_OVER)
         elif which > G_FAR_PUSH:  # the cone, or uplift from rest
             zeta = _leave_rest(b, m, z, tips_first(b, z, gh, t), yield_displacement, gh, gv, t, a)

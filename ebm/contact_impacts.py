@@ -24,6 +24,7 @@ CONTACTS = 6
 _NONE, _STICK, _PLUS, _MINUS = range(4)
 _TINY = 1e-13
 _MOST_STAGES = 40
+_HALVINGS = 45
 
 
 @kernel
@@ -173,9 +174,9 @@ def contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, tally):
         e = b.e_floor if group == 0 else (e_tip if group == 1 else e_far)
         if 2 * stage >= _MOST_STAGES:
             e = 0.0  # what goes to and fro between floor and wall ends plastic
-        scale = 1.0
+        scale, low, high = 1.0, 0.0, 1.0
         before = kinetic_energy(v)
-        for trial in range(60):
+        for trial in range(_HALVINGS + 1):
             for j in range(CONTACTS):
                 mine = j // 2 == group
                 alone = group > 0 and e > 0.0
@@ -186,9 +187,10 @@ def contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, tally):
             if not _strike(rows, taking, target, b.mu_s, b.mu_k, v, after, part):
                 return False
             gain = kinetic_energy(after) - before
-            if not (b.energy_cap and gain > 0.0 and e > 0.0):
+            if not b.energy_cap or e == 0.0 or (trial == 0 and gain <= 0.0) or trial == _HALVINGS:
                 break
-            scale = 0.0 if trial == 58 else scale * 0.9
+            low, high = (low, scale) if gain > 0.0 else (scale, high)
+            scale = low if trial == _HALVINGS - 1 else 0.5 * (low + high)  # the largest restitution that adds no energy
         if gain > 1e-12 * before + 1e-18:
             tally[0] += 1.0
             tally[1] = max(tally[1], gain / before)

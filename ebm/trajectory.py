@@ -115,6 +115,8 @@ _FLUSH = 1e-9
 _LANDED = 1e-7
 # After so many events without a step the modes hand over to each other for rounding; after so many more the run fails.
 _HANDED_OVER, _MOST_ZERO_STEPS = 20, 54
+# A step as long as this shows that they no longer do.
+_PASSED = 1e-6
 # The guards of open contacts, which hold even then.
 _OPEN_CONTACTS = (1 << G_FAR_GAP + 1) - 1
 
@@ -185,7 +187,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
     rattle = np.array([base_rest, -1.0, -1.0, 0.0, 0.0])
     t = 0.0
     rows = steps = events = wall_impacts = zero_steps = 0
-    peak, t_rest = abs(z[THETA]), np.nan
+    peak, t_rest, waits = abs(z[THETA]), np.nan, False
     ending = DONE
     m[FAMILY], m[S], m[FLOOR], m[PULL] = FLAT, 1, STICK, 1  # most often it stands
     stands = z[THETA] == 0.0 and z[VX] == 0.0 and z[W] == 0.0 and z[HEIGHT] == b.cos_alpha and not b.walls
@@ -254,7 +256,8 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         reach = end - t
         order, pivot, h = _expand(b, m, z, gh, gv, t, reach, control, a)
         tau, which = _first_event(b, m, order, pivot, h, guards_of(b, m), a, stack)
-        if zero_steps >= _HANDED_OVER and tau <= 0.0 and which > G_FAR_GAP:
+        waits = zero_steps >= _HANDED_OVER and tau <= 0.0 and which > G_FAR_GAP and not waits
+        if waits:
             # Modes that hand over to each other at one instant differ by rounding: any will do for a little while.
             zero_steps += 1
             h = min(h, INSTANT * 2.0 ** (0.5 * (zero_steps - _HANDED_OVER)))
@@ -284,6 +287,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             t += tau
         peak = max(peak, abs(z[THETA]))
         if which < 0:
+            zero_steps = zero_steps if waits or tau < _PASSED else 0
             continue
         # --- an event
         if which > G_FAR_GAP and m[FAMILY] == TILT and abs(z[THETA]) < 1e-13 and m[S] * z[W] < -CLOSED_RATE:

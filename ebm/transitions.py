@@ -103,7 +103,7 @@ def guard(b, m, which, order, pivot, a):
             a[GUARD, k] = a[PHI, k]
         return order
     if which == G_TOPPLE:
-        if a[PHI, 0] < 0.5:  # no step is long enough to turn the block over from here unseen: see largest_step
+        if a[PHI, 0] < 0.5 and m[FLOOR] != OFF:  # no step on the floor is long enough to turn the block over from here
             return -1
         for k in range(order + 1):
             a[GUARD, k] = -a[PHI, k]

@@ -120,7 +120,7 @@ def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: boo
     horizon, exception = _Horizon(model, played, seed), ""
     if only in ("", "mirror"):
         differ = _mirror(model, played, history)
-        exception = "hangs" if differ and _hangs(model, played) else ""
+        exception = "hangs" if differ and _hangs(model, played, history) else ""
         if not exception:
             figures["mirror"] = differ
     if only in ("", "similarity"):
@@ -399,10 +399,15 @@ def _mirror(model: EventBasedModel, scene: Scene, history: History) -> float:
     return float(differ + (image.outcome != SWAPPED.get(history.outcome, history.outcome)))
 
 
-def _hangs(model: EventBasedModel, scene: Scene) -> bool:
-    """Whether gravity is felt upward at some time, in a model whose pivot holds the block down."""
-    samples = scene.vertical.samples if isinstance(scene.vertical, Record) else scene.vertical.acceleration(scene.output_times)
-    return model.pivot == "bilateral" and float(np.min(samples, initial=0.0)) < -scene.gravity
+def _hangs(model: EventBasedModel, scene: Scene, history: History) -> bool:
+    """Whether the block hangs, and nothing in scene and motion up to then tells left from right: see EXCEPTIONS."""
+    if model.pivot != "bilateral" or len({(wall.gap, wall.restitution) for wall in scene.walls}) > 1 or len(scene.walls) == 1:
+        return False
+    tilts = next((event.t for event in history.event_list), 0.0)
+    upright = history.channels["t"] < tilts
+    apart = any(np.any(history.channels[name][upright]) for name in ODD)
+    downward = scene.gravity + float(scene.vertical.acceleration(np.array([tilts * (1.0 + 1e-9)]))[0])
+    return downward < 1e-6 * scene.gravity and not apart and float(scene.excitation.acceleration(np.array([tilts]))[0]) == 0.0
 
 
 def similar(scene: Scene, seed: int) -> Scene:
