@@ -22,8 +22,11 @@ def duration(seconds: float) -> str:
 
 
 def moment(created: str) -> str:
-    """A time of creation, as ISO 8601 has it, to the minute."""
-    return f"{datetime.fromisoformat(created):%Y-%m-%d %H:%M %Z}"
+    """A time of creation, as ISO 8601 has it, to the minute; what is not one, in a run that somebody sent, as it is."""
+    try:
+        return f"{datetime.fromisoformat(created):%Y-%m-%d %H:%M %Z}"
+    except ValueError:
+        return created
 
 
 def ratio(value: float | None) -> str:
