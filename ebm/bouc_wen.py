@@ -512,7 +512,7 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
         if moving and not yielded:
             zeta = m[S] * value(a, Z, order - 1, tau)
             towards = m[S] * m[SLIP] * zeta
-            if towards > 0.0 and 1.0 - towards < max(10.0 * control.tolerance, 1e-12):
+            if towards > 0.0 and 1.0 - towards < max(10.0 * control.tolerance, 1e-10):
                 zeta, yielded = math.copysign(1.0, zeta), True
                 kind = SLIPS
         if which >= 0:

@@ -37,6 +37,7 @@ from ebm.motion import (
     W,
     X,
     Y,
+    delta,
     flat_series,
     flat_state,
     tilt_series,
@@ -466,10 +467,19 @@ def _step_size(a, first, second, order, tolerance, reach):
 
 @inner_kernel
 def _touch(b, m, z, which):
-    """Puts the block onto the contact whose gap has just closed: the series knows the gap to the tolerance only."""
+    """Puts the block onto the contact whose gap has just closed: the series knows the gap to the tolerance only.
+
+    A standing pivot keeps its place where the rotation can give way (else it would creep, impact by impact).
+    """
     phi = abs(z[THETA])
     if which == G_LANDING:
         z[HEIGHT] = math.cos(b.alpha - phi)
+    elif which == G_TIP_GAP and m[FAMILY] == TILT and m[FLOOR] == STICK:
+        sign = float(m[S])
+        pivot = sign * z[X] - math.sin(b.alpha - phi)
+        gap = sign * z[X] + delta(b, m, True) - math.sin(b.alpha + phi)
+        phi += gap / (math.cos(b.alpha - phi) + math.cos(b.alpha + phi))
+        z[X], z[HEIGHT], z[THETA] = sign * (pivot + math.sin(b.alpha - phi)), math.cos(b.alpha - phi), sign * phi
     elif which == G_TIP_GAP or which == G_FAR_GAP:
         left = (which == G_TIP_GAP) == (m[FAMILY] == FLAT or m[S] > 0)
         gap = b.gap_left if left else b.gap_right

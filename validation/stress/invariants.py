@@ -119,8 +119,8 @@ def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: boo
         figures["impacts"] = history.cost.largest_energy_gain if capped and gains else 0.0
     horizon, exception = _Horizon(model, played, seed), ""
     if only in ("", "mirror"):
-        differ = _mirror(model, played, history)
-        exception = "hangs" if differ and _hangs(model, played, history) else ""
+        differ, row = _mirror(model, played, history)
+        exception = "hangs" if differ and _hangs(model, played, history, row) else ""
         if not exception:
             figures["mirror"] = differ
     if only in ("", "similarity"):
@@ -382,32 +382,35 @@ def _whole_groups(scene: Scene, history: History) -> tuple[NDArray[np.bool_], ND
     return whole, np.all(nodes == nodes[:, :1], axis=1)
 
 
-def _mirror(model: EventBasedModel, scene: Scene, history: History) -> float:
-    """How many values differ from those of the mirror image, to the bit."""
+def _mirror(model: EventBasedModel, scene: Scene, history: History) -> tuple[float, int]:
+    """How many values differ from those of the mirror image, to the bit; and the first row that does."""
     try:
         image = model.simulate(scene.mirrored())
     except ModelFailure:
-        return math.inf
+        return math.inf, 0
+    rows = min(len(image.channels["t"]), len(history.channels["t"]))
+    unlike = [history.channels[name][:rows] != image.channels[name][:rows] for name in EVEN]
+    unlike += [history.channels[name][:rows] != -image.channels[name][:rows] for name in ODD]
+    first = int(np.argmax(np.append(np.any(unlike, axis=0), True)))
     if len(image.channels["t"]) != len(history.channels["t"]) or len(image.event_list) != len(history.event_list):
-        return math.inf
-    differ = sum(int(np.sum(history.channels[name] != image.channels[name])) for name in EVEN)
-    differ += sum(int(np.sum(history.channels[name] != -image.channels[name])) for name in ODD)
+        return math.inf, first
+    differ = int(np.sum(unlike))
     for a, b in zip(history.event_list, image.event_list, strict=True):
         differ += (a.t, SWAPPED.get(a.kind, a.kind), a.mode_before, a.mode_after, a.impulse) != (
             b.t, b.kind, b.mode_before, b.mode_after, b.impulse
         )  # fmt: skip
-    return float(differ + (image.outcome != SWAPPED.get(history.outcome, history.outcome)))
+    return float(differ + (image.outcome != SWAPPED.get(history.outcome, history.outcome))), first
 
 
-def _hangs(model: EventBasedModel, scene: Scene, history: History) -> bool:
-    """Whether the block hangs, and nothing in scene and motion up to then tells left from right: see EXCEPTIONS."""
+def _hangs(model: EventBasedModel, scene: Scene, history: History, row: int) -> bool:
+    """Whether a block starts to hang before `row`, and nothing in scene and motion tells left from right: see EXCEPTIONS."""
     if model.pivot != "bilateral" or len({(wall.gap, wall.restitution) for wall in scene.walls}) > 1 or len(scene.walls) == 1:
         return False
-    tilts = next((event.t for event in history.event_list), 0.0)
-    upright = history.channels["t"] < tilts
-    apart = any(np.any(history.channels[name][upright]) for name in ODD)
-    downward = scene.gravity + float(scene.vertical.acceleration(np.array([tilts * (1.0 + 1e-9)]))[0])
-    return downward < 1e-6 * scene.gravity and not apart and float(scene.excitation.acceleration(np.array([tilts]))[0]) == 0.0
+    t = history.channels["t"]
+    times = np.linspace(t[max(row - 2, 0)], t[min(row, len(t) - 1)], 1001)
+    apart = row > 1 and any(history.channels[name][row - 2] != 0.0 for name in ODD)
+    felt = scene.gravity + scene.vertical.acceleration(times)
+    return not apart and float(np.min(felt)) <= 0.0 and not np.any(scene.excitation.acceleration(times[felt <= 0.0][:2]))
 
 
 def similar(scene: Scene, seed: int) -> Scene:
