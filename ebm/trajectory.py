@@ -591,7 +591,7 @@ def _presses(b, gh, t, side):
 @kernel
 def _strike(b, m, z, gh, t, resting, impulse, gains):
     """Unilateral: resolves all contacts touched at this instant. Returns False where no impact law fits."""
-    sign = float(tips_first(b, z, gh, t) if m[FAMILY] == FLAT else m[S])
+    sign = float(tips_first(b, m, z, gh, t) if m[FAMILY] == FLAT else m[S])
     phi = abs(z[THETA])
     c, reach = math.cos(b.alpha - phi), math.sin(b.alpha + phi)
     flat = z[THETA] == 0.0

@@ -158,7 +158,7 @@ def _gap(b, m, tip, order, pivot, a):
         return -1
     sense = 1.0 if tip else -1.0
     rock = m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
-    if rock and not tip and distance - pivot - 2.0 * b.sin_alpha > -1e-13:
+    if rock and not tip and distance - pivot - 2.0 * b.sin_alpha > -CLOSED_GAP:
         # About a fixed pivot the far gap shrinks with phi, down to this value as the block lands: it cannot close before.
         return -1
     xi = SIN if rock else XI
@@ -339,9 +339,9 @@ def select(b, z, gh, gv, t, left, m, a):
     stands = floor and b.walls and z[THETA] != 0.0 and abs(z[W]) < CLOSED_RATE
     if stands and (closed_wall(b, z, 1, False) or closed_wall(b, z, -1, False)):
         z[W] = z[VX] = z[VY] = 0.0  # on floor and wall a block that does not turn stands
+    first = tips_first(b, m, z, gh, t) if flat else 0
     for attempt in (_OTHER, _SAME, _CREEPING):
         if flat:
-            first = tips_first(b, z, gh, t)
             if floor and z[VX] == 0.0 and not b.walls:
                 # Static friction above kinetic can leave both rocking and sliding consistent: it holds as long as it can.
                 m[:] = 0
@@ -363,11 +363,12 @@ def select(b, z, gh, gv, t, left, m, a):
 
 
 @inner_kernel
-def tips_first(b, z, gh, t):
+def tips_first(b, m, z, gh, t):
     """The side to which a flat block is first asked to tip, +1 left or -1 right: the sense in which all of it is calculated.
 
     Both fit only for rounding, or where the floor falls away faster than g under a pivot that cannot let go: then the base
-    acceleration decides, now or soon, or the friction, or the block's place between its walls: a mirror image does alike.
+    acceleration decides, now or soon, or the friction, its place between walls, the side from which it comes in mode m: a mirror
+    image does alike.
     """
     toward = acceleration(gh, t)
     if toward == 0.0:
@@ -378,6 +379,8 @@ def tips_first(b, z, gh, t):
         toward = z[X]
     if toward == 0.0 and b.gap_left != b.gap_right:
         toward = b.gap_left - b.gap_right
+    if toward == 0.0 and m[FAMILY] == TILT:  # it has just landed
+        toward = float(-m[S])
     return 1 if toward >= 0.0 else -1
 
 

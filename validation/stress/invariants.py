@@ -52,7 +52,7 @@ INVARIANTS = {
     )
 }
 #: The horizon of predictability of a run here: a relative disturbance of the scene's data by DISTURBANCE turns the block by SEEN rad.
-DISTURBANCE, SEEN, DISTURBED = 1e-8, 1e-6, 6
+DISTURBANCE, SEEN, DISTURBED = 1e-7, 1e-6, 6
 #: Rows of an audited history: this fraction of the shortest time in the scene, and at most this many.
 FINE, MOST_ROWS = 64, 4000
 #: A contact counts as closed, a slip as seen, beyond these; conditions are not asked for within this time of an event or a jump.
