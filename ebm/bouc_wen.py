@@ -303,11 +303,12 @@ def _rest(b, m, z, gv, t):
 def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, a):
     """The block at rest starts to slide, or to tilt, as u of sign `sense` grows; returns z = -u/(mu_k G0), +-1 if it slides."""
     u, g = acceleration(gh, t), 1.0 + acceleration(gv, t)
-    if b.mu_k * b.cos_alpha > b.sin_alpha or g <= 0.0:
+    tips = b.mu_k * b.cos_alpha > b.sin_alpha or g <= 0.0
+    if tips:
         zeta = min(max(-u / max(b.mu_k * abs(g), 1e-300), -1.0), 1.0)
         if _tip(b, m, z, sense, zeta, yield_displacement, gh, gv, t, a):
             return zeta
-    if g <= 0.0 or closed_wall(b, z, sense, False):
+    if g <= 0.0 or closed_wall(b, z, sense, False) or (tips and abs(u) < (1.0 + _YIELDS) * g * b.sin_alpha / b.cos_alpha):
         _rest(b, m, z, gv, t)
         return 0.0
     m[:] = 0

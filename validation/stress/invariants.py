@@ -408,7 +408,8 @@ def _hangs(model: EventBasedModel, scene: Scene, history: History, row: int) -> 
         return False
     t = history.channels["t"]
     times = np.linspace(t[max(row - 2, 0)], t[min(row, len(t) - 1)], 1001)
-    apart = row > 1 and any(history.channels[name][row - 2] != 0.0 for name in ODD)
+    before = range(max(row - 2, 0), max(row, 1))
+    apart = all(any(history.channels[name][k] != 0.0 for name in ODD) for k in before)
     felt = scene.gravity + scene.vertical.acceleration(times)
     return not apart and float(np.min(felt)) <= 0.0 and not np.any(scene.excitation.acceleration(times[felt <= 0.0][:2]))
 

@@ -1,0 +1,51 @@
+"""Random scenes in which `rockcheck stress` once found a fault, by what is special in them; each keeps all invariants now."""
+
+from __future__ import annotations
+
+import pytest
+
+from validation.stress.players import PLAYERS
+
+#: The fault, the model, the seed of the random scenes and the scene's number.
+FOUND = [
+    ("hangs as the floor falls away, beside a wall", "ebm", 21, 196),
+    ("hangs as the floor falls away, pressed on a wall", "ebm", 21, 905),
+    ("hangs as the floor falls away, between two walls", "ebm", 21, 900),
+    ("hangs wedged between two walls", "ebm", 21, 4819),
+    ("meets both walls at once", "ebm", 21, 1704),
+    ("meets both walls at once, squat", "ebm", 21, 3936),
+    ("hangs by a tie that the mirror image breaks alike", "ebm", 22, 157),
+    ("slip turns as the far gap closes", "ebm", 23, 2373),
+    ("slip turns as the far gap closes, static friction above kinetic", "ebm", 23, 4029),
+    ("rattles between walls that hardly leave room", "ebm", 23, 10464),
+    ("gravity vanishes under spikes of vertical motion, on the far wall", "ebm", 23, 19271),
+    ("slips at Painleve's limit, hanging", "ebm", 24, 752),
+    ("slips at Painleve's limit, under a strong pulse", "ebm", 24, 24325),
+    ("starts with slip at Painleve's limit", "ebm", 24, 3847),
+    ("rests without friction as gravity vanishes", "ebm", 24, 19696),
+    ("rests without friction on a wall as gravity vanishes", "ebm", 24, 24893),
+    ("bounces a hundred thousand times between two walls", "ebm", 42, 5891),
+    ("strikes the wall so often that its pivot crept", "ebm no-slip", 31, 514),
+    ("lands and hangs at once", "ebm no-slip", 41, 3687),
+    ("lands flat with slip", "ebm-unilateral", 12, 120),
+    ("lands flat beside a wall", "ebm-unilateral", 22, 1193),
+    ("flies between walls that leave no room", "ebm-unilateral", 23, 10166),
+    ("leaves a wall in flight as the base acceleration turns", "ebm-unilateral", 23, 115),
+    ("turns over in one long step of flight", "ebm-unilateral", 31, 222),
+    ("restitution cut so that no energy is gained", "ebm-unilateral", 31, 2079),
+    ("rocks flush with the far wall", "ebm-unilateral", 41, 2537),
+    ("hangs", "ebm-bouc-wen", 25, 862),
+    ("hangs pressed on a wall as gravity passes zero", "ebm-bouc-wen", 25, 1326),
+    ("wedged between walls, held by its friction", "ebm-bouc-wen", 25, 1393),
+    ("leaves a wall on which it hangs", "ebm-bouc-wen", 25, 2067),
+    ("friction is the slope of the block", "ebm-bouc-wen", 26, 3131),
+    ("friction is the slope of the block and nears its limit for ever", "ebm-bouc-wen", 41, 3377),
+    ("tips as gravity jumps", "ebm-bouc-wen", 42, 4402),
+]
+
+
+@pytest.mark.parametrize(("fault", "label", "seed", "number"), FOUND, ids=[one[0] for one in FOUND])
+def test_a_fault_that_was_found(fault: str, label: str, seed: int, number: int):
+    player = PLAYERS[label]
+    played = player.check(player.scene(seed, number), seed, number)
+    assert played.broken == [], (fault, played)
