@@ -410,8 +410,9 @@ def _hangs(model: EventBasedModel, scene: Scene, history: History, row: int) -> 
     times = np.linspace(t[max(row - 2, 0)], t[min(row, len(t) - 1)], 1001)
     before = range(max(row - 2, 0), max(row, 1))
     apart = all(any(history.channels[name][k] != 0.0 for name in ODD) for k in before)
+    apart &= not any(event.mode_after == "rest" and times[0] <= event.t <= times[-1] for event in history.event_list)
     felt = scene.gravity + scene.vertical.acceleration(times)
-    return not apart and float(np.min(felt)) <= 0.0 and not np.any(scene.excitation.acceleration(times[felt <= 0.0][:2]))
+    return not apart and float(np.min(felt)) <= 0.0 and not np.any(scene.excitation.acceleration(times[felt <= 0.0][1:3]))
 
 
 def similar(scene: Scene, seed: int) -> Scene:
