@@ -49,7 +49,7 @@ from ebm.motion import (
     flat_series,
     tilt_series,
 )
-from ebm.series import AHEAD, FORCE_NOISE, MOST_TERMS, POSITION_NOISE, RATE_NOISE, leading
+from ebm.series import FORCE_NOISE, MOST_TERMS, POSITION_NOISE, RATE_NOISE, leading
 from scenes.compiled import inner_kernel
 
 # The guards, in the order in which ties are decided: floor before walls, contacts before friction.
@@ -75,6 +75,8 @@ CLOSED_GAP = 1e-10
 CLOSED_RATE = 1e-9
 # A pivot that slips more slowly than this stands, if it can: so little is rounding of an impact, or of a mode that just began.
 CREEP = 1e-10
+# So soon a base acceleration that is zero shows where it goes (samples of a record may be much nearer than AHEAD).
+SOON = 1e-6
 
 
 @inner_kernel
@@ -372,7 +374,7 @@ def tips_first(b, m, z, gh, t):
     """
     toward = acceleration(gh, t)
     if toward == 0.0:
-        toward = acceleration(gh, t + AHEAD)
+        toward = acceleration(gh, t + SOON)
     if toward == 0.0:
         toward = -z[VX]
     if toward == 0.0:

@@ -40,7 +40,8 @@ def tilted_forces(
 
     `phi`, `w`: rotation and rate; `u`, `g`: base acceleration and gravity felt, all in the pivot's frame. `touching`: pivot on the
     floor, top corner on its wall, bottom corner on its wall. `slip`: direction in which the pivot slips, 0 where it sticks. A slipping
-    pivot has Q = -mu d |P|: where P would pull, the sign of its friction turns with it.
+    pivot has Q = -mu d |P|: where P would pull, the sign of its friction turns with it. Near Painleve's limit both signs of P can
+    solve this; it is then the pull that is returned where only with it the walls push.
     """
     s, c, sp, cp = np.sin(alpha - phi), np.cos(alpha - phi), np.sin(alpha + phi), np.cos(alpha + phi)
     zero, one = np.zeros_like(phi), np.ones_like(phi)
@@ -58,10 +59,13 @@ def tilted_forces(
     slipping = floor & (slip != 0)
     matrix[slipping, 1, 0] = mu * slip[slipping]
     forces = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
-    pulls = slipping & (forces[:, 0] < 0.0)
-    if pulls.any():
-        matrix[pulls, 1, 0] *= -1.0
-        forces[pulls] = np.linalg.solve(matrix[pulls], right[pulls][:, :, None])[:, :, 0]
+    asked = slipping & ((forces[:, 0] < 0.0) | (forces[:, 2:].min(axis=1) < 0.0))
+    if asked.any():
+        matrix[asked, 1, 0] *= -1.0
+        other = forces.copy()
+        other[asked] = np.linalg.solve(matrix[asked], right[asked][:, :, None])[:, :, 0]
+        pulls = asked & ((forces[:, 0] < 0.0) | ((other[:, 0] < 0.0) & (other[:, 2:].min(axis=1) >= 0.0)))
+        forces[pulls] = other[pulls]
     return Forces(*forces.T)
 
 
