@@ -51,7 +51,8 @@ INVARIANTS = {
         Invariant("source", "energy beyond that of the start and the work of the base, of all work done", 0.05),
     )
 }
-#: The horizon of predictability of a run here: a relative disturbance of the scene's data by DISTURBANCE turns the block by SEEN rad.
+#: The horizon of predictability of a run here: a relative disturbance of the scene's data by DISTURBANCE turns the block by SEEN rad,
+#: or the answers at a tenth and at a thousandth of the tolerance differ by as much.
 DISTURBANCE, SEEN, DISTURBED = 1e-7, 1e-6, 6
 #: Rows of an audited history: this fraction of the shortest time in the scene, and at most this many.
 FINE, MOST_ROWS = 64, 4000
@@ -139,9 +140,9 @@ def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: boo
     )
 
 
-def finer(model: EventBasedModel) -> EventBasedModel:
-    """The same model at a hundredth of its tolerance."""
-    return model.model_copy(update={"tolerance": model.tolerance / 100.0})
+def finer(model: EventBasedModel, times: float = 100.0) -> EventBasedModel:
+    """The same model at a tolerance so many times finer."""
+    return model.model_copy(update={"tolerance": model.tolerance / times})
 
 
 def audited(scene: Scene) -> Scene:
@@ -462,10 +463,14 @@ class _Horizon:
         return float(np.max(difference[: self.row(history)], initial=0.0))
 
     def row(self, history: History) -> int:
-        """The first row that differs by more than `SEEN` between the scene and a disturbed one."""
+        """The first row that differs by more than `SEEN` between the scene and a disturbed one, or between two finer tolerances."""
         if self._row is None:
             self.found = 1
             self._row = len(history.channels["t"])
+            with suppress(ModelFailure):  # rounding is a disturbance, too: an answer that finer tolerances do not agree on is none
+                rows, difference = _differences(*(finer(self.model, by).simulate(self.scene) for by in (10.0, 1000.0)))
+                apart = np.flatnonzero(difference > SEEN)
+                self._row = min(self._row, int(apart[0]) if apart.size else rows)
             for disturbed in _disturbed(self.scene, self.seed):
                 try:
                     other = self.model.simulate(disturbed)
