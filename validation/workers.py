@@ -14,16 +14,20 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from scenes import History, InputError, ModelFailure, Scene
 from scenes.errors import printable
 from validation.models import build, family
+
+if TYPE_CHECKING:
+    from pebble import ProcessPool
 
 #: One thread a worker: the cells are what runs in parallel.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
@@ -134,47 +138,65 @@ def _plain(settings: Any) -> dict[str, Any]:
     return dict(sorted(plain.items()))
 
 
-def local(tasks: Sequence[Task | BatchTask], *, jobs: int, seconds: Sequence[float], memory_mb: float) -> Iterator[tuple[int, Played]]:
-    """Play tasks in `jobs` processes; yields (index, result) as they end. `seconds` limits each task's wall time.
-
-    Of each package that compiles, one task goes first, with time for that, and the others of the package wait for it.
-    """
+@contextmanager
+def workers(jobs: int, memory_mb: float) -> Iterator[ProcessPool]:
+    """A pool of processes with one thread each; left by an exception (Ctrl-C is one), it ends whatever they do."""
     from pebble import ProcessPool
 
-    if not tasks:
-        return
-    leader_of = leaders(tasks)
     before = {key: os.environ.get(key) for key in ONE_THREAD}
     os.environ.update(ONE_THREAD)
     try:
         with ProcessPool(
-            max_workers=max(1, min(jobs, len(tasks))),
-            context=multiprocessing.get_context("spawn"),
-            initializer=prepare,
-            initargs=(memory_mb,),
+            max_workers=jobs, context=multiprocessing.get_context("spawn"), initializer=prepare, initargs=(memory_mb,)
         ) as pool:
-            running: dict[Any, tuple[int, float]] = {}
-
-            def begin(n: int) -> None:
-                limit = seconds[n] + (COMPILING if leader_of.get(n) == n else 0.0)
-                running[pool.schedule(play, args=(tasks[n],), timeout=limit)] = n, limit
-
             try:
-                for n in range(len(tasks)):
-                    if leader_of.get(n, n) == n:
-                        begin(n)
-                while running:
-                    for future in wait(running, return_when=FIRST_COMPLETED).done:
-                        done, limit = running.pop(future)
-                        for n in [n for n, leader in leader_of.items() if leader == done != n]:
-                            begin(n)
-                        yield done, _outcome(future, limit)
+                yield pool
             except BaseException:
                 pool.stop()
                 raise
     finally:
         for key, value in before.items():
             os.environ.pop(key, None) if value is None else os.environ.update({key: value})
+
+
+def loss_of(future: Future[Any]) -> str:
+    """Why a process gave nothing back; empty where it did."""
+    from pebble import ProcessExpired
+
+    error = future.exception()
+    if error is None:
+        return ""
+    if isinstance(error, TimeoutError):
+        return "hangs"
+    if isinstance(error, ProcessExpired):
+        return death(int(error.exitcode or 0))
+    return printable(f"{type(error).__name__}: {error}", 300)
+
+
+def local(tasks: Sequence[Task | BatchTask], *, jobs: int, seconds: Sequence[float], memory_mb: float) -> Iterator[tuple[int, Played]]:
+    """Play tasks in `jobs` processes; yields (index, result) as they end. `seconds` limits each task's wall time.
+
+    Of each package that compiles, one task goes first, with time for that, and the others of the package wait for it.
+    """
+    if not tasks:
+        return
+    leader_of = leaders(tasks)
+    with workers(max(1, min(jobs, len(tasks))), memory_mb) as pool:
+        running: dict[Any, tuple[int, float]] = {}
+
+        def begin(n: int) -> None:
+            limit = seconds[n] + (COMPILING if leader_of.get(n) == n else 0.0)
+            running[pool.schedule(play, args=(tasks[n],), timeout=limit)] = n, limit
+
+        for n in range(len(tasks)):
+            if leader_of.get(n, n) == n:
+                begin(n)
+        while running:
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                done, limit = running.pop(future)
+                for n in [n for n, leader in leader_of.items() if leader == done != n]:
+                    begin(n)
+                yield done, _outcome(future, limit)
 
 
 def leaders(tasks: Sequence[Work]) -> dict[int, int]:

@@ -18,7 +18,7 @@ from scenes import Block, Floor, InputError, ModelFailure, Record, Rest, Ricker,
 from scenes.errors import printable
 from validation.models import build
 from validation.stress.players import energy_without_source
-from validation.stress.processes import loss_of, workers
+from validation.workers import loss_of, workers
 
 Axis = Literal["size", "friction", "restitution", "shaking"]
 

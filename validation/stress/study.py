@@ -21,9 +21,9 @@ from validation.results import write_whole
 from validation.stress import stability
 from validation.stress.invariants import INVARIANTS, Played
 from validation.stress.players import PLAYERS
-from validation.stress.processes import loss_of, workers
 from validation.stress.shrinking import shrink, write_scene
 from validation.stress.stability import AXIS_WORDS, Stability
+from validation.workers import loss_of, workers
 
 Progress = Callable[[int, int, str], None]
 What = Literal["all", "runs", "maps"]
@@ -132,7 +132,7 @@ def _checked(label: str, scene: Scene, seed: int, number: int, only: str = "") -
     """What a run shows; a fault of the program itself is a failure like any other."""
     try:
         return PLAYERS[label].check(scene, seed, number, only)
-    except Exception as error:
+    except Exception as error:  # whatever it is: the other runs go on, and this one is told with its words
         return Played(figures={"ends": math.inf}, failure=printable(f"{type(error).__name__}: {error}", 300))
 
 

@@ -36,5 +36,6 @@ def shrink_file(failure: Failure, folder: Path, seconds: float) -> None:
             time.sleep(600.0)
         return Played(figures={"mirror": 1.0})
 
+    # The players are frozen, and a process that dies can be shown only by one that does.
     EventBased.check = check  # type: ignore[method-assign]
     study.shrink_file(failure, folder, seconds)
