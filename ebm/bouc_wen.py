@@ -95,6 +95,8 @@ from ebm.trajectory import (
 )
 from ebm.transitions import (
     CREEP,
+    G_CONE_MINUS,
+    G_CONE_PLUS,
     G_FAR_GAP,
     G_FAR_PUSH,
     G_PUSH,
@@ -104,6 +106,7 @@ from ebm.transitions import (
     G_TOPPLE,
     G_UPLIFT_PLUS,
     GUARDS,
+    SOON,
     closed_wall,
     guard,
     guards_of,
@@ -125,6 +128,8 @@ _ROWS = ROWS + 15
 
 # A guard besides those of ebm.transitions: z comes to the sign of V, from where the pivot loads.
 _G_LOADS = GUARDS
+# The friction of a wedged block, which does not slip, is what z makes it: it has no cone to leave.
+_CONE = 1 << G_CONE_PLUS | 1 << G_CONE_MINUS
 _LOOK = 6
 # z nears 1 for ever. So near to it what hangs on the difference (a block that tips just as it slips) is noise: it has yielded.
 _YIELDS = 1e-6
@@ -284,10 +289,13 @@ def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order
 def _held(b, z, gh, gv, t):
     """Whether a flat block without speed stays at rest: the base neither lifts nor slides it, or presses it on a wall."""
     slope, g, u = b.sin_alpha / b.cos_alpha, 1.0 + acceleration(gv, t), acceleration(gh, t)
+    least = min(slope, b.mu_s)
+    if abs(abs(u) - (least if g >= 0.0 else slope) * abs(g)) < FORCE_NOISE:  # at its limit: where it goes decides
+        g, u = 1.0 + acceleration(gv, t + SOON), acceleration(gh, t + SOON)
     left, right = closed_wall(b, z, 1, False), closed_wall(b, z, -1, False)
     if g < 0.0:  # hanging: only a wall on which it is pressed holds it flat
         return (left and u >= -slope * g) or (right and u <= slope * g)
-    limit = min(slope, b.mu_s) * g
+    limit = least * g
     return (u <= limit or left) and (u >= -limit or right)
 
 
@@ -303,12 +311,16 @@ def _rest(b, m, z, gv, t):
 def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, a):
     """The block at rest starts to slide, or to tilt, as u of sign `sense` grows; returns z = -u/(mu_k G0), +-1 if it slides."""
     u, g = acceleration(gh, t), 1.0 + acceleration(gv, t)
-    tips = b.mu_k * b.cos_alpha > b.sin_alpha or g <= 0.0
+    hangs = (g if abs(g) > FORCE_NOISE else 1.0 + acceleration(gv, t + SOON)) <= 0.0
+    tips = b.mu_k * b.cos_alpha > b.sin_alpha or hangs
     if tips:
         zeta = min(max(-u / max(b.mu_k * abs(g), 1e-300), -1.0), 1.0)
+        if abs(abs(u) - g * b.sin_alpha / b.cos_alpha) < FORCE_NOISE and b.mu_k * b.cos_alpha > b.sin_alpha:
+            # Just where it tips. Where g nears zero the quotient says no more: its rounding would be a moment.
+            zeta = -math.copysign(b.sin_alpha / (b.cos_alpha * b.mu_k), u) if u != 0.0 else 0.0
         if _tip(b, m, z, sense, zeta, yield_displacement, gh, gv, t, a):
             return zeta
-    if g <= 0.0 or closed_wall(b, z, sense, False) or (tips and abs(u) < (1.0 + _YIELDS) * g * b.sin_alpha / b.cos_alpha):
+    if hangs or closed_wall(b, z, sense, False) or (tips and abs(u) < (1.0 + _YIELDS) * g * b.sin_alpha / b.cos_alpha):
         _rest(b, m, z, gv, t)
         return 0.0
     m[:] = 0
@@ -375,10 +387,11 @@ def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a):
             m[FLOOR], m[PULL] = STICK, 1
             _wedged_series(b, m, z, zeta, gh, gv, t, _LOOK, 0.0, a)
             m[PULL] = 1 if a[P, 0] >= 0.0 else -1
+            aimed = True
         else:
             m[FLOOR] = SLIPPING
-            _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a)
-        if attempt == 4 or _walls_hold(b, m, touched, a):
+            aimed = _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a)
+        if attempt == 4 or (aimed and _walls_hold(b, m, touched, a)):
             if walls == 3:
                 z[W] = z[VX] = z[VY] = 0.0
             return
@@ -400,12 +413,18 @@ def _walls_hold(b, m, touched, a):
 
 @inner_kernel
 def _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a):
-    """Sets the sign of P, which does not depend on the sign that is assumed for it; the workspace then holds the series."""
+    """Sets the sign of P, whose series the workspace then holds; returns whether P has it.
+
+    Below Painleve's limit it does not depend on the sign that is assumed for it. Beyond, where a push would pull itself along (its
+    denominator is negative), pull and push both solve the equations or neither does: the motion goes on with the pull.
+    """
     m[PULL] = 1
     friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
-    if a[P, 0] < 0.0:
-        m[PULL] = -1
-        friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
+    if leading(a, P, _LOOK - 2, FORCE_NOISE) >= 0 and a[DEN, 0] > 0.0:
+        return True
+    m[PULL] = -1
+    friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
+    return leading(a, P, _LOOK - 2, FORCE_NOISE) <= 0
 
 
 @inner_kernel
@@ -425,6 +444,8 @@ def _initial_friction(b, m, z, gh, gv, t, a):
         m[TIP] = 0
         tilt_series(b, m, z, gh, gv, t, _LOOK, 0.0, 0.0, a)
     most = b.mu_k * abs(a[P, 0])
+    if a[Q, 0] == 0.0:
+        return 0.0
     return -sense * a[Q, 0] / most if abs(a[Q, 0]) < most else -math.copysign(1.0, sense * a[Q, 0])
 
 
@@ -481,12 +502,15 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
             h = _step_size(a, XI, Z, order - 1, control.tolerance, h)
             if m[FAMILY] == TILT:
                 h = _step_size(a, PHI, COS, order, control.tolerance, h)
-        tau, which = _first_event(b, m, order, 0.0, h, guards_of(b, m), a, stack)
+        mask = guards_of(b, m)
+        if m[FAMILY] == TILT:
+            mask &= ~_CONE
+        tau, which = _first_event(b, m, order, 0.0, h, mask, a, stack)
         waits = zero_steps >= _HANDED_OVER and tau <= 0.0 and which > G_FAR_GAP and not waits
         if waits:  # as in trajectory.run
             zero_steps += 1
             h = min(h, INSTANT * 2.0 ** (0.5 * (zero_steps - _HANDED_OVER)))
-            tau, which = _first_event(b, m, order, 0.0, h, guards_of(b, m) & _OPEN_CONTACTS, a, stack)
+            tau, which = _first_event(b, m, order, 0.0, h, mask & _OPEN_CONTACTS, a, stack)
         if moving and m[SLIP] * a[Z, 0] <= -1e-13:
             for k in range(order):
                 a[GUARD, k] = -m[SLIP] * a[Z, k]
@@ -532,7 +556,10 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
         elif which == _G_LOADS:
             zeta = 0.0
         elif which == G_PUSH:
-            m[PULL] = -m[PULL]
+            if m[FAMILY] == TILT:
+                _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a)
+            else:
+                m[PULL] = -m[PULL]
         elif which == G_SLIP:
             if yielded:
                 kind = STICKS
@@ -549,14 +576,14 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
             else:
                 _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a)
         elif which >= G_UPLIFT_PLUS and moving:  # tilts while it slides
-            kind = UPLIFT
             left[:] = m
-            if not _tip(b, m, z, -m[SLIP], zeta, yield_displacement, gh, gv, t, a):
+            if not yielded and 1.0 - m[SLIP] * zeta < _YIELDS:
+                zeta, yielded, kind = float(m[SLIP]), True, SLIPS
+            elif _tip(b, m, z, -m[SLIP], zeta, yield_displacement, gh, gv, t, a):
+                kind = UPLIFT
+            else:
                 m[:] = left
-                if not yielded and 1.0 - m[SLIP] * zeta < _YIELDS:
-                    zeta, yielded = float(m[SLIP]), True
-                else:
-                    zero_steps = max(zero_steps, _HANDED_OVER)
+                zero_steps = max(zero_steps, _HANDED_OVER)
         elif which > G_FAR_PUSH:  # the cone, or uplift from rest
             zeta = _leave_rest(b, m, z, tips_first(b, m, z, gh, t), yield_displacement, gh, gv, t, a)
             yielded = abs(zeta) == 1.0

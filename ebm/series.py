@@ -86,14 +86,19 @@ def first_root(a, row, n, h, floor, stack):
     if a[row, 0] > floor and a[row, 0] + low > 1e-13 * a[row, 0]:
         return NO_ROOT
     zeros = _order_of_zero(a, row, n, floor)
+    lift = 0.0
     if zeros > n:
-        return NO_ROOT
-    if a[row, zeros] < 0.0:
+        # Noise as far as is looked ahead; in a long step it may yet become what is not.
+        if a[row, 0] + low > -floor:
+            return NO_ROOT
+        zeros, lift = 0, floor + abs(a[row, 0])
+    elif a[row, zeros] < 0.0:
         return 0.0
     scale = 1.0
     for k in range(n + 1 - zeros):
         stack[0, k] = a[row, k + zeros] * scale
         scale *= h
+    stack[0, 0] += lift
     z = _isolate(stack, n - zeros)
     return NO_ROOT if z < 0.0 else z * h
 

@@ -43,7 +43,7 @@ from ebm.motion import (
     tilt_series,
     tilt_state,
 )
-from ebm.series import FORCE_NOISE, INSTANT, NO_ROOT, POSITION_NOISE, first_root, value
+from ebm.series import FORCE_NOISE, INSTANT, NO_ROOT, POSITION_NOISE, first_root, slope, value
 from ebm.transitions import (
     CLOSED_RATE,
     CREEP,
@@ -294,6 +294,13 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         if which > G_FAR_GAP and m[FAMILY] == TILT and abs(z[THETA]) < 1e-13 and m[S] * z[W] < -CLOSED_RATE:
             which = G_PHI  # whatever else happens at that instant, the block lands
         zero_steps = zero_steps + 1 if tau <= 0.0 else 0
+        if which == G_PHI:
+            past = _grazes(b, m, z, order, tau, h, a)
+            if past > 0.0:
+                t += past
+                tilt_state(b, m, order, tau + past, pivot, a, z)
+                z[THETA] = math.copysign(max(abs(z[THETA]), 2.0 * POSITION_NOISE), float(m[S]))
+                continue
         events += 1
         if zero_steps > _MOST_ZERO_STEPS:
             ending = NO_MODE
@@ -352,7 +359,9 @@ def _expand(b, m, z, gh, gv, t, reach, control, a):
     if m[FAMILY] == FLAT:
         order = flat_series(b, m, z, gh, gv, t, control.order, a)
         return order, 0.0, _step_size(a, U, G, order, control.tolerance, reach)
-    order = tilt_series(b, m, z, gh, gv, t, control.order, 1e-2 * control.tolerance, reach, a)
+    # A motion that is still tiny, and may grow, keeps its digits.
+    enough = 1e-2 * control.tolerance * min(1.0, 1e2 * (abs(z[THETA]) + abs(z[W])))
+    order = tilt_series(b, m, z, gh, gv, t, control.order, enough, reach, a)
     h = reach
     if order == control.order:
         h = _step_size(a, PHI, COS, order, control.tolerance, reach)
@@ -488,6 +497,19 @@ def _touch(b, m, z, which):
 
 
 @inner_kernel
+def _grazes(b, m, z, order, tau, h, a):
+    """Time after which a block that comes down hanging has turned back, if its other corner gets no deeper than _TOUCH; else 0.
+
+    Left at rest as the floor falls away, the block swings back to just where it started, which nothing tells from a touch.
+    """
+    if b.unilateral or m[TIP] != 0 or m[FAR] != 0 or abs(z[W]) < SETTLE_SPIN or value(a, G, order, tau) >= 0.0:
+        return 0.0
+    back = slope(a, OMEGA, order - 1, tau)
+    past = 2.0 * abs(z[W]) / back
+    return past if 0.125 * back * past * past < _TOUCH and 0.0 < past <= h - tau else 0.0
+
+
+@inner_kernel
 def _upright(b, m, z):
     """Sets theta from nearly to exactly zero, the pivot keeping its place; a side that then touches a wall touches it exactly."""
     sign = float(m[S])
@@ -496,9 +518,10 @@ def _upright(b, m, z):
     if m[FLOOR] != OFF or closed_floor(b, z):
         z[HEIGHT] = b.cos_alpha
     z[THETA] = 0.0
-    if abs(z[X] + b.gap_left) < _FLUSH:
+    left, right = abs(z[X] + b.gap_left), abs(b.gap_right - z[X])
+    if left < _FLUSH and left < right:
         z[X] = -b.gap_left
-    elif abs(b.gap_right - z[X]) < _FLUSH:
+    elif right < _FLUSH and right < left:
         z[X] = b.gap_right
 
 

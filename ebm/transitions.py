@@ -377,7 +377,7 @@ def tips_first(b, m, z, gh, t):
         toward = acceleration(gh, t + SOON)
     if toward == 0.0:
         toward = -z[VX]
-    if toward == 0.0:
+    if toward == 0.0 and abs(z[X]) > CLOSED_GAP:
         toward = z[X]
     if toward == 0.0 and b.gap_left != b.gap_right:
         toward = b.gap_left - b.gap_right

@@ -20,7 +20,7 @@ from validation.stress.invariants import Played, check_run
 Floats = NDArray[np.float64]
 
 #: Caps of an event-based run: a block that bounces between two near walls with e = 1 needs the most.
-MOST_STEPS, MOST_EVENTS = 600_000, 200_000
+MOST_STEPS, MOST_EVENTS = 1_200_000, 400_000
 #: Every so many runs one is audited, that is, sampled so finely that its energy can be integrated.
 AUDIT = 10
 
