@@ -315,9 +315,9 @@ def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, a):
     tips = b.mu_k * b.cos_alpha > b.sin_alpha or hangs
     if tips:
         zeta = min(max(-u / max(b.mu_k * abs(g), 1e-300), -1.0), 1.0)
-        if abs(abs(u) - g * b.sin_alpha / b.cos_alpha) < FORCE_NOISE and b.mu_k * b.cos_alpha > b.sin_alpha:
-            # Just where it tips. Where g nears zero the quotient says no more: its rounding would be a moment.
-            zeta = -math.copysign(b.sin_alpha / (b.cos_alpha * b.mu_k), u) if u != 0.0 else 0.0
+        if u != 0.0 and abs(abs(u) - g * min(b.sin_alpha / b.cos_alpha, b.mu_k)) < FORCE_NOISE:
+            # Just where it tips or slips: where g nears zero the quotient says no more, and its rounding would be a moment.
+            zeta = -math.copysign(min(b.sin_alpha / (b.cos_alpha * b.mu_k), 1.0) if b.mu_k > 0.0 else 1.0, u)
         if _tip(b, m, z, sense, zeta, yield_displacement, gh, gv, t, a):
             return zeta
     if hangs or closed_wall(b, z, sense, False) or (tips and abs(u) < (1.0 + _YIELDS) * g * b.sin_alpha / b.cos_alpha):
