@@ -34,6 +34,7 @@ from ebm.motion import (
     FLAT,
     FLOOR,
     GUARD,
+    LEAST_FRICTION,
     MODE_SIZE,
     NA,
     NB,
@@ -295,7 +296,7 @@ def _held(b, z, gh, gv, t):
     left, right = closed_wall(b, z, 1, False), closed_wall(b, z, -1, False)
     if g < 0.0:  # hanging: only a wall on which it is pressed holds it flat
         return (left and u >= -slope * g) or (right and u <= slope * g)
-    limit = least * g
+    limit = least if b.mu_s == LEAST_FRICTION else least * g
     return (u <= limit or left) and (u >= -limit or right)
 
 
@@ -477,6 +478,7 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
     peak = abs(z[THETA])
     ending = DONE
     flipped = waits = False
+    corner = 0  # the one that it last stood on
     zeta = _begin(b, m, z, _initial_friction(b, m, z, gh, gv, t, a), yield_displacement, gh, gv, t, a)
     yielded = _has_yielded(b, m, z, zeta)
     if rows > 0:
@@ -534,6 +536,8 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
         _state(b, m, order, tau, a, z)
         t = end
         peak = max(peak, abs(z[THETA]))
+        if m[FAMILY] == TILT:
+            corner = m[S]
         before = _label(m, yielded)
         kind = -1
         if moving and not yielded:
@@ -572,7 +576,9 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
         elif which == G_TIP_PUSH or which == G_FAR_PUSH:
             kind = RELEASE
             if m[FAMILY] == FLAT:
-                m[TIP], m[FAR], m[FLOOR] = 0, 0, SLIPPING
+                m[S] = corner
+                zeta = _leave_rest(b, m, z, tips_first(b, m, z, gh, t), yield_displacement, gh, gv, t, a)
+                yielded = abs(zeta) == 1.0
             else:
                 _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a)
         elif which >= G_UPLIFT_PLUS and moving:  # tilts while it slides
@@ -585,6 +591,7 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
                 m[:] = left
                 zero_steps = max(zero_steps, _HANDED_OVER)
         elif which > G_FAR_PUSH:  # the cone, or uplift from rest
+            m[S] = corner
             zeta = _leave_rest(b, m, z, tips_first(b, m, z, gh, t), yield_displacement, gh, gv, t, a)
             yielded = abs(zeta) == 1.0
             kind = UPLIFT if m[FAMILY] == TILT else SLIPS

@@ -54,6 +54,9 @@ class Setting(NamedTuple):
     energy_cap: bool
 
 
+#: Static friction of a frictionless floor: with less, the rounding of a base acceleration that dies out moves a resting block.
+LEAST_FRICTION = 1e-9
+
 # A mode is a small integer vector.
 FAMILY, S, FLOOR, SLIP, PULL, TIP, FAR = range(7)
 MODE_SIZE = 7
@@ -114,6 +117,8 @@ def tilt_series(b, m, z, gh, gv, t, order, enough, reach, a):
     a[XI, 1] = sign * z[VX]
     a[Y, 0] = z[HEIGHT]
     a[Y, 1] = z[VY]
+    if m[FLOOR] == STICK and m[TIP] != m[FAR]:
+        return _lean_series(b, m[TIP] != 0, order, a)
     return _contact_series(b, m, order, enough, reach, a)
 
 
@@ -142,8 +147,10 @@ def _rock_series(still_vertical, order, enough, reach, need_forces, a):
         a[SIN, k + 1] = -ds * r
         a[COS, k + 1] = dc * r
         a[OMEGA, k + 1] = 0.75 * (push - weight) * r
+        # At its balance point the block does not feel the vertical motion, which P does.
+        lifts = 0.0 if still_vertical else abs(a[G, k]) * scale
         scale *= reach
-        small = small + 1 if abs(a[OMEGA, k + 1]) * scale < enough else 0
+        small = small + 1 if abs(a[OMEGA, k + 1]) * scale + lifts < enough else 0
         if small == 3:
             order = k + 1
             break
@@ -152,6 +159,28 @@ def _rock_series(still_vertical, order, enough, reach, need_forces, a):
             a[P, k] = (k + 2) * (k + 1) * a[COS, k + 2] + a[G, k]
             a[Q, k] = (k + 2) * (k + 1) * a[SIN, k + 2] + a[U, k]
         a[P, order - 1] = a[P, order] = a[Q, order - 1] = a[Q, order] = 0.0
+    return order
+
+
+@inner_kernel
+def _lean_series(b, tip, order, a):
+    """LEAN: nothing moves, and the wall takes the moment about the pivot.
+
+    Written out, for the arm of a far wall can be so short that the general solution has no digits left.
+    """
+    s, c = a[SIN, 0], a[COS, 0]
+    wall = 1.0 if tip else -1.0
+    arm = c + b.sin_2alpha * s + b.cos_2alpha * c if tip else 2.0 * b.sin_alpha * np.sin(a[PHI, 0])  # c - c'
+    push = NA if tip else NB
+    for k in range(order + 1):
+        a[P, k] = a[Q, k] = a[NA, k] = a[NB, k] = 0.0
+        if k > 0:
+            a[PHI, k] = a[OMEGA, k] = a[SIN, k] = a[COS, k] = a[XI, k] = a[Y, k] = 0.0
+    a[OMEGA, 0] = 0.0
+    for k in range(order - 1):
+        a[P, k] = a[G, k]
+        a[push, k] = wall * (a[U, k] * c - a[G, k] * s) / arm
+        a[Q, k] = a[U, k] - wall * a[push, k]
     return order
 
 
@@ -186,7 +215,7 @@ def _contact_series(b, m, order, enough, reach, a):
     """Newton-Euler with the mode's constraints, solved term by term: the matrix of the unknown forces is the same each time."""
     floor, tip, far = m[FLOOR] != OFF, m[TIP] != 0, m[FAR] != 0
     stick = m[FLOOR] == STICK and not (tip and far)  # wedged between two walls the block needs no friction
-    static = (m[FLOOR] == STICK and (tip or far)) or (tip and far)
+    static = tip and far
     kappa = b.mu_k * m[SLIP] * m[PULL] if m[FLOOR] == SLIPPING else 0.0  # Q = -kappa P
     n = _contact_rows(b, kappa, floor, stick, tip, far, a)
     s0, c0 = a[SIN, 0], a[COS, 0]

@@ -8,11 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ebm.ground import GAUSSIAN, Ground, ground_of
-from ebm.motion import Setting
+from ebm.motion import LEAST_FRICTION, Setting
 from scenes.scene import Scene
-
-#: Static friction of a frictionless floor: with less, the rounding of a base acceleration that dies out moves a resting block.
-LEAST_FRICTION = 1e-9
 
 __all__ = ["GAUSSIAN", "grounds_of", "setting_of", "state_of", "time_unit", "to_si"]
 

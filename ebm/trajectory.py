@@ -191,8 +191,11 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
     peak, t_rest, waits = abs(z[THETA]), np.nan, False
     ending = DONE
     m[FAMILY], m[S], m[FLOOR], m[PULL] = FLAT, 1, STICK, 1  # most often it stands
+    corner = 0  # the one that it last stood on
     stands = z[THETA] == 0.0 and z[VX] == 0.0 and z[W] == 0.0 and z[HEIGHT] == b.cos_alpha and not b.walls
-    if not (stands and consistent(b, m, z, gh, gv, t, a, False)) and not select(b, z, gh, gv, t, left, m, a):
+    stands = stands and consistent(b, m, z, gh, gv, t, a, False)
+    m[S] = 1 if stands else 0
+    if not stands and not select(b, z, gh, gv, t, left, m, a):
         return Tally(NO_MODE, t, peak, False, 0, 0, 0, 0, 0.0, 0, t_rest)
     if z[THETA] == 0.0 and z[W] == 0.0 and z[VX] == 0.0 and z[VY] == 0.0 and closed_floor(b, z) and mode_code(m) != 0:
         events += 1  # it cannot stay at rest
@@ -227,9 +230,11 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             left[:] = m
             m[:] = 0  # most often it rocks
             m[FAMILY], m[S], m[FLOOR], m[PULL] = TILT, 1 if acceleration(gh, t) > 0.0 else -1, STICK, 1
-            if not consistent(b, m, z, gh, gv, t, a, False) and not select(b, z, gh, gv, t, left, m, a):
-                ending = NO_MODE
-                break
+            if not consistent(b, m, z, gh, gv, t, a, False):
+                m[FAMILY], m[S] = FLAT, corner
+                if not select(b, z, gh, gv, t, left, m, a):
+                    ending = NO_MODE
+                    break
             t_rest = np.nan
             events += 1
             if log.shape[0] >= events:
@@ -317,6 +322,10 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             break
         before = mode_code(m)
         left[:] = m
+        if m[FAMILY] == FLAT:
+            m[S] = corner
+        else:
+            corner = m[S]
         impulse[:] = 0.0
         strikes = which == G_TIP_GAP or which == G_FAR_GAP or which == G_LANDING or which == G_PHI
         if strikes:
@@ -367,6 +376,7 @@ def _expand(b, m, z, gh, gv, t, reach, control, a):
         h = _step_size(a, PHI, COS, order, control.tolerance, reach)
         if m[FLOOR] != STICK or m[TIP] != 0 or m[FAR] != 0:
             h = _step_size(a, XI, Y, order, control.tolerance, h)
+        if m[FLOOR] != STICK or m[TIP] != 0 or m[FAR] != 0 or gv.kind != STILL:
             h = _step_size(a, U, G, order, control.tolerance, h)  # forces follow the base acceleration
     return order, m[S] * z[X] - a[SIN, 0], h
 

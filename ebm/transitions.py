@@ -23,6 +23,7 @@ from ebm.motion import (
     FLOOR,
     GUARD,
     HEIGHT,
+    LEAST_FRICTION,
     NA,
     NB,
     OFF,
@@ -174,9 +175,11 @@ def _gap(b, m, tip, order, pivot, a):
 @inner_kernel
 def _settle_touch(a):
     """A contact that touches and closes more slowly than CLOSED_RATE counts as resting: its acceleration decides."""
-    if abs(a[GUARD, 0]) < 1e-12 and a[GUARD, 1] < 0.0 and a[GUARD, 1] > -CLOSED_RATE:
+    if a[GUARD, 0] <= -CLOSED_GAP or a[GUARD, 0] >= 1e-12:
+        return
+    if -CLOSED_RATE < a[GUARD, 1] < 0.0:
         a[GUARD, 0] = a[GUARD, 1] = 0.0
-    elif -1e-12 < a[GUARD, 0] < 0.0:
+    elif a[GUARD, 0] < 0.0:
         a[GUARD, 0] = 0.0
 
 
@@ -219,6 +222,9 @@ def _flat_guard(b, m, which, order, a):
         sense = 1.0 if which == G_CONE_PLUS else -1.0
         for k in range(order - 1):
             a[GUARD, k] = b.mu_s * a[P, k] - sense * a[Q, k]
+        if b.mu_s == LEAST_FRICTION:  # a force below rounding, which is to stay what it is where P vanishes
+            for k in range(order - 1):
+                a[GUARD, k] = (b.mu_s if k == 0 else 0.0) - sense * a[Q, k]
         return order - 2
     if which == G_UPLIFT_PLUS or which == G_UPLIFT_MINUS:
         if m[FLOOR] == STICK and m[TIP if which == G_UPLIFT_PLUS else FAR] != 0:
@@ -369,8 +375,8 @@ def tips_first(b, m, z, gh, t):
     """The side to which a flat block is first asked to tip, +1 left or -1 right: the sense in which all of it is calculated.
 
     Both fit only for rounding, or where the floor falls away faster than g under a pivot that cannot let go: then the base
-    acceleration decides, now or soon, or the friction, its place between walls, the side from which it comes in mode m: a mirror
-    image does alike.
+    acceleration decides, now or soon, or the friction, its place between walls, the corner m[S] on which it last stood (0 where
+    there was none): a mirror image does alike.
     """
     toward = acceleration(gh, t)
     if toward == 0.0:
@@ -381,7 +387,7 @@ def tips_first(b, m, z, gh, t):
         toward = z[X]
     if toward == 0.0 and b.gap_left != b.gap_right:
         toward = b.gap_left - b.gap_right
-    if toward == 0.0 and m[FAMILY] == TILT:  # it has just landed
+    if toward == 0.0:
         toward = float(-m[S])
     return 1 if toward >= 0.0 else -1
 

@@ -32,6 +32,10 @@ FOUND = [
     ("integrals that are less exact than they seem", "ebm", 43, 920),
     ("hangs where it has rocked back to, without slip", "ebm no-slip", 1, 8417),
     ("swings back to just where it started to hang", "ebm no-slip", 1, 71160),
+    ("slips as its far gap is closed but for rounding", "ebm", 2, 31813),
+    ("slips away from a wall that it touches", "ebm", 2, 85729),
+    ("leans on a far wall with hardly an arm", "ebm no-slip", 2, 34414),
+    ("hangs on the corner it stood on, no walls", "ebm no-slip", 2, 3342),
     ("strikes the wall so often that its pivot crept", "ebm no-slip", 31, 514),
     ("lands and hangs at once", "ebm no-slip", 41, 3687),
     ("lands flat with slip", "ebm-unilateral", 12, 120),
@@ -42,6 +46,7 @@ FOUND = [
     ("restitution cut so that no energy is gained", "ebm-unilateral", 31, 2079),
     ("rocks flush with the far wall", "ebm-unilateral", 41, 2537),
     ("walls nearer to each other than what counts as flush", "ebm-unilateral", 1, 16952),
+    ("on its balance point under vertical motion, of which only the floor's force knows", "ebm-unilateral", 2, 14172),
     ("hangs", "ebm-bouc-wen", 25, 862),
     ("hangs pressed on a wall as gravity passes zero", "ebm-bouc-wen", 25, 1326),
     ("wedged between walls, held by its friction", "ebm-bouc-wen", 25, 1393),
@@ -58,6 +63,8 @@ FOUND = [
     ("hangs hardly pushed, friction below its slope", "ebm-bouc-wen", 1, 52194),
     ("hangs by no push at all, friction below its slope", "ebm-bouc-wen", 1, 75275),
     ("slides with friction that is its slope", "ebm-bouc-wen", 1, 57608),
+    ("leaves the wall that held it as gravity vanishes", "ebm-bouc-wen", 2, 26903),
+    ("stands without friction on a wall as gravity vanishes", "ebm-bouc-wen", 2, 74848),
     ("stands on its corner without friction", "ebm-bouc-wen", 43, 10501),
 ]
 

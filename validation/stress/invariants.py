@@ -51,10 +51,10 @@ INVARIANTS = {
         Invariant("source", "energy beyond that of the start and the work of the base, of all work done", 0.05),
     )
 }
-#: The horizon of predictability of a run here: a relative disturbance of the scene's data by DISTURBANCE turns the block by SEEN rad,
-#: or the answers at a tenth and at a thousandth of the tolerance differ by as much, or friction near Painleve's limit has let a
-#: difference of the tolerance grow to as much (see `_amplified`).
-DISTURBANCE, SEEN, DISTURBED = 1e-7, 1e-6, 6
+#: The horizon of predictability of a run here: a relative disturbance of the scene's data by DISTURBANCE turns the block by SEEN rad
+#: (half the bound of what is asked before it: of two that grow alike either may be first), or answers at finer tolerances, a hundred
+#: times apart, differ by as much, or friction near Painleve's limit has let a difference of the tolerance grow to it (`_amplified`).
+DISTURBANCE, SEEN, DISTURBED = 1e-7, 5e-7, 6
 #: Rows of an audited history: this fraction of the shortest time in the scene, and at most this many.
 FINE, MOST_ROWS = 64, 4000
 #: A contact counts as closed, a slip as seen, beyond these; conditions are not asked for within this time of an event or a jump.
@@ -473,10 +473,11 @@ class _Horizon:
         if self._row is None:
             self.found = 1
             self._row = len(history.channels["t"])
-            with suppress(ModelFailure):  # rounding is a disturbance, too: an answer that finer tolerances do not agree on is none
-                rows, difference = _differences(*(finer(self.model, by).simulate(self.scene) for by in (10.0, 1000.0)))
-                apart = np.flatnonzero(difference > SEEN)
-                self._row = min(self._row, int(apart[0]) if apart.size else rows)
+            for by in (10.0, 100.0):  # rounding is a disturbance, too: an answer that finer tolerances do not agree on is none
+                with suppress(ModelFailure):
+                    rows, difference = _differences(*(finer(self.model, times).simulate(self.scene) for times in (by, 100.0 * by)))
+                    apart = np.flatnonzero(difference > SEEN)
+                    self._row = min(self._row, int(apart[0]) if apart.size else rows)
             for disturbed in _disturbed(self.scene, self.seed):
                 try:
                     other = self.model.simulate(disturbed)
