@@ -147,10 +147,10 @@ def _rock_series(still_vertical, order, enough, reach, need_forces, a):
         a[SIN, k + 1] = -ds * r
         a[COS, k + 1] = dc * r
         a[OMEGA, k + 1] = 0.75 * (push - weight) * r
-        # At its balance point the block does not feel the vertical motion, which P does.
-        lifts = 0.0 if still_vertical else abs(a[G, k]) * scale
         scale *= reach
-        small = small + 1 if abs(a[OMEGA, k + 1]) * scale + lifts < enough else 0
+        small = small + 1 if abs(a[OMEGA, k + 1]) * scale < enough else 0
+        if not still_vertical and abs(a[G, k]) * scale >= enough:  # at its balance point only P feels the vertical motion
+            small = 0
         if small == 3:
             order = k + 1
             break
