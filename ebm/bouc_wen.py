@@ -312,16 +312,18 @@ def _rest(b, m, z, gv, t):
 def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, a):
     """The block at rest starts to slide, or to tilt, as u of sign `sense` grows; returns z = -u/(mu_k G0), +-1 if it slides."""
     u, g = acceleration(gh, t), 1.0 + acceleration(gv, t)
-    hangs = (g if abs(g) > FORCE_NOISE else 1.0 + acceleration(gv, t + SOON)) <= 0.0
+    soon = 1.0 + acceleration(gv, t + SOON) <= 0.0  # friction falls with P: nothing tips until the floor pulls
+    hangs = g <= 0.0 if abs(g) > FORCE_NOISE else soon
     tips = b.mu_k * b.cos_alpha > b.sin_alpha or hangs
     if tips:
         zeta = min(max(-u / max(b.mu_k * abs(g), 1e-300), -1.0), 1.0)
         if u != 0.0 and abs(abs(u) - g * min(b.sin_alpha / b.cos_alpha, b.mu_k)) < FORCE_NOISE:
-            # Just where it tips or slips: where g nears zero the quotient says no more, and its rounding would be a moment.
-            zeta = -math.copysign(min(b.sin_alpha / (b.cos_alpha * b.mu_k), 1.0) if b.mu_k > 0.0 else 1.0, u)
+            # Just where it tips or slips, so that z is no less than that asks: near g = 0 its rounding would be a moment.
+            least = min(b.sin_alpha / (b.cos_alpha * b.mu_k), 1.0) if b.mu_k > 0.0 else 1.0
+            zeta = -math.copysign(max(abs(zeta), least), u)
         if _tip(b, m, z, sense, zeta, yield_displacement, gh, gv, t, a):
             return zeta
-    if hangs or closed_wall(b, z, sense, False) or (tips and abs(u) < (1.0 + _YIELDS) * g * b.sin_alpha / b.cos_alpha):
+    if hangs or soon or closed_wall(b, z, sense, False) or (tips and abs(u) < (1.0 + _YIELDS) * g * b.sin_alpha / b.cos_alpha):
         _rest(b, m, z, gv, t)
         return 0.0
     m[:] = 0

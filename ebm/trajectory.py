@@ -338,9 +338,9 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         else:
             kind = _release(b, m, z, which)
             found = select(b, z, gh, gv, t, left, m, a)
-            if not found and zero_steps < _HANDED_OVER:
+            if not found and zero_steps < _MOST_ZERO_STEPS:
                 m[:] = left  # none follows, but for rounding: it goes on for a little while
-                zero_steps, found = _HANDED_OVER, True
+                zero_steps, found = max(zero_steps, _HANDED_OVER), True
         if not found:
             ending = NO_IMPACT if strikes else NO_MODE
             break
@@ -512,7 +512,7 @@ def _grazes(b, m, z, order, tau, h, a):
 
     Left at rest as the floor falls away, the block swings back to just where it started, which nothing tells from a touch.
     """
-    if b.unilateral or m[TIP] != 0 or m[FAR] != 0 or abs(z[W]) < SETTLE_SPIN or value(a, G, order, tau) >= 0.0:
+    if b.unilateral or m[TIP] != 0 or m[FAR] != 0 or value(a, G, order, tau) >= 0.0:
         return 0.0
     back = slope(a, OMEGA, order - 1, tau)
     past = 2.0 * abs(z[W]) / back

@@ -34,6 +34,8 @@ FOUND = [
     ("swings back to just where it started to hang", "ebm no-slip", 1, 71160),
     ("slips as its far gap is closed but for rounding", "ebm", 2, 31813),
     ("slips away from a wall that it touches", "ebm", 2, 85729),
+    ("base acceleration and gravity vanish at one instant", "ebm", 3, 16791),
+    ("swings back, gently, to where it started to hang", "ebm no-slip", 3, 97483),
     ("leans on a far wall with hardly an arm", "ebm no-slip", 2, 34414),
     ("hangs on the corner it stood on, no walls", "ebm no-slip", 2, 3342),
     ("strikes the wall so often that its pivot crept", "ebm no-slip", 31, 514),
@@ -64,6 +66,7 @@ FOUND = [
     ("hangs by no push at all, friction below its slope", "ebm-bouc-wen", 1, 75275),
     ("slides with friction that is its slope", "ebm-bouc-wen", 1, 57608),
     ("leaves the wall that held it as gravity vanishes", "ebm-bouc-wen", 2, 26903),
+    ("tips just before gravity vanishes", "ebm-bouc-wen", 3, 15814),
     ("stands without friction on a wall as gravity vanishes", "ebm-bouc-wen", 2, 74848),
     ("stands on its corner without friction", "ebm-bouc-wen", 43, 10501),
 ]
