@@ -300,7 +300,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             which = G_PHI  # whatever else happens at that instant, the block lands
         zero_steps = zero_steps + 1 if tau <= 0.0 else 0
         if which == G_PHI:
-            past = _grazes(b, m, z, order, tau, h, a)
+            past = _grazes(b, m, z, order, tau, h, control.tolerance, a)
             if past > 0.0:
                 t += past
                 tilt_state(b, m, order, tau + past, pivot, a, z)
@@ -507,16 +507,17 @@ def _touch(b, m, z, which):
 
 
 @inner_kernel
-def _grazes(b, m, z, order, tau, h, a):
-    """Time after which a block that comes down hanging has turned back, if its other corner gets no deeper than _TOUCH; else 0.
+def _grazes(b, m, z, order, tau, h, tolerance, a):
+    """Time after which a block that comes down hanging, with less energy than the tolerance, has turned back; 0 if it lands.
 
-    Left at rest as the floor falls away, the block swings back to just where it started, which nothing tells from a touch.
+    Left at rest as the floor falls away, a block swings back to just where it started, which nothing tells from a touch.
     """
     if b.unilateral or m[TIP] != 0 or m[FAR] != 0 or value(a, G, order, tau) >= 0.0:
         return 0.0
     back = slope(a, OMEGA, order - 1, tau)
     past = 2.0 * abs(z[W]) / back
-    return past if 0.125 * back * past * past < _TOUCH and 0.0 < past <= h - tau else 0.0
+    shallow = z[W] * z[W] < tolerance * min(1.0, 10.0 * back)
+    return past if shallow and 0.0 < past <= h - tau else 0.0
 
 
 @inner_kernel
