@@ -318,9 +318,8 @@ def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, a):
     if tips:
         zeta = min(max(-u / max(b.mu_k * abs(g), 1e-300), -1.0), 1.0)
         if u != 0.0 and abs(abs(u) - g * min(b.sin_alpha / b.cos_alpha, b.mu_k)) < FORCE_NOISE:
-            # Just where it tips or slips, so that z is no less than that asks: near g = 0 its rounding would be a moment.
-            least = min(b.sin_alpha / (b.cos_alpha * b.mu_k), 1.0) if b.mu_k > 0.0 else 1.0
-            zeta = -math.copysign(max(abs(zeta), least), u)
+            # Just where it tips or slips: near g = 0 the quotient says no more, and its rounding would be a moment.
+            zeta = -math.copysign(min(b.sin_alpha / (b.cos_alpha * b.mu_k), 1.0) if b.mu_k > 0.0 else 1.0, u)
         if _tip(b, m, z, sense, zeta, yield_displacement, gh, gv, t, a):
             return zeta
     if hangs or soon or closed_wall(b, z, sense, False) or (tips and abs(u) < (1.0 + _YIELDS) * g * b.sin_alpha / b.cos_alpha):

@@ -192,6 +192,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
     ending = DONE
     m[FAMILY], m[S], m[FLOOR], m[PULL] = FLAT, 1, STICK, 1  # most often it stands
     corner = 0  # the one that it last stood on
+    swing = 0.0  # largest rate of rotation since the last event
     stands = z[THETA] == 0.0 and z[VX] == 0.0 and z[W] == 0.0 and z[HEIGHT] == b.cos_alpha and not b.walls
     stands = stands and consistent(b, m, z, gh, gv, t, a, False)
     m[S] = 1 if stands else 0
@@ -292,6 +293,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         else:
             t += tau
         peak = max(peak, abs(z[THETA]))
+        swing = max(swing, abs(z[W]))
         if which < 0:
             zero_steps = zero_steps if waits or tau < _PASSED else 0
             continue
@@ -300,12 +302,13 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
             which = G_PHI  # whatever else happens at that instant, the block lands
         zero_steps = zero_steps + 1 if tau <= 0.0 else 0
         if which == G_PHI:
-            past = _grazes(b, m, z, order, tau, h, control.tolerance, a)
+            past = _grazes(b, m, z, order, tau, h, 10.0 * control.tolerance * swing * swing, a)
             if past > 0.0:
                 t += past
                 tilt_state(b, m, order, tau + past, pivot, a, z)
                 z[THETA] = math.copysign(max(abs(z[THETA]), 2.0 * POSITION_NOISE), float(m[S]))
                 continue
+        swing = 0.0
         events += 1
         if zero_steps > _MOST_ZERO_STEPS:
             ending = NO_MODE
@@ -507,8 +510,8 @@ def _touch(b, m, z, which):
 
 
 @inner_kernel
-def _grazes(b, m, z, order, tau, h, tolerance, a):
-    """Time after which a block that comes down hanging, with less energy than the tolerance, has turned back; 0 if it lands.
+def _grazes(b, m, z, order, tau, h, energy, a):
+    """Time after which a block that comes down hanging, with less energy than is known, has turned back; 0 if it lands.
 
     Left at rest as the floor falls away, a block swings back to just where it started, which nothing tells from a touch.
     """
@@ -516,8 +519,7 @@ def _grazes(b, m, z, order, tau, h, tolerance, a):
         return 0.0
     back = slope(a, OMEGA, order - 1, tau)
     past = 2.0 * abs(z[W]) / back
-    shallow = z[W] * z[W] < tolerance * min(1.0, 10.0 * back)
-    return past if shallow and 0.0 < past <= h - tau else 0.0
+    return past if z[W] * z[W] < energy * min(1.0, 10.0 * back) and 0.0 < past <= h - tau else 0.0
 
 
 @inner_kernel

@@ -36,6 +36,7 @@ FOUND = [
     ("slips away from a wall that it touches", "ebm", 2, 85729),
     ("base acceleration and gravity vanish at one instant", "ebm", 3, 16791),
     ("swings back, gently, to where it started to hang", "ebm no-slip", 3, 97483),
+    ("rocks by less than its tolerance where it hangs", "ebm no-slip", 1, 14446),
     ("leans on a far wall with hardly an arm", "ebm no-slip", 2, 34414),
     ("hangs on the corner it stood on, no walls", "ebm no-slip", 2, 3342),
     ("strikes the wall so often that its pivot crept", "ebm no-slip", 31, 514),
@@ -67,6 +68,7 @@ FOUND = [
     ("slides with friction that is its slope", "ebm-bouc-wen", 1, 57608),
     ("leaves the wall that held it as gravity vanishes", "ebm-bouc-wen", 2, 26903),
     ("tips just before gravity vanishes", "ebm-bouc-wen", 3, 15814),
+    ("tips by a push that is rounding as gravity vanishes", "ebm-bouc-wen", 1, 14361),
     ("stands without friction on a wall as gravity vanishes", "ebm-bouc-wen", 2, 74848),
     ("stands on its corner without friction", "ebm-bouc-wen", 43, 10501),
 ]
