@@ -52,9 +52,9 @@ INVARIANTS = {
     )
 }
 #: The horizon of predictability of a run here: a relative disturbance of the scene's data by DISTURBANCE turns the block by SEEN rad
-#: (half the bound of what is asked before it: of two that grow alike either may be first), or answers at finer tolerances, a hundred
-#: times apart, differ by as much, or friction near Painleve's limit has let a difference of the tolerance grow to it (`_amplified`).
-DISTURBANCE, SEEN, DISTURBED = 1e-7, 5e-7, 6
+#: (half the bound of what is asked before it: of two that grow alike either may be first), or answers at tolerances finer than EXACT, a
+#: hundred times apart, differ by as much, or friction near Painleve's limit has let a difference of EXACT grow to it (`_amplified`).
+DISTURBANCE, SEEN, DISTURBED, EXACT = 1e-7, 5e-7, 6, 1e-10
 #: Rows of an audited history: this fraction of the shortest time in the scene, and at most this many.
 FINE, MOST_ROWS = 64, 4000
 #: A contact counts as closed, a slip as seen, beyond these; conditions are not asked for within this time of an event or a jump.
@@ -473,9 +473,10 @@ class _Horizon:
         if self._row is None:
             self.found = 1
             self._row = len(history.channels["t"])
+            exact = self.model.model_copy(update={"tolerance": EXACT})  # the horizon is the scene's, however coarse the model is
             for by in (10.0, 100.0):  # rounding is a disturbance, too: an answer that finer tolerances do not agree on is none
                 with suppress(ModelFailure):
-                    rows, difference = _differences(*(finer(self.model, times).simulate(self.scene) for times in (by, 100.0 * by)))
+                    rows, difference = _differences(*(finer(exact, times).simulate(self.scene) for times in (by, 100.0 * by)))
                     apart = np.flatnonzero(difference > SEEN)
                     self._row = min(self._row, int(apart[0]) if apart.size else rows)
             for disturbed in _disturbed(self.scene, self.seed):
@@ -486,7 +487,7 @@ class _Horizon:
                 rows, difference = _differences(history, other)
                 apart = np.flatnonzero(difference > SEEN)
                 self._row = min(self._row, int(apart[0]) if apart.size else rows)
-            grown = np.flatnonzero(_amplified(self.scene, history) > math.log(SEEN / self.model.tolerance))
+            grown = np.flatnonzero(_amplified(self.scene, history) > math.log(SEEN / EXACT))
             self._row = min(self._row, int(grown[0]) if grown.size else self._row)
         return self._row
 
