@@ -476,17 +476,13 @@ class _Horizon:
             exact = self.model.model_copy(update={"tolerance": EXACT})  # the horizon is the scene's, however coarse the model is
             for by in (10.0, 100.0):  # rounding is a disturbance, too: an answer that finer tolerances do not agree on is none
                 with suppress(ModelFailure):
-                    rows, difference = _differences(*(finer(exact, times).simulate(self.scene) for times in (by, 100.0 * by)))
-                    apart = np.flatnonzero(difference > SEEN)
-                    self._row = min(self._row, int(apart[0]) if apart.size else rows)
+                    self._row = min(self._row, _agree(*(finer(exact, times).simulate(self.scene) for times in (by, 100.0 * by))))
             for disturbed in _disturbed(self.scene, self.seed):
                 try:
                     other = self.model.simulate(disturbed)
                 except ModelFailure:
                     continue
-                rows, difference = _differences(history, other)
-                apart = np.flatnonzero(difference > SEEN)
-                self._row = min(self._row, int(apart[0]) if apart.size else rows)
+                self._row = min(self._row, _agree(history, other))
             grown = np.flatnonzero(_amplified(self.scene, history) > math.log(SEEN / EXACT))
             self._row = min(self._row, int(grown[0]) if grown.size else self._row)
         return self._row
@@ -526,6 +522,13 @@ def _amplified(scene: Scene, history: History) -> Floats:
 def _differences(a: History, b: History) -> tuple[int, Floats]:
     rows = min(len(a.channels["t"]), len(b.channels["t"]))
     return rows, np.abs(a.channels["theta"][:rows] - b.channels["theta"][:rows])
+
+
+def _agree(a: History, b: History) -> int:
+    """In how many rows, from the first on, two histories differ by no more than `SEEN`."""
+    rows, difference = _differences(a, b)
+    apart = np.flatnonzero(difference > SEEN)
+    return int(apart[0]) if apart.size else rows
 
 
 def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
