@@ -61,10 +61,12 @@ from ebm.motion import (
     X,
     flat_series,
     flat_state,
+    sine_cosine,
     tilt_series,
     tilt_state,
+    workspace,
 )
-from ebm.series import FORCE_NOISE, INSTANT, MOST_TERMS, NO_ROOT, POSITION_NOISE, first_root, leading, value
+from ebm.series import FORCE_NOISE, INSTANT, NO_ROOT, POSITION_NOISE, first_root, leading, value
 from ebm.trajectory import (
     _HANDED_OVER,
     _MOST_ZERO_STEPS,
@@ -242,7 +244,7 @@ def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order
     wall = float(m[TIP] - m[FAR])
     push = NA if m[TIP] != 0 else NB
     a[PHI, 0], a[OMEGA, 0] = sign * z[THETA], sign * z[W]
-    a[SIN, 0], a[COS, 0] = math.sin(b.alpha - a[PHI, 0]), math.cos(b.alpha - a[PHI, 0])
+    a[SIN, 0], a[COS, 0] = sine_cosine(b.alpha - a[PHI, 0], a)
     for k in range(order):
         a[PHI, k + 1] = a[OMEGA, k] / (k + 1)
         a[SIN, k + 1] = -_product(a, OMEGA, COS, k) / (k + 1)
@@ -468,8 +470,7 @@ def _label(m, yielded):
 @kernel
 def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
     """Simulates from state z (changed in place) at t = 0 to t_end; returns a Tally. Arguments as of trajectory.run."""
-    a, stack = np.zeros((_ROWS, MOST_TERMS)), np.zeros((48, MOST_TERMS))
-    a[G, 0] = 1.0
+    a, stack = workspace(_ROWS)
     m, left = np.zeros(MODE_SIZE, dtype=np.int64), np.zeros(MODE_SIZE, dtype=np.int64)
     impulse, gains = np.zeros(2), np.zeros(2)
     rattle = np.array([_REST_BILATERAL, -1.0, -1.0, 0.0, 0.0])
@@ -597,7 +598,7 @@ def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
             yielded = abs(zeta) == 1.0
             kind = UPLIFT if m[FAMILY] == TILT else SLIPS
         elif which >= 0:
-            kind, _, _ = _impact(b, m, z, which, gh, t, resting_speed(rattle, t, _REST_BILATERAL), impulse, gains)
+            kind, _, _ = _impact(b, m, z, which, gh, t, resting_speed(rattle, t, _REST_BILATERAL, zero_steps), impulse, gains)
             wall_impacts += kind == WALL_IMPACT
             zeta = _begin(b, m, z, zeta, yield_displacement, gh, gv, t, a)
             yielded = _has_yielded(b, m, z, zeta)

@@ -72,7 +72,9 @@ OFF, STICK, SLIPPING = 0, 1, 2
 PHI, OMEGA, SIN, COS, U, G, XI, Y, P, Q, NA, NB, GUARD, KNOWN, FORCE, FLOOR_ARM, WALL_ARM, WALL_PUSH = range(18)
 # Rows in which the small linear system of the contacts is put together, three each.
 ROW, COLUMN, MATRIX, INVERSE = range(18, 30, 3)
-ROWS = 30
+# The last angle whose sine and cosine were taken, and these: the end of a step is the start of the next one.
+ANGLE = 30
+ROWS = 31
 
 RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, MOST_TERMS + 2)])
 
@@ -81,11 +83,19 @@ X, HEIGHT, THETA, VX, VY, W = range(6)
 
 
 @kernel
-def workspace():
+def workspace(rows=ROWS):
     """Scratch for one trajectory: the series (G = 1: no vertical motion), and the stack of the root search."""
-    series = np.zeros((ROWS, MOST_TERMS))
-    series[G, 0] = 1.0
+    series = np.zeros((rows, MOST_TERMS))
+    series[G, 0] = series[ANGLE, 2] = 1.0
     return series, np.zeros((48, MOST_TERMS))
+
+
+@inner_kernel
+def sine_cosine(angle, a):
+    """Both, from the workspace where they were asked for last."""
+    if a[ANGLE, 0] != angle:
+        a[ANGLE, 0], a[ANGLE, 1], a[ANGLE, 2] = angle, np.sin(angle), np.cos(angle)
+    return a[ANGLE, 1], a[ANGLE, 2]
 
 
 @inner_kernel
@@ -109,8 +119,7 @@ def tilt_series(b, m, z, gh, gv, t, order, enough, reach, a):
         a[G, 0] += 1.0
     a[PHI, 0] = sign * z[THETA]
     a[OMEGA, 0] = sign * z[W]
-    a[SIN, 0] = np.sin(b.alpha - a[PHI, 0])
-    a[COS, 0] = np.cos(b.alpha - a[PHI, 0])
+    a[SIN, 0], a[COS, 0] = sine_cosine(b.alpha - a[PHI, 0], a)
     if m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0:
         return _rock_series(gv.kind == STILL, order, enough, reach, b.unilateral or not b.no_slip, a)
     a[XI, 0] = sign * z[X]
@@ -371,7 +380,7 @@ def tilt_state(b, m, order, tau, pivot, a, z):
     w = value(a, OMEGA, order - 1, tau)
     if (m[FLOOR] == STICK and (m[TIP] != 0 or m[FAR] != 0)) or (m[TIP] != 0 and m[FAR] != 0):
         phi, w = a[PHI, 0], 0.0
-    s, c = np.sin(b.alpha - phi), np.cos(b.alpha - phi)
+    s, c = sine_cosine(b.alpha - phi, a)
     if m[FLOOR] == STICK:
         xi, v = pivot + s, -c * w
     elif m[TIP] != 0 or m[FAR] != 0:

@@ -7,6 +7,8 @@ step, so an event is the root of a polynomial and can be located to rounding, wi
 
 from __future__ import annotations
 
+import math
+
 from scenes.compiled import inner_kernel
 
 #: Width of the arrays that hold a polynomial: orders up to 28, and two numbers that the root search keeps behind them.
@@ -54,8 +56,9 @@ def leading(a, row, n, floor):
 def _order_of_zero(a, row, n, floor):
     """The index of the first coefficient of c that counts; n + 1 where there is none.
 
-    Coefficients that are rounding noise (below `floor`, see POSITION_NOISE), or turn positive within an INSTANT, are taken
-    as zero, so that a guard that has just fired (and is zero by construction) does not fire again.
+    Coefficients that are rounding noise (below `floor`, see POSITION_NOISE), by themselves or with the noise before them, or
+    turn positive within an INSTANT, are taken as zero, so that a guard that has just fired (and is zero by construction) does
+    not fire again.
     """
     noise = floor
     scale = 1e-13
@@ -63,8 +66,10 @@ def _order_of_zero(a, row, n, floor):
         noise = max(noise, abs(a[row, k]) * scale)
         scale *= AHEAD
     scale = 1.0
+    total = 0.0
     for k in range(n + 1):
-        if abs(a[row, k]) * scale > noise:
+        total += a[row, k] * scale
+        if abs(a[row, k]) * scale > noise and math.copysign(total, total * a[row, k]) > noise:
             rises = k < n and a[row, k] < 0.0 and a[row, k] + (k + 1) * a[row, k + 1] * INSTANT > 0.0
             if not rises:
                 return k

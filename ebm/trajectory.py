@@ -301,7 +301,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         if which > G_FAR_GAP and m[FAMILY] == TILT and abs(z[THETA]) < 1e-13 and m[S] * z[W] < -CLOSED_RATE:
             which = G_PHI  # whatever else happens at that instant, the block lands
         zero_steps = zero_steps + 1 if tau <= 0.0 else 0
-        if which == G_PHI:
+        if which == G_PHI and gv.kind != STILL and not b.unilateral:
             past = _grazes(b, m, z, order, tau, h, 10.0 * control.tolerance * swing * swing, a)
             if past > 0.0:
                 t += past
@@ -332,7 +332,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack):
         impulse[:] = 0.0
         strikes = which == G_TIP_GAP or which == G_FAR_GAP or which == G_LANDING or which == G_PHI
         if strikes:
-            resting = resting_speed(rattle, t, base_rest)
+            resting = resting_speed(rattle, t, base_rest, zero_steps)
             kind, found, known = _impact(b, m, z, which, gh, t, resting, impulse, gains)
             wall_impacts += kind == WALL_IMPACT
             if not known:
@@ -405,8 +405,8 @@ def _first_event(b, m, order, pivot, h, mask, a, stack):
 
 
 @inner_kernel
-def resting_speed(rattle, t, base):
-    """The speed below which a contact that is struck at time t stays closed: `base`, unless it rattles.
+def resting_speed(rattle, t, base, zero_steps):
+    """The speed below which a contact that is struck at time t stays closed: `base`, unless it rattles, or did all at once.
 
     `rattle` keeps that speed, when the count of impacts began, the last impact, the count, and how often it was full.
     """
@@ -420,7 +420,7 @@ def resting_speed(rattle, t, base):
         count, full = 0.0, full + 1.0
         resting = min(10.0 * resting, _RATTLE_BOUND) if full < _RATTLES else np.inf
     rattle[0], rattle[1], rattle[2], rattle[3], rattle[4] = resting, since, t, count, full
-    return resting
+    return resting if zero_steps < _HANDED_OVER else np.inf
 
 
 @inner_kernel
@@ -515,7 +515,7 @@ def _grazes(b, m, z, order, tau, h, energy, a):
 
     Left at rest as the floor falls away, a block swings back to just where it started, which nothing tells from a touch.
     """
-    if b.unilateral or m[TIP] != 0 or m[FAR] != 0 or value(a, G, order, tau) >= 0.0:
+    if m[TIP] != 0 or m[FAR] != 0 or value(a, G, order, tau) >= 0.0:
         return 0.0
     back = slope(a, OMEGA, order - 1, tau)
     past = 2.0 * abs(z[W]) / back
@@ -602,10 +602,11 @@ def _wall_impact(b, m, z, tip, gh, t, resting, impulse, gains):
     if abs(xdot2 + c * w2) < CREEP:
         xdot2 = -c * w2
     z[W], z[VX], z[VY] = sign * w2, sign * xdot2, s * w2
-    if b.no_slip and stays:
+    flush = phi == 0.0 and stays and -resting < sw * xdot2 + c * w2 < 0.0  # its side: the other corner follows
+    if (b.no_slip and stays) or flush:
         z[W] = z[VX] = z[VY] = 0.0
-    flush = sign * sw * z[X] + (b.gap_left if sign * sw > 0 else b.gap_right)
-    if abs(w2) < _FLUSH_SPIN and abs(v2) < _FLUSH_SPEED and abs(flush) < _FLUSH_GAP and _presses(b, gh, t, sign * sw):
+    gap = sign * sw * z[X] + (b.gap_left if sign * sw > 0 else b.gap_right)
+    if abs(w2) < _FLUSH_SPIN and abs(v2) < _FLUSH_SPEED and abs(gap) < _FLUSH_GAP and _presses(b, gh, t, sign * sw):
         z[THETA] = z[W] = z[VX] = z[VY] = 0.0
         z[HEIGHT] = b.cos_alpha
         z[X] = -b.gap_left if sign * sw > 0 else b.gap_right
