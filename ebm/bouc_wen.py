@@ -324,7 +324,7 @@ def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, a):
             zeta = -math.copysign(min(b.sin_alpha / (b.cos_alpha * b.mu_k), 1.0) if b.mu_k > 0.0 else 1.0, u)
         if _tip(b, m, z, sense, zeta, yield_displacement, gh, gv, t, a):
             return zeta
-    if hangs or soon or closed_wall(b, z, sense, False) or (tips and abs(u) < (1.0 + _YIELDS) * g * b.sin_alpha / b.cos_alpha):
+    if hangs or soon or closed_wall(b, z, sense, False) or (tips and abs(u) < g * max((1.0 + _YIELDS) * b.sin_alpha / b.cos_alpha, b.mu_k)):
         _rest(b, m, z, gv, t)
         return 0.0
     m[:] = 0

@@ -404,7 +404,7 @@ def test_bombs_stay_below_a_gigabyte_and_a_minute(tmp_path):
     for name, text in BOMBS.items():
         (tmp_path / "in" / name).write_text(text)
     script = [sys.executable, "-c", _PLAY_BOMBS, str(tmp_path / "in"), str(tmp_path / "out")]
-    done = subprocess.run(script, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(script, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     assert "Traceback" not in done.stderr
     assert all(len(line) < 600 for line in done.stderr.splitlines())

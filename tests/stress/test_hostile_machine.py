@@ -55,7 +55,7 @@ def test_disk_full(tmp_path):
     """A history that does not fit: one line, exit 2, and no half file under its name."""
     out = tmp_path / "out.csv"
     command = [sys.executable, "-c", _LIMITED, "4096", "simulate", "fig4a", "--model", "ebm", "-o", str(out)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 2
     assert "File too large" in one_line(done.stderr)
     assert main(["simulate", "fig4a", "--model", "ebm", "-o", str(out), "--quiet"]) == 0
@@ -65,7 +65,7 @@ def test_disk_full(tmp_path):
 def test_disk_full_while_a_study_is_written(tmp_path):
     """Tables that were written stay whole; the file that does not fit leaves nothing; the next run writes all."""
     command = [sys.executable, "-c", _LIMITED, "3000", *SMALL_RUN, "--out", str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 2
     one_line(done.stderr)
     assert not leavings(tmp_path)
@@ -203,13 +203,27 @@ def test_shrinking_interrupted(tmp_path, monkeypatch, capsys):
         load_scene(tmp_path / file)
 
 
-@posix
+linux = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="children are found as Linux tells them")
+
+
+def workers(running: subprocess.Popen) -> list[str]:
+    """Process ids of the children, once they are at work: a worker, and multiprocessing's tracker."""
+    children: list[str] = []
+    until = time.monotonic() + 60.0
+    while len(children) < 2 and time.monotonic() < until:
+        time.sleep(0.2)
+        children = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
+    time.sleep(3.0)
+    return children
+
+
+@linux
 def test_interrupted(tmp_path):
     """Ctrl-C ends a study in one line; what was finished is written, and says that it is not all."""
     command = [*ROCKCHECK, "stress", "runs", "--model", "ebm no-slip", "--runs", "60000", "--jobs", "1", "--out", str(tmp_path)]
     running = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, start_new_session=True)
     try:
-        time.sleep(6.0)
+        workers(running)
         os.killpg(running.pid, signal.SIGINT)
         _, said = running.communicate(timeout=60)
     finally:
@@ -223,18 +237,13 @@ def test_interrupted(tmp_path):
     assert not leavings(tmp_path)
 
 
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="children are found as Linux tells them")
+@linux
 def test_killed(tmp_path):
     """A run that is killed leaves no worker behind, however busy, and the next run in its folder is whole."""
     command = [*ROCKCHECK, "stress", "runs", "--model", "ebm no-slip", "--runs", "60000", "--jobs", "1", "--out", str(tmp_path)]
     running = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True)
-    children: list[str] = []
     try:
-        until = time.monotonic() + 60.0
-        while len(children) < 2 and time.monotonic() < until:  # the worker, and multiprocessing's tracker
-            time.sleep(0.2)
-            children = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
-        time.sleep(3.0)
+        children = workers(running)
     finally:
         running.kill()
         running.wait()

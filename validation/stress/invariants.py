@@ -9,7 +9,7 @@ import itertools
 import math
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -326,7 +326,9 @@ def energy_error(model: EventBasedModel, scene: Scene, history: History) -> floa
     # In a group before and after, too: where the difference of the two rules changes its sign it says nothing.
     whole &= np.maximum(doubt, np.maximum(np.append(doubt[1:], 0.0), np.append(0.0, doubt[:-1]))) < RESOLVED
     if model.friction == "bouc-wen":
-        held = scene.floor.friction * model.yield_displacement / radius * (2.0 + np.max(np.abs(vg)))
+        rise = np.abs(np.diff(channels["y_dot"])) / speed / step  # per row; with gravity it is the floor's force
+        force = 2.0 + np.max(np.abs(vg)) + rise[: len(work) * GROUP].reshape(-1, GROUP).max(axis=1)
+        held = scene.floor.friction * model.yield_displacement / radius * force
         return float(np.max((off - held / size)[whole], initial=0.0))
     return float(np.max(np.abs(off)[whole & quiet], initial=0.0))
 
@@ -398,7 +400,7 @@ def _whole_groups(scene: Scene, history: History) -> tuple[NDArray[np.bool_], ND
 
 
 def _mirror(model: EventBasedModel, scene: Scene, history: History) -> tuple[float, int]:
-    """How many values differ from those of the mirror image, to the bit; and the first row that does."""
+    """How many values differ from those of the mirror image, to the bit; and the first row that does, or that follows such an event."""
     try:
         image = model.simulate(scene.mirrored())
     except ModelFailure:
@@ -411,9 +413,9 @@ def _mirror(model: EventBasedModel, scene: Scene, history: History) -> tuple[flo
         return math.inf, first
     differ = int(np.sum(unlike))
     for a, b in zip(history.event_list, image.event_list, strict=True):
-        differ += (a.t, SWAPPED.get(a.kind, a.kind), a.mode_before, a.mode_after, a.impulse) != (
-            b.t, b.kind, b.mode_before, b.mode_after, b.impulse
-        )  # fmt: skip
+        if replace(a, kind=SWAPPED.get(a.kind, a.kind)) != b:
+            differ += 1
+            first = min(first, int(np.searchsorted(history.channels["t"], min(a.t, b.t))))
     return float(differ + (image.outcome != SWAPPED.get(history.outcome, history.outcome))), first
 
 
