@@ -268,7 +268,7 @@ def noise_of(which):
     return RATE_NOISE if which == G_SLIP else FORCE_NOISE
 
 
-_OTHER, _SAME, _CREEPING = range(3)  # attempts of a selection
+_OTHER, _SAME, _CREEPING, _STANDING = range(4)  # attempts of a selection
 _LOOK = 6  # order of the series that a selection looks at
 
 
@@ -348,7 +348,12 @@ def select(b, z, gh, gv, t, left, m, a):
     if stands and (closed_wall(b, z, 1, False) or closed_wall(b, z, -1, False)):
         z[W] = z[VX] = z[VY] = 0.0  # on floor and wall a block that does not turn stands
     first = tips_first(b, m, z, gh, t) if flat else 0
-    for attempt in (_OTHER, _SAME, _CREEPING):
+    for attempt in (_OTHER, _SAME, _CREEPING, _STANDING):
+        if attempt == _STANDING:
+            # So slow a slip, which fits in neither sense, is noise of forces that change fast: the pivot stands.
+            if flat or not floor or abs(slip_velocity(b, z)) > CLOSED_RATE:
+                return False
+            z[VX] = -math.cos(b.alpha - abs(z[THETA])) * z[W]
         if flat:
             if floor and z[VX] == 0.0 and not b.walls:
                 # Static friction above kinetic can leave both rocking and sliding consistent: it holds as long as it can.

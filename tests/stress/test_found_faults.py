@@ -30,6 +30,7 @@ FOUND = [
     ("a tiny motion that grows", "ebm", 1, 94890),
     ("a slipping pivot near Painleve's limit, from which all starts lead to one motion, and that to many", "ebm", 1, 29170),
     ("integrals that are less exact than they seem", "ebm", 43, 920),
+    ("gravity passes zero some thousand times a second, beside a wall", "ebm", 6, 45421),
     ("integrals that are less exact than they seem, by two rules", "ebm", 4, 34770),
     ("hangs where it has rocked back to, without slip", "ebm no-slip", 1, 8417),
     ("swings back to just where it started to hang", "ebm no-slip", 1, 71160),
