@@ -53,7 +53,7 @@ INVARIANTS = {
 }
 #: The horizon of predictability of a run here: a relative disturbance of the scene's data by DISTURBANCE turns the block by SEEN rad
 #: (half the bound of what is asked before it: of two that grow alike either may be first), or answers at tolerances finer than EXACT, a
-#: hundred times apart, differ by as much, or friction near Painleve's limit has let a difference of EXACT grow to it (`_amplified`).
+#: hundred times apart, differ by a tenth of that, or friction near Painleve's limit has let a difference of EXACT grow to it (`_amplified`).
 DISTURBANCE, SEEN, DISTURBED, EXACT = 1e-7, 5e-7, 6, 1e-10
 #: Rows of an audited history: this fraction of the shortest time in the scene, and at most this many.
 FINE, MOST_ROWS = 64, 4000
@@ -480,20 +480,21 @@ class _Horizon:
         return float(np.max(difference[: self.row(history)], initial=0.0))
 
     def row(self, history: History) -> int:
-        """The first row that differs by more than `SEEN` between the scene and a disturbed one, or between two finer tolerances."""
+        """The first row in which the scene and a disturbed one, or two finer tolerances, part (see `SEEN`)."""
         if self._row is None:
             self.found = 1
             self._row = len(history.channels["t"])
             exact = self.model.model_copy(update={"tolerance": EXACT})  # the horizon is the scene's, however coarse the model is
             for by in (10.0, 100.0):  # rounding is a disturbance, too: an answer that finer tolerances do not agree on is none
                 with suppress(ModelFailure):
-                    self._row = min(self._row, _agree(*(finer(exact, times).simulate(self.scene) for times in (by, 100.0 * by))))
+                    a, b = (finer(exact, times).simulate(self.scene) for times in (by, 100.0 * by))
+                    self._row = min(self._row, _agree(a, b, 0.1 * SEEN))
             for disturbed in _disturbed(self.scene, self.seed):
                 try:
                     other = self.model.simulate(disturbed)
                 except ModelFailure:
                     continue
-                self._row = min(self._row, _agree(history, other))
+                self._row = min(self._row, _agree(history, other, SEEN))
             grown = np.flatnonzero(_amplified(self.scene, history) > math.log(SEEN / EXACT))
             self._row = min(self._row, int(grown[0]) if grown.size else self._row)
         return self._row
@@ -535,10 +536,10 @@ def _differences(a: History, b: History) -> tuple[int, Floats]:
     return rows, np.abs(a.channels["theta"][:rows] - b.channels["theta"][:rows])
 
 
-def _agree(a: History, b: History) -> int:
-    """In how many rows, from the first on, two histories differ by no more than `SEEN`."""
+def _agree(a: History, b: History, seen: float) -> int:
+    """In how many rows, from the first on, two histories differ by no more than `seen`, rad."""
     rows, difference = _differences(a, b)
-    apart = np.flatnonzero(difference > SEEN)
+    apart = np.flatnonzero(difference > seen)
     return int(apart[0]) if apart.size else rows
 
 
