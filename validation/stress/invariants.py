@@ -52,8 +52,9 @@ INVARIANTS = {
     )
 }
 #: The horizon of predictability of a run here: a relative disturbance of the scene's data by DISTURBANCE turns the block by SEEN rad
-#: (half the bound of what is asked before it: of two that grow alike either may be first), or answers at tolerances finer than EXACT, a
-#: hundred times apart, differ by a tenth of that, or friction near Painleve's limit has let a difference of EXACT grow to it (`_amplified`).
+#: (half the bound of what is asked before it: of two that grow alike either may be first), or answers at tolerances finer than EXACT,
+#: a hundred times apart, differ by a tenth of that, or friction near Painleve's limit has let a difference of EXACT grow to SEEN
+#: (`_amplified`).
 DISTURBANCE, SEEN, DISTURBED, EXACT = 1e-7, 5e-7, 6, 1e-10
 #: Rows of an audited history: this fraction of the shortest time in the scene, and at most this many.
 FINE, MOST_ROWS = 64, 4000
