@@ -124,8 +124,8 @@ def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: boo
         figures["impacts"] = history.cost.largest_energy_gain if capped and gains else 0.0
     horizon, exception = _Horizon(model, played, seed), ""
     if only in ("", "mirror"):
-        differ, row = _mirror(model, played, history)
-        exception = "hangs" if differ and _hangs(model, played, history, row) else ""
+        differ, since = _mirror(model, played, history)
+        exception = "hangs" if differ and _hangs(model, played, history, since) else ""
         if not exception:
             figures["mirror"] = differ
     if only in ("", "similarity"):
@@ -400,31 +400,38 @@ def _whole_groups(scene: Scene, history: History) -> tuple[NDArray[np.bool_], ND
     return whole, np.all(nodes == nodes[:, :1], axis=1)
 
 
-def _mirror(model: EventBasedModel, scene: Scene, history: History) -> tuple[float, int]:
-    """How many values differ from those of the mirror image, to the bit; and the first row that does, or that follows such an event."""
+def _mirror(model: EventBasedModel, scene: Scene, history: History) -> tuple[float, float]:
+    """How many values differ from those of the mirror image, to the bit, infinitely many where it is longer; the time of the first."""
     try:
         image = model.simulate(scene.mirrored())
     except ModelFailure:
-        return math.inf, 0
-    rows = min(len(image.channels["t"]), len(history.channels["t"]))
+        return math.inf, 0.0
+    t = history.channels["t"]
+    rows = min(len(image.channels["t"]), len(t))
     unlike = [history.channels[name][:rows] != image.channels[name][:rows] for name in EVEN]
     unlike += [history.channels[name][:rows] != -image.channels[name][:rows] for name in ODD]
-    first = int(np.argmax(np.append(np.any(unlike, axis=0), True)))
-    if len(image.channels["t"]) != len(history.channels["t"]) or len(image.event_list) != len(history.event_list):
-        return math.inf, first
-    differ = int(np.sum(unlike))
-    for a, b in zip(history.event_list, image.event_list, strict=True):
+    row = int(np.argmax(np.append(np.any(unlike, axis=0), True)))
+    differ, first = int(np.sum(unlike)), float(t[min(row, len(t) - 1)])
+    for a, b in zip(history.event_list, image.event_list, strict=False):
         if replace(a, kind=SWAPPED.get(a.kind, a.kind)) != b:
             differ += 1
-            first = min(first, int(np.searchsorted(history.channels["t"], min(a.t, b.t))))
+            first = min(first, a.t, b.t)
+    if len(image.channels["t"]) != len(t) or len(image.event_list) != len(history.event_list):
+        return math.inf, first
     return float(differ + (image.outcome != SWAPPED.get(history.outcome, history.outcome))), first
 
 
-def _hangs(model: EventBasedModel, scene: Scene, history: History, row: int) -> bool:
-    """Whether a block starts to hang before `row`, and nothing in scene and motion tells left from right: see EXCEPTIONS."""
+def _hangs(model: EventBasedModel, scene: Scene, history: History, until: float) -> bool:
+    """Whether a block starts to hang before `until`, and nothing in scene and motion tells left from right: see EXCEPTIONS."""
     if model.pivot != "bilateral" or len({(wall.gap, wall.restitution) for wall in scene.walls}) > 1 or len(scene.walls) == 1:
         return False
+    begins = next((event.t for event in history.event_list if event.t <= until and event.mode_before == "rest"), None)
+    if begins is not None and begins == history.event_list[0].t:  # it has never moved before
+        soon = begins + np.array([1e-9, 1e-6]) * math.sqrt(scene.block.radius / scene.gravity)
+        if np.all(scene.gravity + scene.vertical.acceleration(soon) <= 0.0) and not np.any(scene.excitation.acceleration(soon)):
+            return True
     t = history.channels["t"]
+    row = int(np.searchsorted(t, until))
     times = np.linspace(t[max(row - 2, 0)], t[min(row, len(t) - 1)], 1001)
     before = range(max(row - 2, 0), max(row, 1))
     moved = {name: PLACE * scene.block.radius if name in ("x", "slip") else 0.0 for name in ODD}
