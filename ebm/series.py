@@ -16,8 +16,8 @@ MOST_TERMS = 32
 #: Natural time over which the first coefficients of a guard are weighed against each other.
 AHEAD = 2e-2
 #: A coefficient below this, scaled to AHEAD, is rounding noise: of a position, a velocity, a force. They fit each other: what
-#: a force of 1e-10 moves in that time is less than 1e-13.
-POSITION_NOISE, RATE_NOISE, FORCE_NOISE = 1e-13, 1e-12, 1e-10
+#: a force of 5e-10 moves in that time is 1e-13, so that where a contact pulls by more than noise, its gap opens by more than noise.
+POSITION_NOISE, RATE_NOISE, FORCE_NOISE = 1e-13, 1e-12, 5e-10
 #: A guard that is negative, but will not be after this time, is at its zero: the time of an event is not known better.
 INSTANT = 1e-9
 NO_ROOT = -1.0
