@@ -58,8 +58,8 @@ class Setting(NamedTuple):
 LEAST_FRICTION = 1e-9
 
 # A mode is a small integer vector.
-FAMILY, S, FLOOR, SLIP, PULL, TIP, FAR = range(7)
-MODE_SIZE = 7
+FAMILY, S, FLOOR, SLIP, PULL, TIP, FAR, LOOSE = range(8)
+MODE_SIZE = 8
 # m[FAMILY]: FLAT has theta = 0; m[S] is the sign of theta, also what phi = 0 is about to become.
 FLAT, TILT = 0, 1
 # m[FLOOR]: what the pivot (or, flat, the base) does; m[SLIP] is the direction of slip (frame; world where flat).
@@ -67,6 +67,7 @@ OFF, STICK, SLIPPING = 0, 1, 2
 # m[PULL]: sign assumed for the normal force P, which gives friction its sense; -1 only with the bilateral pivot.
 # m[TIP], m[FAR]: the corner rests on the wall it tips to, or on the other one. Where flat: the side rests on the left wall, on
 # the right wall; on the floor a block at rest is then held on that side, whatever the base does.
+# m[LOOSE]: its guards are held to more than their noise only, for within that no mode fitted.
 
 # Rows of the workspace that hold series.
 PHI, OMEGA, SIN, COS, U, G, XI, Y, P, Q, NA, NB, GUARD, KNOWN, FORCE, FLOOR_ARM, WALL_ARM, WALL_PUSH = range(18)

@@ -395,7 +395,7 @@ def _first_event(b, m, order, pivot, h, mask, a, stack):
     for k in range(GUARDS):
         degree = guard(b, m, k, order, pivot, a) if mask >> k & 1 else -1
         if degree >= 0:
-            root = first_root(a, GUARD, degree, h, noise_of(k), stack)  # in h, not tau: the mirror image has another order
+            root = first_root(a, GUARD, degree, h, noise_of(m, k), stack)  # in h, not tau: the mirror image has another order
             if root != NO_ROOT and root < tau:
                 tau, which = root, k
     if which >= G_PUSH and which != G_SLIP and tau > 0.25 * h:

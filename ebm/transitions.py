@@ -24,6 +24,7 @@ from ebm.motion import (
     GUARD,
     HEIGHT,
     LEAST_FRICTION,
+    LOOSE,
     NA,
     NB,
     OFF,
@@ -261,14 +262,16 @@ def rock_guards_hold(b, order, pivot_walls, h, a):
 
 
 @inner_kernel
-def noise_of(which):
-    """The rounding noise of a guard: it is a position, a velocity or a force."""
+def noise_of(m, which):
+    """The rounding noise of a guard of mode m: it is a position, a velocity or a force."""
+    times = _LOOSER if m[LOOSE] != 0 else 1.0
     if which <= G_FAR_GAP:
-        return POSITION_NOISE
-    return RATE_NOISE if which == G_SLIP else FORCE_NOISE
+        return times * POSITION_NOISE
+    return times * (RATE_NOISE if which == G_SLIP else FORCE_NOISE)
 
 
-_OTHER, _SAME, _CREEPING, _STANDING = range(4)  # attempts of a selection
+_OTHER, _SAME, _CREEPING, _STANDING, _LOOSE = range(5)  # attempts of a selection
+_LOOSER = 10.0  # the noise of the last attempt, of what counts as such
 _LOOK = 6  # order of the series that a selection looks at
 
 
@@ -289,7 +292,7 @@ def consistent(b, m, z, gh, gv, t, a, creeping):
             continue
         if which <= G_FAR_GAP and a[GUARD, 1] < -CLOSED_RATE:
             continue  # not this mode's fault: an impact comes next
-        sign = leading(a, GUARD, degree, noise_of(which))
+        sign = leading(a, GUARD, degree, noise_of(m, which))
         if sign < 0 or not math.isfinite(a[GUARD, 0]):
             return False
         if sign == 0 and ((which == G_SLIP and not creeping) or (which == G_PHI and m[FLOOR] != OFF)):
@@ -334,7 +337,7 @@ def select(b, z, gh, gv, t, left, m, a):
     """Writes into m the mode that is consistent at state z, and returns whether there is one.
 
     Larger contact sets come first, sticking before slipping. `left`, the mode that has just ended, is taken again only where no
-    other one fits, and a slip that does not begin only where that does not either.
+    other one fits, a slip that does not begin only where that does not either, and what fits but for ten times the noise last.
     """
     if abs(z[THETA]) < 1e-13 and abs(z[W]) < CLOSED_RATE and z[THETA] != 0.0:
         v = slip_velocity(b, z)
@@ -348,17 +351,17 @@ def select(b, z, gh, gv, t, left, m, a):
     if stands and (closed_wall(b, z, 1, False) or closed_wall(b, z, -1, False)):
         z[W] = z[VX] = z[VY] = 0.0  # on floor and wall a block that does not turn stands
     first = tips_first(b, m, z, gh, t) if flat else 0
-    for attempt in (_OTHER, _SAME, _CREEPING, _STANDING):
+    for attempt in (_OTHER, _SAME, _CREEPING, _STANDING, _LOOSE):
         if attempt == _STANDING:
             # So slow a slip, which fits in neither sense, is noise of forces that change fast: the pivot stands.
             if flat or not floor or abs(slip_velocity(b, z)) > CLOSED_RATE:
-                return False
+                continue
             z[VX] = -math.cos(b.alpha - abs(z[THETA])) * z[W]
         if flat:
             if floor and z[VX] == 0.0 and not b.walls:
                 # Static friction above kinetic can leave both rocking and sliding consistent: it holds as long as it can.
                 m[:] = 0
-                m[FLOOR], m[PULL] = STICK, 1
+                m[FLOOR], m[PULL], m[LOOSE] = STICK, 1, attempt == _LOOSE
                 for family in (FLAT, TILT):
                     m[FAMILY], m[S] = family, 1 if family == FLAT else first
                     if _accept(b, m, z, gh, gv, t, left, a, attempt):
@@ -402,13 +405,13 @@ def _accept(b, m, z, gh, gv, t, left, a, attempt):
     same = True
     for k in range(m.size):
         same = same and m[k] == left[k]
-    return same == (attempt == _SAME) and consistent(b, m, z, gh, gv, t, a, attempt == _CREEPING)
+    return (attempt == _LOOSE or same == (attempt == _SAME)) and consistent(b, m, z, gh, gv, t, a, attempt == _CREEPING)
 
 
 @inner_kernel
 def _select_flat(b, z, gh, gv, t, first, floor, left, m, a, attempt):
     m[:] = 0  # `first` is the side to which the base acceleration tips the block; it presses on that wall, slips that way
-    m[FAMILY], m[S], m[PULL] = FLAT, 1, 1
+    m[FAMILY], m[S], m[PULL], m[LOOSE] = FLAT, 1, 1, attempt == _LOOSE
     at_left = b.walls and closed_wall(b, z, 1, False)
     at_right = b.walls and closed_wall(b, z, -1, False)
     if floor:
@@ -440,7 +443,7 @@ def _select_flat(b, z, gh, gv, t, first, floor, left, m, a, attempt):
 @inner_kernel
 def _select_tilt(b, z, gh, gv, t, sense, floor, left, m, a, attempt):
     m[:] = 0
-    m[FAMILY], m[S] = TILT, sense
+    m[FAMILY], m[S], m[LOOSE] = TILT, sense, attempt == _LOOSE
     tip_closed = b.walls and closed_wall(b, z, sense, False)
     far_closed = b.walls and closed_wall(b, z, -sense, True)
     for walls in (3, 1, 2, 0):

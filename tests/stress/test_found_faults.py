@@ -54,6 +54,7 @@ FOUND = [
     ("on its balance point under vertical motion, of which only the floor's force knows", "ebm-unilateral", 2, 14172),
     ("a wall's push and its gap that are both noise", "ebm-unilateral", 4, 36001),
     ("a wall's pull that is more than noise, and its gap that is less", "ebm-unilateral", 9, 42185),
+    ("a wall's push and its gap that both end, but for noise", "ebm-unilateral", 10, 34165),
     ("a corner of its side strikes the wall, then the other, and so on at one instant", "ebm-bouc-wen", 4, 2570),
     ("hangs at once and lands before the next row", "ebm no-slip", 5, 87067),
     ("hangs for an instant between two rows", "ebm no-slip", 9, 87014),
