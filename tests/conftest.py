@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
 
 CHROMIUM = Path("/usr/bin/chromium")
+#: How a request ends that was under way as its page was left.
+ABORTED = "net::ERR_ABORTED"
 ARGUMENTS = [
     "--headless",
     "--no-sandbox",
@@ -52,9 +54,9 @@ def visitor(browser: Browser) -> Iterator[Callable[..., Page]]:
         contexts.append(browser.new_context(**settings))
         page = contexts[-1].new_page()
         home = folder.as_uri()
-        page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+        page.on("console", lambda message: complaints.append(message.text) if message.type in ("error", "warning") else None)
         page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("requestfailed", lambda request: complaints.append(f"failed: {request.url}"))
+        page.on("requestfailed", lambda request: None if request.failure == ABORTED else complaints.append(f"failed: {request.url}"))
         page.on("request", lambda request: None if request.url.startswith((home, "data:", "about:")) else complaints.append(request.url))
         return page
 
