@@ -93,7 +93,7 @@ def workspace(rows=ROWS):
 
 @inner_kernel
 def sine_cosine(angle, a):
-    """Both, from the workspace where they were asked for last."""
+    """Sine and cosine of the angle; those asked for last are kept in the workspace."""
     if a[ANGLE, 0] != angle:
         a[ANGLE, 0], a[ANGLE, 1], a[ANGLE, 2] = angle, np.sin(angle), np.cos(angle)
     return a[ANGLE, 1], a[ANGLE, 2]

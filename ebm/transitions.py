@@ -271,7 +271,7 @@ def noise_of(m, which):
 
 
 _OTHER, _SAME, _CREEPING, _STANDING, _LOOSE = range(5)  # attempts of a selection
-_LOOSER = 10.0  # the noise of the last attempt, of what counts as such
+_LOOSER = 10.0  # times their noise that the guards of a loose mode may be negative
 _LOOK = 6  # order of the series that a selection looks at
 
 
