@@ -425,9 +425,9 @@ def _hangs(model: EventBasedModel, scene: Scene, history: History, until: float)
     """Whether a block starts to hang before `until`, and nothing in scene and motion tells left from right: see EXCEPTIONS."""
     if model.pivot != "bilateral" or len({(wall.gap, wall.restitution) for wall in scene.walls}) > 1 or len(scene.walls) == 1:
         return False
-    begins = next((event.t for event in history.event_list if event.t <= until and event.mode_before == "rest"), None)
-    if begins is not None and begins == history.event_list[0].t:  # it has never moved before
-        soon = begins + np.array([1e-9, 1e-6]) * math.sqrt(scene.block.radius / scene.gravity)
+    start = next(iter(history.event_list), None)
+    if start is not None and start.mode_before == "rest" and start.t <= until:  # it has never moved before
+        soon = start.t + np.array([1e-9, 1e-6]) * math.sqrt(scene.block.radius / scene.gravity)
         if np.all(scene.gravity + scene.vertical.acceleration(soon) <= 0.0) and not np.any(scene.excitation.acceleration(soon)):
             return True
     t = history.channels["t"]
