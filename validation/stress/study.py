@@ -264,7 +264,7 @@ def run_stress(
             if folder is not None and time.monotonic() > saved + SAVING:
                 save(found(), folder)
                 saved = time.monotonic()
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, EOFError):  # Ctrl-C reaches workers, too: one that starts may go first, and its pipe ends
         keep()
         return found()
     keep()
