@@ -20,6 +20,7 @@ lint: $(VENV)/.ready ## linter, formatter's check, type checker
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	cd build/typed && ../../$(BIN)/lint-imports --config ../../pyproject.toml --no-logo
 
 format: $(VENV)/.ready
 	$(BIN)/ruff check --fix .
@@ -41,5 +42,7 @@ clean:
 $(VENV)/.ready: pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "rockcheck needs Python 3.11 or newer: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(VENV)
+	mkdir -p build/typed/rockcheck # the folders as they are installed, for tools that do not follow the install
+	for part in rockcheck/*.py scenes ebm cm engines validation reports; do ln -sfn ../../../$$part build/typed/rockcheck/; done
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,docs,lint]'
 	touch $@

@@ -34,8 +34,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cm import contact
-from scenes.compiled import kernel
+from rockcheck.cm import contact
+from rockcheck.scenes.compiled import kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

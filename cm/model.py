@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
-from cm import contact
-from scenes import Event, History, InputError, ModelFailure, Scene, kinematics
-from scenes.base import Frozen, Positive
-from scenes.excitations import Record, Rest, Ricker, Sine
-from scenes.history import Cost
-from scenes.observation import observe
+from rockcheck.cm import contact
+from rockcheck.scenes import Event, History, InputError, ModelFailure, Scene, kinematics
+from rockcheck.scenes.base import Frozen, Positive
+from rockcheck.scenes.excitations import Record, Rest, Ricker, Sine
+from rockcheck.scenes.history import Cost
+from rockcheck.scenes.observation import observe
 
 if TYPE_CHECKING:
-    from cm import kernels
+    from rockcheck.cm import kernels
 
 #: Most steps of a run: at 0.1 to 0.3 microseconds each, some ten minutes.
 MOST_STEPS = 4_000_000_000
@@ -90,7 +90,7 @@ class ContinuousModel(Frozen):
         too many steps.
         """
         began = time.perf_counter()
-        from cm import kernels
+        from rockcheck.cm import kernels
 
         times = scene.output_times
         parameters = self._parameters(scene)
@@ -153,7 +153,7 @@ class ContinuousModel(Frozen):
         return observe(scene, self.name, output[:row], events=happened, cost=cost, settings=settings)
 
     def _parameters(self, scene: Scene) -> kernels.Parameters:
-        from cm import kernels
+        from rockcheck.cm import kernels
 
         ratio = contact.damping_ratio if self.damping_rule == "calibrated" else contact.damping_ratio_of_paper
         k = self.stiffness_in(scene)
@@ -177,7 +177,7 @@ class ContinuousModel(Frozen):
 
     def _initial(self, scene: Scene, parameters: kernels.Parameters) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """State and contact memory at t = 0. A block on the floor starts sunk in by its weight, so that it does not bounce."""
-        from cm import kernels
+        from rockcheck.cm import kernels
 
         x, y, tilt, *speeds = scene.initial_state
         k = parameters.stiffness

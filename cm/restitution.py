@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cm.model import ContinuousModel
-from scenes import History, InputError, Scene
+from rockcheck.cm.model import ContinuousModel
+from rockcheck.scenes import History, InputError, Scene
 
 
 def measured_restitution(model: ContinuousModel, scene: Scene) -> float:

@@ -1,6 +1,7 @@
-"""The event-based models of a rocking and sliding block, and overturning spectra."""
+"""The event-based models of a rocking and sliding block, overturning spectra, and the horizon of predictability."""
 
-from ebm.model import EventBasedModel
-from ebm.spectrum import Spectrum, overturning_spectrum
+from rockcheck.ebm.horizon import predictability_horizon
+from rockcheck.ebm.model import EventBasedModel
+from rockcheck.ebm.spectrum import Spectrum, overturning_spectrum
 
-__all__ = ["EventBasedModel", "Spectrum", "overturning_spectrum"]
+__all__ = ["EventBasedModel", "Spectrum", "overturning_spectrum", "predictability_horizon"]

@@ -14,14 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ebm import natural
-from ebm.ground import Ground
-from ebm.model import EventBasedModel
-from ebm.motion import Setting, workspace
-from ebm.trajectory import DONE, FAILURES, OVERTURNED, Control, run
-from scenes.compiled import kernel
-from scenes.errors import ModelFailure
-from scenes.scene import Scene
+from rockcheck.ebm import natural
+from rockcheck.ebm.ground import Ground
+from rockcheck.ebm.model import EventBasedModel
+from rockcheck.ebm.motion import Setting, workspace
+from rockcheck.ebm.trajectory import DONE, FAILURES, OVERTURNED, Control, run
+from rockcheck.scenes.compiled import kernel
+from rockcheck.scenes.errors import ModelFailure
+from rockcheck.scenes.scene import Scene
 
 Floats = NDArray[np.float64]
 _CHUNK = 256

@@ -20,14 +20,11 @@ on through them. "slip" and "stick" events, and the modes, tell a yielded pivot 
 from __future__ import annotations
 
 import math
-import time
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ebm import natural, trajectory
-from ebm.ground import acceleration, fill_series, next_kink
-from ebm.motion import (
+from rockcheck.ebm.ground import acceleration, fill_series, next_kink
+from rockcheck.ebm.motion import (
     COS,
     FAMILY,
     FAR,
@@ -66,8 +63,8 @@ from ebm.motion import (
     tilt_state,
     workspace,
 )
-from ebm.series import FORCE_NOISE, INSTANT, NO_ROOT, POSITION_NOISE, first_root, leading, value
-from ebm.trajectory import (
+from rockcheck.ebm.series import FORCE_NOISE, INSTANT, NO_ROOT, POSITION_NOISE, first_root, leading, value
+from rockcheck.ebm.trajectory import (
     _HANDED_OVER,
     _MOST_ZERO_STEPS,
     _OPEN_CONTACTS,
@@ -88,7 +85,6 @@ from ebm.trajectory import (
     TOO_MANY_STEPS,
     UPLIFT,
     WALL_IMPACT,
-    Control,
     Tally,
     _first_event,
     _impact,
@@ -96,7 +92,7 @@ from ebm.trajectory import (
     _step_size,
     resting_speed,
 )
-from ebm.transitions import (
+from rockcheck.ebm.transitions import (
     CREEP,
     G_CONE_MINUS,
     G_CONE_PLUS,
@@ -116,14 +112,7 @@ from ebm.transitions import (
     slip_velocity,
     tips_first,
 )
-from scenes.compiled import inner_kernel, kernel
-from scenes.errors import InputError, ModelFailure
-from scenes.history import Cost, History
-from scenes.observation import observe
-from scenes.scene import Scene
-
-if TYPE_CHECKING:
-    from ebm.model import EventBasedModel
+from rockcheck.scenes.compiled import inner_kernel, kernel
 
 # Rows of the workspace after those of ebm.motion: z, V and what the recurrences need.
 Z, V, Z2, SPIN2, WEIGHT, ARM, TURN, REACH, INERTIA, LOAD, PUSH, ZA, LEVER, DEN, TORQUE = range(ROWS, ROWS + 15)
@@ -136,58 +125,6 @@ _CONE = 1 << G_CONE_PLUS | 1 << G_CONE_MINUS
 _LOOK = 6
 # z nears 1 for ever. So near to it what hangs on the difference (a block that tips just as it slips) is noise: it has yielded.
 _YIELDS = 1e-6
-
-
-def simulate(model: EventBasedModel, scene: Scene, tolerance: float) -> History:
-    """The motion of `scene` with friction (9) and `model.yield_displacement` (m) as u_y.
-
-    Raises `InputError` where the static friction differs from the kinetic one, of which (9) knows nothing, or the pivot is
-    unilateral; `ModelFailure` where a cap is reached or no mode is consistent.
-    """
-    start = time.perf_counter()
-    if model.pivot != "bilateral":
-        raise InputError(f'{model.pivot!r} is not allowed with friction="bouc-wen": only "bilateral" is', "pivot")
-    if scene.floor.mu_s != scene.floor.friction:
-        raise InputError(
-            f"{scene.floor.mu_s:g} is not allowed: Bouc-Wen friction has one coefficient, {scene.floor.friction:g}", "floor.static_friction"
-        )
-    from ebm import model as exact
-
-    b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
-    horizontal, vertical = natural.grounds_of(scene)
-    unit = natural.time_unit(scene)
-    times = scene.output_times
-    order = type(model)(tolerance=tolerance).order
-    control = Control(tolerance, order, model.most_steps, model.most_events, False, scene.output_step / unit)
-    yield_displacement = model.yield_displacement / scene.block.radius
-    state = natural.state_of(scene)
-    out = np.empty((len(times), 6))
-    out_mode = np.zeros(len(times), dtype=np.int8)
-    log = np.empty((model.most_events, 5))
-    run(b, horizontal, vertical, state.copy(), yield_displacement, 0.0, control, out[:0], out_mode[:0], log)  # loads or compiles
-    ready, cpu = time.perf_counter(), time.process_time()
-    tally = run(b, horizontal, vertical, state, yield_displacement, scene.duration / unit, control, out, out_mode, log)
-    seconds, cpu = time.perf_counter() - ready, time.process_time() - cpu
-    if tally.ending in trajectory.FAILURES:
-        raise ModelFailure(f"{model.name}: {trajectory.FAILURES[tally.ending]} at t = {tally.t * unit:.6g} s")
-    return observe(
-        scene,
-        model.name,
-        natural.to_si(scene, out[: tally.rows]),
-        mode=np.array(trajectory.MODE_NAMES)[out_mode[: tally.rows]],
-        events=exact._events(log[: tally.events], unit, scene.block.radius),
-        outcome=exact._outcome(tally, state[THETA]),
-        cost=Cost(
-            wall_seconds=seconds,
-            cpu_seconds=cpu,
-            set_up=ready - start,
-            steps=tally.steps,
-            evaluations=tally.steps,
-            energy_gains=tally.gains,
-            largest_energy_gain=tally.largest_gain,
-        ),
-        settings=model.model_dump(),
-    )
 
 
 @inner_kernel

@@ -16,8 +16,8 @@ import math
 
 import numpy as np
 
-from ebm.motion import inverse_of
-from scenes.compiled import inner_kernel, kernel
+from rockcheck.ebm.motion import inverse_of
+from rockcheck.scenes.compiled import inner_kernel, kernel
 
 F, E, TIP_TOP, TIP_BOTTOM, FAR_BOTTOM, FAR_TOP = range(6)
 CONTACTS = 6

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.compiled import inner_kernel
-from scenes.excitations import Record, Rest, Ricker, Sine
+from rockcheck.scenes.compiled import inner_kernel
+from rockcheck.scenes.excitations import Record, Rest, Ricker, Sine
 
 STILL, GAUSSIAN, SINE, SAMPLED = range(4)
 NEVER = np.inf

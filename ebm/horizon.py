@@ -8,11 +8,11 @@ from contextlib import suppress
 
 import numpy as np
 
-from ebm.model import EventBasedModel
-from scenes.errors import InputError
-from scenes.excitations import Record, Rest, Ricker, Sine
-from scenes.history import History
-from scenes.scene import Scene
+from rockcheck.ebm.model import EventBasedModel
+from rockcheck.scenes.errors import InputError
+from rockcheck.scenes.excitations import Record, Rest, Ricker, Sine
+from rockcheck.scenes.history import History
+from rockcheck.scenes.scene import Scene
 
 #: What is disturbed, relatively, and the separation in alpha up to which histories still say the same.
 PERTURBATION, ALLOWED = 1e-6, 1e-3

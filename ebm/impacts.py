@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from scenes.compiled import inner_kernel
+from rockcheck.scenes.compiled import inner_kernel
 
 STICK, SLIP, FLAT_END = 0, 1, 2
 #: The wall cascade's branches, as the paper's Fig. 3 letters them.

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, Strict
 
-from scenes.base import Frozen, Positive
-from scenes.errors import InputError, ModelFailure
-from scenes.history import Cost, Event, History
-from scenes.observation import observe
-from scenes.scene import Scene
+from rockcheck.scenes.base import Frozen, Positive
+from rockcheck.scenes.errors import InputError, ModelFailure
+from rockcheck.scenes.history import Cost, Event, History
+from rockcheck.scenes.observation import observe
+from rockcheck.scenes.scene import Scene
 
 if TYPE_CHECKING:
-    from ebm.trajectory import Tally
+    from rockcheck.ebm.trajectory import Tally
 
 
 class EventBasedModel(Frozen):
@@ -54,6 +55,8 @@ class EventBasedModel(Frozen):
 
     def check(self, scene: Scene) -> None:
         """Raises `InputError` where the scene asks for physics that this model excludes."""
+        if self.friction == "bouc-wen":
+            self._check_bouc_wen(scene)
         if self.friction == "no-slip" and scene.initial_velocity != 0.0:
             raise InputError(f'{scene.initial_velocity:g} is not allowed with friction="no-slip": it never slips', "initial_velocity")
         if self.pivot == "bilateral":
@@ -74,6 +77,15 @@ class EventBasedModel(Frozen):
                 "1 is not allowed: a block that loses nothing at the floor never settles; use less than 1", "floor.restitution"
             )
 
+    def _check_bouc_wen(self, scene: Scene) -> None:
+        if self.pivot != "bilateral":
+            raise InputError(f'{self.pivot!r} is not allowed with friction="bouc-wen": only "bilateral" is', "pivot")
+        if scene.floor.mu_s != scene.floor.friction:
+            raise InputError(
+                f"{scene.floor.mu_s:g} is not allowed: Bouc-Wen friction has one coefficient, {scene.floor.friction:g}",
+                "floor.static_friction",
+            )
+
     def simulate(self, scene: Scene) -> History:
         """The motion of the scene on its output grid. Raises `InputError` (see `check`) or `ModelFailure`."""
         self.check(scene)
@@ -87,12 +99,8 @@ class EventBasedModel(Frozen):
         return History(**(vars_of(history) | {"cost": cost}))
 
     def _simulate(self, scene: Scene, tolerance: float) -> History:
-        if self.friction == "bouc-wen":
-            from ebm import bouc_wen
-
-            return bouc_wen.simulate(self, scene, tolerance)
         start = time.perf_counter()
-        from ebm import motion, natural, trajectory
+        from rockcheck.ebm import motion, natural, trajectory
 
         b = natural.setting_of(scene, unilateral=self.pivot == "unilateral", no_slip=self.friction == "no-slip", energy_cap=self.energy_cap)
         horizontal, vertical = natural.grounds_of(scene)
@@ -104,9 +112,20 @@ class EventBasedModel(Frozen):
         out = np.empty((len(times), 6))
         out_mode = np.zeros(len(times), dtype=np.int8)
         log = np.empty((self.most_events, 5))
-        _compiled()
+        if self.friction == "bouc-wen":
+            from rockcheck.ebm import bouc_wen
+
+            yields = self.yield_displacement / scene.block.radius
+            march = partial(bouc_wen.run, b, horizontal, vertical)
+            march(state.copy(), yields, 0.0, control, out[:0], out_mode[:0], log)  # loads or compiles
+            march = partial(march, state, yields, scene.duration / unit, control, out, out_mode, log)
+        else:
+            _compiled()
+            march = partial(
+                trajectory.run, b, horizontal, vertical, state, scene.duration / unit, control, out, out_mode, log, *motion.workspace()
+            )
         ready, cpu = time.perf_counter(), time.process_time()
-        tally = trajectory.run(b, horizontal, vertical, state, scene.duration / unit, control, out, out_mode, log, *motion.workspace())
+        tally = march()
         seconds, cpu = time.perf_counter() - ready, time.process_time() - cpu
         if tally.ending in trajectory.FAILURES:
             raise ModelFailure(f"{self.name}: {trajectory.FAILURES[tally.ending]} at t = {tally.t * unit:.6g} s")
@@ -135,7 +154,7 @@ class EventBasedModel(Frozen):
 
 
 def _outcome(tally: Tally, theta: float) -> str:
-    from ebm import trajectory
+    from rockcheck.ebm import trajectory
 
     if tally.ending == trajectory.OVERTURNED:
         return "overturned left" if theta > 0 else "overturned right"
@@ -144,7 +163,7 @@ def _outcome(tally: Tally, theta: float) -> str:
 
 def _events(log: np.ndarray, unit: float, radius: float) -> list[Event]:
     """The event log (natural units) as events (SI)."""
-    from ebm import trajectory
+    from rockcheck.ebm import trajectory
 
     modes, kinds, speed = trajectory.MODE_NAMES, trajectory.EVENT_NAMES, radius / unit
     return [
@@ -163,9 +182,9 @@ def _compiled() -> None:
     global _READY
     if _READY:
         return
-    from ebm import motion, natural, trajectory
-    from scenes.excitations import Rest
-    from scenes.scene import Block, Floor
+    from rockcheck.ebm import motion, natural, trajectory
+    from rockcheck.scenes.excitations import Rest
+    from rockcheck.scenes.scene import Block, Floor
 
     scene = Scene(name="warm-up", block=Block(half_width=1.0, half_height=4.0), floor=Floor(friction=0.5), excitation=Rest(), duration=1.0)
     b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)

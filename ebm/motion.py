@@ -25,9 +25,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ebm.ground import STILL, fill_series
-from ebm.series import MOST_TERMS, slope, value
-from scenes.compiled import inner_kernel, kernel
+from rockcheck.ebm.ground import STILL, fill_series
+from rockcheck.ebm.series import MOST_TERMS, slope, value
+from rockcheck.scenes.compiled import inner_kernel, kernel
 
 
 class Setting(NamedTuple):

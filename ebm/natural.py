@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ebm.ground import GAUSSIAN, Ground, ground_of
-from ebm.motion import LEAST_FRICTION, Setting
-from scenes.scene import Scene
+from rockcheck.ebm.ground import GAUSSIAN, Ground, ground_of
+from rockcheck.ebm.motion import LEAST_FRICTION, Setting
+from rockcheck.scenes.scene import Scene
 
 __all__ = ["GAUSSIAN", "grounds_of", "setting_of", "state_of", "time_unit", "to_si"]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from scenes.compiled import inner_kernel
+from rockcheck.scenes.compiled import inner_kernel
 
 #: Width of the arrays that hold a polynomial: orders up to 28, and two numbers that the root search keeps behind them.
 MOST_TERMS = 32

@@ -6,19 +6,15 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ebm.model import EventBasedModel
-from scenes.display import html_table, number, scene_facts
-from scenes.errors import InputError
-from scenes.excitations import Record
-from scenes.scene import Block, Scene
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from rockcheck.ebm.model import EventBasedModel
+from rockcheck.scenes.errors import InputError
+from rockcheck.scenes.excitations import Record
+from rockcheck.scenes.scene import Block, Scene
+from rockcheck.scenes.shown import Shown
 
 Floats = NDArray[np.float64]
 MOST_NODES = 50_000_000
@@ -30,15 +26,12 @@ COARSEST, FEWEST_CELLS, FOLLOWED = 8, 12, 3
 #: The outcome codes of a spectrum.
 LEFT, SAFE, RIGHT = -1, 0, 1
 _UNKNOWN = 9
-#: The paper's colours.
-COLOURS = {"safe": "#3b6fb6", "counterclockwise": "#e8833a", "clockwise": "#f2cf4a", "overturned": "#e8833a", "undecided": "#9a9a9a"}
-
 #: Plays nodes of a spectrum: scene, amplitude ratios and frequency ratios (1-D, of one length) to sides and failures, see `play_nodes`.
 Player = Callable[[Scene, Floats, Floats], tuple[NDArray[np.int8], NDArray[np.bool_]]]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Spectrum:
+class Spectrum(Shown):
     """Outcomes over frequency and amplitude, or over block size and scale of a record (see `overturning_spectrum`).
 
     `outcomes[i, j]` is -1 (overturned left, counterclockwise), 0 (safe) or +1 (right, clockwise) at `amplitude_ratios[i]`
@@ -71,54 +64,6 @@ class Spectrum:
         fallen = self.outcomes != SAFE
         first = np.argmax(fallen, axis=0)
         return np.where(fallen.any(axis=0), self.amplitude_ratios[first], np.nan)
-
-    def plot(self) -> Figure:
-        """The spectrum as a matplotlib figure, in the paper's colours."""
-        from scenes.drawing import new_figure
-
-        figure = new_figure(4.5, 3.6)
-        draw(self, figure.subplots())
-        return figure
-
-    def _repr_html_(self) -> str:
-        shares = (f"{number(100.0 * float(np.mean(self.outcomes == side)))} %" for side in (SAFE, -1, 1))
-        facts = [*zip(("safe", "overturned left", "overturned right"), shares, strict=True)]
-        facts += [("nodes", f"{self.outcomes.size}, from {self.evaluations} runs"), ("undecided", str(len(self.undecided)))]
-        return html_table(f"Overturning spectrum: {self.scene.name}", [*facts, *scene_facts(self.scene)[:4]])
-
-
-def draw(spectrum: Spectrum, axes: Any) -> None:
-    """Draws a spectrum into matplotlib axes in the paper's colours.
-
-    Blue is safe. Without a wall orange is overturned counterclockwise and yellow clockwise; with a wall orange is overturned.
-    Grey is undecided.
-    """
-    from matplotlib.colors import ListedColormap
-
-    names = ("counterclockwise", "safe", "overturned" if spectrum.scene.walls else "clockwise", "undecided")
-    shown = spectrum.outcomes.copy()
-    shown[tuple(spectrum.undecided.T)] = 2
-    axes.pcolormesh(
-        spectrum.frequency_ratios,
-        spectrum.amplitude_ratios,
-        shown,
-        cmap=ListedColormap([COLOURS[name] for name in names]),
-        vmin=-1,
-        vmax=2,
-        shading="nearest",
-        rasterized=True,
-    )
-    horizontal, vertical = axis_labels(spectrum.scene)
-    axes.set_xlabel(horizontal)
-    axes.set_ylabel(vertical)
-    axes.grid(False)
-
-
-def axis_labels(scene: Scene) -> tuple[str, str]:
-    """What the axes of the scene's spectrum show, in plain text: frequency and amplitude ratio, or size and scale."""
-    if scene.excitation.kind == "record":
-        return "size of the block / its own", "scale of the record"
-    return "\u03c9\u209a / p", "a\u209a / (g tan \u03b1)"
 
 
 def overturning_spectrum(
@@ -204,7 +149,7 @@ def _batch_of(
     jobs: int | None,
     progress: Callable[[int], None] | None,
 ) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
-    from ebm import batch
+    from rockcheck.ebm import batch
 
     if scene.excitation.kind == "record":
         packed = batch.pack([node_scene(scene, a, f) for a, f in zip(amplitude_ratios, frequency_ratios, strict=True)], model)

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ebm import impacts
-from ebm.contact_impacts import CONTACTS, FAR_BOTTOM, FAR_TOP, TIP_BOTTOM, TIP_TOP, E, F, contact_impact
-from ebm.ground import GAUSSIAN, STILL, acceleration, impulse_ahead, largest_ahead, next_exceedance, next_kink
-from ebm.motion import (
+from rockcheck.ebm import impacts
+from rockcheck.ebm.contact_impacts import CONTACTS, FAR_BOTTOM, FAR_TOP, TIP_BOTTOM, TIP_TOP, E, F, contact_impact
+from rockcheck.ebm.ground import GAUSSIAN, STILL, acceleration, impulse_ahead, largest_ahead, next_exceedance, next_kink
+from rockcheck.ebm.motion import (
     COS,
     FAMILY,
     FAR,
@@ -43,8 +43,8 @@ from ebm.motion import (
     tilt_series,
     tilt_state,
 )
-from ebm.series import FORCE_NOISE, INSTANT, NO_ROOT, POSITION_NOISE, first_root, slope, value
-from ebm.transitions import (
+from rockcheck.ebm.series import FORCE_NOISE, INSTANT, NO_ROOT, POSITION_NOISE, first_root, slope, value
+from rockcheck.ebm.transitions import (
     CLOSED_RATE,
     CREEP,
     G_CONE_MINUS,
@@ -69,7 +69,7 @@ from ebm.transitions import (
     slip_velocity,
     tips_first,
 )
-from scenes.compiled import inner_kernel, kernel
+from rockcheck.scenes.compiled import inner_kernel, kernel
 
 #: Names of the mode codes that `mode_code` gives, and of the event codes.
 MODE_NAMES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight")

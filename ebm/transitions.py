@@ -14,8 +14,8 @@ import math
 
 import numpy as np
 
-from ebm.ground import acceleration
-from ebm.motion import (
+from rockcheck.ebm.ground import acceleration
+from rockcheck.ebm.motion import (
     COS,
     FAMILY,
     FAR,
@@ -51,8 +51,8 @@ from ebm.motion import (
     flat_series,
     tilt_series,
 )
-from ebm.series import FORCE_NOISE, MOST_TERMS, POSITION_NOISE, RATE_NOISE, leading
-from scenes.compiled import inner_kernel
+from rockcheck.ebm.series import FORCE_NOISE, MOST_TERMS, POSITION_NOISE, RATE_NOISE, leading
+from rockcheck.scenes.compiled import inner_kernel
 
 # The guards, in the order in which ties are decided: floor before walls, contacts before friction.
 (

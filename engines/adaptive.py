@@ -17,10 +17,10 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.base_motion import BaseMotion
-from engines.contacts import Contact, contacts_of
-from scenes import ModelFailure, Scene
-from scenes.progress import tell
+from rockcheck.engines.base_motion import BaseMotion
+from rockcheck.engines.contacts import Contact, contacts_of
+from rockcheck.scenes import ModelFailure, Scene
+from rockcheck.scenes.progress import tell
 
 FloatArray = NDArray[np.float64]
 Vector = tuple[float, float, float]  # along x, y and theta

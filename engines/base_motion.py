@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes import Record, Rest, Scene
-from scenes.excitations import Ricker, Sine
+from rockcheck.scenes import Record, Rest, Scene
+from rockcheck.scenes.excitations import Ricker, Sine
 
 FloatArray = NDArray[np.float64]
 SAMPLES_A_PERIOD = 4000  # of a pulse: its integral is then good to 2e-7 of itself

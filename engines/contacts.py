@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from scenes import Scene
+from rockcheck.scenes import Scene
 
 Arm = tuple[Any, Any]
 

@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import field_validator, model_validator
 
-from engines.adaptive import Push, march_adaptively
-from engines.base_motion import BaseMotion
-from engines.contacts import contacts_of
-from engines.events import events_of
-from scenes import Block, Cost, History, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall
-from scenes.base import Frozen, Positive
-from scenes.errors import printable
-from scenes.observation import observe
-from scenes.progress import tell
+from rockcheck.engines.adaptive import Push, march_adaptively
+from rockcheck.engines.base_motion import BaseMotion
+from rockcheck.engines.contacts import contacts_of
+from rockcheck.engines.events import events_of
+from rockcheck.scenes import Block, Cost, History, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall
+from rockcheck.scenes.base import Frozen, Positive
+from rockcheck.scenes.errors import printable
+from rockcheck.scenes.observation import observe
+from rockcheck.scenes.progress import tell
 
 FloatArray = NDArray[np.float64]
 Marched = tuple[FloatArray, FloatArray, FloatArray]  # times (n) and states (n, 6) at step ends, felt accelerations (n-1, 2)

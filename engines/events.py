@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.contacts import Contact
-from scenes import Event, Scene, kinematics
-from scenes.observation import STATE, modes_of
+from rockcheck.engines.contacts import Contact
+from rockcheck.scenes import Event, Scene, kinematics
+from rockcheck.scenes.observation import STATE, modes_of
 
 FloatArray = NDArray[np.float64]
 HOLD = 2e-3  # s: shorter openings of a contact are the engine's chatter, and an impulse is summed over this time

@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.adaptive import Vector
-from engines.contacts import Contact, contacts_of
-from engines.engine import Engine, RigidWorld, World
-from scenes import ModelFailure, Scene
-from scenes.errors import printable
+from rockcheck.engines.adaptive import Vector
+from rockcheck.engines.contacts import Contact, contacts_of
+from rockcheck.engines.engine import Engine, RigidWorld, World
+from rockcheck.scenes import ModelFailure, Scene
+from rockcheck.scenes.errors import printable
 
 FloatArray = NDArray[np.float64]
 CORNER_RADIUS = 1e-8  # of the block's radius; contacts are points, and MuJoCo has no contact of a point with a plane

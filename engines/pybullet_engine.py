@@ -11,10 +11,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from engines.adaptive import Vector
-from engines.contacts import contacts_of
-from engines.engine import Engine, RigidWorld, World
-from scenes import Scene
+from rockcheck.engines.adaptive import Vector
+from rockcheck.engines.contacts import contacts_of
+from rockcheck.engines.engine import Engine, RigidWorld, World
+from rockcheck.scenes import Scene
 
 FloatArray = NDArray[np.float64]
 CORNER_RADIUS = 3e-6  # of the block's radius

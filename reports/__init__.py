@@ -11,7 +11,7 @@ def write_site(folder: str | Path, *, jobs: int = 1, afresh: bool = True) -> Pat
     The pages open from the file system and ask nothing of any other place. They are drawn in up to `jobs` processes, and
     unless `afresh` only where they would show something else. Raises `InputError` where there is no run.
     """
-    from reports.site import write_site as write
+    from rockcheck.reports.site import write_site as write
 
     return write(Path(folder), jobs=jobs, afresh=afresh)
 

@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reports.style import PAGE, figure_style, looks, save
-from reports.words import number
-from scenes import Scene, display
-from validation.ensembles import Distribution, Ensemble
-from validation.results import Cell, EnsembleRecord, Figure, Run
-from validation.statistics import CONFIDENCE, SMALLEST_PEAK, Sample, Samples
+from rockcheck.reports.show import words as display
+from rockcheck.reports.style import PAGE, figure_style, looks, save
+from rockcheck.reports.words import number
+from rockcheck.scenes import Scene
+from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.discrepancy.statistics import CONFIDENCE, SMALLEST_PEAK, Sample, Samples
+from rockcheck.validation.suite.ensembles import Distribution, Ensemble
+from rockcheck.validation.suite.results import Cell, EnsembleRecord, Run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

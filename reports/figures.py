@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reports.style import PAGE, figure_style, looks, save
-from reports.view import PAPER_CHANNELS, Band, Channel, SceneView
-from scenes.excitations import GRAVITY_OF_RECORDS
+from rockcheck.reports.style import PAGE, figure_style, looks, save
+from rockcheck.reports.view import PAPER_CHANNELS, Band, Channel, SceneView
+from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

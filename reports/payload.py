@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reports.figures import fineness
-from reports.style import looks
-from reports.view import CHANNELS, SceneView
-from scenes.excitations import GRAVITY_OF_RECORDS
+from rockcheck.reports.figures import fineness
+from rockcheck.reports.style import looks
+from rockcheck.reports.view import CHANNELS, SceneView
+from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
 
 
 def packed(values: ArrayLike) -> str:

@@ -8,9 +8,9 @@ from typing import Any
 
 import tomlkit
 
-from scenes import Scene
-from scenes.excitations import Record
-from validation.results import write_whole
+from rockcheck.scenes import Scene
+from rockcheck.scenes.excitations import Record
+from rockcheck.scenes.writing import write_whole
 
 
 def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:

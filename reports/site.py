@@ -17,19 +17,20 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from reports import tables, words
-from reports.ensembles import EnsembleView, ensemble_views, write_ensemble_figures
-from reports.figures import figure_stem, write_figures
-from reports.payload import script
-from reports.scene_file import write_scene_file
-from reports.style import LOOKS, SPARE, looks
-from reports.view import CHANNELS, SceneView, scene_views, slugs_of
-from scenes.progress import tell
-from validation import provenance
-from validation.models import FAMILIES
-from validation.results import Run, write_whole
+from rockcheck.reports import tables, words
+from rockcheck.reports.ensembles import EnsembleView, ensemble_views, write_ensemble_figures
+from rockcheck.reports.figures import figure_stem, write_figures
+from rockcheck.reports.payload import script
+from rockcheck.reports.scene_file import write_scene_file
+from rockcheck.reports.style import LOOKS, SPARE, looks
+from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
+from rockcheck.scenes.progress import tell
+from rockcheck.scenes.writing import write_whole
+from rockcheck.validation.execute import provenance
+from rockcheck.validation.execute.models import FAMILIES
+from rockcheck.validation.suite.results import Run
 
-DATA = Path(str(resources.files("reports"))) / "data"
+DATA = Path(str(resources.files("rockcheck.reports"))) / "data"
 #: The folder beside `index.html` that holds everything else.
 PAGES = "pages"
 #: Columns of an ensemble's table: measure and title.
@@ -201,7 +202,7 @@ def _appearance() -> str:
     """Hash of the code, templates, scripts and styles that make the pages."""
     files = sorted(path for path in DATA.rglob("*") if path.is_file())
     hashes = [f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}" for path in files]
-    return provenance.digest("\n".join([provenance.code_digest("reports", looks=True), provenance.version_of("matplotlib"), *hashes]))
+    return provenance.digest("\n".join([provenance.code_digest("rockcheck.reports"), provenance.version_of("matplotlib"), *hashes]))
 
 
 def _stamp_of(page: Path) -> str:

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from statistics import geometric_mean
 
-from reports.view import SceneView
-from reports.words import number
-from scenes import display
-from validation.results import Cell, Check, Figure, Run
+from rockcheck.reports.show import words as display
+from rockcheck.reports.view import SceneView
+from rockcheck.reports.words import number
+from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.suite.results import Cell, Check, Run
 
 
 def worst_first(run: Run) -> list[tuple[Cell, Check | None]]:

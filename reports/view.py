@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes import History, InputError, Scene, kinematics
-from validation.results import Cell, Run
+from rockcheck.scenes import History, InputError, Scene, kinematics
+from rockcheck.validation.suite.results import Cell, Run
 
 Array = NDArray[np.float64]
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import datetime
 
-from reports.style import Look
-from scenes.display import number
-from validation.results import Check, Figure, MeasureRecord
-from validation.tables import used
+from rockcheck.reports.show.words import number
+from rockcheck.reports.style import Look
+from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord
+from rockcheck.validation.suite.results import Check
+from rockcheck.validation.suite.tables import used
 
 
 def unit(name: str) -> str:

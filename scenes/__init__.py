@@ -1,10 +1,10 @@
 """The contract that every model signs: a Scene goes in, a History comes out."""
 
-from scenes.errors import InputError, ModelFailure
-from scenes.excitations import Record, Rest, Ricker, Sine
-from scenes.files import load_scene, named_scenes
-from scenes.history import Cost, Event, History
-from scenes.scene import Block, Floor, Scene, Wall
+from rockcheck.scenes.errors import InputError, ModelFailure
+from rockcheck.scenes.excitations import Record, Rest, Ricker, Sine
+from rockcheck.scenes.files import load_scene, named_scenes
+from rockcheck.scenes.history import Cost, Event, History
+from rockcheck.scenes.scene import Block, Floor, Scene, Wall
 
 __all__ = [
     "Block",

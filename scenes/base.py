@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, ValidationError
 
-from scenes.errors import from_validation
+from rockcheck.scenes.errors import from_validation
 
 #: Sizes of numbers in SI units that still have a square, a cube and an inverse.
 LEAST, MOST = 1e-30, 1e30

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
-from scenes.base import Finite, Frozen, Positive
-from scenes.errors import InputError
-from scenes.records import GRAVITY_OF_RECORDS, read_record
+from rockcheck.scenes.base import Finite, Frozen, Positive
+from rockcheck.scenes.errors import InputError
+from rockcheck.scenes.records import GRAVITY_OF_RECORDS, read_record
 
 FloatArray = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from scenes.errors import InputError, printable, unknown_name
-from scenes.scene import Scene
+from rockcheck.scenes.errors import InputError, printable, unknown_name
+from rockcheck.scenes.scene import Scene
 
-DATA = Path(str(resources.files("scenes"))) / "data"
+DATA = Path(str(resources.files("rockcheck.scenes"))) / "data"
 
 
 def named_scenes() -> dict[str, Path]:

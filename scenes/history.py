@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.errors import InputError, printable
+from rockcheck.scenes.errors import InputError, printable
+from rockcheck.scenes.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 COLUMNS = ("t", "x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate", "mode")
 EVENT_COLUMNS = ("t", "kind", "mode_before", "mode_after", "impulse")
@@ -55,7 +55,7 @@ class Cost:
 
 
 @dataclass(frozen=True, kw_only=True)
-class History:
+class History(Shown):
     """The motion of a block as one model sees it. SI units, signs as in the scene.
 
     `channels` holds one 1-D array a name, all of one length: t, x, y, theta, x_dot, y_dot, theta_dot, slip, slip_rate, mode.
@@ -102,17 +102,6 @@ class History:
     def peak_rotation(self) -> float:
         """Largest |theta| on the output grid, rad."""
         return float(np.max(np.abs(self.channels["theta"])))
-
-    def plot(self) -> Figure:
-        """Rotation, slip of the pivot and events over time, as a matplotlib figure."""
-        from scenes.drawing import history_figure
-
-        return history_figure(self)
-
-    def _repr_html_(self) -> str:
-        from scenes.display import history_facts, html_table
-
-        return html_table(f"{self.name}, {self.model}", history_facts(self))
 
     def save(self, path: str | Path) -> None:
         """Write a CSV whose remarks (#) hold outcome, model and settings; its events go to `<stem>.events.csv` beside it."""

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from scenes.scene import Block, Scene
+from rockcheck.scenes.scene import Block, Scene
 
 
 def slip(block: Block, x: Any, theta: Any) -> Any:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes import kinematics
-from scenes.history import Cost, Event, History, outcome_of
-from scenes.scene import Scene
+from rockcheck.scenes import kinematics
+from rockcheck.scenes.history import Cost, Event, History, outcome_of
+from rockcheck.scenes.scene import Scene
 
 STATE = ("x", "y", "theta", "x_dot", "y_dot", "theta_dot")
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.errors import InputError, printable
+from rockcheck.scenes.errors import InputError, printable
 
 GRAVITY_OF_RECORDS = 9.80665  # m/s^2, the unit "g" of record files (standard gravity)
 MOST_SAMPLES = 10_000_000

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, StringConstraints, field_validator, model_validator
 
-from scenes import display
-from scenes.base import Finite, Frozen, NonNegative, Positive, Restitution
-from scenes.errors import InputError
-from scenes.excitations import Excitation, Rest, mirrored
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from rockcheck.scenes.base import Finite, Frozen, NonNegative, Positive, Restitution
+from rockcheck.scenes.errors import InputError
+from rockcheck.scenes.excitations import Excitation, Rest, mirrored
+from rockcheck.scenes.shown import Shown
 
 MOST_SAMPLES = 5_000_000
 #: At mu = 4/3 the pivot of a slender block can jam while it slips (Painleve); physics beyond it is not unique.
@@ -84,7 +81,7 @@ class Wall(Frozen):
     restitution: Restitution = 0.0
 
 
-class Scene(Frozen):
+class Scene(Shown, Frozen):
     """All that a model needs to know; SI units, angles in rad, counterclockwise positive.
 
     The block stands with its centroid above x = 0 unless it starts tilted: `initial_rotation` tilts it about the corner
@@ -171,15 +168,6 @@ class Scene(Frozen):
             initial_angular_velocity=-self.initial_angular_velocity,
             initial_velocity=-self.initial_velocity,
         )
-
-    def plot(self) -> Figure:
-        """The block beside its walls, and the acceleration of the base, as a matplotlib figure."""
-        from scenes.drawing import scene_figure
-
-        return scene_figure(self)
-
-    def _repr_html_(self) -> str:
-        return display.html_table(self.name, display.scene_facts(self))
 
     def replace(self, **change: object) -> Scene:
         """A copy with some fields changed, validated like any scene."""

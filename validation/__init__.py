@@ -1,5 +1,5 @@
 """Discrepancy measures, tolerances, suites, the runner and the command line."""
 
-from validation.discrepancy import Discrepancy, compare
+from rockcheck.validation.discrepancy.compare import Discrepancy, compare
 
 __all__ = ["Discrepancy", "compare"]

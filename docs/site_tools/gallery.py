@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from cm import ContinuousModel
-from ebm import EventBasedModel, overturning_spectrum
-from ebm.spectrum import draw
-from engines import MuJoCo, PyBullet
-from reports.style import PAGE, figure_style, looks, save
-from scenes import Block, Floor, History, Ricker, Scene, Wall, load_scene
-from scenes.drawing import draw_block
-from scenes.kinematics import pivot_height
+from rockcheck.cm import ContinuousModel
+from rockcheck.ebm import EventBasedModel, overturning_spectrum
+from rockcheck.engines import MuJoCo, PyBullet
+from rockcheck.reports.show.drawing import draw_block
+from rockcheck.reports.show.spectrum import draw
+from rockcheck.reports.style import PAGE, figure_style, looks, save
+from rockcheck.scenes import Block, Floor, History, Ricker, Scene, Wall, load_scene
+from rockcheck.scenes.kinematics import pivot_height
 
 FOLDER = Path(__file__).parents[1] / "images" / "gallery"
 

@@ -5,7 +5,7 @@ import math
 import pytest
 from scipy.integrate import solve_ivp
 
-from cm.contact import (
+from rockcheck.cm.contact import (
     LEAST_RESTITUTION,
     damping_ratio,
     damping_ratio_of_paper,

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from cm import ContinuousModel
-from ebm import EventBasedModel
-from scenes import Block, Floor, Ricker, Scene, Sine, Wall, load_scene
+from rockcheck.cm import ContinuousModel
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import Block, Floor, Ricker, Scene, Sine, Wall, load_scene
 
 BLOCK = Block(half_width=0.397, half_height=1.555)
 G = 9.81

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from cm import ContinuousModel
-from scenes import Block, Floor, InputError, ModelFailure, Record, Ricker, Scene, Sine, Wall, load_scene
-from scenes.kinematics import energy
+from rockcheck.cm import ContinuousModel
+from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Ricker, Scene, Sine, Wall, load_scene
+from rockcheck.scenes.kinematics import energy
 
 BLOCK = Block(half_width=0.397, half_height=1.555)
 G = 9.81

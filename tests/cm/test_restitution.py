@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from cm import ContinuousModel, measured_restitution
-from cm.contact import damping_ratio_of_paper, restitution_of
-from scenes import Block, Floor, InputError, Scene, Wall
+from rockcheck.cm import ContinuousModel, measured_restitution
+from rockcheck.cm.contact import damping_ratio_of_paper, restitution_of
+from rockcheck.scenes import Block, Floor, InputError, Scene, Wall
 
 BLOCK = Block(half_width=0.397, half_height=1.555)
 RESTITUTIONS = [0.0, 0.25, 0.5, 0.75, 1.0]

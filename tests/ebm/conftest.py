@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from ebm import EventBasedModel
-from scenes import Block, Floor, Ricker, Scene, Wall
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
 
 PAPER_BLOCK = Block(half_width=0.397, half_height=1.555)
 
@@ -49,7 +49,7 @@ def block() -> Block:
 @pytest.fixture(scope="session")
 def run_to_end() -> Runner:
     """Runs a scene to its end without sampling it; the compiled loop is called as the model calls it."""
-    from ebm import motion, natural, trajectory
+    from rockcheck.ebm import motion, natural, trajectory
 
     scratch = motion.workspace()
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from ebm import EventBasedModel
-from scenes import Block, Floor, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import Block, Floor, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
 
 State = NDArray[np.float64]  # x, theta, dx/dt, dtheta/dt
 
@@ -466,7 +466,7 @@ def random_scene(rng: np.random.Generator, side: str) -> Scene:
 @pytest.mark.parametrize("name", ["rock", "slide-rock", "lean", "ladder"])
 def test_series_begin_with_the_closed_forms(name, side, case):
     """x'', theta'', P, Q and N of the models' series are the paper's, at 200 random blocks and states, to 1e-12."""
-    from ebm import motion, natural
+    from rockcheck.ebm import motion, natural
 
     rng = np.random.default_rng(20240229)
     a, _ = motion.workspace()

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ebm import EventBasedModel
-from scenes import Block, Floor, InputError, Ricker, Scene, Wall, kinematics, load_scene
-from scenes.errors import ModelFailure
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import Block, Floor, InputError, Ricker, Scene, Wall, kinematics, load_scene
+from rockcheck.scenes.errors import ModelFailure
 
 BLOCK = Block(half_width=0.397, half_height=1.555)
 G = 9.81

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ebm import EventBasedModel
-from scenes import History, ModelFailure
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import History, ModelFailure
 
 CASES = {
     "rocking": (2.0, 1.1, 1.0),
@@ -69,7 +69,7 @@ def test_a_run_leaves_no_trace(pivot, pulse_scene):
 
 def test_compiled_scratch_is_scratch(pulse_scene):
     """What the loop finds in its work arrays, however wild, does not matter."""
-    from ebm import motion, natural, trajectory
+    from rockcheck.ebm import motion, natural, trajectory
 
     scene = pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0))
     unit = natural.time_unit(scene)

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from ebm import EventBasedModel
-from scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
 
 BLOCK = Block(half_width=0.397, half_height=1.555)
 SLOPE = BLOCK.half_width / BLOCK.half_height

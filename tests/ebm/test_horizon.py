@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from ebm import EventBasedModel
-from ebm.horizon import predictability_horizon
-from scenes import Block, Floor, InputError, Ricker, Scene, Wall, load_scene
+from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.horizon import predictability_horizon
+from rockcheck.scenes import Block, Floor, InputError, Ricker, Scene, Wall, load_scene
 
 BLOCK = Block(half_width=0.397, half_height=1.555)
 

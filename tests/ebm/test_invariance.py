@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from ebm import EventBasedModel
-from scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, kinematics, load_scene
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, kinematics, load_scene
 
 ODD = ("x", "theta", "x_dot", "theta_dot", "slip", "slip_rate")
 EVEN = ("t", "y", "y_dot", "mode")

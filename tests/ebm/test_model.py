@@ -9,8 +9,8 @@ import sys
 import numpy as np
 import pytest
 
-from ebm import EventBasedModel
-from scenes import Block, Floor, InputError, Record, Rest, Scene, Wall, load_scene
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Scene, Wall, load_scene
 
 BLOCK = Block(half_width=0.397, half_height=1.555)
 

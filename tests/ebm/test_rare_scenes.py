@@ -8,9 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from ebm import EventBasedModel
-from ebm.batch import pack, run_batch
-from scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.batch import pack, run_batch
+from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
 
 PAPER = Block(half_width=0.397, half_height=1.555)
 SQUARE = Block(half_width=7.069, half_height=7.069)
@@ -148,7 +148,7 @@ def test_a_decided_run_has_the_peak_of_the_whole_run(amplitude, period, friction
 def test_impulse_ahead_is_the_integral(symmetric):
     from scipy.integrate import quad
 
-    from ebm.ground import acceleration, ground_of, impulse_ahead
+    from rockcheck.ebm.ground import acceleration, ground_of, impulse_ahead
 
     ground = ground_of(Ricker(amplitude=5.0, period=1.3, symmetric=symmetric), 9.81, 0.4)
     for share in (1.3, 1.6, 2.2):
@@ -160,7 +160,7 @@ def test_impulse_ahead_is_the_integral(symmetric):
 
 def test_inner_kernels_return_no_arrays(monkeypatch):
     """They are compiled without reference counts, so that an array that they returned would be freed too early."""
-    from ebm import contact_impacts, ground, impacts, motion, natural, series, trajectory, transitions
+    from rockcheck.ebm import contact_impacts, ground, impacts, motion, natural, series, trajectory, transitions
 
     seen = set()
 

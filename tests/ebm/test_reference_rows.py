@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ebm import EventBasedModel
-from scenes import Block, Floor, Ricker, Scene, Wall, kinematics
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall, kinematics
 
 DATA = Path(__file__).parents[1] / "data"
 Row = dict[str, str]

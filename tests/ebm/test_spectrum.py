@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ebm import EventBasedModel, batch, overturning_spectrum
-from ebm.spectrum import node_scene, play_nodes
-from ebm.trajectory import TOO_MANY_STEPS
-from scenes import Block, Floor, InputError, Record, Ricker, Scene, Wall
+from rockcheck.ebm import EventBasedModel, batch, overturning_spectrum
+from rockcheck.ebm.spectrum import node_scene, play_nodes
+from rockcheck.ebm.trajectory import TOO_MANY_STEPS
+from rockcheck.scenes import Block, Floor, InputError, Record, Ricker, Scene, Wall
 
 DATA = Path(__file__).parents[1] / "data" / "ebm_ricker_cases.csv"
 SIDES = {"safe": 0, "ccw": -1, "cw": 1}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from scenes import Block, Floor, Ricker, Scene, Wall
+from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
 
 BLOCK = Block(half_width=0.397, half_height=1.555)
 

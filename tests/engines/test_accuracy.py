@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engines import MuJoCo, PyBullet
-from scenes import Floor, Ricker, Scene, Wall
+from rockcheck.engines import MuJoCo, PyBullet
+from rockcheck.scenes import Floor, Ricker, Scene, Wall
 
 CASES = Path(__file__).parents[1] / "data" / "unilateral_ricker_cases.csv"
 TILTS = (0.3, -0.4, 0.5, 0.6, 0.7, -0.8, 0.9)

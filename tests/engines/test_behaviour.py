@@ -10,9 +10,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from engines import MuJoCo, PyBullet
-from engines.engine import Engine
-from scenes import Block, Floor, InputError, ModelFailure, Record, Ricker, Scene, Sine, Wall
+from rockcheck.engines import MuJoCo, PyBullet
+from rockcheck.engines.engine import Engine
+from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Ricker, Scene, Sine, Wall
 
 each_engine = pytest.mark.parametrize("engine", [MuJoCo, PyBullet], ids=lambda engine: engine.name)
 
@@ -28,8 +28,8 @@ def test_import_loads_no_engine():
 
 def test_a_run_prints_nothing():
     code = """
-from engines import MuJoCo, PyBullet
-from scenes import Block, Floor, Scene
+from rockcheck.engines import MuJoCo, PyBullet
+from rockcheck.scenes import Block, Floor, Scene
 scene = Scene(name="quiet", block=Block(half_width=0.4, half_height=1.5), floor=Floor(friction=0.3), duration=0.01)
 for engine in (MuJoCo, PyBullet):
     engine(time_step=1e-3).simulate(scene)

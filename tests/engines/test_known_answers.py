@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from engines import MuJoCo, PyBullet
-from scenes import Block, Floor, Record, Ricker, Scene, Sine, Wall
+from rockcheck.engines import MuJoCo, PyBullet
+from rockcheck.scenes import Block, Floor, Record, Ricker, Scene, Sine, Wall
 
 ENGINES = [engine(time_step=step) for engine in (MuJoCo, PyBullet) for step in (1e-4, "adaptive")]
 SQUAT = Block(half_width=1.0, half_height=0.5)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import importlib
 import re
+import subprocess
 import sys
 import tomllib
 from importlib.metadata import packages_distributions
@@ -12,10 +13,12 @@ from pathlib import Path
 
 import pytest
 
+import rockcheck
+
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 PACKAGES = PROJECT["tool"]["setuptools"]["packages"]
-OWN = {name.partition(".")[0] for name in PACKAGES}
+FOLDERS = PROJECT["tool"]["setuptools"]["package-dir"]
 
 
 def names_of(requirements: list[str]) -> set[str]:
@@ -24,22 +27,33 @@ def names_of(requirements: list[str]) -> set[str]:
 
 
 def test_every_package_is_in_the_wheel():
-    found = {".".join(init.parent.relative_to(ROOT).parts) for top in OWN for init in (ROOT / top).rglob("__init__.py")}
+    found = {
+        ".".join((name, *init.parent.relative_to(ROOT / folder).parts))
+        for name, folder in FOLDERS.items()
+        for init in (ROOT / folder).rglob("__init__.py")
+    }
     assert found == set(PACKAGES)
 
 
 def test_every_data_file_is_in_the_wheel():
     """Files that are not code lie in data/, which package-data names."""
-    for top in OWN:
-        others = [path for path in (ROOT / top).rglob("*") if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts]
+    for name, folder in FOLDERS.items():
+        others = [
+            path for path in (ROOT / folder).rglob("*") if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts
+        ]
         assert all(path.relative_to(ROOT).parts[1] == "data" for path in others), others
-        assert not others or PROJECT["tool"]["setuptools"]["package-data"][top] == ["data/**/*"]
+        assert not others or PROJECT["tool"]["setuptools"]["package-data"][name] == ["data/**/*"]
 
 
-def test_the_command_and_the_plugin_are_there():
-    for point in (PROJECT["project"]["scripts"]["rockcheck"], PROJECT["project"]["entry-points"]["pytest11"]["rockcheck"]):
-        module, _, function = point.partition(":")
-        assert not function or callable(getattr(importlib.import_module(module), function))
+def test_nothing_but_rockcheck_is_installed():
+    assert {name.partition(".")[0] for name in PACKAGES} == {"rockcheck"}
+
+
+def test_the_command_the_plugin_and_the_views_are_there():
+    points = PROJECT["project"]["entry-points"]
+    for point in (PROJECT["project"]["scripts"]["rockcheck"], points["pytest11"]["rockcheck"], points["rockcheck.views"]["rockcheck"]):
+        module, _, name = point.partition(":")
+        assert not name or hasattr(importlib.import_module(module), name)
         importlib.import_module(module)
 
 
@@ -51,7 +65,7 @@ def imported(path: Path) -> set[str]:
     return {name.partition(".")[0] for name in found}
 
 
-@pytest.mark.parametrize("top", sorted(OWN))
+@pytest.mark.parametrize("top", sorted(FOLDERS.values()))
 def test_every_import_is_a_declared_dependency(top):
     declared = names_of(PROJECT["project"]["dependencies"])
     for extra in ("iso", "cluster"):
@@ -59,7 +73,7 @@ def test_every_import_is_a_declared_dependency(top):
     distributions = packages_distributions()
     allowed_unlisted = {"pytest", "llvmlite"}  # the plugin is imported by pytest only; llvmlite is numba's
     for path in (ROOT / top).rglob("*.py"):
-        for name in imported(path) - OWN - set(sys.stdlib_module_names):
+        for name in imported(path) - {"rockcheck"} - set(sys.stdlib_module_names):
             owners = {owner.lower().replace("_", "-") for owner in distributions.get(name, [name])}
             assert owners & (declared | allowed_unlisted), f"{path.relative_to(ROOT)} imports {name}, of {owners}"
 
@@ -67,7 +81,7 @@ def test_every_import_is_a_declared_dependency(top):
 @pytest.mark.parametrize("requirement", sorted(names_of(PROJECT["project"]["dependencies"])))
 def test_every_dependency_is_imported(requirement):
     names = {name for name, owners in packages_distributions().items() if requirement in {o.lower().replace("_", "-") for o in owners}}
-    used = {name for top in OWN for path in (ROOT / top).rglob("*.py") for name in imported(path)}
+    used = {name for top in FOLDERS.values() for path in (ROOT / top).rglob("*.py") for name in imported(path)}
     assert used & names, f"nothing imports {requirement}"
 
 
@@ -77,9 +91,23 @@ def test_the_changelog_is_of_this_version():
     assert newest[1] == PROJECT["project"]["version"]
 
 
-def test_imports_point_one_way():
-    """scenes <- ebm, cm, engines <- validation; reports is called from inside of functions only."""
-    below = {"scenes": set(), "ebm": {"scenes"}, "cm": {"scenes"}, "engines": {"scenes"}}
-    for top, allowed in below.items():
-        for path in (ROOT / top).rglob("*.py"):
-            assert imported(path) & OWN <= allowed | {top}, path
+def test_the_facade_has_every_public_name():
+    """`import rockcheck` gives what its parts call public, and loads none of them until it is asked for."""
+    parts = {name: importlib.import_module(f"rockcheck.{name}") for name in ("scenes", "ebm", "cm", "engines", "validation")}
+    assert set(rockcheck.__all__) == {"__version__"} | {name for part in parts.values() for name in part.__all__}
+    for part in parts.values():
+        assert all(getattr(rockcheck, name) is getattr(part, name) for name in part.__all__)
+    assert rockcheck.__version__ == PROJECT["project"]["version"]
+    with pytest.raises(AttributeError, match="no attribute 'Blok'"):
+        rockcheck.Blok  # noqa: B018
+
+
+def test_importing_rockcheck_loads_nothing_heavy():
+    code = "import sys, rockcheck; print(sorted({'numpy', 'numba', 'pandas', 'pydantic', 'mujoco'} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+
+
+def test_the_plugin_loads_nothing_of_rockcheck():
+    code = "import sys, rockcheck.plugin; print(sorted(m for m in sys.modules if m.startswith('rockcheck')))"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+    assert loaded == "['rockcheck', 'rockcheck.plugin']"

@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scenes import Block, Cost, Event, Floor, Ricker, Scene, Wall
-from scenes.observation import observe
-from validation.discrepancy import evaluate
-from validation.results import HISTORIES, Cell, Check, CostRecord, EnsembleRecord, Figure, MeasureRecord, Run
-from validation.statistics import STATISTICS, Sample, Samples
+from rockcheck.scenes import Block, Cost, Event, Floor, Ricker, Scene, Wall
+from rockcheck.scenes.observation import observe
+from rockcheck.validation.discrepancy.compare import evaluate
+from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord
+from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
+from rockcheck.validation.execute.store import HISTORIES
+from rockcheck.validation.suite.results import Cell, Check, CostRecord, EnsembleRecord, Run
 
 NASTY = "<img src=x onerror=alert(1)>&\"'</script>"
 MODELS: Mapping[str, dict[str, Any]] = {
@@ -214,7 +216,7 @@ def finished(tmp_path: Path) -> Run:
 @pytest.fixture(scope="session")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a finished run and its pages."""
-    from reports import write_site
+    from rockcheck.reports import write_site
 
     folder = tmp_path_factory.mktemp("site")
     make_run(folder)

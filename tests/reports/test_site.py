@@ -12,19 +12,20 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
-from reports import write_site
-from reports.ensembles import distributions_figure, ensemble_views
-from reports.figures import histories_figure
-from reports.payload import packed
-from reports.scene_file import write_scene_file
-from reports.site import PAGES
-from reports.style import LOOKS, SPARE, looks, save
-from reports.tables import overrun, run_times, worst_first
-from reports.view import scene_views, slugs_of
-from reports.words import number, ratio
-from scenes import Block, Floor, InputError, Record, Scene, Sine, Wall, load_scene
-from validation.models import FAMILIES
-from validation.results import Check, Figure, Run
+from rockcheck.reports import write_site
+from rockcheck.reports.ensembles import distributions_figure, ensemble_views
+from rockcheck.reports.figures import histories_figure
+from rockcheck.reports.payload import packed
+from rockcheck.reports.scene_file import write_scene_file
+from rockcheck.reports.site import PAGES
+from rockcheck.reports.style import LOOKS, SPARE, looks, save
+from rockcheck.reports.tables import overrun, run_times, worst_first
+from rockcheck.reports.view import scene_views, slugs_of
+from rockcheck.reports.words import number, ratio
+from rockcheck.scenes import Block, Floor, InputError, Record, Scene, Sine, Wall, load_scene
+from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.execute.models import FAMILIES
+from rockcheck.validation.suite.results import Check, Run
 
 
 class Addresses(HTMLParser):

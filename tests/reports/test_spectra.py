@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 from matplotlib.colors import to_rgba
 
-from ebm import Spectrum
-from ebm.spectrum import COLOURS, draw
-from reports.spectra import paper_figure, write_page
-from reports.style import save
-from validation.agreement import Agreement
-from validation.refinement import Refined, Refinement
-from validation.spectra import KEPT, SPECTRA, Asked, paper_panels
-from validation.spectra import save as save_spectra
+from rockcheck.ebm import Spectrum
+from rockcheck.reports.show.spectrum import COLOURS, draw
+from rockcheck.reports.studies.spectra import paper_figure, write_page
+from rockcheck.reports.style import save
+from rockcheck.validation.spectra.agreement import Agreement
+from rockcheck.validation.spectra.refinement import Refined, Refinement
+from rockcheck.validation.spectra.study import KEPT, SPECTRA, Asked, paper_panels
+from rockcheck.validation.spectra.study import save as save_spectra
 
 SIZE = 12
 

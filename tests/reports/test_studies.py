@@ -11,15 +11,18 @@ import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
-from ebm import Spectrum
-from reports.benchmark import write_benchmark
-from reports.convergence import write_convergence
-from reports.spectra import paper_figure, write_page
-from reports.stress import write_stress
-from reports.style import save
-from validation import benchmark, benchmark_models, convergence, spectra
-from validation.benchmark_skipping import Saving
-from validation.stress.study import Batch, Failure, Stress
+from rockcheck.ebm import Spectrum
+from rockcheck.reports.studies.benchmark import write_benchmark
+from rockcheck.reports.studies.convergence import write_convergence
+from rockcheck.reports.studies.spectra import paper_figure, write_page
+from rockcheck.reports.studies.stress import write_stress
+from rockcheck.reports.style import save
+from rockcheck.validation.bench import convergence
+from rockcheck.validation.bench import models as benchmark_models
+from rockcheck.validation.bench import study as benchmark
+from rockcheck.validation.bench.skipping import Saving
+from rockcheck.validation.spectra import study as spectra
+from rockcheck.validation.stress.study import Batch, Failure, Stress
 
 pytestmark = pytest.mark.browser
 

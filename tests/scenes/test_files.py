@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from scenes import InputError, Ricker, load_scene, named_scenes
+from rockcheck.scenes import InputError, Ricker, load_scene, named_scenes
 
 TEXT = """
 duration = 8.0

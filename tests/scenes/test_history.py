@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from scenes import Block, Cost, Event, Floor, History, InputError, Rest, Scene
-from scenes.observation import observe
+from rockcheck.scenes import Block, Cost, Event, Floor, History, InputError, Rest, Scene
+from rockcheck.scenes.observation import observe
 
 SCENE = Scene(
     name="observed",

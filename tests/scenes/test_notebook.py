@@ -9,9 +9,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from ebm import EventBasedModel, overturning_spectrum
-from scenes import Block, Floor, History, Ricker, Scene, Wall
-from validation import compare
+from rockcheck.ebm import EventBasedModel, overturning_spectrum
+from rockcheck.scenes import Block, Floor, History, Ricker, Scene, Wall
+from rockcheck.validation import compare
 
 NASTY = "<img src=x onerror=alert(1)>&\"'"
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenes import InputError, Record
+from rockcheck.scenes import InputError, Record
 
 G = 9.80665
 NAMED = "PEER STRONG MOTION DATABASE RECORD\nSomewhere, 1/1/2000\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS=  {npts}, DT= {dt} SEC\n"

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
 
 GOOD = {
     "name": "good",

@@ -16,7 +16,7 @@ import atheris
 
 sys.path.insert(0, str(Path(__file__).parent))
 # What is compiled (ebm, cm) must not be instrumented.
-with atheris.instrument_imports(include=["scenes", "validation", "tomllib", "json", "csv"], exclude=["scenes.compiled"]):
+with atheris.instrument_imports(include=["rockcheck", "tomllib", "json", "csv"], exclude=["rockcheck.scenes.compiled"]):
     from test_hostile_input import NASTY, READERS, WORDS
 
 

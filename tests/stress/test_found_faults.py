@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from validation.stress.players import PLAYERS
+from rockcheck.validation.stress.players import PLAYERS
 
 #: The fault, the model, the seed of the random scenes and the scene's number.
 FOUND = [

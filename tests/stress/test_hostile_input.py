@@ -22,14 +22,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from scenes import History, InputError, load_scene
-from scenes.records import read_record
-from validation.cli import main
-from validation.measured import read_measured
-from validation.models import build
-from validation.results import Run
-from validation.store import Store, name_of
-from validation.suites import load_suite
+from rockcheck.scenes import History, InputError, load_scene
+from rockcheck.scenes.records import read_record
+from rockcheck.validation.commands.cli import main
+from rockcheck.validation.discrepancy.measured import read_measured
+from rockcheck.validation.execute.models import build
+from rockcheck.validation.execute.store import Store, name_of
+from rockcheck.validation.suite.results import Run
+from rockcheck.validation.suite.suites import load_suite
 
 fuzzed = settings(
     max_examples=1000,
@@ -240,7 +240,7 @@ def feed_history(content: bytes, folder: Path) -> None:
 @functools.cache
 def stored_texts() -> dict[str, str]:
     """A small finished run as its files: run.json, a history, its events and its record."""
-    from ebm import EventBasedModel
+    from rockcheck.ebm import EventBasedModel
 
     scene = load_scene("fig4a").replace(duration=0.5, name="short")
     history = EventBasedModel().simulate(scene)
@@ -380,9 +380,9 @@ import resource, sys, time
 from pathlib import Path
 import pandas, numba, ebm.trajectory  # what a run needs in any case
 resource.setrlimit(resource.RLIMIT_DATA, (2**30, 2**30))
-from validation.cli import main
-from scenes import InputError
-from scenes.records import read_record
+from rockcheck.validation.commands.cli import main
+from rockcheck.scenes import InputError
+from rockcheck.scenes.records import read_record
 for path in sorted(Path(sys.argv[1]).iterdir()):
     began = time.monotonic()
     if path.suffix == ".toml":
@@ -464,7 +464,7 @@ def test_markup_in_a_stored_run_is_text_on_the_page(tmp_path, stored):
 def test_nothing_received_is_executed():
     """No pickle, eval or exec in any module: what a user might receive is read as text.
 
-    `validation.remote` sends tasks to the workers of one's own cluster, as the cluster's library does itself.
+    `validation.execute.remote` sends tasks to the workers of one's own cluster, as the cluster's library does itself.
     """
     import ast
 

@@ -15,17 +15,17 @@ from pathlib import Path
 
 import pytest
 
-from scenes import Scene, load_scene
-from validation import store as stores
-from validation.cli import main
-from validation.results import HISTORIES, write_whole
-from validation.store import Store
-from validation.stress import study
-from validation.stress.invariants import Played
-from validation.stress.players import PLAYERS, EventBased
-from validation.stress.study import Batch, Chunk, Failure
+from rockcheck.scenes import Scene, load_scene
+from rockcheck.scenes.writing import write_whole
+from rockcheck.validation.commands.cli import main
+from rockcheck.validation.execute import store as stores
+from rockcheck.validation.execute.store import HISTORIES, Store
+from rockcheck.validation.stress import study
+from rockcheck.validation.stress.invariants import Played
+from rockcheck.validation.stress.players import PLAYERS, EventBased
+from rockcheck.validation.stress.study import Batch, Chunk, Failure
 
-ROCKCHECK = [sys.executable, "-m", "validation.cli"]
+ROCKCHECK = [sys.executable, "-m", "rockcheck.validation.commands.cli"]
 posix = pytest.mark.skipif(sys.platform == "win32", reason="limits and signals as POSIX has them")
 
 SMALL_RUN = ["stress", "runs", "--model", "ebm no-slip", "--runs", "30", "--jobs", "1"]
@@ -35,7 +35,7 @@ _LIMITED = """
 import resource, signal, sys
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)
-from validation.cli import main
+from rockcheck.validation.commands.cli import main
 sys.exit(main(sys.argv[2:]))
 """
 

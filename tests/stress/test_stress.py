@@ -9,17 +9,17 @@ import math
 import numpy as np
 import pytest
 
-from ebm import EventBasedModel
-from scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
-from validation.cli import main
-from validation.stress import players, study
-from validation.stress.generator import ALPHA, FRICTION, RADIUS, random_scene
-from validation.stress.invariants import INVARIANTS, Played, audited, check_run, energy_error, similar
-from validation.stress.mechanics import BOOLE, integrals, tilted_forces
-from validation.stress.players import PLAYERS, Approximate, energy_without_source
-from validation.stress.shrinking import shrink, write_scene
-from validation.stress.stability import LINES, fault_of, largest_stable, scene_at, stand_still
-from validation.stress.study import Chunk, chunks, play_some, run_stress
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
+from rockcheck.validation.commands.cli import main
+from rockcheck.validation.stress import players, study
+from rockcheck.validation.stress.generator import ALPHA, FRICTION, RADIUS, random_scene
+from rockcheck.validation.stress.invariants import INVARIANTS, Played, audited, check_run, energy_error, similar
+from rockcheck.validation.stress.mechanics import BOOLE, integrals, tilted_forces
+from rockcheck.validation.stress.players import PLAYERS, Approximate, energy_without_source
+from rockcheck.validation.stress.shrinking import shrink, write_scene
+from rockcheck.validation.stress.stability import LINES, fault_of, largest_stable, scene_at, stand_still
+from rockcheck.validation.stress.study import Chunk, chunks, play_some, run_stress
 
 ALPHA_PAPER = 0.25
 BLOCK = Block(half_width=0.397, half_height=1.555)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scenes import Event, History
+from rockcheck.scenes import Event, History
 
 HALF_WIDTH, HALF_HEIGHT = 0.397, 1.555
 ALPHA = float(np.arctan2(HALF_WIDTH, HALF_HEIGHT))

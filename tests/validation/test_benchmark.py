@@ -6,14 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from reports.benchmark import power_of_ten, write_benchmark
-from validation import benchmark_models, provenance
-from validation.benchmark import Benchmark, save
-from validation.benchmark_ebm import CASES, LEVEL, EbmSpeed, _times
-from validation.benchmark_models import LINES, Point, Sample, cost_at, error_at, evaluated, measure, order_of, planned, work_precision
-from validation.benchmark_scenes import FAMILIES, MEMBERS, prepared
-from validation.benchmark_skipping import Saving, skipping
-from validation.cli import main
+from rockcheck.reports.studies.benchmark import power_of_ten, write_benchmark
+from rockcheck.validation.bench import models as benchmark_models
+from rockcheck.validation.bench.ebm import CASES, LEVEL, EbmSpeed, _times
+from rockcheck.validation.bench.models import LINES, Point, Sample, cost_at, error_at, evaluated, measure, order_of, planned, work_precision
+from rockcheck.validation.bench.scenes import FAMILIES, MEMBERS, prepared
+from rockcheck.validation.bench.skipping import Saving, skipping
+from rockcheck.validation.bench.study import Benchmark, save
+from rockcheck.validation.commands.cli import main
+from rockcheck.validation.execute import provenance
 
 SOME = (1, 4, 7)
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from scenes import History
-from validation.cli import main
+from rockcheck.scenes import History
+from rockcheck.validation.commands.cli import main
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 SCENE = "duration = 0.2\nblock = { half_width = 0.4, half_height = 1.5 }\nfloor = { friction = 0.5 }\n"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from ebm import EventBasedModel
-from validation.discrepancy import describe
-from validation.suites import load_suite
+from rockcheck.ebm import EventBasedModel
+from rockcheck.validation.discrepancy.compare import describe
+from rockcheck.validation.suite.suites import load_suite
 
 FORMS = {
     "sliding": ("sliding_distance_error",),

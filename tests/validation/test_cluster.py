@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from scenes import InputError
-from validation.remote import OnCluster
-from validation.runner import run_suite
-from validation.suites import load_suite
+from rockcheck.scenes import InputError
+from rockcheck.validation.execute.remote import OnCluster
+from rockcheck.validation.suite.runner import run_suite
+from rockcheck.validation.suite.suites import load_suite
 
 pytest.importorskip("distributed")
 MODELS = "\n".join(f'[models.{name}]\nmodel = "faulty:{name}"' for name in ("Segfault", "Hang", "Hog", "Fails"))

@@ -8,10 +8,23 @@ from pathlib import Path
 
 import pytest
 
-from reports.convergence import write_convergence
-from validation import convergence
-from validation.cli import main
-from validation.convergence import GAPS, PULSES, REFINEMENTS, RESTITUTIONS, SCENES, Case, Convergence, Play, case_of, evaluated, play, save
+from rockcheck.reports.studies.convergence import write_convergence
+from rockcheck.validation.bench import convergence
+from rockcheck.validation.bench.convergence import (
+    GAPS,
+    PULSES,
+    REFINEMENTS,
+    RESTITUTIONS,
+    SCENES,
+    Case,
+    Convergence,
+    Play,
+    case_of,
+    evaluated,
+    play,
+    save,
+)
+from rockcheck.validation.commands.cli import main
 
 SOME = ("long 53 mm e 0.5", "short 3 mm e 0")
 

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenes import InputError
-from validation import workers
-from validation.acceptance import accept
-from validation.ensembles import Distribution
-from validation.runner import run_suite
-from validation.statistics import STATISTICS, Sample, Samples
-from validation.suites import load_suite
+from rockcheck.scenes import InputError
+from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
+from rockcheck.validation.execute import workers
+from rockcheck.validation.suite.acceptance import accept
+from rockcheck.validation.suite.ensembles import Distribution
+from rockcheck.validation.suite.runner import run_suite
+from rockcheck.validation.suite.suites import load_suite
 
 SUITE = """
 reference = "still"

@@ -30,7 +30,7 @@ class Copy:
 
     def start(self, *words: str) -> subprocess.Popen[str]:
         environment = {**os.environ, "PYTHONPATH": str(self.folder), "PYTHONDONTWRITEBYTECODE": "1"}
-        command = [sys.executable, "-m", "validation.cli", *words, "--no-report"]
+        command = [sys.executable, "-m", "rockcheck.validation.commands.cli", *words, "--no-report"]
         return subprocess.Popen(
             command, cwd=self.folder, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True
         )
@@ -105,7 +105,7 @@ CHANGES = [
     ("a remark", "engines/pybullet_engine.py", r"\Z", "\n# unused\n", 25),
     ("an engine's setting", "validation/data/suites/smoke.toml", r"(\[models\.mujoco\]\ntime_step = )2e-4", r"\g<1>1.9e-4", 20),
     ("the continuous model's", "cm/contact.py", r"\Z", "\nUNUSED = 1\n", 20),
-    ("a measure", "validation/measures.py", r"\Z", "\nUNUSED = 1\n", 25),
+    ("a measure", "validation/discrepancy/measures.py", r"\Z", "\nUNUSED = 1\n", 25),
     ("a page", "reports/site.py", r"\Z", "\nUNUSED = 1\n", 25),
 ]
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenes import InputError
-from validation.cli import main
-from validation.measured import Measured, read_measured
-from validation.runner import run_suite
-from validation.suites import load_suite
+from rockcheck.scenes import InputError
+from rockcheck.validation.commands.cli import main
+from rockcheck.validation.discrepancy.measured import Measured, read_measured
+from rockcheck.validation.suite.runner import run_suite
+from rockcheck.validation.suite.suites import load_suite
 
 SUITE = """
 reference = "ebm"
@@ -80,7 +80,7 @@ def test_a_measured_history_is_judged_like_a_model(tmp_path, capsys):
     path = tmp_path / "mine.toml"
     path.write_text(SUITE, encoding="utf-8")
     scene = load_suite(path).scenes["tilt"]
-    from ebm import EventBasedModel
+    from rockcheck.ebm import EventBasedModel
 
     truth = EventBasedModel().simulate(scene)
     rows = truth.channels["t"] <= 1.6

@@ -8,10 +8,10 @@ import math
 import numpy as np
 import pytest
 
-from scenes import Event, InputError
-from validation import compare
-from validation.discrepancy import describe
-from validation.measures import DIFFERENCES, FIGURES, match_impacts
+from rockcheck.scenes import Event, InputError
+from rockcheck.validation import compare
+from rockcheck.validation.discrepancy.compare import describe
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, match_impacts
 
 T = np.linspace(0.0, 10.0, 4001)
 WAVE = 0.3 * np.sin(2 * np.pi * T)

@@ -17,15 +17,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cm import ContinuousModel
-from ebm import Spectrum
-from ebm.spectrum import node_scene
-from scenes import InputError, Ricker
-from validation import agreement, claims, fragility, refinement, spectra
-from validation import tiles as tiling
-from validation.cli import main
-from validation.spectra import Asked, Panel, axis, paper_panels, play_panels
-from validation.tiles import Tiles, tile_key
+from rockcheck.cm import ContinuousModel
+from rockcheck.ebm import Spectrum
+from rockcheck.ebm.spectrum import node_scene
+from rockcheck.scenes import InputError, Ricker
+from rockcheck.validation.commands.cli import main
+from rockcheck.validation.spectra import agreement, claims, fragility, refinement
+from rockcheck.validation.spectra import study as spectra
+from rockcheck.validation.spectra import tiles as tiling
+from rockcheck.validation.spectra.study import Asked, Panel, axis, paper_panels, play_panels
+from rockcheck.validation.spectra.tiles import Tiles, tile_key
 
 SCENE = """duration = 1.0
 block = { half_width = 0.2, half_height = 1.0 }
@@ -133,7 +134,7 @@ def test_a_block_past_its_balance_is_not_safe_for_want_of_energy(tmp_path):
 def test_a_killed_run_goes_on_where_it_was(tmp_path, capsys):
     words = ["spectrum", "--figure", "8", "--size", "150", "--out", "out"]
     tiles = tmp_path / "out" / "spectra" / "tiles"
-    command = [sys.executable, "-c", "import sys; from validation.cli import main; sys.exit(main())", *words]
+    command = [sys.executable, "-c", "import sys; from validation.commands.cli import main; sys.exit(main())", *words]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL) as run:
         while len(list(tiles.glob("*.tile"))) < 4:
             assert run.poll() is None

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from scenes import InputError
-from validation.suites import load_suite
+from rockcheck.scenes import InputError
+from rockcheck.validation.suite.suites import load_suite
 
 MODELS = 'reference = "ebm"\n[models.ebm]\n'
 SHELF = '[[scene]]\nname = "shelf"\nduration = 1.0\nblock = { half_width = 0.1, half_height = 0.4 }\nfloor = { friction = 0.5 }\n'

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from scenes import Block, Floor, InputError, Scene, Wall, load_scene
-from scenes.progress import listening, tell
-from validation.cli import COMMANDS, app, main
+from rockcheck.scenes import Block, Floor, InputError, Scene, Wall, load_scene
+from rockcheck.scenes.progress import listening, tell
+from rockcheck.validation.commands.cli import COMMANDS, app, main
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 NAMES = [module.__name__.rpartition(".")[2] for module in COMMANDS]
@@ -34,14 +34,14 @@ floor = { friction = 0.5 }
 
 def rockcheck(*words, **environment):
     """The command in a process of its own, without a terminal."""
-    line = [sys.executable, "-m", "validation.cli", *words]
+    line = [sys.executable, "-m", "rockcheck.validation.commands.cli", *words]
     return subprocess.run(line, capture_output=True, text=True, env={**os.environ, **environment}, timeout=300, check=False)
 
 
 def on_a_terminal(*words, columns=80):
     """What the command writes to a terminal of that width: stdout and stderr together."""
     code = (
-        "import fcntl, struct, sys, termios; from validation.cli import main;"
+        "import fcntl, struct, sys, termios; from validation.commands.cli import main;"
         f"fcntl.ioctl(1, termios.TIOCSWINSZ, struct.pack('HHHH', 40, {columns}, 0, 0)); sys.exit(main(sys.argv[1:]))"
     )
     terminal, inside = pty.openpty()
@@ -173,7 +173,7 @@ def test_on_a_terminal_colour_progress_and_its_width():
 
 
 def test_models_tell_how_far_they_are():
-    from engines import PyBullet
+    from rockcheck.engines import PyBullet
 
     scene = Scene(name="short", block=Block(half_width=0.4, half_height=1.5), floor=Floor(friction=0.5), duration=4.0, initial_rotation=0.1)
     for step in (1e-3, "adaptive"):

@@ -9,12 +9,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from scenes import InputError
-from validation.acceptance import accept
-from validation.measures import DIFFERENCES, FIGURES
-from validation.results import Cell, Figure, Run
-from validation.suites import load_suite, named_suites
-from validation.tolerances import Tolerance, Windowed, judge, parse_tolerances
+from rockcheck.scenes import InputError
+from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
+from rockcheck.validation.suite.acceptance import accept
+from rockcheck.validation.suite.results import Cell, Run
+from rockcheck.validation.suite.suites import load_suite, named_suites
+from rockcheck.validation.suite.tolerances import Tolerance, Windowed, judge, parse_tolerances
 
 LINE = Tolerance(expected=1.0e-3, limit=2.0e-3, drift=1.0e-4, why="a test")
 

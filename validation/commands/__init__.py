@@ -16,8 +16,8 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from scenes import InputError, named_scenes
-from scenes.errors import printable
+from rockcheck.scenes import InputError, named_scenes
+from rockcheck.scenes.errors import printable
 
 OUT = Path("rockcheck-report")
 
@@ -130,14 +130,14 @@ def scene_names(incomplete: str) -> list[str]:
 
 def suite_names(incomplete: str) -> list[str]:
     """For the shell's completion: suites that come with the package, and suite files here."""
-    from validation.suites import named_suites
+    from rockcheck.validation.suite.suites import named_suites
 
     return [name for name in (*named_suites(), *_files(".toml")) if name.startswith(incomplete)]
 
 
 def model_names(incomplete: str) -> list[str]:
     """For the shell's completion."""
-    from validation.models import FAMILIES
+    from rockcheck.validation.execute.models import FAMILIES
 
     return [name for name in FAMILIES if name.startswith(incomplete)]
 

@@ -6,10 +6,10 @@ from typing import Annotated
 
 import typer
 
-from validation.acceptance import accept
-from validation.commands import OUT, JobsOption, OutOption, SchedulerOption, answer, console, usable_folder
-from validation.commands.validate import ForceOption, SuiteArgument, play_suite
-from validation.suites import load_suite
+from rockcheck.validation.commands import OUT, JobsOption, OutOption, SchedulerOption, answer, console, usable_folder
+from rockcheck.validation.commands.validate import ForceOption, SuiteArgument, play_suite
+from rockcheck.validation.suite.acceptance import accept
+from rockcheck.validation.suite.suites import load_suite
 
 
 def run(

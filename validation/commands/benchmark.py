@@ -9,14 +9,14 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from scenes.errors import unknown_name
-from validation.commands import OUT, JobsOption, OutOption, answer, console, told, usable_folder
-from validation.results import write_whole
+from rockcheck.scenes.errors import unknown_name
+from rockcheck.scenes.writing import write_whole
+from rockcheck.validation.commands import OUT, JobsOption, OutOption, answer, console, told, usable_folder
 
 if TYPE_CHECKING:
-    from validation.benchmark import Benchmark
-    from validation.benchmark_ebm import EbmSpeed
-    from validation.benchmark_models import WorkPrecision
+    from rockcheck.validation.bench.ebm import EbmSpeed
+    from rockcheck.validation.bench.models import WorkPrecision
+    from rockcheck.validation.bench.study import Benchmark
 
 WhatArgument = Annotated[str, typer.Argument(metavar="[WHAT]", help="all, ebm (batches), models (work and precision) or skipping.")]
 
@@ -32,15 +32,15 @@ def run(
 
     Writes a page with diagrams and tables, the tables as CSV, and a summary in Markdown. Whatever is left out is listed.
     """
-    from validation import benchmark
+    from rockcheck.validation.bench import study as benchmark
 
     if what not in get_args(benchmark.What):
         raise unknown_name("benchmark", what, get_args(benchmark.What))
     folder = usable_folder(out)
     with told("benchmark") as tell:
         found = benchmark.run_benchmark(what, quick=quick, jobs=jobs, minutes=minutes, progress=tell)  # type: ignore[arg-type]
-        from reports.benchmark import write_benchmark
-        from validation.benchmark_tables import markdown
+        from rockcheck.reports.studies.benchmark import write_benchmark
+        from rockcheck.validation.bench.tables import markdown
 
         benchmark.save(found, folder)
         write_whole(folder / "summary.md", markdown(found))
@@ -72,7 +72,7 @@ def show(found: Benchmark, out: Console) -> None:
 
 def batch_table(speed: EbmSpeed) -> Table:
     """A row a batch, at the cheapest tolerance that is right to 1e-8 (p95 of the peak, rad)."""
-    from validation.benchmark_ebm import CASES
+    from rockcheck.validation.bench.ebm import CASES
 
     table = _table("batch, one core", "tolerance", "μs a run", "right-hand sides", "p95 error", "wrong")
     for case in CASES:
@@ -86,7 +86,7 @@ def batch_table(speed: EbmSpeed) -> Table:
 
 def ratio_table(found: WorkPrecision) -> Table:
     """A row a line: fitted order and ratio of run times to the EBM's at an error of 1e-3 alpha, scenes from least to most."""
-    from validation.benchmark_models import LINES
+    from rockcheck.validation.bench.models import LINES
 
     table = _table("model", "order", "run time / ebm's at 1e-3 alpha", "reached in")
     for label in LINES:

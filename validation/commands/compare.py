@@ -8,10 +8,10 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from scenes import load_scene
-from validation.commands import answer, console, scene_names
-from validation.discrepancy import compare
-from validation.measured import read_measured
+from rockcheck.scenes import load_scene
+from rockcheck.validation.commands import answer, console, scene_names
+from rockcheck.validation.discrepancy.compare import compare
+from rockcheck.validation.discrepancy.measured import read_measured
 
 
 def run(

@@ -9,10 +9,10 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from validation.commands import OUT, JobsOption, OutOption, answer, console, told, usable_folder
+from rockcheck.validation.commands import OUT, JobsOption, OutOption, answer, console, told, usable_folder
 
 if TYPE_CHECKING:
-    from validation.convergence import Convergence
+    from rockcheck.validation.bench.convergence import Convergence
 
 
 def run(
@@ -26,13 +26,13 @@ def run(
 
     Writes a page with a diagram and tables, and the tables as CSV.
     """
-    from validation import convergence
+    from rockcheck.validation.bench import convergence
 
     folder = usable_folder(out)
     with told("convergence") as tell:
         found = convergence.run_convergence(quick=quick, jobs=jobs, progress=tell)
         convergence.save(found, folder)
-        from reports.convergence import write_convergence
+        from rockcheck.reports.studies.convergence import write_convergence
 
         index = write_convergence(found, folder)
     show(found, console())
@@ -42,7 +42,7 @@ def run(
 
 def show(found: Convergence, out: Console) -> None:
     """Errors by model and step against both references, the observed orders, and the runs that do not converge."""
-    from validation.convergence import LEVEL, REFERENCES
+    from rockcheck.validation.bench.convergence import LEVEL, REFERENCES
 
     out.print(f"RMS error of theta, alpha: median (largest) of {len(found.cases)} scenes")
     table = Table(box=None, pad_edge=False)

@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
-from scenes import InputError, load_scene
-from scenes.errors import printable
-from validation.commands import answer, console
+from rockcheck.scenes import InputError, load_scene
+from rockcheck.scenes.errors import printable
+from rockcheck.validation.commands import answer, console
 
 
 def run(path: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write; it must not exist yet.")]) -> None:
@@ -20,7 +20,7 @@ def run(path: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to 
     """
     if path.suffix.lower() != ".toml":
         raise InputError(f"{printable(path)}: the name of a .toml file is asked for")
-    text = (resources.files("validation") / "data" / "new_scene.toml").read_text(encoding="utf-8")
+    text = (resources.files("rockcheck.validation") / "data" / "new_scene.toml").read_text(encoding="utf-8")
     try:
         with path.open("x", encoding="utf-8") as stream:
             stream.write(text)

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from scenes.progress import listening
-from validation.commands import answer, console, progress
-from validation.publish import publish
-from validation.results import Run
+from rockcheck.scenes.progress import listening
+from rockcheck.validation.commands import answer, console, progress
+from rockcheck.validation.commands.publish import publish
+from rockcheck.validation.suite.results import Run
 
 
 def run(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a finished run.")]) -> None:

@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 from rich.table import Table
 
-from scenes import load_scene, named_scenes
-from validation.commands import answer, console
-from validation.models import FAMILIES
-from validation.suites import describe_suite, named_suites
+from rockcheck.scenes import load_scene, named_scenes
+from rockcheck.validation.commands import answer, console
+from rockcheck.validation.execute.models import FAMILIES
+from rockcheck.validation.suite.suites import describe_suite, named_suites
 
 
 def run() -> None:

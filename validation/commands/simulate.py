@@ -9,12 +9,12 @@ from typing import Annotated, Any
 
 import typer
 
-from scenes import InputError, load_scene
-from scenes.errors import printable
-from scenes.progress import listening
-from validation.commands import answer, console, model_names, progress, scene_names
-from validation.models import FAMILIES, build, family, is_own
-from validation.store import name_of
+from rockcheck.scenes import InputError, load_scene
+from rockcheck.scenes.errors import printable
+from rockcheck.scenes.progress import listening
+from rockcheck.validation.commands import answer, console, model_names, progress, scene_names
+from rockcheck.validation.execute.models import FAMILIES, build, family, is_own
+from rockcheck.validation.execute.store import name_of
 
 
 def run(

@@ -16,13 +16,14 @@ from pydantic import BaseModel
 from rich.console import Console
 from rich.table import Table
 
-from ebm import Spectrum
-from ebm.spectrum import LEFT, RIGHT
-from scenes import InputError, load_scene
-from scenes.errors import unknown_name
-from validation.commands import OUT, JobsOption, OutOption, SchedulerOption, answer, console, progress, scene_names, usable_folder
-from validation.results import write_whole
-from validation.spectra import (
+from rockcheck.ebm import Spectrum
+from rockcheck.ebm.spectrum import LEFT, RIGHT
+from rockcheck.scenes import InputError, load_scene
+from rockcheck.scenes.errors import unknown_name
+from rockcheck.scenes.writing import write_whole
+from rockcheck.validation.commands import OUT, JobsOption, OutOption, SchedulerOption, answer, console, progress, scene_names, usable_folder
+from rockcheck.validation.execute.store import name_of
+from rockcheck.validation.spectra.study import (
     AMPLITUDES,
     FIGURES,
     FREQUENCIES,
@@ -37,8 +38,7 @@ from validation.spectra import (
     stem,
     warm_up,
 )
-from validation.store import name_of
-from validation.tiles import Tiles
+from rockcheck.validation.spectra.tiles import Tiles
 
 MOST_SIZE = 5000
 
@@ -94,7 +94,7 @@ def run(
     with contextlib.ExitStack() as stack:
         client = None
         if scheduler:
-            from validation.cluster import connected
+            from rockcheck.validation.execute.cluster import connected
 
             client = stack.enter_context(connected(scheduler))
         tiles = stack.enter_context(Tiles(data / TILES, jobs=jobs, client=client, force=force))
@@ -106,7 +106,7 @@ def run(
             _agreement(panels, asked, agreement, tiles, data, screen)
         else:
             _spectra(panels, asked, tiles, data, screen)
-    from reports.spectra import write_page
+    from rockcheck.reports.studies.spectra import write_page
 
     page = write_page(folder)
     screen.print(f"report: {page}", soft_wrap=True)
@@ -193,7 +193,7 @@ def _speed(spectra: Sequence[Spectrum], asked: Asked, tiles: Tiles, taken: float
     what = "spectrum" if len(spectra) == 1 else "spectra"
     screen.print(f"{len(spectra)} {what}, {nodes} nodes, {evaluations} runs{share}, {tiles.read_back} read back; {taken:.1f} s")
     if tiles.played and tiles.client is None and asked.model in ("ebm", "ebm-unilateral"):
-        from validation.benchmark_ebm import right_hand_side_seconds
+        from rockcheck.validation.bench.ebm import right_hand_side_seconds
 
         one = right_hand_side_seconds()
         each = cpu / tiles.played
@@ -205,7 +205,7 @@ def _speed(spectra: Sequence[Spectrum], asked: Asked, tiles: Tiles, taken: float
 
 
 def _draw(panels: Sequence[Panel], spectra: Sequence[Spectrum], asked: Asked, data: Path) -> None:
-    from reports.spectra import areas_figure, figure_stem, own_figure, paper_figure, write
+    from rockcheck.reports.studies.spectra import areas_figure, figure_stem, own_figure, paper_figure, write
 
     for number in dict.fromkeys(panel.figure for panel in panels):
         mine = [(panel, spectrum) for panel, spectrum in zip(panels, spectra, strict=True) if panel.figure == number]
@@ -220,7 +220,7 @@ def _draw(panels: Sequence[Panel], spectra: Sequence[Spectrum], asked: Asked, da
 
 
 def _claims(spectra: Sequence[Spectrum], asked: Asked, tiles: Tiles, data: Path, screen: Console) -> None:
-    from validation.claims import Claims, check_claims, look_closer
+    from rockcheck.validation.spectra.claims import Claims, check_claims, look_closer
 
     tiles.progress = None
     claims = check_claims(spectra, look_closer(tiles, asked))
@@ -235,7 +235,7 @@ def _claims(spectra: Sequence[Spectrum], asked: Asked, tiles: Tiles, data: Path,
 
 
 def _verify(panels: Sequence[Panel], asked: Asked, tiles: Tiles, data: Path, screen: Console) -> None:
-    from validation.refinement import COLUMNS, verify
+    from rockcheck.validation.spectra.refinement import COLUMNS, verify
 
     nodes = len(asked.frequencies) * len(asked.amplitudes)
     warm_up(panels[0], asked)
@@ -254,8 +254,8 @@ def _verify(panels: Sequence[Panel], asked: Asked, tiles: Tiles, data: Path, scr
 
 
 def _agreement(panels: Sequence[Panel], asked: Asked, count: int, tiles: Tiles, data: Path, screen: Console) -> None:
-    from reports.spectra import MAPS, maps_figure, write
-    from validation.agreement import CANDIDATES, COLUMNS, MAP_SIZE, agree, mapped
+    from rockcheck.reports.studies.spectra import MAPS, maps_figure, write
+    from rockcheck.validation.spectra.agreement import CANDIDATES, COLUMNS, MAP_SIZE, agree, mapped
 
     if asked.model != "ebm":
         raise InputError("cannot be given together with --model or --pivot: all models are compared", "--agreement")
@@ -288,8 +288,8 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, words: int)
 
 
 def _fragility(panels: Sequence[Panel], asked: Asked, records: Sequence[Path], tiles: Tiles, data: Path, screen: Console) -> None:
-    from reports.spectra import fragility_figure, write
-    from validation.fragility import PULSES, csv, fragility
+    from rockcheck.reports.studies.spectra import fragility_figure, write
+    from rockcheck.validation.spectra.fragility import PULSES, csv, fragility
 
     if len(panels) != 1:
         raise InputError("needs --scene", "--fragility")

@@ -8,12 +8,12 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from scenes.errors import unknown_name
-from validation.commands import OUT, JobsOption, OutOption, answer, console, progress, usable_folder
+from rockcheck.scenes.errors import unknown_name
+from rockcheck.validation.commands import OUT, JobsOption, OutOption, answer, console, progress, usable_folder
 
 if TYPE_CHECKING:
-    from validation.stress.stability import Stability
-    from validation.stress.study import Stress
+    from rockcheck.validation.stress.stability import Stability
+    from rockcheck.validation.stress.study import Stress
 
 
 WhatArgument = Annotated[str, typer.Argument(metavar="[WHAT]", help="all, runs (random scenes) or maps (where engines break).")]
@@ -34,8 +34,8 @@ def run(
     tables as CSV, a summary in Markdown, and of failures the smallest scene files that show them.
     Exit 1 where an event-based model breaks an invariant.
     """
-    from validation.stress import study
-    from validation.stress.players import PLAYERS
+    from rockcheck.validation.stress import study
+    from rockcheck.validation.stress.players import PLAYERS
 
     if what not in get_args(study.What):
         raise unknown_name("stress", what, get_args(study.What))
@@ -48,7 +48,7 @@ def run(
             cast("study.What", what), seed=seed, quick=quick, runs=runs, jobs=jobs, models=model, folder=folder, progress=tell
         )
     study.save(found, folder)
-    from reports.stress import write_stress
+    from rockcheck.reports.studies.stress import write_stress
 
     index = write_stress(found, folder)
     show(found, console())
@@ -61,8 +61,8 @@ def run(
 
 def show(found: Stress, out: Console) -> None:
     """For each model runs, failures by invariant and the worst figures; then the failures with their files."""
-    from validation.stress.invariants import EXCEPTIONS
-    from validation.stress.study import summary_rows
+    from rockcheck.validation.stress.invariants import EXCEPTIONS
+    from rockcheck.validation.stress.study import summary_rows
 
     if found.stability is not None:
         out.print(stable_table(found.stability))
@@ -96,7 +96,7 @@ def show(found: Stress, out: Console) -> None:
 
 def stable_table(found: Stability) -> Table:
     """A row a model with settings, a column an axis: the least of the largest stable steps along it, and what comes beyond."""
-    from validation.stress.stability import AXIS_WORDS
+    from rockcheck.validation.stress.stability import AXIS_WORDS
 
     table = Table(box=None, pad_edge=False, title="largest stable step, sqrt(R/g): least of an axis", title_justify="left")
     table.add_column("model")

@@ -8,15 +8,15 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from scenes import InputError
-from scenes.progress import listening
-from validation import remote, workers
-from validation.commands import OUT, JobsOption, OutOption, SchedulerOption, answer, console, progress, suite_names, usable_folder
-from validation.publish import keep, publish
-from validation.results import Run
-from validation.runner import run_suite
-from validation.suites import load_suite
-from validation.tables import summary, verdict_lines, verdict_table
+from rockcheck.scenes import InputError
+from rockcheck.scenes.progress import listening
+from rockcheck.validation.commands import OUT, JobsOption, OutOption, SchedulerOption, answer, console, progress, suite_names, usable_folder
+from rockcheck.validation.commands.publish import keep, publish
+from rockcheck.validation.execute import remote, workers
+from rockcheck.validation.suite.results import Run
+from rockcheck.validation.suite.runner import run_suite
+from rockcheck.validation.suite.suites import load_suite
+from rockcheck.validation.suite.tables import summary, verdict_lines, verdict_table
 
 ForceOption = Annotated[bool, typer.Option("--force", help="Run every cell, also those whose results are up to date.")]
 SuiteArgument = Annotated[str | None, typer.Argument(help="A named suite or a .toml file (default: paper).", autocompletion=suite_names)]

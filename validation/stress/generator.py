@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall
+from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall
 
 #: What a family of models can play: the bilateral pivot neither bounces nor hops, Bouc-Wen friction has one coefficient, and a
 #: pivot that never slips does not start with slip.

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ebm import EventBasedModel
-from scenes import Block, History, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
-from validation.stress.mechanics import BOOLE, GROUP, integrals, tilted_forces
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import Block, History, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from rockcheck.validation.stress.mechanics import BOOLE, GROUP, integrals, tilted_forces
 
 Floats = NDArray[np.float64]
 

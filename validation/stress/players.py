@@ -10,12 +10,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ebm import EventBasedModel
-from scenes import History, InputError, ModelFailure, Record, Scene, kinematics
-from scenes.excitations import Excitation
-from validation.models import build
-from validation.stress.generator import Kind, random_scene
-from validation.stress.invariants import Played, check_run
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import History, InputError, ModelFailure, Record, Scene, kinematics
+from rockcheck.scenes.excitations import Excitation
+from rockcheck.validation.execute.models import build
+from rockcheck.validation.stress.generator import Kind, random_scene
+from rockcheck.validation.stress.invariants import Played, check_run
 
 Floats = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import tomlkit
 
-from scenes import Block, Floor, InputError, Record, Rest, Scene
-from validation.results import write_whole
+from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Scene
+from rockcheck.scenes.writing import write_whole
 
 Shows = Callable[[Scene], bool]
 #: Most scenes that are tried.

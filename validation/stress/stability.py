@@ -14,11 +14,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from scenes import Block, Floor, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
-from scenes.errors import printable
-from validation.models import build
-from validation.stress.players import energy_without_source
-from validation.workers import loss_of, workers
+from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from rockcheck.scenes.errors import printable
+from rockcheck.validation.execute.models import build
+from rockcheck.validation.execute.workers import loss_of, workers
+from rockcheck.validation.stress.players import energy_without_source
 
 Axis = Literal["size", "friction", "restitution", "shaking"]
 

@@ -14,16 +14,16 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
-from scenes import Scene
-from scenes.errors import printable
-from validation import provenance
-from validation.results import write_whole
-from validation.stress import stability
-from validation.stress.invariants import INVARIANTS, Played
-from validation.stress.players import PLAYERS
-from validation.stress.shrinking import shrink, write_scene
-from validation.stress.stability import AXIS_WORDS, Stability
-from validation.workers import loss_of, workers
+from rockcheck.scenes import Scene
+from rockcheck.scenes.errors import printable
+from rockcheck.scenes.writing import write_whole
+from rockcheck.validation.execute import provenance
+from rockcheck.validation.execute.workers import loss_of, workers
+from rockcheck.validation.stress import stability
+from rockcheck.validation.stress.invariants import INVARIANTS, Played
+from rockcheck.validation.stress.players import PLAYERS
+from rockcheck.validation.stress.shrinking import shrink, write_scene
+from rockcheck.validation.stress.stability import AXIS_WORDS, Stability
 
 Progress = Callable[[int, int, str], None]
 What = Literal["all", "runs", "maps"]

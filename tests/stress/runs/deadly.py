@@ -7,11 +7,11 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from scenes import Scene
-from validation.stress import study
-from validation.stress.invariants import Played
-from validation.stress.players import EventBased
-from validation.stress.study import Batch, Failure
+from rockcheck.scenes import Scene
+from rockcheck.validation.stress import study
+from rockcheck.validation.stress.invariants import Played
+from rockcheck.validation.stress.players import EventBased
+from rockcheck.validation.stress.study import Batch, Failure
 
 
 def play_some(label: str, seed: int, first: int, count: int) -> Batch:

@@ -8,9 +8,9 @@ import time
 
 import numpy as np
 
-from scenes import History, ModelFailure, Scene
-from scenes.base import Frozen
-from scenes.observation import observe
+from rockcheck.scenes import History, ModelFailure, Scene
+from rockcheck.scenes.base import Frozen
+from rockcheck.scenes.observation import observe
 
 
 class Still(Frozen):

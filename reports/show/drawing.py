@@ -1,0 +1,122 @@
+"""What `.plot()` draws. Imports matplotlib, and is therefore imported only where something is drawn."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon, Rectangle
+
+from rockcheck.reports.style import SPARE, looks
+from rockcheck.scenes import History, InputError, Scene
+from rockcheck.validation.discrepancy import Discrepancy
+from rockcheck.validation.discrepancy.measures import Pair
+
+INK, SHADE, ACCENT = "#1b1b1b", "#d5d5d5", "#0072b2"
+#: Where a kind of event is drawn, from the top, and how.
+TRACKS = {"wall impact": "v", "floor impact": "^", "slip": "_", "landing": "x", "lift-off": "+"}
+
+
+class NotebookFigure(Figure):
+    """A matplotlib figure that a notebook shows without a display and without pyplot, which would keep it for ever."""
+
+    def _repr_png_(self) -> bytes:
+        png = io.BytesIO()
+        self.savefig(png, format="png", dpi=110)
+        return png.getvalue()
+
+
+def new_figure(width: float = 7.0, height: float = 3.5) -> NotebookFigure:
+    """An empty figure, sizes in inches."""
+    return NotebookFigure(figsize=(width, height), layout="constrained")
+
+
+def scene_figure(scene: Scene) -> Figure:
+    """The block on its floor, beside its walls, and the acceleration of the base."""
+    figure = new_figure(7.0, 3.0)
+    sketch, base = figure.subplots(1, 2, width_ratios=(1, 2))
+    draw_block(sketch, scene)
+    time = np.linspace(0.0, scene.duration, 2001)
+    base.plot(time, scene.excitation.acceleration(time), color=INK, linewidth=0.8, label="horizontal")
+    if scene.vertical.kind != "rest":
+        base.plot(time, scene.vertical.acceleration(time), color=ACCENT, linewidth=0.8, label="vertical")
+        base.legend(frameon=False)
+    base.set(xlabel="t, s", ylabel="acceleration of the base, m/s²", title=scene.name)
+    base.grid(color=SHADE, linewidth=0.5)
+    return figure
+
+
+def draw_block(axes: Any, scene: Scene) -> None:
+    """Block (tilted as it starts), floor and walls to scale, in m."""
+    block = scene.block
+    x, y, theta = scene.initial_state[:3]
+    turn = np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (block.half_width, block.half_height)
+    axes.add_patch(Polygon(corners @ turn.T + (x, y), facecolor=SHADE, edgecolor=INK))
+    reach = 1.4 * block.radius
+    axes.axhline(0.0, color=INK, linewidth=2)
+    thick = 0.12 * block.radius
+    for wall in scene.walls:
+        place = block.half_width + wall.gap
+        left = -place - thick if wall.side == "left" else place
+        axes.add_patch(Rectangle((left, 0.0), thick, 2.4 * block.half_height, facecolor=INK))
+    axes.set(xlim=(-reach, reach), ylim=(-0.1 * block.half_height, 2.4 * block.half_height), aspect="equal", xlabel="m")
+    axes.tick_params(labelsize="small")
+
+
+def history_figure(history: History) -> Figure:
+    """Rotation, position of the pivot corner, and events over time."""
+    figure = new_figure(7.0, 4.2)
+    rotation, slip, tracks = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 1))
+    time = history.channels["t"]
+    rotation_lines(rotation, [history], [INK])
+    rotation.set_title(f"{history.name}, {history.model}: {history.outcome}")
+    if "slip" in history.channels:
+        slip.plot(time, 1e3 * history.channels["slip"], color=INK, linewidth=0.9)
+    slip.set_ylabel("slip of the\npivot, mm")
+    slip.grid(color=SHADE, linewidth=0.5)
+    _tracks(tracks, history)
+    tracks.set_xlabel("t, s")
+    return figure
+
+
+def rotation_lines(axes: Any, histories: list[History], colours: list[str]) -> None:
+    """Theta of some histories over time, in alpha where all blocks are known."""
+    known = all(history.alpha is not None for history in histories)
+    for history, colour in zip(histories, colours, strict=True):
+        unit = (history.alpha if known else None) or 1.0
+        axes.plot(history.channels["t"], history.channels["theta"] / unit, color=colour, linewidth=0.9, label=history.model)
+    axes.set_ylabel("θ / α" if known else "θ, rad")
+    axes.grid(color=SHADE, linewidth=0.5)
+
+
+def _tracks(axes: Any, history: History) -> None:
+    kinds = [kind for kind in TRACKS if any(event.kind == kind for event in history.event_list)]
+    for place, kind in enumerate(kinds):
+        times = [event.t for event in history.event_list if event.kind == kind]
+        axes.plot(times, [place] * len(times), TRACKS[kind], color=INK, markersize=4)
+    axes.set_yticks(range(len(kinds)), kinds, fontsize="small")
+    axes.set_ylim(max(len(kinds), 1) - 0.5, -0.5)
+    axes.grid(axis="x", color=SHADE, linewidth=0.5)
+
+
+def discrepancy_figure(found: Discrepancy) -> Figure:
+    """Rotation of both histories, and their difference over the time that was compared. Raises `InputError` where they were not kept."""
+    if found.histories is None:
+        raise InputError("this comparison has not kept its histories")
+    reference, candidate = found.histories
+    style = looks([reference.model, candidate.model])
+    mine = style[reference.model]
+    other = style[candidate.model] if candidate.model != reference.model else SPARE[0]
+    figure = new_figure(7.0, 4.0)
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    rotation_lines(above, [reference, candidate], [mine.light, other.light])
+    above.legend(frameon=False, ncols=2)
+    pair = Pair(reference, candidate, None, found.end)
+    theta = pair.theta
+    below.plot(pair.time, theta[1] - theta[0], color=other.light, linewidth=0.9)
+    below.set(xlabel="t, s", ylabel="difference, α" if pair.alpha else "difference, rad")
+    below.grid(color=SHADE, linewidth=0.5)
+    return figure

@@ -1,0 +1,116 @@
+"""How scenes, histories and whatever else holds figures show themselves in a notebook: escaped HTML, and a few words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+import numpy as np
+
+from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, Spectrum
+from rockcheck.scenes import History, Record, Rest, Ricker, Scene, Sine
+from rockcheck.validation.discrepancy import Discrepancy
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number for people: a few digits, a true minus sign, powers of ten where it is very large or small."""
+    if value is None:
+        return "–"
+    text = f"{value:.{digits}g}"
+    if "e" in text:
+        mantissa, power = text.split("e")
+        return f"{mantissa}·10{str(int(power)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}".replace("-", "−")
+    return text.replace("-", "−")
+
+
+def html_table(caption: str, rows: Iterable[Sequence[object]], head: Sequence[object] = ()) -> str:
+    """A small HTML table; all text is escaped. Without `head` the first column names the rows."""
+
+    def line(row: Sequence[object], first: str, other: str) -> str:
+        tags = [first, *[other] * (len(row) - 1)]
+        texts = (f'<{tag} style="text-align: left">{escape(str(cell))}</{tag[:2]}>' for cell, tag in zip(row, tags, strict=True))
+        return f"<tr>{''.join(texts)}</tr>"
+
+    column, row_name = 'th scope="col"', 'th scope="row"'
+    lines = [line(head, column, column)] if head else []
+    lines += [line(row, "td" if head else row_name, "td") for row in rows]
+    return f'<table><caption style="text-align: left"><b>{escape(caption)}</b></caption>{"".join(lines)}</table>'
+
+
+def excitation_words(excitation: Rest | Ricker | Sine | Record) -> str:
+    """An excitation in a few words."""
+    if isinstance(excitation, Record):
+        return f"{excitation.source} × {number(excitation.scale)}, peak {number(excitation.peak)} g"
+    if isinstance(excitation, Ricker):
+        shape = "symmetric" if excitation.symmetric else "antisymmetric"
+        return f"{shape} Ricker pulse, {number(excitation.amplitude)} m/s², period {number(excitation.period)} s"
+    if isinstance(excitation, Sine):
+        return f"sine, {number(excitation.amplitude)} m/s², period {number(excitation.period)} s, {excitation.cycles} cycles"
+    return "at rest"
+
+
+def scene_facts(scene: Scene) -> list[tuple[str, str]]:
+    """A scene in a few words: block, floor, walls, excitation, duration."""
+    block = scene.block
+    floor = f"μ {number(scene.floor.friction)}"
+    if scene.floor.mu_s != scene.floor.friction:
+        floor += f" (static {number(scene.floor.mu_s)})"
+    if scene.floor.restitution:
+        floor += f", restitution {number(scene.floor.restitution)}"
+    walls = ", ".join(f"{wall.side}, gap {number(1e3 * wall.gap)} mm, restitution {number(wall.restitution)}" for wall in scene.walls)
+    facts = [
+        ("block", f"{number(2 * block.half_width, 4)} m × {number(2 * block.half_height, 4)} m, α = {number(block.alpha)} rad"),
+        ("p", f"{number(scene.frequency_parameter)} rad/s"),
+        ("floor", floor),
+        ("wall" if len(scene.walls) < 2 else "walls", walls or "none"),
+        ("base", excitation_words(scene.excitation)),
+        ("duration", f"{number(scene.duration)} s, a row each {number(1e3 * scene.output_step)} ms"),
+    ]
+    if scene.vertical.kind != "rest":
+        facts.insert(5, ("vertical", excitation_words(scene.vertical)))
+    if scene.initial_rotation:
+        facts.append(("starts at", f"θ = {number(scene.initial_rotation / block.alpha)} α"))
+    return facts
+
+
+def history_facts(history: History) -> list[tuple[str, str]]:
+    """A history in a few words: outcome, peak, impacts, time, cost, notes."""
+    time, alpha = history.channels["t"], history.alpha
+    peak = f"{number(history.peak_rotation)} rad" if alpha is None else f"{number(history.peak_rotation / alpha)} α"
+    impacts = {kind: sum(event.kind == kind for event in history.event_list) for kind in ("floor impact", "wall impact")}
+    facts = [
+        ("outcome", history.outcome),
+        ("peak rotation", peak),
+        ("impacts", f"{impacts['floor impact']} on the floor, {impacts['wall impact']} on walls"),
+        ("time", f"{number(float(time[0]))} to {number(float(time[-1]), 4)} s, {len(time)} rows"),
+    ]
+    if history.settings:
+        facts.append(("settings", ", ".join(f"{key} {value}" for key, value in history.settings.items())))
+    if history.cost.steps:
+        facts.append(("cost", f"{number(1e3 * history.cost.wall_seconds)} ms, {history.cost.steps} steps"))
+    return facts + [("note", note) for note in history.notes]
+
+
+def scene_html(scene: Scene) -> str:
+    """A scene as a notebook shows it."""
+    return html_table(scene.name, scene_facts(scene))
+
+
+def history_html(history: History) -> str:
+    """A history as a notebook shows it."""
+    return html_table(f"{history.name}, {history.model}", history_facts(history))
+
+
+def discrepancy_html(found: Discrepancy) -> str:
+    """A comparison as a notebook shows it."""
+    rows = [(f.label, number(f.value), f.unit, f.note) for f in found.figures]
+    caption = f"{found.candidate} against {found.reference}, {found.start:g} to {found.end:g} s"
+    return html_table(f"{caption}; not the whole time: {found.gap}" if found.gap else caption, rows, ("measure", "value", "unit", ""))
+
+
+def spectrum_html(spectrum: Spectrum) -> str:
+    """A spectrum as a notebook shows it."""
+    shares = (f"{number(100.0 * float(np.mean(spectrum.outcomes == side)))} %" for side in (SAFE, LEFT, RIGHT))
+    facts = [*zip(("safe", "overturned left", "overturned right"), shares, strict=True)]
+    facts += [("nodes", f"{spectrum.outcomes.size}, from {spectrum.evaluations} runs"), ("undecided", str(len(spectrum.undecided)))]
+    return html_table(f"Overturning spectrum: {spectrum.scene.name}", [*facts, *scene_facts(spectrum.scene)[:4]])

@@ -1,0 +1,279 @@
+"""Overturning spectra as the paper shows them, and the page with all that was found out about them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rockcheck.ebm.spectrum import Spectrum
+from rockcheck.reports.show.spectrum import COLOURS, axis_labels, draw
+from rockcheck.reports.site import PAGES, STUDIES, Site
+from rockcheck.reports.style import LOOKS, PAGE, figure_style, save
+from rockcheck.validation.discrepancy.figures import Stored
+from rockcheck.validation.suite.results import RUN_FILE
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from rockcheck.validation.spectra.agreement import Agreement
+    from rockcheck.validation.spectra.study import Panel
+
+TITLES = {
+    6: "Wall on the left, μ = 0.3",
+    7: "Wall on the left, μ = 0.6",
+    8: "Wall on the right, μ = 0.3",
+    9: "Wall on the right, μ = 0.6",
+}
+PAGE_NAME = "spectra.html"
+#: The name of the files of the figure of all models' maps.
+MAPS = "models"
+
+
+def paper_figure(panels: Sequence[Panel], spectra: Sequence[Spectrum], *, of: str = "") -> Figure:
+    """One of the paper's Figs. 6 to 9: the unobstructed spectrum beside those with a wall, a column a gap, a row an e.
+
+    `of` names the model where it is not the paper's.
+    """
+    from matplotlib.figure import Figure
+
+    gaps = sorted({panel.wall.gap for panel in panels if panel.wall})
+    restitutions = sorted({panel.wall.restitution for panel in panels if panel.wall})
+    with figure_style():
+        figure = Figure(figsize=(PAGE, 4.0), layout="constrained")
+        grid = figure.add_gridspec(2 * len(restitutions), 1 + len(gaps))
+        for panel, spectrum in zip(panels, spectra, strict=True):
+            if panel.wall is None:
+                axes = figure.add_subplot(grid[1:3, 0])
+                _panel(axes, spectrum, panel.title)
+            else:
+                row, column = restitutions.index(panel.wall.restitution), gaps.index(panel.wall.gap)
+                axes = figure.add_subplot(grid[2 * row : 2 * row + 2, 1 + column])
+                _panel(axes, spectrum, panel.title)
+                if row + 1 < len(restitutions):
+                    axes.set_xlabel("")
+                    axes.tick_params(labelbottom=False)
+                if column:
+                    axes.set_ylabel("")
+                    axes.tick_params(labelleft=False)
+        number = panels[0].figure or 0
+        figure.suptitle(f"Fig. {number}: {TITLES[number]}{f' ({of})' if of else ''}", fontsize=9, x=0.01, ha="left")
+        _legend(figure, spectra)
+    return figure
+
+
+def own_figure(panel: Panel, spectrum: Spectrum) -> Figure:
+    """The user's own spectrum."""
+    from matplotlib.figure import Figure
+
+    with figure_style():
+        figure = Figure(figsize=(PAGE / 1.6, 3.6), layout="constrained")
+        _panel(figure.subplots(), spectrum, panel.title)
+        _legend(figure, [spectrum])
+    return figure
+
+
+def _panel(axes: Any, spectrum: Spectrum, title: str) -> None:
+    draw(spectrum, axes)
+    axes.set_title(title, fontsize=7.5)
+    axes.set_xlim(spectrum.frequency_ratios[[0, -1]])
+    axes.set_ylim(spectrum.amplitude_ratios[[0, -1]])
+    for spine in ("top", "right"):
+        axes.spines[spine].set_visible(True)
+    if spectrum.scene.excitation.kind != "record" and spectrum.frequency_ratios[-1] <= 12:
+        axes.set_xticks(np.arange(np.ceil(spectrum.frequency_ratios[0]), spectrum.frequency_ratios[-1] + 1e-9))
+        axes.yaxis.get_major_locator().set_params(integer=True)
+
+
+def _legend(figure: Figure, spectra: Iterable[Spectrum]) -> None:
+    from matplotlib.patches import Patch
+
+    spectra = list(spectra)
+    free, walled = (any(bool(spectrum.scene.walls) == wall for spectrum in spectra) for wall in (False, True))
+    labels = {"safe": "safe"}
+    if free:
+        labels |= {"clockwise": "overturned clockwise", "counterclockwise": "overturned counterclockwise"}
+    if free and walled:
+        labels |= {"clockwise": "no wall: overturned clockwise", "counterclockwise": "overturned; no wall: counterclockwise"}
+    elif walled:
+        labels["overturned"] = "overturned"
+    if any(len(spectrum.undecided) for spectrum in spectra):
+        labels["undecided"] = "undecided"
+    patches = [Patch(facecolor=COLOURS[name], label=label) for name, label in labels.items()]
+    figure.legend(handles=patches, loc="outside lower center", ncols=4, fontsize=7, handlelength=1.6)
+
+
+def maps_figure(found: Agreement, panels: Sequence[Panel]) -> Figure:
+    """The figure's spectra by every model, a row each, in the paper's colours."""
+    from matplotlib.figure import Figure
+
+    from rockcheck.validation.spectra.agreement import map_spectra
+
+    with figure_style():
+        figure = Figure(figsize=(PAGE, 0.4 + 0.92 * len(found.maps)), layout="constrained")
+        grid = figure.subplots(len(found.maps), len(panels), sharex=True, sharey=True, squeeze=False)
+        for axes, panel in zip(grid[0], panels, strict=True):
+            axes.set_title(panel.title.replace(", ", "\n"), fontsize=6.5)
+            axes.locator_params(integer=True)
+        for row, one in zip(grid, found.maps, strict=True):
+            for axes, spectrum in zip(row, map_spectra(found, one, panels), strict=True):
+                draw(spectrum, axes)
+                axes.set(xlabel="", ylabel="")
+            row[0].set_ylabel(LOOKS[one.model].label.replace(", ", ",\n"))
+        horizontal, vertical = axis_labels(panels[0].scene)
+        figure.supxlabel(horizontal, fontsize=7.5)
+        figure.supylabel(vertical, fontsize=7.5)
+    return figure
+
+
+def areas_figure(spectra: Sequence[Spectrum]) -> Figure:
+    """The safe areas of the 28 spectra against the gap, with those without a wall: what the claims about areas rest on."""
+    from matplotlib.figure import Figure
+
+    with figure_style():
+        figure = Figure(figsize=(PAGE, 2.6), layout="constrained")
+        for axes, side in zip(figure.subplots(1, 2, sharey=True), ("left", "right"), strict=True):
+            for friction, colour in ((0.3, "#0072b2"), (0.6, "#d55e00")):
+                for e, line, marker in ((0.0, "-", "o"), (1.0, "--", "s")):
+                    walls = sorted(
+                        (s.scene.walls[0].gap, s.safe_area)
+                        for s in spectra
+                        if s.scene.walls
+                        and (s.scene.walls[0].side, s.scene.floor.friction, s.scene.walls[0].restitution) == (side, friction, e)
+                    )
+                    gaps, areas = zip(*walls, strict=True)
+                    axes.plot(
+                        1000.0 * np.array(gaps),
+                        100.0 * np.array(areas),
+                        line,
+                        color=colour,
+                        marker=marker,
+                        label=f"μ {friction:g}, e {e:g}",
+                    )
+                free = next(s.safe_area for s in spectra if not s.scene.walls and s.scene.floor.friction == friction)
+                axes.axhline(100.0 * free, color=colour, linestyle=":", label=f"μ {friction:g}, no wall")
+            axes.set_title(f"Wall on the {side}")
+            axes.set_xlabel("gap, mm")
+            axes.set_xticks([3, 53, 103])
+        figure.axes[0].set_ylim(0.0, 105.0 * max(spectrum.safe_area for spectrum in spectra))
+        figure.axes[0].set_ylabel("safe nodes, %")
+        figure.axes[1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def fragility_figure(fragility: Mapping[str, Any]) -> Figure:
+    """Probability of overturning against intensity: the share of the motions with its confidence band, and the lognormal fit, dotted."""
+    from matplotlib.figure import Figure
+
+    looks = (("#d55e00", ()), ("#0072b2", (5.0, 1.5)))
+    with figure_style():
+        figure = Figure(figsize=(PAGE / 1.4, 3.2), layout="constrained")
+        axes = figure.subplots()
+        for case, (colour, dash) in zip(fragility["cases"], looks, strict=False):
+            points = np.array(case["points"])
+            axes.fill_between(points[:, 0], points[:, 2], points[:, 3], color=colour, alpha=0.15, linewidth=0)
+            axes.plot(points[:, 0], points[:, 1], color=colour, linestyle=(0, dash) if dash else "-", label=case["label"])
+            axes.plot(points[:, 0], points[:, 4], color=colour, linestyle=(0, (0.7, 1.7)), linewidth=0.8)
+        axes.set_xlabel(fragility["intensity"])
+        axes.set_ylabel("probability of overturning")
+        axes.set_ylim(-0.02, 1.02)
+        axes.legend(loc="lower right")
+        axes.set_title(fragility["title"], fontsize=7.5)
+    return figure
+
+
+def write_page(folder: Path) -> Path:
+    """Write `spectra.html` into the report's folder from what its `spectra/` holds; returns the page.
+
+    Beside the paper's figures stand the long studies, agreement of models and refinement, as they were last computed here, or
+    else as they came with the package.
+    """
+    from rockcheck.validation.execute import provenance
+    from rockcheck.validation.spectra.study import SPECTRA, read_index
+
+    data = folder / SPECTRA
+    index = read_index(data)
+    found = {name: _read(data / f"{name}.json") for name in ("claims", "fragility")}
+    figures = sorted({(record.figure, record.model) for record in index.spectra if record.figure}, key=lambda key: (key[0] or 0, key[1]))
+    shown = [
+        {
+            "stem": f"{SPECTRA}/{figure_stem(number, model)}",
+            "number": number,
+            "model": model,
+            "title": TITLES[number or 6],
+            "records": [record for record in index.spectra if (record.figure, record.model) == (number, model)],
+        }
+        for number, model in figures
+        if (data / f"{figure_stem(number, model)}.svg").exists()
+    ]
+    site = Site(folder, "rockcheck: overturning spectra", _links(folder))
+    site.assets()
+    addresses = [PAGE_NAME] if (folder / RUN_FILE).exists() else ["index.html", PAGE_NAME]  # a folder has a page to open
+    pages = [
+        site.page(
+            address,
+            "spectra.html",
+            figures=shown,
+            own=[record for record in index.spectra if record.figure is None],
+            **found,
+            **_studies(data, bool(figures)),
+            areas=(data / "safe-areas.svg").exists(),
+            fragility_drawn=(data / "fragility.svg").exists(),
+            versions=provenance.versions(),
+        )
+        for address in addresses
+    ]
+    return pages[-1]
+
+
+def _studies(data: Path, papers: bool) -> dict[str, Any]:
+    """Agreement and refinement for the page: those in the folder, or with the `papers` figures those that came with the package."""
+    from rockcheck.validation.spectra import agreement as agreements
+    from rockcheck.validation.spectra import refinement
+    from rockcheck.validation.spectra.study import KEPT, paper_panels
+
+    context: dict[str, Any] = {"maps": (data / f"{MAPS}.svg").exists()}
+    context |= {"agreement_columns": agreements.COLUMNS, "refinement_columns": refinement.COLUMNS}
+    for name, kind in (("agreement", agreements.Agreement), ("refinement", refinement.Refinement)):
+        found = _stored(data, name, kind)
+        context[f"{name}_kept"] = found is None
+        context[name] = found or (_stored(KEPT, name, kind) if papers else None)
+    agreement = context["agreement"]
+    if agreement and context["agreement_kept"]:
+        write(maps_figure(agreement, agreements.mapped([panel for number in TITLES for panel in paper_panels(number)])), data / MAPS)
+        context["maps"] = True
+    return context
+
+
+def _stored(folder: Path, name: str, kind: type[Stored]) -> Any:
+    try:
+        return kind.model_validate_json((folder / f"{name}.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def figure_stem(number: int | None, model: str) -> str:
+    """The name of a figure's files."""
+    return f"figure-{number}" if model == "ebm" else f"figure-{number}--{model}"
+
+
+def write(figure: Figure, stem: Path) -> list[Path]:
+    """Write a figure as SVG, PNG and PDF."""
+    return save(figure, stem)
+
+
+def _links(folder: Path) -> tuple[tuple[str, str], ...]:
+    """The navigation: the scenes of the finished run that shares the folder, if any, and the studies beside it."""
+    scenes = sorted((folder / PAGES).glob("*.html")) if (folder / RUN_FILE).exists() else []
+    studies = [(title, address) for title, address in STUDIES if address == PAGE_NAME or (folder / address).exists()]
+    return (*((page.stem, f"{PAGES}/{page.name}") for page in scenes), *studies)
+
+
+def _read(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None

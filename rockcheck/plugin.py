@@ -1,0 +1,52 @@
+"""A pytest plugin: `check("my-scene", model="mujoco")` in a test of your own holds a cell against its suite's tolerances.
+
+The suite is the ini option `rockcheck_suite` (a named suite or a .toml file, relative to pytest's root), by default
+`rockcheck.toml` in the root where there is one, else `paper`. Histories are kept in pytest's cache and read back while
+nothing that they depend on has changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from rockcheck.validation.suite.results import Cell
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """The ini option `rockcheck_suite`."""
+    parser.addini("rockcheck_suite", "suite that the fixture `check` takes scenes, models and tolerances from", default="")
+
+
+@pytest.fixture
+def check(request: pytest.FixtureRequest) -> Callable[..., Cell]:
+    """`check(scene, model=..., suite=None, strict=False)`: runs that cell and its references, fails the test out of tolerance.
+
+    Returns the finished `validation.suite.results.Cell`, whose figures a test may look at. With `strict` a figure that left its
+    drift band fails too.
+    """
+    config = request.config
+
+    def check(scene: str, *, model: str, suite: str | Path | None = None, strict: bool = False) -> Cell:
+        from rockcheck.validation.suite.runner import run_suite
+        from rockcheck.validation.suite.suites import load_suite, named_suites
+        from rockcheck.validation.suite.tables import cell_lines
+
+        own = config.rootpath / "rockcheck.toml"
+        chosen = str(suite or config.getini("rockcheck_suite") or (own if own.exists() else "paper"))
+        loaded = load_suite(chosen if chosen in named_suites() else config.rootpath / chosen)
+        run = run_suite(loaded.only(scene, model), config.cache.mkdir("rockcheck"), strict=strict)
+        cell = run.cell(scene, model)
+        assert cell is not None
+        wrong = [line for line in cell_lines(cell) if strict or cell.verdict != "changed"]
+        if wrong:
+            pytest.fail("\n".join(wrong), pytrace=False)
+        if not cell.checks:
+            pytest.fail(f"{scene}, {model}: nothing is judged: the suite has no tolerance for it", pytrace=False)
+        return cell
+
+    return check

@@ -1,0 +1,315 @@
+"""The convergence study: beside a wall, engines and CM tend to the event-based model whose floor can only push, not to the paper's.
+
+As the step falls, the error against `ebm-unilateral` is numerical and falls with it; the error against `ebm`, which excludes
+flight, ends at the difference in form between the two.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import os
+import time
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from functools import cache
+from multiprocessing import get_context
+from pathlib import Path
+from statistics import median
+from typing import Literal
+
+import numpy as np
+
+from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.horizon import predictability_horizon
+from rockcheck.scenes import History, InputError, ModelFailure, Scene, Wall
+from rockcheck.scenes.writing import write_whole
+from rockcheck.validation.bench.scenes import pulse
+from rockcheck.validation.discrepancy.compare import compare
+from rockcheck.validation.execute import provenance
+from rockcheck.validation.execute.models import build
+
+Progress = Callable[[str], None]
+Reference = Literal["ebm-unilateral", "ebm"]
+REFERENCES: tuple[Reference, ...] = ("ebm-unilateral", "ebm")
+TOLERANCE = 1e-12
+#: Longest run, s; the horizon of predictability may end it before.
+DURATION = 5.0
+#: A run counts as converged if its error at the finest setting is at most this (alpha) ...
+LEVEL = 1e-3
+#: ... and its order in the step at least this, where the finest error is not already below `ROUNDED` (alpha).
+LEAST_ORDER, ROUNDED = 0.5, 1e-6
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """A model and the setting that is refined, coarse to fine."""
+
+    model: str
+    knob: str
+    values: tuple[float, ...]
+
+
+#: The step of the CM is 3/sqrt(k/m), k/m = g/penetration: with these penetrations (m) 8e-4, 9e-5 and 1e-5 s.
+REFINEMENTS = {
+    refinement.model: refinement
+    for refinement in (
+        Refinement("mujoco", "time_step", (1e-3, 1e-4, 1e-5)),
+        Refinement("pybullet", "time_step", (1e-3, 1e-4, 1e-5)),
+        Refinement("cm", "penetration", (1e-6, 1e-8, 1e-10)),
+    )
+}
+#: omega_p/p, a_p/(g tan alpha) and friction of pulses that hit a left wall at every gap, and leave the block standing.
+PULSES = {"long": (3.0, 2.5, 0.3), "medium": (4.5, 2.5, 0.3), "short": (6.0, 2.5, 0.6)}
+GAPS, RESTITUTIONS = (0.003, 0.053, 0.103), (0.0, 0.5)
+
+
+def _beside_a_wall(name: str, gap: float, restitution: float) -> Scene:
+    walls = (Wall(side="left", gap=gap, restitution=restitution),)
+    return pulse(*PULSES[name], walls=walls, name=f"{name} {1e3 * gap:g} mm e {restitution:g}").replace(duration=DURATION)
+
+
+SCENES = {scene.name: scene for scene in itertools.starmap(_beside_a_wall, itertools.product(PULSES, GAPS, RESTITUTIONS))}
+#: The scenes of `--quick`.
+QUICK = ("long 53 mm e 0.5", "medium 53 mm e 0", "short 3 mm e 0")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene of the study: the time (s) it is compared up to, and how the references end and differ (RMS of theta, alpha)."""
+
+    scene: str
+    horizon: float
+    model_form: float
+    ends: dict[Reference, str]
+
+
+@dataclass(frozen=True)
+class Play:
+    """One run: its step in s, and its RMS error of theta in alpha against each reference; NaN with a `failure`."""
+
+    scene: str
+    model: str
+    value: float
+    step: float = math.nan
+    against_unilateral: float = math.nan
+    against_ebm: float = math.nan
+    cpu: float = math.nan
+    failure: str = ""
+
+    def error(self, reference: Reference) -> float:
+        """The error against a reference; infinite for a run that failed."""
+        error = self.against_unilateral if reference == "ebm-unilateral" else self.against_ebm
+        return math.inf if self.failure or math.isnan(error) else error
+
+
+@dataclass(frozen=True)
+class Level:
+    """All runs of a model at one setting: errors (alpha) against a reference; `within`: how many are at most `LEVEL`."""
+
+    model: str
+    reference: Reference
+    value: float
+    step: float
+    median: float
+    largest: float
+    runs: int
+    within: int
+
+
+@dataclass(frozen=True)
+class Order:
+    """Slope of log error over log step, by least squares: of the median error, or in one `scene` where that is not empty."""
+
+    model: str
+    reference: Reference
+    order: float
+    scene: str = ""
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """What was found, when, with what, on what."""
+
+    suite: str
+    created: str
+    quick: bool
+    jobs: int
+    wall_seconds: float
+    versions: dict[str, str]
+    hardware: dict[str, str]
+    cases: tuple[Case, ...]
+    plays: tuple[Play, ...]
+    levels: tuple[Level, ...]
+    orders: tuple[Order, ...]
+    #: A line each: the runs that do not converge to the unilateral model.
+    exceptions: tuple[str, ...]
+
+    @property
+    def model_form(self) -> float:
+        """Median difference between the references, alpha."""
+        return median(case.model_form for case in self.cases)
+
+    def order(self, model: str, reference: Reference, scene: str = "") -> float:
+        """The observed order of a model; NaN where it cannot be fitted."""
+        return next((o.order for o in self.orders if (o.model, o.reference, o.scene) == (model, reference, scene)), math.nan)
+
+    def level(self, model: str, reference: Reference, value: float) -> Level:
+        """A model's errors at one setting."""
+        return next(one for one in self.levels if (one.model, one.reference, one.value) == (model, reference, value))
+
+    def line(self, model: str, scene: str) -> list[Play]:
+        """The runs of a model in a scene, coarse to fine."""
+        return [play for play in self.plays if (play.model, play.scene) == (model, scene)]
+
+
+@cache
+def _prepared(name: str) -> tuple[Scene, dict[Reference, History]]:
+    """A scene cut at its horizon of predictability, and how the references play it; they take milliseconds."""
+    scene = SCENES[name]
+    scene = scene.replace(duration=min(scene.duration, predictability_horizon(scene)))
+    unilateral, paper = (EventBasedModel(pivot=pivot, tolerance=TOLERANCE) for pivot in ("unilateral", "bilateral"))
+    return scene, {"ebm-unilateral": unilateral.simulate(scene), "ebm": paper.simulate(scene)}
+
+
+def case_of(name: str) -> Case:
+    """What is to be known of a scene before any model is refined in it."""
+    scene, played = _prepared(name)
+    form = _rms(played["ebm-unilateral"], played["ebm"])
+    return Case(name, scene.duration, form, {reference: played[reference].outcome for reference in REFERENCES})
+
+
+def play(name: str, model: str, value: float) -> Play:
+    """Plays one scene with a model at one value of the setting that is refined."""
+    scene, limits = _prepared(name)
+    try:
+        history = build(model, {REFINEMENTS[model].knob: value}).simulate(scene)
+    except (ModelFailure, InputError, ImportError) as error:
+        return Play(name, model, value, failure=str(error))
+    return Play(
+        name,
+        model,
+        value,
+        step=float(history.settings["time_step"]),
+        against_unilateral=_rms(limits["ebm-unilateral"], history),
+        against_ebm=_rms(limits["ebm"], history),
+        cpu=history.cost.cpu_seconds,
+    )
+
+
+def _rms(reference: History, candidate: History) -> float:
+    return compare(reference, candidate, measures=["theta_rms"])["theta_rms"]
+
+
+def run_convergence(*, quick: bool = False, jobs: int | None = None, progress: Progress = lambda text: None) -> Convergence:
+    """Plays every scene with every model at every setting in `jobs` processes (default: one a core).
+
+    `quick`: the scenes `QUICK` without the finest settings, in this process.
+    """
+    began, jobs = time.monotonic(), 1 if quick else jobs or os.cpu_count() or 1
+    names = QUICK if quick else tuple(SCENES)
+    cases = [case_of(name) for name in names]
+    asked = [
+        (name, refinement.model, value)
+        for place in range(2 if quick else 3)
+        for refinement in REFINEMENTS.values()
+        for name in names
+        for value in (refinement.values[place],)
+    ]
+    plays: list[Play] = []
+    for found in itertools.starmap(play, asked) if jobs == 1 else _side_by_side(asked[::-1], jobs):  # the longest first
+        plays.append(found)
+        progress(f"{len(plays)} of {len(asked)} runs: {found.scene}, {found.model}")
+    return evaluated(cases, plays, quick=quick, jobs=jobs, wall_seconds=time.monotonic() - began)
+
+
+def _side_by_side(asked: Sequence[tuple[str, str, float]], jobs: int) -> Iterable[Play]:
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        for future in as_completed([pool.submit(play, *one) for one in asked]):
+            yield future.result()
+
+
+def evaluated(
+    cases: Sequence[Case], plays: Iterable[Play], *, quick: bool = False, jobs: int = 1, wall_seconds: float = math.nan
+) -> Convergence:
+    """What the runs say."""
+    place = {name: n for n, name in enumerate([*SCENES, *REFINEMENTS])}
+    ordered = sorted(plays, key=lambda one: (place[one.model], place[one.scene], -one.value))
+    levels: list[Level] = []
+    orders: list[Order] = []
+    for model in dict.fromkeys(one.model for one in ordered):
+        for reference in REFERENCES:
+            mine = [one for one in ordered if one.model == model]
+            values = sorted({one.value for one in mine}, reverse=True)
+            found = [_level([one for one in mine if one.value == value], reference) for value in values]
+            levels += found
+            orders.append(Order(model, reference, slope([(level.step, level.median) for level in found])))
+            for case in cases:
+                points = [(one.step, one.error(reference)) for one in mine if one.scene == case.scene]
+                orders.append(Order(model, reference, slope(points), case.scene))
+    return Convergence(
+        suite=f"convergence{', quick' if quick else ''}",
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        quick=quick,
+        jobs=jobs,
+        wall_seconds=wall_seconds,
+        versions=provenance.versions(),
+        hardware=provenance.hardware(),
+        cases=tuple(cases),
+        plays=tuple(ordered),
+        levels=tuple(levels),
+        orders=tuple(orders),
+        exceptions=tuple(_exceptions(ordered, orders)),
+    )
+
+
+def _level(plays: Sequence[Play], reference: Reference) -> Level:
+    errors = [one.error(reference) for one in plays]
+    steps = [one.step for one in plays if not one.failure]
+    return Level(
+        model=plays[0].model,
+        reference=reference,
+        value=plays[0].value,
+        step=median(steps) if steps else math.nan,
+        median=median(errors),
+        largest=max(errors),
+        runs=len(plays),
+        within=sum(error <= LEVEL for error in errors),
+    )
+
+
+def slope(points: Iterable[tuple[float, float]]) -> float:
+    """Slope of log error over log step by least squares; NaN with fewer than two finite points."""
+    usable = [(math.log(step), math.log(error)) for step, error in points if math.isfinite(step) and 0.0 < error < math.inf]
+    if len(usable) < 2:
+        return math.nan
+    x, y = np.array(usable).T
+    return float(np.polyfit(x, y, 1)[0])
+
+
+def _exceptions(plays: Sequence[Play], orders: Sequence[Order]) -> Iterable[str]:
+    """The runs that fail or do not converge to the unilateral model, a line each."""
+    fitted = {(order.model, order.scene): order.order for order in orders if order.reference == "ebm-unilateral"}
+    for (model, scene), group in itertools.groupby(plays, key=lambda one: (one.model, one.scene)):
+        line = list(group)
+        for one in line:
+            if one.failure:
+                yield f"{scene}, {model} at {REFINEMENTS[model].knob} {one.value:g} failed: {one.failure}"
+        finest, order = line[-1].error("ebm-unilateral"), fitted[model, scene]
+        if math.isfinite(finest) and (finest > LEVEL or (finest > ROUNDED and not order >= LEAST_ORDER)):
+            errors = " → ".join(f"{one.error('ebm-unilateral'):.1e}" for one in line)
+            yield f"{scene}, {model}: {errors} α, order {order:.2f}"
+
+
+def save(found: Convergence, folder: Path) -> None:
+    """Writes the tables as CSV, and run.json with all else, into a folder."""
+    import pandas as pd
+
+    tables: dict[str, Sequence[object]] = {"runs": found.plays, "levels": found.levels, "orders": found.orders}
+    for name, rows in tables.items():
+        write_whole(folder / f"{name}.csv", pd.DataFrame(list(rows)).to_csv(index=False, float_format="%.6g"))
+    rest = {name: value for name, value in asdict(found).items() if name not in ("plays", "levels", "orders")}
+    write_whole(folder / "run.json", json.dumps(rest, indent=1) + "\n")

@@ -1,0 +1,233 @@
+"""Speed of the event-based model: compiled batches on one core, as microseconds and as right-hand-side evaluations; cold starts."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from statistics import median
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.batch import Packed, pack, pack_pulses, run_batch
+from rockcheck.ebm.ground import Ground, acceleration
+from rockcheck.scenes import Floor, ModelFailure, Ricker, Scene, Wall, load_scene
+from rockcheck.scenes.compiled import kernel
+from rockcheck.validation.bench.scenes import BLOCK
+
+Progress = Callable[[str], None]
+#: The grid of Ricker pulses: omega_p/p, a_p/(g tan alpha), and its nodes along each axis.
+FREQUENCY_RATIOS, AMPLITUDE_RATIOS, NODES = (0.5, 8.0), (1.0, 12.0), 100
+TOLERANCES = (1e-6, 1e-7, 2e-8, 1e-8, 1e-9, 1e-10, 1e-12)
+REFERENCE_TOLERANCE, ROUNDS = 1e-14, 3
+#: The error for which a trajectory's cost is told: 95th percentile of the peak's, rad.
+LEVEL = 1e-8
+
+
+@dataclass(frozen=True)
+class Case:
+    """A batch: what it is, the model's settings, and how its runs are packed."""
+
+    name: str
+    words: str
+    settings: dict[str, Any]
+    packed: Callable[[EventBasedModel, int], Packed]
+    until_decided: bool = True
+
+
+@dataclass(frozen=True)
+class BatchTime:
+    """A batch at one tolerance: cost of a trajectory, and what it is wrong by against `REFERENCE_TOLERANCE`.
+
+    `cpu` and `wall` in s (medians), `evaluations` the CPU time in right-hand-side evaluations, `error_95` and `error_50`
+    percentiles of the peak's error in rad, `wrong` outcomes that differ, `failed` runs without outcome.
+    """
+
+    case: str
+    tolerance: float
+    runs: int
+    cpu: float
+    wall: float
+    evaluations: float
+    error_50: float
+    error_95: float
+    wrong: int
+    failed: int
+
+
+@dataclass(frozen=True)
+class ColdStart:
+    """Seconds in a fresh process: importing the package, and its first simulation (compiler's import included)."""
+
+    cache: str
+    importing: float
+    first_simulation: float
+
+
+@dataclass(frozen=True)
+class EbmSpeed:
+    """All batches, the time of one right-hand side (s), and cold starts."""
+
+    right_hand_side: float
+    times: tuple[BatchTime, ...]
+    cold_starts: tuple[ColdStart, ...]
+
+    def at_level(self, case: str) -> BatchTime | None:
+        """The cheapest tolerance whose p95 error is at most `LEVEL`, None where there is none."""
+        good = [row for row in self.times if row.case == case and row.error_95 <= LEVEL]
+        return min(good, key=lambda row: row.cpu, default=None)
+
+
+def _scene(*walls: Wall, friction: float = 0.3) -> Scene:
+    pulse = Ricker(amplitude=1.0, period=1.0)
+    return Scene(name="grid", block=BLOCK, floor=Floor(friction=friction), walls=walls, excitation=pulse, duration=10.0)
+
+
+def grid(scene: Scene, nodes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Amplitudes (m/s^2) and periods (s) of the grid of pulses, `nodes` along each axis."""
+    frequency, amplitude = np.meshgrid(np.linspace(*FREQUENCY_RATIOS, nodes), np.linspace(*AMPLITUDE_RATIOS, nodes))
+    strength = amplitude.ravel() * scene.gravity * math.tan(scene.block.alpha)
+    return strength, 2.0 * math.pi / (frequency.ravel() * scene.frequency_parameter)
+
+
+def _pulses(scene: Scene) -> Callable[[EventBasedModel, int], Packed]:
+    return lambda model, nodes: pack_pulses(scene, model, *grid(scene, nodes))
+
+
+def _records(model: EventBasedModel, nodes: int) -> Packed:
+    """El Centro at `nodes` scales from 1.4 to 1.8, to the record's end."""
+    scene = load_scene("fig4a")
+    louder = (scene.excitation.model_copy(update={"scale": scale}) for scale in np.linspace(1.4, 1.8, nodes).tolist())
+    return pack([scene.replace(excitation=record, duration=scene.excitation.quiet_after) for record in louder], model)
+
+
+_WALL = Wall(side="left", gap=0.053)
+CASES = (
+    Case("pure rocking", "no slip, no wall", {"friction": "no-slip"}, _pulses(_scene())),
+    Case("friction", "μ 0.3, no wall", {}, _pulses(_scene())),
+    Case("wall", "μ 0.3, left wall at 53 mm, e 0", {}, _pulses(_scene(_WALL))),
+    Case("unilateral, wall", "the same, unilateral", {"pivot": "unilateral"}, _pulses(_scene(_WALL))),
+    Case("El Centro", "31 s of El Centro × 1.4 to 1.8, μ 0.3, to the end", {}, _records, until_decided=False),
+)
+
+
+def ebm_speed(*, quick: bool = False, cold: bool = True, progress: Progress = lambda text: None) -> EbmSpeed:
+    """Times all batches on one core, interleaved; `quick` with 400 trajectories instead of 10,000.
+
+    `cold` also starts fresh processes, with the compile cache and (not `quick`) without.
+    """
+    nodes = 20 if quick else NODES
+    times: list[BatchTime] = []
+    ones: list[float] = []
+    for case in CASES:
+        progress(f"batches: {case.name}")
+        times += _times(case, nodes, ones)
+    return EbmSpeed(median(ones), tuple(times), cold_starts(progress, without_cache=not quick) if cold else ())
+
+
+def _times(case: Case, nodes: int, ones: list[float]) -> list[BatchTime]:
+    """A row a tolerance; the time of one right-hand side, taken in the same rounds, is added to `ones`."""
+    reference_model = EventBasedModel(tolerance=REFERENCE_TOLERANCE, **case.settings)
+    packed = case.packed(reference_model, nodes)
+    play = partial(run_batch, packed, until_decided=case.until_decided, strict=False, jobs=1)
+    reference = play(reference_model)
+    cpu: dict[float, list[float]] = {tolerance: [] for tolerance in TOLERANCES}
+    wall: dict[float, list[float]] = {tolerance: [] for tolerance in TOLERANCES}
+    found = {}
+    for _ in range(ROUNDS):
+        ones.append(right_hand_side_seconds())
+        for tolerance in TOLERANCES:
+            model = EventBasedModel(tolerance=tolerance, **case.settings)
+            began, began_cpu = time.perf_counter(), time.process_time()
+            found[tolerance] = play(model)
+            cpu[tolerance].append((time.process_time() - began_cpu) / len(packed))
+            wall[tolerance].append((time.perf_counter() - began) / len(packed))
+    rows = []
+    one = median(ones[-ROUNDS:])
+    for tolerance, outcomes in found.items():
+        error = np.abs(outcomes.peak - reference.peak)
+        rows.append(
+            BatchTime(
+                case=case.name,
+                tolerance=tolerance,
+                runs=len(packed),
+                cpu=median(cpu[tolerance]),
+                wall=median(wall[tolerance]),
+                evaluations=median(cpu[tolerance]) / one,
+                error_50=float(np.quantile(error, 0.5)),
+                error_95=float(np.quantile(error, 0.95)),
+                wrong=int(np.count_nonzero(outcomes.side != reference.side)),
+                failed=int(np.count_nonzero(outcomes.failed)),
+            )
+        )
+    return rows
+
+
+@kernel
+def _right_hand_sides(ground: Ground, alpha: float, count: int) -> float:
+    """(3) in natural units, `count` times, each at a place that depends on the one before."""
+    theta = 0.1 * alpha
+    for k in range(count):
+        turn = 0.75 * (acceleration(ground, 1e-6 * k) * math.cos(alpha - theta) - math.sin(alpha - theta))
+        theta += 1e-12 * turn
+    return theta
+
+
+def right_hand_side_seconds(count: int = 400_000) -> float:
+    """CPU seconds of one evaluation of the rocking equation under a Ricker pulse: sin, cos, exp and a polynomial."""
+    from rockcheck.ebm import natural
+
+    ground, _ = natural.grounds_of(_scene())
+    _right_hand_sides(ground, BLOCK.alpha, 1)
+    taken = []
+    for _ in range(5):
+        began = time.process_time()
+        _right_hand_sides(ground, BLOCK.alpha, count)
+        taken.append((time.process_time() - began) / count)
+    return median(taken)
+
+
+_FRESH = """
+import time
+began = time.perf_counter()
+import rockcheck.ebm
+imported = time.perf_counter()
+from rockcheck.scenes import load_scene
+scene = load_scene("fig5a")
+loaded = time.perf_counter()
+ebm.EventBasedModel().simulate(scene)
+print(imported - began, time.perf_counter() - loaded)
+"""
+
+
+def cold_starts(progress: Progress = lambda text: None, *, without_cache: bool = True) -> tuple[ColdStart, ...]:
+    """Import and first simulation in fresh processes: once without compile cache, then (median of three) with it."""
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        fresh = {**os.environ, "NUMBA_CACHE_DIR": folder} if without_cache else dict(os.environ)
+        if without_cache:
+            progress("cold start without compile cache")
+            found.append(ColdStart("none", *_cold_start(fresh)))
+        progress("cold starts with compile cache")
+        if not without_cache:
+            _cold_start(fresh)
+        warm = [_cold_start(fresh) for _ in range(3)]
+        found.append(ColdStart("filled", *(median(column) for column in zip(*warm, strict=True))))
+    return tuple(found)
+
+
+def _cold_start(environment: dict[str, str]) -> tuple[float, float]:
+    played = subprocess.run([sys.executable, "-c", _FRESH], env=environment, capture_output=True, text=True, check=False)
+    if played.returncode:
+        raise ModelFailure(f"ebm: no fresh process could be started: {played.stderr.strip().splitlines()[-1:]}")
+    importing, first = map(float, played.stdout.split()[-2:])
+    return importing, first

@@ -1,0 +1,5 @@
+"""How far two histories differ: measures, `compare`, statistics, closed forms, measured histories."""
+
+from rockcheck.validation.discrepancy.compare import Discrepancy, compare
+
+__all__ = ["Discrepancy", "compare"]

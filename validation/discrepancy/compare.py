@@ -1,0 +1,152 @@
+"""`compare`: how far a candidate's history is from a reference's, by every measure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from rockcheck.scenes import History, InputError, Scene
+from rockcheck.scenes.shown import Shown
+from rockcheck.validation.discrepancy import closed_forms as _closed_forms  # noqa: F401 - registers them
+from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, TURNS, Measure, Motion, Pair, Unavailable
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class Discrepancy(Shown):
+    """The figures of one comparison.
+
+    `start` and `end` (s) bound the time that was compared. `gap` says which part of the asked time could not be
+    compared, empty where all was; a comparison with a gap never passes a tolerance. `fall` says that one block's fall is
+    why: then the two models answer differently, which a difference in form may do.
+    """
+
+    reference: str
+    candidate: str
+    figures: tuple[Figure, ...]
+    start: float
+    end: float
+    gap: str = ""
+    fall: bool = False
+    #: The reference's history and the candidate's.
+    histories: tuple[History, History] | None = field(default=None, repr=False, compare=False)
+
+    def __getitem__(self, measure: str) -> float:
+        """The value of a measure; NaN where it could not be computed."""
+        value = self.figure(measure).value
+        return math.nan if value is None else value
+
+    def figure(self, measure: str) -> Figure:
+        """The figure of a measure; KeyError for an unknown one."""
+        for found in self.figures:
+            if found.measure == measure:
+                return found
+        raise KeyError(measure)
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """One row a measure: measure, value (NaN where it could not be computed), unit, note."""
+        import pandas as pd
+
+        rows = [(f.measure, math.nan if f.value is None else f.value, f.unit, f.note) for f in self.figures]
+        return pd.DataFrame(rows, columns=["measure", "value", "unit", "note"])
+
+
+def compare(
+    reference: History,
+    candidate: History,
+    *,
+    until: float | None = None,
+    scene: Scene | None = None,
+    measures: Collection[str] | None = None,
+) -> Discrepancy:
+    """Compare two histories over their common time, up to `until` (s), by the `measures` of `validation.discrepancy.measures`.
+
+    By default by all but those that are `on_request`. The candidate is interpolated linearly onto the reference's times.
+    `scene` adds its gravity (9.81 m/s^2 otherwise). A measure that cannot be computed is NaN and says why. Raises
+    `InputError` if the histories have no time in common.
+    """
+    if until is not None and not until > 0.0:
+        raise InputError(f"{until:g} is not allowed: a positive time in s is asked for", "until")
+    pair = Pair(reference, candidate, scene, math.inf if until is None else until)
+    if len(pair.time) == 0:
+        raise InputError(f"{reference.model} and {candidate.model} have no time in common")
+    window = "" if until is None else f"{until:g}s"
+    chosen = [m for m in DIFFERENCES.values() if not m.on_request] if measures is None else [DIFFERENCES[name] for name in measures]
+    figures = tuple(
+        evaluate(measure, pair, "rad" if pair.alpha is None else "alpha", against=reference.model, window=window, until=until)
+        for measure in chosen
+    )
+    gap, fall = _gap(pair, until)
+    return Discrepancy(reference.model, candidate.model, figures, pair.start, pair.end, gap, fall, histories=(reference, candidate))
+
+
+def describe(
+    history: History, *, until: float | None = None, scene: Scene | None = None, measures: Collection[str] | None = None
+) -> tuple[Figure, ...]:
+    """The figures of one history: peak rotation, last place, impacts, hop, penetration and so on; up to `until` (s)."""
+    motion = Motion(history, scene, math.inf if until is None else until)
+    window = "" if until is None else f"{until:g}s"
+    chosen = [m for m in FIGURES.values() if not m.on_request] if measures is None else [FIGURES[name] for name in measures]
+    return tuple(evaluate(measure, motion, "alpha", window=window, until=until) for measure in chosen)
+
+
+def evaluate(measure: Measure, what: object, angle: str, *, against: str = "", window: str = "", until: float | None = None) -> Figure:
+    """One measure as a figure; what is not finite becomes None with a note."""
+    try:
+        result = measure.evaluate(what)
+    except Unavailable as error:
+        result = math.nan, str(error)
+    value, note = result if isinstance(result, tuple) else (result, "")
+    unit = angle if measure.unit == "angle" else measure.unit
+    if not math.isfinite(value):
+        note = note or ("infinite" if math.isinf(value) else "not a number")
+    return Figure(
+        measure=measure.name,
+        label=measure.label,
+        unit=unit,
+        value=float(value) if math.isfinite(value) else None,
+        against=against,
+        window=window,
+        until=until,
+        note=note,
+    )
+
+
+def too_short(history: History, until: float | None) -> str:
+    """What is missing of a history up to `until`, empty where nothing is: one that ended by falling is whole."""
+    end = float(history.channels["t"][-1])
+    if until is None or history.outcome in TURNS or end >= until - 1.5 * _step(history):
+        return ""
+    return f"{history.model} ends at {end:g} s, before {until:g} s"
+
+
+def _gap(pair: Pair, until: float | None) -> tuple[str, bool]:
+    """What part of the asked time is missing from the comparison, and whether because one block fell.
+
+    Nothing is missing where both fell to the same side.
+    """
+    starts, ends = ([float(h.channels["t"][k]) for h in (pair.reference, pair.candidate)] for k in (0, -1))
+    step = 1.5 * float(max(_step(pair.reference), _step(pair.candidate)))
+    if max(starts) - min(starts) > step:
+        late = pair.reference if starts[0] > starts[1] else pair.candidate
+        return f"{late.model} starts only at {max(starts):g} s", False
+    if pair.reference.outcome == pair.candidate.outcome and pair.reference.outcome in TURNS:
+        return "", False
+    asked = max(ends) if until is None else until
+    if asked - min(ends) > step:
+        short = pair.reference if ends[0] < ends[1] else pair.candidate
+        fall = short.outcome in TURNS
+        return f"{short.model} {'falls' if fall else 'ends'} at {min(ends):g} s, before {asked:g} s", fall
+    return "", False
+
+
+def _step(history: History) -> float:
+    t = history.channels["t"]
+    return float(t[-1] - t[0]) / (len(t) - 1) if len(t) > 1 else 0.0

@@ -1,0 +1,41 @@
+"""A figure: the value of one measure, as it is stored."""
+
+from __future__ import annotations
+
+from pydantic import ConfigDict
+
+from rockcheck.scenes.base import Frozen
+
+
+class Stored(Frozen):
+    """A value of `run.json`; a float that is not finite is written as null."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="null")
+
+
+class MeasureRecord(Stored):
+    """How a measure is defined, for the pages: see `validation.discrepancy.measures`."""
+
+    name: str
+    label: str
+    unit: str
+    formula: str
+    source: str = ""
+
+
+class Figure(Stored):
+    """The value of one measure of one cell.
+
+    `against` names the reference model, "closed form" or, for a figure of the cell itself, is empty. `until` is the end of
+    the window in s, None for the whole common time; `window` says it as the tolerances do ("", "8s", "horizon"). `value`
+    is None where it could not be computed; `note` then says why. `note` also holds what a figure cannot (which event).
+    """
+
+    measure: str
+    label: str
+    unit: str
+    value: float | None
+    against: str = ""
+    window: str = ""
+    until: float | None = None
+    note: str = ""

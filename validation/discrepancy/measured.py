@@ -1,0 +1,111 @@
+"""Measured histories: a CSV from a shake table, or from any other program, played back as if it were a model.
+
+Its columns are named as a history's (`scenes.history.COLUMNS`), each with its unit: `t_s` or `time_ms`, `theta_deg`, `x_mm`,
+`slip_rate_mm_s` and so on; a name without unit is in SI units. Angles and lengths count as in the scene: theta
+counterclockwise positive, x the centroid relative to the base.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from rockcheck.scenes import History, InputError, Scene
+from rockcheck.scenes.base import Finite, Frozen
+from rockcheck.scenes.errors import printable
+from rockcheck.scenes.history import outcome_of
+
+TIMES = {"s": 1.0, "ms": 1e-3}
+ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+UNITS: Mapping[str, Mapping[str, float]] = {
+    "t": TIMES,
+    "theta": ANGLES,
+    "theta_dot": {f"{unit}_s": factor for unit, factor in ANGLES.items()},
+    **dict.fromkeys(("x", "y", "slip"), LENGTHS),
+    **{name: {f"{unit}_s": factor for unit, factor in LENGTHS.items()} for name in ("x_dot", "y_dot", "slip_rate")},
+}
+
+
+class Measured(Frozen):
+    """Plays back the file of each scene it knows; `offset` (s) is added to the file's times, to align it with the scene's.
+
+    `files` maps names of scenes to CSV files.
+    """
+
+    name: ClassVar[str] = "measured"
+    files: dict[str, str]
+    offset: Finite = 0.0
+
+    def simulate(self, scene: Scene) -> History:
+        """The measured history of the scene, from its t = 0 to its end. Raises `InputError` for a file that is not usable."""
+        if scene.name not in self.files:
+            raise InputError(f"no measured history of scene {scene.name!r}", "files")
+        history = read_measured(self.files[scene.name], offset=self.offset)
+        t = history.channels["t"]
+        inside = (t >= -1e-9) & (t <= scene.duration + 1e-9)
+        if not np.any(inside):
+            raise InputError(f"nothing of {printable(self.files[scene.name])} lies within the scene's 0 to {scene.duration:g} s", "offset")
+        return dataclasses.replace(
+            history,
+            name=scene.name,
+            channels={key: column[inside] for key, column in history.channels.items()},
+            half_width=scene.block.half_width,
+            half_height=scene.block.half_height,
+            settings={"file": Path(self.files[scene.name]).name, "offset": self.offset},
+        )
+
+
+def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
+    """A history from a CSV whose columns name their units, or that rockcheck wrote; `offset` (s) is added to its times.
+
+    Raises `InputError`, naming file and column, for whatever is missing, unknown, doubled or not finite.
+    """
+    shown = printable(path)
+    columns: dict[str, tuple[str, float]] = {}
+    for column in _heading(Path(path), shown):
+        name, factor = _meaning(column, shown)
+        if name in (known for known, _ in columns.values()):
+            raise InputError(f"{shown}: column {printable(column)!r} gives {printable(name)} a second time")
+        columns[column] = (name, factor)
+    history = History.load(path, columns={column: name for column, (name, _) in columns.items()})
+    channels: dict[str, Any] = {}
+    for name, factor in columns.values():
+        if name in history.channels:
+            channels[name] = history.channels[name] if factor == 1.0 else factor * history.channels[name]
+    channels["t"] = channels["t"] + offset
+    si = all(factor == 1.0 for _, factor in columns.values())
+    return dataclasses.replace(history, channels=channels, outcome=history.outcome if si else outcome_of(channels))
+
+
+def _heading(path: Path, shown: str) -> list[str]:
+    """Names of the columns, with quotes and remarks read as those of the rows are."""
+    import pandas as pd
+
+    try:
+        row = pd.read_csv(path, comment="#", header=None, nrows=1, dtype=str, keep_default_na=False)
+    except OSError as error:
+        raise InputError(f"{shown}: cannot be read: {error.strerror}") from None
+    except (ValueError, OverflowError) as error:  # pandas' own parser errors are ValueErrors
+        raise InputError(f"{shown}: not a CSV table: {printable(error)}") from None
+    return [column.strip() for column in row.iloc[0]]
+
+
+def _meaning(column: str, shown: str) -> tuple[str, float]:
+    """A column's name in a history, and the factor to SI units."""
+    plain = "t" + column.removeprefix("time") if column == "time" or column.startswith("time_") else column
+    for name in sorted(UNITS, key=len, reverse=True):
+        if plain == name:
+            return name, 1.0
+        if plain.startswith(f"{name}_") and plain.removeprefix(f"{name}_") in UNITS[name]:
+            return name, UNITS[name][plain.removeprefix(f"{name}_")]
+    for name in sorted(UNITS, key=len, reverse=True):
+        if plain.startswith(f"{name}_"):
+            units = ", ".join(UNITS[name])
+            raise InputError(f"{shown}: column {printable(column)!r}: a unit of {name} is asked for: {units}")
+    return column, 1.0

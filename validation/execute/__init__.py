@@ -1,0 +1,1 @@
+"""Where models run: workers, clusters, the store of results, and what a result depends on."""

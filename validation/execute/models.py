@@ -1,0 +1,111 @@
+"""The models by the names that suites and the command line use; what each is built from and depends on."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from rockcheck.scenes import History, InputError, Scene
+from rockcheck.scenes.errors import printable, unknown_name
+
+
+class Model(Protocol):
+    """What every model is: a frozen, validated object with its settings as fields."""
+
+    def simulate(self, scene: Scene) -> History:
+        """The block's motion; raises `scenes.ModelFailure` where the model cannot finish."""
+        ...  # pragma: no cover
+
+
+@dataclass(frozen=True)
+class Family:
+    """A named kind of model: a class of a package, the settings that the name fixes, and the libraries its results depend on."""
+
+    module: str
+    class_name: str
+    summary: str
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+    libraries: tuple[str, ...] = ()
+    #: Whether the block can leave the floor; a model that cannot differs in form from one that can.
+    flies: bool = True
+
+    @property
+    def compiled(self) -> bool:
+        """Whether its first run on a machine compiles, which may take longer than any cell."""
+        return "numba" in self.libraries
+
+
+COMPILED = ("numba", "llvmlite", "numpy", "scipy")
+FAMILIES: dict[str, Family] = {
+    "ebm": Family(
+        "rockcheck.ebm",
+        "EventBasedModel",
+        "event-based model of the paper: exact stick-slip, no free flight",
+        {"pivot": "bilateral", "friction": "coulomb"},
+        COMPILED,
+        flies=False,
+    ),
+    "ebm-unilateral": Family(
+        "rockcheck.ebm",
+        "EventBasedModel",
+        "event-based model whose floor can only push: the block may hop",
+        {"pivot": "unilateral", "friction": "coulomb"},
+        COMPILED,
+    ),
+    "ebm-bouc-wen": Family(
+        "rockcheck.ebm",
+        "EventBasedModel",
+        "event-based model with the paper's regularised friction",
+        {"pivot": "bilateral", "friction": "bouc-wen"},
+        COMPILED,
+        flies=False,
+    ),
+    "cm": Family("rockcheck.cm", "ContinuousModel", "the paper's penalty-based continuous model", {}, COMPILED),
+    "mujoco": Family("rockcheck.engines", "MuJoCo", "the physics engine MuJoCo", {}, ("mujoco", "numpy")),
+    "pybullet": Family("rockcheck.engines", "PyBullet", "the physics engine PyBullet", {}, ("pybullet", "numpy")),
+    "measured": Family(
+        "rockcheck.validation.discrepancy.measured", "Measured", "a CSV history from a shake table, or from any other program"
+    ),
+}
+
+
+def family(name: str) -> Family:
+    """The family of that name, or of "module:Class" for a model of the user's own; raises `InputError` suggesting the nearest."""
+    module, colon, class_name = name.partition(":")
+    if colon and module.isidentifier() and class_name.isidentifier():
+        return Family(module, class_name, "a model of the user's own")
+    if name not in FAMILIES:
+        raise unknown_name("model", name, FAMILIES)
+    return FAMILIES[name]
+
+
+def is_own(name: str) -> bool:
+    """Whether that is a model of the user's own, which may lie beside the suite or in the working directory."""
+    return ":" in name
+
+
+def home(name: str) -> str:
+    """The module in which the model of that name is defined."""
+    return str(_class_of(name).__module__)
+
+
+def _class_of(name: str) -> Any:
+    kind = family(name)
+    try:
+        return getattr(importlib.import_module(kind.module), kind.class_name)
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"model {name!r} is not available in this installation: {printable(error)}") from None
+
+
+def build(name: str, settings: Mapping[str, Any] | None = None) -> Model:
+    """The model of that name with these settings; raises `InputError` naming the setting that is not usable."""
+    kind, settings = family(name), dict(settings or {})
+    for key in kind.fixed.keys() & settings.keys():
+        raise InputError(f"is fixed by the name of the model, {name}", f"{name}.{key}")
+    try:
+        model: Model = _class_of(name)(**kind.fixed, **settings)
+    except InputError as error:
+        raise InputError(error.reason, f"{name}.{error.key}" if error.key else name) from None
+    return model

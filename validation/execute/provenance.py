@@ -1,0 +1,157 @@
+"""What a result depends on: code, libraries, scene and settings, as one key; and what the run's machine was."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.util
+import json
+import os
+import platform
+from collections.abc import Container, Iterable, Mapping
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from rockcheck.scenes import Scene
+from rockcheck.validation.execute.models import FAMILIES, family, home
+
+#: The package whose code counts where it can be reached; the package of the model itself always does.
+OWN_PACKAGE = "rockcheck"
+
+
+def cell_key(scene: Scene, name: str, settings: Mapping[str, Any]) -> str:
+    """Hash of all that a cell's history depends on: scene, settings, the code it can reach, and the libraries' versions."""
+    depends = {
+        "scene": scene.model_dump(mode="json"),
+        "model": name,
+        "settings": dict(settings),
+        "files": {name: hashlib.sha256(Path(file).read_bytes()).hexdigest() for name, file in _files(settings, scene).items()},
+        "code": code_digest(home(name)),
+        "libraries": {library: version_of(library) for library in family(name).libraries},
+        "python": platform.python_version(),
+        "machine": platform.machine(),
+    }
+    return digest(json.dumps(depends, sort_keys=True, default=str))
+
+
+def _files(settings: Mapping[str, Any], scene: Scene) -> dict[str, str]:
+    """The file that a measured history of this scene is read from, where it can be."""
+    return {name: file for name, file in settings.get("files", {}).items() if name == scene.name and Path(file).is_file()}
+
+
+def digest(text: str) -> str:
+    """A short hash of a text, 16 hex digits."""
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+@cache
+def code_digest(module: str) -> str:
+    """Hash of the code of a module and of all project modules that it imports, at its top or inside functions.
+
+    Of the syntax trees without docstrings: comments, layout and documentation do not count.
+    """
+    return digest("".join(f"{name}\n{_essence(path)}\n" for name, path in sorted(reachable(module).items())))
+
+
+def reachable(module: str) -> dict[str, Path]:
+    """Names and files of the project modules that `module` can import, itself included.
+
+    The packages that a module lies in count themselves, but not what else they import.
+    """
+    found: dict[str, Path] = {}
+    packages = {OWN_PACKAGE, module.split(".")[0]}
+    waiting = [module]
+    followed: set[str] = set()
+    while waiting:
+        name = waiting.pop()
+        path = _source(name) if name.split(".")[0] in packages else None
+        if path is None or name in followed:
+            continue
+        followed.add(name)
+        found[name] = path
+        parents = name.split(".")[:-1]
+        for depth in range(len(parents)):
+            parent = ".".join(parents[: depth + 1])
+            found.setdefault(parent, _source(parent) or path)
+        waiting += _imports(path, name if path.name == "__init__.py" else ".".join(parents), packages)
+    return found
+
+
+def _source(name: str) -> Path | None:
+    """The file of a module, None where there is none (a name inside a module)."""
+    parts = name.split(".")
+    for depth in range(min(2, len(parts)), 0, -1):  # rockcheck's folders do not lie in each other
+        try:
+            spec = importlib.util.find_spec(".".join(parts[:depth]))
+        except ModuleNotFoundError:
+            continue
+        if spec is None or spec.origin is None:
+            continue
+        if depth == len(parts):
+            return Path(spec.origin)
+        base = Path(spec.origin).parent.joinpath(*parts[depth:])
+        return next((path for path in (base / "__init__.py", base.with_suffix(".py")) if path.is_file()), None)
+    return None
+
+
+def _imports(path: Path, package: str, packages: Container[str]) -> Iterable[str]:
+    """Names of the modules that a file of `package` imports; of a package only where something that is no module is taken from it."""
+    for node in ast.walk(syntax(path)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                base = ".".join(filter(None, [*package.split(".")[: len(package.split(".")) - node.level + 1], base]))
+            for alias in node.names:
+                inner = f"{base}.{alias.name}"
+                yield inner if base.split(".")[0] in packages and _source(inner) else base
+
+
+@cache
+def syntax(path: Path) -> ast.Module:
+    """The syntax tree of a source file."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
+def _essence(path: Path) -> str:
+    tree = ast.parse(path.read_text(encoding="utf-8"))  # a tree of its own, since it is changed
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and ast.get_docstring(node, clean=False):
+            node.body = node.body[1:] or [ast.Pass()]
+    return ast.dump(tree)
+
+
+@cache
+def version_of(library: str) -> str:
+    """A distribution's version, "absent" where it is not installed."""
+    try:
+        return metadata.version(library)
+    except metadata.PackageNotFoundError:
+        return "absent"
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything that a run's figures may depend on."""
+    libraries = sorted({library for known in FAMILIES.values() for library in known.libraries} | {"pandas"})
+    return {"rockcheck": version_of("rockcheck"), "python": platform.python_version()} | {name: version_of(name) for name in libraries}
+
+
+def hardware() -> dict[str, str]:
+    """What ran it: processor, cores, memory, system."""
+    facts = {"system": f"{platform.system()} {platform.release()}", "processor": _processor(), "cores": str(os.cpu_count() or 1)}
+    if hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names:
+        facts["memory"] = f"{os.sysconf('SC_PHYS_PAGES') * os.sysconf('SC_PAGE_SIZE') / 2**30:.0f} GiB"
+    return facts
+
+
+def _processor() -> str:
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        for line in cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()

@@ -1,0 +1,110 @@
+"""The folder where results wait for the next run: written whole or not at all, read only if nothing they depend on changed.
+
+`histories/<scene>--<model>--<key>` has three files: `.csv` and `.events.csv` (`scenes.History.save`) and `.json`, the
+record, which is written last and holds the hashes of the other two. `comparisons/` holds figures in the same way. A name
+contains the hash of everything that the content depends on, so runs that share a folder can only ever write the same
+thing, and a reader never meets a half-written or outdated result.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import re
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rockcheck.scenes.writing import write_whole
+
+HISTORIES = "histories"
+COMPARISONS = "comparisons"
+#: What a history's files are called after its name.
+SUFFIXES = {".csv", ".events.csv"}
+#: A result that no run has used for so long is removed, s.
+KEEP = 14 * 86400.0
+
+
+def name_of(*parts: str) -> str:
+    """A file name from scene, model and key, safe on any system."""
+    return "--".join(re.sub(r"[^A-Za-z0-9._+=-]", "_", part) for part in parts)
+
+
+@dataclass(frozen=True)
+class Store:
+    """The results in a run's folder."""
+
+    folder: Path
+
+    def __post_init__(self) -> None:
+        for kind in (HISTORIES, COMPARISONS):
+            (self.folder / kind).mkdir(parents=True, exist_ok=True)
+
+    def history(self, name: str) -> Path:
+        """Path of a history's CSV."""
+        return self.folder / HISTORIES / f"{name}.csv"
+
+    def put(self, name: str, files: Mapping[str, str], record: Mapping[str, Any]) -> None:
+        """Keep a history: its files by suffix (".csv", ".events.csv") and its record."""
+        for suffix, text in files.items():
+            write_whole(self.folder / HISTORIES / f"{name}{suffix}", text)
+        hashes = {suffix: _hash(text.encode()) for suffix, text in files.items()}
+        write_whole(self.folder / HISTORIES / f"{name}.json", json.dumps({**record, "files": hashes}, sort_keys=True) + "\n")
+
+    def get(self, name: str) -> dict[str, Any] | None:
+        """The record of a history whose files are whole, else None."""
+        base = self.folder / HISTORIES
+        record = _read(base / f"{name}.json")
+        files = record.pop("files", None) if record else None
+        if record is None or not isinstance(files, dict) or ".csv" not in files or not files.keys() <= SUFFIXES:
+            return None
+        for suffix, expected in files.items():
+            path = base / f"{name}{suffix}"
+            if not path.is_file() or _hash(path.read_bytes()) != expected:
+                return None
+        _touch(base / f"{name}.json")
+        return record
+
+    def put_comparison(self, name: str, content: Mapping[str, Any]) -> None:
+        """Keep a cell's figures."""
+        write_whole(self.folder / COMPARISONS / f"{name}.json", json.dumps(content, sort_keys=True) + "\n")
+
+    def get_comparison(self, name: str) -> dict[str, Any] | None:
+        """A cell's figures, or None."""
+        path = self.folder / COMPARISONS / f"{name}.json"
+        found = _read(path)
+        if found is not None:
+            _touch(path)
+        return found
+
+    def prune(self, now: float | None = None) -> None:
+        """Remove results that no run has used for two weeks, and the leavings of killed runs after a day."""
+        now = time.time() if now is None else now
+        for path in [*(self.folder / HISTORIES).iterdir(), *(self.folder / COMPARISONS).iterdir(), *self.folder.glob(".*.part")]:
+            record = path if path.suffix in (".json", ".part") else path.with_name(re.sub(r"(\.events)?\.csv$", ".json", path.name))
+            used = record if record.exists() else path
+            try:
+                if now - used.stat().st_mtime > (86400.0 if path.suffix == ".part" else KEEP):
+                    path.unlink()
+            except FileNotFoundError:
+                continue  # another run was quicker
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def _touch(path: Path) -> None:
+    with contextlib.suppress(OSError):  # a read-only store can still be read
+        path.touch()
+
+
+def _hash(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

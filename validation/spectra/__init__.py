@@ -1,0 +1,1 @@
+"""Overturning spectra of all models: tiles, the claims of the paper, agreement, fragility."""

@@ -1,0 +1,152 @@
+"""Fragility: the probability that a block overturns, against the intensity of the base motion, with and without its wall."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.ebm.spectrum import SAFE, Floats
+from rockcheck.scenes import InputError, Record, Scene
+from rockcheck.validation.discrepancy.figures import Stored
+from rockcheck.validation.spectra.study import Asked, Panel
+from rockcheck.validation.spectra.tiles import Tiles
+
+#: Frequencies of the set of pulses.
+PULSES = 50
+BOOTSTRAPS, CONFIDENCE = 2000, 0.95
+FEWEST = 2
+
+
+class Case(Stored):
+    """One curve. A point is intensity, share overturned, lower and upper end of its confidence band, fitted probability.
+
+    The fit is a lognormal curve: `median` is the intensity at which its probability is one half, `dispersion` the standard
+    deviation of its logarithm; both None (and the probabilities NaN) where all or none overturn. `motions` are the records or
+    pulses, each in both directions; `undecided` runs, which failed, count as safe.
+    """
+
+    label: str
+    motions: int
+    undecided: int
+    median: float | None
+    dispersion: float | None
+    points: tuple[tuple[float, float, float, float, float], ...]
+
+
+class Fragility(Stored):
+    """`fragility.json`."""
+
+    format: int = 1
+    title: str
+    about: str
+    intensity: str
+    cases: tuple[Case, ...]
+
+
+def fragility(panel: Panel, asked: Asked, records: Sequence[Path], tiles: Tiles) -> Fragility:
+    """The curves of a scene for a set of records, or, without any, for pulses of the scene's kind over the frequencies asked.
+
+    Each motion is played in both directions at every intensity: its peak acceleration over g tan(alpha), the amplitudes
+    asked. Raises `InputError` for a set of fewer than `FEWEST`.
+    """
+    scene = panel.scene
+    walls = [("with the wall", scene)] if scene.walls else []
+    cases = []
+    if 0 < len(records) < FEWEST:
+        raise InputError(f"{len(records)} is too few: give at least {FEWEST} records", "--record")
+    for label, case in [*walls, ("without a wall", scene.replace(walls=()))]:
+        sides, failed = _play_records(case, asked, records, tiles) if records else _play_pulses(case, asked, tiles)
+        cases.append(case_of(label, sides != SAFE, int(failed.sum()), asked.amplitudes))
+    motions = f"{len(records)} records" if records else f"{PULSES} pulses"
+    about = (
+        f"{motions}, each in both directions. Lines: share of the runs that overturn the block; bands: {CONFIDENCE:.0%}, by drawing the"
+        f" {'records' if records else 'pulses'} anew {BOOTSTRAPS} times; dots: the lognormal curve of the greatest likelihood."
+    )
+    if undecided := sum(case.undecided for case in cases):
+        about += f" {undecided} runs failed and count as safe."
+    return Fragility(title=f"{panel.title}, {motions}", about=about, intensity="peak acceleration / (g tan α)", cases=tuple(cases))
+
+
+Runs = tuple[NDArray[np.int8], NDArray[np.bool_]]
+
+
+def _play_pulses(scene: Scene, asked: Asked, tiles: Tiles) -> Runs:
+    """Sides and failures (pulse, direction, intensity)."""
+    if scene.excitation.kind not in ("ricker", "sine"):
+        raise InputError("is needed: the scene's excitation is no pulse", "--record")
+    frequencies = np.geomspace(asked.frequencies[0], asked.frequencies[-1], PULSES)
+    f, sign, a = np.meshgrid(frequencies, [1.0, -1.0], asked.amplitudes, indexing="ij")
+    sides, failed = tiles.play(scene, (sign * a).ravel(), f.ravel(), model=asked.model, settings=asked.settings)
+    return sides.reshape(a.shape), failed.reshape(a.shape)
+
+
+def _play_records(scene: Scene, asked: Asked, records: Sequence[Path], tiles: Tiles) -> Runs:
+    """Sides and failures (record, direction, intensity)."""
+    found = []
+    for path in records:
+        record = Record.from_file(path)
+        peak = float(np.max(np.abs(record.samples)))
+        if peak == 0.0:
+            raise InputError(f"{path.name}: a record without motion has no intensity", "--record")
+        scales = asked.amplitudes * scene.gravity * scene.block.half_width / scene.block.half_height / peak
+        both = np.concatenate([scales, -scales])
+        played = tiles.play(scene.replace(excitation=record), both, np.ones(len(both)), model=asked.model, settings=asked.settings)
+        found.append([runs.reshape(2, len(scales)) for runs in played])
+    sides, failed = zip(*found, strict=True)
+    return np.array(sides), np.array(failed)
+
+
+def case_of(label: str, overturned: NDArray[np.bool_], undecided: int, intensities: Floats) -> Case:
+    """The curve of one case from its runs (motion, direction, intensity).
+
+    The two directions of a motion are drawn together for the band, since they tell of the same motion.
+    """
+    motions, directions, _ = overturned.shape
+    drawn = np.random.default_rng(1).integers(motions, size=(BOOTSTRAPS, motions))
+    each = overturned.mean(axis=1)
+    low, high = np.quantile([each[chosen].mean(axis=0) for chosen in drawn], [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2], axis=0)
+    fit = fit_lognormal(intensities, overturned.sum(axis=(0, 1)), motions * directions)
+    fitted = lognormal(intensities, *fit) if fit else np.full(len(intensities), np.nan)
+    columns = (intensities, each.mean(axis=0), low, high, fitted)
+    points = tuple((float(x), float(share), float(lo), float(hi), float(p)) for x, share, lo, hi, p in zip(*columns, strict=True))
+    median, dispersion = fit or (None, None)
+    return Case(label=label, motions=motions, undecided=undecided, median=median, dispersion=dispersion, points=points)
+
+
+def lognormal(intensities: Floats, median: float, dispersion: float) -> Floats:
+    """Probability of overturning Phi(ln(x/median)/dispersion)."""
+    from scipy.special import ndtr
+
+    p: Floats = ndtr(np.log(intensities / median) / dispersion)
+    return p
+
+
+def fit_lognormal(intensities: Floats, overturned: NDArray[np.int64], motions: int) -> tuple[float, float] | None:
+    """Median and dispersion of the lognormal curve of the greatest likelihood (Baker 2015); None where all or none overturn.
+
+    `overturned` counts the motions, of `motions`, that overturn the block at each intensity.
+    """
+    from scipy.optimize import minimize
+    from scipy.special import log_ndtr
+
+    if not 0 < overturned.sum() < motions * len(overturned):
+        return None
+
+    def unlikelihood(place: Floats) -> float:
+        linear = (np.log(intensities) - place[0]) / np.exp(place[1])
+        return -float(np.sum(overturned * log_ndtr(linear) + (motions - overturned) * log_ndtr(-linear)))
+
+    found = minimize(
+        unlikelihood, [float(np.mean(np.log(intensities))), -0.7], method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-9}
+    )
+    return float(np.exp(found.x[0])), float(np.exp(found.x[1]))
+
+
+def csv(found: Fragility) -> str:
+    """The curves as a table."""
+    lines = ["case,intensity,share_overturned,band_low,band_high,lognormal_fit"]
+    lines += [f"{case.label}," + ",".join(map(repr, point)) for case in found.cases for point in case.points]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,241 @@
+"""Overturning spectra as a job: the paper's Figs. 6 to 9 and the user's own, in tiles that are kept, on this machine or many.
+
+A spectrum's folder holds `<name>.npz` and `<name>.csv` (outcomes with all settings), `spectra.json` (what there is), and
+`tiles/` (validation.spectra.tiles), where every finished tile waits for the next run.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from rockcheck.ebm import Spectrum, overturning_spectrum
+from rockcheck.ebm.spectrum import LEFT, RIGHT, TOLERANCE, Floats, play_nodes
+from rockcheck.scenes import Block, Floor, InputError, Ricker, Scene, Wall
+from rockcheck.scenes.writing import write_whole
+from rockcheck.validation.discrepancy.figures import Stored
+from rockcheck.validation.execute import provenance
+from rockcheck.validation.execute.models import build
+from rockcheck.validation.spectra.tiles import Tiles, compiled
+
+FIGURES: dict[int, tuple[Literal["left", "right"], float]] = {6: ("left", 0.3), 7: ("left", 0.6), 8: ("right", 0.3), 9: ("right", 0.6)}
+GAPS, RESTITUTIONS = (0.003, 0.053, 0.103), (0.0, 1.0)
+BLOCK = Block(half_width=0.397, half_height=1.555)
+FREQUENCIES, AMPLITUDES = (0.5, 8.0), (1.0, 12.0)
+#: Settings of the models in spectra, where they are not their own: outcomes need no more, and take a tenth of the time.
+SETTINGS: dict[str, dict[str, Any]] = {
+    "ebm": {"tolerance": TOLERANCE},
+    "ebm-unilateral": {"tolerance": TOLERANCE},
+    "mujoco": {"time_step": "adaptive", "largest_step": 2e-3},
+    "pybullet": {"time_step": "adaptive", "largest_step": 2e-3},
+}
+SPECTRA, TILES = "spectra", "tiles"
+#: Results of the long studies of spectra, as they come with the package.
+KEPT = Path(str(resources.files("rockcheck.validation"))) / "data" / "spectra"
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One spectrum to be played: its scene, and where it stands in the paper (`figure` None: nowhere)."""
+
+    name: str
+    title: str
+    scene: Scene
+    figure: int | None = None
+
+    @property
+    def wall(self) -> Wall | None:
+        """The wall, or None."""
+        return self.scene.walls[0] if self.scene.walls else None
+
+
+@dataclass(frozen=True)
+class Asked:
+    """How spectra are to be played: grid, model and settings. Raises `InputError` where that cannot be."""
+
+    frequencies: Floats
+    amplitudes: Floats
+    model: str = "ebm"
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    refine: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "settings", {**SETTINGS.get(self.model, {}), **self.settings})
+        build(self.model, self.settings)
+
+
+class SpectrumRecord(Stored):
+    """A played spectrum in `spectra.json`; shares are of all nodes."""
+
+    name: str
+    title: str
+    figure: int | None
+    scene: dict[str, Any]
+    model: str
+    settings: dict[str, Any]
+    frequency_ratios: tuple[float, ...]
+    amplitude_ratios: tuple[float, ...]
+    refined: bool
+    evaluations: int
+    undecided: int
+    safe: float
+    left: float
+    right: float
+
+
+class SpectraIndex(Stored):
+    """`spectra.json`: what spectra there are in the folder."""
+
+    format: int = 1
+    spectra: tuple[SpectrumRecord, ...] = ()
+
+
+def paper_panels(figure: int) -> tuple[Panel, ...]:
+    """The seven spectra of the paper's Fig. 6, 7, 8 or 9: unobstructed, then gap by gap with e = 0 and e = 1."""
+    side, friction = FIGURES[figure]
+    walls: list[Wall | None] = [None, *(Wall(side=side, gap=gap, restitution=e) for gap in GAPS for e in RESTITUTIONS)]
+    return tuple(_paper_panel(figure, friction, wall) for wall in walls)
+
+
+def _paper_panel(figure: int, friction: float, wall: Wall | None) -> Panel:
+    name, title = f"figure-{figure}-unobstructed", "Unobstructed"
+    if wall:
+        millimetres = round(1000.0 * wall.gap)
+        name, title = f"figure-{figure}-gap-{millimetres}-e-{wall.restitution:g}", f"Gap {millimetres} mm, e = {wall.restitution:g}"
+    scene = Scene(
+        name=name,
+        block=BLOCK,
+        floor=Floor(friction=friction),
+        walls=(wall,) if wall else (),
+        excitation=Ricker(amplitude=1.0, period=1.0),
+        duration=1.0,
+    )
+    return Panel(name, title, scene, figure)
+
+
+def axis(low: float, high: float, size: int, key: str) -> Floats:
+    """`size` equally spaced ratios from `low` to `high`; raises `InputError` where they are not finite, positive and in order."""
+    if not (np.isfinite(low) and np.isfinite(high) and low > 0.0):
+        raise InputError(f"{low:g} to {high:g} is not allowed: positive finite numbers are asked for", key)
+    if low >= high:
+        raise InputError(f"{low:g} to {high:g} is not allowed: the lower end comes first", key)
+    return np.linspace(low, high, size)
+
+
+def play_panels(panels: Sequence[Panel], asked: Asked, tiles: Tiles, done: Callable[[Panel], None] | None = None) -> list[Spectrum]:
+    """The spectra of the panels, in order; on a cluster all at once, here one after the other on all cores.
+
+    `done` is called when a panel is finished. Raises `InputError`.
+    """
+
+    def play(panel: Panel) -> Spectrum:
+        spectrum = overturning_spectrum(
+            panel.scene,
+            asked.frequencies,
+            asked.amplitudes,
+            refine=asked.refine,
+            play=lambda scene, a, f: tiles.play(scene, a, f, model=asked.model, settings=asked.settings),
+        )
+        if done is not None:
+            done(panel)
+        return spectrum
+
+    for panel in panels:
+        check = getattr(build(asked.model, asked.settings), "check", None)
+        if check is not None:
+            check(panel.scene)
+    if tiles.client is None:
+        return [play(panel) for panel in panels]
+    with ThreadPoolExecutor(max_workers=len(panels)) as pool:
+        return list(pool.map(play, panels))
+
+
+def warm_up(panel: Panel, asked: Asked) -> None:
+    """Load or compile the event-based model's code, by one node of the panel."""
+    player = build(asked.model, asked.settings)
+    if compiled(player):
+        play_nodes(panel.scene, asked.amplitudes[:1], asked.frequencies[-1:], model=player)
+
+
+def save(panels: Sequence[Panel], spectra: Sequence[Spectrum], asked: Asked, folder: Path) -> None:
+    """Write each spectrum's outcomes with its settings as NPZ and CSV, and note it in the folder's `spectra.json`."""
+    records = []
+    for panel, spectrum in zip(panels, spectra, strict=True):
+        record = SpectrumRecord(
+            name=stem(panel.name, asked.model),
+            title=panel.title,
+            figure=panel.figure,
+            scene=_plain_scene(panel.scene),
+            model=asked.model,
+            settings=dict(asked.settings),
+            frequency_ratios=tuple(spectrum.frequency_ratios.tolist()),
+            amplitude_ratios=tuple(spectrum.amplitude_ratios.tolist()),
+            refined=asked.refine,
+            evaluations=spectrum.evaluations,
+            undecided=len(spectrum.undecided),
+            safe=spectrum.safe_area,
+            left=float(np.mean(spectrum.outcomes == LEFT)),
+            right=float(np.mean(spectrum.outcomes == RIGHT)),
+        )
+        about = record.model_dump(exclude={"frequency_ratios", "amplitude_ratios"}) | {"versions": provenance.versions()}
+        _write_npz(folder / f"{record.name}.npz", spectrum, json.dumps(about))
+        write_whole(folder / f"{record.name}.csv", _csv(spectrum, json.dumps(about)))
+        records.append(record)
+    index = read_index(folder)
+    new = {record.name: record for record in records}
+    merged = [*(old for old in index.spectra if old.name not in new), *records]
+    whole = SpectraIndex(spectra=tuple(sorted(merged, key=lambda record: record.name)))
+    write_whole(folder / "spectra.json", whole.model_dump_json(indent=1) + "\n")
+
+
+def stem(name: str, model: str) -> str:
+    """The name of a spectrum's files: the panel's, and the model's where that is not the paper's."""
+    return name if model == "ebm" else f"{name}--{model}"
+
+
+def read_index(folder: Path) -> SpectraIndex:
+    """`spectra.json` of a folder; empty where there is none that this version can read."""
+    try:
+        return SpectraIndex.model_validate_json((folder / "spectra.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return SpectraIndex()
+
+
+def _plain_scene(scene: Scene) -> dict[str, Any]:
+    """The scene as data, a record's samples left out (its name says which it is)."""
+    data = scene.model_dump(mode="json")
+    data["excitation"].pop("unscaled", None)
+    data["vertical"].pop("unscaled", None)
+    return data
+
+
+def _write_npz(path: Path, spectrum: Spectrum, about: str) -> None:
+    content = io.BytesIO()
+    np.savez_compressed(
+        content,
+        outcomes=spectrum.outcomes,
+        frequency_ratios=spectrum.frequency_ratios,
+        amplitude_ratios=spectrum.amplitude_ratios,
+        undecided=spectrum.undecided,
+        settings=np.array(about),
+    )
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    part.write_bytes(content.getvalue())
+    part.replace(path)
+
+
+def _csv(spectrum: Spectrum, about: str) -> str:
+    """One row an amplitude ratio, one column a frequency ratio: -1 overturned left, 0 safe, 1 overturned right."""
+    lines = [f"# rockcheck spectrum {about}", "amplitude_ratio\\frequency_ratio," + ",".join(map(repr, spectrum.frequency_ratios.tolist()))]
+    rows: Iterable[tuple[float, list[int]]] = zip(spectrum.amplitude_ratios.tolist(), spectrum.outcomes.tolist(), strict=True)
+    lines += [f"{amplitude!r}," + ",".join(map(str, row)) for amplitude, row in rows]
+    return "\n".join(lines) + "\n"

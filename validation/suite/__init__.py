@@ -1,0 +1,1 @@
+"""Suites of cells: read, run, judged against tolerances, accepted."""

@@ -1,0 +1,118 @@
+"""`accept`: the figures of a run become the expected ones of the suite's tolerance file, which keeps its remarks and order."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, MutableMapping
+from typing import Any
+
+import tomlkit
+
+from rockcheck.scenes import InputError
+from rockcheck.scenes.errors import printable
+from rockcheck.scenes.writing import write_whole
+from rockcheck.validation.suite.results import Check, Run
+from rockcheck.validation.suite.suites import Suite
+from rockcheck.validation.suite.tolerances import OWN_FIGURES, Windowed
+
+#: New lines: the limit and the drift band as shares of a difference from perfection, and of a figure of the cell itself.
+ROOM, DRIFT = 2.0, 0.2
+OWN_ROOM, OWN_DRIFT = 0.02, 0.002
+#: The least limit and drift band of new lines: multiples of the measure's resolution, and a share of the limit.
+LEAST_LIMIT, LEAST_DRIFT, LEAST_SHARE = 10.0, 1.0, 0.01
+
+
+def accept(suite: Suite, run: Run, reason: str | None) -> tuple[list[str], list[str]]:
+    """Write the figures of `run` into the tolerance file of `suite`.
+
+    Returns the changes and what was refused, a line each. A limit that the figure is outside of is loosened only with a
+    `reason`, which goes into the file; a check without a figure is always refused. A limit is never tightened.
+    """
+    changes: list[str] = []
+    refused: list[str] = []
+    for part in suite.parts or (suite,):
+        _accept(part, run, reason, changes, refused)
+    return changes, refused
+
+
+def _accept(suite: Suite, run: Run, reason: str | None, changes: list[str], refused: list[str]) -> None:
+    path = suite.tolerances_path
+    document = tomlkit.parse(path.read_text(encoding="utf-8")) if path.exists() else tomlkit.document()
+    tables: Any = document.setdefault("tolerances", tomlkit.table()) if path == suite.path else document
+    before = len(changes)
+    for cell, check in run.checks():
+        if cell.scene not in suite.scenes and cell.scene not in suite.ensembles:
+            continue
+        figure = check.figure
+        against, key = figure.against or OWN_FIGURES, str(Windowed(figure.measure, figure.window))
+        where = f"[{cell.scene}.{cell.model}.{against}] {key}"
+        line = _accepted(check, reason)
+        if isinstance(line, str):
+            refused.append(f"{where}: {line}")
+            continue
+        old = None if check.limit is None else {"expected": check.expected, "limit": check.limit, "drift": check.drift, "why": check.why}
+        if line != old:
+            table = _table(tables, (cell.scene, cell.model, against))
+            changes.append(f"{where}: {_shown(old)} -> {_shown(line)}")
+            entry = tomlkit.inline_table()
+            entry.update(line)
+            table[key] = entry
+    if len(changes) > before:
+        try:
+            write_whole(path, re.sub(r"}\n+\[", "}\n\n[", tomlkit.dumps(document)))
+        except OSError as error:
+            raise InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
+
+
+def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
+    """The new line of a check, or why there is none."""
+    value = check.figure.value
+    if value is None:
+        return check.reason
+    measure = Windowed.parse(check.figure.measure).definition
+    at_least = measure.sense == "at least"
+    outside = check.limit is not None and (value < check.limit if at_least else abs(value - (check.ideal or 0.0)) > check.limit)
+    if check.verdict == "fail" and check.limit is not None and not outside:
+        return check.reason  # such as a window that was not compared whole
+    if outside and not reason:
+        return f"{check.reason}; loosening a limit needs --reason"
+    own = measure.ideal is None
+    size = abs(value) if own else abs(value - (measure.ideal or 0.0))
+    limit, why = check.limit, check.why
+    if limit is None or outside:
+        room = max((OWN_ROOM if own else ROOM) * size, LEAST_LIMIT * measure.resolution)
+        limit = _round(0.9 * value, down=True) if at_least else _round(room)
+        why = reason or "first accepted figure"
+    drift = check.drift
+    if drift is None:
+        drift = _round(max((OWN_DRIFT if own else DRIFT) * size, LEAST_SHARE * limit, LEAST_DRIFT * measure.resolution))
+    expected = value if check.verdict != "pass" or check.expected is None else check.expected
+    return {"expected": _short(expected), "limit": limit, "drift": drift, "why": why}
+
+
+def _table(tables: MutableMapping[str, Any], path: tuple[str, ...]) -> Any:
+    for depth, name in enumerate(path):
+        if name not in tables:
+            tables[name] = tomlkit.table(is_super_table=depth < len(path) - 1)
+        tables = tables[name]
+    return tables
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.8g}")
+
+
+def _round(value: float, down: bool = False) -> float:
+    """`value` with two digits, rounded up (or down)."""
+    if value == 0.0:
+        return 0.0
+    unit = 10.0 ** (math.floor(math.log10(abs(value))) - 1)
+    steps = math.floor(value / unit) if down else math.ceil(value / unit * (1.0 - 1e-12))
+    return float(f"{steps * unit:.2g}")
+
+
+def _shown(line: Mapping[str, Any] | None) -> str:
+    if line is None:
+        return "none"
+    return ", ".join(f"{name} {'-' if line[name] is None else line[name]}" for name in ("expected", "limit", "drift"))

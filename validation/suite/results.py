@@ -1,0 +1,228 @@
+"""A finished run as data: what `rockcheck validate` writes to `run.json` and what reports, CI and `rockcheck accept` read.
+
+A run's folder holds
+
+    run.json                       one `Run` (this module); run.schema.json beside it describes it
+    histories/<scene>--<model>--<key>.csv          one history a cell, `scenes.History.save` (path in `Cell.history`)
+    histories/<scene>--<model>--<key>.events.csv   its events
+
+Nothing here knows how a cell is simulated, compared or shown.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path, PurePath
+from typing import Any, Literal
+
+from pydantic import Field, ValidationError, field_validator
+
+from rockcheck.scenes import InputError, Scene
+from rockcheck.scenes.errors import from_validation, printable
+from rockcheck.scenes.writing import write_whole
+from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
+
+RUN_FILE = "run.json"
+SCHEMA_FILE = "run.schema.json"
+FORMAT = 1
+
+#: Verdict on one check: inside the limit; inside, but outside the drift band; outside the limit or not to be judged.
+CheckVerdict = Literal["pass", "changed", "fail"]
+#: Verdict on a cell or a run: the worst of its checks, or "error" where a model failed.
+Verdict = Literal["pass", "changed", "fail", "error"]
+SEVERITY: tuple[Verdict, ...] = ("pass", "changed", "fail", "error")
+#: "numerical": two solutions of the same equations. "model form": the reference forbids free flight, the candidate does not.
+#: "measured": one of the two was measured. "exact": against a closed form. "absolute": a figure of the cell itself against
+#: its expected value.
+Kind = Literal["numerical", "model form", "measured", "exact", "absolute"]
+
+
+class Check(Stored):
+    """A figure with the tolerance that it was held against.
+
+    The figure's distance from `ideal` (0 for differences, 1 for ratios, `expected` for absolute figures) may be at most
+    `limit`; a value further than `drift` from `expected` is "changed". `limit` is None where no tolerance is written down,
+    which never passes. `reason` says why a check did not pass, one line.
+    """
+
+    figure: Figure
+    kind: Kind
+    verdict: CheckVerdict
+    reason: str = ""
+    ideal: float | None = None
+    expected: float | None = None
+    limit: float | None = None
+    drift: float | None = None
+    why: str = ""
+
+
+class CostRecord(Stored):
+    """What the cell's run took: `scenes.Cost`, and all of the worker's wall time (set-up, simulation, writing)."""
+
+    wall_seconds: float = 0.0
+    cpu_seconds: float = 0.0
+    set_up: float = 0.0
+    steps: int = 0
+    evaluations: int = 0
+    energy_gains: int = 0
+    largest_energy_gain: float = 0.0
+    error_estimate: float | None = None
+    worker_seconds: float = 0.0
+
+
+class Cell(Stored):
+    """One scene played by one model.
+
+    `status` "failed" means no history (`reason` says why: a model's failure, a crash, a hang, memory). `history` is the
+    path of its CSV relative to the run's folder. `read_back` is true where nothing that the cell depends on had changed.
+    `figures` are all measures, judged or not; `checks` those with a tolerance or in need of one.
+    """
+
+    scene: str
+    model: str
+    settings: dict[str, Any] = Field(default_factory=dict)
+    key: str = ""
+    status: Literal["done", "failed"]
+    reason: str = ""
+    read_back: bool = False
+    history: str | None = None
+    outcome: str = ""
+    notes: tuple[str, ...] = ()
+    cost: CostRecord = CostRecord()
+    figures: tuple[Figure, ...] = ()
+    checks: tuple[Check, ...] = ()
+
+    @field_validator("history")
+    @classmethod
+    def _inside(cls, history: str | None) -> str | None:
+        if history is not None and (PurePath(history).is_absolute() or ".." in PurePath(history).parts or not history.isprintable()):
+            raise InputError(f"{printable(history)} is not allowed: a path within the run's folder is asked for")
+        return history
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst of the cell's checks; "error" if the model failed."""
+        if self.status == "failed":
+            return "error"
+        return worst(check.verdict for check in self.checks)
+
+
+class EnsembleRecord(Stored):
+    """What each model made of an ensemble: by model, peak |theta| in alpha and outcome of each scene (None and why it failed).
+
+    The statistics are in the figures of the ensemble's cells, whose `scene` is the ensemble's name. `definition` is the table
+    that the scenes are drawn from.
+    """
+
+    name: str
+    description: str = ""
+    definition: dict[str, Any]
+    peaks: dict[str, tuple[float | None, ...]]
+    outcomes: dict[str, tuple[str, ...]]
+
+
+class Run(Stored):
+    """All of one run of a suite.
+
+    `scenes` holds each scene's `model_dump(mode="json")` by name, in the suite's order, `models` the models' names in
+    order; a cell's `scene` may also be one of `ensembles`. `reference` is the model that judges numerical differences,
+    `model_form` the one whose missing physics is shown beside it. `faults` are checks that belong to no cell of the run (a
+    tolerance whose cell is missing).
+    """
+
+    format: int = FORMAT
+    suite: str
+    description: str = ""
+    created: str
+    reference: str
+    model_form: str = ""
+    scenes: dict[str, dict[str, Any]]
+    models: tuple[str, ...]
+    cells: tuple[Cell, ...]
+    faults: tuple[str, ...] = ()
+    measures: tuple[MeasureRecord, ...] = ()
+    versions: dict[str, str] = Field(default_factory=dict)
+    hardware: dict[str, str] = Field(default_factory=dict)
+    wall_seconds: float = 0.0
+    strict: bool = False
+    tolerances_file: str = ""
+    ensembles: tuple[EnsembleRecord, ...] = ()
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst cell; "fail" at least where there are faults, and never "pass" without a single check."""
+        found = worst([cell.verdict for cell in self.cells] + (["fail"] if self.faults else []))
+        return found if any(cell.checks for cell in self.cells) else worst([found, "fail"])
+
+    @property
+    def exit_code(self) -> int:
+        """0 pass, 1 out of tolerance (under `strict` also changed), 3 a model failed."""
+        return {"pass": 0, "changed": int(self.strict), "fail": 1, "error": 3}[self.verdict]
+
+    @property
+    def up_to_date(self) -> int:
+        """How many cells were read back."""
+        return sum(cell.read_back for cell in self.cells)
+
+    def cell(self, scene: str, model: str) -> Cell | None:
+        """The cell of that scene and model, or None."""
+        return next((cell for cell in self.cells if (cell.scene, cell.model) == (scene, model)), None)
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Names of scenes and ensembles that have cells, in order."""
+        return tuple(dict.fromkeys(cell.scene for cell in self.cells))
+
+    def of_scene(self, scene: str) -> tuple[Cell, ...]:
+        """The cells of one scene, in the models' order."""
+        return tuple(cell for cell in self.cells if cell.scene == scene)
+
+    @property
+    def without_tolerance(self) -> int:
+        """How many figures are asked for but have no tolerance yet, which none of them passes."""
+        return sum(check.limit is None for _, check in self.checks())
+
+    def checks(self) -> Iterator[tuple[Cell, Check]]:
+        """All checks with their cells."""
+        for cell in self.cells:
+            for check in cell.checks:
+                yield cell, check
+
+    def load_scene(self, name: str) -> Scene:
+        """The scene of that name, rebuilt."""
+        return Scene(**self.scenes[name])
+
+    def save(self, folder: Path) -> Path:
+        """Write `run.json` and its schema into `folder` (made if need be), each whole or not at all; returns run.json's path."""
+        folder.mkdir(parents=True, exist_ok=True)
+        write_whole(folder / SCHEMA_FILE, json.dumps(schema(), indent=1, sort_keys=True) + "\n")
+        return write_whole(folder / RUN_FILE, self.model_dump_json(indent=1) + "\n")
+
+    @classmethod
+    def load(cls, folder: str | Path) -> Run:
+        """The run in `folder`; raises `InputError` where there is none or it was written by another format."""
+        path = Path(folder) / RUN_FILE
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise InputError(f"{printable(path)}: no finished run here ({error.strerror})") from None
+        except (ValueError, RecursionError) as error:
+            raise InputError(f"{printable(path)}: not a run written by rockcheck: {printable(error)}") from None
+        if isinstance(data, dict) and data.get("format") != FORMAT:
+            found = f"format {printable(data['format'])}; this version reads {FORMAT}" if "format" in data else "not the run of a suite"
+            raise InputError(f"{printable(path)}: {found}")
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise InputError(f"{printable(path)}: {from_validation(error)}") from None
+
+
+def worst(verdicts: Iterator[Any] | list[Any]) -> Verdict:
+    """The most severe verdict; "pass" if there is none."""
+    return max(verdicts, key=SEVERITY.index, default="pass")
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema of `run.json`."""
+    return Run.model_json_schema()

@@ -1,0 +1,350 @@
+"""Runs a suite: plays the cells that are not up to date, compares, judges, and returns the `Run`."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import time
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rockcheck.scenes import History, InputError, Scene
+from rockcheck.validation.discrepancy.compare import compare, describe, evaluate, too_short
+from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
+from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
+from rockcheck.validation.execute import provenance, workers
+from rockcheck.validation.execute.models import is_own
+from rockcheck.validation.execute.store import HISTORIES, Store, name_of
+from rockcheck.validation.suite.ensembles import Ensemble
+from rockcheck.validation.suite.results import Cell, CostRecord, EnsembleRecord, Run
+from rockcheck.validation.suite.suites import Part, Suite
+from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Place, Windowed, judge
+
+#: Told after each cell: cells done, cells in all, and a few words on what was last.
+Progress = Callable[[int, int, str], None]
+#: Plays tasks somewhere: yields (index, result) as they end.
+Executor = Callable[..., Iterator[tuple[int, workers.Played]]]
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """A cell of the suite before it is played: scene, model, and the key of all that it depends on."""
+
+    scene: Scene
+    part: Part
+    key: str
+
+    @property
+    def name(self) -> str:
+        """Name of its files."""
+        return name_of(self.scene.name, self.part.label, self.key)
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Some scenes of an ensemble, for one model."""
+
+    ensemble: Ensemble
+    base: Scene
+    part: Part
+    numbers: range
+    key: str
+
+    @property
+    def name(self) -> str:
+        """Name of its file."""
+        return name_of(self.ensemble.name, self.part.label, f"{self.numbers.start}", self.key)
+
+
+def run_suite(
+    suite: Suite,
+    folder: Path,
+    *,
+    jobs: int | None = None,
+    force: bool = False,
+    strict: bool = False,
+    play: Executor = workers.local,
+    progress: Progress | None = None,
+) -> Run:
+    """Play, compare and judge every cell of a suite; results are kept in `folder` and read back while up to date.
+
+    A cell that fails is a failed cell of the run, never an exception. Raises `InputError` where `folder` cannot be used.
+    """
+    began = time.perf_counter()
+    report = progress or (lambda done, of, what: None)
+    try:
+        store = Store(folder)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be used as the output folder: {error.strerror}") from None
+    spots = [Spot(scene, part, provenance.cell_key(scene, part.family_name, part.settings)) for scene, part in suite.cells()]
+    batches = [batch for crowd in suite.crowds() for batch in _batches(*crowd)]
+    items: list[Spot | Batch] = [*spots, *batches]
+    records: dict[Spot | Batch, dict[str, Any]] = {}
+    failures: dict[Spot | Batch, str] = {}
+    if not force:
+        for item in items:
+            found = store.get(item.name) if isinstance(item, Spot) else store.get_comparison(item.name)
+            if found is not None:
+                records[item] = found
+    read_back = set(records)
+    waiting = [item for item in items if item not in records]
+    report(len(records), len(items), f"{len(records)} up to date")
+    limits = [suite.part_of(item.scene.name if isinstance(item, Spot) else item.ensemble.name).limits for item in waiting]
+    for index, result in play(
+        [_task(item, suite.path.parent) for item in waiting],
+        jobs=jobs or os.cpu_count() or 1,
+        seconds=[limit.seconds for limit in limits],
+        memory_mb=max((limit.memory_mb for limit in limits), default=0.0),
+    ):
+        item = waiting[index]
+        if result.failure:
+            failures[item] = result.failure
+        else:
+            records[item] = result.record
+            if isinstance(item, Spot):
+                store.put(item.name, result.files, result.record)
+            else:
+                store.put_comparison(item.name, result.record)
+        place = item.scene.name if isinstance(item, Spot) else item.ensemble.name
+        report(len(records) + len(failures), len(items), f"{place}, {item.part.label}")
+    by_place = {(spot.scene.name, spot.part.label): spot for spot in spots}
+    cells = [_cell(suite, spot, by_place, records, failures, store, spot in read_back) for spot in spots]
+    ensembles, crowds = _crowds(suite, batches, records, failures, read_back)
+    cells += crowds
+    store.prune()
+    return Run(
+        suite=suite.name,
+        description=suite.description,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        reference=suite.reference,
+        model_form=suite.model_form,
+        scenes={name: scene.model_dump(mode="json") for name, scene in suite.scenes.items()},
+        models=tuple(suite.models),
+        cells=tuple(cells),
+        ensembles=tuple(ensembles),
+        faults=_without_cell(suite, {(cell.scene, cell.model) for cell in cells}),
+        measures=tuple(MeasureRecord(name=m.name, label=m.label, unit=m.unit, formula=m.formula) for m in MEASURES.values()),
+        versions=provenance.versions(),
+        hardware=provenance.hardware(),
+        wall_seconds=time.perf_counter() - began,
+        strict=strict,
+        tolerances_file=str(suite.tolerances_path),
+    )
+
+
+def _batches(ensemble: Ensemble, base: Scene, part: Part) -> Iterator[Batch]:
+    """An ensemble cut into batches; a batch's key covers how its scenes are drawn, so that they need not be drawn to look it up."""
+    drawing = {
+        "ensemble": ensemble.model_dump(mode="json", exclude={"count", "batch", "description"}),
+        "code": provenance.code_digest("rockcheck.validation.suite.ensembles"),
+    }
+    for start in range(0, ensemble.count, ensemble.batch):
+        numbers = range(start, min(start + ensemble.batch, ensemble.count))
+        settings = {**part.settings, "drawn": {**drawing, "numbers": [numbers.start, numbers.stop]}}
+        yield Batch(ensemble, base, part, numbers, provenance.cell_key(base, part.family_name, settings))
+
+
+def _task(item: Spot | Batch, folder: Path) -> workers.Task | workers.BatchTask:
+    part = item.part
+    model: dict[str, Any] = {
+        "label": part.label,
+        "family": part.family_name,
+        "settings": dict(part.settings),
+        "search_path": (str(folder),) if is_own(part.family_name) else (),
+    }
+    if isinstance(item, Spot):
+        return workers.Task(scene=item.scene, **model)
+    return workers.BatchTask(scenes=tuple(item.ensemble.drawn(item.base, n) for n in item.numbers), **model)
+
+
+def _crowds(
+    suite: Suite,
+    batches: Sequence[Batch],
+    records: Mapping[Spot | Batch, Mapping[str, Any]],
+    failures: Mapping[Spot | Batch, str],
+    read_back: Container[Spot | Batch],
+) -> tuple[list[EnsembleRecord], list[Cell]]:
+    """The ensembles with all peaks and outcomes, and a cell for each of them and each model."""
+    ensembles: list[EnsembleRecord] = []
+    cells: list[Cell] = []
+    for ensemble, of_ensemble in groupby(batches, key=lambda batch: batch.ensemble):
+        by_model = {label: list(found) for label, found in groupby(of_ensemble, key=lambda batch: batch.part.label)}
+        samples: dict[str, Sample] = {}
+        for label, parts in by_model.items():
+            got = [records.get(b) or {"peaks": [None] * len(b.numbers), "outcomes": [failures[b]] * len(b.numbers)} for b in parts]
+            peaks = [math.nan if peak is None else peak for record in got for peak in record["peaks"]]
+            samples[label] = Sample(np.array(peaks), tuple(outcome for record in got for outcome in record["outcomes"]))
+        ensembles.append(
+            EnsembleRecord(
+                name=ensemble.name,
+                description=ensemble.description,
+                definition=ensemble.model_dump(mode="json", exclude_none=True),
+                peaks={label: tuple(peak if math.isfinite(peak) else None for peak in sample.peaks) for label, sample in samples.items()},
+                outcomes={label: tuple(sample.outcomes) for label, sample in samples.items()},
+            )
+        )
+        cells += [_crowd_cell(suite, ensemble, by_model[label], samples, records, read_back) for label in samples]
+    return ensembles, cells
+
+
+def _crowd_cell(
+    suite: Suite,
+    ensemble: Ensemble,
+    batches: Sequence[Batch],
+    samples: Mapping[str, Sample],
+    records: Mapping[Spot | Batch, Mapping[str, Any]],
+    read_back: Container[Spot | Batch],
+) -> Cell:
+    part = batches[0].part
+    own, origin = samples[part.label], suite.part_of(ensemble.name)
+    costs = [records[batch]["cost"] for batch in batches if batch in records]
+    about: dict[str, Any] = {
+        "scene": ensemble.name,
+        "model": part.label,
+        "key": provenance.digest("".join(batch.key for batch in batches)),
+        "settings": dict(part.settings),
+        "read_back": all(batch in read_back for batch in batches),
+        "cost": CostRecord(**{key: sum(cost[key] for cost in costs) for key in (costs[0] if costs else ())}),
+    }
+    if own.failures:
+        reason = next(outcome for peak, outcome in zip(own.peaks, own.outcomes, strict=True) if not math.isfinite(peak))
+        return Cell(**about, status="failed", reason=f"{own.failures} of {len(own.peaks)} scenes failed; the first: {reason}")
+    asked = origin.asked(ensemble.name, part.label)
+    figures = [
+        evaluate(measure, Samples(samples[name], own), "alpha", against=name)
+        for name in dict.fromkeys([origin.reference, origin.model_form, *(place.against for place in asked)])
+        if name in samples and name != part.label
+        for measure in STATISTICS.values()
+    ]
+    checks = [
+        judge(_figure(figures, place), origin.tolerances.get(place), kind=kind, measure=place.what.definition)
+        for place, kind in asked.items()
+    ]
+    outcome = f"{int(np.sum(own.fallen))} of {len(own.peaks)} overturned"
+    return Cell(**about, status="done", outcome=outcome, figures=tuple(figures), checks=tuple(checks))
+
+
+def _without_cell(suite: Suite, cells: Container[tuple[str, str]]) -> tuple[str, ...]:
+    """Tolerances that nothing in the suite can meet."""
+    return tuple(f"tolerance [{place}] has no cell in the suite" for place in suite.tolerances if (place.scene, place.model) not in cells)
+
+
+def _cell(
+    suite: Suite,
+    spot: Spot,
+    spots: Mapping[tuple[str, str], Spot],
+    records: Mapping[Spot | Batch, Mapping[str, Any]],
+    failures: Mapping[Spot | Batch, str],
+    store: Store,
+    read_back: bool,
+) -> Cell:
+    """The finished cell: its figures, compared with each reference, and the verdicts on them."""
+    scene, label = spot.scene, spot.part.label
+    about: dict[str, Any] = {"scene": scene.name, "model": label, "key": spot.key, "read_back": read_back}
+    if spot in failures:
+        return Cell(**about, status="failed", reason=failures[spot], settings=dict(spot.part.settings))
+    record = records[spot]
+    asked = suite.asked(scene.name, label)
+    own = suite.part_of(scene.name)
+    figures: list[Figure] = []
+    gaps: dict[tuple[str, str], tuple[str, bool]] = {}
+    for name in dict.fromkeys([OWN_FIGURES, own.reference, own.model_form, *(place.against for place in asked)]):
+        reference = spots.get((scene.name, name))
+        if name != OWN_FIGURES and (reference is None or reference is spot or reference not in records):
+            continue
+        extra = sorted(p.what for p in asked if p.against == name and (p.what.window or p.what.definition.on_request))
+        horizon = _horizon(store, scene) if any(what.window == HORIZON for what in extra) else None
+        found = _compared(store, scene, spot, reference, extra, horizon)
+        figures += [Figure(**figure) for figure in found["figures"]]
+        gaps |= {(name, window): (text, fall) for window, (text, fall) in found["gaps"].items()}
+    checks = []
+    for place, kind in asked.items():
+        figure = _figure(figures, place)
+        text, fall = gaps.get((place.against, place.what.window), ("", False))
+        gap = "" if fall and kind == "model form" else text
+        checks.append(judge(figure, own.tolerances.get(place), kind=kind, measure=place.what.definition, gap=gap))
+    return Cell(
+        **about,
+        status="done",
+        settings=record["settings"],
+        history=f"{HISTORIES}/{spot.name}.csv",
+        outcome=record["outcome"],
+        notes=tuple(record["notes"]),
+        cost=CostRecord(**record["cost"]),
+        figures=tuple(figures),
+        checks=tuple(checks),
+    )
+
+
+def _figure(figures: Sequence[Figure], place: Place) -> Figure:
+    """The figure that a check is about; one without value where it is missing, so that the check cannot pass."""
+    against = "" if place.against == OWN_FIGURES else place.against
+    for figure in figures:
+        if (figure.measure, figure.against, figure.window) == (place.what.measure, against, place.what.window):
+            return figure
+    measure = place.what.definition
+    reason = f"{place.against} failed in this scene" if against else "not computed"
+    return Figure(
+        measure=measure.name, label=measure.label, unit=measure.unit, value=None, against=against, window=place.what.window, note=reason
+    )
+
+
+def _horizon(store: Store, scene: Scene) -> float:
+    """The time up to which histories of this scene can be compared point by point (`ebm.horizon`), s; kept in the store."""
+    key = provenance.cell_key(scene, "ebm-unilateral", {"of": "horizon"})
+    name = name_of(scene.name, HORIZON, key)
+    found = store.get_comparison(name)
+    if found is None:
+        from rockcheck.ebm.horizon import predictability_horizon
+
+        found = {"horizon": predictability_horizon(scene)}
+        store.put_comparison(name, found)
+    return float(found["horizon"])
+
+
+def _compared(
+    store: Store, scene: Scene, spot: Spot, reference: Spot | None, windowed: Sequence[Windowed], horizon: float | None
+) -> dict[str, Any]:
+    """All figures over the whole time, and those asked for over a window; kept in the store.
+
+    Figures of the cell itself where `reference` is None. "gaps" says by window what could not be compared,
+    and whether because one block fell.
+    """
+    code = provenance.code_digest("rockcheck.validation.discrepancy.compare")
+    key = provenance.digest(json.dumps([spot.key, reference.key if reference else "", list(map(str, windowed)), horizon, code]))
+    name = name_of(scene.name, spot.part.label, reference.part.label if reference else OWN_FIGURES, key)
+    found = store.get_comparison(name)
+    if found is None:
+        found = _compute(store, scene, spot, reference, windowed, horizon)
+        store.put_comparison(name, found)
+    return found
+
+
+def _compute(
+    store: Store, scene: Scene, spot: Spot, reference: Spot | None, windowed: Sequence[Windowed], horizon: float | None
+) -> dict[str, Any]:
+    candidate = History.load(store.history(spot.name))
+    yardstick = History.load(store.history(reference.name)) if reference else None
+    figures: list[Figure] = []
+    gaps: dict[str, tuple[str, bool]] = {}
+    asked: dict[str, list[str]] = {"": [m.name for m in (DIFFERENCES if reference else FIGURES).values() if not m.on_request]}
+    for what in windowed:
+        asked.setdefault(what.window, []).append(what.measure)
+    for window, measures in asked.items():
+        until = horizon if window == HORIZON else float(window[:-1]) if window else None
+        if yardstick is None:
+            found = describe(candidate, until=until, scene=scene, measures=measures)
+            gaps[window] = too_short(candidate, until), False
+        else:
+            discrepancy = compare(yardstick, candidate, until=until, scene=scene, measures=measures)
+            found, gaps[window] = discrepancy.figures, (discrepancy.gap, discrepancy.fall)
+        figures += [figure.model_copy(update={"window": window}) for figure in found]
+    return {"figures": [figure.model_dump(mode="json") for figure in figures], "gaps": gaps}

@@ -1,0 +1,365 @@
+"""Suites: which scenes, which models with which settings, and which figures must be within tolerance.
+
+A suite is a TOML file that a user can write:
+
+    description = "my shelf on my record"
+    reference = "ebm-unilateral"                 # judges numerical differences
+    model_form = "ebm"                           # optional: shown beside it, with a band of its own
+    scenes = ["fig4a", "shelf.toml"]             # names, or scene files beside this one
+
+    [models.ebm-unilateral]
+    [models.ebm]
+    [models.mujoco]
+    time_step = 1e-4
+    [models.mujoco-coarse]                       # a second variant of a model; "my_module:MyModel" is one of your own
+    model = "mujoco"
+    time_step = 1e-3
+    [models.table]                               # a measured history, for the scenes that it names (validation.discrepancy.measured)
+    model = "measured"
+    files = { shelf = "run7.csv" }
+    offset = -0.35                               # s, added to its times
+
+    [require]                                    # what must have a tolerance, for every scene and model
+    difference = ["theta_rms@8s", "outcome_agrees"]
+    model_form = ["theta_rms@8s"]
+    figures = ["peak_rotation@8s"]
+
+    [[grid]]                                     # scenes by combination: one alternative of each axis, merged into `scene`
+    scene = { duration = 6.0, block = { half_width = 0.4, half_height = 1.5 } }
+    axes = [
+        [{ name = "mu03", floor = { friction = 0.3 } }, { name = "mu06", floor = { friction = 0.6 } }],
+        [{ name = "weak", excitation = { kind = "ricker", amplitude = 4.0, period = 1.5 } }],
+    ]
+
+Ensembles are `[[ensemble]]` tables (validation.suite.ensembles), judged by what `require.ensemble` names. Scenes can also be written
+out as `[[scene]]` tables. Tolerances (validation.suite.tolerances) are a table `[tolerances]` in the file or a file
+`<suite>.tolerances.toml` beside it. `include = ["smoke", "walls"]` joins other suites instead.
+"""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from rockcheck.scenes import InputError, Scene, load_scene
+from rockcheck.scenes.base import Frozen, Positive
+from rockcheck.scenes.errors import printable, unknown_name
+from rockcheck.scenes.files import named_scenes, read_toml, scene_from
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
+from rockcheck.validation.discrepancy.statistics import STATISTICS
+from rockcheck.validation.execute.models import Family, build, family, is_own
+from rockcheck.validation.suite.ensembles import Ensemble
+from rockcheck.validation.suite.results import Kind
+from rockcheck.validation.suite.tolerances import OWN_FIGURES, Place, Tolerances, Windowed, parse_tolerances
+
+DATA = Path(str(resources.files("rockcheck.validation"))) / "data"
+
+
+class Limits(Frozen):
+    """What one cell may take, of wall time (s) and of memory (MB)."""
+
+    seconds: Positive = 120.0
+    memory_mb: Positive = 4096.0
+
+
+class Require(Frozen):
+    """Measures ("name" or "name@window") that must have a tolerance in every scene.
+
+    `difference`: of every other model against the reference; `model_form`: against the suite's `model_form`; `figures`: of
+    every cell itself; `ensemble`: of every other model against the reference, in the suite's ensembles.
+    """
+
+    difference: tuple[str, ...] = ()
+    model_form: tuple[str, ...] = ()
+    figures: tuple[str, ...] = ()
+    ensemble: tuple[str, ...] = ()
+
+
+class Grid(Frozen):
+    """Scenes by combination: one alternative of each axis merged into `scene`, their names joined to the scene's."""
+
+    scene: dict[str, Any] = Field(default_factory=dict)
+    axes: Annotated[tuple[tuple[dict[str, Any], ...], ...], Field(min_length=1)]
+
+
+class SuiteFile(Frozen):
+    """The keys of a suite file; see the module."""
+
+    description: str = ""
+    include: tuple[str, ...] = ()
+    reference: str = "ebm-unilateral"
+    model_form: str = ""
+    scenes: tuple[str, ...] = ()
+    scene: tuple[dict[str, Any], ...] = ()
+    grid: tuple[Grid, ...] = ()
+    models: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    require: Require = Require()
+    limits: Limits = Limits()
+    ensemble: tuple[Ensemble, ...] = ()
+    tolerances: dict[str, Any] | None = None
+
+
+@dataclass(frozen=True)
+class Part:
+    """A model of a suite: label, name of its family, and settings."""
+
+    label: str
+    family_name: str
+    settings: Mapping[str, Any]
+
+    @property
+    def family(self) -> Family:
+        """The kind of model."""
+        return family(self.family_name)
+
+
+@dataclass(frozen=True)
+class Suite:
+    """A suite, ready to run: every scene and every model's settings are validated."""
+
+    name: str
+    path: Path
+    description: str
+    reference: str
+    model_form: str
+    scenes: Mapping[str, Scene]
+    models: Mapping[str, Part]
+    require: Require
+    limits: Limits
+    tolerances: Tolerances = field(repr=False)
+    #: Where `rockcheck accept` writes: the tolerance file, or the suite file where it holds a table `[tolerances]`.
+    tolerances_path: Path = Path()
+    #: Ensembles with the scene that each is drawn from.
+    ensembles: Mapping[str, tuple[Ensemble, Scene]] = field(default_factory=dict)
+    parts: tuple[Suite, ...] = ()
+
+    def part_of(self, scene: str) -> Suite:
+        """The suite that a scene or an ensemble comes from: this one, or the included one."""
+        return next((part for part in self.parts if scene in part.scenes or scene in part.ensembles), self)
+
+    def cells(self) -> Iterator[tuple[Scene, Part]]:
+        """All cells, scene by scene."""
+        for part in self.parts or (self,):
+            for scene, model in _played(part.scenes, part.models):
+                yield part.scenes[scene], part.models[model]
+
+    def crowds(self) -> Iterator[tuple[Ensemble, Scene, Part]]:
+        """All ensembles with the scene that they are drawn from, model by model."""
+        for part in self.parts or (self,):
+            for ensemble, base in part.ensembles.values():
+                for model in part.models.values():
+                    yield ensemble, base, model
+
+    def only(self, scene: str, model: str) -> Suite:
+        """The suite with one cell, and the references that it is held against."""
+        own = self.part_of(scene)
+        if scene not in own.scenes:
+            raise unknown_name("scene of the suite", scene, self.scenes)
+        if model not in own.models:
+            raise unknown_name("model of the suite", model, own.models)
+        tolerances = {place: line for place, line in own.tolerances.items() if (place.scene, place.model) == (scene, model)}
+        needed = {model, own.reference, own.model_form, *(place.against for place in tolerances)}
+        return replace(
+            own,
+            scenes={scene: own.scenes[scene]},
+            ensembles={},
+            models={label: part for label, part in own.models.items() if label in needed},
+            tolerances=tolerances,
+        )
+
+    def asked(self, scene: str, model: str) -> dict[Place, Kind]:
+        """What must be judged in a cell, and as what: what the suite requires and whatever has a tolerance."""
+        own = self.part_of(scene)
+        required = own.require
+        if scene in own.ensembles:
+            required = Require(difference=required.ensemble)
+        places = [Place(scene, model, OWN_FIGURES, Windowed.parse(text)) for text in required.figures]
+        for against, texts in ((own.reference, required.difference), (own.model_form, required.model_form)):
+            if against and model not in (own.reference, against):
+                places += [Place(scene, model, against, Windowed.parse(text)) for text in texts]
+        places += [place for place in own.tolerances if (place.scene, place.model) == (scene, model)]
+        return {place: own.kind(place) for place in places}
+
+    def kind(self, place: Place) -> Kind:
+        """What a check means: with a wall (or a bounce), a model that cannot fly differs in form from one that can."""
+        if place.against == OWN_FIGURES:
+            return "exact" if place.what.definition.exact else "absolute"
+        if "measured" in (self.models[place.model].family_name, self.models[place.against].family_name):
+            return "measured"
+        scene = self.ensembles[place.scene][1] if place.scene in self.ensembles else self.scenes[place.scene]
+        may_hop = bool(scene.walls) or scene.floor.restitution > 0.0 or scene.initial_height > 0.0
+        differ = self.models[place.model].family.flies != self.models[place.against].family.flies
+        return "model form" if may_hop and differ else "numerical"
+
+
+def named_suites() -> dict[str, Path]:
+    """Names and files of the suites that come with the package."""
+    return {path.stem: path for path in sorted((DATA / "suites").glob("*.toml"))}
+
+
+def describe_suite(path: Path) -> str:
+    """A suite file's description, without loading its scenes."""
+    return str(read_toml(path).get("description", ""))
+
+
+def load_suite(source: str | Path) -> Suite:
+    """A suite from a TOML file, or by the name of one that comes with the package.
+
+    Raises `InputError` naming the file, the key, the value and what is allowed.
+    """
+    known = named_suites()
+    shipped = str(source) in known
+    path = known[str(source)] if shipped else Path(source)
+    if path.suffix.lower() != ".toml":
+        raise InputError(f"{unknown_name('suite', str(source), known)}; or the path of a .toml file")
+    tables = read_toml(path)
+    try:
+        return _suite(SuiteFile(**tables), path, shipped)
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if text.startswith(printable(path.parent)) else f"{printable(path)}: {text}") from None
+
+
+def _suite(given: SuiteFile, path: Path, shipped: bool) -> Suite:
+    if given.include:
+        return _joined(given, path)
+    own = any(is_own(str(settings.get("model", label))) for label, settings in given.models.items())
+    if own and str(path.parent) not in sys.path:
+        sys.path.append(str(path.parent))
+    models = {label: _part(label, settings, path.parent) for label, settings in given.models.items()}
+    for key, label in (("reference", given.reference), ("model_form", given.model_form)):
+        if label and label not in models:
+            raise InputError(f"{label!r} is not among the suite's models: {', '.join(models) or 'none'}", key)
+    if not models:
+        raise InputError("no model; at least the reference is needed", "models")
+    scenes = _scenes(given, path.parent)
+    ensembles = {e.name: (e, scene_from(e.scene, folder=path.parent, default_name=e.name)) for e in given.ensemble}
+    if not scenes and not ensembles:
+        raise InputError("no scene; at least one is needed", "scenes")
+    for name in ensembles.keys() & scenes.keys():
+        raise InputError(f"{name!r} is a scene, too", "ensemble.name")
+    for key, texts in given.require:
+        for text in texts:
+            _required(key, text)
+    tolerances_path, tables = _tolerance_tables(given, path, shipped)
+    try:
+        tolerances = parse_tolerances(tables, _played(scenes, models))
+        for place in tolerances:
+            if place.against not in (OWN_FIGURES, *models):
+                raise unknown_name(f"reference of [{place.scene}.{place.model}]", place.against, [OWN_FIGURES, *models])
+    except InputError as error:
+        raise InputError(f"{printable(tolerances_path)}: {error}") from None
+    return Suite(
+        name=path.stem,
+        path=path,
+        description=given.description,
+        reference=given.reference,
+        model_form=given.model_form,
+        scenes=scenes,
+        ensembles=ensembles,
+        models=models,
+        require=given.require,
+        limits=given.limits,
+        tolerances=tolerances,
+        tolerances_path=tolerances_path,
+    )
+
+
+def _played(scenes: Iterable[str], models: Mapping[str, Part]) -> Iterator[tuple[str, str]]:
+    """Names of scenes and models that make a cell: all, but a measured history belongs to the scenes that it names."""
+    for scene in scenes:
+        yield from ((scene, label) for label, model in models.items() if scene in model.settings.get("files", {scene: ""}))
+
+
+def _joined(given: SuiteFile, path: Path) -> Suite:
+    """Several suites as one; their scenes must have different names, their references must agree."""
+    parts = [load_suite(name if name in named_suites() else path.parent / name) for name in given.include]
+    scenes: dict[str, Scene] = {}
+    ensembles: dict[str, tuple[Ensemble, Scene]] = {}
+    models: dict[str, Part] = {}
+    for part in parts:
+        for name in {*part.scenes, *part.ensembles} & {*scenes, *ensembles}:
+            raise InputError(f"scene {name!r} is in two of the suites", "include")
+        if part.reference != parts[0].reference:
+            raise InputError(f"{part.name} and {parts[0].name} have different references", "include")
+        scenes |= part.scenes
+        ensembles |= part.ensembles
+        models |= part.models
+    return Suite(
+        name=path.stem,
+        path=path,
+        description=given.description,
+        reference=parts[0].reference,
+        model_form=next((part.model_form for part in parts if part.model_form), ""),
+        scenes=scenes,
+        ensembles=ensembles,
+        models=models,
+        require=Require(),
+        limits=given.limits,
+        tolerances={place: line for part in parts for place, line in part.tolerances.items()},
+        tolerances_path=path,
+        parts=tuple(parts),
+    )
+
+
+def _part(label: str, settings: Mapping[str, Any], folder: Path) -> Part:
+    settings = dict(settings)
+    name = str(settings.pop("model", label))
+    if name == "measured" and isinstance(settings.get("files"), dict):
+        settings["files"] = {scene: str(folder / str(file)) for scene, file in settings["files"].items()}
+    build(name, settings)
+    return Part(label, name, settings)
+
+
+def _scenes(given: SuiteFile, folder: Path) -> dict[str, Scene]:
+    found: dict[str, Scene] = {}
+    for scene in itertools.chain(
+        (load_scene(name if name in named_scenes() or Path(name).suffix != ".toml" else folder / name) for name in given.scenes),
+        (scene_from(table, folder=folder, default_name=f"scene {n}") for n, table in enumerate(given.scene, 1)),
+        (scene for grid in given.grid for scene in _combined(grid, folder)),
+    ):
+        if scene.name in found:
+            raise InputError(f"scene {scene.name!r} is named twice", "scenes")
+        found[scene.name] = scene
+    return found
+
+
+def _combined(grid: Grid, folder: Path) -> Iterator[Scene]:
+    for choice in itertools.product(*grid.axes):
+        table: Any = {key: value for key, value in grid.scene.items() if key != "name"}
+        names = [grid.scene["name"]] if "name" in grid.scene else []
+        for alternative in choice:
+            if not isinstance(alternative.get("name"), str):
+                raise InputError("each alternative needs a name", "grid.axes")
+            names.append(alternative["name"])
+            table = _merged(table, {key: value for key, value in alternative.items() if key != "name"})
+        yield scene_from({**table, "name": "-".join(map(str, names))}, folder=folder, default_name="scene")
+
+
+def _merged(base: Any, change: Any) -> Any:
+    """`change` over `base`: tables key by key, lists of tables one by one, anything else replaced."""
+    if isinstance(base, dict) and isinstance(change, dict):
+        return {**base, **{key: _merged(base.get(key), value) for key, value in change.items()}}
+    if isinstance(base, list) and isinstance(change, list):
+        return [_merged(a, b) if b is not None else a for a, b in itertools.zip_longest(base, change)]
+    return change
+
+
+def _required(key: str, text: str) -> None:
+    book = {"figures": FIGURES, "ensemble": STATISTICS}.get(key, DIFFERENCES)
+    if Windowed.parse(text).measure not in book:
+        raise unknown_name(f"measure of require.{key}", text, book)
+
+
+def _tolerance_tables(given: SuiteFile, path: Path, shipped: bool) -> tuple[Path, Mapping[str, Any]]:
+    if given.tolerances is not None:
+        return path, given.tolerances
+    beside = DATA / "tolerances" / path.name if shipped else path.with_name(f"{path.stem}.tolerances.toml")
+    return beside, read_toml(beside) if beside.exists() else {}

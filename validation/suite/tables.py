@@ -1,0 +1,140 @@
+"""Verdicts as tables: for the terminal, and as CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+from rich.table import Table
+from rich.text import Text
+
+from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.suite.results import Cell, Check, Run
+
+COLOURS = {"pass": "green", "changed": "yellow", "fail": "red", "error": "red"}
+
+
+def verdict_table(run: Run) -> Table:
+    """A row a cell, within 80 columns: the check that is nearest to its limit, how much of that it uses, and the verdict."""
+    table = Table(box=None, pad_edge=False, expand=False)
+    table.add_column("scene", overflow="ellipsis", no_wrap=True, max_width=22)
+    table.add_column("model", overflow="ellipsis", no_wrap=True, max_width=14)
+    table.add_column("nearest to its limit", overflow="ellipsis", no_wrap=True, max_width=24)
+    table.add_column("used", justify="right", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    before = ""
+    for cell in run.cells:
+        near = nearest(cell)
+        words = f"{cell.reason or 'failed'}" if cell.status == "failed" else windowed(near) if near else "nothing judged"
+        verdict = Text("-") if cell.status == "done" and not cell.checks else Text(cell.verdict, COLOURS[cell.verdict])
+        table.add_row("" if cell.scene == before else cell.scene, cell.model, Text(words), percent(near) if near else "", verdict)
+        before = cell.scene
+    return table
+
+
+def summary(run: Run) -> dict[str, Any]:
+    """The verdicts in a few plain values: of the run, of each cell, and why anything is not a pass."""
+    return {
+        "suite": run.suite,
+        "verdict": run.verdict,
+        "exit_code": run.exit_code,
+        "wall_seconds": run.wall_seconds,
+        "cells": [
+            {
+                "scene": cell.scene,
+                "model": cell.model,
+                "outcome": cell.outcome,
+                "checks": len(cell.checks),
+                "verdict": cell.verdict if cell.checks or cell.status == "failed" else None,
+            }
+            for cell in run.cells
+        ],
+        "reasons": list(verdict_lines(run)),
+    }
+
+
+def verdict_lines(run: Run) -> Iterator[str]:
+    """Why anything is not a pass, a line each."""
+    yield from run.faults
+    for cell in run.cells:
+        yield from cell_lines(cell)
+    if not any(cell.checks or cell.status == "failed" for cell in run.cells):
+        yield "nothing was judged: the suite requires no measure and has no tolerance"
+
+
+def cell_lines(cell: Cell) -> Iterator[str]:
+    """Why a cell is not a pass, a line each."""
+    if cell.status == "failed":
+        yield f"{cell.scene}, {cell.model}: {cell.reason}"
+    for check in cell.checks:
+        if check.verdict != "pass":
+            yield f"{cell.scene}, {cell.model}: {title(check)}: {check.reason}"
+
+
+def title(check: Check) -> str:
+    """The check as tolerances name it: measure, window, and what it is held against."""
+    against = f" against {check.figure.against}" if check.figure.against else ""
+    return f"{windowed(check)}{against}"
+
+
+def windowed(check: Check) -> str:
+    """What is checked, as tolerances name it: measure and window."""
+    return f"{check.figure.measure}{'@' if check.figure.window else ''}{check.figure.window}"
+
+
+def used(check: Check) -> float:
+    """Share of its limit that a check uses up, 0 to 1 within it; infinite where it cannot be judged."""
+    value, limit = check.figure.value, check.limit
+    if check.verdict == "fail" or value is None or limit is None:
+        return math.inf
+    if check.ideal is None:  # an "at least" measure: what is there of what is needed
+        return limit / value if value > 0.0 else 0.0
+    return abs(value - check.ideal) / limit if limit > 0.0 else 0.0
+
+
+def percent(check: Check) -> str:
+    """`used` in words."""
+    return f"{100.0 * used(check):.0f} %" if math.isfinite(used(check)) else "beyond"
+
+
+def nearest(cell: Cell) -> Check | None:
+    """The check that failed, else the one nearest to its limit."""
+    return max(cell.checks, key=used, default=None)
+
+
+def share(check: Check) -> str:
+    """A check in a few words: name, figure, limit."""
+    figure = check.figure
+    value = "-" if figure.value is None else f"off {abs(figure.value - check.ideal):.1e}" if check.ideal else f"{figure.value:.2e}"
+    limit = "none" if check.limit is None else f"{check.limit:.2g}"
+    return f"{windowed(check)} {value} / {limit}"
+
+
+def checks_csv(run: Run) -> str:
+    """All checks, a row each."""
+    tolerance = ("expected", "limit", "drift", "verdict", "reason", "why")
+    rows = ((*_row(cell, check.figure), check.kind, *(getattr(check, name) for name in tolerance)) for cell, check in run.checks())
+    return _csv((*ROW, "kind", *tolerance), rows)
+
+
+def figures_csv(run: Run) -> str:
+    """All figures, judged or not, a row each."""
+    return _csv((*ROW, "note"), ((*_row(cell, figure), figure.note) for cell in run.cells for figure in cell.figures))
+
+
+ROW = ("scene", "model", "against", "measure", "window", "value", "unit")
+
+
+def _row(cell: Cell, figure: Figure) -> tuple[object, ...]:
+    return cell.scene, cell.model, figure.against, figure.measure, figure.window, figure.value, figure.unit
+
+
+def _csv(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(head)
+    writer.writerows(["" if value is None else value for value in row] for row in rows)
+    return text.getvalue()

@@ -1,0 +1,82 @@
+"""Verdicts for machines and job pages: JUnit XML and Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
+
+from rockcheck.validation.suite.results import Cell, Check, Run
+from rockcheck.validation.suite.tables import share, title, verdict_lines
+
+MARKS = {"pass": "✅", "changed": "🟡", "fail": "❌", "error": "💥"}
+
+
+def junit(run: Run) -> str:
+    """JUnit XML: a test suite a scene, a test case a check and one for each cell's run, which is an error where it failed.
+
+    A figure that changed within its limit is a failure only in a strict run.
+    """
+    document = JUnitXml(f"rockcheck {run.suite}")
+    for scene in run.places:
+        suite = TestSuite(scene)
+        for cell in run.of_scene(scene):
+            suite.add_testcases(list(_cases(cell, run.strict)))
+        document.add_testsuite(suite)
+    if run.faults:
+        suite = TestSuite("tolerances")
+        for fault in run.faults:
+            suite.add_testcase(_case("tolerances", fault, Failure(fault)))
+        document.add_testsuite(suite)
+    document.update_statistics()
+    return bytes(document.tostring()).decode() + "\n"
+
+
+def _cases(cell: Cell, strict: bool) -> Iterator[TestCase]:
+    place = f"{cell.scene}.{cell.model}"
+    ran = _case(place, "runs", Error(cell.reason) if cell.status == "failed" else None)
+    ran.time = cell.cost.worker_seconds
+    yield ran
+    for check in cell.checks:
+        failed = check.verdict == "fail" or (strict and check.verdict == "changed")
+        yield _case(place, title(check), Failure(check.reason, check.verdict) if failed else None)
+
+
+def _case(place: str, name: str, result: Failure | Error | None) -> TestCase:
+    case = TestCase(name, place)
+    if result is not None:
+        case.result = [result]
+    return case
+
+
+def markdown(run: Run) -> str:
+    """A summary for a job's page: the verdict, what is not a pass and why, and a table of scenes by models."""
+    lines = [
+        f"## {MARKS[run.verdict]} rockcheck {run.suite}: {run.verdict}",
+        "",
+        f"{len(run.cells)} simulations, {run.up_to_date} up to date, {sum(1 for _ in run.checks())} checks, {run.wall_seconds:.1f} s.",
+        "",
+    ]
+    reasons = list(verdict_lines(run))
+    if reasons:
+        lines += [*(f"- {_plain(reason)}" for reason in reasons), ""]
+    lines += ["| scene | " + " | ".join(run.models) + " |", "|---" * (len(run.models) + 1) + "|"]
+    for scene in run.places:
+        row = [run.cell(scene, model) for model in run.models]
+        lines.append(f"| {_plain(scene)} | " + " | ".join(_entry(cell) for cell in row) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _entry(cell: Cell | None) -> str:
+    if cell is None:
+        return ""
+    return f"{MARKS[cell.verdict]} {_plain(_worst(cell.checks))}".strip()
+
+
+def _worst(checks: tuple[Check, ...]) -> str:
+    against_others = [check for check in checks if check.figure.against and check.kind == "numerical"]
+    return share(max(against_others, key=lambda check: (check.figure.value or 0.0) / (check.limit or 1.0))) if against_others else ""
+
+
+def _plain(text: str) -> str:
+    return text.replace("|", "\\|").replace("<", "&lt;")
