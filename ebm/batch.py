@@ -25,19 +25,24 @@ from rockcheck.scenes.scene import Scene
 
 Floats = NDArray[np.float64]
 _CHUNK = 256
+#: Rows of settings and grounds, by the names of their fields.
+SETTING = np.dtype([(name, np.bool_ if kind == "bool" else np.float64) for name, kind in Setting.__annotations__.items()])
+GROUND = np.dtype(
+    [(name, np.int64 if kind == "int" else np.float64) for name, kind in Ground.__annotations__.items() if name != "samples"]
+    + [("first", np.int64), ("count", np.int64)]
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Packed:
-    """Runs as arrays, one row each, natural units: settings and grounds in the order of their fields, initial states, lengths.
+    """Runs as arrays, one row each, natural units: settings (`SETTING`) and grounds (`GROUND`), initial states, lengths.
 
-    Recorded samples of all rows stand in one `samples` array; a row's first sample and their number are the last two
-    columns of its ground.
+    Recorded samples of all rows stand in one `samples` array, where a row's ground has `count` of them from `first` on.
     """
 
-    settings: Floats
-    horizontal: Floats
-    vertical: Floats
+    settings: NDArray[np.void]
+    horizontal: NDArray[np.void]
+    vertical: NDArray[np.void]
     states: Floats
     durations: Floats
     samples: Floats
@@ -72,19 +77,19 @@ def pack(scenes: Sequence[Scene], model: EventBasedModel) -> Packed:
     """Packs a list of scenes; raises `InputError` where the model cannot play one of them."""
     bank: list[Floats] = []
     offset = 0
-    horizontal: list[list[float]] = []
-    vertical: list[list[float]] = []
+    horizontal: list[tuple[float, ...]] = []
+    vertical: list[tuple[float, ...]] = []
     for scene in scenes:
         model.check(scene)
         for ground, rows in zip(natural.grounds_of(scene), (horizontal, vertical), strict=True):
-            rows.append([*ground[:-1], offset, len(ground.samples)])
+            rows.append((*ground[:-1], offset, len(ground.samples)))
             bank.append(ground.samples)
             offset += len(ground.samples)
     settings = [_setting(scene, model) for scene in scenes]
     return Packed(
-        settings=np.array(settings, dtype=np.float64).reshape(len(scenes), len(Setting._fields)),
-        horizontal=np.array(horizontal, dtype=np.float64),
-        vertical=np.array(vertical, dtype=np.float64),
+        settings=np.array(settings, dtype=SETTING),
+        horizontal=np.array(horizontal, dtype=GROUND),
+        vertical=np.array(vertical, dtype=GROUND),
         states=np.array([natural.state_of(scene) for scene in scenes]).reshape(len(scenes), 6),
         durations=np.array([scene.duration / natural.time_unit(scene) for scene in scenes]),
         samples=np.concatenate(bank) if bank else np.zeros(1),
@@ -100,17 +105,17 @@ def pack_pulses(scene: Scene, model: EventBasedModel, amplitudes: Floats, period
     one, _ = natural.grounds_of(scene.replace(excitation=template(**pulse.model_dump())))
     # A pulse of amplitude a and period T is a times the unit pulse at time t/T.
     ratio = 1.0 / periods
-    horizontal = np.tile(np.array([*one[:-1], 0, 1], dtype=np.float64), (count, 1))
+    horizontal = np.repeat(np.array([(*one[:-1], 0, 1)], dtype=GROUND), count)
     for power in range(4):
-        horizontal[:, 1 + power] *= amplitudes * (ratio**power if one.kind == natural.GAUSSIAN else 1.0)
-    horizontal[:, 5] *= ratio**2 if one.kind == natural.GAUSSIAN else ratio
-    horizontal[:, 6] *= periods
-    horizontal[:, 7] *= periods
+        horizontal[f"c{power}"] *= amplitudes * (ratio**power if one.kind == natural.GAUSSIAN else 1.0)
+    horizontal["rate"] *= ratio**2 if one.kind == natural.GAUSSIAN else ratio
+    horizontal["centre"] *= periods
+    horizontal["quiet"] *= periods
     _, still = natural.grounds_of(scene)
     return Packed(
-        settings=np.tile(np.array(_setting(scene, model), dtype=np.float64), (count, 1)),
+        settings=np.repeat(np.array([_setting(scene, model)], dtype=SETTING), count),
         horizontal=horizontal,
-        vertical=np.tile(np.array([*still[:-1], 1, len(still.samples)], dtype=np.float64), (count, 1)),
+        vertical=np.repeat(np.array([(*still[:-1], 1, len(still.samples))], dtype=GROUND), count),
         states=np.tile(natural.state_of(scene), (count, 1)),
         durations=np.full(count, scene.duration / unit),
         samples=np.concatenate([np.zeros(1), still.samples]),
@@ -174,8 +179,18 @@ def run_batch(
 
 @kernel
 def _ground(row, samples):
-    first, count = int(row[9]), int(row[10])
-    return Ground(int(row[0]), row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], samples[first : first + count])
+    return Ground(
+        kind=row.kind,
+        c0=row.c0,
+        c1=row.c1,
+        c2=row.c2,
+        c3=row.c3,
+        rate=row.rate,
+        centre=row.centre,
+        quiet=row.quiet,
+        step=row.step,
+        samples=samples[row.first : row.first + row.count],
+    )
 
 
 @kernel
@@ -186,22 +201,22 @@ def _run_rows(settings, horizontal, vertical, states, durations, samples, contro
     for i in range(len(durations)):
         r = settings[i]
         b = Setting(
-            r[0],
-            r[1],
-            r[2],
-            r[3],
-            r[4],
-            r[5],
-            r[6],
-            r[7],
-            r[8],
-            r[9],
-            r[10],
-            r[11],
-            r[12] != 0.0,
-            r[13] != 0.0,
-            r[14] != 0.0,
-            r[15] != 0.0,
+            alpha=r.alpha,
+            sin_alpha=r.sin_alpha,
+            cos_alpha=r.cos_alpha,
+            sin_2alpha=r.sin_2alpha,
+            cos_2alpha=r.cos_2alpha,
+            mu_s=r.mu_s,
+            mu_k=r.mu_k,
+            e_floor=r.e_floor,
+            gap_left=r.gap_left,
+            gap_right=r.gap_right,
+            e_left=r.e_left,
+            e_right=r.e_right,
+            walls=r.walls,
+            no_slip=r.no_slip,
+            unilateral=r.unilateral,
+            energy_cap=r.energy_cap,
         )
         z[:] = states[i]
         tally = run(

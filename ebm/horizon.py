@@ -10,7 +10,6 @@ import numpy as np
 
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes.errors import InputError
-from rockcheck.scenes.excitations import Record, Rest, Ricker, Sine
 from rockcheck.scenes.history import History
 from rockcheck.scenes.scene import Scene
 
@@ -68,12 +67,7 @@ def _disturbed(scene: Scene, perturbation: float) -> Iterator[Scene]:
     start = {name: value for name in START if (value := getattr(scene, name)) != 0.0}
     for factor in (1.0 - perturbation, 1.0 + perturbation):
         if scene.excitation.kind != "rest" or scene.vertical.kind != "rest":
-            yield scene.replace(excitation=_scaled(scene.excitation, factor), vertical=_scaled(scene.vertical, factor))
+            yield scene.replace(excitation=scene.excitation.scaled(factor), vertical=scene.vertical.scaled(factor))
         if start:
             with suppress(InputError):  # farther from rest would be inside a wall
                 yield scene.replace(**{name: factor * value for name, value in start.items()})
-
-
-def _scaled(excitation: Rest | Ricker | Sine | Record, factor: float) -> Rest | Ricker | Sine | Record:
-    size = {"record": "scale", "rest": ""}.get(excitation.kind, "amplitude")
-    return excitation.model_copy(update={size: factor * getattr(excitation, size)}) if size else excitation

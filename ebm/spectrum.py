@@ -166,7 +166,7 @@ def node_scene(scene: Scene, amplitude_ratio: float, frequency_ratio: float, set
     if isinstance(scene.excitation, Record):
         block = scene.block
         return scene.replace(
-            excitation=scene.excitation.model_copy(update={"scale": scene.excitation.scale * float(amplitude_ratio)}),
+            excitation=scene.excitation.scaled(float(amplitude_ratio)),
             block=Block(half_width=block.half_width * float(frequency_ratio), half_height=block.half_height * float(frequency_ratio)),
             duration=max(scene.excitation.quiet_after, scene.vertical.quiet_after) + settle,
         )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,9 +21,32 @@ from rockcheck.scenes.records import GRAVITY_OF_RECORDS, read_record
 FloatArray = NDArray[np.float64]
 
 
-class Rest(Frozen):
+class Motion(Frozen):
+    """What all excitations share: a base motion made larger or longer is one of the same kind.
+
+    `_size` names the field that its acceleration is proportional to, `_length` the one that its time is; "" where it has none.
+    """
+
+    _size: ClassVar[str] = "amplitude"
+    _length: ClassVar[str] = "period"
+
+    def scaled(self, factor: float) -> Self:
+        """The same motion with `factor` times the acceleration; a negative factor also exchanges left and right."""
+        return self._times(self._size, factor)
+
+    def stretched(self, factor: float) -> Self:
+        """The same motion `factor` (> 0) times as slow."""
+        return self._times(self._length, factor)
+
+    def _times(self, name: str, factor: float) -> Self:
+        return self.model_copy(update={name: factor * getattr(self, name)}) if name else self
+
+
+class Rest(Motion):
     """A base that does not move."""
 
+    _size: ClassVar[str] = ""
+    _length: ClassVar[str] = ""
     kind: Literal["rest"] = "rest"
 
     def acceleration(self, t: ArrayLike) -> FloatArray:
@@ -36,7 +59,7 @@ class Rest(Frozen):
         return 0.0
 
 
-class Ricker(Frozen):
+class Ricker(Motion):
     """A Ricker pulse; antisymmetric (the paper's (34)) unless `symmetric`.
 
     It starts 2 T_p before its centre. An antisymmetric pulse of positive amplitude has a weak negative lobe, a strong
@@ -84,7 +107,7 @@ class Ricker(Frozen):
         return self.centre + math.sqrt(46.0 / self.rate)
 
 
-class Sine(Frozen):
+class Sine(Motion):
     """`cycles` full cycles of a sine of `amplitude` (m/s^2) and `period` (s), then rest."""
 
     kind: Literal["sine"] = "sine"
@@ -104,13 +127,15 @@ class Sine(Frozen):
         return self.cycles * self.period
 
 
-class Record(Frozen):
+class Record(Motion):
     """A sampled ground motion: linear between its samples, zero after the last one.
 
     Usually made by `Record.from_file` or `Record.from_samples`. `unscaled` holds the samples in m/s^2 as recorded, and
     `scale` multiplies them. A scene longer than its record goes on with a base at rest.
     """
 
+    _size: ClassVar[str] = "scale"
+    _length: ClassVar[str] = "time_step"
     kind: Literal["record"] = "record"
     unscaled: tuple[Finite, ...] = Field(min_length=1, repr=False)
     time_step: Positive
@@ -168,12 +193,3 @@ class Record(Frozen):
 
 
 Excitation = Annotated[Rest | Ricker | Sine | Record, Field(discriminator="kind")]
-
-
-def mirrored(excitation: Rest | Ricker | Sine | Record) -> Rest | Ricker | Sine | Record:
-    """The same excitation with left and right exchanged."""
-    if isinstance(excitation, Record):
-        return excitation.model_copy(update={"scale": -excitation.scale})
-    if isinstance(excitation, Rest):
-        return excitation
-    return excitation.model_copy(update={"amplitude": -excitation.amplitude})

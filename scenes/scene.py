@@ -11,7 +11,7 @@ from pydantic import Field, StringConstraints, field_validator, model_validator
 
 from rockcheck.scenes.base import Finite, Frozen, NonNegative, Positive, Restitution
 from rockcheck.scenes.errors import InputError
-from rockcheck.scenes.excitations import Excitation, Rest, mirrored
+from rockcheck.scenes.excitations import Excitation, Rest
 from rockcheck.scenes.shown import Shown
 
 MOST_SAMPLES = 5_000_000
@@ -43,6 +43,10 @@ class Block(Frozen):
     def frequency_parameter(self) -> float:
         """p = sqrt(3 g / (4 R)) in rad/s at g = 9.81 m/s^2."""
         return math.sqrt(0.75 * 9.81 / self.radius)
+
+
+#: The block of the paper: R = 1.605 m, alpha = 0.25 rad, p = 2.14 rad/s.
+PAPER_BLOCK = Block(half_width=0.397, half_height=1.555)
 
 
 class Floor(Frozen):
@@ -163,7 +167,7 @@ class Scene(Shown, Frozen):
         swap: dict[str, Literal["left", "right"]] = {"left": "right", "right": "left"}
         return self.replace(
             walls=tuple(Wall(side=swap[w.side], gap=w.gap, restitution=w.restitution) for w in self.walls),
-            excitation=mirrored(self.excitation),
+            excitation=self.excitation.scaled(-1.0),
             initial_rotation=-self.initial_rotation,
             initial_angular_velocity=-self.initial_angular_velocity,
             initial_velocity=-self.initial_velocity,

@@ -15,8 +15,9 @@ from rockcheck.engines import MuJoCo, PyBullet
 from rockcheck.reports.show.drawing import draw_block
 from rockcheck.reports.show.spectrum import draw
 from rockcheck.reports.style import PAGE, figure_style, looks, save
-from rockcheck.scenes import Block, Floor, History, Ricker, Scene, Wall, load_scene
+from rockcheck.scenes import Floor, History, Ricker, Scene, Wall, load_scene
 from rockcheck.scenes.kinematics import pivot_height
+from rockcheck.scenes.scene import PAPER_BLOCK
 
 FOLDER = Path(__file__).parents[1] / "images" / "gallery"
 
@@ -26,7 +27,7 @@ def bookcase(gap: float | None = 0.053, **change: object) -> Scene:
     walls = () if gap is None else (Wall(side="left", gap=gap, restitution=0.5),)
     return Scene(
         name="block beside a wall",
-        block=Block(half_width=0.397, half_height=1.555),
+        block=PAPER_BLOCK,
         floor=Floor(friction=0.3),
         walls=walls,
         excitation=Ricker(amplitude=6.0, period=0.75),

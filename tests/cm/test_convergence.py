@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 
 from rockcheck.cm import ContinuousModel
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Block, Floor, Ricker, Scene, Sine, Wall, load_scene
+from rockcheck.scenes import Floor, Ricker, Scene, Sine, Wall, load_scene
+from rockcheck.scenes.scene import PAPER_BLOCK
 
-BLOCK = Block(half_width=0.397, half_height=1.555)
 G = 9.81
 CASES = Path(__file__).parents[1] / "data" / "unilateral_ricker_cases.csv"
 
@@ -20,7 +20,7 @@ CASES = Path(__file__).parents[1] / "data" / "unilateral_ricker_cases.csv"
 def rms(history, theta):
     """RMS difference of theta from the array, in alpha."""
     rows = min(len(theta), len(history.channels["theta"]))  # one may overturn a step before the other
-    return float(np.sqrt(np.mean((history.channels["theta"][:rows] - theta[:rows]) ** 2))) / BLOCK.alpha
+    return float(np.sqrt(np.mean((history.channels["theta"][:rows] - theta[:rows]) ** 2))) / PAPER_BLOCK.alpha
 
 
 def rigid(scene):
@@ -29,7 +29,7 @@ def rigid(scene):
 
 def rocking(scene, tilt):
     """theta of a block that rocks without slip from rest at `tilt`, with Housner's impacts; adaptive steps to 1e-12."""
-    radius, alpha = BLOCK.radius, BLOCK.alpha
+    radius, alpha = PAPER_BLOCK.radius, PAPER_BLOCK.alpha
     ratio = 1.0 - 1.5 * math.sin(alpha) ** 2
 
     def motion(t, q):
@@ -54,13 +54,13 @@ def rocking(scene, tilt):
 def test_error_falls_with_the_penetration_in_rocking():
     scene = Scene(
         name="rocking",
-        block=BLOCK,
+        block=PAPER_BLOCK,
         floor=Floor(friction=0.9),
         excitation=Sine(amplitude=1.0, period=0.7, cycles=4),
-        initial_rotation=0.4 * BLOCK.alpha,
+        initial_rotation=0.4 * PAPER_BLOCK.alpha,
         duration=3.0,
     )
-    exact = rocking(scene, 0.4 * BLOCK.alpha)
+    exact = rocking(scene, 0.4 * PAPER_BLOCK.alpha)
     errors = [rms(ContinuousModel(penetration=depth).simulate(scene), exact) for depth in (1e-6, 1e-7, 1e-8, 1e-9)]
     orders = -np.diff(np.log10(errors))
     assert errors[-1] < 1e-7
@@ -68,9 +68,9 @@ def test_error_falls_with_the_penetration_in_rocking():
 
 
 def test_error_falls_with_the_duration_of_a_wall_contact():
-    pulse = Ricker(amplitude=3.0 * G * math.tan(BLOCK.alpha), period=2.0 * math.pi / (6.0 * BLOCK.frequency_parameter))
+    pulse = Ricker(amplitude=3.0 * G * math.tan(PAPER_BLOCK.alpha), period=2.0 * math.pi / (6.0 * PAPER_BLOCK.frequency_parameter))
     walls = [Wall(side="left", gap=0.003, restitution=0.5)]
-    scene = Scene(name="wall", block=BLOCK, floor=Floor(friction=0.6), walls=walls, excitation=pulse, duration=4.0)
+    scene = Scene(name="wall", block=PAPER_BLOCK, floor=Floor(friction=0.6), walls=walls, excitation=pulse, duration=4.0)
     exact = rigid(scene)
     errors = [rms(ContinuousModel(penetration=depth).simulate(scene), exact) for depth in (1e-5, 1e-7, 1e-9)]
     orders = -np.diff(np.log10(errors)) / 2.0
@@ -104,13 +104,13 @@ def test_paper_rule_is_further_off():
 @pytest.mark.parametrize("e", [0.0, 0.5])
 @pytest.mark.parametrize(("omega", "amplitude", "mu"), [(4.5, 2.5, 0.3), (6.0, 2.5, 0.6), (3.0, 1.8, 0.3)])
 def test_pulses_beside_a_wall(gap, e, omega, amplitude, mu):
-    period = 2.0 * math.pi / (omega * BLOCK.frequency_parameter)
+    period = 2.0 * math.pi / (omega * PAPER_BLOCK.frequency_parameter)
     scene = Scene(
         name="pulse",
-        block=BLOCK,
+        block=PAPER_BLOCK,
         floor=Floor(friction=mu),
         walls=[Wall(side="left", gap=gap, restitution=e)],
-        excitation=Ricker(amplitude=amplitude * G * math.tan(BLOCK.alpha), period=period),
+        excitation=Ricker(amplitude=amplitude * G * math.tan(PAPER_BLOCK.alpha), period=period),
         duration=4.0 * period + 3.0,
         output_step=0.001,
     )
@@ -122,14 +122,14 @@ def peak_errors(rows):
     model, errors, missed = ContinuousModel(), [], []
     names = {"overturned left": "ccw", "overturned right": "cw"}
     for row in rows:
-        period = 2.0 * math.pi / (float(row["wp_over_p"]) * BLOCK.frequency_parameter)
+        period = 2.0 * math.pi / (float(row["wp_over_p"]) * PAPER_BLOCK.frequency_parameter)
         walls = [] if row["side"] == "none" else [Wall(side=row["side"], gap=float(row["gap"]), restitution=float(row["e_w"]))]
         scene = Scene(
             name="case",
-            block=BLOCK,
+            block=PAPER_BLOCK,
             floor=Floor(friction=float(row["mu"])),
             walls=walls,
-            excitation=Ricker(amplitude=float(row["ap_ratio"]) * G * math.tan(BLOCK.alpha), period=period),
+            excitation=Ricker(amplitude=float(row["ap_ratio"]) * G * math.tan(PAPER_BLOCK.alpha), period=period),
             duration=4.0 * period + 8.0,
             output_step=0.0005,
         )
@@ -137,7 +137,7 @@ def peak_errors(rows):
         if names.get(history.outcome, "safe") != row["outcome"]:
             missed.append(row)
         elif row["outcome"] == "safe":
-            errors.append(abs(history.peak_rotation / BLOCK.alpha - float(row["peak_theta_over_alpha"])))
+            errors.append(abs(history.peak_rotation / PAPER_BLOCK.alpha - float(row["peak_theta_over_alpha"])))
     return np.array(errors), missed
 
 

@@ -11,13 +11,13 @@ from scipy.integrate import quad
 from rockcheck.cm import ContinuousModel
 from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Ricker, Scene, Sine, Wall, load_scene
 from rockcheck.scenes.kinematics import energy
+from rockcheck.scenes.scene import PAPER_BLOCK
 
-BLOCK = Block(half_width=0.397, half_height=1.555)
 G = 9.81
 
 
 def scene(**change):
-    return Scene(**{"name": "test", "block": BLOCK, "floor": Floor(friction=0.3), "duration": 2.0, "output_step": 0.001} | change)
+    return Scene(**{"name": "test", "block": PAPER_BLOCK, "floor": Floor(friction=0.3), "duration": 2.0, "output_step": 0.001} | change)
 
 
 def strikes(history, kind):
@@ -63,7 +63,7 @@ def test_stiffness_and_step_follow_from_the_penetration():
 
 def test_depth_under_own_weight_is_the_target_penetration():
     history = ContinuousModel(penetration=2e-6).simulate(scene(duration=0.2))
-    assert BLOCK.half_height - history.channels["y"][-1] == pytest.approx(1e-6, rel=1e-6)  # two corners share the weight
+    assert PAPER_BLOCK.half_height - history.channels["y"][-1] == pytest.approx(1e-6, rel=1e-6)  # two corners share the weight
 
 
 @pytest.mark.parametrize("walls", [[], [Wall(side="left", gap=0.0, restitution=1.0), Wall(side="right", gap=0.0, restitution=0.5)]])
@@ -84,7 +84,7 @@ def test_block_shaken_below_slip_and_uplift_does_not_creep():
     )
     assert np.max(np.abs(history.channels["slip"])) < penetration
     assert abs(history.channels["slip"][-1]) < 0.1 * penetration
-    assert np.max(np.abs(history.channels["theta"])) < 2.0 * penetration / BLOCK.half_width
+    assert np.max(np.abs(history.channels["theta"])) < 2.0 * penetration / PAPER_BLOCK.half_width
     assert history.event_list == ()
 
 
@@ -121,10 +121,10 @@ def test_frictionless_block_is_left_behind_by_its_base():
 
 @pytest.mark.parametrize("mu", [0.2, 0.3, 0.6, 1.0])
 def test_floor_impact_has_housners_ratio_and_does_not_slip(mu):
-    history = ContinuousModel().simulate(scene(floor=Floor(friction=mu), initial_rotation=0.5 * BLOCK.alpha))
+    history = ContinuousModel().simulate(scene(floor=Floor(friction=mu), initial_rotation=0.5 * PAPER_BLOCK.alpha))
     c = history.channels
-    e = energy(BLOCK, G, c["y"], c["x_dot"], c["y_dot"], c["theta_dot"])
-    ratio = 1.0 - 1.5 * math.sin(BLOCK.alpha) ** 2
+    e = energy(PAPER_BLOCK, G, c["y"], c["x_dot"], c["y_dot"], c["theta_dot"])
+    ratio = 1.0 - 1.5 * math.sin(PAPER_BLOCK.alpha) ** 2
     impacts = strikes(history, "floor impact")
     assert len(impacts) == 2
     for event in impacts:
@@ -135,7 +135,7 @@ def test_floor_impact_has_housners_ratio_and_does_not_slip(mu):
 
 def test_first_floor_impact_comes_at_housners_quarter_period_with_his_impulse():
     # theta'' = -p^2 sin(alpha - theta) from rest at `tilt`: w^2 = 2 p^2 (cos(alpha - tilt) - cos(alpha - theta)), theta = tilt (1 - z^2)
-    tilt, alpha, p = 0.6 * BLOCK.alpha, BLOCK.alpha, math.sqrt(0.75 * G / BLOCK.radius)
+    tilt, alpha, p = 0.6 * PAPER_BLOCK.alpha, PAPER_BLOCK.alpha, math.sqrt(0.75 * G / PAPER_BLOCK.radius)
 
     def spin(theta):
         return math.sqrt(2.0 * p * p * (math.cos(alpha - tilt) - math.cos(alpha - theta)))
@@ -144,30 +144,30 @@ def test_first_floor_impact_comes_at_housners_quarter_period_with_his_impulse():
     history = ContinuousModel().simulate(scene(floor=Floor(friction=0.6), initial_rotation=tilt, duration=quarter + 0.01))
     (strike,) = strikes(history, "floor impact")
     assert strike.t == pytest.approx(quarter, abs=1e-6)
-    impulse = BLOCK.radius * math.sin(alpha) * (2.0 - 1.5 * math.sin(alpha) ** 2) * spin(0.0)
+    impulse = PAPER_BLOCK.radius * math.sin(alpha) * (2.0 - 1.5 * math.sin(alpha) ** 2) * spin(0.0)
     assert strike.impulse == pytest.approx(impulse + G * 2e-3, abs=0.2 * G * 2e-3)  # and the weight that it carries for 2 ms
 
 
 def test_uplift_asks_for_more_than_tan_alpha():
     def peak(ratio):
-        push = Record.from_samples([ratio * math.tan(BLOCK.alpha) * G] * 2, 0.2)
+        push = Record.from_samples([ratio * math.tan(PAPER_BLOCK.alpha) * G] * 2, 0.2)
         return ContinuousModel().simulate(scene(floor=Floor(friction=0.6), excitation=push, duration=0.2)).peak_rotation
 
     assert peak(0.999) < 1e-7
     # theta'' = (3/(4R)) (u cos(alpha - theta) - g sin(alpha - theta)), to second order in the time
-    assert peak(1.1) == pytest.approx(0.75 / BLOCK.radius * 0.1 * G * math.sin(BLOCK.alpha) * 0.2**2 / 2.0, rel=0.05)
+    assert peak(1.1) == pytest.approx(0.75 / PAPER_BLOCK.radius * 0.1 * G * math.sin(PAPER_BLOCK.alpha) * 0.2**2 / 2.0, rel=0.05)
 
 
 def test_energy_never_rises_without_excitation():
     history = ContinuousModel().simulate(
         scene(
-            initial_rotation=-0.6 * BLOCK.alpha,
+            initial_rotation=-0.6 * PAPER_BLOCK.alpha,
             walls=[Wall(side="left", gap=0.02, restitution=1.0)],
             duration=5.0,
         )
     )
     c = history.channels
-    e = energy(BLOCK, G, c["y"], c["x_dot"], c["y_dot"], c["theta_dot"])
+    e = energy(PAPER_BLOCK, G, c["y"], c["x_dot"], c["y_dot"], c["theta_dot"])
     assert len(strikes(history, "wall impact")) >= 3
     assert np.max(e[1:] - np.minimum.accumulate(e)[:-1]) < 1e-5 * e[0]
 
@@ -184,7 +184,7 @@ def test_dropped_block_bounces_to_its_height(e):
     first = strikes(history, "floor impact")[:2]
     assert [event.t for event in first] == pytest.approx([fall, fall], abs=1e-6)  # both corners
     assert sum(event.impulse for event in first) == pytest.approx((1.0 + e) * G * fall, rel=1e-3)
-    top = np.max(c["y"][c["t"] > fall]) - BLOCK.half_height
+    top = np.max(c["y"][c["t"] > fall]) - PAPER_BLOCK.half_height
     assert top == pytest.approx(e * e * height, rel=3e-3)
     assert np.max(np.abs(c["theta"])) < 1e-9
 
@@ -226,7 +226,7 @@ def test_record_is_linear_between_its_samples():
 
 
 def test_vertical_acceleration_is_added_gravity():
-    tilted = {"initial_rotation": 0.5 * BLOCK.alpha, "floor": Floor(friction=0.6)}
+    tilted = {"initial_rotation": 0.5 * PAPER_BLOCK.alpha, "floor": Floor(friction=0.6)}
     lifted = scene(vertical=Record.from_samples([0.5 * G, 0.5 * G], 3.0), **tilted)
     heavier = scene(gravity=1.5 * G, **tilted)
     model = ContinuousModel(stiffness=1e9)
@@ -268,10 +268,10 @@ def test_blow_up_is_a_failure():
 
 
 def test_steps_far_too_long_do_not_add_energy():
-    tilted = scene(initial_rotation=0.5 * BLOCK.alpha, floor=Floor(friction=0.6, restitution=0.5), output_step=0.02)
+    tilted = scene(initial_rotation=0.5 * PAPER_BLOCK.alpha, floor=Floor(friction=0.6, restitution=0.5), output_step=0.02)
     for step in (1e-3, 5e-3, 2e-2):
         history = ContinuousModel(time_step=step).simulate(tilted)
-        assert history.peak_rotation == pytest.approx(0.5 * BLOCK.alpha)
+        assert history.peak_rotation == pytest.approx(0.5 * PAPER_BLOCK.alpha)
 
 
 def test_endless_run_is_refused():

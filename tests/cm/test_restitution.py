@@ -6,16 +6,16 @@ import pytest
 
 from rockcheck.cm import ContinuousModel, measured_restitution
 from rockcheck.cm.contact import damping_ratio_of_paper, restitution_of
-from rockcheck.scenes import Block, Floor, InputError, Scene, Wall
+from rockcheck.scenes import Floor, InputError, Scene, Wall
+from rockcheck.scenes.scene import PAPER_BLOCK
 
-BLOCK = Block(half_width=0.397, half_height=1.555)
 RESTITUTIONS = [0.0, 0.25, 0.5, 0.75, 1.0]
 
 
 def scene(*, friction=0.3, floor=0.0, wall=None, gap=0.03, side="left", **change):
     walls = [] if wall is None else [Wall(side=side, gap=gap, restitution=wall)]
     floor = Floor(friction=friction, restitution=floor)
-    return Scene(**{"name": "strike", "block": BLOCK, "floor": floor, "walls": walls, "duration": 0.7, "output_step": 0.001} | change)
+    return Scene(**{"name": "strike", "block": PAPER_BLOCK, "floor": floor, "walls": walls, "duration": 0.7, "output_step": 0.001} | change)
 
 
 FLOOR = {
@@ -23,7 +23,7 @@ FLOOR = {
     "offset corner, frictionless": {"friction": 0.0, "initial_height": 0.02, "initial_rotation": 0.1},
     "offset corner, slipping": {"friction": 0.1, "initial_height": 0.02, "initial_rotation": 0.2},
     "offset corner, sticking": {"friction": 1.0, "initial_height": 0.02, "initial_rotation": -0.2},
-    "corner below the centroid": {"friction": 0.3, "initial_height": 0.02, "initial_rotation": BLOCK.alpha},
+    "corner below the centroid": {"friction": 0.3, "initial_height": 0.02, "initial_rotation": PAPER_BLOCK.alpha},
     "sliding corner": {"friction": 0.3, "initial_height": 0.02, "initial_rotation": 0.1, "initial_velocity": -1.0},
     "rocking block": {"friction": 0.3, "initial_rotation": 0.1},
 }
@@ -60,8 +60,8 @@ def test_restitution_of_a_soft_contact_is_within_a_hundredth(e):
 def test_paper_rule_misses_as_its_formula_says(e):
     # (33) takes the whole mass, the corner has less of it, and the contact lets go when its force does.
     drop = scene(friction=0.0, floor=e, initial_height=0.02, initial_rotation=0.1)
-    lever = BLOCK.radius * math.sin(BLOCK.alpha - 0.1)
-    xi = damping_ratio_of_paper(e) * math.sqrt(1.0 + 3.0 * (lever / BLOCK.radius) ** 2)
+    lever = PAPER_BLOCK.radius * math.sin(PAPER_BLOCK.alpha - 0.1)
+    xi = damping_ratio_of_paper(e) * math.sqrt(1.0 + 3.0 * (lever / PAPER_BLOCK.radius) ** 2)
     assert measured_restitution(ContinuousModel(damping_rule="paper"), drop) == pytest.approx(restitution_of(xi), abs=1e-3)
 
 

@@ -11,8 +11,7 @@ import pytest
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
-
-PAPER_BLOCK = Block(half_width=0.397, half_height=1.555)
+from rockcheck.scenes.scene import PAPER_BLOCK
 
 
 @dataclass(frozen=True)

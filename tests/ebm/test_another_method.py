@@ -20,6 +20,7 @@ from scipy.optimize import brentq
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Block, Floor, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
+from rockcheck.scenes.scene import PAPER_BLOCK
 
 State = NDArray[np.float64]  # x, theta, dx/dt, dtheta/dt
 
@@ -365,13 +366,12 @@ class PaperModel:
         return np.array(rows)
 
 
-BLOCK = Block(half_width=0.397, half_height=1.555)
-SLOPE = 9.81 * math.tan(BLOCK.alpha)
+SLOPE = 9.81 * math.tan(PAPER_BLOCK.alpha)
 
 
 def pulse(frequency_ratio: float, amplitude_ratio: float) -> Ricker:
     """A pulse of omega_p = ratio p and a_p = ratio g tan(alpha)."""
-    return Ricker(amplitude=amplitude_ratio * SLOPE, period=2.0 * math.pi / (frequency_ratio * BLOCK.frequency_parameter))
+    return Ricker(amplitude=amplitude_ratio * SLOPE, period=2.0 * math.pi / (frequency_ratio * PAPER_BLOCK.frequency_parameter))
 
 
 def beside(side: str, gap: float, e: float) -> list[Wall]:
@@ -390,7 +390,7 @@ def scene(
 ) -> Scene:
     floor = Floor(friction=mu, static_friction=static)
     return Scene(
-        name=name, block=BLOCK, floor=floor, walls=walls or [], excitation=excitation, vertical=vertical or Rest(), duration=duration
+        name=name, block=PAPER_BLOCK, floor=floor, walls=walls or [], excitation=excitation, vertical=vertical or Rest(), duration=duration
     )
 
 

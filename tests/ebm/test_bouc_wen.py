@@ -9,12 +9,12 @@ from scipy.integrate import solve_ivp
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Block, Floor, InputError, Ricker, Scene, Wall, kinematics, load_scene
 from rockcheck.scenes.errors import ModelFailure
+from rockcheck.scenes.scene import PAPER_BLOCK
 
-BLOCK = Block(half_width=0.397, half_height=1.555)
 G = 9.81
 
 
-def pulse(a_ratio=4.0, w_ratio=4.5, mu=0.3, walls=(), block=BLOCK, **more):
+def pulse(a_ratio=4.0, w_ratio=4.5, mu=0.3, walls=(), block=PAPER_BLOCK, **more):
     period = 2.0 * math.pi / (w_ratio * block.frequency_parameter)
     excitation = Ricker(amplitude=a_ratio * G * math.tan(block.alpha), period=period)
     fields = {"name": "pulse", "block": block, "floor": Floor(friction=mu), "walls": walls, "excitation": excitation, "duration": 10.0}
@@ -80,7 +80,7 @@ def test_tolerance_controls_the_error_of_the_steps():
     scene = pulse(duration=4.0)
     truth = bouc_wen(scene, tolerance=1e-14).channels["theta"]
     errors = [np.max(np.abs(bouc_wen(scene, tolerance=tolerance).channels["theta"] - truth)) for tolerance in (1e-7, 1e-9, 1e-11)]
-    assert errors[2] < 1e-6 * BLOCK.alpha
+    assert errors[2] < 1e-6 * PAPER_BLOCK.alpha
     assert errors[2] < 0.1 * errors[1] < 0.01 * errors[0]
 
 
@@ -114,9 +114,9 @@ def test_walls_hold_the_block_and_the_motion_tends_to_the_exact_one(side, restit
     assert [e.kind for e in fine.event_list].count("wall impact") >= 1
     assert gap.min() > -1e-9
     assert fine.outcome == exact.outcome
-    assert np.max(np.abs(kinematics.pivot_height(BLOCK, fine.channels["y"], fine.channels["theta"]))) < 1e-12
+    assert np.max(np.abs(kinematics.pivot_height(PAPER_BLOCK, fine.channels["y"], fine.channels["theta"]))) < 1e-12
     rows = min(len(fine.channels["theta"]), len(exact.channels["theta"]), 600)
-    assert np.max(np.abs(fine.channels["theta"][:rows] - exact.channels["theta"][:rows])) < 2e-3 * BLOCK.alpha
+    assert np.max(np.abs(fine.channels["theta"][:rows] - exact.channels["theta"][:rows])) < 2e-3 * PAPER_BLOCK.alpha
 
 
 def test_the_mirror_image_is_exact():

@@ -9,16 +9,16 @@ import pytest
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from rockcheck.scenes.scene import PAPER_BLOCK
 
-BLOCK = Block(half_width=0.397, half_height=1.555)
-SLOPE = BLOCK.half_width / BLOCK.half_height
+SLOPE = PAPER_BLOCK.half_width / PAPER_BLOCK.half_height
 G = 9.81
 PIVOTS = ("bilateral", "unilateral")
 pivots = pytest.mark.parametrize("pivot", PIVOTS)
 
 
 def scene_of(**change: object) -> Scene:
-    return Scene(**{"name": "edge", "block": BLOCK, "floor": Floor(friction=0.8), "duration": 3.0, "output_step": 0.01} | change)
+    return Scene(**{"name": "edge", "block": PAPER_BLOCK, "floor": Floor(friction=0.8), "duration": 3.0, "output_step": 0.01} | change)
 
 
 def play(scene: Scene, pivot: str = "bilateral", **settings: object) -> History:
@@ -35,7 +35,7 @@ def constant(acceleration: float, duration: float = 10.0) -> Record:
 
 def assert_contacts_hold(scene: Scene, history: History) -> None:
     motion = history.channels
-    assert np.min(kinematics.pivot_height(BLOCK, motion["y"], motion["theta"])) > -1e-9
+    assert np.min(kinematics.pivot_height(PAPER_BLOCK, motion["y"], motion["theta"])) > -1e-9
     for wall in scene.walls:
         assert np.min(kinematics.wall_gap(scene, wall.side, motion["x"], motion["theta"])) > -1e-9
 
@@ -45,11 +45,11 @@ def grazing_gap(tilt: float) -> float:
 
     Its next rotation follows from Housner's impact, r = 1 - 3/2 sin^2 alpha, and energy.
     """
-    r = 1.0 - 1.5 * math.sin(BLOCK.alpha) ** 2
+    r = 1.0 - 1.5 * math.sin(PAPER_BLOCK.alpha) ** 2
     # Height of the centroid, R cos(alpha - phi), is all the energy there is at a turning point.
-    depth = r**2 * (math.cos(BLOCK.alpha - tilt) - math.cos(BLOCK.alpha))
-    peak = BLOCK.alpha - math.acos(math.cos(BLOCK.alpha) + depth)
-    return BLOCK.radius * (math.sin(BLOCK.alpha + peak) - math.sin(BLOCK.alpha - peak))
+    depth = r**2 * (math.cos(PAPER_BLOCK.alpha - tilt) - math.cos(PAPER_BLOCK.alpha))
+    peak = PAPER_BLOCK.alpha - math.acos(math.cos(PAPER_BLOCK.alpha) + depth)
+    return PAPER_BLOCK.radius * (math.sin(PAPER_BLOCK.alpha + peak) - math.sin(PAPER_BLOCK.alpha - peak))
 
 
 @pivots
@@ -76,7 +76,7 @@ def test_impact_on_floor_and_wall_at_once(pivot, e):
     assert_contacts_hold(scene, history)
     motion = history.channels
     assert np.max(motion["theta"]) < 1e-9
-    energy = kinematics.energy(BLOCK, G, *(motion[name] for name in ("y", "x_dot", "y_dot", "theta_dot")))
+    energy = kinematics.energy(PAPER_BLOCK, G, *(motion[name] for name in ("y", "x_dot", "y_dot", "theta_dot")))
     assert np.max(np.diff(energy)) < 1e-8
     if e == 0.0:
         assert history.outcome == "at rest"
@@ -84,7 +84,7 @@ def test_impact_on_floor_and_wall_at_once(pivot, e):
         first = next(event.t for event in history.event_list if event.kind == "floor impact")
         after = motion["theta"][motion["t"] > first]
         turned = energy[motion["t"] > first][0] / energy[0]
-        assert turned == pytest.approx((e * (1.0 - 1.5 * math.sin(BLOCK.alpha) ** 2)) ** 2, rel=1e-6)
+        assert turned == pytest.approx((e * (1.0 - 1.5 * math.sin(PAPER_BLOCK.alpha) ** 2)) ** 2, rel=1e-6)
         assert np.min(after) < -1e-3
 
 
@@ -118,11 +118,11 @@ def test_slip_at_exactly_the_friction(pivot):
 def test_balance_point(pivot):
     """At theta = alpha the block stands on its corner; a little less and it comes back, a little more and it falls."""
     back, on, over = (
-        play(scene_of(initial_rotation=BLOCK.alpha * factor, duration=20.0), pivot) for factor in (1.0 - 1e-6, 1.0, 1.0 + 1e-6)
+        play(scene_of(initial_rotation=PAPER_BLOCK.alpha * factor, duration=20.0), pivot) for factor in (1.0 - 1e-6, 1.0, 1.0 + 1e-6)
     )
     assert on.outcome in ("moving", "overturned left", "at rest")
     assert np.all(np.isfinite(on.channels["theta"]))
-    assert np.min(on.channels["theta"][:300]) == pytest.approx(BLOCK.alpha, abs=1e-9)
+    assert np.min(on.channels["theta"][:300]) == pytest.approx(PAPER_BLOCK.alpha, abs=1e-9)
     assert np.min(back.channels["theta"]) <= 0.0
     assert over.outcome == "overturned left"
 
@@ -130,7 +130,7 @@ def test_balance_point(pivot):
 @pivots
 def test_start_past_the_balance_point(pivot):
     for side in (1.0, -1.0):
-        history = play(scene_of(initial_rotation=side * 1.3 * BLOCK.alpha), pivot)
+        history = play(scene_of(initial_rotation=side * 1.3 * PAPER_BLOCK.alpha), pivot)
         assert history.outcome == ("overturned left" if side > 0 else "overturned right")
         assert np.all(np.diff(side * history.channels["theta"]) > 0.0)
 
@@ -225,7 +225,7 @@ def test_pulse_that_is_shorter_than_a_step(pivot, vertical, symmetric):
     """
     pulse = Ricker(amplitude=4000.0 * G * SLOPE, period=2e-3, symmetric=symmetric)
     more = {"vertical": Sine(amplitude=0.5, period=1.0, cycles=3)} if vertical else {}
-    for start in ({}, {"initial_rotation": 0.3 * BLOCK.alpha}):
+    for start in ({}, {"initial_rotation": 0.3 * PAPER_BLOCK.alpha}):
         scene = scene_of(floor=Floor(friction=1.2), excitation=pulse, duration=0.5, **start, **more)
         usual, fine = play(scene, pivot), play(scene, pivot, tolerance=1e-13)
         np.testing.assert_allclose(usual.channels["theta"], fine.channels["theta"], rtol=0.0, atol=1e-7)

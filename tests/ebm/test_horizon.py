@@ -7,14 +7,15 @@ import pytest
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.horizon import predictability_horizon
-from rockcheck.scenes import Block, Floor, InputError, Ricker, Scene, Wall, load_scene
-
-BLOCK = Block(half_width=0.397, half_height=1.555)
+from rockcheck.scenes import Floor, InputError, Ricker, Scene, Wall, load_scene
+from rockcheck.scenes.scene import PAPER_BLOCK
 
 
 def balanced(**change: object) -> Scene:
     """The block on its corner, in unstable balance."""
-    scene = Scene(name="balanced", block=BLOCK, floor=Floor(friction=1.0), initial_rotation=BLOCK.alpha, duration=8.0, output_step=0.001)
+    scene = Scene(
+        name="balanced", block=PAPER_BLOCK, floor=Floor(friction=1.0), initial_rotation=PAPER_BLOCK.alpha, duration=8.0, output_step=0.001
+    )
     return scene.replace(**change)
 
 
@@ -28,7 +29,7 @@ def test_unstable_balance_amplifies_as_the_hyperbolic_cosine(perturbation: float
 
 
 def test_free_rocking_can_be_compared_to_its_end() -> None:
-    scene = balanced(initial_rotation=0.5 * BLOCK.alpha)
+    scene = balanced(initial_rotation=0.5 * PAPER_BLOCK.alpha)
     assert predictability_horizon(scene) == scene.duration
 
 
@@ -55,8 +56,8 @@ def test_a_record_parts_from_its_disturbed_self_just_after_the_horizon() -> None
 
 
 def test_a_start_against_a_wall_is_disturbed_away_from_it() -> None:
-    tilt = 0.3 * BLOCK.alpha
-    gap = BLOCK.radius * (math.sin(BLOCK.alpha + tilt) - math.sin(BLOCK.alpha - tilt))  # of the upright block
+    tilt = 0.3 * PAPER_BLOCK.alpha
+    gap = PAPER_BLOCK.radius * (math.sin(PAPER_BLOCK.alpha + tilt) - math.sin(PAPER_BLOCK.alpha - tilt))  # of the upright block
     scene = balanced(initial_rotation=tilt, walls=[Wall(side="left", gap=gap)])
     with pytest.raises(InputError, match="inside the left wall"):
         scene.replace(initial_rotation=tilt * (1 + 1e-6))
@@ -76,7 +77,7 @@ def test_of_the_bilateral_model_on_request() -> None:
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_a_landing_flush_against_a_bouncing_wall_has_no_unique_answer(side: str, sign: float, restitution: float) -> None:
     """A block that stands against the wall and is tilted away from it lands on floor and wall at once, at its first impact."""
-    tilt = sign * 0.3 * BLOCK.alpha
+    tilt = sign * 0.3 * PAPER_BLOCK.alpha
     scene = balanced(initial_rotation=tilt, walls=[Wall(side=side, gap=0.0, restitution=restitution)])
     first = next(event.t for event in EventBasedModel(pivot="unilateral").simulate(scene).event_list if event.kind == "floor impact")
     found = predictability_horizon(scene)

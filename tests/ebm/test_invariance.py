@@ -9,17 +9,17 @@ import pytest
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, kinematics, load_scene
+from rockcheck.scenes.scene import PAPER_BLOCK
 
 ODD = ("x", "theta", "x_dot", "theta_dot", "slip", "slip_rate")
 EVEN = ("t", "y", "y_dot", "mode")
 PIVOTS = ["bilateral", "unilateral"]
-BLOCK = Block(half_width=0.397, half_height=1.555)
-SLOPE = 9.81 * math.tan(BLOCK.alpha)
+SLOPE = 9.81 * math.tan(PAPER_BLOCK.alpha)
 RICKER = Ricker(amplitude=4.0 * SLOPE, period=0.65)
 
 
 def scene_of(**change: object) -> Scene:
-    return Scene(**{"name": "symmetry", "block": BLOCK, "floor": Floor(friction=0.3), "excitation": RICKER, "duration": 5.0} | change)
+    return Scene(**{"name": "symmetry", "block": PAPER_BLOCK, "floor": Floor(friction=0.3), "excitation": RICKER, "duration": 5.0} | change)
 
 
 def walls(left: float | None = None, right: float | None = None, e: float = 0.0) -> list[Wall]:
@@ -37,7 +37,7 @@ SCENES = {
     "sine": scene_of(excitation=Sine(amplitude=2.0 * SLOPE, period=0.7, cycles=3)),
     "record": load_scene("fig5b").replace(duration=8.0),
     "vertical record": load_scene("fig4a").replace(vertical=load_scene("fig4b").excitation, duration=6.0),
-    "tilted": scene_of(excitation=Rest(), initial_rotation=0.7 * BLOCK.alpha, initial_angular_velocity=0.1, initial_velocity=0.05),
+    "tilted": scene_of(excitation=Rest(), initial_rotation=0.7 * PAPER_BLOCK.alpha, initial_angular_velocity=0.1, initial_velocity=0.05),
     "squat": scene_of(
         block=Block(half_width=2.0, half_height=1.0), floor=Floor(friction=1.2), excitation=Ricker(amplitude=30.0, period=1.0)
     ),
@@ -65,14 +65,16 @@ def test_mirror_image_to_the_bit(pivot, name):
     assert scene.mirrored().mirrored() == scene
 
 
-@pytest.mark.parametrize("scale", [1e-3 / BLOCK.radius, 0.25, 3.0, 1e3 / BLOCK.radius], ids=["R = 1 mm", "1/4", "3", "R = 1 km"])
+@pytest.mark.parametrize(
+    "scale", [1e-3 / PAPER_BLOCK.radius, 0.25, 3.0, 1e3 / PAPER_BLOCK.radius], ids=["R = 1 mm", "1/4", "3", "R = 1 km"]
+)
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_dynamic_similarity(pivot, scale):
     """Lengths by k and times by sqrt(k): the same motion, to 1e-12 of R and of the rotation's scale."""
     model, scene = EventBasedModel(pivot=pivot, tolerance=1e-14), SCENES["left wall"]
     root = math.sqrt(scale)
     scaled = scene.replace(
-        block=Block(half_width=scale * BLOCK.half_width, half_height=scale * BLOCK.half_height),
+        block=Block(half_width=scale * PAPER_BLOCK.half_width, half_height=scale * PAPER_BLOCK.half_height),
         walls=[Wall(side="left", gap=scale * 0.053)],
         excitation=Ricker(amplitude=RICKER.amplitude, period=root * RICKER.period),
         duration=root * scene.duration,
@@ -118,7 +120,7 @@ def test_floor_that_falls_away(pivot):
     """A floor that falls faster than g: the block flies freely (unilateral), or hangs on to a pivot and turns about it."""
     drop = Record.from_samples([-12.0, -12.0], time_step=0.1)
     motion = EventBasedModel(pivot=pivot).simulate(scene_of(excitation=Rest(), vertical=drop, duration=0.1, output_step=0.01)).channels
-    lift = kinematics.pivot_height(BLOCK, motion["y"], motion["theta"])
+    lift = kinematics.pivot_height(PAPER_BLOCK, motion["y"], motion["theta"])
     free = 0.5 * (12.0 - 9.81) * motion["t"] ** 2
     np.testing.assert_allclose(lift, free if pivot == "unilateral" else 0.0, rtol=0.0, atol=1e-12)
     assert motion["theta"].any() == (pivot == "bilateral")
@@ -157,7 +159,7 @@ def test_walls_and_floor_are_not_entered(pivot, e):
     for side in ("left", "right"):
         assert np.min(kinematics.wall_gap(scene, side, motion["x"], motion["theta"])) > -1e-9
     assert {e.kind for e in history.event_list} >= {"uplift", "floor impact", "wall impact"}
-    lift = kinematics.pivot_height(BLOCK, motion["y"], motion["theta"])
+    lift = kinematics.pivot_height(PAPER_BLOCK, motion["y"], motion["theta"])
     assert np.min(lift) > -1e-9
     assert (np.max(lift) > 1e-4) == (pivot == "unilateral")
 

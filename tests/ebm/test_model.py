@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Scene, Wall, load_scene
-
-BLOCK = Block(half_width=0.397, half_height=1.555)
+from rockcheck.scenes import Floor, InputError, Record, Rest, Scene, Wall, load_scene
+from rockcheck.scenes.scene import PAPER_BLOCK
 
 
 def scene_of(**change: object) -> Scene:
-    rest = {"name": "model", "block": BLOCK, "floor": Floor(friction=0.3), "excitation": Rest(), "duration": 1.0}
+    rest = {"name": "model", "block": PAPER_BLOCK, "floor": Floor(friction=0.3), "excitation": Rest(), "duration": 1.0}
     return Scene(**(rest | change))
 
 
@@ -100,7 +99,7 @@ def test_note_where_a_record_is_short():
 @pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
 def test_overturning_ends_the_history(pivot, side):
     sign = 1.0 if side == "left" else -1.0
-    scene = scene_of(initial_rotation=sign * 0.99 * BLOCK.alpha, initial_angular_velocity=sign * 0.3, duration=30.0)
+    scene = scene_of(initial_rotation=sign * 0.99 * PAPER_BLOCK.alpha, initial_angular_velocity=sign * 0.3, duration=30.0)
     history = EventBasedModel(pivot=pivot).simulate(scene)
     assert history.outcome == f"overturned {side}"
     last = history.event_list[-1]

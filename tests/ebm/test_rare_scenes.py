@@ -11,8 +11,8 @@ import pytest
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from rockcheck.scenes.scene import PAPER_BLOCK
 
-PAPER = Block(half_width=0.397, half_height=1.555)
 SQUARE = Block(half_width=7.069, half_height=7.069)
 
 
@@ -27,14 +27,16 @@ def scene_of(block: Block, friction: float, duration: float, **more: object) -> 
 SCENES = {
     # The corner lets go of the wall at the instant at which the floor's force turns.
     "release on the ladder": scene_of(
-        PAPER,
+        PAPER_BLOCK,
         0.3,
         4.0,
         walls=[Wall(side="left", gap=0.003)],
         excitation=Ricker(amplitude=27.828295819935693, period=1.030200737875156),
     ),
     "no room between walls": scene_of(SQUARE, 0.3, 1.0, walls=both(0.0, 0.0, 0.9), initial_velocity=1.33),
-    "no room, elastic walls": scene_of(PAPER, 0.3, 1.0, walls=both(0.0, 0.0, 1.0), initial_velocity=-0.5, initial_angular_velocity=0.2),
+    "no room, elastic walls": scene_of(
+        PAPER_BLOCK, 0.3, 1.0, walls=both(0.0, 0.0, 1.0), initial_velocity=-0.5, initial_angular_velocity=0.2
+    ),
     "wedged": scene_of(
         Block(half_width=0.2767571700542464, half_height=1.842522521858856),
         1.0755489589847906,
@@ -46,10 +48,10 @@ SCENES = {
         gravity=10.0,
     ),
     "no friction, shaken both ways": scene_of(
-        PAPER, 0.0, 6.0, excitation=Ricker(amplitude=8.0, period=0.9), vertical=Ricker(amplitude=-6.0, period=0.6)
+        PAPER_BLOCK, 0.0, 6.0, excitation=Ricker(amplitude=8.0, period=0.9), vertical=Ricker(amplitude=-6.0, period=0.6)
     ),
     "no friction, a wall that is touched": scene_of(
-        PAPER,
+        PAPER_BLOCK,
         0.0,
         6.0,
         walls=[Wall(side="right", gap=0.0)],
@@ -61,7 +63,7 @@ SCENES = {
         Block(half_width=0.5, half_height=0.5), 0.6, 4.0, initial_rotation=0.5, excitation=Rest()
     ),
     "weight that turns around": scene_of(
-        PAPER, 0.5, 3.0, excitation=Ricker(amplitude=3.0, period=1.0), vertical=Sine(amplitude=14.0, period=1.1, cycles=2)
+        PAPER_BLOCK, 0.5, 3.0, excitation=Ricker(amplitude=3.0, period=1.0), vertical=Sine(amplitude=14.0, period=1.1, cycles=2)
     ),
     "spikes from below": scene_of(
         Block(half_width=0.088, half_height=0.996),
@@ -101,12 +103,12 @@ def test_a_landing_at_the_slip_limit_takes_its_energy():
 
 def test_a_pivot_that_cannot_slip_has_no_slip_velocity():
     with pytest.raises(InputError, match="initial_velocity"):
-        EventBasedModel(friction="no-slip").simulate(scene_of(PAPER, 0.3, 1.0, initial_velocity=0.1))
+        EventBasedModel(friction="no-slip").simulate(scene_of(PAPER_BLOCK, 0.3, 1.0, initial_velocity=0.1))
 
 
 def test_a_vertical_record_of_zeros_is_none():
     """It costs no step at each of its samples."""
-    scene = scene_of(PAPER, 0.5, 5.0, excitation=Ricker(amplitude=4.0, period=1.0))
+    scene = scene_of(PAPER_BLOCK, 0.5, 5.0, excitation=Ricker(amplitude=4.0, period=1.0))
     flat = scene.replace(vertical=Record.from_samples(np.zeros(1000), 0.005))
     one, other = (EventBasedModel().simulate(each) for each in (scene, flat))
     assert other.cost.steps == one.cost.steps
@@ -121,7 +123,7 @@ def test_random_pulses_between_walls(settings):
     gaps = (0.0, 0.003, 0.053)
     scenes = [
         scene_of(
-            PAPER,
+            PAPER_BLOCK,
             float(random.choice([0.0, 0.1, 0.3, 1.2])),
             6.0,
             walls=both(float(random.choice(gaps)), float(random.choice(gaps)), float(random.choice([0.0, 0.5, 1.0]))),
@@ -136,7 +138,7 @@ def test_random_pulses_between_walls(settings):
 def test_a_decided_run_has_the_peak_of_the_whole_run(amplitude, period, friction):
     """Deciding early, when what is left of the pulse cannot lift the block above its peak, changes no peak."""
     model = EventBasedModel(tolerance=1e-11)
-    scene = scene_of(PAPER, friction, 15.0, excitation=Ricker(amplitude=amplitude, period=period))
+    scene = scene_of(PAPER_BLOCK, friction, 15.0, excitation=Ricker(amplitude=amplitude, period=period))
     packed = pack([scene], model)
     early, whole = run_batch(packed, model), run_batch(packed, model, until_decided=False)
     assert early.series[0] < whole.series[0]

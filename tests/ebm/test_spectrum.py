@@ -12,16 +12,16 @@ import pytest
 from rockcheck.ebm import EventBasedModel, batch, overturning_spectrum
 from rockcheck.ebm.spectrum import node_scene, play_nodes
 from rockcheck.ebm.trajectory import TOO_MANY_STEPS
-from rockcheck.scenes import Block, Floor, InputError, Record, Ricker, Scene, Wall
+from rockcheck.scenes import Floor, InputError, Record, Ricker, Scene, Wall
+from rockcheck.scenes.scene import PAPER_BLOCK
 
 DATA = Path(__file__).parents[1] / "data" / "ebm_ricker_cases.csv"
 SIDES = {"safe": 0, "ccw": -1, "cw": 1}
-BLOCK = Block(half_width=0.397, half_height=1.555)
 
 
 def scene(*walls, friction=0.3, excitation=None):
     pulse = excitation or Ricker(amplitude=1.0, period=1.0)
-    return Scene(name="spectrum", block=BLOCK, floor=Floor(friction=friction), walls=walls, excitation=pulse, duration=1.0)
+    return Scene(name="spectrum", block=PAPER_BLOCK, floor=Floor(friction=friction), walls=walls, excitation=pulse, duration=1.0)
 
 
 def reference_runs():
@@ -130,7 +130,7 @@ def test_a_record_is_scaled_and_the_block_resized():
     record = Record.from_samples(3.0 * np.sin(2.0 * np.pi * np.arange(0.0, 2.0, 0.02)), 0.02)
     start = scene(excitation=record)
     node = node_scene(start, 2.0, 0.5)
-    assert (node.block.half_width, node.block.half_height) == (0.5 * BLOCK.half_width, 0.5 * BLOCK.half_height)
+    assert (node.block.half_width, node.block.half_height) == (0.5 * PAPER_BLOCK.half_width, 0.5 * PAPER_BLOCK.half_height)
     np.testing.assert_allclose(node.excitation.samples, 2.0 * record.samples)
     sizes, scales = np.array([0.3, 0.6, 1.2]), np.array([0.5, 1.0, 2.0, 4.0])
     spectrum = overturning_spectrum(start, sizes, scales)
@@ -179,6 +179,6 @@ def test_grids_that_cannot_be(frequencies, amplitudes, said):
 
 
 def test_a_base_at_rest_has_no_spectrum():
-    at_rest = Scene(name="still", block=BLOCK, floor=Floor(friction=0.3), duration=1.0)
+    at_rest = Scene(name="still", block=PAPER_BLOCK, floor=Floor(friction=0.3), duration=1.0)
     with pytest.raises(InputError, match="ricker or sine pulse, or a record"):
         overturning_spectrum(at_rest, [1.0], [1.0])

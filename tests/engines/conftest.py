@@ -12,14 +12,13 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
-
-BLOCK = Block(half_width=0.397, half_height=1.555)
+from rockcheck.scenes.scene import PAPER_BLOCK
 
 
 @pytest.fixture(scope="session")
 def block() -> Block:
     """The paper's block, alpha = 0.25."""
-    return BLOCK
+    return PAPER_BLOCK
 
 
 @pytest.fixture(scope="session")
@@ -27,7 +26,9 @@ def free_rocking() -> Callable[[float], Scene]:
     """Free rocking from a tilt, given in alpha, on a floor that holds the pivot."""
 
     def scene(tilt: float) -> Scene:
-        return Scene(name="free rocking", block=BLOCK, floor=Floor(friction=1.0), initial_rotation=tilt * BLOCK.alpha, duration=4.0)
+        return Scene(
+            name="free rocking", block=PAPER_BLOCK, floor=Floor(friction=1.0), initial_rotation=tilt * PAPER_BLOCK.alpha, duration=4.0
+        )
 
     return scene
 
@@ -38,9 +39,9 @@ def pulse() -> Callable[..., Scene]:
 
     def scene(amplitude: float, frequency: float, friction: float = 1.0, walls: Sequence[Wall] = (), duration: float = 4.0) -> Scene:
         excitation = Ricker(
-            amplitude=amplitude * 9.81 * math.tan(BLOCK.alpha), period=2 * math.pi / (frequency * BLOCK.frequency_parameter)
+            amplitude=amplitude * 9.81 * math.tan(PAPER_BLOCK.alpha), period=2 * math.pi / (frequency * PAPER_BLOCK.frequency_parameter)
         )
-        return Scene(name="pulse", block=BLOCK, floor=Floor(friction=friction), walls=walls, excitation=excitation, duration=duration)
+        return Scene(name="pulse", block=PAPER_BLOCK, floor=Floor(friction=friction), walls=walls, excitation=excitation, duration=duration)
 
     return scene
 

@@ -13,6 +13,7 @@ import pytest
 from rockcheck.engines import MuJoCo, PyBullet
 from rockcheck.engines.engine import Engine
 from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Ricker, Scene, Sine, Wall
+from rockcheck.scenes.scene import PAPER_BLOCK
 
 each_engine = pytest.mark.parametrize("engine", [MuJoCo, PyBullet], ids=lambda engine: engine.name)
 
@@ -193,7 +194,7 @@ def test_record_with_kinks(engine):
 HARD = [
     Scene(
         name="rattle between walls",
-        block=Block(half_width=0.397, half_height=1.555),
+        block=PAPER_BLOCK,
         floor=Floor(friction=0.3),
         walls=[Wall(side="left", gap=0.0, restitution=0.9), Wall(side="right", gap=0.001, restitution=1.0)],
         excitation=Sine(amplitude=8.0, period=0.7, cycles=2),
@@ -220,7 +221,7 @@ HARD = [
     ),
     Scene(
         name="pressed on a wall",
-        block=Block(half_width=0.397, half_height=1.555),
+        block=PAPER_BLOCK,
         floor=Floor(friction=1.2),
         walls=[Wall(side="left", gap=0.0, restitution=0.5)],
         excitation=Record.from_samples([6.0] * 150, time_step=0.01),

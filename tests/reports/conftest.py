@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rockcheck.scenes import Block, Cost, Event, Floor, Ricker, Scene, Wall
+from rockcheck.scenes import Cost, Event, Floor, Ricker, Scene, Wall
 from rockcheck.scenes.observation import observe
+from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
@@ -33,7 +34,7 @@ def scene(name: str, wall: bool, duration: float = 12.0) -> Scene:
     """The paper's block under a pulse."""
     return Scene(
         name=name,
-        block=Block(half_width=0.397, half_height=1.555),
+        block=PAPER_BLOCK,
         floor=Floor(friction=0.3),
         walls=(Wall(side="left", gap=0.053, restitution=0.5),) if wall else (),
         excitation=Ricker(amplitude=6.0, period=1.0),

@@ -115,7 +115,7 @@ def test_text_is_escaped():
 
 def test_nothing_heavy_is_imported_to_show_a_table():
     code = (
-        "import sys; from scenes import Block, Floor, Scene;"
+        "import sys; from rockcheck import Block, Floor, Scene;"
         "Scene(name='a', block=Block(half_width=1.0, half_height=2.0), floor=Floor(friction=0.5), duration=1.0)._repr_html_();"
         "print(sorted({'matplotlib', 'pandas', 'numba', 'mujoco', 'pybullet'} & sys.modules.keys()))"
     )

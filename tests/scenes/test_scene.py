@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from rockcheck.scenes.scene import PAPER_BLOCK
 
 GOOD = {
     "name": "good",
@@ -118,7 +119,7 @@ def test_frozen():
 
 
 def test_derived_quantities():
-    block = Block(half_width=0.397, half_height=1.555)
+    block = PAPER_BLOCK
     assert block.alpha == pytest.approx(0.25, abs=1e-4)
     assert block.radius == pytest.approx(math.hypot(0.397, 1.555))
     assert block.frequency_parameter == pytest.approx(2.14, abs=5e-3)

@@ -25,7 +25,7 @@ from rockcheck.validation.stress.invariants import Played
 from rockcheck.validation.stress.players import PLAYERS, EventBased
 from rockcheck.validation.stress.study import Batch, Chunk, Failure
 
-ROCKCHECK = [sys.executable, "-m", "rockcheck.validation.commands.cli"]
+ROCKCHECK = [sys.executable, "-m", "rockcheck"]
 posix = pytest.mark.skipif(sys.platform == "win32", reason="limits and signals as POSIX has them")
 
 SMALL_RUN = ["stress", "runs", "--model", "ebm no-slip", "--runs", "30", "--jobs", "1"]

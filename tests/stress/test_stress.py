@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
+from rockcheck.scenes import Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
+from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.commands.cli import main
 from rockcheck.validation.stress import players, study
 from rockcheck.validation.stress.generator import ALPHA, FRICTION, RADIUS, random_scene
@@ -22,10 +23,9 @@ from rockcheck.validation.stress.stability import LINES, fault_of, largest_stabl
 from rockcheck.validation.stress.study import Chunk, chunks, play_some, run_stress
 
 ALPHA_PAPER = 0.25
-BLOCK = Block(half_width=0.397, half_height=1.555)
 SLIDES_AND_HITS = Scene(
     name="hits",
-    block=BLOCK,
+    block=PAPER_BLOCK,
     floor=Floor(friction=0.3),
     walls=[Wall(side="left", gap=0.05, restitution=0.5)],
     excitation=Ricker(amplitude=8.0, period=1.2),
@@ -188,7 +188,7 @@ def test_a_block_that_hangs_is_counted_by_name():
 
 def test_similar_scenes_have_the_same_numbers():
     other = similar(SLIDES_AND_HITS, 3)
-    k = other.block.radius / BLOCK.radius
+    k = other.block.radius / PAPER_BLOCK.radius
     assert k != pytest.approx(1.0)
     assert other.walls[0].gap == pytest.approx(k * 0.05)
     assert other.excitation.amplitude == 8.0

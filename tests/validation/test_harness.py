@@ -30,7 +30,7 @@ class Copy:
 
     def start(self, *words: str) -> subprocess.Popen[str]:
         environment = {**os.environ, "PYTHONPATH": str(self.folder), "PYTHONDONTWRITEBYTECODE": "1"}
-        command = [sys.executable, "-m", "rockcheck.validation.commands.cli", *words, "--no-report"]
+        command = [sys.executable, "-m", "rockcheck", *words, "--no-report"]
         return subprocess.Popen(
             command, cwd=self.folder, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True
         )

@@ -134,7 +134,7 @@ def test_a_block_past_its_balance_is_not_safe_for_want_of_energy(tmp_path):
 def test_a_killed_run_goes_on_where_it_was(tmp_path, capsys):
     words = ["spectrum", "--figure", "8", "--size", "150", "--out", "out"]
     tiles = tmp_path / "out" / "spectra" / "tiles"
-    command = [sys.executable, "-c", "import sys; from validation.commands.cli import main; sys.exit(main())", *words]
+    command = [sys.executable, "-c", "import sys; from rockcheck.validation.commands.cli import main; sys.exit(main())", *words]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL) as run:
         while len(list(tiles.glob("*.tile"))) < 4:
             assert run.poll() is None

@@ -34,14 +34,14 @@ floor = { friction = 0.5 }
 
 def rockcheck(*words, **environment):
     """The command in a process of its own, without a terminal."""
-    line = [sys.executable, "-m", "rockcheck.validation.commands.cli", *words]
+    line = [sys.executable, "-m", "rockcheck", *words]
     return subprocess.run(line, capture_output=True, text=True, env={**os.environ, **environment}, timeout=300, check=False)
 
 
 def on_a_terminal(*words, columns=80):
     """What the command writes to a terminal of that width: stdout and stderr together."""
     code = (
-        "import fcntl, struct, sys, termios; from validation.commands.cli import main;"
+        "import fcntl, struct, sys, termios; from rockcheck.validation.commands.cli import main;"
         f"fcntl.ioctl(1, termios.TIOCSWINSZ, struct.pack('HHHH', 40, {columns}, 0, 0)); sys.exit(main(sys.argv[1:]))"
     )
     terminal, inside = pty.openpty()

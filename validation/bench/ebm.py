@@ -22,7 +22,7 @@ from rockcheck.ebm.batch import Packed, pack, pack_pulses, run_batch
 from rockcheck.ebm.ground import Ground, acceleration
 from rockcheck.scenes import Floor, ModelFailure, Ricker, Scene, Wall, load_scene
 from rockcheck.scenes.compiled import kernel
-from rockcheck.validation.bench.scenes import BLOCK
+from rockcheck.scenes.scene import PAPER_BLOCK
 
 Progress = Callable[[str], None]
 #: The grid of Ricker pulses: omega_p/p, a_p/(g tan alpha), and its nodes along each axis.
@@ -89,7 +89,7 @@ class EbmSpeed:
 
 def _scene(*walls: Wall, friction: float = 0.3) -> Scene:
     pulse = Ricker(amplitude=1.0, period=1.0)
-    return Scene(name="grid", block=BLOCK, floor=Floor(friction=friction), walls=walls, excitation=pulse, duration=10.0)
+    return Scene(name="grid", block=PAPER_BLOCK, floor=Floor(friction=friction), walls=walls, excitation=pulse, duration=10.0)
 
 
 def grid(scene: Scene, nodes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -106,7 +106,7 @@ def _pulses(scene: Scene) -> Callable[[EventBasedModel, int], Packed]:
 def _records(model: EventBasedModel, nodes: int) -> Packed:
     """El Centro at `nodes` scales from 1.4 to 1.8, to the record's end."""
     scene = load_scene("fig4a")
-    louder = (scene.excitation.model_copy(update={"scale": scale}) for scale in np.linspace(1.4, 1.8, nodes).tolist())
+    louder = (scene.excitation.scaled(scale / 1.6) for scale in np.linspace(1.4, 1.8, nodes).tolist())
     return pack([scene.replace(excitation=record, duration=scene.excitation.quiet_after) for record in louder], model)
 
 
@@ -187,11 +187,11 @@ def right_hand_side_seconds(count: int = 400_000) -> float:
     from rockcheck.ebm import natural
 
     ground, _ = natural.grounds_of(_scene())
-    _right_hand_sides(ground, BLOCK.alpha, 1)
+    _right_hand_sides(ground, PAPER_BLOCK.alpha, 1)
     taken = []
     for _ in range(5):
         began = time.process_time()
-        _right_hand_sides(ground, BLOCK.alpha, count)
+        _right_hand_sides(ground, PAPER_BLOCK.alpha, count)
         taken.append((time.process_time() - began) / count)
     return median(taken)
 

@@ -13,10 +13,10 @@ from functools import cache
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.horizon import predictability_horizon
-from rockcheck.scenes import Block, Floor, History, Rest, Ricker, Scene, Wall, load_scene
+from rockcheck.scenes import Floor, History, Rest, Ricker, Scene, Wall, load_scene
+from rockcheck.scenes.scene import PAPER_BLOCK
 
 MEMBERS = 10
-BLOCK = Block(half_width=0.397, half_height=1.555)
 #: How accurate the references are, and to what time a record is played at most, s.
 REFERENCE_TOLERANCE, RECORD_DURATION = 1e-13, 8.0
 
@@ -36,17 +36,17 @@ def _spread(k: int) -> float:
 
 
 def _free(k: int) -> Scene:
-    tilt = (0.30 + 0.05 * k) * BLOCK.alpha
-    return Scene(name=f"free {k}", block=BLOCK, floor=Floor(friction=1.0), excitation=Rest(), duration=3.0, initial_rotation=tilt)
+    tilt = (0.30 + 0.05 * k) * PAPER_BLOCK.alpha
+    return Scene(name=f"free {k}", block=PAPER_BLOCK, floor=Floor(friction=1.0), excitation=Rest(), duration=3.0, initial_rotation=tilt)
 
 
 def pulse(frequency_ratio: float, amplitude_ratio: float, friction: float, *, walls: tuple[Wall, ...] = (), name: str = "pulse") -> Scene:
     """A Ricker pulse of omega_p = ratio p and a_p = ratio g tan alpha, 3 s."""
-    amplitude = amplitude_ratio * 9.81 * math.tan(BLOCK.alpha)
-    period = 2.0 * math.pi / (frequency_ratio * BLOCK.frequency_parameter)
+    amplitude = amplitude_ratio * 9.81 * math.tan(PAPER_BLOCK.alpha)
+    period = 2.0 * math.pi / (frequency_ratio * PAPER_BLOCK.frequency_parameter)
     return Scene(
         name=name,
-        block=BLOCK,
+        block=PAPER_BLOCK,
         floor=Floor(friction=friction),
         walls=walls,
         excitation=Ricker(amplitude=amplitude, period=period),
@@ -65,7 +65,7 @@ def _pulses(name: str, frequency_ratio: float, amplitude_ratio: float, friction:
 def _record(name: str, words: str) -> SceneFamily:
     def member(k: int) -> Scene:
         scene = load_scene(name)
-        louder = scene.excitation.model_copy(update={"scale": 1.5 + 0.02 * k})
+        louder = scene.excitation.scaled((1.5 + 0.02 * k) / 1.6)
         return scene.replace(name=f"{name} {k}", excitation=louder, duration=RECORD_DURATION)
 
     return SceneFamily(name, f"El Centro × 1.5 to 1.68, {words}", member)

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from rockcheck.scenes import Floor, History, Record, Scene, Wall
-from rockcheck.validation.bench.scenes import BLOCK, pulse
+from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.validation.bench.scenes import pulse
 from rockcheck.validation.execute.models import Model, build
 
 Progress = Callable[[str], None]
@@ -96,7 +97,7 @@ def _batches(nodes: int) -> Iterator[Saving]:
     def row(thing: str, dear: tuple[Any, Any], cheap: tuple[Any, Any], remark: str = "") -> Saving:
         peaks = dear[1](), cheap[1]()
         both = (peaks[0].side == 0) & (peaks[1].side == 0)
-        change = float(np.max(np.abs(peaks[0].peak - peaks[1].peak)[both], initial=0.0)) / BLOCK.alpha
+        change = float(np.max(np.abs(peaks[0].peak - peaks[1].peak)[both], initial=0.0)) / PAPER_BLOCK.alpha
         return _saving("ebm", thing, "μs a trajectory", dear[0], cheap[0], change=change, remark=remark)
 
     sticky = plain.replace(floor=Floor(friction=1.3))
@@ -150,7 +151,7 @@ def _of_histories(label: str, thing: str, dear: tuple[Model, Scene], cheap: tupl
 
     first, second = (_rows(model.simulate(scene)) for model, scene in (dear, cheap))
     common = sorted(first.keys() & second.keys())
-    change = max(abs(first[t] - second[t]) for t in common) / BLOCK.alpha
+    change = max(abs(first[t] - second[t]) for t in common) / PAPER_BLOCK.alpha
     return _saving(label, thing, "ms a simulated s", cost(*dear), cost(*cheap), change=change, remark=remark)
 
 
@@ -170,7 +171,7 @@ def _mujoco_steps() -> Iterator[Saving]:
 
     from rockcheck.engines import MuJoCo
 
-    scene = Scene(name="tilted", block=BLOCK, floor=Floor(friction=1.0), walls=(FAR,), duration=1.0)
+    scene = Scene(name="tilted", block=PAPER_BLOCK, floor=Floor(friction=1.0), walls=(FAR,), duration=1.0)
     text = _as_xml(MuJoCo().rigid_world(scene))
 
     def loaded(change: Callable[[ET.Element], None] = lambda root: None) -> Any:
@@ -187,7 +188,7 @@ def _mujoco_steps() -> Iterator[Saving]:
 
     def started(model: Any) -> Any:
         data = mujoco.MjData(model)
-        tilt = 0.3 * BLOCK.alpha
+        tilt = 0.3 * PAPER_BLOCK.alpha
         pose = scene.replace(initial_rotation=tilt).initial_state
         if model.nq == 3:
             data.qpos[:] = pose[:3]
@@ -276,7 +277,7 @@ def _as_xml(world: Any) -> str:
 def _pybullet_steps() -> Iterator[Saving]:
     from rockcheck.engines import PyBullet
 
-    tilted = Scene(name="tilted", block=BLOCK, floor=Floor(friction=1.0), duration=1.0, initial_rotation=0.3 * BLOCK.alpha)
+    tilted = Scene(name="tilted", block=PAPER_BLOCK, floor=Floor(friction=1.0), duration=1.0, initial_rotation=0.3 * PAPER_BLOCK.alpha)
     start = np.array(tilted.initial_state)
 
     def steps(walls: tuple[Wall, ...] = (), each: Callable[[Any], object] = lambda world: None, count: int = _STEPS) -> Callable[[], float]:

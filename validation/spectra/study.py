@@ -20,7 +20,8 @@ import numpy as np
 
 from rockcheck.ebm import Spectrum, overturning_spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT, TOLERANCE, Floats, play_nodes
-from rockcheck.scenes import Block, Floor, InputError, Ricker, Scene, Wall
+from rockcheck.scenes import Floor, InputError, Ricker, Scene, Wall
+from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.execute import provenance
@@ -29,7 +30,6 @@ from rockcheck.validation.spectra.tiles import Tiles, compiled
 
 FIGURES: dict[int, tuple[Literal["left", "right"], float]] = {6: ("left", 0.3), 7: ("left", 0.6), 8: ("right", 0.3), 9: ("right", 0.6)}
 GAPS, RESTITUTIONS = (0.003, 0.053, 0.103), (0.0, 1.0)
-BLOCK = Block(half_width=0.397, half_height=1.555)
 FREQUENCIES, AMPLITUDES = (0.5, 8.0), (1.0, 12.0)
 #: Settings of the models in spectra, where they are not their own: outcomes need no more, and take a tenth of the time.
 SETTINGS: dict[str, dict[str, Any]] = {
@@ -113,7 +113,7 @@ def _paper_panel(figure: int, friction: float, wall: Wall | None) -> Panel:
         name, title = f"figure-{figure}-gap-{millimetres}-e-{wall.restitution:g}", f"Gap {millimetres} mm, e = {wall.restitution:g}"
     scene = Scene(
         name=name,
-        block=BLOCK,
+        block=PAPER_BLOCK,
         floor=Floor(friction=friction),
         walls=(wall,) if wall else (),
         excitation=Ricker(amplitude=1.0, period=1.0),

@@ -446,15 +446,11 @@ def similar(scene: Scene, seed: int) -> Scene:
     k = float(np.exp(np.random.default_rng([seed, 1]).uniform(math.log(1e-2), math.log(1e2))))
     root = math.sqrt(k)
 
-    def stretched(excitation: Rest | Ricker | Sine | Record) -> Rest | Ricker | Sine | Record:
-        name = {"record": "time_step", "rest": ""}.get(excitation.kind, "period")
-        return excitation.model_copy(update={name: root * getattr(excitation, name)}) if name else excitation
-
     return scene.replace(
         block=Block(half_width=k * scene.block.half_width, half_height=k * scene.block.half_height),
         walls=tuple(Wall(side=wall.side, gap=k * wall.gap, restitution=wall.restitution) for wall in scene.walls),
-        excitation=stretched(scene.excitation),
-        vertical=stretched(scene.vertical),
+        excitation=scene.excitation.stretched(root),
+        vertical=scene.vertical.stretched(root),
         duration=root * scene.duration,
         output_step=root * scene.output_step,
         initial_angular_velocity=scene.initial_angular_velocity / root,
@@ -559,8 +555,7 @@ def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
         return value * (1.0 + DISTURBANCE * float(r.choice([-1.0, 1.0])) * float(r.uniform(0.5, 1.0)))
 
     def stronger(excitation: Rest | Ricker | Sine | Record) -> Rest | Ricker | Sine | Record:
-        name = {"record": "scale", "rest": ""}.get(excitation.kind, "amplitude")
-        return excitation.model_copy(update={name: by(getattr(excitation, name))}) if name else excitation
+        return excitation if excitation.kind == "rest" else excitation.scaled(by(1.0))
 
     for _ in range(DISTURBED):
         floor = scene.floor

@@ -16,6 +16,7 @@ import numpy as np
 
 from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import build
 from rockcheck.validation.execute.workers import loss_of, workers
 from rockcheck.validation.stress.players import energy_without_source
@@ -178,7 +179,7 @@ CASES = {"left alone": 0.0, "pushed": 0.5, "shaken": 0.8}
 
 def stand_still(label: str, case: str, duration: float, step: float = REST_STEP) -> Still:
     """Plays a block that should not move; the paper's."""
-    block, mu = Block(half_width=0.397, half_height=1.555), 0.3
+    block, mu = PAPER_BLOCK, 0.3
     push = CASES[case] * 9.81 * min(SLOPE, mu)
     excitation: Rest | Record | Sine = Rest()
     if case == "pushed":
