@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rockcheck.scenes.errors import InputError, printable, unknown_name
+from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.scene import Scene
 
 DATA = Path(str(resources.files("rockcheck.scenes"))) / "data"
@@ -52,27 +53,20 @@ def _record_path(name: str, folder: Path) -> Path:
     return shipped if not beside.exists() and Path(name).name == name and shipped.exists() else beside
 
 
-#: Largest TOML file, and a key of so many parts that the parser's memory, which goes with their square, would be at stake.
+#: Largest TOML file, bytes.
 MOST_BYTES = 10_000_000
-_DEEP_KEY = re.compile(r"(?:[^\s.,=\[\]]+\s*\.\s*){50}")
+#: A key of so many parts that the parser's memory, which goes with their square, would be at stake. Every character is looked
+#: at a bounded number of times: a match begins only where a part does, and no part is tried in another way.
+_PART = r"""(?:"[^"\n]*+"|'[^'\n]*+'|[^\s.,=\[\]"']++)"""
+_DEEP_KEY = re.compile(rf"(?<![^\s.,=\[\]]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{49}}")
 
 
 def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a TOML file, or an `InputError` that names file and line."""
+    text = read_text(path, MOST_BYTES)
+    if _DEEP_KEY.search(text):
+        raise InputError(f"{printable(path)}: a key of more than 50 parts")
     try:
-        if path.exists() and not path.is_file():
-            raise InputError(f"{printable(path)}: not a file")
-        if path.stat().st_size > MOST_BYTES:
-            raise InputError(f"{printable(path)}: larger than {MOST_BYTES} bytes")
-        text = path.read_text(encoding="utf-8")
-        if _DEEP_KEY.search(text):
-            raise InputError(f"{printable(path)}: a key of more than 50 parts")
         return tomllib.loads(text)
-    except InputError:
-        raise
-    except UnicodeDecodeError:
-        raise InputError(f"{printable(path)}: not a text file") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # such as an integer of more digits than Python reads
         raise InputError(f"{printable(path)}: not valid TOML: {printable(error)}") from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"{printable(path)}: cannot be read: {getattr(error, 'strerror', None) or error}") from None

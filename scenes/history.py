@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import io
 import json
 import math
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.scenes.errors import InputError, printable
+from rockcheck.scenes.reading import MOST_LINE, MOST_TABLE_BYTES, open_regular, read_table
 from rockcheck.scenes.shown import Shown
 
 if TYPE_CHECKING:
@@ -133,19 +135,12 @@ class History(Shown):
 
         path = Path(path)
         shown = printable(path)
-        try:
-            with path.open(encoding="utf-8") as stream:
-                first = stream.readline()
-            frame = pd.read_csv(path, comment="#").rename(columns=str.strip).rename(columns=dict(columns or {}))
-            events_path = _events_path(path)
-            events = pd.read_csv(events_path) if events_path.exists() else pd.DataFrame()
-        except OSError as error:
-            raise InputError(f"{shown}: cannot be read: {error.strerror}") from None
-        except (ValueError, OverflowError) as error:  # pandas' own parser errors are ValueErrors
-            raise InputError(f"{shown}: not a CSV table: {printable(error)}") from None
+        frame = read_table(path).rename(columns=str.strip).rename(columns=dict(columns or {}))
+        events_path = _events_path(path)
+        events = read_table(events_path) if events_path.exists() else pd.DataFrame()
         if len(frame) and not isinstance(frame.index, pd.RangeIndex):  # pandas would take the first column for names of rows
             raise InputError(f"{shown}: rows have more values than the heading has columns")
-        about = _header(first, shown)
+        about = _header(path, shown)
         channels = _checked_channels(frame, shown)
         try:
             event_list = tuple(
@@ -186,12 +181,15 @@ def _text(value: object) -> str:
     return value if isinstance(value, str) else ""
 
 
-def _header(line: str, shown: str) -> dict[str, Any]:
-    mark = "# rockcheck history "
+def _header(path: Path, shown: str) -> dict[str, Any]:
+    """What `save` says of a history in the file's first line; empty for a file of another program."""
+    with open_regular(path, MOST_TABLE_BYTES) as stream:
+        line = stream.readline(MOST_LINE).removeprefix(codecs.BOM_UTF8)
+    mark = b"# rockcheck history "
     if not line.startswith(mark):
         return {}
     try:
-        about = json.loads(line[len(mark) :])
+        about = json.loads(line.removeprefix(mark).decode("utf-8"))
     except (ValueError, RecursionError):
         raise InputError(f"{shown}, line 1: not a header written by rockcheck") from None
     if not isinstance(about, dict) or not isinstance(about.get("cost", {}), dict) or not isinstance(about.get("settings", {}), dict):
@@ -211,6 +209,8 @@ def _size(about: Mapping[str, Any], key: str, shown: str) -> float | None:
 
 
 def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]]:
+    import pandas as pd
+
     missing = [name for name in ("t", "theta") if name not in frame.columns]
     if missing:
         raise InputError(f"{shown}: no column {missing[0]!r}; t and theta are needed, of {', '.join(COLUMNS)}")
@@ -227,7 +227,9 @@ def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]
             channels[name] = frame[name].astype(str).to_numpy()
             continue
         try:
-            values = frame[name].to_numpy(dtype=float)
+            if frame[name].dtype == bool:
+                raise ValueError("True is no number")
+            values = pd.to_numeric(frame[name]).to_numpy(dtype=float)
         except (TypeError, ValueError):
             raise InputError(f"{shown}: column {name!r} is not numeric") from None
         bad = np.flatnonzero(~np.isfinite(values))

@@ -11,15 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.scenes.errors import InputError, printable
+from rockcheck.scenes.reading import read_text
 
 GRAVITY_OF_RECORDS = 9.80665  # m/s^2, the unit "g" of record files (standard gravity)
 MOST_SAMPLES = 10_000_000
-MOST_BYTES = 400_000_000
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?"
-_HEADER_NAMED = re.compile(rf"NPTS\s*=\s*(\d+)\s*,?\s*DT\s*=\s*({_NUMBER})", re.IGNORECASE)
-_HEADER_PLAIN = re.compile(rf"^\s*(\d+)\s+({_NUMBER})\s+NPTS\s*,?\s*DT", re.IGNORECASE)
-_UNITS_G = re.compile(r"UNITS?\s+(?:OF|IN|ARE|:)?\s*\(?G(?:'?S)?\b", re.IGNORECASE)
+# Whatever repeats is possessive: what does not match ends after one pass, however long the line.
+_NUMBER = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eEdD][-+]?\d++)?"
+_HEADER_NAMED = re.compile(rf"NPTS\s*+=\s*+(\d++)\s*+(?:,\s*+)?DT\s*+=\s*+({_NUMBER})", re.IGNORECASE)
+_HEADER_PLAIN = re.compile(rf"^\s*+(\d++)\s++({_NUMBER})\s++NPTS\s*+(?:,\s*+)?DT", re.IGNORECASE)
+_UNITS_G = re.compile(r"UNITS?\s++(?:(?:OF|IN|ARE|:)\s*+)?\(?G(?:'?S)?\b", re.IGNORECASE)
 _UNIT_FACTORS = {"acceleration_g": GRAVITY_OF_RECORDS, "acceleration_m_s2": 1.0}
 
 
@@ -32,23 +33,7 @@ def read_record(path: Path) -> tuple[NDArray[np.float64], float]:
     readers = {".at2": _read_at2, ".csv": _read_csv}
     if path.suffix.lower() not in readers:
         raise InputError(f"{printable(path)}: not a record file; a .AT2 or .csv file is asked for")
-    return readers[path.suffix.lower()](path, _read_text(path))
-
-
-def _read_text(path: Path) -> str:
-    try:
-        if path.exists() and not path.is_file():  # such as a device, which has no end
-            raise InputError(f"{printable(path)}: cannot be read: not a file")
-        if path.stat().st_size > MOST_BYTES:
-            raise InputError(f"{printable(path)}: larger than {MOST_BYTES} bytes")
-        return path.read_text(encoding="utf-8", errors="strict")
-    except UnicodeDecodeError:
-        raise InputError(f"{printable(path)}: not a text file") from None
-    except (OSError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{printable(path)}: cannot be read: {reason}") from None
+    return readers[path.suffix.lower()](path, read_text(path))
 
 
 def _number(path: Path, line: int, word: str) -> float:
@@ -84,12 +69,19 @@ def _read_at2(path: Path, text: str) -> tuple[NDArray[np.float64], float]:
     return np.array(values) * GRAVITY_OF_RECORDS, time_step
 
 
+def _words(path: Path, number: int, line: str) -> list[str]:
+    try:
+        return [word.strip() for word in next(csv.reader([line]))]
+    except csv.Error as error:
+        raise InputError(f"{printable(path)}, line {number}: not a line of a CSV table: {printable(error)}") from None
+
+
 def _read_csv(path: Path, text: str) -> tuple[NDArray[np.float64], float]:
     """CSV with a header line naming `time_s` and one of the acceleration columns; lines that start with # are remarks."""
     numbered = [(n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
     if not numbered:
         raise InputError(f"{printable(path)}: empty")
-    names = [word.strip() for word in next(csv.reader([numbered[0][1]]))]
+    names = _words(path, *numbered[0])
     units = [name for name in _UNIT_FACTORS if name in names]
     if "time_s" not in names or len(units) != 1:
         raise InputError(
@@ -99,7 +91,7 @@ def _read_csv(path: Path, text: str) -> tuple[NDArray[np.float64], float]:
     columns = names.index("time_s"), names.index(units[0])
     times, values, places = [], [], []
     for n, line in numbered[1:]:
-        words = [word.strip() for word in next(csv.reader([line]))]
+        words = _words(path, n, line)
         if len(words) != len(names):
             raise InputError(f"{printable(path)}, line {n}: {len(words)} fields where the header names {len(names)}")
         times.append(_number(path, n, words[columns[0]]))

@@ -19,6 +19,7 @@ from rockcheck.scenes import History, InputError, Scene
 from rockcheck.scenes.base import Finite, Frozen
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.history import outcome_of
+from rockcheck.scenes.reading import read_table
 
 TIMES = {"s": 1.0, "ms": 1e-3}
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
@@ -85,14 +86,9 @@ def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
 
 def _heading(path: Path, shown: str) -> list[str]:
     """Names of the columns, with quotes and remarks read as those of the rows are."""
-    import pandas as pd
-
-    try:
-        row = pd.read_csv(path, comment="#", header=None, nrows=1, dtype=str, keep_default_na=False)
-    except OSError as error:
-        raise InputError(f"{shown}: cannot be read: {error.strerror}") from None
-    except (ValueError, OverflowError) as error:  # pandas' own parser errors are ValueErrors
-        raise InputError(f"{shown}: not a CSV table: {printable(error)}") from None
+    row = read_table(path, header=None, nrows=1, dtype=str, keep_default_na=False)
+    if row.empty:
+        raise InputError(f"{shown}: empty")
     return [column.strip() for column in row.iloc[0]]
 
 

@@ -20,6 +20,7 @@ from pydantic import Field, ValidationError, field_validator
 
 from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.errors import from_validation, printable
+from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
 
@@ -203,10 +204,11 @@ class Run(Stored):
     def load(cls, folder: str | Path) -> Run:
         """The run in `folder`; raises `InputError` where there is none or it was written by another format."""
         path = Path(folder) / RUN_FILE
+        if not path.exists():
+            raise InputError(f"{printable(path)}: no finished run here")
+        text = read_text(path)
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise InputError(f"{printable(path)}: no finished run here ({error.strerror})") from None
+            data = json.loads(text)
         except (ValueError, RecursionError) as error:
             raise InputError(f"{printable(path)}: not a run written by rockcheck: {printable(error)}") from None
         if isinstance(data, dict) and data.get("format") != FORMAT:

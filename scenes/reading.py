@@ -1,0 +1,88 @@
+"""Reading files that somebody else may have written: only regular files, of bounded size, as UTF-8 text."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+from rockcheck.scenes.errors import InputError, printable
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Largest text file, bytes.
+MOST_BYTES = 400_000_000
+#: Largest table, bytes: the longest history that a scene may ask for, with all its digits.
+MOST_TABLE_BYTES = 1_500_000_000
+#: Most columns of a table, and the longest line, bytes.
+MOST_COLUMNS, MOST_LINE = 1000, 1_000_000
+
+
+def open_regular(path: Path, most: int) -> IO[bytes]:
+    """A regular file of at most `most` bytes, open for reading.
+
+    Raises `InputError` for anything else, such as a pipe or a device, which may have no end or wait for ever.
+    """
+    shown = printable(path)
+    try:
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    except (OSError, ValueError) as error:  # a path that holds a null character is a ValueError
+        raise InputError(f"{shown}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    about = os.fstat(handle)
+    if stat.S_ISREG(about.st_mode) and about.st_size <= most:
+        return os.fdopen(handle, "rb")
+    os.close(handle)
+    raise InputError(f"{shown}: larger than {most} bytes" if stat.S_ISREG(about.st_mode) else f"{shown}: cannot be read: not a file")
+
+
+def read_text(path: Path, most: int = MOST_BYTES) -> str:
+    """The text of a file without a byte-order mark. Raises `InputError` where it is no file, too large or not UTF-8."""
+    with open_regular(path, most) as stream:
+        try:
+            content = stream.read(most + 1)
+        except OSError as error:
+            raise InputError(f"{printable(path)}: cannot be read: {error.strerror}") from None
+    if len(content) > most:  # it has grown
+        raise InputError(f"{printable(path)}: larger than {most} bytes")
+    try:
+        return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError:
+        raise InputError(f"{printable(path)}: not a text file") from None
+
+
+def read_table(path: Path, **options: Any) -> pd.DataFrame:
+    """A CSV file by pandas, whose `options` these are; lines that start with # are remarks.
+
+    Raises `InputError` where it is no such file, or a line of it is too long for a table of histories.
+    """
+    import pandas as pd
+
+    shown = printable(path)
+    try:
+        with open_regular(path, MOST_TABLE_BYTES) as stream:
+            _check_lines(stream, shown)
+            stream.seek(0)
+            return pd.read_csv(stream, comment="#", **options)
+    except OSError as error:
+        raise InputError(f"{shown}: cannot be read: {error.strerror}") from None
+    except InputError:
+        raise
+    except (ValueError, OverflowError, RecursionError) as error:  # pandas' own parser errors are ValueErrors
+        raise InputError(f"{shown}: not a CSV table: {printable(error)}") from None
+
+
+def _check_lines(stream: IO[bytes], shown: str) -> None:
+    """Every row stands on one line, of a bounded number of columns."""
+    number = 0
+    while line := stream.readline(MOST_LINE + 1):
+        number += 1
+        if len(line) > MOST_LINE:
+            raise InputError(f"{shown}: not a CSV table: line {number}: longer than {MOST_LINE} bytes")
+        if line.startswith(b"#"):
+            continue
+        if line.count(b",") >= MOST_COLUMNS:
+            raise InputError(f"{shown}: not a CSV table: line {number}: more than {MOST_COLUMNS} columns")
+        if line.count(b'"') % 2 and line.partition(b"#")[0].count(b'"') % 2:
+            raise InputError(f"{shown}: not a CSV table: line {number}: a quotation mark that is not closed on its line")

@@ -1,0 +1,151 @@
+"""Reading is bounded: whatever a file holds, and whatever it is, it is read or refused within seconds and with little memory."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rockcheck.scenes import History, InputError, load_scene
+from rockcheck.scenes.files import read_toml
+from rockcheck.scenes.records import read_record
+from rockcheck.validation.discrepancy.measured import read_measured
+from rockcheck.validation.suite.results import Run
+
+#: Files of 100 kB and more that took over a minute each, by the square of a repetition.
+LONG = {
+    "digits.AT2": "UNITS OF G\nNPTS= 1, DT= .01\n" + "1" * 100_000 + "x",
+    "units.AT2": "UNITS" + " " * 100_000 + "\nNPTS= 1, DT= .01\n1",
+    "npts.AT2": "UNITS OF G\nNPTS=1" + " " * 100_000 + "\n1",
+    "plain.AT2": "UNITS OF G\n1" + " " * 100_000 + "1\n1",
+    "step.AT2": "UNITS OF G\nNPTS=1 DT=" + "1" * 100_000 + "\n1",
+    "digits.csv": "time_s,acceleration_g\n0,1\n0.1," + "1" * 100_000 + "x\n",
+    "field.csv": 'time_s,acceleration_g\n0,1\n0.1,"' + "1" * 200_000 + '"\n',
+    "word.toml": "a" * 1_000_000,
+    "blanks.toml": "a = 1\n" + " " * 1_000_000 + "\n",
+    "dots.toml": "a = '" + "x. " * 300_000 + "'",
+    "quotes.toml": "a = 1 #" + "\"'" * 500_000,
+    "quoted.toml": '" "' + '." "' * 100_000 + " = 1",
+    "columns.csv": "t,theta" + ",x" * 1_000_000 + "\n0,1" + ",1" * 1_000_000 + "\n",
+    "row.csv": "t,theta\n0,1" + ",1" * 1_000_000 + "\n",
+    "lines.csv": 't,theta,"' + "\n" * 300_000 + '"\n0,0,0\n',
+    "line.csv": "t,theta\n0," + "1" * 2_000_000 + "\n",
+}
+
+_READ = """
+import resource, sys
+from pathlib import Path
+import pandas
+from rockcheck.scenes import History, InputError
+from rockcheck.scenes.files import read_toml
+from rockcheck.scenes.records import read_record
+from rockcheck.validation.discrepancy.measured import read_measured
+used = resource.getrusage(resource.RUSAGE_SELF).ru_utime
+resource.setrlimit(resource.RLIMIT_CPU, (int(used) + 10,) * 2)
+path = Path(sys.argv[1])
+for read in {".AT2": [read_record], ".toml": [read_toml], ".csv": [read_record, History.load, read_measured]}[path.suffix]:
+    try:
+        read(path)
+    except InputError as error:
+        assert len(str(error)) < 600 and str(error).isprintable(), error
+print("read or refused")
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of processor time are set as POSIX does")
+@pytest.mark.parametrize("name", LONG)
+def test_any_file_of_a_megabyte_is_read_or_refused_within_ten_seconds(tmp_path, name):
+    (tmp_path / name).write_text(LONG[name])
+    done = subprocess.run([sys.executable, "-c", _READ, str(tmp_path / name)], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.stdout == "read or refused\n"
+
+
+READERS = (History.load, read_measured, read_record, load_scene, read_toml)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with a name are POSIX")
+@pytest.mark.parametrize("read", READERS)
+@pytest.mark.parametrize("kind", ["a pipe", "a device", "a folder", "a link to a device"])
+def test_only_regular_files_are_read(tmp_path, read, kind):
+    """A pipe would be waited for without end, a device read without end."""
+    path = tmp_path / ("a.toml" if read in (load_scene, read_toml) else "a.csv")
+    if kind == "a pipe":
+        os.mkfifo(path)
+    elif kind == "a folder":
+        path.mkdir()
+    else:
+        path.symlink_to("/dev/zero")
+    with pytest.raises(InputError, match="not a file"):
+        read(path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with a name are POSIX")
+def test_what_lies_beside_a_history_or_in_a_run_is_a_regular_file_too(tmp_path):
+    (tmp_path / "h.csv").write_text("t,theta\n0,0\n1,0\n")
+    os.mkfifo(tmp_path / "h.events.csv")
+    os.mkfifo(tmp_path / "run.json")
+    for read in (lambda: History.load(tmp_path / "h.csv"), lambda: Run.load(tmp_path)):
+        with pytest.raises(InputError, match="not a file"):
+            read()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("t,theta\n0,True\n1,False\n", "column 'theta' is not numeric"),
+        ("t,theta\n0,True\n1,0.5\n", "column 'theta' is not numeric"),
+        ("t,theta\n0,1_000\n1,0.5\n", "column 'theta' is not numeric"),
+        ("t,theta\n0,0x10\n1,0.5\n", "column 'theta' is not numeric"),
+        ("t,x,theta\n0,1,2\n0,,1\n", "column 'x', row 2: nan is not finite"),
+        ("", "empty|No columns"),
+        ("# a remark\n", "empty|No columns"),
+        ('t,"theta\nx"\n0,1\n', "line 1: a quotation mark that is not closed on its line"),
+        ("t,theta" + ",x" * 1000 + "\n", "line 1: more than 1000 columns"),
+    ],
+)
+def test_words_are_no_numbers_and_rows_are_lines(tmp_path, text, said):
+    path = tmp_path / "h.csv"
+    path.write_text(text)
+    for read in (History.load, read_measured):
+        with pytest.raises(InputError, match=said):
+            read(path)
+
+
+def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
+    """As some editors write it: scene, suite, record and history are read as without it."""
+    scene = 'duration = 1.0\nblock = { half_width = 0.3, half_height = 1.0 }\nfloor = { friction = 0.4 }\nname = "a"\n'
+    (tmp_path / "a.toml").write_text(scene, encoding="utf-8-sig")
+    assert load_scene(tmp_path / "a.toml").name == "a"
+    (tmp_path / "a.csv").write_text("time_s,acceleration_m_s2\n0.0,0.1\n0.5,0.2\n", encoding="utf-8-sig")
+    assert read_record(tmp_path / "a.csv")[1] == 0.5
+    for remark in ("", '# rockcheck history {"name": "kept", "outcome": "at rest"}\n'):
+        path = tmp_path / "h.csv"
+        path.write_text(remark + "t,theta\n0,0.5\n1,0.25\n", encoding="utf-8-sig")
+        history = History.load(path)
+        assert history.channels["theta"].tolist() == [0.5, 0.25]
+        assert history.outcome == ("at rest" if remark else "moving")
+
+
+@pytest.mark.parametrize("key", ["a" + ".a" * 50, "a" + " . a" * 50, '" "' + '." "' * 50, "[a" + ".a" * 50 + "]", '"a."' + ".'.'" * 50])
+def test_a_key_of_many_parts_is_refused(tmp_path, key):
+    (tmp_path / "a.toml").write_text(key if key.startswith("[") else f"{key} = 1")
+    with pytest.raises(InputError, match="a key of more than 50 parts"):
+        read_toml(tmp_path / "a.toml")
+
+
+@pytest.mark.parametrize("line", ["a" + ".a" * 48 + " = 1", "a = [" + "0.1, " * 100 + "]", 'a = "' + "two words. " * 100 + '"'])
+def test_a_key_of_few_parts_is_read(tmp_path, line):
+    (tmp_path / "a.toml").write_text(line)
+    assert read_toml(tmp_path / "a.toml")
+
+
+def test_a_file_that_is_too_large_is_not_read(tmp_path, monkeypatch):
+    path: Path = tmp_path / "a.toml"
+    with path.open("wb") as stream:
+        stream.truncate(10_000_001)
+    with pytest.raises(InputError, match="larger than 10000000 bytes"):
+        read_toml(path)
