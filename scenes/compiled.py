@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core import config as numba_config
 from numba.core.event import Event, Listener, register
 from numba.extending import register_jitable
@@ -75,8 +76,11 @@ def kernel(function: Callable[..., Any]) -> Any:
     """Compiles `function` with numba on its first call, cached on disk until any source of its package changes.
 
     The compiled code releases the interpreter's lock, so that batches run on threads, and divides as IEEE 754 does (no
-    exception for a zero divisor).
+    exception for a zero divisor). Under NUMBA_DISABLE_JIT=1, as for a debugger or to measure coverage, it is interpreted and
+    divides likewise.
     """
+    if config.DISABLE_JIT:
+        return np.errstate(all="ignore")(function)
     compiled = numba.njit(nogil=True, error_model="numpy", _nrt=True, no_cfunc_wrapper=True)(function)
     before = config.CACHE_DIR
     config.CACHE_DIR = _cache_folder(Path(function.__code__.co_filename).parent)

@@ -57,32 +57,60 @@ def test_the_command_the_plugin_and_the_views_are_there():
         importlib.import_module(module)
 
 
-def imported(path: Path) -> set[str]:
-    """Top-level names that a file imports, wherever in it."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+def imported(tree: ast.AST) -> set[str]:
+    """Top-level names of modules that a file imports, wherever in it."""
     found = {name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names}
     found |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module and not node.level}
     return {name.partition(".")[0] for name in found}
 
 
+def imported_at_once(tree: ast.Module) -> set[str]:
+    """Those that it needs to be imported itself: not inside a function, nor for types only."""
+    kept = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+    return imported(ast.Module(body=kept, type_ignores=[]))
+
+
+def sources(top: str) -> dict[Path, ast.Module]:
+    """The files of a folder, parsed; there are some."""
+    found = {path: ast.parse(path.read_text(encoding="utf-8")) for path in (ROOT / top).rglob("*.py")}
+    assert found
+    return found
+
+
+DISTRIBUTIONS = packages_distributions()
+
+
+def owners_of(name: str) -> set[str]:
+    """Distributions that install a module of this name."""
+    return {owner.lower().replace("_", "-") for owner in DISTRIBUTIONS.get(name, [name])}
+
+
 @pytest.mark.parametrize("top", sorted(FOLDERS.values()))
 def test_every_import_is_a_declared_dependency(top):
-    declared = names_of(PROJECT["project"]["dependencies"])
-    for extra in ("iso", "cluster"):
-        declared |= names_of(PROJECT["project"]["optional-dependencies"][extra])
-    distributions = packages_distributions()
-    allowed_unlisted = {"pytest", "llvmlite"}  # the plugin is imported by pytest only; llvmlite is numba's
-    for path in (ROOT / top).rglob("*.py"):
-        for name in imported(path) - {"rockcheck"} - set(sys.stdlib_module_names):
-            owners = {owner.lower().replace("_", "-") for owner in distributions.get(name, [name])}
-            assert owners & (declared | allowed_unlisted), f"{path.relative_to(ROOT)} imports {name}, of {owners}"
+    """What a module needs to be imported comes with every installation; an extra is imported by the function that needs it."""
+    declared = names_of(PROJECT["project"]["dependencies"]) | {"llvmlite"}  # which is numba's
+    extras = {name for extra in ("iso", "cluster") for name in names_of(PROJECT["project"]["optional-dependencies"][extra])}
+    for path, tree in sources(top).items():
+        of_pytest = {"pytest"} if path.name == "plugin.py" else set()  # which pytest loads
+        for name in imported(tree) - {"rockcheck"} - set(sys.stdlib_module_names):
+            allowed = declared | of_pytest | (extras if name not in imported_at_once(tree) else set())
+            assert owners_of(name) & allowed, f"{path.relative_to(ROOT)} imports {name}, of {owners_of(name)}"
+
+
+def test_every_package_has_its_layer():
+    """A folder that no layer names could import anything: `lint-imports` would not notice."""
+    (layers,) = (one["layers"] for one in PROJECT["tool"]["importlinter"]["contracts"] if one["type"] == "layers")
+    named = {name for line in layers for name in re.split(r" *[:|] *", line)}
+    parents = {name.rpartition(".")[0] for name in named}
+    left_out = {name for name in PACKAGES if not any(name == one or name.startswith(f"{one}.") for one in named) and name not in parents}
+    assert left_out == set()
+    assert named <= set(PACKAGES)
 
 
 @pytest.mark.parametrize("requirement", sorted(names_of(PROJECT["project"]["dependencies"])))
 def test_every_dependency_is_imported(requirement):
-    names = {name for name, owners in packages_distributions().items() if requirement in {o.lower().replace("_", "-") for o in owners}}
-    used = {name for top in FOLDERS.values() for path in (ROOT / top).rglob("*.py") for name in imported(path)}
-    assert used & names, f"nothing imports {requirement}"
+    used = {name for top in FOLDERS.values() for tree in sources(top).values() for name in imported(tree)}
+    assert requirement in {owner for name in used for owner in owners_of(name)}, f"nothing imports {requirement}"
 
 
 def test_the_changelog_is_of_this_version():

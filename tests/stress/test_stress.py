@@ -13,14 +13,14 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.commands.cli import main
-from rockcheck.validation.stress import players, study
+from rockcheck.validation.stress import invariants, players, study
 from rockcheck.validation.stress.generator import ALPHA, FRICTION, RADIUS, random_scene
 from rockcheck.validation.stress.invariants import INVARIANTS, Played, audited, check_run, energy_error, similar
 from rockcheck.validation.stress.mechanics import BOOLE, integrals, tilted_forces
 from rockcheck.validation.stress.players import PLAYERS, Approximate, energy_without_source
 from rockcheck.validation.stress.shrinking import shrink, write_scene
 from rockcheck.validation.stress.stability import LINES, fault_of, largest_stable, scene_at, stand_still
-from rockcheck.validation.stress.study import Chunk, chunks, play_some, run_stress
+from rockcheck.validation.stress.study import Chunk, Stress, chunks, invariants_markdown, play_some, run_stress, summary_rows
 
 ALPHA_PAPER = 0.25
 SLIDES_AND_HITS = Scene(
@@ -174,6 +174,25 @@ def test_energy_balance_is_exact_to_rounding():
         assert energy_error(model, fine, model.simulate(fine)) < 1e-11
 
 
+def test_energy_that_cannot_be_judged_is_not_said_to_hold(monkeypatch):
+    """A history of too few rows, and one whose work is resolved nowhere: neither has an error of 0, and the run is counted."""
+    model, short = EventBasedModel(), SLIDES_AND_HITS.replace(duration=0.2)
+    assert energy_error(model, short, model.simulate(short)) is None
+    rough = SLIDES_AND_HITS.replace(excitation=Record.from_samples(8.0 * np.sin(np.arange(500.0)), time_step=0.008))
+    assert energy_error(model, rough, model.simulate(rough)) is None  # five kinks between two rows
+    assert energy_error(model, audited(rough), model.simulate(audited(rough))) < 1e-9
+    monkeypatch.setattr(invariants, "RESOLVED", 0.0)
+    played = check_run(model, SLIDES_AND_HITS, audit=True)
+    assert (played.unjudged, "energy" in played.figures, played.broken) == (("energy",), False, [])
+    assert check_run(model, SLIDES_AND_HITS, audit=True, only="energy").figures == {}
+    batch = play_some("ebm", 1, 0, 1)  # run 0 is audited
+    assert (batch.unjudged["energy"], batch.looked_at["energy"]) == (1, 0)
+    found = Stress(**{field.name: "" for field in dataclasses.fields(Stress)} | {"batches": {"ebm": batch}})
+    (row,) = (row for row in summary_rows(found) if row["invariant"] == "energy")
+    assert (row["runs"], row["not judged"], row["failures"]) == (0, 1, 0)
+    assert any("1 not judged" in line for line in invariants_markdown(found))
+
+
 def test_a_block_that_hangs_is_counted_by_name():
     """At rest, symmetric, and the floor falls away faster than g: the paper's pivot has to choose a corner."""
     hangs = SLIDES_AND_HITS.replace(
@@ -228,7 +247,19 @@ def test_shrinking_drops_all_that_does_not_matter(tmp_path):
 def test_a_batch_counts_what_it_saw():
     """Two halves are the whole, and the worst figure names its run."""
     whole, halves = play_some("ebm", 1, 0, 8), play_some("ebm", 1, 0, 4) + play_some("ebm", 1, 4, 4)
-    for name in ("runs", "looked_at", "worst", "failures", "outcomes", "events", "gaining", "largest_gain", "horizons", "exceptions"):
+    for name in (
+        "runs",
+        "looked_at",
+        "worst",
+        "failures",
+        "outcomes",
+        "events",
+        "gaining",
+        "largest_gain",
+        "horizons",
+        "exceptions",
+        "unjudged",
+    ):
         assert getattr(whole, name) == getattr(halves, name), name
     assert whole.runs == 8
     assert whole.looked_at["ends"] == 8

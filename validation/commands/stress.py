@@ -88,6 +88,8 @@ def show(found: Stress, out: Console) -> None:
     for label, batch in found.batches.items():
         for name, count in batch.exceptions.items():
             out.print(f"{label}: {count} runs excepted, {name}: {EXCEPTIONS[name]}", soft_wrap=True)
+        for name, count in batch.unjudged.items():
+            out.print(f"{label}: {name} could not be judged in {count} of {count + batch.looked_at[name]} runs")
     runs = sum(batch.runs for batch in found.batches.values())
     broken = len(found.broken)
     verdict = "no failure of an event-based model" if not broken else f"{broken} failures of event-based models"

@@ -94,6 +94,8 @@ class Played:
     horizons: int = 0
     #: Name of an exception of the model by which an invariant is not asked of this run, see EXCEPTIONS.
     exception: str = ""
+    #: Invariants that were to be looked at, but could not be judged.
+    unjudged: tuple[str, ...] = ()
 
     @property
     def broken(self) -> list[str]:
@@ -117,7 +119,8 @@ def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: boo
     figures |= conditions(model, played, history)
     if audit:  # at the finer tolerance, so that its error is not taken for one of the balance
         with suppress(ModelFailure):
-            figures["energy"] = _energy(finer(model), played)
+            energy = _energy(finer(model), played)
+            figures |= {"energy": energy} if energy is not None else {}
     capped = model.energy_cap or not _bounces(scene)
     gains = history.cost.energy_gains
     if model.pivot == "unilateral":
@@ -133,7 +136,7 @@ def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: boo
     if only in ("", "tolerance"):
         figures["tolerance"] = horizon.apart(history, played, finer(model))
     return Played(
-        figures=figures if not only else {only: figures.get(only, 0.0)},
+        figures=figures if not only else {name: figure for name, figure in figures.items() if name == only},
         outcome=history.outcome,
         events=len(history.event_list),
         gains=gains,
@@ -141,15 +144,21 @@ def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: boo
         horizons=horizon.found,
         failure=horizon.failure,
         exception=exception,
+        unjudged=("energy",) if audit and "energy" not in figures else (),
     )
 
 
-def _energy(model: EventBasedModel, scene: Scene) -> float:
-    """The energy's error, from rows four times as near where it is too large: one of the integral is then gone, one of the motion not."""
+def _energy(model: EventBasedModel, scene: Scene) -> float | None:
+    """The energy's error, or None where it cannot be judged.
+
+    It is taken from rows four times as near where it is too large, or cannot be judged: an error of the integral is then gone, one of
+    the motion not.
+    """
     error = energy_error(model, scene, model.simulate(scene))
-    if error > INVARIANTS["energy"].bound:
+    if error is None or error > INVARIANTS["energy"].bound:
         near = scene.replace(output_step=scene.output_step / 4.0)
-        error = energy_error(model, near, model.simulate(near))
+        closer = energy_error(model, near, model.simulate(near))
+        error = error if closer is None else closer
     return error
 
 
@@ -296,15 +305,16 @@ def _force_conditions(
     return excess, max(tension, float(np.max(pulls, initial=0.0)))
 
 
-def energy_error(model: EventBasedModel, scene: Scene, history: History) -> float:
+def energy_error(model: EventBasedModel, scene: Scene, history: History) -> float | None:
     """Largest change of energy, over eight rows without event or kink, that the work of base and friction does not account for.
 
     Relative to the energy and the work at play in the run, at least g R. Where friction is not known (Bouc-Wen): what
-    energy gains beyond the work of the base and what the friction spring can hold.
+    energy gains beyond the work of the base and what the friction spring can hold. None where no eight rows can be judged: the
+    history has fewer, events or kinks lie in all of them, or the work is not resolved in any.
     """
     channels, radius, gravity = history.channels, scene.block.radius, scene.gravity
     if len(channels["t"]) <= GROUP:
-        return 0.0
+        return None
     unit = math.sqrt(radius / gravity)
     t = channels["t"]
     energy = kinematics.energy(scene.block, gravity, *(channels[c] for c in ("y", "x_dot", "y_dot", "theta_dot"))) / (gravity * radius)
@@ -316,7 +326,7 @@ def energy_error(model: EventBasedModel, scene: Scene, history: History) -> floa
         power = power + _friction_power(scene, history, u, 1.0 + vg)
     whole, quiet = _whole_groups(scene, history)
     if not whole.any():
-        return 0.0
+        return None
     step = scene.output_step / unit
     work, moved = integrals(step, power), integrals(step, np.abs(power))
     rough = integrals(step, power, BOOLE)
@@ -330,8 +340,9 @@ def energy_error(model: EventBasedModel, scene: Scene, history: History) -> floa
         rise = np.abs(np.diff(channels["y_dot"])) / speed / step  # per row; with gravity it is the floor's force
         force = 2.0 + np.max(np.abs(vg)) + rise[: len(work) * GROUP].reshape(-1, GROUP).max(axis=1)
         held = scene.floor.friction * model.yield_displacement / radius * force
-        return float(np.max((off - held / size)[whole], initial=0.0))
-    return float(np.max(np.abs(off)[whole & quiet], initial=0.0))
+        return float(np.max((off - held / size)[whole], initial=0.0)) if whole.any() else None
+    judged = whole & quiet
+    return float(np.max(np.abs(off)[judged])) if judged.any() else None
 
 
 def _pivots(theta: Floats) -> Floats:

@@ -76,6 +76,8 @@ class Batch:
     horizons: int = 0
     #: Runs that an exception of the model excuses from an invariant, by its name.
     exceptions: Counter[str] = field(default_factory=Counter)
+    #: Runs in which an invariant that was to be looked at could not be judged, by its name.
+    unjudged: Counter[str] = field(default_factory=Counter)
 
     def __add__(self, other: Batch) -> Batch:
         worst = dict(self.worst)
@@ -94,6 +96,7 @@ class Batch:
             largest_gain=max(self.largest_gain, other.largest_gain),
             horizons=self.horizons + other.horizons,
             exceptions=self.exceptions + other.exceptions,
+            unjudged=self.unjudged + other.unjudged,
         )
 
     def failed(self, invariant: str) -> int:
@@ -143,6 +146,7 @@ def play_some(label: str, seed: int, first: int, count: int) -> Batch:
     looked_at: Counter[str] = Counter()
     outcomes: Counter[str] = Counter()
     exceptions: Counter[str] = Counter()
+    unjudged: Counter[str] = Counter()
     worst: dict[str, tuple[float, int]] = {}
     failures: list[Failure] = []
     events = gaining = horizons = 0
@@ -161,6 +165,7 @@ def play_some(label: str, seed: int, first: int, count: int) -> Batch:
         horizons += played.horizons
         if played.exception:
             exceptions[played.exception] += 1
+        unjudged.update(played.unjudged)
     return Batch(
         model=label,
         runs=count,
@@ -174,6 +179,7 @@ def play_some(label: str, seed: int, first: int, count: int) -> Batch:
         largest_gain=largest_gain,
         horizons=horizons,
         exceptions=exceptions,
+        unjudged=unjudged,
     )
 
 
@@ -389,10 +395,11 @@ def summary_rows(found: Stress) -> list[dict[str, Any]]:
     rows = []
     for label, batch in found.batches.items():
         for name, invariant in INVARIANTS.items():
-            if batch.looked_at[name] or batch.failed(name):
-                worst, number = batch.worst.get(name, (math.inf, -1))
+            if batch.looked_at[name] or batch.failed(name) or batch.unjudged[name]:
+                worst, number = batch.worst.get(name, (math.inf if batch.failed(name) else math.nan, -1))
                 failures = batch.failed(name)
-                row = {"model": label, "invariant": name, "runs": batch.looked_at[name], "failures": failures}
+                row = {"model": label, "invariant": name, "runs": batch.looked_at[name], "not judged": batch.unjudged[name]}
+                row |= {"failures": failures}
                 rows.append(row | {"worst": worst, "in run": number, "bound": invariant.bound})
     return rows
 
@@ -412,12 +419,9 @@ def invariants_markdown(found: Stress) -> list[str]:
     for name, invariant in INVARIANTS.items():
         cells = []
         for batch in found.batches.values():
-            if not batch.looked_at[name] and not batch.failed(name):
-                cells.append("")
-                continue
-            worst = batch.worst.get(name, (math.inf, -1))[0]
-            failures = batch.failed(name)
-            cells.append(f"{worst:.1e}" + (f", **{failures} fail**" if failures else ""))
+            failures, unjudged = batch.failed(name), batch.unjudged[name]
+            worst = [f"{batch.worst.get(name, (math.inf, -1))[0]:.1e}"] if batch.looked_at[name] or failures else []
+            cells.append(", ".join([*worst, *[f"**{failures} fail**"] * (failures > 0), *[f"{unjudged} not judged"] * (unjudged > 0)]))
         lines.append(f"| {invariant.words} | {invariant.bound:g} | " + " | ".join(cells) + " |")
     return lines
 
