@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-import shutil
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -68,10 +67,10 @@ class Site:
         """Write style sheets, scripts and the plotting library, once for all pages."""
         target = _made(self.folder / PAGES / "assets")
         for source in sorted((DATA / "assets").iterdir()):
-            shutil.copyfile(source, target / source.name)
+            write_whole(target / source.name, source.read_bytes())
         for source in sorted((DATA / "vendor").glob("*/*")):
             name = source.name if source.name != "LICENSE" else f"LICENSE.{source.parent.name}.txt"
-            shutil.copyfile(source, target / name)
+            write_whole(target / name, source.read_bytes())
         write_whole(target / "models.css", model_styles())
 
 

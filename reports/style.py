@@ -6,11 +6,14 @@ white would fall below a contrast of 3:1. A dash pattern says the same once more
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from rockcheck.scenes.writing import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -128,6 +131,7 @@ def save(figure: Figure, stem: Path, formats: Iterable[str] = FORMATS) -> list[P
     with figure_style():
         for kind in formats:
             path = stem.with_name(f"{stem.name}.{kind}")
-            figure.savefig(path, metadata=undated[kind])
-            written.append(path)
+            content = io.BytesIO()
+            figure.savefig(content, format=kind, metadata=undated[kind])
+            written.append(write_whole(path, content.getvalue()))
     return written

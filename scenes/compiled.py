@@ -1,15 +1,20 @@
 """Compiled functions whose cache can be trusted.
 
 numba's own cache looks at a function's own file only: after a change in a function that it calls, the old machine code would
-be used silently. Here the cache folder is named after the content of all source files of the function's package.
+be used silently. Here the cache folder is named after the content of all source files of the function's package. And it would
+run whatever lies in its cache; here only what this user wrote is read, and only where it is whole.
 """
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import hashlib
 import os
+import pickle
 import shutil
+import stat
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -20,8 +25,14 @@ from typing import Any
 import numba
 import numpy as np
 from numba.core import config as numba_config
+from numba.core import serialize
+from numba.core.caching import FunctionCache
 from numba.core.event import Event, Listener, register
 from numba.extending import register_jitable
+
+from rockcheck.scenes.errors import InputError
+from rockcheck.scenes.reading import MOST_BYTES, open_regular
+from rockcheck.scenes.writing import write_whole
 
 config: Any = numba_config
 
@@ -53,23 +64,115 @@ register("numba:compile", _NoCollection())
 
 
 @cache
-def _cache_folder(package: Path) -> str:
+def _cache_folder(package: Path) -> Path | None:
+    """The private folder for the compiled code of a package; None, with a line on stderr, where there can be none.
+
+    What lies there is unpickled and run. So it must be nobody else's: the user's own, closed to all others, in a folder that only
+    the user, the package's owner or root may change.
+    """
     digest = hashlib.sha256()
     for source in [Path(__file__), *sorted(package.glob("*.py"))]:
         digest.update(source.name.encode() + b"\0" + source.read_bytes())
     name = f"{package.name}-kernels-{digest.hexdigest()[:16]}"
-    base = Path(config.CACHE_DIR) if config.CACHE_DIR else package / "__pycache__"
-    try:
-        folder = base / name
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-        for old in base.glob(f"{package.name}-kernels-*"):
-            if old != folder and time.time() - old.stat().st_mtime > _KEPT:  # another process may be using a younger one
-                shutil.rmtree(old, ignore_errors=True)
-    except OSError:  # installed where we may not write
-        folder = Path(tempfile.gettempdir()) / f"rockcheck-{os.getuid() if hasattr(os, 'getuid') else 'user'}" / name
-    return str(folder)
+    user_wide = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "rockcheck"
+    for base in (Path(config.CACHE_DIR),) if config.CACHE_DIR else (package / "__pycache__", user_wide):
+        with contextlib.suppress(OSError):  # such as a package that is installed where we may not write
+            if base == user_wide:
+                base.mkdir(mode=0o700, parents=True, exist_ok=True)
+            folder = base.absolute() / name
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if _is_private(folder, package.stat().st_uid):
+                with tempfile.TemporaryFile(dir=folder):
+                    pass
+                _remove_old(folder, package.name)
+                return folder
+    print("rockcheck: no private folder for compiled code, each run compiles anew: set NUMBA_CACHE_DIR to one of your own", file=sys.stderr)
+    return None
+
+
+def _is_private(folder: Path, owner: int) -> bool:
+    """Whether nobody but the user can have written into `folder`, or put it there; `owner` is that of the code itself."""
+    if not hasattr(os, "geteuid"):
+        return True  # no owners and modes that could be asked
+    me, own, above = os.geteuid(), folder.lstat(), folder.parent.stat()
+    others_write = stat.S_IWGRP | stat.S_IWOTH
+    return (
+        stat.S_ISDIR(own.st_mode)
+        and own.st_uid == me
+        and not own.st_mode & (stat.S_IRWXG | stat.S_IRWXO)
+        and above.st_uid in (me, owner, 0)
+        and (not above.st_mode & others_write or bool(above.st_mode & stat.S_ISVTX))
+    )
+
+
+def _remove_old(folder: Path, package: str) -> None:
+    """Remove what was compiled from other sources, unless it is young: another process may be using it."""
+    for old in folder.parent.glob(f"{package}-kernels-*"):
+        if old != folder and time.time() - old.stat().st_mtime > _KEPT:
+            shutil.rmtree(old, ignore_errors=True)
+
+
+class _Cache(FunctionCache):
+    """The compiled variants of one function, a file each that begins with the hash of the rest.
+
+    A file that is damaged is as good as none: it is removed, and the function compiled again. numba itself would unpickle it.
+    """
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        before = config.CACHE_DIR
+        config.CACHE_DIR = str(folder)
+        try:
+            super().__init__(function)
+        finally:
+            config.CACHE_DIR = before
+        self.folder = folder
+        self.name = f"{function.__module__}.{function.__qualname__}"
+        self._cache_file = self  # numba's own, with an index of many files, is not used
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The compiled function for a signature, None where it is not there or not whole."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:
+            return None  # whole, but of no use to this numba: it is compiled and written again
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a compiled function, where that can be done: it is compiled in any case."""
+        with contextlib.suppress(OSError):
+            super().save_overload(sig, data)
+
+    def _path(self, key: object) -> Path:
+        about = (numba.__version__, sys.version, key)
+        return self.folder / f"{self.name[-100:]}-{hashlib.sha256(repr(about).encode()).hexdigest()[:32]}.nbc"
+
+    def load(self, key: object) -> Any:
+        """What `save` kept."""
+        path = self._path(key)
+        if not os.path.lexists(path):
+            return None
+        with contextlib.suppress(OSError, InputError), open_regular(path, MOST_BYTES) as stream:
+            content = stream.read()
+            if hashlib.sha256(content[32:]).digest() == content[:32]:
+                return pickle.loads(content[32:])
+        self._drop(path)
+        return None
+
+    def save(self, key: object, data: object) -> None:
+        """Write what numba made of a function, whole or not at all."""
+        path = self._path(key)
+        if path.is_dir():
+            self._drop(path)
+        content = serialize.dumps(data)
+        write_whole(path, hashlib.sha256(content).digest() + content)
+
+    def _drop(self, path: Path) -> None:
+        with contextlib.suppress(OSError):
+            shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
+
+    def flush(self) -> None:
+        """Forget what was kept of this function."""
+        for path in self.folder.glob(f"{self.name[-100:]}-*.nbc"):
+            self._drop(path)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -82,12 +185,9 @@ def kernel(function: Callable[..., Any]) -> Any:
     if config.DISABLE_JIT:
         return np.errstate(all="ignore")(function)
     compiled = numba.njit(nogil=True, error_model="numpy", _nrt=True, no_cfunc_wrapper=True)(function)
-    before = config.CACHE_DIR
-    config.CACHE_DIR = _cache_folder(Path(function.__code__.co_filename).parent)
-    try:
-        compiled.enable_caching()
-    finally:
-        config.CACHE_DIR = before
+    folder = _cache_folder(Path(function.__code__.co_filename).parent)
+    if folder is not None:
+        compiled._cache = _Cache(function, folder)
     return compiled
 
 

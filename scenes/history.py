@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.reading import MOST_LINE, MOST_TABLE_BYTES, open_regular, read_table
 from rockcheck.scenes.shown import Shown
+from rockcheck.scenes.writing import write_together
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -106,7 +107,10 @@ class History(Shown):
         return float(np.max(np.abs(self.channels["theta"])))
 
     def save(self, path: str | Path) -> None:
-        """Write a CSV whose remarks (#) hold outcome, model and settings; its events go to `<stem>.events.csv` beside it."""
+        """Write a CSV whose remarks (#) hold outcome, model and settings; its events go to `<stem>.events.csv` beside it.
+
+        Both are written whole, or neither is touched. Raises `OSError` that names the file which cannot be written.
+        """
         path = Path(path)
         about = {
             "name": self.name,
@@ -121,8 +125,10 @@ class History(Shown):
         text = io.StringIO()
         text.write(f"# rockcheck history {json.dumps(about, sort_keys=True, default=str)}\n")
         self.frame.to_csv(text, index=False, lineterminator="\n")
-        path.write_text(text.getvalue(), encoding="utf-8")
-        self.events.to_csv(_events_path(path), index=False, lineterminator="\n")
+        contents: dict[Path, str | bytes] = {path: text.getvalue()}
+        if path.is_file() or not path.exists():  # beside /dev/stdout there is nothing to be written
+            contents = {_events_path(path): self.events.to_csv(index=False, lineterminator="\n"), **contents}
+        write_together(contents)
 
     @classmethod
     def load(cls, path: str | Path, *, columns: Mapping[str, str] | None = None) -> History:

@@ -4,18 +4,63 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 
 
-def write_whole(path: Path, text: str) -> Path:
-    """Write a text file so that a reader sees the old content or the new, never a part."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:60]}.", suffix=".part")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+def write_whole(path: Path, content: str | bytes) -> Path:
+    """Write a file so that a reader sees the old content or the new, never a part. See `write_together`."""
+    write_together({path: content})
     return path
+
+
+def write_together(contents: Mapping[Path, str | bytes]) -> None:
+    """Write files, text as UTF-8, so that all of them are new or all of them are as they were.
+
+    What is no regular file, such as /dev/stdout, is written as it is; a link stays one. Raises `OSError` that names the file.
+    """
+    finished: list[tuple[str, Path]] = []
+    with ExitStack() as leavings:
+        for path, content in contents.items():
+            try:
+                data = content.encode() if isinstance(content, str) else content
+                if path.exists() and not path.is_file() and not path.is_dir():
+                    path.write_bytes(data)
+                    continue
+                target = Path(os.path.realpath(path))
+                handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:60]}.", suffix=".part")
+                leavings.callback(Path(temporary).unlink, missing_ok=True)
+                with os.fdopen(handle, "wb") as stream:
+                    stream.write(data)
+                os.chmod(temporary, 0o644)
+                if target.is_dir():
+                    raise IsADirectoryError(21, "Is a directory")
+                finished.append((temporary, target))
+            except OSError as error:
+                raise _named(error, path) from None
+        for temporary, target in finished:
+            try:
+                os.replace(temporary, target)
+            except OSError as error:
+                raise _named(error, target) from None
+
+
+def write_new(path: Path, content: str) -> Path:
+    """Write a text file that must not be there yet, whole or not at all. Raises `FileExistsError` where it is."""
+    try:
+        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
+    except OSError as error:
+        raise _named(error, path) from None
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content.encode())
+    except BaseException as error:
+        path.unlink(missing_ok=True)
+        raise _named(error, path) if isinstance(error, OSError) else error from None
+    return path
+
+
+def _named(error: OSError, path: Path) -> OSError:
+    """The same fault, which names the file that was to be written."""
+    return OSError(error.errno, error.strerror or str(error), str(path))

@@ -52,13 +52,47 @@ def leavings(folder: Path) -> list[Path]:
 
 @posix
 def test_disk_full(tmp_path):
-    """A history that does not fit: one line, exit 2, and no half file under its name."""
-    out = tmp_path / "out.csv"
+    """A history that does not fit: one line that names the file, exit 2, and the old history with its events as they were."""
+    out, events = tmp_path / "out.csv", tmp_path / "out.events.csv"
     command = [sys.executable, "-c", _LIMITED, "4096", "simulate", "fig4a", "--model", "ebm", "-o", str(out)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-    assert done.returncode == 2
-    assert "File too large" in one_line(done.stderr)
-    assert main(["simulate", "fig4a", "--model", "ebm", "-o", str(out), "--quiet"]) == 0
+    for old in (False, True):
+        if old:
+            assert main(["simulate", "fig5a", "--model", "ebm", "-o", str(out), "--quiet"]) == 0
+        before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+        assert set(before) == ({out, events} if old else set())
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+        assert done.returncode == 2
+        assert f"{out}: cannot be written: File too large" in one_line(done.stderr)
+        assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@posix
+@pytest.mark.parametrize("size", [100, 2000, 30_000])
+def test_disk_full_whatever_is_written(tmp_path, size):
+    """A scene file, figures and pages: nothing that is there is cut, and the line names the file that could not be written."""
+    for words in (["new", str(tmp_path / "a.toml")], ["validate", "smoke", "--out", str(tmp_path / "run")]):
+        command = [sys.executable, "-c", _LIMITED, str(size), *words]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+        if words[0] == "validate" or size == 100:
+            assert done.returncode == 2
+            assert str(tmp_path) in one_line(done.stderr)
+            assert "File too large" in one_line(done.stderr)
+        for path in (path for path in tmp_path.rglob("*") if path.is_file()):
+            assert path.name.startswith(".lock") or path.stat().st_size > 0, path
+    assert not leavings(tmp_path)
+
+
+@posix
+def test_what_is_no_file_is_written_as_it_is(tmp_path):
+    """A pipe, a device or a link is not replaced by a file."""
+    (tmp_path / "link").symlink_to(tmp_path / "out.csv")
+    assert main(["simulate", "fig4a", "--model", "ebm", "-o", str(tmp_path / "link"), "--quiet"]) == 0
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "out.csv").read_text().startswith("# rockcheck history")
+    command = [*ROCKCHECK, "simulate", "fig4a", "--model", "ebm", "-q", "-o", "/dev/stdout"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
+    assert done.stdout.splitlines()[1:] == (tmp_path / "out.csv").read_text().splitlines()[1:]
+    assert Path("/dev/stdout").is_symlink()
 
 
 @posix

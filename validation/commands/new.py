@@ -10,6 +10,7 @@ import typer
 
 from rockcheck.scenes import InputError, load_scene
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.writing import write_new
 from rockcheck.validation.commands import answer, console
 
 
@@ -22,8 +23,7 @@ def run(path: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to 
         raise InputError(f"{printable(path)}: the name of a .toml file is asked for")
     text = (resources.files("rockcheck.validation") / "data" / "new_scene.toml").read_text(encoding="utf-8")
     try:
-        with path.open("x", encoding="utf-8") as stream:
-            stream.write(text)
+        write_new(path, text)
     except FileExistsError:
         raise InputError(f"{printable(path)}: is there already; it is left as it is") from None
     except OSError as error:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -228,9 +227,7 @@ def _write_npz(path: Path, spectrum: Spectrum, about: str) -> None:
         undecided=spectrum.undecided,
         settings=np.array(about),
     )
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    part.write_bytes(content.getvalue())
-    part.replace(path)
+    write_whole(path, content.getvalue())
 
 
 def _csv(spectrum: Spectrum, about: str) -> str:

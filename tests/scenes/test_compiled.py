@@ -1,0 +1,161 @@
+"""The cache of compiled code: what lies in it is unpickled and run, so it must be the user's own, and whole."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rockcheck.scenes import compiled
+
+posix = pytest.mark.skipif(os.name != "posix", reason="owners and modes as POSIX has them")
+
+#: A package of one kernel, played in a process of its own; says how many functions were read from the cache and how many compiled.
+_TINY = """
+import numpy as np
+from rockcheck.scenes.compiled import inner_kernel, kernel
+
+@inner_kernel
+def twice(x):
+    return 2.0 * x
+
+@kernel
+def doubled(values):
+    total = 0.0
+    for value in values:
+        total += twice(value)
+    return total
+
+if __name__ == "__main__":
+    assert doubled(np.array([1.0, 2.0])) == 6.0
+    assert doubled(np.array([1.0, 2.0], dtype=np.float32)) == 6.0
+    stats = getattr(doubled, "stats", None)
+    print("interpreted" if stats is None else f"{sum(stats.cache_hits.values())} read, {sum(stats.cache_misses.values())} compiled")
+"""
+
+
+@pytest.fixture
+def play(tmp_path):
+    (tmp_path / "tiny").mkdir()
+    (tmp_path / "tiny" / "kernels.py").write_text(_TINY)
+
+    def play(said: str, **environment: str) -> str:
+        """Play the kernel in a new process; returns its stderr."""
+        place = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "HOME": str(tmp_path), "XDG_CACHE_HOME": ""} | environment
+        command = [sys.executable, str(tmp_path / "tiny" / "kernels.py")]
+        done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **place}, timeout=120, check=False)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout == f"{said}\n"
+        return done.stderr
+
+    return play
+
+
+def files(tmp_path: Path) -> list[Path]:
+    return sorted((tmp_path / "cache").glob("tiny-kernels-*/*.nbc"))
+
+
+def test_what_was_compiled_is_read_back(tmp_path, play):
+    assert play("0 read, 2 compiled") == ""
+    assert len(files(tmp_path)) == 2
+    assert play("2 read, 0 compiled") == ""
+    (tmp_path / "tiny" / "kernels.py").write_text(_TINY.replace("2.0 * x", "x + x"))
+    assert play("0 read, 2 compiled") == ""
+
+
+@pytest.mark.parametrize("damage", ["cut short", "a flipped bit", "empty", "a folder", "a pipe", "another's pickle", "a link to nowhere"])
+def test_a_damaged_file_is_compiled_again(tmp_path, play, damage):
+    """And what the planted pickle would do is not done."""
+    play("0 read, 2 compiled")
+    for path in files(tmp_path):
+        content = bytearray(path.read_bytes())
+        path.unlink()
+        if damage == "cut short":
+            path.write_bytes(content[: len(content) // 2])
+        elif damage == "a flipped bit":
+            content[len(content) // 2] ^= 1
+            path.write_bytes(content)
+        elif damage == "empty":
+            path.write_bytes(b"")
+        elif damage == "a folder":
+            (path / "inside").mkdir(parents=True)
+        elif damage == "a pipe":
+            os.mkfifo(path)
+        elif damage == "another's pickle":
+            path.write_bytes(pickle.dumps(_Planted(str(tmp_path / "ran"))))
+        else:
+            path.symlink_to(tmp_path / "nowhere")
+    assert play("0 read, 2 compiled") == ""
+    assert play("2 read, 0 compiled") == ""
+    assert not (tmp_path / "ran").exists()
+
+
+class _Planted:
+    """Its pickle makes a file as it is read."""
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[object, tuple[str, ...]]:
+        return os.mkdir, (self.path,)
+
+
+@posix
+def test_the_folder_is_closed_to_others(tmp_path, play):
+    play("0 read, 2 compiled")
+    (folder,) = (tmp_path / "cache").glob("tiny-kernels-*")
+    assert folder.stat().st_mode & 0o777 == 0o700
+
+
+@posix
+@pytest.mark.parametrize("fault", ["open to others", "a link", "below a folder that all may change"])
+def test_a_folder_that_others_may_change_is_not_used(tmp_path, play, fault):
+    """The next place is taken, or none: then one line says so."""
+    play("0 read, 2 compiled")
+    (folder,) = (tmp_path / "cache").glob("tiny-kernels-*")
+    if fault == "open to others":
+        folder.chmod(0o777)
+    elif fault == "a link":
+        folder.rename(tmp_path / "elsewhere")
+        folder.symlink_to(tmp_path / "elsewhere")
+    else:
+        folder.parent.chmod(0o777)
+    said = play("0 read, 2 compiled")
+    assert said == "rockcheck: no private folder for compiled code, each run compiles anew: set NUMBA_CACHE_DIR to one of your own\n"
+
+
+@posix
+def test_a_folder_of_another_user_is_not_used(tmp_path, monkeypatch):
+    folder = tmp_path / "cache" / "tiny-kernels-0"
+    folder.mkdir(parents=True, mode=0o700)
+    assert compiled._is_private(folder, os.getuid())
+    monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+    assert not compiled._is_private(folder, os.getuid())
+
+
+@posix
+def test_no_folder_that_could_be_foreseen(tmp_path, play):
+    """Where the package's folder cannot be written, the user's own cache is taken, never a common one."""
+    (tmp_path / "tiny" / "__pycache__").write_text("not a folder")
+    assert play("0 read, 2 compiled", NUMBA_CACHE_DIR="") == ""
+    assert len(list((tmp_path / ".cache" / "rockcheck").glob("tiny-kernels-*/*.nbc"))) == 2
+    assert play("2 read, 0 compiled", NUMBA_CACHE_DIR="") == ""
+    assert "no private folder" in play("0 read, 2 compiled", NUMBA_CACHE_DIR="", XDG_CACHE_HOME="/dev/null")
+
+
+def test_without_the_compiler(play):
+    play("interpreted", NUMBA_DISABLE_JIT="1")
+
+
+def test_everything_can_be_imported_without_the_compiler():
+    """NUMBA_DISABLE_JIT=1, as for a debugger."""
+    imports = "import rockcheck, rockcheck.ebm, rockcheck.cm, rockcheck.engines, rockcheck.ebm.bouc_wen"
+    play = "scene = rockcheck.load_scene('fig4a').replace(duration=0.2); print(rockcheck.EventBasedModel().simulate(scene).outcome)"
+    command = [sys.executable, "-c", f"{imports}; {play}"]
+    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.stdout == "at rest\n"
