@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,12 @@ import pytest
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
 
+#: What may be skipped while `CI` is set: how the reason begins, and where it is no fault of the job. All else that is skipped fails it.
+MAY_BE_SKIPPED: dict[str, bool] = {
+    "needs PyBullet": sys.version_info >= (3, 12),  # which has wheels for 3.11 only
+    "needs Linux": sys.platform != "linux",
+    "needs POSIX": sys.platform == "win32",
+}
 CHROMIUM = Path("/usr/bin/chromium")
 #: How a request ends that was under way as its page was left.
 ABORTED = "net::ERR_ABORTED"
@@ -25,6 +32,36 @@ ARGUMENTS = [
     "--disable-component-update",
     "--disable-sync",
 ]
+
+
+def _may_be_skipped(reason: str) -> bool:
+    return any(reason.startswith(words) and allowed for words, allowed in MAY_BE_SKIPPED.items())
+
+
+def _judged(report: Any) -> None:
+    """In CI a test, or a whole file, that is skipped without a listed reason has failed."""
+    if not os.environ.get("CI") or not report.skipped or hasattr(report, "wasxfail"):
+        return
+    reason = str(report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr).removeprefix("Skipped: ")
+    if not _may_be_skipped(reason):
+        report.outcome = "failed"
+        report.longrepr = f"skipped in CI, and tests/conftest.py lists no such reason: {reason}"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Iterator[None]:
+    """What became of a test."""
+    report = yield
+    _judged(report)
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report() -> Iterator[None]:
+    """What became of a file that was read for tests."""
+    report = yield
+    _judged(report)
+    return report
 
 
 @pytest.fixture(scope="module")

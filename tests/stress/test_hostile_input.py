@@ -397,7 +397,7 @@ for path in sorted(Path(sys.argv[1]).iterdir()):
 """
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="limits of memory are set as POSIX does")
+@pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX: its limits of memory")
 def test_bombs_stay_below_a_gigabyte_and_a_minute(tmp_path):
     """Files that ask for much are played with 1 GiB of memory: each gives a result or one line."""
     (tmp_path / "in").mkdir()

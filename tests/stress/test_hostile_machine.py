@@ -26,7 +26,7 @@ from rockcheck.validation.stress.players import PLAYERS, EventBased
 from rockcheck.validation.stress.study import Batch, Chunk, Failure
 
 ROCKCHECK = [sys.executable, "-m", "rockcheck"]
-posix = pytest.mark.skipif(sys.platform == "win32", reason="limits and signals as POSIX has them")
+posix = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX: its limits and signals")
 
 SMALL_RUN = ["stress", "runs", "--model", "ebm no-slip", "--runs", "30", "--jobs", "1"]
 
@@ -237,21 +237,30 @@ def test_shrinking_interrupted(tmp_path, monkeypatch, capsys):
         load_scene(tmp_path / file)
 
 
-linux = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="children are found as Linux tells them")
+linux = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs Linux: it tells the children")
 
 
-def workers(running: subprocess.Popen) -> list[str]:
-    """Process ids of the children, once they are at work: a worker, and multiprocessing's tracker."""
+@pytest.fixture
+def interruptible():
+    """What is started here hears SIGINT, also where these tests run in the background of a shell, which makes it ignore that."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def workers(running: subprocess.Popen, settled: float = 3.0) -> list[str]:
+    """Process ids of the children, `settled` s after they were started: a worker, and multiprocessing's tracker."""
     children: list[str] = []
     until = time.monotonic() + 60.0
     while len(children) < 2 and time.monotonic() < until:
-        time.sleep(0.2)
+        time.sleep(0.02)
         children = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
-    time.sleep(3.0)
+    time.sleep(settled)
     return children
 
 
 @linux
+@pytest.mark.usefixtures("interruptible")
 def test_interrupted(tmp_path):
     """Ctrl-C ends a study in one line; what was finished is written, and says that it is not all."""
     command = [*ROCKCHECK, "stress", "runs", "--model", "ebm no-slip", "--runs", "60000", "--jobs", "1", "--out", str(tmp_path)]
@@ -269,6 +278,24 @@ def test_interrupted(tmp_path):
     assert data["batches"]["ebm no-slip"]["runs"] < 60000
     assert "interrupted" in (tmp_path / "index.html").read_text()
     assert not leavings(tmp_path)
+
+
+@linux
+@pytest.mark.usefixtures("interruptible")
+@pytest.mark.parametrize("later", [0.0, 0.2, 0.4, 0.6])
+def test_interrupted_while_a_worker_starts(tmp_path, later):
+    """Ctrl-C reaches a worker, too, before it can say that it is not meant: still one line, and no traceback of the worker."""
+    command = [*ROCKCHECK, *SMALL_RUN, "--runs", "60000", "--out", str(tmp_path)]
+    running = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, start_new_session=True)
+    try:
+        assert len(workers(running, settled=later)) >= 2
+        os.killpg(running.pid, signal.SIGINT)
+        _, said = running.communicate(timeout=60)
+    finally:
+        running.kill()
+    assert running.returncode == 130
+    assert "interrupted" in one_line(said)
+    assert json.loads((tmp_path / "run.json").read_text())["complete"] is False
 
 
 @linux

@@ -179,9 +179,7 @@ def test_every_measure_says_what_it_is():
         assert measure.unit
 
 
-@pytest.mark.slow
 def test_iso_18571_rates_on_one_bounded_grid(made):
-    pytest.importorskip("objective_rating_metrics")
     few, wave = T[::40], WAVE[::40]
     reference = made(wave, few)
     same, worse = (compare(reference, made(c * wave, few), measures=["iso_18571"])["iso_18571"] for c in (1.0, 0.7))

@@ -149,7 +149,8 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path, capsys):
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_a_cluster_that_loses_a_worker_gives_the_same(tmp_path, monkeypatch):
-    distributed = pytest.importorskip("distributed")
+    import distributed
+
     monkeypatch.setattr(tiling, "TILE", 100)
     panels, asked = paper_panels(8)[:3], small(40)
     alone = play_panels(panels, asked, Tiles(tmp_path / "alone"))
@@ -212,8 +213,6 @@ def test_a_cluster_that_loses_a_worker_gives_the_same(tmp_path, monkeypatch):
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(words, said, capsys):
-    if "--scheduler" in words:
-        pytest.importorskip("distributed")
     assert main(["spectrum", *words]) == 2
     captured = capsys.readouterr()
     assert said in captured.err

@@ -12,6 +12,7 @@ import pickle
 import subprocess
 import sys
 import threading
+import time
 import uuid
 from collections.abc import Iterator, Sequence
 from typing import IO, Any
@@ -21,6 +22,10 @@ from rockcheck.validation.execute.workers import COMPILING, ONE_THREAD, BatchTas
 
 #: What a process that has closed its streams may take to end, s.
 PATIENCE = 10.0
+#: What a process may take to start, s. It counts for no task's limit.
+STARTING = 120.0
+#: What a process says once it waits for its first task.
+READY = b"ready\n"
 
 
 class OnCluster:
@@ -74,6 +79,8 @@ class _Child:
 
     def __init__(self, run: str, memory_mb: float) -> None:
         self.run = run
+        self.ready = threading.Event()
+        self.latest = time.monotonic() + STARTING
         self.process = subprocess.Popen(
             [
                 sys.executable,
@@ -93,14 +100,18 @@ class _Child:
         assert given is not None
         assert back is not None
         results: list[Played] = []
-        listener = threading.Thread(target=_exchange, args=(task, given, back, results), daemon=True)
+        listener = threading.Thread(target=_exchange, args=(task, given, back, results, self.ready), daemon=True)
         listener.start()
-        listener.join(seconds)
+        while listener.is_alive() and not self.ready.wait(0.1) and time.monotonic() < self.latest:
+            pass
+        listener.join(seconds if self.ready.is_set() else 0.0)
         if results:
             return results[0]
         hangs = listener.is_alive()
         self.end(0.0 if hangs else PATIENCE)
-        return Played(failure=f"did not end within {seconds:g} s" if hangs else death(self.process.returncode))
+        if hangs:
+            return Played(failure=f"did not end within {seconds:g} s" if self.ready.is_set() else f"did not start within {STARTING:g} s")
+        return Played(failure=death(self.process.returncode))
 
     @property
     def ended(self) -> bool:
@@ -120,8 +131,12 @@ class _Child:
                     stream.close()
 
 
-def _exchange(task: Task | BatchTask, given: IO[bytes], back: IO[bytes], results: list[Played]) -> None:
+def _exchange(task: Task | BatchTask, given: IO[bytes], back: IO[bytes], results: list[Played], ready: threading.Event) -> None:
     try:
+        if not ready.is_set():
+            if back.readline() != READY:
+                return  # it has ended as it started
+            ready.set()
         pickle.dump(task, given)
         given.flush()
         results.append(pickle.load(back))
@@ -146,6 +161,8 @@ def _serve(memory_mb: float) -> None:
     """What the process does: until its input ends, a task in, a result out."""
     results = os.fdopen(os.dup(1), "wb")  # the stream itself is closed to whatever engines say
     prepare(memory_mb)
+    results.write(READY)
+    results.flush()
     while True:
         try:
             task = pickle.load(sys.stdin.buffer)

@@ -17,6 +17,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -150,6 +151,9 @@ def workers(jobs: int, memory_mb: float) -> Iterator[ProcessPool]:
             max_workers=jobs, context=multiprocessing.get_context("spawn"), initializer=prepare, initargs=(memory_mb,)
         ) as pool:
             try:
+                with _interrupts_held():
+                    if not pool.active:  # asking starts it
+                        raise RuntimeError("the workers do not start")
                 yield pool
             except BaseException:
                 pool.stop()
@@ -157,6 +161,33 @@ def workers(jobs: int, memory_mb: float) -> Iterator[ProcessPool]:
     finally:
         for key, value in before.items():
             os.environ.pop(key, None) if value is None else os.environ.update({key: value})
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Ctrl-C waits for the end of this block, and never reaches processes and threads that are started in it.
+
+    Ctrl-C goes to all processes of a terminal. One that starts would die of it, with a traceback, before `prepare` can say otherwise.
+    The pool's threads, which replace lost workers, keep this thread's mask.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # as it starts it lets SIGINT through again
+    came: list[int] = []
+    handler = signal.getsignal(signal.SIGINT)
+    ours = callable(handler) and threading.current_thread() is threading.main_thread()
+    if ours:  # whichever thread the signal comes to, its handler runs in this one
+        signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        if ours:
+            signal.signal(signal.SIGINT, handler)
+        if came:
+            signal.raise_signal(signal.SIGINT)
 
 
 def loss_of(future: Future[Any]) -> str:
