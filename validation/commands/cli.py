@@ -1,17 +1,17 @@
-"""The command `rockcheck`: one module a command under validation.commands; here they meet, and errors become one line.
-
-Exit codes: 0 pass, 1 out of tolerance, 2 bad input, 3 a model failed.
-"""
+"""The command `rockcheck`: one module a command under validation.commands; here they meet, and errors become one line."""
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 import os
 import sys
-from collections.abc import Callable, Sequence
+import tempfile
+import traceback
+from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TextIO, cast
 
 import typer
 
@@ -47,8 +47,16 @@ COMMANDS = {
     report: "rockcheck report rockcheck-report",
 }
 
-#: Exit code of a run that Ctrl-C ended.
-INTERRUPTED = 130
+#: Exit codes that no verdict has: a fault of rockcheck's own (EX_SOFTWARE of sysexits), and Ctrl-C.
+FAULT, INTERRUPTED = 70, 130
+EXIT_CODES = {
+    0: "done; of a verdict: within tolerance",
+    1: "out of tolerance, or an invariant is broken",
+    2: "bad input, or a file that cannot be read or written",
+    3: "a model failed",
+    FAULT: "a fault of rockcheck itself: please report it",
+    INTERRUPTED: "interrupted by Ctrl-C",
+}
 
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Nothing but errors; the exit code tells.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="The result as JSON on stdout, instead of tables.")]
@@ -57,6 +65,7 @@ app = typer.Typer(
     name="rockcheck",
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
+    epilog="\b\nExit codes:\n" + "\n".join(f"{code:5}  {meaning}" for code, meaning in EXIT_CODES.items()),
 )
 
 
@@ -96,25 +105,73 @@ for module, example in COMMANDS.items():
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
+    """Run the command line; returns the exit code, one of `EXIT_CODES`."""
+    with _readers_may_go():
+        try:
+            code = app(args=list(sys.argv[1:] if arguments is None else arguments), prog_name="rockcheck", standalone_mode=False)
+        except (typer.TyperException, InputError) as error:
+            return _told(error.format_message() if isinstance(error, typer.TyperException) else str(error), 2)
+        except ModelFailure as error:
+            return _told(str(error), 3)
+        except (KeyboardInterrupt, typer.Abort):
+            return _told("interrupted; what was finished is kept", INTERRUPTED)
+        except OSError as error:  # a disk that is full, a folder that has gone: what was written before is whole
+            return _told(f"{printable(Path(os.fsdecode(error.filename or 'output')))}: cannot be used: {error.strerror or error}", 2)
+        except MemoryError:
+            return _told("out of memory; what was finished is kept", 3)
+        except Exception as error:
+            return _told(f"a fault of rockcheck itself, {type(error).__name__}: please report it with {_reported(error)}", FAULT)
+        if code == INTERRUPTED:  # Typer has caught it
+            return _told("interrupted; what was finished is kept", INTERRUPTED)
+        return code if isinstance(code, int) else 0
+
+
+def _reported(error: Exception) -> str:
+    """Write the traceback into a file of its own, readable by the user only; returns its path."""
+    text = "".join([f"rockcheck {version('rockcheck')}, Python {sys.version}\n", *traceback.format_exception(error)])
     try:
-        code = app(args=list(sys.argv[1:] if arguments is None else arguments), prog_name="rockcheck", standalone_mode=False)
-    except (typer.TyperException, InputError) as error:
-        return _told(error.format_message() if isinstance(error, typer.TyperException) else str(error), 2)
-    except ModelFailure as error:
-        return _told(str(error), 3)
-    except (KeyboardInterrupt, typer.Abort):
-        return _told("interrupted; what was finished is kept", INTERRUPTED)
-    except BrokenPipeError:
-        sys.stderr.close()  # the reader of a pipe has gone: nobody is left to be told
-        return 141
-    except OSError as error:  # a disk that is full, a folder that has gone: what was written before is whole
-        return _told(f"{printable(Path(os.fsdecode(error.filename or 'output')))}: cannot be used: {error.strerror or error}", 2)
-    except MemoryError:
-        return _told("out of memory; what was finished is kept", 3)
-    if code == INTERRUPTED:  # Typer has caught it
-        return _told("interrupted; what was finished is kept", INTERRUPTED)
-    return code if isinstance(code, int) else 0
+        handle, path = tempfile.mkstemp(prefix="rockcheck-fault-", suffix=".txt")
+        with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as stream:
+            stream.write(text)
+    except OSError:
+        return f"this: {error}"
+    return path
+
+
+class _Pipe:
+    """A text stream whose reader may go, as that of `rockcheck scenes | head -1` does: the rest is then written to nobody."""
+
+    def __init__(self, stream: Any) -> None:
+        self._stream = stream
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        with contextlib.suppress(BrokenPipeError):
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        try:
+            self._stream.flush()
+        except BrokenPipeError:  # what waits to be written would be tried again as Python ends
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self._stream.fileno())
+            os.close(nowhere)
+
+
+@contextlib.contextmanager
+def _readers_may_go() -> Iterator[None]:
+    """Within this block nobody needs to read what is said: the exit code stays what it is."""
+    before = sys.stdout, sys.stderr
+    sys.stdout, sys.stderr = cast(TextIO, _Pipe(sys.stdout)), cast(TextIO, _Pipe(sys.stderr))
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        sys.stdout, sys.stderr = before
 
 
 def _told(message: str, code: int) -> int:

@@ -3,21 +3,58 @@
 from __future__ import annotations
 
 import os
+import platform
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from filelock import FileLock
+from filelock import FileLock, Timeout
 
+from rockcheck.scenes import InputError
+from rockcheck.scenes.errors import printable
+from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.tables import checks_csv, figures_csv
 from rockcheck.validation.suite.verdicts import junit, markdown
 
-LOCK = ".lock"
+LOCK, HOLDER = ".lock", ".lock.holder"
+#: How long a run waits in silence for another one that writes the same folder, and how long at all, s.
+SILENT, PATIENCE = 2.0, 600.0
+
+
+@contextmanager
+def _turn(folder: Path) -> Iterator[None]:
+    """Within this block no other run writes into `folder`. Who waits says for whom, and gives up after `PATIENCE` s."""
+    lock = FileLock(folder / LOCK)
+    try:
+        lock.acquire(timeout=SILENT)
+    except Timeout:
+        whom = f"{_holder(folder)}, which holds {printable(folder / LOCK)}"
+        print(f"rockcheck: waiting up to {PATIENCE:g} s for {whom}", file=sys.stderr)
+        try:
+            lock.acquire(timeout=PATIENCE)
+        except Timeout:
+            raise InputError(f"{printable(folder)}: waited {PATIENCE:g} s for {whom}: end it, or give another --out") from None
+    try:
+        write_whole(folder / HOLDER, f"process {os.getpid()} on {platform.node()}")
+        yield
+    finally:
+        (folder / HOLDER).unlink(missing_ok=True)
+        lock.release()
+
+
+def _holder(folder: Path) -> str:
+    try:
+        return printable(read_text(folder / HOLDER, most=1000)) or "another run"
+    except InputError:
+        return "another run"
 
 
 def keep(run: Run, folder: Path) -> Path:
     """Write run.json, its schema and the tables (the histories are there already); returns run.json. Two runs take turns."""
-    with FileLock(folder / LOCK):
+    with _turn(folder):
         write_whole(folder / "checks.csv", checks_csv(run))
         write_whole(folder / "figures.csv", figures_csv(run))
         write_whole(folder / "junit.xml", junit(run))
@@ -32,5 +69,5 @@ def publish(folder: Path, *, jobs: int | None = None, afresh: bool = False) -> P
     """
     from rockcheck import reports
 
-    with FileLock(folder / LOCK):
+    with _turn(folder):
         return Path(reports.write_site(folder, jobs=jobs or os.cpu_count() or 1, afresh=afresh))
