@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -91,6 +92,7 @@ class ContinuousModel(Frozen):
         """
         began = time.perf_counter()
         from rockcheck.cm import kernels
+        from rockcheck.scenes.compiled import interruptible
 
         times = scene.output_times
         parameters = self._parameters(scene)
@@ -119,7 +121,8 @@ class ContinuousModel(Frozen):
         strikes: list[NDArray[np.float64]] = []
         row, steps, sweeps, ending, reached = 1, 0, 0, kernels.DONE, 0.0
         while row < len(times) and ending == kernels.DONE:
-            ending, rows, found, more_steps, more_sweeps, reached = advance(row, min(rows_a_slab, len(times) - row))
+            slab = partial(advance, row, min(rows_a_slab, len(times) - row))
+            ending, rows, found, more_steps, more_sweeps, reached = interruptible(slab)
             row, steps, sweeps = row + rows, steps + more_steps, sweeps + more_sweeps
             strikes.append(events[:found].copy())
             if steps > MOST_STEPS:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +18,7 @@ from rockcheck.ebm.ground import Ground
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.ebm.motion import Setting, workspace
 from rockcheck.ebm.trajectory import DONE, FAILURES, OVERTURNED, Control, run
-from rockcheck.scenes.compiled import kernel
+from rockcheck.scenes.compiled import kernel, threads
 from rockcheck.scenes.errors import ModelFailure
 from rockcheck.scenes.scene import Scene
 
@@ -166,7 +165,7 @@ def run_batch(
         )
         return rows.stop - rows.start
 
-    with ThreadPoolExecutor(max_workers=jobs or os.cpu_count()) as pool:
+    with threads(jobs or os.cpu_count() or 1) as pool:
         for done in pool.map(chunk, range(0, count, _CHUNK)):
             if progress is not None:
                 progress(done)

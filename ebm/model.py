@@ -101,6 +101,7 @@ class EventBasedModel(Frozen):
     def _simulate(self, scene: Scene, tolerance: float) -> History:
         start = time.perf_counter()
         from rockcheck.ebm import motion, natural, trajectory
+        from rockcheck.scenes.compiled import interruptible
 
         b = natural.setting_of(scene, unilateral=self.pivot == "unilateral", no_slip=self.friction == "no-slip", energy_cap=self.energy_cap)
         horizontal, vertical = natural.grounds_of(scene)
@@ -125,7 +126,7 @@ class EventBasedModel(Frozen):
                 trajectory.run, b, horizontal, vertical, state, scene.duration / unit, control, out, out_mode, log, *motion.workspace()
             )
         ready, cpu = time.perf_counter(), time.process_time()
-        tally = march()
+        tally = interruptible(march)
         seconds, cpu = time.perf_counter() - ready, time.process_time() - cpu
         if tally.ending in trajectory.FAILURES:
             raise ModelFailure(f"{self.name}: {trajectory.FAILURES[tally.ending]} at t = {tally.t * unit:.6g} s")

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
+    from rockcheck.validation.commands.cli import INTERRUPTED
     from rockcheck.validation.commands.cli import main as run
 
-    return run(arguments)
+    code = run(arguments)
+    if code == INTERRUPTED:  # compiled code may still run in threads, which Python would wait for
+        os._exit(code)
+    return code
 
 
 if __name__ == "__main__":

@@ -16,11 +16,13 @@ import shutil
 import stat
 import sys
 import tempfile
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numba
 import numpy as np
@@ -35,6 +37,7 @@ from rockcheck.scenes.reading import MOST_BYTES, open_regular
 from rockcheck.scenes.writing import write_whole
 
 config: Any = numba_config
+Result = TypeVar("Result")
 
 _KEPT = 7 * 86400.0  # s
 
@@ -189,6 +192,40 @@ def kernel(function: Callable[..., Any]) -> Any:
     if folder is not None:
         compiled._cache = _Cache(function, folder)
     return compiled
+
+
+def interruptible(call: Callable[[], Result]) -> Result:
+    """What `call` of a kernel gives, so that Ctrl-C ends the wait for it at once.
+
+    Python hears of a signal only between two of its own steps, and a kernel may run for minutes. So in the main thread, which is
+    the one that is interrupted, it runs in another; one that nobody waits for any more ends with the process.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return call()
+    ended: Future[Result] = Future()
+
+    def run() -> None:
+        try:
+            ended.set_result(call())
+        except BaseException as error:
+            ended.set_exception(error)
+
+    threading.Thread(target=run, daemon=True).start()
+    while not ended.done():
+        wait((ended,), timeout=1.0)  # Windows wakes no wait without end
+    return ended.result()
+
+
+@contextlib.contextmanager
+def threads(count: int) -> Iterator[ThreadPoolExecutor]:
+    """Threads for kernels. Left by an exception (Ctrl-C is one), nobody waits for what they are at."""
+    pool = ThreadPoolExecutor(count)
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
+    pool.shutdown()
 
 
 def inner_kernel(function: Callable[..., Any]) -> Any:

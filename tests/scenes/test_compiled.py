@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import pickle
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -159,3 +161,50 @@ def test_everything_can_be_imported_without_the_compiler():
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, timeout=300, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     assert done.stdout == "at rest\n"
+
+
+@posix
+def test_the_wait_for_compiled_code_can_be_interrupted(tmp_path):
+    """Ctrl-C while a kernel runs for minutes: the process ends at once, with 130."""
+    script = tmp_path / "slow.py"
+    script.write_text(_SLOW)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    for how in ("one", "many"):
+        running = subprocess.Popen([sys.executable, str(script), how], stdout=subprocess.PIPE, text=True, env=environment)
+        assert running.stdout is not None
+        assert running.stdout.readline() == "begins\n"
+        time.sleep(1.0)
+        running.send_signal(signal.SIGINT)
+        assert running.communicate(timeout=60)[0] == "interrupted\n"
+        assert running.returncode == 130
+
+
+_SLOW = """
+import os, sys
+from rockcheck.scenes.compiled import interruptible, kernel, threads
+
+@kernel
+def spin(count):
+    total = 0.0
+    for k in range(count):
+        total = (total + k) % 7.0
+    return total
+
+spin(1)
+print("begins", flush=True)
+try:
+    if sys.argv[1] == "one":
+        interruptible(lambda: spin(10**12))
+    else:
+        with threads(2) as pool:
+            list(pool.map(spin, [10**12] * 4))
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+    os._exit(130)
+"""
+
+
+def test_an_interruptible_call_is_the_call_itself():
+    assert compiled.interruptible(lambda: 3) == 3
+    with pytest.raises(ZeroDivisionError):
+        compiled.interruptible(lambda: 1 // 0)

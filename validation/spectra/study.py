@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -20,6 +19,7 @@ import numpy as np
 from rockcheck.ebm import Spectrum, overturning_spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT, TOLERANCE, Floats, play_nodes
 from rockcheck.scenes import Floor, InputError, Ricker, Scene, Wall
+from rockcheck.scenes.compiled import threads
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.discrepancy.figures import Stored
@@ -154,7 +154,7 @@ def play_panels(panels: Sequence[Panel], asked: Asked, tiles: Tiles, done: Calla
             check(panel.scene)
     if tiles.client is None:
         return [play(panel) for panel in panels]
-    with ThreadPoolExecutor(max_workers=len(panels)) as pool:
+    with threads(len(panels)) as pool:
         return list(pool.map(play, panels))
 
 
