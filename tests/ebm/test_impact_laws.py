@@ -1,0 +1,130 @@
+"""What the impact laws decide: the branches of the wall cascade, the energy cap, and when a block lies still."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from rockcheck.ebm import EventBasedModel, impacts, natural
+from rockcheck.ebm import contact_impacts as ci
+from rockcheck.scenes import Block, Floor, Scene
+from rockcheck.scenes.scene import PAPER_BLOCK
+
+
+def random_strikes(count: int, parting: bool):
+    """alpha, phi, case, w1, xdot1, e, mu, no_slip: a corner that comes to the wall, or leaves it already."""
+    rng = np.random.default_rng(20)
+    for _ in range(count):
+        alpha, sw = rng.uniform(0.05, 1.0), float(rng.choice([-1, 1]))
+        phi = alpha * rng.uniform(0.01, 1.0)
+        C = sw * math.cos(alpha + phi)
+        w1, xdot1 = rng.normal(0.0, 1.0, 2) * 10.0 ** rng.uniform(-1.0, 1.0, 2)
+        if (sw * (xdot1 - C * w1) >= 0.0) != parting:
+            w1, xdot1 = -w1, -xdot1
+        yield alpha, phi, sw, w1, xdot1, float(rng.choice([0.0, 1.0, rng.uniform()])), rng.uniform(0.0, 1.3), bool(rng.integers(0, 2))
+
+
+@pytest.mark.parametrize("parting", [False, True], ids=["the corner comes", "the corner leaves"])
+def test_each_branch_of_the_wall_cascade(parting):
+    """Every branch of Fig. 3 is taken for the reason that it stands for, and gives what its equations say.
+
+    A corner that comes leads to A, B and D only: the impulse of the wall grows with the speed at which the corner is thrown back.
+    The others are reached where it leaves already.
+    """
+    seen: Counter[int] = Counter()
+    for alpha, phi, sw, w1, xdot1, e, mu, no_slip in random_strikes(4000, parting):
+        s, c, cp = math.sin(alpha - phi), math.cos(alpha - phi), math.cos(alpha + phi)
+        C = sw * cp
+        branch, w2, xdot2, n, p, v2 = impacts.wall_impact(1.0, sw, s, c, cp, w1, xdot1, e, mu, mu, no_slip)
+        seen[branch] += 1
+        assert n >= 0.0
+        # (27): without an impulse of the wall, the pivot held: angular momentum about it stays what it is.
+        alone = 0.75 * (w1 / 3.0 - c * xdot1 + s * s * w1)
+        leaves = sw * (-c * alone - C * alone)
+        if branch == impacts.A_STICK:
+            assert sw * (xdot2 - C * w2) == pytest.approx(-e * sw * (xdot1 - C * w1), abs=1e-11)
+            assert xdot2 == pytest.approx(-c * w2, abs=1e-12)
+        elif branch == impacts.B_STICK:
+            assert leaves >= 0.0  # (22)
+            assert (w2, xdot2) == pytest.approx((alone, -c * alone), abs=1e-12)
+            assert (n, v2) == (0.0, 0.0)
+        elif branch == impacts.C_STICK:
+            assert leaves < 0.0
+            assert (w2, xdot2, v2) == (0.0, 0.0, 0.0)
+            assert p == pytest.approx(-s * w1, abs=1e-12)
+        else:
+            assert branch in (impacts.D_SLIP, impacts.E_SLIP)
+            assert not no_slip
+            assert p == pytest.approx(s * (w2 - w1), abs=1e-11)
+            assert v2 == pytest.approx(xdot2 + c * w2, abs=1e-11)
+            q = xdot2 - xdot1 - sw * n
+            assert abs(q) == pytest.approx(mu * abs(p), abs=1e-10)
+        if branch == impacts.D_SLIP:
+            assert sw * (xdot2 - C * w2) == pytest.approx(-e * sw * (xdot1 - C * w1), abs=1e-10)
+            assert q * v2 <= 1e-12
+        if branch == impacts.E_SLIP:
+            assert n == 0.0
+            assert xdot2 == pytest.approx(C * w2, abs=1e-10)  # (32): the corner stays on the wall
+    least = {impacts.A_STICK: 20, impacts.B_STICK: 20, impacts.E_SLIP if parting else impacts.D_SLIP: 500}
+    least |= {impacts.C_STICK: 10} if parting else {}
+    assert seen.keys() == least.keys()
+    assert all(seen[branch] > count for branch, count in least.items()), seen
+
+
+def landing(alpha: float, phi: float, mu: float, e: float, v, cap: bool) -> tuple[np.ndarray, float]:
+    """Velocities after a tilted block lands on its corner with restitution e, and the largest relative gain of energy."""
+    block = Block(half_width=math.sin(alpha), half_height=math.cos(alpha))
+    scene = Scene(name="cap", block=block, floor=Floor(friction=mu, restitution=e), duration=1.0)
+    setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=cap)
+    touching = np.zeros(ci.CONTACTS, dtype=bool)
+    touching[ci.F] = True
+    after, impulse, tally = np.array(v), np.zeros(2), np.zeros(2)
+    assert ci.contact_impact(setting, phi, touching, 0.0, 0.0, 1e-9, after, impulse, tally)
+    return after, float(tally[1])
+
+
+def test_the_energy_cap_takes_the_largest_restitution_that_adds_none():
+    """Where Newton's restitution adds no energy the cap changes nothing; where it does, a little more restitution would add some."""
+    rng = np.random.default_rng(21)
+    capped = untouched = 0
+    for _ in range(3000):
+        alpha, mu, e = rng.uniform(0.3, 1.2), rng.uniform(0.2, 1.33), rng.uniform(0.5, 0.99)
+        phi = alpha * rng.uniform(0.05, 0.9)
+        v = rng.normal(0.0, 0.5, 3)
+        row = ci.contact_rows(alpha, phi)[ci.F]
+        if row @ v > -1e-3:
+            continue
+        plain, gain = landing(alpha, phi, mu, e, v, cap=False)
+        held, none = landing(alpha, phi, mu, e, v, cap=True)
+        if gain == 0.0:
+            np.testing.assert_array_equal(held, plain)
+            untouched += 1
+            continue
+        capped += 1
+        assert none <= 1e-12
+        used = -(row @ held) / (row @ v)
+        assert 0.0 < used < e
+        np.testing.assert_allclose(landing(alpha, phi, mu, used, v, cap=False)[0], held, rtol=0.0, atol=1e-12)
+        assert landing(alpha, phi, mu, used * (1.0 + 1e-9), v, cap=False)[1] > 0.0
+    assert capped > 10
+    assert untouched > 1000
+
+
+@pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
+def test_a_block_rocks_on_until_its_rate_is_a_ten_millionth(pivot):
+    """Housner's impacts follow each other down to a rate of 1e-6 sqrt(g/R) at least; with the paper's pivot all to 5e-8."""
+    alpha = PAPER_BLOCK.alpha
+    tilt, ratio = 0.3 * alpha, 1.0 - 1.5 * math.sin(alpha) ** 2
+    scene = Scene(name="still", block=PAPER_BLOCK, floor=Floor(friction=0.8), initial_rotation=tilt, duration=12.0, output_step=0.1)
+    history = EventBasedModel(pivot=pivot).simulate(scene)
+    assert history.outcome == "at rest"
+    speed = math.sqrt(scene.gravity * PAPER_BLOCK.radius)
+    rates = [event.impulse / speed / (math.sin(alpha) * (1.0 + ratio)) for event in history.event_list if event.kind == "floor impact"]
+    first = math.sqrt(1.5 * (math.cos(alpha - tilt) - math.cos(alpha)))
+    np.testing.assert_allclose(rates[:100], first * ratio ** np.arange(100), rtol=1e-6)
+    assert rates[-1] < 1e-6
+    if pivot == "bilateral":
+        assert len(rates) == math.ceil(math.log(5e-8 / first) / math.log(ratio))

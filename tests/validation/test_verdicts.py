@@ -1,0 +1,154 @@
+"""What CI reads: totals and failures of the JUnit file, limits that hold to the last digit, statistics against their definitions."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from scipy.stats import ttest_1samp
+
+from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.discrepancy.measures import DIFFERENCES
+from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
+from rockcheck.validation.suite.results import Cell, Check, Run
+from rockcheck.validation.suite.tolerances import Tolerance, judge
+from rockcheck.validation.suite.verdicts import junit, markdown
+
+LINE = Tolerance(expected=0.25, limit=0.5, drift=0.125, why="a test")
+
+
+def check(value: float, measure: str = "theta_rms", line: Tolerance = LINE) -> Check:
+    figure = Figure(measure=measure, label=measure, unit="alpha", value=value, against="r")
+    return judge(figure, line, kind="numerical", measure=DIFFERENCES[measure])
+
+
+def run_of(*cells: Cell, **more: object) -> Run:
+    scenes = {cell.scene: {} for cell in cells}
+    return Run(
+        suite="mine", created="", reference="r", scenes=scenes, models=("r", *dict.fromkeys(c.model for c in cells)), cells=cells, **more
+    )
+
+
+def cell(scene: str, model: str, *checks: Check, reason: str = "") -> Cell:
+    return Cell(scene=scene, model=model, status="failed" if reason else "done", reason=reason, checks=checks)
+
+
+MIXED = (
+    cell("a", "m", check(0.25), check(0.4, "theta_peak"), check(0.75, "x_rms")),  # passes, has changed, fails
+    cell("a", "n", reason="more than 10 events"),
+    cell("b", "m", check(0.4), check(0.9, "theta_peak")),
+)
+
+
+def totals(element: ET.Element) -> dict[str, int]:
+    return {name: int(element.get(name, 0)) for name in ("tests", "failures", "errors")}
+
+
+@pytest.mark.parametrize(("strict", "failures"), [(False, [1, 1, 1]), (True, [2, 2, 1])])
+def test_totals_and_failures_of_the_junit_file(strict, failures):
+    """A test case a run and a check; what has changed is red in a strict run only; totals of a suite and of all are the sums."""
+    root = ET.fromstring(junit(run_of(*MIXED, strict=strict, faults=("s.m.r: theta_rms: no such cell",))))
+    suites = {suite.get("name"): suite for suite in root.iter("testsuite")}
+    assert {name: totals(suite) for name, suite in suites.items()} == {
+        "a": {"tests": 5, "failures": failures[0], "errors": 1},
+        "b": {"tests": 3, "failures": failures[1], "errors": 0},
+        "tolerances": {"tests": 1, "failures": failures[2], "errors": 0},
+    }
+    assert totals(root) == {"tests": 9, "failures": sum(failures), "errors": 1}
+    red = {(case.get("classname"), case.get("name").partition(" ")[0]) for case in root.iter("testcase") if len(case)}
+    expected = {("a.m", "x_rms"), ("a.n", "runs"), ("b.m", "theta_peak")} | (
+        {("a.m", "theta_peak"), ("b.m", "theta_rms")} if strict else set()
+    )
+    assert {one for one in red if one[0] != "tolerances"} == expected
+    (error,) = root.iter("error")
+    assert error.get("message") == "more than 10 events"
+
+
+def test_a_run_without_a_fault_is_green():
+    root = ET.fromstring(junit(run_of(cell("a", "m", check(0.25)))))
+    assert totals(root) == {"tests": 2, "failures": 0, "errors": 0}
+
+
+def test_the_summary_names_what_is_not_a_pass():
+    text = markdown(run_of(*MIXED))
+    assert "## 💥 rockcheck mine: error" in text
+    assert "3 simulations, 0 up to date, 5 checks" in text
+    assert "theta_peak against r: 0.9 is more than 0.5" in text
+    assert [line for line in text.splitlines() if line.startswith("| a |")] == ["| a |  | ❌ x_rms 7.50e-01 / 0.5 | 💥 |"]
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        (0.375, "pass"),
+        (0.125, "pass"),
+        (0.3750001, "changed"),
+        (0.1249999, "changed"),
+        (0.5, "changed"),
+        (0.5000001, "fail"),
+        (-0.5, "changed"),
+    ],
+)
+def test_limit_and_drift_themselves_are_inside(value, expected):
+    """Numbers that a computer holds exactly: a figure just at its drift passes, one just at its limit does not fail."""
+    assert check(value).verdict == expected
+
+
+def test_a_limit_of_zero_asks_for_the_figure_itself():
+    exact = Tolerance(expected=1.0, limit=0.0, drift=0.0, why="the same outcome")
+    assert check(1.0, "outcome_agrees", exact).verdict == "pass"
+    assert check(0.0, "outcome_agrees", exact).verdict == "fail"
+
+
+def samples(reference: list[float], candidate: list[float], fallen: tuple[int, ...] = ()) -> Samples:
+    """Peaks of both; in the scenes `fallen` the candidate falls."""
+    safe = ("at rest",) * len(reference)
+    ends = tuple("overturned left" if n in fallen else "at rest" for n in range(len(candidate)))
+    return Samples(Sample(np.array(reference), safe), Sample(np.array(candidate), ends))
+
+
+def test_the_fallen_are_beyond_all_others():
+    """Two of four rock less than any of the reference and two fall: the distributions part by a half; as peaks of 0 by the whole."""
+    value, remark = STATISTICS["ks_distance"].evaluate(samples([0.1, 0.2, 0.3, 0.4], [0.05, 0.06, 0.1, 0.2], fallen=(2, 3)))
+    assert value == pytest.approx(0.5)
+    assert remark.startswith("p = ")
+
+
+def test_bias_and_scatter_by_student_and_chi_squared():
+    """Four ratios: mean and its interval as scipy's t-test has it; the scatter is that of a sample, not of a population."""
+    reference, candidate = [0.1, 0.2, 0.3, 0.4], [0.11, 0.19, 0.36, 0.41]
+    ratios = np.log(np.array(candidate) / reference)
+    bias, remark = STATISTICS["peak_bias"].evaluate(samples(reference, candidate))
+    interval = ttest_1samp(ratios, 0.0).confidence_interval(0.95)
+    assert bias == pytest.approx(np.mean(ratios))
+    assert remark == f"[{interval.low:.2g}, {interval.high:.2g}], 4 scenes"
+    scatter, remark = STATISTICS["peak_scatter"].evaluate(samples(reference, candidate))
+    assert scatter == pytest.approx(np.sqrt(np.sum((ratios - bias) ** 2) / 3.0))
+    # chi-squared with 3 degrees of freedom has its 2.5 % and 97.5 % points at 0.2158 and 9.3484
+    assert remark == f"[{scatter * np.sqrt(3.0 / 9.3484):.2g}, {scatter * np.sqrt(3.0 / 0.2158):.2g}]"
+
+
+def test_only_scenes_in_which_both_rock_have_a_ratio():
+    """A peak of a thousandth and less, and a fall, have none; with fewer than two there is no bias and no scatter."""
+    both = samples([0.1, 0.2, 1e-3, 0.4, 0.3], [0.2, 0.4, 0.4, 1e-3, 0.6], fallen=(4,))
+    assert both.log_ratios() == pytest.approx(np.log([2.0, 2.0]))
+    for name in ("peak_bias", "peak_scatter"):
+        value, remark = STATISTICS[name].evaluate(samples([0.1, 0.2], [0.1, 1e-4]))
+        assert np.isnan(value)
+        assert remark == "fewer than two scenes in which both rock and neither falls"
+
+
+def test_shares_have_wilsons_interval():
+    """Three of four: Wilson (1927) by his formula; where none falls, precision and recall are 1."""
+    value, remark = STATISTICS["overturning_accuracy"].evaluate(samples([0.1] * 4, [0.1] * 4, fallen=(0,)))
+    z, p, n = 1.959963984540054, 0.75, 4
+    middle, half = (p + z * z / (2 * n)) / (1 + z * z / n), z / (1 + z * z / n) * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    assert (value, remark) == (0.75, f"[{middle - half:.3f}, {middle + half:.3f}], 3 of 4")
+    assert STATISTICS["overturning_recall"].evaluate(samples([0.1] * 4, [0.1] * 4, fallen=(0,))) == (1.0, "none fall")
+    assert STATISTICS["overturning_precision"].evaluate(samples([0.1] * 4, [0.1] * 4, fallen=(0,)))[0] == 0.0
+
+
+def test_a_failed_scene_is_counted():
+    sample = Sample(np.array([0.1, np.nan, np.inf]), ("at rest", "", "overturned left"))
+    assert (sample.failures, list(sample.fallen)) == (2, [False, False, True])
