@@ -52,7 +52,7 @@ def run_times(run: Run) -> list[RunTime]:
 
 
 @dataclass(frozen=True)
-class Measured:
+class TableEntry:
     """One figure of one model, with the check that it was held to, if any."""
 
     figure: Figure
@@ -64,7 +64,7 @@ class MeasureRow:
     """A measure of all models: one that stands for its name and window, and what each model gave."""
 
     figure: Figure
-    cells: tuple[Measured | None, ...]
+    cells: tuple[TableEntry | None, ...]
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class MeasureTable:
 
 def measure_table(view: SceneView, against: str) -> MeasureTable:
     """All figures of a scene that are held against `against`, a row a measure and window, a column a model."""
-    found: dict[tuple[str, str], dict[str, Measured]] = {}
+    found: dict[tuple[str, str], dict[str, TableEntry]] = {}
     for cell in view.cells:
         for check in cell.checks:
             _enter(found, cell.model, check.figure, check, against)
@@ -88,9 +88,9 @@ def measure_table(view: SceneView, against: str) -> MeasureTable:
     return MeasureTable(models, tuple(sorted(rows, key=lambda row: (row.figure.measure, row.figure.until or float("inf")))))
 
 
-def _enter(found: dict[tuple[str, str], dict[str, Measured]], model: str, figure: Figure, check: Check | None, against: str) -> None:
+def _enter(found: dict[tuple[str, str], dict[str, TableEntry]], model: str, figure: Figure, check: Check | None, against: str) -> None:
     if figure.against == against:
-        found.setdefault((figure.measure, figure.window), {}).setdefault(model, Measured(figure, check))
+        found.setdefault((figure.measure, figure.window), {}).setdefault(model, TableEntry(figure, check))
 
 
 def scene_facts(view: SceneView) -> list[tuple[str, str]]:

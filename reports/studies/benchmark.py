@@ -11,7 +11,7 @@ from rockcheck.reports.site import PAGES, Site
 from rockcheck.reports.style import LOOKS, PAGE, figure_style, looks, save
 from rockcheck.validation.bench.ebm import CASES, EbmSpeed
 from rockcheck.validation.bench.ebm import LEVEL as BATCH_LEVEL
-from rockcheck.validation.bench.models import LEVEL, LINES, Line, Point, WorkPrecision
+from rockcheck.validation.bench.models import LEVEL, LINES, DiagramLine, Point, WorkPrecision
 from rockcheck.validation.bench.scenes import FAMILIES
 from rockcheck.validation.bench.skipping import NOT_MEASURED
 from rockcheck.validation.bench.study import Benchmark
@@ -119,7 +119,7 @@ def _label(line: str) -> str:
     return " ".join(filter(None, [LOOKS[model].label if model in LOOKS else model, rest]))
 
 
-def _appearance(label: str, line: Line) -> dict[str, Any]:
+def _appearance(label: str, line: DiagramLine) -> dict[str, Any]:
     """A model's colour and marker; default settings are hollow and dotted, adaptive stepping is dashed."""
     look = LOOKS[line.model]
     appearance: dict[str, Any] = {"color": look.light, "marker": look.marker, "markersize": 3.2, "linewidth": 0.9}
@@ -130,7 +130,7 @@ def _appearance(label: str, line: Line) -> dict[str, Any]:
     return appearance
 
 
-def _draw(ax: Axes, line: Line, points: Sequence[Point]) -> Any:
+def _draw(ax: Axes, line: DiagramLine, points: Sequence[Point]) -> Any:
     cpu = [point.cpu for point in points]
     appearance = _appearance(line.label, line)
     lows = [max(point.rms_10, FLOOR) for point in points]

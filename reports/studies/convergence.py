@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rockcheck.reports.site import Site
 from rockcheck.reports.studies.benchmark import power_of_ten
 from rockcheck.reports.style import LOOKS, PAGE, figure_style, looks, save
-from rockcheck.validation.bench.convergence import DURATION, LEVEL, PULSES, REFERENCES, REFINEMENTS, TOLERANCE, Convergence
+from rockcheck.validation.bench.convergence import DURATION, LEVEL, PULSES, REFERENCE_TOLERANCE, REFERENCES, SWEEPS, Convergence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,11 +33,11 @@ def write_convergence(found: Convergence, folder: Path) -> Path:
         diagram=DIAGRAM,
         looks=looks(LOOKS),
         references=REFERENCES,
-        refinements=REFINEMENTS,
+        refinements=SWEEPS,
         pulses=PULSES,
         duration=DURATION,
         level=LEVEL,
-        tolerance=power_of_ten(TOLERANCE),
+        tolerance=power_of_ten(REFERENCE_TOLERANCE),
         finite=math.isfinite,
     )
 
@@ -50,7 +50,7 @@ def convergence_figure(found: Convergence) -> Figure:
         figure = Figure(figsize=(PAGE, 3.4), layout="constrained")
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
         for ax, reference in zip(panels, REFERENCES, strict=True):
-            for model in REFINEMENTS:
+            for model in SWEEPS:
                 colour = LOOKS[model].light
                 for case in found.cases:
                     line = [one for one in found.line(model, case.scene) if math.isfinite(one.error(reference))]

@@ -14,7 +14,7 @@ from rockcheck.reports.studies.spectra import paper_figure, write_page
 from rockcheck.reports.style import save
 from rockcheck.validation.spectra.agreement import Agreement
 from rockcheck.validation.spectra.refinement import Refined, Refinement
-from rockcheck.validation.spectra.study import KEPT, SPECTRA, Asked, paper_panels
+from rockcheck.validation.spectra.study import KEPT, SPECTRA, SpectrumRequest, paper_panels
 from rockcheck.validation.spectra.study import save as save_spectra
 
 SIZE = 12
@@ -59,7 +59,7 @@ def test_the_page_shows_what_the_folder_holds(tmp_path):
     panels, folder = paper_panels(7), tmp_path / SPECTRA
     folder.mkdir()
     spectra = [made(panel) for panel in panels]
-    save_spectra(panels, spectra, Asked(np.linspace(0.5, 8.0, SIZE), np.linspace(1.0, 12.0, SIZE)), folder)
+    save_spectra(panels, spectra, SpectrumRequest(np.linspace(0.5, 8.0, SIZE), np.linspace(1.0, 12.0, SIZE)), folder)
     save(paper_figure(panels, spectra), folder / "figure-7")
     text = write_page(tmp_path).read_text(encoding="utf-8")
     assert "Fig. 7" in text

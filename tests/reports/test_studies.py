@@ -22,7 +22,7 @@ from rockcheck.validation.bench import models as benchmark_models
 from rockcheck.validation.bench import study as benchmark
 from rockcheck.validation.bench.skipping import Saving
 from rockcheck.validation.spectra import study as spectra
-from rockcheck.validation.stress.study import Batch, Failure, Stress
+from rockcheck.validation.stress.study import Failure, RunTotals, Stress
 
 pytestmark = pytest.mark.browser
 
@@ -42,12 +42,12 @@ PHONE = {"viewport": {"width": 390, "height": 800}}
 def benchmark_page(folder: Path) -> Path:
     lines = (("ebm", 1e-6, 1e-6, 1e-5), ("ebm", 1e-8, 1e-8, 2e-5), ("cm", 1e-5, 1e-3, 1e-3), ("cm", 1e-6, 1e-4, 3e-3))
     samples = [
-        benchmark_models.Sample(family, member, line, value, 3.0, error, 2.0 * error, error, 0.1 * error, cpu, cpu, 0.1, 1000)
+        benchmark_models.BenchmarkRun(family, member, line, value, 3.0, error, 2.0 * error, error, 0.1 * error, cpu, cpu, 0.1, 1000)
         for family in ("free", "wall 53 mm e 0")
         for member in range(3)
         for line, value, error, cpu in lines
     ]
-    failed = benchmark_models.Sample("free", 0, "pybullet", 1e-2, 3.0, failure="it blew up")
+    failed = benchmark_models.BenchmarkRun("free", 0, "pybullet", 1e-2, 3.0, failure="it blew up")
     models = benchmark_models.evaluated([*samples, failed], [("free", 0, "mujoco", 1e-4)])
     savings = (Saving("cm", "wall", "ms", 2.0, 1.0),)
     return write_benchmark(benchmark.Benchmark(suite="benchmark all", models=models, savings=savings, **MADE), folder)
@@ -60,14 +60,14 @@ def benchmark_page_without_time(folder: Path) -> Path:
 
 def convergence_page(folder: Path) -> Path:
     names = ("long 53 mm e 0.5", "short 3 mm e 0")
-    cases = [convergence.Case(name, 5.0, 0.1, {"ebm-unilateral": "at rest", "ebm": "overturned left"}) for name in names]
+    cases = [convergence.StudyScene(name, 5.0, 0.1, {"ebm-unilateral": "at rest", "ebm": "overturned left"}) for name in names]
     plays = [
-        convergence.Play(name, model, 10.0**-n, 10.0**-n, 10.0 ** (1 - n), 0.1, 1.0)
+        convergence.SweepRun(name, model, 10.0**-n, 10.0**-n, 10.0 ** (1 - n), 0.1, 1.0)
         for name in names
         for model in ("mujoco", "pybullet", "cm")
         for n in (3, 4)
     ]
-    failed = convergence.Play(names[0], "pybullet", 1e-5, failure="it blew up")
+    failed = convergence.SweepRun(names[0], "pybullet", 1e-5, failure="it blew up")
     return write_convergence(convergence.evaluated(cases, [*plays, failed], quick=True), folder)
 
 
@@ -77,7 +77,7 @@ def stress_page(folder: Path) -> Path:
     (folder / failure.file).touch()
     looked, worst = Counter(ends=10, finite=10, mirror=9), {"ends": (math.inf, 7), "finite": (0.0, 9), "mirror": (0.0, 9)}
     batches = {
-        model: Batch(model=model, runs=10, looked_at=looked, worst=worst, exceptions=Counter(hangs=2), failures=faults)
+        model: RunTotals(model=model, runs=10, looked_at=looked, worst=worst, exceptions=Counter(hangs=2), failures=faults)
         for model, faults in (("ebm", (failure,)), ("ebm-unilateral", ()))
     }
     return write_stress(Stress(suite="stress", seed=1, complete=True, batches=batches, **MADE), folder)
@@ -90,7 +90,7 @@ def spectra_page(folder: Path) -> Path:
     outcomes[6:] = 1
     about = {"frequency_ratios": axes[0], "amplitude_ratios": axes[1], "evaluations": 144, "undecided": np.zeros((0, 2), dtype=np.int64)}
     found = [Spectrum(outcomes=outcomes, scene=panel.scene, model=None, **about) for panel in panels]
-    spectra.save(panels, found, spectra.Asked(*axes), data)
+    spectra.save(panels, found, spectra.SpectrumRequest(*axes), data)
     save(paper_figure(panels, found), data / "figure-8")
     return write_page(folder)
 

@@ -21,9 +21,9 @@ from rockcheck.validation.commands.cli import main
 from rockcheck.validation.execute import store as stores
 from rockcheck.validation.execute.store import HISTORIES, Store
 from rockcheck.validation.stress import study
-from rockcheck.validation.stress.invariants import Played
+from rockcheck.validation.stress.invariants import TaskResult
 from rockcheck.validation.stress.players import PLAYERS, EventBased
-from rockcheck.validation.stress.study import Batch, Chunk, Failure
+from rockcheck.validation.stress.study import Chunk, Failure, RunTotals
 
 ROCKCHECK = [sys.executable, "-m", "rockcheck"]
 posix = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX: its limits and signals")
@@ -192,7 +192,7 @@ def test_shrinking_that_hangs(tmp_path, monkeypatch):
 
     numbers = (3, 4, 5, 13)
     failures = tuple(Failure("ebm", "mirror", 1, number, 1.0) for number in numbers)
-    batch = study.write_failures({"ebm": Batch(model="ebm", runs=20, failures=failures)}, tmp_path)["ebm"]
+    batch = study.write_failures({"ebm": RunTotals(model="ebm", runs=20, failures=failures)}, tmp_path)["ebm"]
     found = {number: load_scene(tmp_path / failure.file) for number, failure in zip(numbers, batch.failures, strict=True)}
     assert found[3].excitation == PLAYERS["ebm"].scene(1, 3).excitation
     monkeypatch.setattr(study, "shrink_file", deadly.shrink_file)
@@ -215,8 +215,8 @@ def test_shrinking_that_hangs(tmp_path, monkeypatch):
 def test_shrinking_interrupted(tmp_path, monkeypatch, capsys):
     """Ctrl-C while failures are shrunk: all of them are saved, each with its scene."""
 
-    def check(self: object, scene: Scene, seed: int, number: int, only: str = "") -> Played:
-        return Played(figures={"ends": 0.0, "mirror": 1.0}, outcome="at rest")
+    def check(self: object, scene: Scene, seed: int, number: int, only: str = "") -> TaskResult:
+        return TaskResult(figures={"ends": 0.0, "mirror": 1.0}, outcome="at rest")
 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt

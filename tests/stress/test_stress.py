@@ -15,11 +15,11 @@ from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.commands.cli import main
 from rockcheck.validation.stress import invariants, players, study
 from rockcheck.validation.stress.generator import ALPHA, FRICTION, RADIUS, random_scene
-from rockcheck.validation.stress.invariants import INVARIANTS, Played, audited, check_run, energy_error, similar
+from rockcheck.validation.stress.invariants import INVARIANTS, CheckedRun, audited, check_run, energy_error, similar
 from rockcheck.validation.stress.mechanics import BOOLE, integrals, tilted_forces
 from rockcheck.validation.stress.players import PLAYERS, Approximate, energy_without_source
 from rockcheck.validation.stress.shrinking import shrink, write_scene
-from rockcheck.validation.stress.stability import LINES, fault_of, largest_stable, scene_at, stand_still
+from rockcheck.validation.stress.stability import SETUPS, fault_of, largest_stable, scene_at, stand_still
 from rockcheck.validation.stress.study import Chunk, Stress, chunks, invariants_markdown, play_some, run_stress, summary_rows
 
 ALPHA_PAPER = 0.25
@@ -277,8 +277,8 @@ def test_work_is_all_runs_once():
 def test_a_failure_is_shown_with_its_smallest_scene(tmp_path, monkeypatch, capsys):
     """An event-based model that breaks an invariant: exit 1, counted, and a scene file that a user can play."""
 
-    def check(self: object, scene: Scene, seed: int, number: int, only: str = "") -> Played:
-        return Played(figures={"ends": 0.0, "mirror": 3.0 if scene.walls else 0.0}, outcome="at rest")
+    def check(self: object, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
+        return CheckedRun(figures={"ends": 0.0, "mirror": 3.0 if scene.walls else 0.0}, outcome="at rest")
 
     monkeypatch.setattr(type(PLAYERS["ebm"]), "check", check)
     monkeypatch.setattr(study, "_side_by_side", lambda work, jobs: (play_some(c.label, c.seed, c.first, c.count) for c in work))
@@ -334,8 +334,8 @@ def test_of_an_engine_that_gains_energy_half_the_step_is_told(monkeypatch):
 
 def test_where_an_engine_breaks_is_found():
     """MuJoCo's own contact lets a block of a millimetre sink; at its best it holds it. Creep under a push is seen, too."""
-    assert fault_of(LINES["mujoco default"], scene_at("size", 1e-3), 0.01) == "sinks"
-    assert fault_of(LINES["mujoco"], scene_at("size", 1e-3), 0.01) == ""
+    assert fault_of(SETUPS["mujoco default"], scene_at("size", 1e-3), 0.01) == "sinks"
+    assert fault_of(SETUPS["mujoco"], scene_at("size", 1e-3), 0.01) == ""
     found = largest_stable("mujoco default", "size", 1e-3, steps=(0.03, 0.01))
     assert (found.step, found.fault) == (0.0, "sinks")
     creeps, stands = stand_still("mujoco default", "pushed", 5.0), stand_still("mujoco adaptive", "pushed", 5.0)

@@ -9,7 +9,18 @@ import pytest
 from rockcheck.reports.studies.benchmark import power_of_ten, write_benchmark
 from rockcheck.validation.bench import models as benchmark_models
 from rockcheck.validation.bench.ebm import CASES, LEVEL, EbmSpeed, _times
-from rockcheck.validation.bench.models import LINES, Point, Sample, cost_at, error_at, evaluated, measure, order_of, planned, work_precision
+from rockcheck.validation.bench.models import (
+    LINES,
+    BenchmarkRun,
+    Point,
+    cost_at,
+    error_at,
+    evaluated,
+    measure,
+    order_of,
+    planned,
+    work_precision,
+)
 from rockcheck.validation.bench.scenes import FAMILIES, MEMBERS, prepared
 from rockcheck.validation.bench.skipping import Saving, skipping
 from rockcheck.validation.bench.study import Benchmark, save
@@ -75,8 +86,8 @@ def test_members_stay_up_and_end_at_their_horizon(family: str) -> None:
         ready = prepared(family, k)
         assert 1.5 < ready.horizon <= 8.0
         assert ready.scene.duration == ready.horizon
-        for limit in ready.limits.values():
-            assert not limit.outcome.startswith("overturned")
+        for reference in ready.references.values():
+            assert not reference.outcome.startswith("overturned")
         assert (ready.model_form > 1e-3) if ready.scene.walls else (ready.model_form < 1e-12)
 
 
@@ -105,19 +116,19 @@ def test_the_error_of_adaptive_steps_is_told_at_the_cost_of_fixed_ones() -> None
     assert math.isnan(error_at(line, 17.0))
     runs = [sample(k, 5e-3) for k in range(10)]
     for value, rms, cpu in ((2e-3, 1e-3, 0.15), (1e-3, 1e-5, 0.6)):
-        runs += [Sample("pulse a", k, "mujoco adaptive", value, 3.0, rms=rms * (1 + k % 3), cpu=cpu) for k in range(3)]
+        runs += [BenchmarkRun("pulse a", k, "mujoco adaptive", value, 3.0, rms=rms * (1 + k % 3), cpu=cpu) for k in range(3)]
     everything = {row.line: row for row in evaluated(runs, ()).pooled if row.kind == "all" and row.value == 1e-3}
     assert everything["mujoco"].at_the_cost == pytest.approx(2e-4)
     assert everything["mujoco adaptive"].rms_worst == pytest.approx(3e-5)
 
 
-def sample(member: int, rms: float, **change: object) -> Sample:
-    return Sample("free", member, "mujoco", 1e-3, 3.0, rms=rms, cpu=0.3, wall=0.6, set_up=0.1, steps=3000, **change)  # type: ignore[arg-type]
+def sample(member: int, rms: float, **change: object) -> BenchmarkRun:
+    return BenchmarkRun("free", member, "mujoco", 1e-3, 3.0, rms=rms, cpu=0.3, wall=0.6, set_up=0.1, steps=3000, **change)  # type: ignore[arg-type]
 
 
 def test_failed_runs_count_as_infinitely_wrong_and_are_listed() -> None:
     good = [sample(k, 1e-3 * (k + 1)) for k in range(4)]
-    bad = [Sample("free", k, "mujoco", 1e-3, 3.0, failure="it blew up") for k in range(4, 10)]
+    bad = [BenchmarkRun("free", k, "mujoco", 1e-3, 3.0, failure="it blew up") for k in range(4, 10)]
     found = evaluated([*good, *bad], [("free", 0, "mujoco", 1e-5)])
     (row,) = found.points
     assert (row.runs, row.failed, row.rms, row.rms_10) == (10, 6, math.inf, pytest.approx(1.5e-3))
@@ -144,9 +155,9 @@ def test_the_dearest_runs_come_last_and_none_is_missing(monkeypatch: pytest.Monk
     """Every member of every family meets every setting once; an engine's 1e-4 s after all longer steps."""
     played: list[tuple[str, int, str, float]] = []
 
-    def note(family: str, member: int, line: str, value: float) -> Sample:
+    def note(family: str, member: int, line: str, value: float) -> BenchmarkRun:
         played.append((family, member, line, value))
-        return Sample(family, member, line, value, 3.0, rms=1e-3, cpu=0.1)
+        return BenchmarkRun(family, member, line, value, 3.0, rms=1e-3, cpu=0.1)
 
     monkeypatch.setattr(benchmark_models, "measure", note)
     found = work_precision(quick=True)
@@ -179,7 +190,7 @@ def test_the_page_holds_every_table_and_asks_nothing_of_others(tmp_path: Path) -
         for k in SOME
         for line, value in (("ebm", 1e-4), ("ebm", 1e-8), ("cm", 1e-5), ("cm", 1e-6), ("mujoco", 1e-2))
     ]
-    failed = Sample("free", 0, "pybullet", 1e-2, 3.0, failure="it blew up <fast>")
+    failed = BenchmarkRun("free", 0, "pybullet", 1e-2, 3.0, failure="it blew up <fast>")
     found = Benchmark(
         suite="benchmark all",
         created="2026-01-01T00:00:00+00:00",
@@ -221,7 +232,7 @@ def test_nothing_that_is_skipped_changes_the_motion() -> None:
     found = skipping(quick=True)
     needed = {"cone correction", "friction limit"}
     for saving in found:
-        limit = 2e-2 if saving.thing in needed or saving.model == "pybullet" else 1e-5
-        assert not saving.change > limit, saving
+        reference = 2e-2 if saving.thing in needed or saving.model == "pybullet" else 1e-5
+        assert not saving.change > reference, saving
         assert saving.cost_with > 0.0 < saving.cost_without
     assert {"ebm", "cm", "mujoco", "pybullet"} <= {saving.model for saving in found}

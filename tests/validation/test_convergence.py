@@ -13,16 +13,16 @@ from rockcheck.validation.bench import convergence
 from rockcheck.validation.bench.convergence import (
     GAPS,
     PULSES,
-    REFINEMENTS,
     RESTITUTIONS,
     SCENES,
-    Case,
+    SWEEPS,
     Convergence,
-    Play,
-    case_of,
+    StudyScene,
+    SweepRun,
     evaluated,
     play,
     save,
+    study_scene,
 )
 from rockcheck.validation.commands.cli import main
 
@@ -32,11 +32,11 @@ SOME = ("long 53 mm e 0.5", "short 3 mm e 0")
 @pytest.fixture(scope="module")
 def study() -> Convergence:
     """Two scenes with the two coarser settings of each model."""
-    plays = [play(name, r.model, value) for name in SOME for r in REFINEMENTS.values() for value in r.values[:2]]
-    return evaluated([case_of(name) for name in SOME], plays, quick=True)
+    plays = [play(name, r.model, value) for name in SOME for r in SWEEPS.values() for value in r.values[:2]]
+    return evaluated([study_scene(name) for name in SOME], plays, quick=True)
 
 
-@pytest.mark.parametrize("model", REFINEMENTS)
+@pytest.mark.parametrize("model", SWEEPS)
 @pytest.mark.parametrize("scene", SOME)
 def test_errors_fall_against_the_unilateral_model_and_stall_against_the_papers(study: Convergence, model: str, scene: str) -> None:
     """A tenth of the step leaves at most a fifth of the numerical error, and nothing of the model-form difference less."""
@@ -52,7 +52,7 @@ def test_errors_fall_against_the_unilateral_model_and_stall_against_the_papers(s
 
 
 def test_orders_are_first_or_better_against_one_and_none_against_the_other(study: Convergence) -> None:
-    for model in REFINEMENTS:
+    for model in SWEEPS:
         assert study.order(model, "ebm-unilateral") > 0.7
         assert abs(study.order(model, "ebm")) < 0.1
     assert study.exceptions == ()
@@ -61,18 +61,18 @@ def test_orders_are_first_or_better_against_one_and_none_against_the_other(study
 def test_every_pulse_hits_the_wall_and_leaves_the_unilateral_block_standing() -> None:
     assert len(SCENES) == len(PULSES) * len(GAPS) * len(RESTITUTIONS) == 18
     for name in SCENES:
-        case = case_of(name)
+        case = study_scene(name)
         assert not case.ends["ebm-unilateral"].startswith("overturned")
         assert case.model_form > 1e-3, "without a wall hit the two references are one model"
         assert 3.0 < case.horizon <= convergence.DURATION
 
 
-def made(*errors: float, model: str = "mujoco", scene: str = SOME[0], other: float = 0.1) -> list[Play]:
+def made(*errors: float, model: str = "mujoco", scene: str = SOME[0], other: float = 0.1) -> list[SweepRun]:
     """Runs with these errors against the unilateral model, steps falling tenfold from 1e-3."""
-    return [Play(scene, model, 10.0 ** -(3 + n), 10.0 ** -(3 + n), error, other) for n, error in enumerate(errors)]
+    return [SweepRun(scene, model, 10.0 ** -(3 + n), 10.0 ** -(3 + n), error, other) for n, error in enumerate(errors)]
 
 
-CASES = [Case(scene, 5.0, 0.1, {"ebm-unilateral": "at rest", "ebm": "at rest"}) for scene in SOME]
+CASES = [StudyScene(scene, 5.0, 0.1, {"ebm-unilateral": "at rest", "ebm": "at rest"}) for scene in SOME]
 
 
 def test_levels_and_orders_of_known_errors() -> None:
@@ -95,7 +95,7 @@ def test_what_does_not_converge_is_named_not_dropped() -> None:
 
 
 def test_a_failed_run_is_infinitely_wrong_and_named(tmp_path: Path) -> None:
-    failed = Play(SOME[0], "pybullet", 1e-3, failure="it blew up <fast>")
+    failed = SweepRun(SOME[0], "pybullet", 1e-3, failure="it blew up <fast>")
     found = evaluated(CASES, [failed, *made(1e-2, 1e-3), *made(1e-2, 1e-3, scene=SOME[1])])
     (level,) = (level for level in found.levels if (level.model, level.reference) == ("pybullet", "ebm-unilateral"))
     assert (level.median, level.within, level.runs) == (math.inf, 0, 1)
@@ -126,7 +126,7 @@ def test_the_command_writes_the_page_and_prints_the_table(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(convergence, "QUICK", SOME[1:])
-    monkeypatch.setattr(convergence, "REFINEMENTS", {"cm": REFINEMENTS["cm"]})
+    monkeypatch.setattr(convergence, "SWEEPS", {"cm": SWEEPS["cm"]})
     assert main(["convergence", "--quick", "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
     assert "order of cm" in printed

@@ -25,7 +25,7 @@ from rockcheck.validation.commands.cli import main
 from rockcheck.validation.spectra import agreement, claims, fragility, refinement
 from rockcheck.validation.spectra import study as spectra
 from rockcheck.validation.spectra import tiles as tiling
-from rockcheck.validation.spectra.study import Asked, Panel, axis, paper_panels, play_panels
+from rockcheck.validation.spectra.study import Panel, SpectrumRequest, axis, paper_panels, play_panels
 from rockcheck.validation.spectra.tiles import Tiles, tile_key
 
 SCENE = """duration = 1.0
@@ -44,7 +44,7 @@ def in_an_empty_folder(tmp_path, monkeypatch):
 
 
 def small(size=8, **settings):
-    return Asked(axis(0.5, 8.0, size, "frequencies"), axis(1.0, 12.0, size, "amplitudes"), **settings)
+    return SpectrumRequest(axis(0.5, 8.0, size, "frequencies"), axis(1.0, 12.0, size, "amplitudes"), **settings)
 
 
 def test_the_papers_28_spectra():
@@ -63,7 +63,7 @@ def test_the_papers_28_spectra():
 
 def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
     monkeypatch.setattr(tiling, "TILE", 20)
-    panel, asked = paper_panels(8)[1], small()
+    panel, request = paper_panels(8)[1], small()
     runs, play = [], tiling.play_nodes
 
     def killed_at_the_third(scene, a, f, **rest):
@@ -74,23 +74,23 @@ def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
 
     monkeypatch.setattr(tiling, "play_nodes", killed_at_the_third)
     with pytest.raises(KeyboardInterrupt):
-        play_panels([panel], asked, Tiles(tmp_path / "tiles"))
+        play_panels([panel], request, Tiles(tmp_path / "tiles"))
     tiles = Tiles(tmp_path / "tiles")
-    resumed = play_panels([panel], asked, tiles)[0]
+    resumed = play_panels([panel], request, tiles)[0]
     assert runs == [20, 20, 20, 20, 4]  # two tiles, the one that was killed, and then only that and the last one
     assert (tiles.read_back, tiles.played) == (40, 24)
-    whole = play_panels([panel], asked, Tiles(tmp_path / "other"))[0]
+    whole = play_panels([panel], request, Tiles(tmp_path / "other"))[0]
     np.testing.assert_array_equal(resumed.outcomes, whole.outcomes)
 
 
 @pytest.mark.parametrize("damage", ["", "L", "x" * 64, "\x00" * 64])
 def test_a_damaged_tile_is_run_again(tmp_path, damage):
-    panel, asked = paper_panels(8)[0], small()
-    whole = play_panels([panel], asked, Tiles(tmp_path))[0]
+    panel, request = paper_panels(8)[0], small()
+    whole = play_panels([panel], request, Tiles(tmp_path))[0]
     (tile,) = tmp_path.glob("*.tile")
     tile.write_text(damage, encoding="utf-8")
     tiles = Tiles(tmp_path)
-    np.testing.assert_array_equal(play_panels([panel], asked, tiles)[0].outcomes, whole.outcomes)
+    np.testing.assert_array_equal(play_panels([panel], request, tiles)[0].outcomes, whole.outcomes)
     assert (tiles.played, tiles.read_back) == (64, 0)
 
 
@@ -152,8 +152,8 @@ def test_a_cluster_that_loses_a_worker_gives_the_same(tmp_path, monkeypatch):
     import distributed
 
     monkeypatch.setattr(tiling, "TILE", 100)
-    panels, asked = paper_panels(8)[:3], small(40)
-    alone = play_panels(panels, asked, Tiles(tmp_path / "alone"))
+    panels, request = paper_panels(8)[:3], small(40)
+    alone = play_panels(panels, request, Tiles(tmp_path / "alone"))
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
         distributed.Client(cluster) as client,
@@ -170,7 +170,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same(tmp_path, monkeypatch):
         killer = threading.Thread(target=kill)
         killer.start()
         tiles = Tiles(tmp_path / "cluster", client=client, progress=lambda count: first.set())
-        together = play_panels(panels, asked, tiles)
+        together = play_panels(panels, request, tiles)
         killer.join()
         deadline = time.monotonic() + 60.0
         while killed[0] in client.run(os.getpid).values() and time.monotonic() < deadline:
@@ -282,7 +282,7 @@ def synthetic(height, size=40):
 
 def judged(spectra_made, least=None):
     least = least or {None: 10.0, (0.103, 0.0): 9.0, (0.103, 1.0): 8.0}
-    return {claim.name: claim for claim in claims.check_claims(spectra_made, claims.Closer(least, {}))}
+    return {claim.name: claim for claim in claims.check_claims(spectra_made, claims.ExtraRuns(least, {}))}
 
 
 def verdicts(spectra_made, least=None):
@@ -362,10 +362,10 @@ def test_sides_that_the_pulse_turns_round():
 
 @pytest.mark.slow
 def test_the_documentation_says_what_is_found(tmp_path):
-    asked = small(100, refine=True)
+    request = small(100, refine=True)
     panels = [panel for figure in spectra.FIGURES for panel in paper_panels(figure)]
     tiles = Tiles(tmp_path)
-    found = claims.check_claims(play_panels(panels, asked, tiles), claims.look_closer(tiles, asked))
+    found = claims.check_claims(play_panels(panels, request, tiles), claims.extra_runs(tiles, request))
     page = (Path(__file__).parents[2] / "docs" / "spectra.md").read_text(encoding="utf-8").split("## What the paper says")[1]
     rows = [line.split("|")[2].strip() for line in page.split("\n## ")[0].splitlines() if line.startswith("| ")]
     assert rows == ["verdict", *(claim.verdict for claim in found)]
@@ -390,18 +390,18 @@ def test_half_of_the_nodes_lie_near_the_boundary():
 def test_agreement_counts_equal_outcomes(tmp_path, monkeypatch):
     monkeypatch.setattr(agreement, "CANDIDATES", ("ebm-unilateral", "cm"))
     monkeypatch.setattr(agreement, "MAP_SIZE", 5)
-    panel, asked = paper_panels(8)[0], small(20)
-    spectrum = play_panels([panel], asked, Tiles(tmp_path))[0]
+    panel, request = paper_panels(8)[0], small(20)
+    spectrum = play_panels([panel], request, Tiles(tmp_path))[0]
 
     class Player(Tiles):
         def play(self, scene, amplitudes, frequencies, *, model, settings):
-            i, j = np.searchsorted(asked.amplitudes, amplitudes), np.searchsorted(asked.frequencies, frequencies)
+            i, j = np.searchsorted(request.amplitudes, amplitudes), np.searchsorted(request.frequencies, frequencies)
             sides, failed = spectrum.outcomes[i, j].copy(), np.zeros(len(i), dtype=bool)
             if model == "cm":
                 sides[0], failed[-1] = 1 - abs(sides[0]), True  # one wrong, near the boundary, and one failed, away from it
             return sides, failed
 
-    found = agreement.agree([panel], [spectrum], asked, 40, Player(tmp_path))
+    found = agreement.agree([panel], [spectrum], request, 40, Player(tmp_path))
     assert {(s.model, s.near): (s.equal["ebm"], s.nodes, s.failed) for s in found.shares} == {
         ("ebm-unilateral", True): (20, 20, 0),
         ("ebm-unilateral", False): (20, 20, 0),
@@ -457,12 +457,12 @@ def test_the_dimension_of_a_boundary(inside, dimension):
 
 
 def test_wrong_nodes_are_counted(tmp_path):
-    asked = small(33)
-    found = refinement.verify(paper_panels(8)[:2], asked, Tiles(tmp_path))
+    request = small(33)
+    found = refinement.verify(paper_panels(8)[:2], request, Tiles(tmp_path))
     assert [one.wrong for one in found.spectra] == [0, 0]
     assert found.rows[0][:2] == ("all", str(found.runs))
     assert 0 < found.runs < found.nodes == 2 * 33**2
-    full = play_panels(paper_panels(8)[:1], asked, Tiles(tmp_path))[0]
+    full = play_panels(paper_panels(8)[:1], request, Tiles(tmp_path))[0]
     other = replace(full, outcomes=np.where(np.arange(33) == 3, 7, full.outcomes).astype(np.int8))
     assert refinement.compared("x", full, other).wrong == 33
 
@@ -484,7 +484,7 @@ def test_the_lognormal_curve_is_found_again():
 def test_the_band_holds_the_binomial_spread():
     overturned = np.zeros((100, 2, 3), dtype=bool)
     overturned[:50, :, 1] = overturned[:, :, 2] = True  # directions alike: no more is known than from 100 runs
-    case = fragility.case_of("made", overturned, 0, np.array([1.0, 2.0, 3.0]))
+    case = fragility.curve_of("made", overturned, 0, np.array([1.0, 2.0, 3.0]))
     (_, share, low, high, _) = case.points[1]
     assert share == 0.5
     assert low == pytest.approx(0.5 - 1.96 * 0.05, abs=0.015)  # the normal approximation of the binomial
@@ -496,12 +496,12 @@ def test_records_are_scaled_to_the_intensity(tmp_path, monkeypatch):
     for n, gain in enumerate((1.0, 4.0)):
         rows = "\n".join(f"{0.02 * k},{gain * math.sin(0.3 * k):.6f}" for k in range(80))
         (tmp_path / f"{n}.csv").write_text(f"time_s,acceleration_m_s2\n{rows}\n", encoding="utf-8")
-    asked = Asked(np.array([1.0, 2.0]), np.linspace(0.5, 12.0, 8))
+    request = SpectrumRequest(np.array([1.0, 2.0]), np.linspace(0.5, 12.0, 8))
     panel = Panel("case", "case", paper_panels(8)[0].scene)
-    found = fragility.fragility(panel, asked, [tmp_path / "0.csv", tmp_path / "1.csv"], Tiles(tmp_path / "tiles"))
+    found = fragility.fragility(panel, request, [tmp_path / "0.csv", tmp_path / "1.csv"], Tiles(tmp_path / "tiles"))
     (case,) = found.cases
     assert (case.motions, case.undecided) == (2, 0)
     # The two records differ only in their size, which the intensity takes out: both directions of each overturn together.
     assert {point[1] for point in case.points} <= {0.0, 0.5, 1.0}
     with pytest.raises(InputError, match="too few"):
-        fragility.fragility(panel, asked, [tmp_path / "0.csv"], Tiles(tmp_path / "tiles"))
+        fragility.fragility(panel, request, [tmp_path / "0.csv"], Tiles(tmp_path / "tiles"))

@@ -53,7 +53,7 @@ walls = [{ restitution = 0.5 }]
 
 def test_variants_of_a_model_have_labels_of_their_own(tmp_path):
     found = suite(tmp_path, SHELF.replace("[[scene]]", MODELS + '[models.coarse]\nmodel = "mujoco"\ntime_step = 1e-3\n[[scene]]'))
-    assert [(scene.name, part.label, part.family_name) for scene, part in found.cells()] == [
+    assert [(scene.name, variant.label, variant.family_name) for scene, variant in found.cells()] == [
         ("shelf", "ebm", "ebm"),
         ("shelf", "coarse", "mujoco"),
     ]

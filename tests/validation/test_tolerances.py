@@ -97,7 +97,7 @@ def check(value, line=LINE, measure="theta_rms"):
 
 
 def accepted(path: Path, run: Run, reason: str | None = None):
-    suite = SimpleNamespace(parts=(), path=Path("mine.toml"), tolerances_path=path, scenes={"s": None})
+    suite = SimpleNamespace(included=(), path=Path("mine.toml"), tolerances_path=path, scenes={"s": None})
     return accept(suite, run, reason)
 
 
@@ -168,8 +168,8 @@ def test_a_new_line_holds_what_it_was_made_from(tmp_path):
 def test_shipped_suites_load_and_their_tolerances_have_cells():
     for name in named_suites():
         suite = load_suite(name)
-        cells = {(scene.name, part.label) for scene, part in suite.cells()}
-        cells |= {(ensemble.name, part.label) for ensemble, _, part in suite.crowds()}
+        cells = {(scene.name, variant.label) for scene, variant in suite.cells()}
+        cells |= {(ensemble.name, variant.label) for ensemble, _, variant in suite.ensemble_cells()}
         assert cells, name
         for place, line in suite.tolerances.items():
             assert (place.scene, place.model) in cells, str(place)

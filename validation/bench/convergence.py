@@ -35,7 +35,7 @@ from rockcheck.validation.execute.models import build
 Progress = Callable[[str], None]
 Reference = Literal["ebm-unilateral", "ebm"]
 REFERENCES: tuple[Reference, ...] = ("ebm-unilateral", "ebm")
-TOLERANCE = 1e-12
+REFERENCE_TOLERANCE = 1e-12
 #: Longest run, s; the horizon of predictability may end it before.
 DURATION = 5.0
 #: A run counts as converged if its error at the finest setting is at most this (alpha) ...
@@ -45,7 +45,7 @@ LEAST_ORDER, ROUNDED = 0.5, 1e-6
 
 
 @dataclass(frozen=True)
-class Refinement:
+class StepSweep:
     """A model and the setting that is refined, coarse to fine."""
 
     model: str
@@ -54,12 +54,12 @@ class Refinement:
 
 
 #: The step of the CM is 3/sqrt(k/m), k/m = g/penetration: with these penetrations (m) 8e-4, 9e-5 and 1e-5 s.
-REFINEMENTS = {
-    refinement.model: refinement
-    for refinement in (
-        Refinement("mujoco", "time_step", (1e-3, 1e-4, 1e-5)),
-        Refinement("pybullet", "time_step", (1e-3, 1e-4, 1e-5)),
-        Refinement("cm", "penetration", (1e-6, 1e-8, 1e-10)),
+SWEEPS = {
+    sweep.model: sweep
+    for sweep in (
+        StepSweep("mujoco", "time_step", (1e-3, 1e-4, 1e-5)),
+        StepSweep("pybullet", "time_step", (1e-3, 1e-4, 1e-5)),
+        StepSweep("cm", "penetration", (1e-6, 1e-8, 1e-10)),
     )
 }
 #: omega_p/p, a_p/(g tan alpha) and friction of pulses that hit a left wall at every gap, and leave the block standing.
@@ -78,7 +78,7 @@ QUICK = ("long 53 mm e 0.5", "medium 53 mm e 0", "short 3 mm e 0")
 
 
 @dataclass(frozen=True)
-class Case:
+class StudyScene:
     """A scene of the study: the time (s) it is compared up to, and how the references end and differ (RMS of theta, alpha)."""
 
     scene: str
@@ -88,7 +88,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Play:
+class SweepRun:
     """One run: its step in s, and its RMS error of theta in alpha against each reference; NaN with a `failure`."""
 
     scene: str
@@ -141,8 +141,8 @@ class Convergence:
     wall_seconds: float
     versions: dict[str, str]
     hardware: dict[str, str]
-    cases: tuple[Case, ...]
-    plays: tuple[Play, ...]
+    cases: tuple[StudyScene, ...]
+    plays: tuple[SweepRun, ...]
     levels: tuple[Level, ...]
     orders: tuple[Order, ...]
     #: A line each: the runs that do not converge to the unilateral model.
@@ -161,7 +161,7 @@ class Convergence:
         """A model's errors at one setting."""
         return next(one for one in self.levels if (one.model, one.reference, one.value) == (model, reference, value))
 
-    def line(self, model: str, scene: str) -> list[Play]:
+    def line(self, model: str, scene: str) -> list[SweepRun]:
         """The runs of a model in a scene, coarse to fine."""
         return [play for play in self.plays if (play.model, play.scene) == (model, scene)]
 
@@ -171,31 +171,31 @@ def _prepared(name: str) -> tuple[Scene, dict[Reference, History]]:
     """A scene cut at its horizon of predictability, and how the references play it; they take milliseconds."""
     scene = SCENES[name]
     scene = scene.replace(duration=min(scene.duration, predictability_horizon(scene)))
-    unilateral, paper = (EventBasedModel(pivot=pivot, tolerance=TOLERANCE) for pivot in ("unilateral", "bilateral"))
+    unilateral, paper = (EventBasedModel(pivot=pivot, tolerance=REFERENCE_TOLERANCE) for pivot in ("unilateral", "bilateral"))
     return scene, {"ebm-unilateral": unilateral.simulate(scene), "ebm": paper.simulate(scene)}
 
 
-def case_of(name: str) -> Case:
+def study_scene(name: str) -> StudyScene:
     """What is to be known of a scene before any model is refined in it."""
     scene, played = _prepared(name)
     form = _rms(played["ebm-unilateral"], played["ebm"])
-    return Case(name, scene.duration, form, {reference: played[reference].outcome for reference in REFERENCES})
+    return StudyScene(name, scene.duration, form, {reference: played[reference].outcome for reference in REFERENCES})
 
 
-def play(name: str, model: str, value: float) -> Play:
+def play(name: str, model: str, value: float) -> SweepRun:
     """Plays one scene with a model at one value of the setting that is refined."""
-    scene, limits = _prepared(name)
+    scene, references = _prepared(name)
     try:
-        history = build(model, {REFINEMENTS[model].knob: value}).simulate(scene)
+        history = build(model, {SWEEPS[model].knob: value}).simulate(scene)
     except (ModelFailure, InputError, ImportError) as error:
-        return Play(name, model, value, failure=str(error))
-    return Play(
+        return SweepRun(name, model, value, failure=str(error))
+    return SweepRun(
         name,
         model,
         value,
         step=float(history.settings["time_step"]),
-        against_unilateral=_rms(limits["ebm-unilateral"], history),
-        against_ebm=_rms(limits["ebm"], history),
+        against_unilateral=_rms(references["ebm-unilateral"], history),
+        against_ebm=_rms(references["ebm"], history),
         cpu=history.cost.cpu_seconds,
     )
 
@@ -211,32 +211,32 @@ def run_convergence(*, quick: bool = False, jobs: int | None = None, progress: P
     """
     began, jobs = time.monotonic(), 1 if quick else jobs or os.cpu_count() or 1
     names = QUICK if quick else tuple(SCENES)
-    cases = [case_of(name) for name in names]
+    cases = [study_scene(name) for name in names]
     asked = [
-        (name, refinement.model, value)
+        (name, sweep.model, value)
         for place in range(2 if quick else 3)
-        for refinement in REFINEMENTS.values()
+        for sweep in SWEEPS.values()
         for name in names
-        for value in (refinement.values[place],)
+        for value in (sweep.values[place],)
     ]
-    plays: list[Play] = []
+    plays: list[SweepRun] = []
     for found in itertools.starmap(play, asked) if jobs == 1 else _side_by_side(asked[::-1], jobs):  # the longest first
         plays.append(found)
         progress(f"{len(plays)} of {len(asked)} runs: {found.scene}, {found.model}")
     return evaluated(cases, plays, quick=quick, jobs=jobs, wall_seconds=time.monotonic() - began)
 
 
-def _side_by_side(asked: Sequence[tuple[str, str, float]], jobs: int) -> Iterable[Play]:
+def _side_by_side(asked: Sequence[tuple[str, str, float]], jobs: int) -> Iterable[SweepRun]:
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         for future in as_completed([pool.submit(play, *one) for one in asked]):
             yield future.result()
 
 
 def evaluated(
-    cases: Sequence[Case], plays: Iterable[Play], *, quick: bool = False, jobs: int = 1, wall_seconds: float = math.nan
+    cases: Sequence[StudyScene], plays: Iterable[SweepRun], *, quick: bool = False, jobs: int = 1, wall_seconds: float = math.nan
 ) -> Convergence:
     """What the runs say."""
-    place = {name: n for n, name in enumerate([*SCENES, *REFINEMENTS])}
+    place = {name: n for n, name in enumerate([*SCENES, *SWEEPS])}
     ordered = sorted(plays, key=lambda one: (place[one.model], place[one.scene], -one.value))
     levels: list[Level] = []
     orders: list[Order] = []
@@ -266,7 +266,7 @@ def evaluated(
     )
 
 
-def _level(plays: Sequence[Play], reference: Reference) -> Level:
+def _level(plays: Sequence[SweepRun], reference: Reference) -> Level:
     errors = [one.error(reference) for one in plays]
     steps = [one.step for one in plays if not one.failure]
     return Level(
@@ -290,14 +290,14 @@ def slope(points: Iterable[tuple[float, float]]) -> float:
     return float(np.polyfit(x, y, 1)[0])
 
 
-def _exceptions(plays: Sequence[Play], orders: Sequence[Order]) -> Iterable[str]:
+def _exceptions(plays: Sequence[SweepRun], orders: Sequence[Order]) -> Iterable[str]:
     """The runs that fail or do not converge to the unilateral model, a line each."""
     fitted = {(order.model, order.scene): order.order for order in orders if order.reference == "ebm-unilateral"}
     for (model, scene), group in itertools.groupby(plays, key=lambda one: (one.model, one.scene)):
         line = list(group)
         for one in line:
             if one.failure:
-                yield f"{scene}, {model} at {REFINEMENTS[model].knob} {one.value:g} failed: {one.failure}"
+                yield f"{scene}, {model} at {SWEEPS[model].knob} {one.value:g} failed: {one.failure}"
         finest, order = line[-1].error("ebm-unilateral"), fitted[model, scene]
         if math.isfinite(finest) and (finest > LEVEL or (finest > ROUNDED and not order >= LEAST_ORDER)):
             errors = " → ".join(f"{one.error('ebm-unilateral'):.1e}" for one in line)

@@ -34,7 +34,7 @@ LEVEL = 1e-8
 
 
 @dataclass(frozen=True)
-class Case:
+class BatchCase:
     """A batch: what it is, the model's settings, and how its runs are packed."""
 
     name: str
@@ -112,11 +112,11 @@ def _records(model: EventBasedModel, nodes: int) -> Packed:
 
 _WALL = Wall(side="left", gap=0.053)
 CASES = (
-    Case("pure rocking", "no slip, no wall", {"friction": "no-slip"}, _pulses(_scene())),
-    Case("friction", "μ 0.3, no wall", {}, _pulses(_scene())),
-    Case("wall", "μ 0.3, left wall at 53 mm, e 0", {}, _pulses(_scene(_WALL))),
-    Case("unilateral, wall", "the same, unilateral", {"pivot": "unilateral"}, _pulses(_scene(_WALL))),
-    Case("El Centro", "31 s of El Centro × 1.4 to 1.8, μ 0.3, to the end", {}, _records, until_decided=False),
+    BatchCase("pure rocking", "no slip, no wall", {"friction": "no-slip"}, _pulses(_scene())),
+    BatchCase("friction", "μ 0.3, no wall", {}, _pulses(_scene())),
+    BatchCase("wall", "μ 0.3, left wall at 53 mm, e 0", {}, _pulses(_scene(_WALL))),
+    BatchCase("unilateral, wall", "the same, unilateral", {"pivot": "unilateral"}, _pulses(_scene(_WALL))),
+    BatchCase("El Centro", "31 s of El Centro × 1.4 to 1.8, μ 0.3, to the end", {}, _records, until_decided=False),
 )
 
 
@@ -134,7 +134,7 @@ def ebm_speed(*, quick: bool = False, cold: bool = True, progress: Progress = la
     return EbmSpeed(median(ones), tuple(times), cold_starts(progress, without_cache=not quick) if cold else ())
 
 
-def _times(case: Case, nodes: int, ones: list[float]) -> list[BatchTime]:
+def _times(case: BatchCase, nodes: int, ones: list[float]) -> list[BatchTime]:
     """A row a tolerance; the time of one right-hand side, taken in the same rounds, is added to `ones`."""
     reference_model = EventBasedModel(tolerance=REFERENCE_TOLERANCE, **case.settings)
     packed = case.packed(reference_model, nodes)

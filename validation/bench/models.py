@@ -34,15 +34,15 @@ FITTED = 3e-13, 0.2
 
 
 @dataclass(frozen=True)
-class Line:
-    """A line of the diagrams: a model, the setting that is swept, coarse to fine, and the model that is its limit."""
+class DiagramLine:
+    """A line of the diagrams: a model, the setting that is swept, coarse to fine, and the model that is its reference."""
 
     label: str
     model: str
     knob: str
     values: tuple[float, ...]
     fixed: dict[str, Any] = field(default_factory=dict, hash=False)
-    limit: str = "ebm-unilateral"
+    reference: str = "ebm-unilateral"
     #: The values of `--quick`.
     quick: tuple[float, ...] = ()
     remark: str = ""
@@ -58,17 +58,19 @@ _LARGEST = (8e-3, 4e-3, 2e-3, 1e-3)
 LINES = {
     line.label: line
     for line in (
-        Line("ebm", "ebm", "tolerance", _TOLERANCES, limit="ebm", quick=_TOLERANCES),
-        Line("ebm-unilateral", "ebm-unilateral", "tolerance", _TOLERANCES, quick=_TOLERANCES),
-        Line("ebm-bouc-wen", "ebm-bouc-wen", "yield_displacement", (1e-4, 1e-5, 1e-6), limit="ebm", quick=(1e-4, 1e-5)),
-        Line("cm", "cm", "penetration", (1e-4, 1e-5, 1e-6, 1e-7, 1e-8), quick=(1e-5, 1e-6, 1e-7), remark="step tied to the penetration"),
+        DiagramLine("ebm", "ebm", "tolerance", _TOLERANCES, reference="ebm", quick=_TOLERANCES),
+        DiagramLine("ebm-unilateral", "ebm-unilateral", "tolerance", _TOLERANCES, quick=_TOLERANCES),
+        DiagramLine("ebm-bouc-wen", "ebm-bouc-wen", "yield_displacement", (1e-4, 1e-5, 1e-6), reference="ebm", quick=(1e-4, 1e-5)),
+        DiagramLine(
+            "cm", "cm", "penetration", (1e-4, 1e-5, 1e-6, 1e-7, 1e-8), quick=(1e-5, 1e-6, 1e-7), remark="step tied to the penetration"
+        ),
         *(
             line
             for engine in ("mujoco", "pybullet")
             for line in (
-                Line(engine, engine, "time_step", _STEPS, quick=_STEPS[:3]),
-                Line(f"{engine} adaptive", engine, "largest_step", _LARGEST, {"time_step": "adaptive"}, quick=_LARGEST[1:3]),
-                Line(f"{engine} default", engine, "time_step", _STEPS[:3], {"settings": "default"}, quick=_STEPS[:2]),
+                DiagramLine(engine, engine, "time_step", _STEPS, quick=_STEPS[:3]),
+                DiagramLine(f"{engine} adaptive", engine, "largest_step", _LARGEST, {"time_step": "adaptive"}, quick=_LARGEST[1:3]),
+                DiagramLine(f"{engine} default", engine, "time_step", _STEPS[:3], {"settings": "default"}, quick=_STEPS[:2]),
             )
         ),
     )
@@ -85,8 +87,8 @@ LEFT_OUT = (
 
 
 @dataclass(frozen=True)
-class Sample:
-    """One run: where, with what, its errors against the limit of its kind of model, and its cost.
+class BenchmarkRun:
+    """One run: where, with what, its errors against the reference of its kind of model, and its cost.
 
     `rms` and `largest` are those of theta up to the horizon, `peak` the error of the largest |theta|, all in alpha;
     `first_impact` the error of the first impact's time, s. NaN errors and a `failure` where there is no history.
@@ -170,7 +172,7 @@ class Pooled:
 class WorkPrecision:
     """All runs, and what they say."""
 
-    samples: tuple[Sample, ...]
+    samples: tuple[BenchmarkRun, ...]
     points: tuple[Point, ...]
     trends: tuple[Trend, ...]
     #: The engines' settings over whole kinds of scenes.
@@ -185,7 +187,7 @@ class WorkPrecision:
         return [point for point in self.points if (point.family, point.line) == (family, line)]
 
 
-def measure(family: str, member: int, label: str, value: float, *, repeats: int = REPEATS) -> Sample:
+def measure(family: str, member: int, label: str, value: float, *, repeats: int = REPEATS) -> BenchmarkRun:
     """Plays one member with one setting; short runs `repeats` times, for the median time."""
     line, ready = LINES[label], prepared(family, member)
     place: dict[str, Any] = {"family": family, "member": member, "line": label, "value": value, "horizon": ready.horizon}
@@ -196,10 +198,10 @@ def measure(family: str, member: int, label: str, value: float, *, repeats: int 
         while len(costs) < repeats and costs[0].wall_seconds < LONG_ENOUGH:
             costs.append(model.simulate(ready.scene).cost)
     except (ModelFailure, InputError, ImportError) as error:
-        return Sample(**place, failure=str(error))
-    return Sample(
+        return BenchmarkRun(**place, failure=str(error))
+    return BenchmarkRun(
         **place,
-        **errors_of(ready.limits[line.limit], history),
+        **errors_of(ready.references[line.reference], history),
         cpu=median(cost.cpu_seconds for cost in costs),
         wall=median(cost.wall_seconds for cost in costs),
         set_up=median(cost.set_up for cost in costs),
@@ -207,15 +209,15 @@ def measure(family: str, member: int, label: str, value: float, *, repeats: int 
     )
 
 
-def errors_of(limit: History, history: History) -> dict[str, Any]:
-    """The errors of a `Sample`."""
-    found = compare(limit, history, measures=["theta_rms", "theta_peak"])
-    alpha = limit.alpha or 1.0
-    first = [min((event.t for event in h.event_list if event.kind in IMPACTS), default=math.nan) for h in (limit, history)]
+def errors_of(reference: History, history: History) -> dict[str, Any]:
+    """The errors of a `BenchmarkRun`."""
+    found = compare(reference, history, measures=["theta_rms", "theta_peak"])
+    alpha = reference.alpha or 1.0
+    first = [min((event.t for event in h.event_list if event.kind in IMPACTS), default=math.nan) for h in (reference, history)]
     return {
         "rms": found["theta_rms"],
         "largest": found["theta_peak"],
-        "peak": abs(history.peak_rotation - limit.peak_rotation) / alpha,
+        "peak": abs(history.peak_rotation - reference.peak_rotation) / alpha,
         "first_impact": abs(first[1] - first[0]),
     }
 
@@ -231,7 +233,7 @@ def work_precision(
     """
     plays = planned(quick=quick)
     short = [play for play in plays if _stage(play) < 2]
-    samples: list[Sample] = []
+    samples: list[BenchmarkRun] = []
     now = time.monotonic()
     for n, play in enumerate(sorted(short, key=_stage)):
         if time.monotonic() > now + SHARE_OF_SHORT * (deadline - now):
@@ -243,10 +245,10 @@ def work_precision(
     return evaluated(samples, [play for play in plays if play not in done])
 
 
-Play = tuple[str, int, str, float]
+PlannedRun = tuple[str, int, str, float]
 
 
-def planned(*, quick: bool = False) -> list[Play]:
+def planned(*, quick: bool = False) -> list[PlannedRun]:
     """All runs: family, member, line and value of its setting."""
     return [
         (family, member, line.label, value)
@@ -257,19 +259,19 @@ def planned(*, quick: bool = False) -> list[Play]:
     ]
 
 
-def _stage(play: Play) -> int:
+def _stage(play: PlannedRun) -> int:
     """0: at once; 1: an engine's small steps; 2: its smallest, side by side. Where time is short, the dearest runs are left out."""
     if LINES[play[2]].knob != "time_step" or play[3] > SIDE_BY_SIDE:
         return 0
     return 1 if play[3] == SIDE_BY_SIDE else 2
 
 
-def _side_by_side(plays: Sequence[Play], jobs: int, deadline: float, progress: Progress) -> Iterable[Sample]:
+def _side_by_side(plays: Sequence[PlannedRun], jobs: int, deadline: float, progress: Progress) -> Iterable[BenchmarkRun]:
     """Plays in worker processes; nothing new begins after the deadline."""
     if not plays:
         return []
-    samples: list[Sample] = []
-    waiting, running = list(reversed(plays)), set[Future[Sample]]()
+    samples: list[BenchmarkRun] = []
+    waiting, running = list(reversed(plays)), set[Future[BenchmarkRun]]()
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         while running or (waiting and time.monotonic() < deadline):
             while waiting and len(running) < jobs and time.monotonic() < deadline:
@@ -280,9 +282,9 @@ def _side_by_side(plays: Sequence[Play], jobs: int, deadline: float, progress: P
     return samples
 
 
-def evaluated(samples: Sequence[Sample], missing: Sequence[Play]) -> WorkPrecision:
+def evaluated(samples: Sequence[BenchmarkRun], missing: Sequence[PlannedRun]) -> WorkPrecision:
     """What the samples say; `missing` are runs that there was no time for."""
-    groups: dict[tuple[str, str, float], list[Sample]] = {}
+    groups: dict[tuple[str, str, float], list[BenchmarkRun]] = {}
     for sample in samples:
         groups.setdefault((sample.family, sample.line, sample.value), []).append(sample)
     order = {name: n for n, name in enumerate([*FAMILIES, *LINES])}
@@ -309,7 +311,7 @@ def evaluated(samples: Sequence[Sample], missing: Sequence[Play]) -> WorkPrecisi
     )
 
 
-def _point(samples: Sequence[Sample]) -> Point:
+def _point(samples: Sequence[BenchmarkRun]) -> Point:
     good = [sample for sample in samples if not sample.failure]
     errors = [math.inf if sample.failure or math.isnan(sample.rms) else sample.rms for sample in samples]
 
@@ -337,7 +339,7 @@ def _point(samples: Sequence[Sample]) -> Point:
     )
 
 
-def pooled(samples: Sequence[Sample]) -> Iterable[Pooled]:
+def pooled(samples: Sequence[BenchmarkRun]) -> Iterable[Pooled]:
     """Every setting of the engines' lines over all scenes of each kind."""
     for kind, starts in KINDS.items():
         mine = [s for s in samples if s.family.startswith(starts)]
@@ -394,7 +396,7 @@ def cost_at(line: Sequence[Point], level: float = LEVEL) -> tuple[float, bool]:
     return min(costs, default=(math.nan, False))
 
 
-def _missing(plays: Sequence[Play]) -> Iterable[str]:
+def _missing(plays: Sequence[PlannedRun]) -> Iterable[str]:
     """Runs that there was no time for, a line for each line of the diagrams."""
     for label in dict.fromkeys(play[2] for play in plays):
         mine = [play for play in plays if play[2] == label]
@@ -402,9 +404,9 @@ def _missing(plays: Sequence[Play]) -> Iterable[str]:
         yield f"no time for {len(mine)} runs of {label} at {LINES[label].knob} {values}"
 
 
-def _failures(samples: Sequence[Sample]) -> Iterable[str]:
+def _failures(samples: Sequence[BenchmarkRun]) -> Iterable[str]:
     """Runs that failed, a line for each setting, with the first one's reason."""
-    groups: dict[tuple[str, float], list[Sample]] = {}
+    groups: dict[tuple[str, float], list[BenchmarkRun]] = {}
     for sample in samples:
         if sample.failure:
             groups.setdefault((sample.line, sample.value), []).append(sample)

@@ -94,11 +94,11 @@ QUICK = ("free", "pulse a", "slip a", "wall 53 mm e 0")
 
 @dataclass(frozen=True)
 class Prepared:
-    """A member cut at its horizon (s), the limit of each kind of model, and how far these are apart (RMS, alpha)."""
+    """A member cut at its horizon (s), the reference of each kind of model, and how far these are apart (RMS, alpha)."""
 
     scene: Scene
     horizon: float
-    limits: dict[str, History]
+    references: dict[str, History]
     model_form: float
 
 
@@ -110,12 +110,12 @@ def prepared(family: str, member: int) -> Prepared:
     whole = FAMILIES[family].member(member)
     horizon = predictability_horizon(whole)
     scene = whole.replace(duration=horizon)
-    limits = {
+    references = {
         model.name: model.simulate(scene)
         for model in (
             EventBasedModel(tolerance=REFERENCE_TOLERANCE, pivot="unilateral"),
             EventBasedModel(tolerance=REFERENCE_TOLERANCE, pivot="bilateral"),
         )
     }
-    model_form = compare(limits["ebm"], limits["ebm-unilateral"], scene=scene, measures=["theta_rms"])["theta_rms"]
-    return Prepared(scene, horizon, limits, model_form)
+    model_form = compare(references["ebm"], references["ebm-unilateral"], scene=scene, measures=["theta_rms"])["theta_rms"]
+    return Prepared(scene, horizon, references, model_form)

@@ -29,8 +29,8 @@ from rockcheck.validation.spectra.study import (
     FREQUENCIES,
     SPECTRA,
     TILES,
-    Asked,
     Panel,
+    SpectrumRequest,
     axis,
     paper_panels,
     play_panels,
@@ -85,7 +85,7 @@ def run(
     --scene shelf.toml --fragility --record a.AT2 --record b.AT2
     """
     panels = _panels(figure, scene)
-    asked = _asked(size, frequencies, amplitudes, pivot, model, tolerance, refine)
+    request = _request(size, frequencies, amplitudes, pivot, model, tolerance, refine)
     if records and not fragility:
         raise InputError("needs --fragility", "--record")
     folder = usable_folder(out)
@@ -99,13 +99,13 @@ def run(
             client = stack.enter_context(connected(scheduler))
         tiles = stack.enter_context(Tiles(data / TILES, jobs=jobs, client=client, force=force))
         if fragility:
-            _fragility(panels, asked, records or [], tiles, data, screen)
+            _fragility(panels, request, records or [], tiles, data, screen)
         elif verify:
-            _verify(panels, asked, tiles, data, screen)
+            _verify(panels, request, tiles, data, screen)
         elif agreement is not None:
-            _agreement(panels, asked, agreement, tiles, data, screen)
+            _agreement(panels, request, agreement, tiles, data, screen)
         else:
-            _spectra(panels, asked, tiles, data, screen)
+            _spectra(panels, request, tiles, data, screen)
     from rockcheck.reports.studies.spectra import write_page
 
     page = write_page(folder)
@@ -125,7 +125,7 @@ def _panels(figure: str | None, scene: str | None) -> list[Panel]:
     return [panel for number in chosen for panel in paper_panels(number)]
 
 
-def _asked(
+def _request(
     size: int,
     frequencies: tuple[float, float],
     amplitudes: tuple[float, float],
@@ -133,7 +133,7 @@ def _asked(
     model: str | None,
     tolerance: float | None,
     refine: bool,
-) -> Asked:
+) -> SpectrumRequest:
     if not 2 <= size <= MOST_SIZE:
         raise InputError(f"{size} is not allowed: 2 to {MOST_SIZE} nodes an axis are asked for", "--size")
     if pivot not in ("bilateral", "unilateral"):
@@ -143,7 +143,7 @@ def _asked(
     name = model or ("ebm" if pivot == "bilateral" else "ebm-unilateral")
     if tolerance is not None and not (name.startswith("ebm") and math.isfinite(tolerance)):
         raise InputError(f"{tolerance:g} is not allowed: a finite number, with an event-based model", "--tolerance")
-    return Asked(
+    return SpectrumRequest(
         frequencies=axis(*frequencies, size, "--frequencies"),
         amplitudes=axis(*amplitudes, size, "--amplitudes"),
         model=name,
@@ -152,11 +152,11 @@ def _asked(
     )
 
 
-def _spectra(panels: Sequence[Panel], asked: Asked, tiles: Tiles, data: Path, screen: Console) -> None:
+def _spectra(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, data: Path, screen: Console) -> None:
     if tiles.client is None:
-        warm_up(panels[0], asked)  # so that no run's time holds the compiler's
+        warm_up(panels[0], request)  # so that no run's time holds the compiler's
     began, cpu = time.perf_counter(), time.process_time()
-    nodes = len(asked.frequencies) * len(asked.amplitudes)
+    nodes = len(request.frequencies) * len(request.amplitudes)
     finished = 0
     with _bar("spectra", nodes * len(panels)) as advance:
 
@@ -166,14 +166,14 @@ def _spectra(panels: Sequence[Panel], asked: Asked, tiles: Tiles, data: Path, sc
             advance(to=finished * nodes)
 
         tiles.progress = advance
-        spectra = play_panels(panels, asked, tiles, done)
+        spectra = play_panels(panels, request, tiles, done)
     taken, cpu = time.perf_counter() - began, time.process_time() - cpu
     screen.print(_shares(panels, spectra))
-    _speed(spectra, asked, tiles, taken, cpu, screen)
-    save(panels, spectra, asked, data)
-    _draw(panels, spectra, asked, data)
-    if {panel.figure for panel in panels} == set(FIGURES) and asked.model == "ebm":
-        _claims(spectra, asked, tiles, data, screen)
+    _speed(spectra, request, tiles, taken, cpu, screen)
+    save(panels, spectra, request, data)
+    _draw(panels, spectra, request, data)
+    if {panel.figure for panel in panels} == set(FIGURES) and request.model == "ebm":
+        _claims(spectra, request, tiles, data, screen)
 
 
 def _shares(panels: Sequence[Panel], spectra: Sequence[Spectrum]) -> Table:
@@ -187,12 +187,12 @@ def _shares(panels: Sequence[Panel], spectra: Sequence[Spectrum]) -> Table:
     return table
 
 
-def _speed(spectra: Sequence[Spectrum], asked: Asked, tiles: Tiles, taken: float, cpu: float, screen: Console) -> None:
+def _speed(spectra: Sequence[Spectrum], request: SpectrumRequest, tiles: Tiles, taken: float, cpu: float, screen: Console) -> None:
     nodes, evaluations = sum(s.outcomes.size for s in spectra), sum(s.evaluations for s in spectra)
-    share = f" ({nodes / evaluations:.1f} times fewer than nodes)" if asked.refine else ""
+    share = f" ({nodes / evaluations:.1f} times fewer than nodes)" if request.refine else ""
     what = "spectrum" if len(spectra) == 1 else "spectra"
     screen.print(f"{len(spectra)} {what}, {nodes} nodes, {evaluations} runs{share}, {tiles.read_back} read back; {taken:.1f} s")
-    if tiles.played and tiles.client is None and asked.model in ("ebm", "ebm-unilateral"):
+    if tiles.played and tiles.client is None and request.model in ("ebm", "ebm-unilateral"):
         from rockcheck.validation.bench.ebm import right_hand_side_seconds
 
         one = right_hand_side_seconds()
@@ -204,28 +204,28 @@ def _speed(spectra: Sequence[Spectrum], asked: Asked, tiles: Tiles, taken: float
         )
 
 
-def _draw(panels: Sequence[Panel], spectra: Sequence[Spectrum], asked: Asked, data: Path) -> None:
+def _draw(panels: Sequence[Panel], spectra: Sequence[Spectrum], request: SpectrumRequest, data: Path) -> None:
     from rockcheck.reports.studies.spectra import areas_figure, figure_stem, own_figure, paper_figure, write
 
     for number in dict.fromkeys(panel.figure for panel in panels):
         mine = [(panel, spectrum) for panel, spectrum in zip(panels, spectra, strict=True) if panel.figure == number]
         if number is None:
             for panel, spectrum in mine:
-                write(own_figure(panel, spectrum), data / stem(panel.name, asked.model))
+                write(own_figure(panel, spectrum), data / stem(panel.name, request.model))
         else:
-            drawn = paper_figure([p for p, _ in mine], [s for _, s in mine], of="" if asked.model == "ebm" else asked.model)
-            write(drawn, data / figure_stem(number, asked.model))
-    if {panel.figure for panel in panels} == set(FIGURES) and asked.model == "ebm":
+            drawn = paper_figure([p for p, _ in mine], [s for _, s in mine], of="" if request.model == "ebm" else request.model)
+            write(drawn, data / figure_stem(number, request.model))
+    if {panel.figure for panel in panels} == set(FIGURES) and request.model == "ebm":
         write(areas_figure(spectra), data / "safe-areas")
 
 
-def _claims(spectra: Sequence[Spectrum], asked: Asked, tiles: Tiles, data: Path, screen: Console) -> None:
-    from rockcheck.validation.spectra.claims import Claims, check_claims, look_closer
+def _claims(spectra: Sequence[Spectrum], request: SpectrumRequest, tiles: Tiles, data: Path, screen: Console) -> None:
+    from rockcheck.validation.spectra.claims import Claims, check_claims, extra_runs
 
     tiles.progress = None
-    claims = check_claims(spectra, look_closer(tiles, asked))
-    grid = f"{len(asked.amplitudes)} x {len(asked.frequencies)}"
-    write_whole(data / "claims.json", Claims(grid=grid, model=asked.model, claims=claims).model_dump_json(indent=1) + "\n")
+    claims = check_claims(spectra, extra_runs(tiles, request))
+    grid = f"{len(request.amplitudes)} x {len(request.frequencies)}"
+    write_whole(data / "claims.json", Claims(grid=grid, model=request.model, claims=claims).model_dump_json(indent=1) + "\n")
     table = Table(box=None, pad_edge=False, title="The paper's section 5", title_justify="left")
     for title in ("sentence", "verdict", "finding"):
         table.add_column(title)
@@ -234,11 +234,11 @@ def _claims(spectra: Sequence[Spectrum], asked: Asked, tiles: Tiles, data: Path,
     screen.print(table)
 
 
-def _verify(panels: Sequence[Panel], asked: Asked, tiles: Tiles, data: Path, screen: Console) -> None:
+def _verify(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, data: Path, screen: Console) -> None:
     from rockcheck.validation.spectra.refinement import COLUMNS, verify
 
-    nodes = len(asked.frequencies) * len(asked.amplitudes)
-    warm_up(panels[0], asked)
+    nodes = len(request.frequencies) * len(request.amplitudes)
+    warm_up(panels[0], request)
     finished = 0
     with _bar("refined and full", 2 * nodes * len(panels)) as advance:
 
@@ -248,24 +248,24 @@ def _verify(panels: Sequence[Panel], asked: Asked, tiles: Tiles, data: Path, scr
             advance(to=2 * nodes * finished)
 
         tiles.progress = advance
-        found = verify(panels, asked, tiles, done)
+        found = verify(panels, request, tiles, done)
     _write_table("refinement", found, (COLUMNS, *found.rows), data)
     screen.print(_table(COLUMNS, found.rows, words=1))
 
 
-def _agreement(panels: Sequence[Panel], asked: Asked, count: int, tiles: Tiles, data: Path, screen: Console) -> None:
+def _agreement(panels: Sequence[Panel], request: SpectrumRequest, count: int, tiles: Tiles, data: Path, screen: Console) -> None:
     from rockcheck.reports.studies.spectra import MAPS, maps_figure, write
     from rockcheck.validation.spectra.agreement import CANDIDATES, COLUMNS, MAP_SIZE, agree, mapped
 
-    if asked.model != "ebm":
+    if request.model != "ebm":
         raise InputError("cannot be given together with --model or --pivot: all models are compared", "--agreement")
-    if not 2 <= count <= len(asked.frequencies) * len(asked.amplitudes):
+    if not 2 <= count <= len(request.frequencies) * len(request.amplitudes):
         raise InputError(f"{count} is not allowed: 2 up to the spectrum's nodes are asked for", "--agreement")
-    spectra = play_panels(panels, asked, tiles)
+    spectra = play_panels(panels, request, tiles)
     on_maps = MAP_SIZE**2 * len(mapped(panels)) * (1 + len(CANDIDATES))
     with _bar("agreement", count * len(CANDIDATES) * len(panels) + on_maps) as advance:
         tiles.progress = advance
-        found = agree(panels, spectra, asked, count, tiles)
+        found = agree(panels, spectra, request, count, tiles)
     _write_table("agreement", found, (COLUMNS, *found.rows), data)
     write(maps_figure(found, mapped(panels)), data / MAPS)
     screen.print(_table(COLUMNS[1:], [row[1:] for row in found.rows[: len(CANDIDATES)]], words=1))
@@ -287,17 +287,19 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, words: int)
     return table
 
 
-def _fragility(panels: Sequence[Panel], asked: Asked, records: Sequence[Path], tiles: Tiles, data: Path, screen: Console) -> None:
+def _fragility(
+    panels: Sequence[Panel], request: SpectrumRequest, records: Sequence[Path], tiles: Tiles, data: Path, screen: Console
+) -> None:
     from rockcheck.reports.studies.spectra import fragility_figure, write
     from rockcheck.validation.spectra.fragility import PULSES, csv, fragility
 
     if len(panels) != 1:
         raise InputError("needs --scene", "--fragility")
-    warm_up(panels[0], asked)
+    warm_up(panels[0], request)
     motions = 2 * len(records) if records else 2 * PULSES
-    with _bar("fragility", motions * len(asked.amplitudes) * (1 + bool(panels[0].scene.walls))) as advance:
+    with _bar("fragility", motions * len(request.amplitudes) * (1 + bool(panels[0].scene.walls))) as advance:
         tiles.progress = advance
-        found = fragility(panels[0], asked, records, tiles)
+        found = fragility(panels[0], request, records, tiles)
     write_whole(data / "fragility.json", found.model_dump_json(indent=1) + "\n")
     write_whole(data / "fragility.csv", csv(found))
     write(fragility_figure(found.model_dump()), data / "fragility")

@@ -7,16 +7,16 @@ import math
 import numpy as np
 
 from rockcheck.scenes import Scene
-from rockcheck.validation.discrepancy.measures import FIGURES, Definition, Motion, Unavailable, register
+from rockcheck.validation.discrepancy.measures import FIGURES, Definition, Unavailable, WindowedHistory, register
 
 
 def closed_form(label: str, unit: str) -> Definition:
-    """Register a function of a `Motion` as its distance from a closed form, computed where it is asked for."""
+    """Register a function of a `WindowedHistory` as its distance from a closed form, computed where it is asked for."""
     return register(FIGURES, label, unit, ideal=0.0, on_request=True, exact=True)
 
 
 @closed_form("error of sliding distance", "m")
-def sliding_distance_error(motion: Motion) -> float:
+def sliding_distance_error(motion: WindowedHistory) -> float:
     """|x at the end - x at the start| - v0^2/(2 mu g): a block that slides flat to a stop on a base at rest, m."""
     scene = _scene(motion)
     _need(scene.initial_velocity != 0.0 and not scene.walls and scene.initial_rotation == 0.0, "a block that starts sliding flat")
@@ -25,7 +25,7 @@ def sliding_distance_error(motion: Motion) -> float:
 
 
 @closed_form("error of wall rebound", "m")
-def wall_rebound_error(motion: Motion) -> float:
+def wall_rebound_error(motion: WindowedHistory) -> float:
     """Place where a block that slides flat into a wall stops, less e^2 (v0^2 - 2 mu g gap)/(2 mu g) from the wall, m.
 
     Case III: it leaves the wall at e times the speed that friction has left it.
@@ -41,7 +41,7 @@ def wall_rebound_error(motion: Motion) -> float:
 
 
 @closed_form("error of bounce height", "m")
-def bounce_height_error(motion: Motion) -> float:
+def bounce_height_error(motion: WindowedHistory) -> float:
     """Highest point after the first bounce, less e_g^2 h: a block that drops flat from h, m."""
     scene = _scene(motion)
     height, e = scene.initial_height, scene.floor.restitution
@@ -55,7 +55,7 @@ def bounce_height_error(motion: Motion) -> float:
 
 
 @closed_form("error of quarter period", "s")
-def quarter_period_error(motion: Motion) -> float:
+def quarter_period_error(motion: WindowedHistory) -> float:
     """Time of the first floor impact, less Housner's quarter period: a block released at theta_0 that does not slip, s.
 
     T/4 = int_0^theta_0 d theta / sqrt(2 p^2 [cos(alpha - theta_0) - cos(alpha - theta)]), without his small angles.
@@ -79,7 +79,7 @@ def quarter_period_error(motion: Motion) -> float:
 
 
 @closed_form("error of impact ratio", "1")
-def impact_ratio_error(motion: Motion) -> float:
+def impact_ratio_error(motion: WindowedHistory) -> float:
     """Ratio of angular velocities over the first floor impact, less Housner's 1 - 1.5 sin^2 alpha, for a block released at rest.
 
     From the turning points before and after it, between which energy is kept: sqrt of the ratio of cos(alpha - |theta|) - cos alpha.
@@ -96,13 +96,13 @@ def impact_ratio_error(motion: Motion) -> float:
     return math.sqrt(after / before) - (1.0 - 1.5 * math.sin(alpha) ** 2)
 
 
-def _scene(motion: Motion) -> Scene:
+def _scene(motion: WindowedHistory) -> Scene:
     if motion.scene is None or motion.scene.excitation.kind != "rest" or motion.scene.vertical.kind != "rest":
         raise Unavailable("closed forms need a known scene with a base at rest")
     return motion.scene
 
 
-def _released(motion: Motion) -> None:
+def _released(motion: WindowedHistory) -> None:
     scene = _scene(motion)
     moving = scene.initial_velocity != 0.0 or scene.initial_angular_velocity != 0.0 or scene.initial_height != 0.0
     _need(0.0 < abs(scene.initial_rotation) < scene.block.alpha and not moving and not scene.walls, "a block released at rest from a tilt")

@@ -12,7 +12,7 @@ from rockcheck.scenes import History, InputError, Scene
 from rockcheck.scenes.shown import Shown
 from rockcheck.validation.discrepancy import closed_forms as _closed_forms  # noqa: F401 - registers them
 from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, TURNS, Measure, Motion, Pair, Unavailable
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, TURNS, Measure, Pair, Unavailable, WindowedHistory
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -91,7 +91,7 @@ def describe(
     history: History, *, until: float | None = None, scene: Scene | None = None, measures: Collection[str] | None = None
 ) -> tuple[Figure, ...]:
     """The figures of one history: peak rotation, last place, impacts, hop, penetration and so on; up to `until` (s)."""
-    motion = Motion(history, scene, math.inf if until is None else until)
+    motion = WindowedHistory(history, scene, math.inf if until is None else until)
     window = "" if until is None else f"{until:g}s"
     chosen = [m for m in FIGURES.values() if not m.on_request] if measures is None else [FIGURES[name] for name in measures]
     return tuple(evaluate(measure, motion, "alpha", window=window, until=until) for measure in chosen)

@@ -86,12 +86,12 @@ def difference(label: str, unit: str, **settings: Any) -> Definition:
 
 
 def figure(label: str, unit: str, **settings: Any) -> Definition:
-    """Register a function of one `Motion` as a figure; without an ideal value, so held against an expected one."""
+    """Register a function of one `WindowedHistory` as a figure; without an ideal value, so held against an expected one."""
     return register(FIGURES, label, unit, **{"ideal": None, **settings})
 
 
 @dataclass(frozen=True)
-class Motion:
+class WindowedHistory:
     """One history as the figures see it: cut to a window, with the scene's gravity and walls where they are known."""
 
     history: History
@@ -195,7 +195,7 @@ class Pair:
     def energies(self) -> tuple[Array, Array]:
         """Energy per unit mass of both, J/kg."""
         columns = [self.channels(name) for name in ("y", "x_dot", "y_dot", "theta_dot")]
-        known = Motion(self.reference if self.reference.alpha is not None else self.candidate, self.scene)
+        known = WindowedHistory(self.reference if self.reference.alpha is not None else self.candidate, self.scene)
         first, second = (np.asarray(kinematics.energy(known.block, known.gravity, *(c[k] for c in columns))) for k in (0, 1))
         return first, second
 
@@ -364,7 +364,7 @@ def theta_hausdorff(pair: Pair) -> float:
     """
     if pair.alpha is None:
         raise Unavailable("the block's size is not known")
-    p = Motion(pair.reference if pair.reference.alpha is not None else pair.candidate, pair.scene).block.frequency_parameter
+    p = WindowedHistory(pair.reference if pair.reference.alpha is not None else pair.candidate, pair.scene).block.frequency_parameter
     first, second = (np.column_stack([p * pair.time, column]) for column in pair.theta)
     if not (np.all(np.isfinite(first)) and np.all(np.isfinite(second))):
         return math.nan
@@ -478,55 +478,55 @@ def _unmatched(pair: Pair, matched: MatchedImpacts) -> list[tuple[History, Seque
 
 
 @figure("peak rotation", "angle")
-def peak_rotation(motion: Motion) -> float:
+def peak_rotation(motion: WindowedHistory) -> float:
     """max |theta|, in alpha."""
     return float(np.max(np.abs(motion.channel("theta")))) / motion.block.alpha
 
 
 @figure("last rotation", "angle")
-def last_rotation(motion: Motion) -> float:
+def last_rotation(motion: WindowedHistory) -> float:
     """theta in the window's last row, in alpha: sees a shift in time that a peak does not."""
     return float(motion.channel("theta")[-1]) / motion.block.alpha
 
 
 @figure("last x", "m")
-def last_x(motion: Motion) -> float:
+def last_x(motion: WindowedHistory) -> float:
     """The centroid's x in the window's last row, m."""
     return float(motion.channel("x")[-1])
 
 
 @figure("last slip", "m")
-def last_slip(motion: Motion) -> float:
+def last_slip(motion: WindowedHistory) -> float:
     """Where the pivot corner stands along the floor in the window's last row, m from its first place."""
     return float(motion.channel("slip")[-1])
 
 
 @figure("end of motion", "s")
-def end_time(motion: Motion) -> float:
+def end_time(motion: WindowedHistory) -> float:
     """Time of the window's last row, s; before the scene's duration where the block overturned."""
     return float(motion.channel("t")[-1])
 
 
 @figure("floor impacts", "1", resolution=0.0)
-def floor_impacts(motion: Motion) -> float:
+def floor_impacts(motion: WindowedHistory) -> float:
     """Number of floor impacts stronger than 1 % of the strongest."""
     return _strong_count(motion, "floor impact")
 
 
 @figure("wall impacts", "1", resolution=0.0)
-def wall_impacts(motion: Motion) -> float:
+def wall_impacts(motion: WindowedHistory) -> float:
     """Number of wall impacts stronger than 1 % of the strongest."""
     return _strong_count(motion, "wall impact")
 
 
 @figure("highest hop", "m", ideal=0.0)
-def highest_hop(motion: Motion) -> float:
+def highest_hop(motion: WindowedHistory) -> float:
     """Largest height of the lowest corner above the floor, m; 0 for a model without free flight."""
     return float(np.maximum(_extreme(motion, np.max), 0.0))
 
 
 @figure("deepest penetration", "m", ideal=0.0)
-def deepest_penetration(motion: Motion) -> float:
+def deepest_penetration(motion: WindowedHistory) -> float:
     """Largest depth of a corner below the floor or behind a wall (walls where the scene is known), m."""
     deepest = -_extreme(motion, np.min)
     if motion.scene is not None:
@@ -537,16 +537,16 @@ def deepest_penetration(motion: Motion) -> float:
 
 
 @figure("largest energy gain at an impact", "1", ideal=0.0)
-def energy_gain(motion: Motion) -> float:
+def energy_gain(motion: WindowedHistory) -> float:
     """Most kinetic energy that the impact law added at one impact, relative to that before it (`Cost.largest_energy_gain`)."""
     return motion.history.cost.largest_energy_gain
 
 
-def _strong_count(motion: Motion, kind: str) -> float:
+def _strong_count(motion: WindowedHistory, kind: str) -> float:
     events = motion.events(kind)
     return float(sum(_strong(event, events) for event in events))
 
 
-def _extreme(motion: Motion, choose: Callable[[Array], Any]) -> float:
+def _extreme(motion: WindowedHistory, choose: Callable[[Array], Any]) -> float:
     heights = kinematics.pivot_height(motion.block, motion.channel("y"), motion.channel("theta"))
     return float(choose(heights))

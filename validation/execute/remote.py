@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from typing import IO, Any
 
 from rockcheck.validation.execute.cluster import connected
-from rockcheck.validation.execute.workers import COMPILING, ONE_THREAD, BatchTask, Played, Task, death, leaders, play, prepare
+from rockcheck.validation.execute.workers import COMPILING, ONE_THREAD, BatchTask, Task, TaskResult, death, leaders, play, prepare
 
 #: What a process that has closed its streams may take to end, s.
 PATIENCE = 10.0
@@ -36,7 +36,7 @@ class OnCluster:
 
     def __call__(
         self, tasks: Sequence[Task | BatchTask], *, jobs: int, seconds: Sequence[float], memory_mb: float
-    ) -> Iterator[tuple[int, Played]]:
+    ) -> Iterator[tuple[int, TaskResult]]:
         """Yields (index, result) as they end; the cluster's size, not `jobs`, says how many run at once.
 
         Of each package that compiles, one task goes first on each machine, with time for that, and the others wait for it.
@@ -71,7 +71,7 @@ class OnCluster:
                         running.update([submit(n) for n, leader in leader_of.items() if leader == done != n])
                 if done not in told:
                     told.add(done)
-                    yield done, result if isinstance(result, Played) else Played(failure=f"the cluster lost it: {result}")
+                    yield done, result if isinstance(result, TaskResult) else TaskResult(failure=f"the cluster lost it: {result}")
 
 
 class _Child:
@@ -94,12 +94,12 @@ class _Child:
             env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )
 
-    def play(self, task: Task | BatchTask, seconds: float) -> Played:
+    def play(self, task: Task | BatchTask, seconds: float) -> TaskResult:
         """The result, or how the process ended; a process that takes longer is ended."""
         given, back = self.process.stdin, self.process.stdout
         assert given is not None
         assert back is not None
-        results: list[Played] = []
+        results: list[TaskResult] = []
         listener = threading.Thread(target=_exchange, args=(task, given, back, results, self.ready), daemon=True)
         listener.start()
         while listener.is_alive() and not self.ready.wait(0.1) and time.monotonic() < self.latest:
@@ -110,8 +110,8 @@ class _Child:
         hangs = listener.is_alive()
         self.end(0.0 if hangs else PATIENCE)
         if hangs:
-            return Played(failure=f"did not end within {seconds:g} s" if self.ready.is_set() else f"did not start within {STARTING:g} s")
-        return Played(failure=death(self.process.returncode))
+            return TaskResult(failure=f"did not end within {seconds:g} s" if self.ready.is_set() else f"did not start within {STARTING:g} s")
+        return TaskResult(failure=death(self.process.returncode))
 
     @property
     def ended(self) -> bool:
@@ -131,7 +131,7 @@ class _Child:
                     stream.close()
 
 
-def _exchange(task: Task | BatchTask, given: IO[bytes], back: IO[bytes], results: list[Played], ready: threading.Event) -> None:
+def _exchange(task: Task | BatchTask, given: IO[bytes], back: IO[bytes], results: list[TaskResult], ready: threading.Event) -> None:
     try:
         if not ready.is_set():
             if back.readline() != READY:
@@ -147,7 +147,7 @@ def _exchange(task: Task | BatchTask, given: IO[bytes], back: IO[bytes], results
 _mine = threading.local()
 
 
-def alone(task: Task | BatchTask, seconds: float, memory_mb: float, run: str) -> Played:
+def alone(task: Task | BatchTask, seconds: float, memory_mb: float, run: str) -> TaskResult:
     """Play a task in a process apart: that of this thread's last task where it was of the same run, so of the same code."""
     child: _Child | None = getattr(_mine, "child", None)
     if child is None or child.run != run or child.ended:

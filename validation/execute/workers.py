@@ -64,7 +64,7 @@ class BatchTask(Work):
 
 
 @dataclass(frozen=True)
-class Played:
+class TaskResult:
     """What a worker gives back: the history's files by suffix and the record, or the reason of its failure."""
 
     files: dict[str, str] = field(default_factory=dict, repr=False)
@@ -72,7 +72,7 @@ class Played:
     failure: str = ""
 
 
-def play(task: Task | BatchTask) -> Played:
+def play(task: Task | BatchTask) -> TaskResult:
     """Simulate. Whatever goes wrong in the model is this task's failure, told in one line."""
     began = time.perf_counter()
     sys.path.extend(path for path in task.search_path if path not in sys.path)
@@ -80,7 +80,7 @@ def play(task: Task | BatchTask) -> Played:
         return _play_batch(task, began)
     history, fault = _simulate(task, task.scene)
     if history is None:
-        return Played(failure=fault)
+        return TaskResult(failure=fault)
     with tempfile.TemporaryDirectory() as folder:
         history.save(Path(folder) / "history.csv")
         files = {path.name.removeprefix("history"): path.read_text(encoding="utf-8") for path in Path(folder).iterdir()}
@@ -91,10 +91,10 @@ def play(task: Task | BatchTask) -> Played:
         "settings": _plain(history.settings),
         "cost": {**cost, "worker_seconds": time.perf_counter() - began},
     }
-    return Played(files=files, record=record)
+    return TaskResult(files=files, record=record)
 
 
-def _play_batch(task: BatchTask, began: float) -> Played:
+def _play_batch(task: BatchTask, began: float) -> TaskResult:
     """Peak |theta| in alpha and outcome of each scene; None and the reason where the model failed."""
     peaks: list[float | None] = []
     outcomes: list[str] = []
@@ -106,7 +106,7 @@ def _play_batch(task: BatchTask, began: float) -> Played:
         if history is not None:
             cost = {key: value + getattr(history.cost, key) for key, value in cost.items()}
     cost["worker_seconds"] = time.perf_counter() - began
-    return Played(record={"peaks": peaks, "outcomes": outcomes, "cost": cost})
+    return TaskResult(record={"peaks": peaks, "outcomes": outcomes, "cost": cost})
 
 
 def _simulate(task: Work, scene: Scene) -> tuple[History | None, str]:
@@ -204,7 +204,7 @@ def loss_of(future: Future[Any]) -> str:
     return printable(f"{type(error).__name__}: {error}", 300)
 
 
-def local(tasks: Sequence[Task | BatchTask], *, jobs: int, seconds: Sequence[float], memory_mb: float) -> Iterator[tuple[int, Played]]:
+def local(tasks: Sequence[Task | BatchTask], *, jobs: int, seconds: Sequence[float], memory_mb: float) -> Iterator[tuple[int, TaskResult]]:
     """Play tasks in `jobs` processes; yields (index, result) as they end. `seconds` limits each task's wall time.
 
     Of each package that compiles, one task goes first, with time for that, and the others of the package wait for it.
@@ -260,19 +260,19 @@ def _follow(run: Any) -> None:
     os._exit(1)
 
 
-def _outcome(future: Any, seconds: float) -> Played:
+def _outcome(future: Any, seconds: float) -> TaskResult:
     from pebble import ProcessExpired
 
     try:
-        result: Played = future.result()
+        result: TaskResult = future.result()
     except TimeoutError:
-        return Played(failure=f"did not end within {seconds:g} s")
+        return TaskResult(failure=f"did not end within {seconds:g} s")
     except ProcessExpired as error:
-        return Played(failure=death(int(error.exitcode or 0)))
+        return TaskResult(failure=death(int(error.exitcode or 0)))
     except MemoryError:
-        return Played(failure="out of memory")
+        return TaskResult(failure="out of memory")
     except Exception as error:  # such as a result that cannot be sent back
-        return Played(failure=printable(f"{type(error).__name__}: {error}", 300))
+        return TaskResult(failure=printable(f"{type(error).__name__}: {error}", 300))
     return result
 
 

@@ -15,7 +15,7 @@ from rockcheck.ebm import Spectrum
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.spectra.claims import percent
-from rockcheck.validation.spectra.study import Asked, Panel, play_panels
+from rockcheck.validation.spectra.study import Panel, SpectrumRequest, play_panels
 from rockcheck.validation.spectra.tiles import CODES, SETTLE, UNDECIDED, Tiles
 
 CANDIDATES = ("ebm-unilateral", "cm", "mujoco", "pybullet")
@@ -107,21 +107,21 @@ def near_boundary(outcomes: NDArray[np.int8]) -> NDArray[np.bool_]:
 def agree(
     panels: Sequence[Panel],
     spectra: Sequence[Spectrum],
-    asked: Asked,
+    request: SpectrumRequest,
     count: int,
     tiles: Tiles,
     done: Callable[[Panel], None] | None = None,
 ) -> Agreement:
     """Plays `count` nodes of each spectrum by the other models and counts equal outcomes; then a map of one figure by each model."""
     shares: list[Share] = []
-    settings = {model: Asked(asked.frequencies, asked.amplitudes, model).settings for model in CANDIDATES}
+    settings = {model: SpectrumRequest(request.frequencies, request.amplitudes, model).settings for model in CANDIDATES}
     for panel, spectrum in zip(panels, spectra, strict=True):
         nodes, near = choose_nodes(spectrum, count, panel.name)
         i, j = nodes.T
         sides = {"ebm": spectrum.outcomes[i, j]}
         failures = {}
         for model in CANDIDATES:
-            amplitudes, frequencies = asked.amplitudes[i], asked.frequencies[j]
+            amplitudes, frequencies = request.amplitudes[i], request.frequencies[j]
             sides[model], failures[model] = tiles.play(panel.scene, amplitudes, frequencies, model=model, settings=settings[model])
         for model in CANDIDATES:
             for part in (True, False):
@@ -145,13 +145,13 @@ def agree(
         if done is not None:
             done(panel)
     about = (
-        f"Share of equal outcomes at {count} nodes of each spectrum of {len(asked.amplitudes)} x {len(asked.frequencies)} nodes, half of"
-        f" them at most {NEAR} nodes from a boundary (near), the others further away, against the paper's bilateral event-based model and"
+        f"Share of equal outcomes at {count} nodes of each spectrum of {len(request.amplitudes)} x {len(request.frequencies)} nodes,"
+        f" half of them at most {NEAR} nodes from a boundary (near), the others further away, against the paper's bilateral event-based model and"
         " against the unilateral one, which lets the block hop as the other models do. Runs of the other models end with the pulse where"
         f" the block then lacks the energy to tip over, otherwise {SETTLE:g} s later; a block that then stands counts as safe."
     )
-    plain = {asked.model: dict(asked.settings)} | {model: dict(chosen) for model, chosen in settings.items()}
-    across, up = (np.linspace(axis[0], axis[-1], MAP_SIZE) for axis in (asked.frequencies, asked.amplitudes))
+    plain = {request.model: dict(request.settings)} | {model: dict(chosen) for model, chosen in settings.items()}
+    across, up = (np.linspace(axis[0], axis[-1], MAP_SIZE) for axis in (request.frequencies, request.amplitudes))
     return Agreement(
         about=about,
         date=datetime.now(UTC).date().isoformat(),
@@ -160,7 +160,7 @@ def agree(
         shares=tuple(shares),
         map_frequencies=tuple(across.tolist()),
         map_amplitudes=tuple(up.tolist()),
-        maps=_maps(mapped(panels), [Asked(across, up, model, chosen) for model, chosen in plain.items()], tiles),
+        maps=_maps(mapped(panels), [SpectrumRequest(across, up, model, chosen) for model, chosen in plain.items()], tiles),
     )
 
 
@@ -170,8 +170,8 @@ def mapped(panels: Sequence[Panel]) -> list[Panel]:
     return [panel for panel in panels if panel.figure == figure]
 
 
-def _maps(panels: Sequence[Panel], asked: Sequence[Asked], tiles: Tiles) -> tuple[Map, ...]:
-    played = {one.model: play_panels(panels, one, tiles) for one in asked}
+def _maps(panels: Sequence[Panel], request: Sequence[SpectrumRequest], tiles: Tiles) -> tuple[Map, ...]:
+    played = {one.model: play_panels(panels, one, tiles) for one in request}
     truth = played["ebm-unilateral"]
     return tuple(
         Map(

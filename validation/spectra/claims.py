@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE
 from rockcheck.validation.discrepancy.figures import Stored
-from rockcheck.validation.spectra.study import AMPLITUDES, FIGURES, GAPS, RESTITUTIONS, Asked, paper_panels, play_panels
+from rockcheck.validation.spectra.study import AMPLITUDES, FIGURES, GAPS, RESTITUTIONS, SpectrumRequest, paper_panels, play_panels
 from rockcheck.validation.spectra.tiles import Tiles
 
 ClaimVerdict = Literal["holds", "holds in part", "does not hold"]
@@ -29,7 +29,7 @@ GREATLY = 0.25
 #: End of the scan at omega_p/p = 6, beyond the spectra's own range.
 HIGHEST_SCANNED = 20.0
 #: Where the paper sees the stable islands, omega_p/p, and the fewest nodes of one; nodes (amplitude, frequency) of the closer look.
-ISLANDS, SMALLEST_ISLAND, CLOSER = (2.0, 3.0), 4, (111, 81)
+ISLANDS, SMALLEST_ISLAND, ISLAND_GRID = (2.0, 3.0), 4, (111, 81)
 
 
 class Row(Stored):
@@ -64,7 +64,7 @@ class Claims(Stored):
 
 
 @dataclass(frozen=True)
-class Closer:
+class ExtraRuns:
     """What the claims need beyond the 28 spectra.
 
     `least_amplitudes`: the lowest overturning a_p/(g tan alpha) at omega_p/p = 6, mu = 0.3, by (gap, e) of a right wall, None
@@ -97,7 +97,7 @@ class Paper:
         return float(np.mean(spectrum.safe[:, self.frequencies > above]))
 
 
-def check_claims(spectra: Sequence[Spectrum], closer: Closer) -> tuple[Claim, ...]:
+def check_claims(spectra: Sequence[Spectrum], extra: ExtraRuns) -> tuple[Claim, ...]:
     """The claims, judged by the 28 spectra on one grid and a closer look at two places."""
     paper = Paper(spectra)
     return (
@@ -105,31 +105,31 @@ def check_claims(spectra: Sequence[Spectrum], closer: Closer) -> tuple[Claim, ..
         _lower_restitution(paper),
         _smaller_gap(paper),
         _left_wall_high_frequency(paper),
-        _islands(paper, closer.islands),
+        _islands(paper, extra.islands),
         _right_wall_near(paper),
-        _right_wall_far(closer.least_amplitudes),
+        _right_wall_far(extra.least_amplitudes),
         _restitution_rules(paper),
         _high_friction_benefit(paper),
         _likelier_side(paper),
     )
 
 
-def look_closer(tiles: Tiles, asked: Asked) -> Closer:
+def extra_runs(tiles: Tiles, request: SpectrumRequest) -> ExtraRuns:
     """Plays what the claims need beyond the 28 spectra, by the model asked; the islands by the unilateral one, too."""
     amplitudes = np.arange(AMPLITUDES[0], HIGHEST_SCANNED + 0.005, 0.01)
     least: dict[tuple[float, float] | None, float] = {}
     for panel in paper_panels(8):
         if panel.wall is None or panel.wall.gap == GAPS[-1]:
-            sides, _ = tiles.play(panel.scene, amplitudes, np.full(len(amplitudes), 6.0), model=asked.model, settings=asked.settings)
+            sides, _ = tiles.play(panel.scene, amplitudes, np.full(len(amplitudes), 6.0), model=request.model, settings=request.settings)
             key = (panel.wall.gap, panel.wall.restitution) if panel.wall else None
             least[key] = float(amplitudes[np.argmax(sides != SAFE)]) if (sides != SAFE).any() else math.inf
-    axes = np.linspace(ISLANDS[0] - 0.5, ISLANDS[1] + 0.5, CLOSER[1]), np.linspace(*AMPLITUDES, CLOSER[0])
+    axes = np.linspace(ISLANDS[0] - 0.5, ISLANDS[1] + 0.5, ISLAND_GRID[1]), np.linspace(*AMPLITUDES, ISLAND_GRID[0])
     islands = {}
-    for figure, model in itertools.product((6, 7), dict.fromkeys((asked.model, "ebm-unilateral"))):
+    for figure, model in itertools.product((6, 7), dict.fromkeys((request.model, "ebm-unilateral"))):
         panel = paper_panels(figure)[1]
-        around = Asked(*axes, model, asked.settings if model == asked.model else {})
+        around = SpectrumRequest(*axes, model, request.settings if model == request.model else {})
         islands[panel.scene.floor.friction, model] = play_panels([panel], around, tiles)[0]
-    return Closer(least, islands)
+    return ExtraRuns(least, islands)
 
 
 def _pairs(paper: Paper, pairs: Sequence[tuple[str, Spectrum, Spectrum]]) -> tuple[Row, ...]:
@@ -246,14 +246,14 @@ def islands(spectrum: Spectrum) -> list[NDArray[np.int64]]:
     return sorted((nodes for nodes in found if len(nodes) >= SMALLEST_ISLAND), key=len, reverse=True)
 
 
-def _islands(paper: Paper, closer: Mapping[tuple[float, str], Spectrum]) -> Claim:
+def _islands(paper: Paper, extra: Mapping[tuple[float, str], Spectrum]) -> Claim:
     rows = []
     for mu in (0.3, 0.6):
         here = islands_there(paper.walled["left", mu, GAPS[0], 0.0])
         rows.append(Row(what=f"μ {mu:g}", value="; ".join(here) or "none there", holds=bool(here)))
-    for (mu, model), spectrum in closer.items():
+    for (mu, model), spectrum in extra.items():
         here = islands_there(spectrum)
-        grid = f"{CLOSER[0]} x {CLOSER[1]} nodes, ω_p/p {spectrum.frequency_ratios[0]:g} to {spectrum.frequency_ratios[-1]:g}"
+        grid = f"{ISLAND_GRID[0]} x {ISLAND_GRID[1]} nodes, ω_p/p {spectrum.frequency_ratios[0]:g} to {spectrum.frequency_ratios[-1]:g}"
         rows.append(Row(what=f"μ {mu:g}, {model}, {grid}", value="; ".join(here) or "none there"))
     return _judged(
         "stable islands",

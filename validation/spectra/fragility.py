@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rockcheck.ebm.spectrum import SAFE, Floats
 from rockcheck.scenes import InputError, Record, Scene
 from rockcheck.validation.discrepancy.figures import Stored
-from rockcheck.validation.spectra.study import Asked, Panel
+from rockcheck.validation.spectra.study import Panel, SpectrumRequest
 from rockcheck.validation.spectra.tiles import Tiles
 
 #: Frequencies of the set of pulses.
@@ -20,7 +20,7 @@ BOOTSTRAPS, CONFIDENCE = 2000, 0.95
 FEWEST = 2
 
 
-class Case(Stored):
+class FragilityCurve(Stored):
     """One curve. A point is intensity, share overturned, lower and upper end of its confidence band, fitted probability.
 
     The fit is a lognormal curve: `median` is the intensity at which its probability is one half, `dispersion` the standard
@@ -43,10 +43,10 @@ class Fragility(Stored):
     title: str
     about: str
     intensity: str
-    cases: tuple[Case, ...]
+    cases: tuple[FragilityCurve, ...]
 
 
-def fragility(panel: Panel, asked: Asked, records: Sequence[Path], tiles: Tiles) -> Fragility:
+def fragility(panel: Panel, request: SpectrumRequest, records: Sequence[Path], tiles: Tiles) -> Fragility:
     """The curves of a scene for a set of records, or, without any, for pulses of the scene's kind over the frequencies asked.
 
     Each motion is played in both directions at every intensity: its peak acceleration over g tan(alpha), the amplitudes
@@ -58,8 +58,8 @@ def fragility(panel: Panel, asked: Asked, records: Sequence[Path], tiles: Tiles)
     if 0 < len(records) < FEWEST:
         raise InputError(f"{len(records)} is too few: give at least {FEWEST} records", "--record")
     for label, case in [*walls, ("without a wall", scene.replace(walls=()))]:
-        sides, failed = _play_records(case, asked, records, tiles) if records else _play_pulses(case, asked, tiles)
-        cases.append(case_of(label, sides != SAFE, int(failed.sum()), asked.amplitudes))
+        sides, failed = _play_records(case, request, records, tiles) if records else _play_pulses(case, request, tiles)
+        cases.append(curve_of(label, sides != SAFE, int(failed.sum()), request.amplitudes))
     motions = f"{len(records)} records" if records else f"{PULSES} pulses"
     about = (
         f"{motions}, each in both directions. Lines: share of the runs that overturn the block; bands: {CONFIDENCE:.0%}, by drawing the"
@@ -73,17 +73,17 @@ def fragility(panel: Panel, asked: Asked, records: Sequence[Path], tiles: Tiles)
 Runs = tuple[NDArray[np.int8], NDArray[np.bool_]]
 
 
-def _play_pulses(scene: Scene, asked: Asked, tiles: Tiles) -> Runs:
+def _play_pulses(scene: Scene, request: SpectrumRequest, tiles: Tiles) -> Runs:
     """Sides and failures (pulse, direction, intensity)."""
     if scene.excitation.kind not in ("ricker", "sine"):
         raise InputError("is needed: the scene's excitation is no pulse", "--record")
-    frequencies = np.geomspace(asked.frequencies[0], asked.frequencies[-1], PULSES)
-    f, sign, a = np.meshgrid(frequencies, [1.0, -1.0], asked.amplitudes, indexing="ij")
-    sides, failed = tiles.play(scene, (sign * a).ravel(), f.ravel(), model=asked.model, settings=asked.settings)
+    frequencies = np.geomspace(request.frequencies[0], request.frequencies[-1], PULSES)
+    f, sign, a = np.meshgrid(frequencies, [1.0, -1.0], request.amplitudes, indexing="ij")
+    sides, failed = tiles.play(scene, (sign * a).ravel(), f.ravel(), model=request.model, settings=request.settings)
     return sides.reshape(a.shape), failed.reshape(a.shape)
 
 
-def _play_records(scene: Scene, asked: Asked, records: Sequence[Path], tiles: Tiles) -> Runs:
+def _play_records(scene: Scene, request: SpectrumRequest, records: Sequence[Path], tiles: Tiles) -> Runs:
     """Sides and failures (record, direction, intensity)."""
     found = []
     for path in records:
@@ -91,15 +91,15 @@ def _play_records(scene: Scene, asked: Asked, records: Sequence[Path], tiles: Ti
         peak = float(np.max(np.abs(record.samples)))
         if peak == 0.0:
             raise InputError(f"{path.name}: a record without motion has no intensity", "--record")
-        scales = asked.amplitudes * scene.gravity * scene.block.half_width / scene.block.half_height / peak
+        scales = request.amplitudes * scene.gravity * scene.block.half_width / scene.block.half_height / peak
         both = np.concatenate([scales, -scales])
-        played = tiles.play(scene.replace(excitation=record), both, np.ones(len(both)), model=asked.model, settings=asked.settings)
+        played = tiles.play(scene.replace(excitation=record), both, np.ones(len(both)), model=request.model, settings=request.settings)
         found.append([runs.reshape(2, len(scales)) for runs in played])
     sides, failed = zip(*found, strict=True)
     return np.array(sides), np.array(failed)
 
 
-def case_of(label: str, overturned: NDArray[np.bool_], undecided: int, intensities: Floats) -> Case:
+def curve_of(label: str, overturned: NDArray[np.bool_], undecided: int, intensities: Floats) -> FragilityCurve:
     """The curve of one case from its runs (motion, direction, intensity).
 
     The two directions of a motion are drawn together for the band, since they tell of the same motion.
@@ -113,7 +113,7 @@ def case_of(label: str, overturned: NDArray[np.bool_], undecided: int, intensiti
     columns = (intensities, each.mean(axis=0), low, high, fitted)
     points = tuple((float(x), float(share), float(lo), float(hi), float(p)) for x, share, lo, hi, p in zip(*columns, strict=True))
     median, dispersion = fit or (None, None)
-    return Case(label=label, motions=motions, undecided=undecided, median=median, dispersion=dispersion, points=points)
+    return FragilityCurve(label=label, motions=motions, undecided=undecided, median=median, dispersion=dispersion, points=points)
 
 
 def lognormal(intensities: Floats, median: float, dispersion: float) -> Floats:

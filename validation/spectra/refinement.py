@@ -14,7 +14,7 @@ from scipy import ndimage
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, Spectrum
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.execute import provenance
-from rockcheck.validation.spectra.study import Asked, Panel, play_panels
+from rockcheck.validation.spectra.study import Panel, SpectrumRequest, play_panels
 from rockcheck.validation.spectra.tiles import Tiles
 
 #: Sizes of the boxes, in nodes, over which a boundary's dimension is measured.
@@ -69,20 +69,20 @@ class Refinement(Stored):
         return tuple(rows)
 
 
-def verify(panels: Sequence[Panel], asked: Asked, tiles: Tiles, done: Callable[[Panel], None] | None = None) -> Refinement:
+def verify(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, done: Callable[[Panel], None] | None = None) -> Refinement:
     """Plays each spectrum on the full grid and refined, and counts the nodes that differ."""
     found = []
     for panel in panels:
-        full, refined = (play_panels([panel], replace(asked, refine=refine), tiles)[0] for refine in (False, True))
+        full, refined = (play_panels([panel], replace(request, refine=refine), tiles)[0] for refine in (False, True))
         found.append(compared(panel.name, full, refined))
         if done is not None:
             done(panel)
     return Refinement(
         date=datetime.now(UTC).date().isoformat(),
         versions=provenance.versions(),
-        grid=f"{len(asked.amplitudes)} x {len(asked.frequencies)}",
-        model=asked.model,
-        settings=dict(asked.settings),
+        grid=f"{len(request.amplitudes)} x {len(request.frequencies)}",
+        model=request.model,
+        settings=dict(request.settings),
         spectra=tuple(found),
     )
 

@@ -58,7 +58,7 @@ class Panel:
 
 
 @dataclass(frozen=True)
-class Asked:
+class SpectrumRequest:
     """How spectra are to be played: grid, model and settings. Raises `InputError` where that cannot be."""
 
     frequencies: Floats
@@ -130,7 +130,9 @@ def axis(low: float, high: float, size: int, key: str) -> Floats:
     return np.linspace(low, high, size)
 
 
-def play_panels(panels: Sequence[Panel], asked: Asked, tiles: Tiles, done: Callable[[Panel], None] | None = None) -> list[Spectrum]:
+def play_panels(
+    panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, done: Callable[[Panel], None] | None = None
+) -> list[Spectrum]:
     """The spectra of the panels, in order; on a cluster all at once, here one after the other on all cores.
 
     `done` is called when a panel is finished. Raises `InputError`.
@@ -139,17 +141,17 @@ def play_panels(panels: Sequence[Panel], asked: Asked, tiles: Tiles, done: Calla
     def play(panel: Panel) -> Spectrum:
         spectrum = overturning_spectrum(
             panel.scene,
-            asked.frequencies,
-            asked.amplitudes,
-            refine=asked.refine,
-            play=lambda scene, a, f: tiles.play(scene, a, f, model=asked.model, settings=asked.settings),
+            request.frequencies,
+            request.amplitudes,
+            refine=request.refine,
+            play=lambda scene, a, f: tiles.play(scene, a, f, model=request.model, settings=request.settings),
         )
         if done is not None:
             done(panel)
         return spectrum
 
     for panel in panels:
-        check = getattr(build(asked.model, asked.settings), "check", None)
+        check = getattr(build(request.model, request.settings), "check", None)
         if check is not None:
             check(panel.scene)
     if tiles.client is None:
@@ -158,27 +160,27 @@ def play_panels(panels: Sequence[Panel], asked: Asked, tiles: Tiles, done: Calla
         return list(pool.map(play, panels))
 
 
-def warm_up(panel: Panel, asked: Asked) -> None:
+def warm_up(panel: Panel, request: SpectrumRequest) -> None:
     """Load or compile the event-based model's code, by one node of the panel."""
-    player = build(asked.model, asked.settings)
+    player = build(request.model, request.settings)
     if compiled(player):
-        play_nodes(panel.scene, asked.amplitudes[:1], asked.frequencies[-1:], model=player)
+        play_nodes(panel.scene, request.amplitudes[:1], request.frequencies[-1:], model=player)
 
 
-def save(panels: Sequence[Panel], spectra: Sequence[Spectrum], asked: Asked, folder: Path) -> None:
+def save(panels: Sequence[Panel], spectra: Sequence[Spectrum], request: SpectrumRequest, folder: Path) -> None:
     """Write each spectrum's outcomes with its settings as NPZ and CSV, and note it in the folder's `spectra.json`."""
     records = []
     for panel, spectrum in zip(panels, spectra, strict=True):
         record = SpectrumRecord(
-            name=stem(panel.name, asked.model),
+            name=stem(panel.name, request.model),
             title=panel.title,
             figure=panel.figure,
             scene=_plain_scene(panel.scene),
-            model=asked.model,
-            settings=dict(asked.settings),
+            model=request.model,
+            settings=dict(request.settings),
             frequency_ratios=tuple(spectrum.frequency_ratios.tolist()),
             amplitude_ratios=tuple(spectrum.amplitude_ratios.tolist()),
-            refined=asked.refine,
+            refined=request.refine,
             evaluations=spectrum.evaluations,
             undecided=len(spectrum.undecided),
             safe=spectrum.safe_area,

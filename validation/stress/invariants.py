@@ -80,7 +80,7 @@ SWAPPED = {"overturned left": "overturned right", "overturned right": "overturne
 
 
 @dataclass(frozen=True, kw_only=True)
-class Played:
+class CheckedRun:
     """What was found of one run: the figure of each invariant that was looked at, and how it failed to end."""
 
     figures: dict[str, float]
@@ -103,18 +103,18 @@ class Played:
         return [name for name, value in self.figures.items() if not value <= INVARIANTS[name].bound]
 
 
-def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: bool = False, only: str = "") -> Played:
+def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: bool = False, only: str = "") -> CheckedRun:
     """Plays a scene and checks every invariant, or only one. With `audit` also those that ask for many rows: energy."""
     played = audited(scene) if audit else scene
     figures: dict[str, float] = {}
     try:
         history = model.simulate(played)
     except ModelFailure as error:
-        return Played(figures={"ends": 1.0}, failure=str(error))
+        return CheckedRun(figures={"ends": 1.0}, failure=str(error))
     figures["ends"] = 0.0
     figures["finite"] = _not_finite(history)
     if figures["finite"]:
-        return Played(figures=figures, outcome=history.outcome)
+        return CheckedRun(figures=figures, outcome=history.outcome)
     figures["outcome"] = float(_contradicts(played, history))
     figures |= conditions(model, played, history)
     if audit:  # at the finer tolerance, so that its error is not taken for one of the balance
@@ -135,7 +135,7 @@ def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: boo
         figures["similarity"] = horizon.apart(history, similar(played, seed))
     if only in ("", "tolerance"):
         figures["tolerance"] = horizon.apart(history, played, finer(model))
-    return Played(
+    return CheckedRun(
         figures=figures if not only else {name: figure for name, figure in figures.items() if name == only},
         outcome=history.outcome,
         events=len(history.event_list),

@@ -15,7 +15,7 @@ from rockcheck.scenes import History, InputError, ModelFailure, Record, Scene, k
 from rockcheck.scenes.excitations import Excitation
 from rockcheck.validation.execute.models import build
 from rockcheck.validation.stress.generator import Kind, random_scene
-from rockcheck.validation.stress.invariants import Played, check_run
+from rockcheck.validation.stress.invariants import CheckedRun, check_run
 
 Floats = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class Player(ABC):
         return random_scene(seed, number, self.kind)
 
     @abstractmethod
-    def check(self, scene: Scene, seed: int, number: int, only: str = "") -> Played:
+    def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
         """Plays the scene and checks what the model is held to."""
 
 
@@ -70,7 +70,7 @@ class EventBased(Player):
             most_events=MOST_EVENTS,
         )
 
-    def check(self, scene: Scene, seed: int, number: int, only: str = "") -> Played:
+    def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
         """Every invariant; energy in each tenth run."""
         audit = only == "energy" or (not only and number % AUDIT == 0)
         return check_run(self.model(scene, number), scene, seed=seed, audit=audit, only=only)
@@ -112,7 +112,7 @@ class Approximate(Player):
         """The options of `rockcheck simulate` with which this run can be made again."""
         return " ".join([f"--model {self.family}", *(f"--set {key}={value!r}" for key, value in self.settings(scene).items())])
 
-    def check(self, scene: Scene, seed: int, number: int, only: str = "") -> Played:
+    def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
         """Ends, finite numbers, depth and energy. Of an engine that breaks the last two it is said what half the step does."""
         played = self._check(scene)
         broken = [name for name in played.broken if name in ("depth", "source")]
@@ -122,16 +122,16 @@ class Approximate(Player):
             played = replace(played, failure="; ".join(words))
         return played
 
-    def _check(self, scene: Scene) -> Played:
+    def _check(self, scene: Scene) -> CheckedRun:
         try:
             history = build(self.family, self.settings(scene)).simulate(scene)
         except (ModelFailure, InputError) as error:
-            return Played(figures={"ends": 1.0}, failure=str(error))
+            return CheckedRun(figures={"ends": 1.0}, failure=str(error))
         bad = sum(float(np.sum(~np.isfinite(column))) for column in history.channels.values() if column.dtype.kind == "f")
         figures = {"ends": 0.0, "finite": bad}
         if not bad:
             figures |= {"depth": self.depth(scene, history), "source": energy_without_source(scene, history)}
-        return Played(figures=figures, outcome=history.outcome, events=len(history.event_list))
+        return CheckedRun(figures=figures, outcome=history.outcome, events=len(history.event_list))
 
     def depth(self, scene: Scene, history: History) -> float:
         """Deepest penetration over what the model states: for an engine the way of a step, for the CM that of a spring."""

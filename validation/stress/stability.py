@@ -49,7 +49,7 @@ MEMORY = 4096.0
 
 
 @dataclass(frozen=True)
-class Line:
+class ModelSetup:
     """A model with settings as they come ("default") or at their best; `knob` is what the step is called there."""
 
     label: str
@@ -65,17 +65,17 @@ class Line:
         return build(self.family, settings)
 
 
-LINES = {
+SETUPS = {
     line.label: line
     for line in (
-        Line("mujoco default", "mujoco", (("settings", "default"),)),
-        Line("mujoco", "mujoco", ()),
-        Line("mujoco adaptive", "mujoco", (("time_step", "adaptive"),), "largest_step"),
-        Line("pybullet default", "pybullet", (("settings", "default"),)),
-        Line("pybullet", "pybullet", ()),
-        Line("pybullet adaptive", "pybullet", (("time_step", "adaptive"),), "largest_step"),
-        Line("cm paper", "cm", (("damping_rule", "paper"),)),
-        Line("cm", "cm", ()),
+        ModelSetup("mujoco default", "mujoco", (("settings", "default"),)),
+        ModelSetup("mujoco", "mujoco", ()),
+        ModelSetup("mujoco adaptive", "mujoco", (("time_step", "adaptive"),), "largest_step"),
+        ModelSetup("pybullet default", "pybullet", (("settings", "default"),)),
+        ModelSetup("pybullet", "pybullet", ()),
+        ModelSetup("pybullet adaptive", "pybullet", (("time_step", "adaptive"),), "largest_step"),
+        ModelSetup("cm paper", "cm", (("damping_rule", "paper"),)),
+        ModelSetup("cm", "cm", ()),
     )
 }
 
@@ -135,7 +135,7 @@ def scene_at(axis: Axis, value: float) -> Scene:
     )
 
 
-def fault_of(line: Line, scene: Scene, step: float) -> str:
+def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
     """How a run of that step (sqrt(R/g)) breaks: "blows up", "sinks", "gains energy"; empty where it does not."""
     unit, radius = math.sqrt(scene.block.radius / scene.gravity), scene.block.radius
     scene = scene.replace(output_step=max(scene.output_step, step * unit))  # the CM ends a step at each row
@@ -166,7 +166,7 @@ def largest_stable(label: str, axis: Axis, value: float, steps: Sequence[float] 
     scene = scene_at(axis, value)
     best = 0.0
     for step in reversed(steps):
-        fault = fault_of(LINES[label], scene, step)
+        fault = fault_of(SETUPS[label], scene, step)
         if fault:
             return Stable(label, axis, value, best, fault)
         best = step
@@ -189,7 +189,7 @@ def stand_still(label: str, case: str, duration: float, step: float = REST_STEP)
     scene = Scene(
         name=case, block=block, floor=Floor(friction=mu), excitation=excitation, duration=duration, output_step=max(step, duration / 4000)
     )
-    line = LINES[label]
+    line = SETUPS[label]
     settings = dict(line.settings)
     if line.family != "cm":  # whose own step it is that makes an hour cheap
         settings |= {line.knob: step}
@@ -217,7 +217,7 @@ def stand_still(label: str, case: str, duration: float, step: float = REST_STEP)
 
 
 @dataclass(frozen=True)
-class Task:
+class MapTask:
     """One place of a map for one worker; it may take so many `seconds`, far more than it needs."""
 
     find: Callable[..., Still | Stable]
@@ -232,18 +232,18 @@ class Task:
         return Stable(label, case_or_axis, value, math.nan, fault)
 
 
-def tasks(quick: bool = False) -> list[Task]:
-    """The maps of all `LINES`, the longest tasks first; `quick` has fewer values and steps, and seconds for the hour."""
+def tasks(quick: bool = False) -> list[MapTask]:
+    """The maps of all `SETUPS`, the longest tasks first; `quick` has fewer values and steps, and seconds for the hour."""
     steps = QUICK_STEPS if quick else STEPS
     values = {axis: some[:: max(1, len(some) // QUICK_VALUES)] if quick else some for axis, some in AXES.items()}
     still = [
-        Task(stand_still, (label, case, QUICK_REST if quick else PUSHED if CASES[case] else HOUR, REST_STEP))
-        for case, label in itertools.product(CASES, LINES)
+        MapTask(stand_still, (label, case, QUICK_REST if quick else PUSHED if CASES[case] else HOUR, REST_STEP))
+        for case, label in itertools.product(CASES, SETUPS)
     ]
-    return still + [Task(largest_stable, (label, axis, value, steps)) for axis in AXES for value in values[axis] for label in LINES]
+    return still + [MapTask(largest_stable, (label, axis, value, steps)) for axis in AXES for value in values[axis] for label in SETUPS]
 
 
-def play(work: Sequence[Task], jobs: int) -> Iterator[tuple[int, Still | Stable]]:
+def play(work: Sequence[MapTask], jobs: int) -> Iterator[tuple[int, Still | Stable]]:
     """Plays tasks in processes; yields (index, result) as they end."""
     if not work:
         return

@@ -20,7 +20,7 @@ from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.workers import loss_of, workers
 from rockcheck.validation.stress import stability
-from rockcheck.validation.stress.invariants import INVARIANTS, Played
+from rockcheck.validation.stress.invariants import INVARIANTS, CheckedRun
 from rockcheck.validation.stress.players import PLAYERS
 from rockcheck.validation.stress.shrinking import shrink, write_scene
 from rockcheck.validation.stress.stability import AXIS_WORDS, Stability
@@ -57,7 +57,7 @@ class Failure:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Batch:
+class RunTotals:
     """What some runs of one model showed, one after the other."""
 
     model: str
@@ -79,11 +79,11 @@ class Batch:
     #: Runs in which an invariant that was to be looked at could not be judged, by its name.
     unjudged: Counter[str] = field(default_factory=Counter)
 
-    def __add__(self, other: Batch) -> Batch:
+    def __add__(self, other: RunTotals) -> RunTotals:
         worst = dict(self.worst)
         for name, found in other.worst.items():
             worst[name] = max(found, worst.get(name, found))
-        return Batch(
+        return RunTotals(
             model=self.model,
             runs=self.runs + other.runs,
             cpu_seconds=self.cpu_seconds + other.cpu_seconds,
@@ -117,7 +117,7 @@ class Stress:
     complete: bool
     versions: dict[str, str]
     hardware: dict[str, str]
-    batches: dict[str, Batch]
+    batches: dict[str, RunTotals]
     stability: Stability | None = None
 
     @property
@@ -131,15 +131,15 @@ class Stress:
         return [failure for batch in self.batches.values() for failure in batch.failures]
 
 
-def _checked(label: str, scene: Scene, seed: int, number: int, only: str = "") -> Played:
+def _checked(label: str, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
     """What a run shows; a fault of the program itself is a failure like any other."""
     try:
         return PLAYERS[label].check(scene, seed, number, only)
     except Exception as error:  # whatever it is: the other runs go on, and this one is told with its words
-        return Played(figures={"ends": math.inf}, failure=printable(f"{type(error).__name__}: {error}", 300))
+        return CheckedRun(figures={"ends": math.inf}, failure=printable(f"{type(error).__name__}: {error}", 300))
 
 
-def play_some(label: str, seed: int, first: int, count: int) -> Batch:
+def play_some(label: str, seed: int, first: int, count: int) -> RunTotals:
     """Plays runs `first` to `first + count - 1` of a model under a seed."""
     player = PLAYERS[label]
     began = time.process_time()
@@ -166,7 +166,7 @@ def play_some(label: str, seed: int, first: int, count: int) -> Batch:
         if played.exception:
             exceptions[played.exception] += 1
         unjudged.update(played.unjudged)
-    return Batch(
+    return RunTotals(
         model=label,
         runs=count,
         cpu_seconds=time.process_time() - began,
@@ -237,7 +237,7 @@ def run_stress(
     began, jobs = time.monotonic(), jobs or os.cpu_count() or 1
     labels = list(models or PLAYERS) if what != "maps" else []
     work, maps = chunks(seed, runs, quick, labels), stability.tasks(quick) if what != "runs" else []
-    batches = {label: Batch(model=label) for label in labels}
+    batches = {label: RunTotals(model=label) for label in labels}
     places: dict[int, stability.Still | stability.Stable] = {}
 
     def found(complete: bool = False) -> Stress:
@@ -285,10 +285,10 @@ def run_stress(
     return found(complete=True)
 
 
-def _side_by_side(work: Sequence[Chunk], jobs: int) -> Iterator[Batch]:
+def _side_by_side(work: Sequence[Chunk], jobs: int) -> Iterator[RunTotals]:
     """Plays chunks in processes. A chunk whose process hangs or dies is halved until the run that did it stands alone."""
     waiting = list(reversed(work))
-    running: dict[Future[Batch], Chunk] = {}
+    running: dict[Future[RunTotals], Chunk] = {}
     started: set[str] = set()
     if not work:
         return
@@ -311,12 +311,12 @@ def _side_by_side(work: Sequence[Chunk], jobs: int) -> Iterator[Batch]:
                     yield _lost(chunk, fault)
 
 
-def _lost(chunk: Chunk, fault: str) -> Batch:
+def _lost(chunk: Chunk, fault: str) -> RunTotals:
     failure = Failure(chunk.label, "ends", chunk.seed, chunk.first, math.inf, fault)
-    return Batch(model=chunk.label, runs=1, failures=(failure,), outcomes=Counter({"failed": 1}))
+    return RunTotals(model=chunk.label, runs=1, failures=(failure,), outcomes=Counter({"failed": 1}))
 
 
-def write_failures(batches: dict[str, Batch], folder: Path) -> dict[str, Batch]:
+def write_failures(batches: dict[str, RunTotals], folder: Path) -> dict[str, RunTotals]:
     """Writes the scenes of the first failures of each model and invariant, as they are, to `failures/`; the batches name them."""
     place = folder / "failures"
     place.mkdir(exist_ok=True)

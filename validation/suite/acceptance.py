@@ -31,8 +31,8 @@ def accept(suite: Suite, run: Run, reason: str | None) -> tuple[list[str], list[
     """
     changes: list[str] = []
     refused: list[str] = []
-    for part in suite.parts or (suite,):
-        _accept(part, run, reason, changes, refused)
+    for included in suite.included or (suite,):
+        _accept(included, run, reason, changes, refused)
     return changes, refused
 
 

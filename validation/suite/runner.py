@@ -25,43 +25,56 @@ from rockcheck.validation.execute.models import is_own
 from rockcheck.validation.execute.store import HISTORIES, Store, name_of
 from rockcheck.validation.suite.ensembles import Ensemble
 from rockcheck.validation.suite.results import Cell, CostRecord, EnsembleRecord, Run
-from rockcheck.validation.suite.suites import Part, Suite
+from rockcheck.validation.suite.suites import ModelVariant, Suite
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Place, Windowed, judge
 
 #: Told after each cell: cells done, cells in all, and a few words on what was last.
 Progress = Callable[[int, int, str], None]
 #: Plays tasks somewhere: yields (index, result) as they end.
-Executor = Callable[..., Iterator[tuple[int, workers.Played]]]
+Executor = Callable[..., Iterator[tuple[int, workers.TaskResult]]]
 
 
 @dataclass(frozen=True, eq=False)
-class Spot:
+class PlannedCell:
     """A cell of the suite before it is played: scene, model, and the key of all that it depends on."""
 
     scene: Scene
-    part: Part
+    variant: ModelVariant
     key: str
+
+    @property
+    def place(self) -> str:
+        """Name of the scene."""
+        return self.scene.name
 
     @property
     def name(self) -> str:
         """Name of its files."""
-        return name_of(self.scene.name, self.part.label, self.key)
+        return name_of(self.scene.name, self.variant.label, self.key)
 
 
 @dataclass(frozen=True, eq=False)
-class Batch:
-    """Some scenes of an ensemble, for one model."""
+class PlannedBatch:
+    """Some scenes of an ensemble, for one model, before they are played."""
 
     ensemble: Ensemble
     base: Scene
-    part: Part
+    variant: ModelVariant
     numbers: range
     key: str
 
     @property
+    def place(self) -> str:
+        """Name of the ensemble."""
+        return self.ensemble.name
+
+    @property
     def name(self) -> str:
         """Name of its file."""
-        return name_of(self.ensemble.name, self.part.label, f"{self.numbers.start}", self.key)
+        return name_of(self.ensemble.name, self.variant.label, f"{self.numbers.start}", self.key)
+
+
+Planned = PlannedCell | PlannedBatch
 
 
 def run_suite(
@@ -84,20 +97,22 @@ def run_suite(
         store = Store(folder)
     except OSError as error:
         raise InputError(f"{folder}: cannot be used as the output folder: {error.strerror}") from None
-    spots = [Spot(scene, part, provenance.cell_key(scene, part.family_name, part.settings)) for scene, part in suite.cells()]
-    batches = [batch for crowd in suite.crowds() for batch in _batches(*crowd)]
-    items: list[Spot | Batch] = [*spots, *batches]
-    records: dict[Spot | Batch, dict[str, Any]] = {}
-    failures: dict[Spot | Batch, str] = {}
+    planned_cells = [
+        PlannedCell(scene, variant, provenance.cell_key(scene, variant.family_name, variant.settings)) for scene, variant in suite.cells()
+    ]
+    batches = [batch for found in suite.ensemble_cells() for batch in _batches(*found)]
+    items: list[Planned] = [*planned_cells, *batches]
+    records: dict[Planned, dict[str, Any]] = {}
+    failures: dict[Planned, str] = {}
     if not force:
         for item in items:
-            found = store.get(item.name) if isinstance(item, Spot) else store.get_comparison(item.name)
+            found = store.get(item.name) if isinstance(item, PlannedCell) else store.get_comparison(item.name)
             if found is not None:
                 records[item] = found
     read_back = set(records)
     waiting = [item for item in items if item not in records]
     report(len(records), len(items), f"{len(records)} up to date")
-    limits = [suite.part_of(item.scene.name if isinstance(item, Spot) else item.ensemble.name).limits for item in waiting]
+    limits = [suite.suite_of(item.place).limits for item in waiting]
     for index, result in play(
         [_task(item, suite.path.parent) for item in waiting],
         jobs=jobs or os.cpu_count() or 1,
@@ -109,16 +124,15 @@ def run_suite(
             failures[item] = result.failure
         else:
             records[item] = result.record
-            if isinstance(item, Spot):
+            if isinstance(item, PlannedCell):
                 store.put(item.name, result.files, result.record)
             else:
                 store.put_comparison(item.name, result.record)
-        place = item.scene.name if isinstance(item, Spot) else item.ensemble.name
-        report(len(records) + len(failures), len(items), f"{place}, {item.part.label}")
-    by_place = {(spot.scene.name, spot.part.label): spot for spot in spots}
-    cells = [_cell(suite, spot, by_place, records, failures, store, spot in read_back) for spot in spots]
-    ensembles, crowds = _crowds(suite, batches, records, failures, read_back)
-    cells += crowds
+        report(len(records) + len(failures), len(items), f"{item.place}, {item.variant.label}")
+    by_place = {(planned.scene.name, planned.variant.label): planned for planned in planned_cells}
+    cells = [_cell(suite, planned, by_place, records, failures, store, planned in read_back) for planned in planned_cells]
+    ensembles, ensemble_cells = _ensembles(suite, batches, records, failures, read_back)
+    cells += ensemble_cells
     store.prune()
     return Run(
         suite=suite.name,
@@ -140,7 +154,7 @@ def run_suite(
     )
 
 
-def _batches(ensemble: Ensemble, base: Scene, part: Part) -> Iterator[Batch]:
+def _batches(ensemble: Ensemble, base: Scene, variant: ModelVariant) -> Iterator[PlannedBatch]:
     """An ensemble cut into batches; a batch's key covers how its scenes are drawn, so that they need not be drawn to look it up."""
     drawing = {
         "ensemble": ensemble.model_dump(mode="json", exclude={"count", "batch", "description"}),
@@ -148,35 +162,35 @@ def _batches(ensemble: Ensemble, base: Scene, part: Part) -> Iterator[Batch]:
     }
     for start in range(0, ensemble.count, ensemble.batch):
         numbers = range(start, min(start + ensemble.batch, ensemble.count))
-        settings = {**part.settings, "drawn": {**drawing, "numbers": [numbers.start, numbers.stop]}}
-        yield Batch(ensemble, base, part, numbers, provenance.cell_key(base, part.family_name, settings))
+        settings = {**variant.settings, "drawn": {**drawing, "numbers": [numbers.start, numbers.stop]}}
+        yield PlannedBatch(ensemble, base, variant, numbers, provenance.cell_key(base, variant.family_name, settings))
 
 
-def _task(item: Spot | Batch, folder: Path) -> workers.Task | workers.BatchTask:
-    part = item.part
+def _task(item: Planned, folder: Path) -> workers.Task | workers.BatchTask:
+    variant = item.variant
     model: dict[str, Any] = {
-        "label": part.label,
-        "family": part.family_name,
-        "settings": dict(part.settings),
-        "search_path": (str(folder),) if is_own(part.family_name) else (),
+        "label": variant.label,
+        "family": variant.family_name,
+        "settings": dict(variant.settings),
+        "search_path": (str(folder),) if is_own(variant.family_name) else (),
     }
-    if isinstance(item, Spot):
+    if isinstance(item, PlannedCell):
         return workers.Task(scene=item.scene, **model)
     return workers.BatchTask(scenes=tuple(item.ensemble.drawn(item.base, n) for n in item.numbers), **model)
 
 
-def _crowds(
+def _ensembles(
     suite: Suite,
-    batches: Sequence[Batch],
-    records: Mapping[Spot | Batch, Mapping[str, Any]],
-    failures: Mapping[Spot | Batch, str],
-    read_back: Container[Spot | Batch],
+    batches: Sequence[PlannedBatch],
+    records: Mapping[Planned, Mapping[str, Any]],
+    failures: Mapping[Planned, str],
+    read_back: Container[Planned],
 ) -> tuple[list[EnsembleRecord], list[Cell]]:
     """The ensembles with all peaks and outcomes, and a cell for each of them and each model."""
     ensembles: list[EnsembleRecord] = []
     cells: list[Cell] = []
     for ensemble, of_ensemble in groupby(batches, key=lambda batch: batch.ensemble):
-        by_model = {label: list(found) for label, found in groupby(of_ensemble, key=lambda batch: batch.part.label)}
+        by_model = {label: list(found) for label, found in groupby(of_ensemble, key=lambda batch: batch.variant.label)}
         samples: dict[str, Sample] = {}
         for label, parts in by_model.items():
             got = [records.get(b) or {"peaks": [None] * len(b.numbers), "outcomes": [failures[b]] * len(b.numbers)} for b in parts]
@@ -191,42 +205,42 @@ def _crowds(
                 outcomes={label: tuple(sample.outcomes) for label, sample in samples.items()},
             )
         )
-        cells += [_crowd_cell(suite, ensemble, by_model[label], samples, records, read_back) for label in samples]
+        cells += [_ensemble_cell(suite, ensemble, by_model[label], samples, records, read_back) for label in samples]
     return ensembles, cells
 
 
-def _crowd_cell(
+def _ensemble_cell(
     suite: Suite,
     ensemble: Ensemble,
-    batches: Sequence[Batch],
+    batches: Sequence[PlannedBatch],
     samples: Mapping[str, Sample],
-    records: Mapping[Spot | Batch, Mapping[str, Any]],
-    read_back: Container[Spot | Batch],
+    records: Mapping[Planned, Mapping[str, Any]],
+    read_back: Container[Planned],
 ) -> Cell:
-    part = batches[0].part
-    own, origin = samples[part.label], suite.part_of(ensemble.name)
+    variant = batches[0].variant
+    own, origin = samples[variant.label], suite.suite_of(ensemble.name)
     costs = [records[batch]["cost"] for batch in batches if batch in records]
     about: dict[str, Any] = {
         "scene": ensemble.name,
-        "model": part.label,
+        "model": variant.label,
         "key": provenance.digest("".join(batch.key for batch in batches)),
-        "settings": dict(part.settings),
+        "settings": dict(variant.settings),
         "read_back": all(batch in read_back for batch in batches),
         "cost": CostRecord(**{key: sum(cost[key] for cost in costs) for key in (costs[0] if costs else ())}),
     }
     if own.failures:
         reason = next(outcome for peak, outcome in zip(own.peaks, own.outcomes, strict=True) if not math.isfinite(peak))
         return Cell(**about, status="failed", reason=f"{own.failures} of {len(own.peaks)} scenes failed; the first: {reason}")
-    asked = origin.asked(ensemble.name, part.label)
+    required = origin.required(ensemble.name, variant.label)
     figures = [
         evaluate(measure, Samples(samples[name], own), "alpha", against=name)
-        for name in dict.fromkeys([origin.reference, origin.model_form, *(place.against for place in asked)])
-        if name in samples and name != part.label
+        for name in dict.fromkeys([origin.reference, origin.model_form, *(place.against for place in required)])
+        if name in samples and name != variant.label
         for measure in STATISTICS.values()
     ]
     checks = [
         judge(_figure(figures, place), origin.tolerances.get(place), kind=kind, measure=place.what.definition)
-        for place, kind in asked.items()
+        for place, kind in required.items()
     ]
     outcome = f"{int(np.sum(own.fallen))} of {len(own.peaks)} overturned"
     return Cell(**about, status="done", outcome=outcome, figures=tuple(figures), checks=tuple(checks))
@@ -239,34 +253,34 @@ def _without_cell(suite: Suite, cells: Container[tuple[str, str]]) -> tuple[str,
 
 def _cell(
     suite: Suite,
-    spot: Spot,
-    spots: Mapping[tuple[str, str], Spot],
-    records: Mapping[Spot | Batch, Mapping[str, Any]],
-    failures: Mapping[Spot | Batch, str],
+    planned: PlannedCell,
+    planned_cells: Mapping[tuple[str, str], PlannedCell],
+    records: Mapping[Planned, Mapping[str, Any]],
+    failures: Mapping[Planned, str],
     store: Store,
     read_back: bool,
 ) -> Cell:
     """The finished cell: its figures, compared with each reference, and the verdicts on them."""
-    scene, label = spot.scene, spot.part.label
-    about: dict[str, Any] = {"scene": scene.name, "model": label, "key": spot.key, "read_back": read_back}
-    if spot in failures:
-        return Cell(**about, status="failed", reason=failures[spot], settings=dict(spot.part.settings))
-    record = records[spot]
-    asked = suite.asked(scene.name, label)
-    own = suite.part_of(scene.name)
+    scene, label = planned.scene, planned.variant.label
+    about: dict[str, Any] = {"scene": scene.name, "model": label, "key": planned.key, "read_back": read_back}
+    if planned in failures:
+        return Cell(**about, status="failed", reason=failures[planned], settings=dict(planned.variant.settings))
+    record = records[planned]
+    required = suite.required(scene.name, label)
+    own = suite.suite_of(scene.name)
     figures: list[Figure] = []
     gaps: dict[tuple[str, str], tuple[str, bool]] = {}
-    for name in dict.fromkeys([OWN_FIGURES, own.reference, own.model_form, *(place.against for place in asked)]):
-        reference = spots.get((scene.name, name))
-        if name != OWN_FIGURES and (reference is None or reference is spot or reference not in records):
+    for name in dict.fromkeys([OWN_FIGURES, own.reference, own.model_form, *(place.against for place in required)]):
+        reference = planned_cells.get((scene.name, name))
+        if name != OWN_FIGURES and (reference is None or reference is planned or reference not in records):
             continue
-        extra = sorted(p.what for p in asked if p.against == name and (p.what.window or p.what.definition.on_request))
+        extra = sorted(p.what for p in required if p.against == name and (p.what.window or p.what.definition.on_request))
         horizon = _horizon(store, scene) if any(what.window == HORIZON for what in extra) else None
-        found = _compared(store, scene, spot, reference, extra, horizon)
+        found = _compared(store, scene, planned, reference, extra, horizon)
         figures += [Figure(**figure) for figure in found["figures"]]
         gaps |= {(name, window): (text, fall) for window, (text, fall) in found["gaps"].items()}
     checks = []
-    for place, kind in asked.items():
+    for place, kind in required.items():
         figure = _figure(figures, place)
         text, fall = gaps.get((place.against, place.what.window), ("", False))
         gap = "" if fall and kind == "model form" else text
@@ -275,7 +289,7 @@ def _cell(
         **about,
         status="done",
         settings=record["settings"],
-        history=f"{HISTORIES}/{spot.name}.csv",
+        history=f"{HISTORIES}/{planned.name}.csv",
         outcome=record["outcome"],
         notes=tuple(record["notes"]),
         cost=CostRecord(**record["cost"]),
@@ -311,7 +325,7 @@ def _horizon(store: Store, scene: Scene) -> float:
 
 
 def _compared(
-    store: Store, scene: Scene, spot: Spot, reference: Spot | None, windowed: Sequence[Windowed], horizon: float | None
+    store: Store, scene: Scene, planned: PlannedCell, reference: PlannedCell | None, windowed: Sequence[Windowed], horizon: float | None
 ) -> dict[str, Any]:
     """All figures over the whole time, and those asked for over a window; kept in the store.
 
@@ -319,26 +333,26 @@ def _compared(
     and whether because one block fell.
     """
     code = provenance.code_digest("rockcheck.validation.discrepancy.compare")
-    key = provenance.digest(json.dumps([spot.key, reference.key if reference else "", list(map(str, windowed)), horizon, code]))
-    name = name_of(scene.name, spot.part.label, reference.part.label if reference else OWN_FIGURES, key)
+    key = provenance.digest(json.dumps([planned.key, reference.key if reference else "", list(map(str, windowed)), horizon, code]))
+    name = name_of(scene.name, planned.variant.label, reference.variant.label if reference else OWN_FIGURES, key)
     found = store.get_comparison(name)
     if found is None:
-        found = _compute(store, scene, spot, reference, windowed, horizon)
+        found = _compute(store, scene, planned, reference, windowed, horizon)
         store.put_comparison(name, found)
     return found
 
 
 def _compute(
-    store: Store, scene: Scene, spot: Spot, reference: Spot | None, windowed: Sequence[Windowed], horizon: float | None
+    store: Store, scene: Scene, planned: PlannedCell, reference: PlannedCell | None, windowed: Sequence[Windowed], horizon: float | None
 ) -> dict[str, Any]:
-    candidate = History.load(store.history(spot.name))
+    candidate = History.load(store.history(planned.name))
     yardstick = History.load(store.history(reference.name)) if reference else None
     figures: list[Figure] = []
     gaps: dict[str, tuple[str, bool]] = {}
-    asked: dict[str, list[str]] = {"": [m.name for m in (DIFFERENCES if reference else FIGURES).values() if not m.on_request]}
+    by_window: dict[str, list[str]] = {"": [m.name for m in (DIFFERENCES if reference else FIGURES).values() if not m.on_request]}
     for what in windowed:
-        asked.setdefault(what.window, []).append(what.measure)
-    for window, measures in asked.items():
+        by_window.setdefault(what.window, []).append(what.measure)
+    for window, measures in by_window.items():
         until = horizon if window == HORIZON else float(window[:-1]) if window else None
         if yardstick is None:
             found = describe(candidate, until=until, scene=scene, measures=measures)

@@ -40,7 +40,7 @@ from __future__ import annotations
 
 import itertools
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
@@ -107,7 +107,7 @@ class SuiteFile(Frozen):
 
 
 @dataclass(frozen=True)
-class Part:
+class ModelVariant:
     """A model of a suite: label, name of its family, and settings."""
 
     label: str
@@ -130,7 +130,7 @@ class Suite:
     reference: str
     model_form: str
     scenes: Mapping[str, Scene]
-    models: Mapping[str, Part]
+    models: Mapping[str, ModelVariant]
     require: Require
     limits: Limits
     tolerances: Tolerances = field(repr=False)
@@ -138,28 +138,29 @@ class Suite:
     tolerances_path: Path = Path()
     #: Ensembles with the scene that each is drawn from.
     ensembles: Mapping[str, tuple[Ensemble, Scene]] = field(default_factory=dict)
-    parts: tuple[Suite, ...] = ()
+    #: The suites that this one joins.
+    included: tuple[Suite, ...] = ()
 
-    def part_of(self, scene: str) -> Suite:
+    def suite_of(self, scene: str) -> Suite:
         """The suite that a scene or an ensemble comes from: this one, or the included one."""
-        return next((part for part in self.parts if scene in part.scenes or scene in part.ensembles), self)
+        return next((suite for suite in self.included if scene in suite.scenes or scene in suite.ensembles), self)
 
-    def cells(self) -> Iterator[tuple[Scene, Part]]:
+    def cells(self) -> Iterator[tuple[Scene, ModelVariant]]:
         """All cells, scene by scene."""
-        for part in self.parts or (self,):
-            for scene, model in _played(part.scenes, part.models):
-                yield part.scenes[scene], part.models[model]
+        for suite in self.included or (self,):
+            for scene, model in _played(suite.scenes, suite.models):
+                yield suite.scenes[scene], suite.models[model]
 
-    def crowds(self) -> Iterator[tuple[Ensemble, Scene, Part]]:
+    def ensemble_cells(self) -> Iterator[tuple[Ensemble, Scene, ModelVariant]]:
         """All ensembles with the scene that they are drawn from, model by model."""
-        for part in self.parts or (self,):
-            for ensemble, base in part.ensembles.values():
-                for model in part.models.values():
+        for suite in self.included or (self,):
+            for ensemble, base in suite.ensembles.values():
+                for model in suite.models.values():
                     yield ensemble, base, model
 
     def only(self, scene: str, model: str) -> Suite:
         """The suite with one cell, and the references that it is held against."""
-        own = self.part_of(scene)
+        own = self.suite_of(scene)
         if scene not in own.scenes:
             raise unknown_name("scene of the suite", scene, self.scenes)
         if model not in own.models:
@@ -170,18 +171,18 @@ class Suite:
             own,
             scenes={scene: own.scenes[scene]},
             ensembles={},
-            models={label: part for label, part in own.models.items() if label in needed},
+            models={label: variant for label, variant in own.models.items() if label in needed},
             tolerances=tolerances,
         )
 
-    def asked(self, scene: str, model: str) -> dict[Place, Kind]:
+    def required(self, scene: str, model: str) -> dict[Place, Kind]:
         """What must be judged in a cell, and as what: what the suite requires and whatever has a tolerance."""
-        own = self.part_of(scene)
-        required = own.require
+        own = self.suite_of(scene)
+        require = own.require
         if scene in own.ensembles:
-            required = Require(difference=required.ensemble)
-        places = [Place(scene, model, OWN_FIGURES, Windowed.parse(text)) for text in required.figures]
-        for against, texts in ((own.reference, required.difference), (own.model_form, required.model_form)):
+            require = Require(difference=require.ensemble)
+        places = [Place(scene, model, OWN_FIGURES, Windowed.parse(text)) for text in require.figures]
+        for against, texts in ((own.reference, require.difference), (own.model_form, require.model_form)):
             if against and model not in (own.reference, against):
                 places += [Place(scene, model, against, Windowed.parse(text)) for text in texts]
         places += [place for place in own.tolerances if (place.scene, place.model) == (scene, model)]
@@ -233,29 +234,11 @@ def _suite(given: SuiteFile, path: Path, shipped: bool) -> Suite:
     own = any(is_own(str(settings.get("model", label))) for label, settings in given.models.items())
     if own and str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))
-    models = {label: _part(label, settings, path.parent) for label, settings in given.models.items()}
-    for key, label in (("reference", given.reference), ("model_form", given.model_form)):
-        if label and label not in models:
-            raise InputError(f"{label!r} is not among the suite's models: {', '.join(models) or 'none'}", key)
-    if not models:
-        raise InputError("no model; at least the reference is needed", "models")
+    models = {label: _variant(label, settings, path.parent) for label, settings in given.models.items()}
     scenes = _scenes(given, path.parent)
     ensembles = {e.name: (e, scene_from(e.scene, folder=path.parent, default_name=e.name)) for e in given.ensemble}
-    if not scenes and not ensembles:
-        raise InputError("no scene; at least one is needed", "scenes")
-    for name in ensembles.keys() & scenes.keys():
-        raise InputError(f"{name!r} is a scene, too", "ensemble.name")
-    for key, texts in given.require:
-        for text in texts:
-            _required(key, text)
+    _check_names(given, models, scenes, ensembles)
     tolerances_path, tables = _tolerance_tables(given, path, shipped)
-    try:
-        tolerances = parse_tolerances(tables, _played(scenes, models))
-        for place in tolerances:
-            if place.against not in (OWN_FIGURES, *models):
-                raise unknown_name(f"reference of [{place.scene}.{place.model}]", place.against, [OWN_FIGURES, *models])
-    except InputError as error:
-        raise InputError(f"{printable(tolerances_path)}: {error}") from None
     return Suite(
         name=path.stem,
         path=path,
@@ -267,12 +250,40 @@ def _suite(given: SuiteFile, path: Path, shipped: bool) -> Suite:
         models=models,
         require=given.require,
         limits=given.limits,
-        tolerances=tolerances,
+        tolerances=_tolerances(tolerances_path, tables, scenes, models),
         tolerances_path=tolerances_path,
     )
 
 
-def _played(scenes: Iterable[str], models: Mapping[str, Part]) -> Iterator[tuple[str, str]]:
+def _check_names(given: SuiteFile, models: Container[str], scenes: Collection[str], ensembles: Collection[str]) -> None:
+    """Raises `InputError` where something is missing, named twice, or not known."""
+    for key, label in (("reference", given.reference), ("model_form", given.model_form)):
+        if label and label not in models:
+            raise InputError(f"{label!r} is not among the suite's models: {', '.join(given.models) or 'none'}", key)
+    if not given.models:
+        raise InputError("no model; at least the reference is needed", "models")
+    if not scenes and not ensembles:
+        raise InputError("no scene; at least one is needed", "scenes")
+    for name in ensembles:
+        if name in scenes:
+            raise InputError(f"{name!r} is a scene, too", "ensemble.name")
+    for key, texts in given.require:
+        for text in texts:
+            _required(key, text)
+
+
+def _tolerances(path: Path, tables: Mapping[str, Any], scenes: Iterable[str], models: Mapping[str, ModelVariant]) -> Tolerances:
+    try:
+        tolerances = parse_tolerances(tables, _played(scenes, models))
+        for place in tolerances:
+            if place.against not in (OWN_FIGURES, *models):
+                raise unknown_name(f"reference of [{place.scene}.{place.model}]", place.against, [OWN_FIGURES, *models])
+    except InputError as error:
+        raise InputError(f"{printable(path)}: {error}") from None
+    return tolerances
+
+
+def _played(scenes: Iterable[str], models: Mapping[str, ModelVariant]) -> Iterator[tuple[str, str]]:
     """Names of scenes and models that make a cell: all, but a measured history belongs to the scenes that it names."""
     for scene in scenes:
         yield from ((scene, label) for label, model in models.items() if scene in model.settings.get("files", {scene: ""}))
@@ -280,42 +291,42 @@ def _played(scenes: Iterable[str], models: Mapping[str, Part]) -> Iterator[tuple
 
 def _joined(given: SuiteFile, path: Path) -> Suite:
     """Several suites as one; their scenes must have different names, their references must agree."""
-    parts = [load_suite(name if name in named_suites() else path.parent / name) for name in given.include]
+    included = [load_suite(name if name in named_suites() else path.parent / name) for name in given.include]
     scenes: dict[str, Scene] = {}
     ensembles: dict[str, tuple[Ensemble, Scene]] = {}
-    models: dict[str, Part] = {}
-    for part in parts:
-        for name in {*part.scenes, *part.ensembles} & {*scenes, *ensembles}:
+    models: dict[str, ModelVariant] = {}
+    for suite in included:
+        for name in {*suite.scenes, *suite.ensembles} & {*scenes, *ensembles}:
             raise InputError(f"scene {name!r} is in two of the suites", "include")
-        if part.reference != parts[0].reference:
-            raise InputError(f"{part.name} and {parts[0].name} have different references", "include")
-        scenes |= part.scenes
-        ensembles |= part.ensembles
-        models |= part.models
+        if suite.reference != included[0].reference:
+            raise InputError(f"{suite.name} and {included[0].name} have different references", "include")
+        scenes |= suite.scenes
+        ensembles |= suite.ensembles
+        models |= suite.models
     return Suite(
         name=path.stem,
         path=path,
         description=given.description,
-        reference=parts[0].reference,
-        model_form=next((part.model_form for part in parts if part.model_form), ""),
+        reference=included[0].reference,
+        model_form=next((suite.model_form for suite in included if suite.model_form), ""),
         scenes=scenes,
         ensembles=ensembles,
         models=models,
         require=Require(),
         limits=given.limits,
-        tolerances={place: line for part in parts for place, line in part.tolerances.items()},
+        tolerances={place: line for suite in included for place, line in suite.tolerances.items()},
         tolerances_path=path,
-        parts=tuple(parts),
+        included=tuple(included),
     )
 
 
-def _part(label: str, settings: Mapping[str, Any], folder: Path) -> Part:
+def _variant(label: str, settings: Mapping[str, Any], folder: Path) -> ModelVariant:
     settings = dict(settings)
     name = str(settings.pop("model", label))
     if name == "measured" and isinstance(settings.get("files"), dict):
         settings["files"] = {scene: str(folder / str(file)) for scene, file in settings["files"].items()}
     build(name, settings)
-    return Part(label, name, settings)
+    return ModelVariant(label, name, settings)
 
 
 def _scenes(given: SuiteFile, folder: Path) -> dict[str, Scene]:

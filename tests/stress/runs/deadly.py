@@ -11,17 +11,17 @@ from rockcheck.scenes import Scene
 from rockcheck.validation.stress import study
 from rockcheck.validation.stress.invariants import Played
 from rockcheck.validation.stress.players import EventBased
-from rockcheck.validation.stress.study import Batch, Failure
+from rockcheck.validation.stress.study import Failure, RunTotals
 
 
-def play_some(label: str, seed: int, first: int, count: int) -> Batch:
+def play_some(label: str, seed: int, first: int, count: int) -> RunTotals:
     """Run 3 kills its process, run 13 hangs."""
     for number in range(first, first + count):
         if number == 3:
             os._exit(9)
         if number == 13:
             time.sleep(600.0)
-    return Batch(model=label, runs=count, looked_at=Counter({"ends": count}))
+    return RunTotals(model=label, runs=count, looked_at=Counter({"ends": count}))
 
 
 def shrink_file(failure: Failure, folder: Path, seconds: float) -> None:
