@@ -127,7 +127,7 @@ def march_adaptively(scene: Scene, base: BaseMotion, push: Push, longest: float)
         states.append((*pose, *velocity))
         felt.append(feels)
         if len(times) % 512 == 0:
-            tell(t / end)
+            tell(t, end)
         if not math.hypot(*velocity) < 1e6 or len(times) > most_steps:  # nan, too
             raise ModelFailure(f"no end to the events, or a motion that blew up, after {len(times)} steps at t = {t:g} s")
     return np.array(times), np.array(states), np.array(felt).reshape(-1, 2)

@@ -164,7 +164,7 @@ def _march(world: World, scene: Scene, times: FloatArray, felt: FloatArray) -> M
     pieces = [np.array(scene.initial_state)[None, :]]
     world.place(pieces[0][0])
     for first in range(0, len(felt), STEPS_AT_ONCE):
-        tell(first / len(felt))
+        tell(first, len(felt))
         states = world.march(felt[first : first + STEPS_AT_ONCE], dt)
         tipped = np.flatnonzero(np.abs(states[:, 2]) >= math.pi / 2)
         if tipped.size:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections import deque
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +22,11 @@ from rockcheck.reports.payload import script
 from rockcheck.reports.scene_file import write_scene_file
 from rockcheck.reports.style import LOOKS, SPARE, looks
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
-from rockcheck.scenes.progress import tell
+from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import FAMILIES
+from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.suite.results import Run
 
 DATA = Path(str(resources.files("rockcheck.reports"))) / "data"
@@ -86,7 +86,7 @@ STUDIES = (
 View = SceneView | EnsembleView
 
 
-def write_site(folder: Path, *, jobs: int = 1, afresh: bool = True) -> Path:
+def write_site(folder: Path, *, jobs: int = 1, afresh: bool = True, on_progress: OnProgress = unheard) -> Path:
     """Write `index.html` and a page a scene and an ensemble, with figures and data, beside a finished run; returns the index.
 
     Pages are made in up to `jobs` processes. Unless `afresh`, one stays that shows the same as it would now. What belonged
@@ -95,8 +95,8 @@ def write_site(folder: Path, *, jobs: int = 1, afresh: bool = True) -> Path:
     pages = _Pages(folder)
     pages.site.assets()
     waiting = [view.name for view in pages.views.values() if afresh or _stamp_of(folder / _address(view)) != pages.stamp(view)]
-    for done, _ in enumerate(_write_pages(pages, waiting, jobs)):
-        tell(done / len(waiting))
+    for done, _ in enumerate(_write_pages(pages, waiting, jobs), 1):
+        on_progress(done, len(waiting))
     current = {f"{view.slug}.html" for view in pages.views.values()}
     for page in (folder / PAGES).glob("*.html"):
         if page.name not in current and _stamp_of(page):
@@ -110,8 +110,11 @@ def _write_pages(pages: _Pages, names: Sequence[str], jobs: int) -> Iterator[Non
     if min(jobs, len(names)) < 2 or len(names) < FEW:
         yield from map(pages.write, names)
         return
-    with ProcessPoolExecutor(min(jobs, len(names)), get_context("spawn"), _begin_process, (pages.folder,)) as pool:
-        yield from pool.map(_write_in_process, names)
+    with Pool(min(jobs, len(names))) as pool:
+        for ended in pool.run(deque(Call(_write_page, (pages.folder, name)) for name in names)):
+            if ended.error is not None:
+                raise ended.error
+            yield
 
 
 class _Pages:
@@ -184,16 +187,14 @@ def _address(view: View) -> str:
     return f"{PAGES}/{view.slug}.html"
 
 
-_pages: _Pages
+@cache
+def _pages_of(folder: Path) -> _Pages:
+    """In a process of the pool, which ends with the run: it reads the run once for all its pages."""
+    return _Pages(folder)
 
 
-def _begin_process(folder: Path) -> None:
-    global _pages
-    _pages = _Pages(folder)
-
-
-def _write_in_process(name: str) -> None:
-    _pages.write(name)
+def _write_page(folder: Path, name: str) -> None:
+    _pages_of(folder).write(name)
 
 
 @cache

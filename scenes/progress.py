@@ -1,27 +1,59 @@
-"""How far a run has come, told to whoever listens (a progress bar); costs nothing where nobody does."""
+"""How far a run has come: one protocol for models, spectra, studies, suites and pages.
+
+Whoever works calls `on_progress(done, total, what)`. A model has no argument for it: it calls `tell`, and whoever is `listening`
+hears it; without a listener that costs nothing.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass, field
+from threading import Lock
+from typing import Protocol
 
-Listener = Callable[[float], None]
-_listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
+
+class OnProgress(Protocol):
+    """Called now and then with the parts done, the parts in all (of any unit), and a few words on what was last."""
+
+    def __call__(self, done: float, total: float, what: str = "") -> None:
+        """See the class."""
 
 
-def tell(share: float) -> None:
-    """A model says now and then which share of its work is done, 0 to 1."""
-    listener = _listener.get()
-    if listener is not None:
-        listener(share)
+def unheard(done: float, total: float, what: str = "") -> None:
+    """An `OnProgress` for nobody."""
+
+
+_listener: ContextVar[OnProgress] = ContextVar("listener", default=unheard)
+
+
+def tell(done: float, total: float, what: str = "") -> None:
+    """Tells whoever listens in this thread."""
+    _listener.get()(done, total, what)
 
 
 @contextmanager
-def listening(listener: Listener) -> Iterator[None]:
-    """Within this block `listener` is called with what models `tell`, in this thread."""
-    token = _listener.set(listener)
+def listening(on_progress: OnProgress) -> Iterator[None]:
+    """Within this block `on_progress` is called with what models `tell`, in this thread."""
+    token = _listener.set(on_progress)
     try:
         yield
     finally:
         _listener.reset(token)
+
+
+@dataclass
+class Count:
+    """Adds up parts that are done here and there, in any thread, and tells `on_progress` the sum."""
+
+    on_progress: OnProgress = unheard
+    total: float = 0.0
+    done: float = 0.0
+    _lock: Lock = field(default_factory=Lock, init=False, repr=False)
+
+    def add(self, parts: float) -> None:
+        """So many more parts are done."""
+        with self._lock:
+            self.done += parts
+            self.on_progress(self.done, self.total)

@@ -27,7 +27,7 @@ from rockcheck.scenes.records import read_record
 from rockcheck.validation.commands.cli import main
 from rockcheck.validation.discrepancy.measured import read_measured
 from rockcheck.validation.execute.models import build
-from rockcheck.validation.execute.store import Store, name_of
+from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.suites import load_suite
 
@@ -269,7 +269,7 @@ def feed_stored_record(content: bytes, folder: Path) -> None:
     (folder / "histories" / "a.json").write_bytes(content)
     (folder / "comparisons" / "a.json").write_bytes(content)
     assert isinstance(store.get("a"), dict | None)
-    assert isinstance(store.get_comparison("a"), dict | None)
+    assert isinstance(store.get_record(COMPARISONS, "a"), dict | None)
 
 
 def feed_command_line(content: bytes, folder: Path) -> None:

@@ -18,10 +18,11 @@ import pytest
 from rockcheck.scenes import Scene, load_scene
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.commands.cli import main
+from rockcheck.validation.execute import pool
 from rockcheck.validation.execute import store as stores
 from rockcheck.validation.execute.store import HISTORIES, Store
 from rockcheck.validation.stress import study
-from rockcheck.validation.stress.invariants import TaskResult
+from rockcheck.validation.stress.invariants import CheckedRun
 from rockcheck.validation.stress.players import PLAYERS, EventBased
 from rockcheck.validation.stress.study import Chunk, Failure, RunTotals
 
@@ -177,12 +178,12 @@ def test_worker_lost_or_hanging(tmp_path, monkeypatch):
 
     monkeypatch.setattr(study, "play_some", deadly.play_some)
     monkeypatch.setattr(study, "SECONDS_A_RUN", 0.0)
-    monkeypatch.setattr(study, "COMPILING", 0.0)
+    monkeypatch.setattr(pool, "COMPILING", 0.0)
     monkeypatch.setattr(study, "PATIENCE", 6.0)
     batches = list(study._side_by_side([Chunk("ebm", 1, 0, 4), Chunk("ebm", 1, 13, 1), Chunk("ebm", 1, 14, 2)], 2))
     assert sum(batch.runs for batch in batches) == 7
     failures = {failure.number: failure.words for batch in batches for failure in batch.failures}
-    assert failures == {3: "the process ended with code 9", 13: "hangs"}
+    assert failures == {3: "the process ended with code 9", 13: "did not end within 6 s"}
 
 
 def test_shrinking_that_hangs(tmp_path, monkeypatch):
@@ -215,8 +216,8 @@ def test_shrinking_that_hangs(tmp_path, monkeypatch):
 def test_shrinking_interrupted(tmp_path, monkeypatch, capsys):
     """Ctrl-C while failures are shrunk: all of them are saved, each with its scene."""
 
-    def check(self: object, scene: Scene, seed: int, number: int, only: str = "") -> TaskResult:
-        return TaskResult(figures={"ends": 0.0, "mirror": 1.0}, outcome="at rest")
+    def check(self: object, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
+        return CheckedRun(figures={"ends": 0.0, "mirror": 1.0}, outcome="at rest")
 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt

@@ -21,6 +21,7 @@ from rockcheck.cm import ContinuousModel
 from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import node_scene
 from rockcheck.scenes import InputError, Ricker
+from rockcheck.scenes.progress import Count
 from rockcheck.validation.commands.cli import main
 from rockcheck.validation.spectra import agreement, claims, fragility, refinement
 from rockcheck.validation.spectra import study as spectra
@@ -83,11 +84,11 @@ def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
     np.testing.assert_array_equal(resumed.outcomes, whole.outcomes)
 
 
-@pytest.mark.parametrize("damage", ["", "L", "x" * 64, "\x00" * 64])
+@pytest.mark.parametrize("damage", ["", "\x00" * 64, "[]", '{"outcomes": 64}', '{"outcomes": "L"}', json.dumps({"outcomes": "x" * 64})])
 def test_a_damaged_tile_is_run_again(tmp_path, damage):
     panel, request = paper_panels(8)[0], small()
     whole = play_panels([panel], request, Tiles(tmp_path))[0]
-    (tile,) = tmp_path.glob("*.tile")
+    (tile,) = tmp_path.glob("tiles/*.json")
     tile.write_text(damage, encoding="utf-8")
     tiles = Tiles(tmp_path)
     np.testing.assert_array_equal(play_panels([panel], request, tiles)[0].outcomes, whole.outcomes)
@@ -136,11 +137,11 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path, capsys):
     tiles = tmp_path / "out" / "spectra" / "tiles"
     command = [sys.executable, "-c", "import sys; from rockcheck.validation.commands.cli import main; sys.exit(main())", *words]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL) as run:
-        while len(list(tiles.glob("*.tile"))) < 4:
+        while len(list(tiles.glob("*.json"))) < 4:
             assert run.poll() is None
             time.sleep(0.002)
         run.kill()
-    finished = sum(len(tile.read_text(encoding="utf-8")) for tile in tiles.glob("*.tile"))
+    finished = sum(len(json.loads(tile.read_text(encoding="utf-8"))["outcomes"]) for tile in tiles.glob("*.json"))
     assert 0 < finished < 7 * 150**2
     assert main(words) == 0
     assert f"{7 * 150**2} runs, {finished} read back" in capsys.readouterr().out
@@ -169,7 +170,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same(tmp_path, monkeypatch):
 
         killer = threading.Thread(target=kill)
         killer.start()
-        tiles = Tiles(tmp_path / "cluster", client=client, progress=lambda count: first.set())
+        tiles = Tiles(tmp_path / "cluster", client=client, count=Count(lambda done, total, what="": first.set()))
         together = play_panels(panels, request, tiles)
         killer.join()
         deadline = time.monotonic() + 60.0

@@ -11,12 +11,11 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections import deque
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from functools import cache
-from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
 from typing import Literal
@@ -26,13 +25,14 @@ import numpy as np
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.horizon import predictability_horizon
 from rockcheck.scenes import History, InputError, ModelFailure, Scene, Wall
+from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.bench.scenes import pulse
 from rockcheck.validation.discrepancy.compare import compare
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build
+from rockcheck.validation.execute.pool import Call, Pool
 
-Progress = Callable[[str], None]
 Reference = Literal["ebm-unilateral", "ebm"]
 REFERENCES: tuple[Reference, ...] = ("ebm-unilateral", "ebm")
 REFERENCE_TOLERANCE = 1e-12
@@ -204,7 +204,7 @@ def _rms(reference: History, candidate: History) -> float:
     return compare(reference, candidate, measures=["theta_rms"])["theta_rms"]
 
 
-def run_convergence(*, quick: bool = False, jobs: int | None = None, progress: Progress = lambda text: None) -> Convergence:
+def run_convergence(*, quick: bool = False, jobs: int | None = None, on_progress: OnProgress = unheard) -> Convergence:
     """Plays every scene with every model at every setting in `jobs` processes (default: one a core).
 
     `quick`: the scenes `QUICK` without the finest settings, in this process.
@@ -212,7 +212,7 @@ def run_convergence(*, quick: bool = False, jobs: int | None = None, progress: P
     began, jobs = time.monotonic(), 1 if quick else jobs or os.cpu_count() or 1
     names = QUICK if quick else tuple(SCENES)
     cases = [study_scene(name) for name in names]
-    asked = [
+    planned = [
         (name, sweep.model, value)
         for place in range(2 if quick else 3)
         for sweep in SWEEPS.values()
@@ -220,16 +220,17 @@ def run_convergence(*, quick: bool = False, jobs: int | None = None, progress: P
         for value in (sweep.values[place],)
     ]
     plays: list[SweepRun] = []
-    for found in itertools.starmap(play, asked) if jobs == 1 else _side_by_side(asked[::-1], jobs):  # the longest first
+    for found in itertools.starmap(play, planned) if jobs == 1 else _side_by_side(planned[::-1], jobs):  # the longest first
         plays.append(found)
-        progress(f"{len(plays)} of {len(asked)} runs: {found.scene}, {found.model}")
+        on_progress(len(plays), len(planned), f"{found.scene}, {found.model}")
     return evaluated(cases, plays, quick=quick, jobs=jobs, wall_seconds=time.monotonic() - began)
 
 
-def _side_by_side(asked: Sequence[tuple[str, str, float]], jobs: int) -> Iterable[SweepRun]:
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        for future in as_completed([pool.submit(play, *one) for one in asked]):
-            yield future.result()
+def _side_by_side(planned: Sequence[tuple[str, str, float]], jobs: int) -> Iterable[SweepRun]:
+    with Pool(jobs) as pool:
+        for ended in pool.run(deque(Call(play, one) for one in planned)):
+            scene, model, value = ended.call.arguments
+            yield SweepRun(scene, model, value, failure=ended.fault) if ended.error else ended.result
 
 
 def evaluated(

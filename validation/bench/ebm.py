@@ -22,9 +22,9 @@ from rockcheck.ebm.batch import Packed, pack, pack_pulses, run_batch
 from rockcheck.ebm.ground import Ground, acceleration
 from rockcheck.scenes import Floor, ModelFailure, Ricker, Scene, Wall, load_scene
 from rockcheck.scenes.compiled import kernel
+from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.scene import PAPER_BLOCK
 
-Progress = Callable[[str], None]
 #: The grid of Ricker pulses: omega_p/p, a_p/(g tan alpha), and its nodes along each axis.
 FREQUENCY_RATIOS, AMPLITUDE_RATIOS, NODES = (0.5, 8.0), (1.0, 12.0), 100
 TOLERANCES = (1e-6, 1e-7, 2e-8, 1e-8, 1e-9, 1e-10, 1e-12)
@@ -120,7 +120,7 @@ CASES = (
 )
 
 
-def ebm_speed(*, quick: bool = False, cold: bool = True, progress: Progress = lambda text: None) -> EbmSpeed:
+def ebm_speed(*, quick: bool = False, cold: bool = True, on_progress: OnProgress = unheard) -> EbmSpeed:
     """Times all batches on one core, interleaved; `quick` with 400 trajectories instead of 10,000.
 
     `cold` also starts fresh processes, with the compile cache and (not `quick`) without.
@@ -128,10 +128,10 @@ def ebm_speed(*, quick: bool = False, cold: bool = True, progress: Progress = la
     nodes = 20 if quick else NODES
     times: list[BatchTime] = []
     ones: list[float] = []
-    for case in CASES:
-        progress(f"batches: {case.name}")
+    for done, case in enumerate(CASES):
+        on_progress(done, len(CASES), f"batches: {case.name}")
         times += _times(case, nodes, ones)
-    return EbmSpeed(median(ones), tuple(times), cold_starts(progress, without_cache=not quick) if cold else ())
+    return EbmSpeed(median(ones), tuple(times), cold_starts(on_progress, without_cache=not quick) if cold else ())
 
 
 def _times(case: BatchCase, nodes: int, ones: list[float]) -> list[BatchTime]:
@@ -209,15 +209,15 @@ print(imported - began, time.perf_counter() - loaded)
 """
 
 
-def cold_starts(progress: Progress = lambda text: None, *, without_cache: bool = True) -> tuple[ColdStart, ...]:
+def cold_starts(on_progress: OnProgress = unheard, *, without_cache: bool = True) -> tuple[ColdStart, ...]:
     """Import and first simulation in fresh processes: once without compile cache, then (median of three) with it."""
     found = []
     with tempfile.TemporaryDirectory() as folder:
         fresh = {**os.environ, "NUMBA_CACHE_DIR": folder} if without_cache else dict(os.environ)
         if without_cache:
-            progress("cold start without compile cache")
+            on_progress(0, 2, "cold start without compile cache")
             found.append(ColdStart("none", *_cold_start(fresh)))
-        progress("cold starts with compile cache")
+        on_progress(1, 2, "cold starts with compile cache")
         if not without_cache:
             _cold_start(fresh)
         warm = [_cold_start(fresh) for _ in range(3)]

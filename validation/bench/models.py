@@ -5,22 +5,22 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections import deque
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from multiprocessing import get_context
 from statistics import median
 from typing import Any
 
 import numpy as np
 
 from rockcheck.scenes import History, InputError, ModelFailure
+from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.validation.bench.scenes import FAMILIES, MEMBERS, QUICK, prepared
 from rockcheck.validation.discrepancy.compare import compare
 from rockcheck.validation.discrepancy.measures import IMPACTS
 from rockcheck.validation.execute.models import build
+from rockcheck.validation.execute.pool import Call, Pool
 
-Progress = Callable[[str], None]
 #: Errors for which each model's cost is told, alpha.
 LEVEL = 1e-3
 #: Runs at least this long (s) are timed once, shorter ones `REPEATS` times.
@@ -187,7 +187,7 @@ class WorkPrecision:
         return [point for point in self.points if (point.family, point.line) == (family, line)]
 
 
-def measure(family: str, member: int, label: str, value: float, *, repeats: int = REPEATS) -> BenchmarkRun:
+def measure(family: str, member: int, label: str, value: float, repeats: int = REPEATS) -> BenchmarkRun:
     """Plays one member with one setting; short runs `repeats` times, for the median time."""
     line, ready = LINES[label], prepared(family, member)
     place: dict[str, Any] = {"family": family, "member": member, "line": label, "value": value, "horizon": ready.horizon}
@@ -222,9 +222,7 @@ def errors_of(reference: History, history: History) -> dict[str, Any]:
     }
 
 
-def work_precision(
-    *, quick: bool = False, jobs: int = 1, deadline: float = math.inf, progress: Progress = lambda text: None
-) -> WorkPrecision:
+def work_precision(*, quick: bool = False, jobs: int = 1, deadline: float = math.inf, on_progress: OnProgress = unheard) -> WorkPrecision:
     """Plays all lines in all families.
 
     Runs are interleaved: member by member, family by family, every model and setting in turn, so that whatever else the
@@ -238,9 +236,9 @@ def work_precision(
     for n, play in enumerate(sorted(short, key=_stage)):
         if time.monotonic() > now + SHARE_OF_SHORT * (deadline - now):
             break
-        progress(f"{n + 1} of {len(short)} runs: {play[0]}, {play[2]}")
+        on_progress(n, len(short), f"{play[0]}, {play[2]}")
         samples.append(measure(*play))
-    samples += _side_by_side([play for play in plays if _stage(play) == 2], jobs, deadline, progress)
+    samples += _side_by_side([play for play in plays if _stage(play) == 2], jobs, deadline, on_progress)
     done = {(s.family, s.member, s.line, s.value) for s in samples}
     return evaluated(samples, [play for play in plays if play not in done])
 
@@ -266,20 +264,24 @@ def _stage(play: PlannedRun) -> int:
     return 1 if play[3] == SIDE_BY_SIDE else 2
 
 
-def _side_by_side(plays: Sequence[PlannedRun], jobs: int, deadline: float, progress: Progress) -> Iterable[BenchmarkRun]:
+def _side_by_side(plays: Sequence[PlannedRun], jobs: int, deadline: float, on_progress: OnProgress) -> Iterable[BenchmarkRun]:
     """Plays in worker processes; nothing new begins after the deadline."""
     if not plays:
         return []
     samples: list[BenchmarkRun] = []
-    waiting, running = list(reversed(plays)), set[Future[BenchmarkRun]]()
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        while running or (waiting and time.monotonic() < deadline):
-            while waiting and len(running) < jobs and time.monotonic() < deadline:
-                running.add(pool.submit(measure, *waiting.pop(), repeats=1))
-            ended, running = wait(running, return_when=FIRST_COMPLETED)
-            samples += [future.result() for future in ended]
-            progress(f"{len(samples)} of {len(plays)} long runs")
+    waiting = deque(Call(measure, (*play, 1), key=play) for play in plays if time.monotonic() < deadline)
+    with Pool(jobs) as pool:
+        for ended in pool.run(waiting):
+            samples.append(_lost(ended.call.key, ended.fault) if ended.error else ended.result)
+            on_progress(len(samples), len(plays), "long runs")
+            if time.monotonic() > deadline:
+                waiting.clear()
     return samples
+
+
+def _lost(play: PlannedRun, fault: str) -> BenchmarkRun:
+    family, member, label, value = play
+    return BenchmarkRun(family, member, label, value, prepared(family, member).horizon, failure=fault)
 
 
 def evaluated(samples: Sequence[BenchmarkRun], missing: Sequence[PlannedRun]) -> WorkPrecision:

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from rockcheck.scenes import Floor, History, Record, Scene, Wall
+from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.bench.scenes import pulse
 from rockcheck.validation.execute.models import Model, build
 
-Progress = Callable[[str], None]
 #: A wall that the block cannot reach, m.
 FAR = Wall(side="left", gap=100.0)
 ROUNDS = 5
@@ -48,12 +48,13 @@ class Saving:
         return self.cost_with / self.cost_without
 
 
-def skipping(*, quick: bool = False, progress: Progress = lambda text: None) -> tuple[Saving, ...]:
+def skipping(*, quick: bool = False, on_progress: OnProgress = unheard) -> tuple[Saving, ...]:
     """The whole table; `quick` with small batches."""
     found: list[Saving] = []
-    for part in (_batches(10 if quick else 40), _histories(), _mujoco_steps(), _pybullet_steps()):
-        for saving in part:
-            progress(f"savings: {saving.model}, {saving.thing}")
+    kinds = (_batches(10 if quick else 40), _histories(), _mujoco_steps(), _pybullet_steps())
+    for done, savings in enumerate(kinds):
+        for saving in savings:
+            on_progress(done, len(kinds), f"savings: {saving.model}, {saving.thing}")
             found.append(saving)
     return tuple(found)
 

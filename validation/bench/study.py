@@ -8,12 +8,13 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.execute import provenance
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from rockcheck.validation.bench.skipping import Saving
 
 What = Literal["all", "ebm", "models", "skipping"]
-Progress = Callable[[str], None]
 #: Minutes that a benchmark may take, whole and quick; see `work_precision` for what happens then.
 MINUTES, QUICK_MINUTES = 25.0, 2.0
 #: Share of the time within which the last run must have begun: it may take a while, and pages are written after it.
@@ -52,7 +52,7 @@ def run_benchmark(
     quick: bool = False,
     jobs: int | None = None,
     minutes: float | None = None,
-    progress: Progress = lambda text: None,
+    on_progress: OnProgress = unheard,
 ) -> Benchmark:
     """Measures `what`. `jobs` processes (default: one a core) play the longest runs side by side, all else runs alone.
 
@@ -64,15 +64,15 @@ def run_benchmark(
     if what in ("all", "ebm"):
         from rockcheck.validation.bench.ebm import ebm_speed
 
-        parts["ebm"] = ebm_speed(quick=quick, progress=progress)
+        parts["ebm"] = ebm_speed(quick=quick, on_progress=on_progress)
     if what in ("all", "skipping"):
         from rockcheck.validation.bench.skipping import skipping
 
-        parts["savings"] = skipping(quick=quick, progress=progress)
+        parts["savings"] = skipping(quick=quick, on_progress=on_progress)
     if what in ("all", "models"):
         from rockcheck.validation.bench.models import work_precision
 
-        parts["models"] = work_precision(quick=quick, jobs=jobs, deadline=deadline, progress=progress)
+        parts["models"] = work_precision(quick=quick, jobs=jobs, deadline=deadline, on_progress=on_progress)
     return Benchmark(
         suite=f"benchmark {what}{', quick' if quick else ''}",
         created=datetime.now(UTC).isoformat(timespec="seconds"),

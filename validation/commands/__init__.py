@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -18,6 +17,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from rockcheck.scenes import InputError, named_scenes
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.progress import OnProgress
 
 OUT = Path("rockcheck-report")
 
@@ -73,11 +73,8 @@ def _finite(value: Any) -> Any:
 
 
 @contextmanager
-def progress(title: str) -> Iterator[Callable[..., None]]:
-    """A bar on stderr with the time left, on a terminal only.
-
-    Gives a function of the parts done, the parts in all, and a few words on the last one.
-    """
+def progress(title: str) -> Iterator[OnProgress]:
+    """A bar on stderr with the time left, on a terminal only."""
     screen = Console(stderr=True)
     bar = Progress(
         TextColumn("{task.description}"),
@@ -93,23 +90,10 @@ def progress(title: str) -> Iterator[Callable[..., None]]:
     with bar:
         task = bar.add_task(title, total=None)
 
-        def tell(done: float, of: float, what: str = "") -> None:
-            bar.update(task, completed=done, total=of, description=f"{title}: {printable(what, 24)}" if what else title)
+        def on_progress(done: float, total: float, what: str = "") -> None:
+            bar.update(task, completed=done, total=total, description=f"{title}: {printable(what, 24)}" if what else title)
 
-        yield tell
-
-
-@contextmanager
-def told(title: str) -> Iterator[Callable[[str], None]]:
-    """`progress` for studies that tell a line of words: "3 of 40 runs: ..." moves the bar."""
-    with progress(title) as tell:
-
-        def hear(words: str) -> None:
-            count = re.match(r"(\d+) of (\d+)", words)
-            done, of = (int(count[1]), int(count[2])) if count else (0, 1)
-            tell(done, of, words.partition(": ")[2] if count else words)
-
-        yield hear
+        yield on_progress
 
 
 def usable_folder(path: Path) -> Path:

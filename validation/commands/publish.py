@@ -13,6 +13,7 @@ from filelock import FileLock, Timeout
 
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.suite.results import Run
@@ -62,7 +63,7 @@ def keep(run: Run, folder: Path) -> Path:
         return run.save(folder)
 
 
-def publish(folder: Path, *, jobs: int | None = None, afresh: bool = False) -> Path:
+def publish(folder: Path, *, jobs: int | None = None, afresh: bool = False, on_progress: OnProgress = unheard) -> Path:
     """Write the pages of the run that was kept in `folder`; returns the page to open.
 
     Unless `afresh`, only those that would show something else than they do. `jobs` processes draw, by default one a core.
@@ -70,4 +71,4 @@ def publish(folder: Path, *, jobs: int | None = None, afresh: bool = False) -> P
     from rockcheck import reports
 
     with _turn(folder):
-        return Path(reports.write_site(folder, jobs=jobs or os.cpu_count() or 1, afresh=afresh))
+        return Path(reports.write_site(folder, jobs=jobs or os.cpu_count() or 1, afresh=afresh, on_progress=on_progress))

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from rockcheck.scenes.progress import listening
 from rockcheck.validation.commands import answer, console, progress
 from rockcheck.validation.commands.publish import publish
 from rockcheck.validation.suite.results import Run
@@ -16,7 +15,7 @@ from rockcheck.validation.suite.results import Run
 def run(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a finished run.")]) -> None:
     """Render the pages of a finished run again."""
     Run.load(folder)
-    with progress("pages") as tell, listening(lambda share: tell(share, 1.0)):
-        index = publish(folder, afresh=True)
+    with progress("pages") as on_progress:
+        index = publish(folder, afresh=True, on_progress=on_progress)
     console().print(f"report: {index}", soft_wrap=True)
     answer({"report": index})

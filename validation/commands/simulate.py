@@ -35,7 +35,7 @@ def run(
     if not path.parent.is_dir():
         raise InputError(f"{printable(path.parent)}: no such folder", "--output")
     compiles = ", a first run compiles" if family(model).compiled else ""
-    with progress(f"{what.name}, {model}{compiles}") as tell, listening(lambda share: tell(share, 1.0)):
+    with progress(f"{what.name}, {model}{compiles}") as on_progress, listening(on_progress):
         history = player.simulate(what)
     try:
         history.save(path)

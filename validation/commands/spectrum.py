@@ -6,9 +6,9 @@ import contextlib
 import math
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -20,6 +20,7 @@ from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT
 from rockcheck.scenes import InputError, load_scene
 from rockcheck.scenes.errors import unknown_name
+from rockcheck.scenes.progress import Count
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.commands import OUT, JobsOption, OutOption, SchedulerOption, answer, console, progress, scene_names, usable_folder
 from rockcheck.validation.execute.store import name_of
@@ -28,7 +29,6 @@ from rockcheck.validation.spectra.study import (
     FIGURES,
     FREQUENCIES,
     SPECTRA,
-    TILES,
     Panel,
     SpectrumRequest,
     axis,
@@ -97,7 +97,7 @@ def run(
             from rockcheck.validation.execute.cluster import connected
 
             client = stack.enter_context(connected(scheduler))
-        tiles = stack.enter_context(Tiles(data / TILES, jobs=jobs, client=client, force=force))
+        tiles = stack.enter_context(Tiles(data, jobs=jobs, client=client, force=force))
         if fragility:
             _fragility(panels, request, records or [], tiles, data, screen)
         elif verify:
@@ -157,16 +157,9 @@ def _spectra(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, da
         warm_up(panels[0], request)  # so that no run's time holds the compiler's
     began, cpu = time.perf_counter(), time.process_time()
     nodes = len(request.frequencies) * len(request.amplitudes)
-    finished = 0
-    with _bar("spectra", nodes * len(panels)) as advance:
-
-        def done(panel: Panel) -> None:
-            nonlocal finished
-            finished += 1
-            advance(to=finished * nodes)
-
-        tiles.progress = advance
-        spectra = play_panels(panels, request, tiles, done)
+    with progress("spectra") as on_progress:
+        tiles.count = Count(on_progress, nodes * len(panels))
+        spectra = play_panels(panels, request, tiles)
     taken, cpu = time.perf_counter() - began, time.process_time() - cpu
     screen.print(_shares(panels, spectra))
     _speed(spectra, request, tiles, taken, cpu, screen)
@@ -222,7 +215,7 @@ def _draw(panels: Sequence[Panel], spectra: Sequence[Spectrum], request: Spectru
 def _claims(spectra: Sequence[Spectrum], request: SpectrumRequest, tiles: Tiles, data: Path, screen: Console) -> None:
     from rockcheck.validation.spectra.claims import Claims, check_claims, extra_runs
 
-    tiles.progress = None
+    tiles.count = Count()
     claims = check_claims(spectra, extra_runs(tiles, request))
     grid = f"{len(request.amplitudes)} x {len(request.frequencies)}"
     write_whole(data / "claims.json", Claims(grid=grid, model=request.model, claims=claims).model_dump_json(indent=1) + "\n")
@@ -239,16 +232,9 @@ def _verify(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, dat
 
     nodes = len(request.frequencies) * len(request.amplitudes)
     warm_up(panels[0], request)
-    finished = 0
-    with _bar("refined and full", 2 * nodes * len(panels)) as advance:
-
-        def done(panel: Panel) -> None:
-            nonlocal finished
-            finished += 1
-            advance(to=2 * nodes * finished)
-
-        tiles.progress = advance
-        found = verify(panels, request, tiles, done)
+    with progress("refined and full") as on_progress:
+        tiles.count = Count(on_progress, 2 * nodes * len(panels))
+        found = verify(panels, request, tiles)
     _write_table("refinement", found, (COLUMNS, *found.rows), data)
     screen.print(_table(COLUMNS, found.rows, words=1))
 
@@ -263,8 +249,8 @@ def _agreement(panels: Sequence[Panel], request: SpectrumRequest, count: int, ti
         raise InputError(f"{count} is not allowed: 2 up to the spectrum's nodes are asked for", "--agreement")
     spectra = play_panels(panels, request, tiles)
     on_maps = MAP_SIZE**2 * len(mapped(panels)) * (1 + len(CANDIDATES))
-    with _bar("agreement", count * len(CANDIDATES) * len(panels) + on_maps) as advance:
-        tiles.progress = advance
+    with progress("agreement") as on_progress:
+        tiles.count = Count(on_progress, count * len(CANDIDATES) * len(panels) + on_maps)
         found = agree(panels, spectra, request, count, tiles)
     _write_table("agreement", found, (COLUMNS, *found.rows), data)
     write(maps_figure(found, mapped(panels)), data / MAPS)
@@ -297,8 +283,8 @@ def _fragility(
         raise InputError("needs --scene", "--fragility")
     warm_up(panels[0], request)
     motions = 2 * len(records) if records else 2 * PULSES
-    with _bar("fragility", motions * len(request.amplitudes) * (1 + bool(panels[0].scene.walls))) as advance:
-        tiles.progress = advance
+    with progress("fragility") as on_progress:
+        tiles.count = Count(on_progress, motions * len(request.amplitudes) * (1 + bool(panels[0].scene.walls)))
         found = fragility(panels[0], request, records, tiles)
     write_whole(data / "fragility.json", found.model_dump_json(indent=1) + "\n")
     write_whole(data / "fragility.csv", csv(found))
@@ -306,18 +292,3 @@ def _fragility(
     for case in found.cases:
         fit = "no curve fits" if case.median is None else f"median {case.median:.3g}, dispersion {case.dispersion:.3g}"
         screen.print(f"{case.label}: {case.motions} motions, {fit}")
-
-
-@contextlib.contextmanager
-def _bar(what: str, total: int) -> Iterator[Any]:
-    """`progress` as a function that advances it by a count, or `to` a place."""
-    place = 0
-    with progress(what) as tell:
-        tell(0, total)
-
-        def advance(count: int = 0, *, to: int | None = None) -> None:
-            nonlocal place
-            place = place + count if to is None else to
-            tell(place, total)
-
-        yield advance

@@ -43,9 +43,9 @@ def run(
         if name not in PLAYERS:
             raise unknown_name("model", name, PLAYERS)
     folder = usable_folder(out)
-    with progress("stress") as tell:
+    with progress("stress") as on_progress:
         found = study.run_stress(
-            cast("study.What", what), seed=seed, quick=quick, runs=runs, jobs=jobs, models=model, folder=folder, progress=tell
+            cast("study.What", what), seed=seed, quick=quick, runs=runs, jobs=jobs, models=model, folder=folder, on_progress=on_progress
         )
     study.save(found, folder)
     from rockcheck.reports.studies.stress import write_stress

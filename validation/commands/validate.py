@@ -9,7 +9,6 @@ import typer
 from rich.console import Console
 
 from rockcheck.scenes import InputError
-from rockcheck.scenes.progress import listening
 from rockcheck.validation.commands import OUT, JobsOption, OutOption, SchedulerOption, answer, console, progress, suite_names, usable_folder
 from rockcheck.validation.commands.publish import keep, publish
 from rockcheck.validation.execute import remote, workers
@@ -54,13 +53,13 @@ def play_suite(suite: str, folder: Path, jobs: int | None, force: bool, strict: 
     """Run a suite with a progress bar on stderr."""
     loaded = load_suite(suite)
     play = workers.local if scheduler is None else remote.OnCluster(scheduler)
-    with progress(loaded.name) as tell:
-        return run_suite(loaded, folder, jobs=jobs, force=force, strict=strict, play=play, progress=tell)
+    with progress(loaded.name) as on_progress:
+        return run_suite(loaded, folder, jobs=jobs, force=force, strict=strict, play=play, on_progress=on_progress)
 
 
 def _published(folder: Path, jobs: int | None) -> Path:
-    with progress("pages") as tell, listening(lambda share: tell(share, 1.0)):
-        return publish(folder, jobs=jobs)
+    with progress("pages") as on_progress:
+        return publish(folder, jobs=jobs, on_progress=on_progress)
 
 
 def show(finished: Run, out: Console) -> None:

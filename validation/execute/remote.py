@@ -18,7 +18,8 @@ from collections.abc import Iterator, Sequence
 from typing import IO, Any
 
 from rockcheck.validation.execute.cluster import connected
-from rockcheck.validation.execute.workers import COMPILING, ONE_THREAD, BatchTask, Task, TaskResult, death, leaders, play, prepare
+from rockcheck.validation.execute.pool import COMPILING, ONE_THREAD, death, prepare
+from rockcheck.validation.execute.workers import BatchTask, Task, TaskResult, compiled_by, play
 
 #: What a process that has closed its streams may take to end, s.
 PATIENCE = 10.0
@@ -45,7 +46,7 @@ class OnCluster:
             return
         from distributed import as_completed
 
-        leader_of = leaders(tasks)
+        leader_of = _leaders(tasks)
         run = uuid.uuid4().hex
         with connected(self.address) as client:
             machines = {about["host"]: address for address, about in client.scheduler_info(n_workers=-1)["workers"].items()}
@@ -72,6 +73,12 @@ class OnCluster:
                 if done not in told:
                     told.add(done)
                     yield done, result if isinstance(result, TaskResult) else TaskResult(failure=f"the cluster lost it: {result}")
+
+
+def _leaders(tasks: Sequence[Task | BatchTask]) -> dict[int, int]:
+    """For each task of a package that compiles: the first task of that package."""
+    first: dict[str, int] = {}
+    return {n: first.setdefault(package, n) for n, task in enumerate(tasks) if (package := compiled_by(task))}
 
 
 class _Child:
@@ -110,7 +117,9 @@ class _Child:
         hangs = listener.is_alive()
         self.end(0.0 if hangs else PATIENCE)
         if hangs:
-            return TaskResult(failure=f"did not end within {seconds:g} s" if self.ready.is_set() else f"did not start within {STARTING:g} s")
+            return TaskResult(
+                failure=f"did not end within {seconds:g} s" if self.ready.is_set() else f"did not start within {STARTING:g} s"
+            )
         return TaskResult(failure=death(self.process.returncode))
 
     @property

@@ -1,8 +1,12 @@
 """The folder where results wait for the next run: written whole or not at all, read only if nothing they depend on changed.
 
-`histories/<scene>--<model>--<key>` has three files: `.csv` and `.events.csv` (`scenes.History.save`) and `.json`, the
-record, which is written last and holds the hashes of the other two. `comparisons/` holds figures in the same way. A name
-contains the hash of everything that the content depends on, so runs that share a folder can only ever write the same
+| folder | a result |
+|---|---|
+| `histories/` | `.csv` and `.events.csv` (`scenes.History.save`); `.json`, the record with their hashes, is written last |
+| `comparisons/` | `.json`: figures of a cell, peaks of an ensemble's batch, a horizon of predictability |
+| `tiles/` | `.json`: outcomes at some nodes of a spectrum |
+
+A name contains the hash of everything that the content depends on. So runs that share a folder can only ever write the same
 thing, and a reader never meets a half-written or outdated result.
 """
 
@@ -22,6 +26,7 @@ from rockcheck.scenes.writing import write_whole
 
 HISTORIES = "histories"
 COMPARISONS = "comparisons"
+TILES = "tiles"
 #: What a history's files are called after its name.
 SUFFIXES = {".csv", ".events.csv"}
 #: A result that no run has used for so long is removed, s.
@@ -35,12 +40,13 @@ def name_of(*parts: str) -> str:
 
 @dataclass(frozen=True)
 class Store:
-    """The results in a run's folder."""
+    """The results of some kinds in a folder. Raises `OSError` where the folder cannot be made."""
 
     folder: Path
+    kinds: tuple[str, ...] = (HISTORIES, COMPARISONS)
 
     def __post_init__(self) -> None:
-        for kind in (HISTORIES, COMPARISONS):
+        for kind in self.kinds:
             (self.folder / kind).mkdir(parents=True, exist_ok=True)
 
     def history(self, name: str) -> Path:
@@ -68,13 +74,13 @@ class Store:
         _touch(base / f"{name}.json")
         return record
 
-    def put_comparison(self, name: str, content: Mapping[str, Any]) -> None:
-        """Keep a cell's figures."""
-        write_whole(self.folder / COMPARISONS / f"{name}.json", json.dumps(content, sort_keys=True) + "\n")
+    def put_record(self, kind: str, name: str, content: Mapping[str, Any]) -> None:
+        """Keep a result that is one record, such as a cell's figures."""
+        write_whole(self.folder / kind / f"{name}.json", json.dumps(content, sort_keys=True) + "\n")
 
-    def get_comparison(self, name: str) -> dict[str, Any] | None:
-        """A cell's figures, or None."""
-        path = self.folder / COMPARISONS / f"{name}.json"
+    def get_record(self, kind: str, name: str) -> dict[str, Any] | None:
+        """A result that is one record, or None."""
+        path = self.folder / kind / f"{name}.json"
         found = _read(path)
         if found is not None:
             _touch(path)
@@ -83,7 +89,7 @@ class Store:
     def prune(self, now: float | None = None) -> None:
         """Remove results that no run has used for two weeks, and the leavings of killed runs after a day."""
         now = time.time() if now is None else now
-        for path in [*(self.folder / HISTORIES).iterdir(), *(self.folder / COMPARISONS).iterdir(), *self.folder.glob(".*.part")]:
+        for path in [*(path for kind in self.kinds for path in (self.folder / kind).iterdir()), *self.folder.glob(".*.part")]:
             record = path if path.suffix in (".json", ".part") else path.with_name(re.sub(r"(\.events)?\.csv$", ".json", path.name))
             used = record if record.exists() else path
             try:

@@ -1,39 +1,23 @@
-"""Cells in processes of their own: what a worker does, and the local pool with its limits of time and memory.
-
-A worker that crashes, hangs or runs out of memory costs its own cell and nothing else.
-"""
+"""What a worker anywhere does with a cell, and cells in processes of this machine."""
 
 from __future__ import annotations
 
 import dataclasses
-import multiprocessing
-import os
-import signal
 import sys
 import tempfile
-import threading
 import time
+from collections import deque
 from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
-from contextlib import contextmanager
 from dataclasses import dataclass, field
-from multiprocessing import resource_tracker
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rockcheck.scenes import History, InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.execute.models import build, family
-
-if TYPE_CHECKING:
-    from pebble import ProcessPool
-
-#: One thread a worker: the cells are what runs in parallel.
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-#: What the first task of a package may take in addition, to compile, s.
-COMPILING = 600.0
+from rockcheck.validation.execute.pool import Call, Pool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,71 +123,6 @@ def _plain(settings: Any) -> dict[str, Any]:
     return dict(sorted(plain.items()))
 
 
-@contextmanager
-def workers(jobs: int, memory_mb: float) -> Iterator[ProcessPool]:
-    """A pool of processes with one thread each; left by an exception (Ctrl-C is one), it ends whatever they do."""
-    from pebble import ProcessPool
-
-    before = {key: os.environ.get(key) for key in ONE_THREAD}
-    os.environ.update(ONE_THREAD)
-    try:
-        with ProcessPool(
-            max_workers=jobs, context=multiprocessing.get_context("spawn"), initializer=prepare, initargs=(memory_mb,)
-        ) as pool:
-            try:
-                with _interrupts_held():
-                    if not pool.active:  # asking starts it
-                        raise RuntimeError("the workers do not start")
-                yield pool
-            except BaseException:
-                pool.stop()
-                raise
-    finally:
-        for key, value in before.items():
-            os.environ.pop(key, None) if value is None else os.environ.update({key: value})
-
-
-@contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Ctrl-C waits for the end of this block, and never reaches processes and threads that are started in it.
-
-    Ctrl-C goes to all processes of a terminal. One that starts would die of it, with a traceback, before `prepare` can say otherwise.
-    The pool's threads, which replace lost workers, keep this thread's mask.
-    """
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    resource_tracker.ensure_running()  # as it starts it lets SIGINT through again
-    came: list[int] = []
-    handler = signal.getsignal(signal.SIGINT)
-    ours = callable(handler) and threading.current_thread() is threading.main_thread()
-    if ours:  # whichever thread the signal comes to, its handler runs in this one
-        signal.signal(signal.SIGINT, lambda number, _: came.append(number))
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        if ours:
-            signal.signal(signal.SIGINT, handler)
-        if came:
-            signal.raise_signal(signal.SIGINT)
-
-
-def loss_of(future: Future[Any]) -> str:
-    """Why a process gave nothing back; empty where it did."""
-    from pebble import ProcessExpired
-
-    error = future.exception()
-    if error is None:
-        return ""
-    if isinstance(error, TimeoutError):
-        return "hangs"
-    if isinstance(error, ProcessExpired):
-        return death(int(error.exitcode or 0))
-    return printable(f"{type(error).__name__}: {error}", 300)
-
-
 def local(tasks: Sequence[Task | BatchTask], *, jobs: int, seconds: Sequence[float], memory_mb: float) -> Iterator[tuple[int, TaskResult]]:
     """Play tasks in `jobs` processes; yields (index, result) as they end. `seconds` limits each task's wall time.
 
@@ -211,76 +130,13 @@ def local(tasks: Sequence[Task | BatchTask], *, jobs: int, seconds: Sequence[flo
     """
     if not tasks:
         return
-    leader_of = leaders(tasks)
-    with workers(max(1, min(jobs, len(tasks))), memory_mb) as pool:
-        running: dict[Any, tuple[int, float]] = {}
-
-        def begin(n: int) -> None:
-            limit = seconds[n] + (COMPILING if leader_of.get(n) == n else 0.0)
-            running[pool.schedule(play, args=(tasks[n],), timeout=limit)] = n, limit
-
-        for n in range(len(tasks)):
-            if leader_of.get(n, n) == n:
-                begin(n)
-        while running:
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                done, limit = running.pop(future)
-                for n in [n for n, leader in leader_of.items() if leader == done != n]:
-                    begin(n)
-                yield done, _outcome(future, limit)
+    calls = (Call(play, (task,), limit, compiled_by(task), n) for n, (task, limit) in enumerate(zip(tasks, seconds, strict=True)))
+    with Pool(max(1, min(jobs, len(tasks))), memory_mb) as pool:
+        for ended in pool.run(deque(calls)):
+            yield ended.call.key, TaskResult(failure=ended.fault) if ended.error else ended.result
 
 
-def leaders(tasks: Sequence[Work]) -> dict[int, int]:
-    """For each task of a package that compiles: the first task of that package."""
-    first: dict[str, int] = {}
-    return {n: first.setdefault(family(task.family).module, n) for n, task in enumerate(tasks) if family(task.family).compiled}
-
-
-def prepare(memory_mb: float) -> None:
-    """Make this worker die with the run, and fail where it takes more memory than it may (where the system can say so)."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run itself ends its workers
-    if (run := multiprocessing.parent_process()) is not None:
-        threading.Thread(target=_follow, args=(run,), daemon=True).start()
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for stream in (1, 2):  # the terminal is the run's; engines greet on it from C
-        os.dup2(nowhere, stream)
-    try:
-        import resource
-
-        most = int(memory_mb * 2**20)
-        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    except (ImportError, ValueError, OSError):
-        pass
-
-
-def _follow(run: Any) -> None:
-    """End this process, whatever it is doing, once the run has ended in whatever way."""
-    run.join()
-    os._exit(1)
-
-
-def _outcome(future: Any, seconds: float) -> TaskResult:
-    from pebble import ProcessExpired
-
-    try:
-        result: TaskResult = future.result()
-    except TimeoutError:
-        return TaskResult(failure=f"did not end within {seconds:g} s")
-    except ProcessExpired as error:
-        return TaskResult(failure=death(int(error.exitcode or 0)))
-    except MemoryError:
-        return TaskResult(failure="out of memory")
-    except Exception as error:  # such as a result that cannot be sent back
-        return TaskResult(failure=printable(f"{type(error).__name__}: {error}", 300))
-    return result
-
-
-def death(code: int) -> str:
-    """How a process ended, from its exit code."""
-    if code < 0:
-        try:
-            return f"crashed: {signal.Signals(-code).name}"
-        except ValueError:
-            return f"crashed: signal {-code}"
-    return f"the process ended with code {code}"
+def compiled_by(task: Work) -> str:
+    """The package whose code a task may have to compile, empty where there is none."""
+    kind = family(task.family)
+    return kind.module if kind.compiled else ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any
 
@@ -110,7 +110,6 @@ def agree(
     request: SpectrumRequest,
     count: int,
     tiles: Tiles,
-    done: Callable[[Panel], None] | None = None,
 ) -> Agreement:
     """Plays `count` nodes of each spectrum by the other models and counts equal outcomes; then a map of one figure by each model."""
     shares: list[Share] = []
@@ -142,13 +141,12 @@ def agree(
                         equal=equal,
                     )
                 )
-        if done is not None:
-            done(panel)
+    grid = f"{len(request.amplitudes)} x {len(request.frequencies)}"
     about = (
-        f"Share of equal outcomes at {count} nodes of each spectrum of {len(request.amplitudes)} x {len(request.frequencies)} nodes,"
-        f" half of them at most {NEAR} nodes from a boundary (near), the others further away, against the paper's bilateral event-based model and"
-        " against the unilateral one, which lets the block hop as the other models do. Runs of the other models end with the pulse where"
-        f" the block then lacks the energy to tip over, otherwise {SETTLE:g} s later; a block that then stands counts as safe."
+        f"Share of equal outcomes at {count} nodes of each spectrum of {grid} nodes. Half of them are at most {NEAR} nodes from a boundary"
+        " (near), the others further away. Models are held against the paper's bilateral event-based model and against the unilateral one,"
+        " which lets the block hop as the other models do. Runs of the other models end with the pulse where the block then lacks the"
+        f" energy to tip over, otherwise {SETTLE:g} s later. A block that then stands counts as safe."
     )
     plain = {request.model: dict(request.settings)} | {model: dict(chosen) for model, chosen in settings.items()}
     across, up = (np.linspace(axis[0], axis[-1], MAP_SIZE) for axis in (request.frequencies, request.amplitudes))

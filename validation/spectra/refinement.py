@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
@@ -69,14 +69,12 @@ class Refinement(Stored):
         return tuple(rows)
 
 
-def verify(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, done: Callable[[Panel], None] | None = None) -> Refinement:
+def verify(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles) -> Refinement:
     """Plays each spectrum on the full grid and refined, and counts the nodes that differ."""
     found = []
     for panel in panels:
         full, refined = (play_panels([panel], replace(request, refine=refine), tiles)[0] for refine in (False, True))
         found.append(compared(panel.name, full, refined))
-        if done is not None:
-            done(panel)
     return Refinement(
         date=datetime.now(UTC).date().isoformat(),
         versions=provenance.versions(),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -37,7 +37,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "mujoco": {"time_step": "adaptive", "largest_step": 2e-3},
     "pybullet": {"time_step": "adaptive", "largest_step": 2e-3},
 }
-SPECTRA, TILES = "spectra", "tiles"
+SPECTRA = "spectra"
 #: Results of the long studies of spectra, as they come with the package.
 KEPT = Path(str(resources.files("rockcheck.validation"))) / "data" / "spectra"
 
@@ -130,13 +130,8 @@ def axis(low: float, high: float, size: int, key: str) -> Floats:
     return np.linspace(low, high, size)
 
 
-def play_panels(
-    panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, done: Callable[[Panel], None] | None = None
-) -> list[Spectrum]:
-    """The spectra of the panels, in order; on a cluster all at once, here one after the other on all cores.
-
-    `done` is called when a panel is finished. Raises `InputError`.
-    """
+def play_panels(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles) -> list[Spectrum]:
+    """The spectra of the panels, in order; on a cluster all at once, here one after the other on all cores. Raises `InputError`."""
 
     def play(panel: Panel) -> Spectrum:
         spectrum = overturning_spectrum(
@@ -146,8 +141,7 @@ def play_panels(
             refine=request.refine,
             play=lambda scene, a, f: tiles.play(scene, a, f, model=request.model, settings=request.settings),
         )
-        if done is not None:
-            done(panel)
+        tiles.count.add(spectrum.outcomes.size - spectrum.evaluations)  # what did not have to be run
         return spectrum
 
     for panel in panels:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future, as_completed
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -18,7 +18,7 @@ from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Res
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import build
-from rockcheck.validation.execute.workers import loss_of, workers
+from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.stress.players import energy_without_source
 
 Axis = Literal["size", "friction", "restitution", "shaking"]
@@ -247,13 +247,10 @@ def play(work: Sequence[MapTask], jobs: int) -> Iterator[tuple[int, Still | Stab
     """Plays tasks in processes; yields (index, result) as they end."""
     if not work:
         return
-    with workers(jobs, MEMORY) as pool:
-        running: dict[Future[Any], int] = {
-            pool.schedule(task.find, args=task.arguments, timeout=task.seconds): n for n, task in enumerate(work)
-        }
-        for future in as_completed(running):
-            n, fault = running[future], loss_of(future)
-            yield n, work[n].lost(fault) if fault else future.result()
+    with Pool(jobs, MEMORY) as pool:
+        for ended in pool.run(deque(Call(task.find, task.arguments, task.seconds, key=n) for n, task in enumerate(work))):
+            n = ended.call.key
+            yield n, work[n].lost(ended.fault) if ended.error else ended.result
 
 
 def stability_of(found: Iterable[Still | Stable]) -> Stability:

@@ -6,9 +6,8 @@ import json
 import math
 import os
 import time
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, as_completed, wait
+from collections import Counter, deque
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,22 +15,22 @@ from typing import Any, Literal
 
 from rockcheck.scenes import Scene
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.workers import loss_of, workers
+from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.stress import stability
 from rockcheck.validation.stress.invariants import INVARIANTS, CheckedRun
 from rockcheck.validation.stress.players import PLAYERS
 from rockcheck.validation.stress.shrinking import shrink, write_scene
 from rockcheck.validation.stress.stability import AXIS_WORDS, Stability
 
-Progress = Callable[[int, int, str], None]
 What = Literal["all", "runs", "maps"]
 #: Runs that one task of a worker holds, and how long (s) one of them may take on the average: event-based runs, others.
 CHUNK, APPROXIMATE_CHUNK = 250, 20
 SECONDS_A_RUN, SECONDS_AN_APPROXIMATE_RUN = 0.2, 2.0
-#: How long (s) a task may take in addition, and the first one of a model, which may have to compile.
-PATIENCE, COMPILING = 20.0, 600.0
+#: How long (s) a task may take in addition.
+PATIENCE = 20.0
 #: Memory that a worker may take, MB.
 MEMORY = 2048.0
 #: Failures of a model and an invariant that are written as scenes; how long (s) all of them may be shrunk, in a whole run and in a
@@ -226,7 +225,7 @@ def run_stress(
     jobs: int | None = None,
     models: Sequence[str] | None = None,
     folder: Path | None = None,
-    progress: Progress = lambda done, of, text: None,
+    on_progress: OnProgress = unheard,
 ) -> Stress:
     """Plays `runs` scenes with each of the `models` (default: all, as many as `PLAYERS` says) in `jobs` processes (one a core).
 
@@ -266,7 +265,7 @@ def run_stress(
         for batch in _side_by_side(work, jobs):
             batches[batch.model] += batch
             done += batch.runs
-            progress(done, total, batch.model)
+            on_progress(done, total, batch.model)
             if folder is not None and time.monotonic() > saved + SAVING:
                 save(found(), folder)
                 saved = time.monotonic()
@@ -276,10 +275,10 @@ def run_stress(
     keep()
     try:
         if folder is not None:
-            _shrink(found().failures, folder, jobs, SHRINKING_QUICK if quick else SHRINKING, progress)
+            _shrink(found().failures, folder, jobs, SHRINKING_QUICK if quick else SHRINKING, on_progress)
         for n, place in stability.play(maps, jobs):
             places[n] = place
-            progress(len(places), len(maps), f"map of {place.line}")
+            on_progress(len(places), len(maps), f"map of {place.line}")
     except KeyboardInterrupt:
         return found()
     return found(complete=True)
@@ -287,28 +286,22 @@ def run_stress(
 
 def _side_by_side(work: Sequence[Chunk], jobs: int) -> Iterator[RunTotals]:
     """Plays chunks in processes. A chunk whose process hangs or dies is halved until the run that did it stands alone."""
-    waiting = list(reversed(work))
-    running: dict[Future[RunTotals], Chunk] = {}
-    started: set[str] = set()
     if not work:
         return
-    with workers(jobs, MEMORY) as pool:
-        while waiting or running:
-            while waiting and len(running) < jobs + 1:
-                chunk = waiting.pop()
-                seconds = chunk.seconds + (0.0 if chunk.label in started else COMPILING)
-                arguments = (chunk.label, chunk.seed, chunk.first, chunk.count)
-                running[pool.schedule(play_some, args=arguments, timeout=seconds)] = chunk
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                chunk = running.pop(future)
-                fault = loss_of(future)
-                if not fault:
-                    started.add(chunk.label)
-                    yield future.result()
-                elif chunk.count > 1:
-                    waiting += chunk.halves
-                else:
-                    yield _lost(chunk, fault)
+    waiting = deque(map(_call, work))
+    with Pool(jobs, MEMORY) as pool:
+        for ended in pool.run(waiting):
+            chunk = ended.call.key
+            if ended.error is None:
+                yield ended.result
+            elif chunk.count > 1:
+                waiting.extendleft(map(_call, chunk.halves))
+            else:
+                yield _lost(chunk, ended.fault)
+
+
+def _call(chunk: Chunk) -> Call:
+    return Call(play_some, (chunk.label, chunk.seed, chunk.first, chunk.count), chunk.seconds, chunk.label, chunk)
 
 
 def _lost(chunk: Chunk, fault: str) -> RunTotals:
@@ -344,7 +337,7 @@ def _write(failure: Failure, scene: Scene, folder: Path, remark: str = "") -> No
     write_scene(scene, file, "\n".join(line for line in words if line))
 
 
-def _shrink(failures: Sequence[Failure], folder: Path, jobs: int, seconds: float, progress: Progress) -> None:
+def _shrink(failures: Sequence[Failure], folder: Path, jobs: int, seconds: float, on_progress: OnProgress) -> None:
     """Shrinks the scenes in `failures/` where they stand, in processes, for so long: what is small is there whatever ends it."""
     turns: Counter[tuple[str, str]] = Counter()
     queue = []
@@ -354,16 +347,11 @@ def _shrink(failures: Sequence[Failure], folder: Path, jobs: int, seconds: float
     if not queue:
         return
     each = ONE_FAILURE * seconds
-    with workers(jobs, MEMORY) as pool:
-        running = [
-            pool.schedule(shrink_file, args=(failure, folder, each), timeout=each + HANGING)
-            for *_, failure in sorted(queue, key=lambda entry: entry[:2])
-        ]
-        try:
-            for done, _ in enumerate(as_completed(running, timeout=STARTING + seconds), 1):
-                progress(done, len(running), "smallest scenes")
-        except TimeoutError:
-            pool.stop()
+    ordered = sorted(queue, key=lambda entry: entry[:2])
+    with Pool(jobs, MEMORY) as pool:
+        calls = deque(Call(shrink_file, (failure, folder, each), each + HANGING) for *_, failure in ordered)
+        for done, _ in enumerate(pool.run(calls, until=time.monotonic() + STARTING + seconds), 1):
+            on_progress(done, len(ordered), "smallest scenes")
 
 
 def shrink_file(failure: Failure, folder: Path, seconds: float) -> None:

@@ -16,20 +16,19 @@ from typing import Any
 import numpy as np
 
 from rockcheck.scenes import History, InputError, Scene
+from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.validation.discrepancy.compare import compare, describe, evaluate, too_short
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.execute import provenance, workers
 from rockcheck.validation.execute.models import is_own
-from rockcheck.validation.execute.store import HISTORIES, Store, name_of
+from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, Store, name_of
 from rockcheck.validation.suite.ensembles import Ensemble
 from rockcheck.validation.suite.results import Cell, CostRecord, EnsembleRecord, Run
 from rockcheck.validation.suite.suites import ModelVariant, Suite
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Place, Windowed, judge
 
-#: Told after each cell: cells done, cells in all, and a few words on what was last.
-Progress = Callable[[int, int, str], None]
 #: Plays tasks somewhere: yields (index, result) as they end.
 Executor = Callable[..., Iterator[tuple[int, workers.TaskResult]]]
 
@@ -85,14 +84,13 @@ def run_suite(
     force: bool = False,
     strict: bool = False,
     play: Executor = workers.local,
-    progress: Progress | None = None,
+    on_progress: OnProgress = unheard,
 ) -> Run:
     """Play, compare and judge every cell of a suite; results are kept in `folder` and read back while up to date.
 
     A cell that fails is a failed cell of the run, never an exception. Raises `InputError` where `folder` cannot be used.
     """
     began = time.perf_counter()
-    report = progress or (lambda done, of, what: None)
     try:
         store = Store(folder)
     except OSError as error:
@@ -106,12 +104,12 @@ def run_suite(
     failures: dict[Planned, str] = {}
     if not force:
         for item in items:
-            found = store.get(item.name) if isinstance(item, PlannedCell) else store.get_comparison(item.name)
+            found = store.get(item.name) if isinstance(item, PlannedCell) else store.get_record(COMPARISONS, item.name)
             if found is not None:
                 records[item] = found
     read_back = set(records)
     waiting = [item for item in items if item not in records]
-    report(len(records), len(items), f"{len(records)} up to date")
+    on_progress(len(records), len(items), f"{len(records)} up to date")
     limits = [suite.suite_of(item.place).limits for item in waiting]
     for index, result in play(
         [_task(item, suite.path.parent) for item in waiting],
@@ -127,8 +125,8 @@ def run_suite(
             if isinstance(item, PlannedCell):
                 store.put(item.name, result.files, result.record)
             else:
-                store.put_comparison(item.name, result.record)
-        report(len(records) + len(failures), len(items), f"{item.place}, {item.variant.label}")
+                store.put_record(COMPARISONS, item.name, result.record)
+        on_progress(len(records) + len(failures), len(items), f"{item.place}, {item.variant.label}")
     by_place = {(planned.scene.name, planned.variant.label): planned for planned in planned_cells}
     cells = [_cell(suite, planned, by_place, records, failures, store, planned in read_back) for planned in planned_cells]
     ensembles, ensemble_cells = _ensembles(suite, batches, records, failures, read_back)
@@ -315,12 +313,12 @@ def _horizon(store: Store, scene: Scene) -> float:
     """The time up to which histories of this scene can be compared point by point (`ebm.horizon`), s; kept in the store."""
     key = provenance.cell_key(scene, "ebm-unilateral", {"of": "horizon"})
     name = name_of(scene.name, HORIZON, key)
-    found = store.get_comparison(name)
+    found = store.get_record(COMPARISONS, name)
     if found is None:
         from rockcheck.ebm.horizon import predictability_horizon
 
         found = {"horizon": predictability_horizon(scene)}
-        store.put_comparison(name, found)
+        store.put_record(COMPARISONS, name, found)
     return float(found["horizon"])
 
 
@@ -335,10 +333,10 @@ def _compared(
     code = provenance.code_digest("rockcheck.validation.discrepancy.compare")
     key = provenance.digest(json.dumps([planned.key, reference.key if reference else "", list(map(str, windowed)), horizon, code]))
     name = name_of(scene.name, planned.variant.label, reference.variant.label if reference else OWN_FIGURES, key)
-    found = store.get_comparison(name)
+    found = store.get_record(COMPARISONS, name)
     if found is None:
         found = _compute(store, scene, planned, reference, windowed, horizon)
-        store.put_comparison(name, found)
+        store.put_record(COMPARISONS, name, found)
     return found
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rockcheck.scenes import Scene
 from rockcheck.validation.stress import study
-from rockcheck.validation.stress.invariants import Played
+from rockcheck.validation.stress.invariants import CheckedRun
 from rockcheck.validation.stress.players import EventBased
 from rockcheck.validation.stress.study import Failure, RunTotals
 
@@ -27,14 +27,14 @@ def play_some(label: str, seed: int, first: int, count: int) -> RunTotals:
 def shrink_file(failure: Failure, folder: Path, seconds: float) -> None:
     """Every scene fails. Run 13 kills its process, run 4 takes its time, run 3 never ends once it has no walls."""
 
-    def check(self: EventBased, scene: Scene, seed: int, number: int, only: str = "") -> Played:
+    def check(self: EventBased, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
         if number == 13:
             os._exit(9)
         if number == 4:
             time.sleep(0.5)
         if number == 3 and not scene.walls:
             time.sleep(600.0)
-        return Played(figures={"mirror": 1.0})
+        return CheckedRun(figures={"mirror": 1.0})
 
     # The players are frozen, and a process that dies can be shown only by one that does.
     EventBased.check = check  # type: ignore[method-assign]

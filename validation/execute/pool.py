@@ -1,0 +1,210 @@
+"""Calls in processes of their own, with limits of time and memory: for cells, spectra, studies and pages alike.
+
+A process that crashes, hangs or runs out of memory costs the call that it was at, and nothing else.
+"""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from multiprocessing import resource_tracker
+from typing import Any, Self
+
+from rockcheck.scenes.errors import printable
+
+#: One thread a process: the calls are what runs in parallel.
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+#: What the first call that uses compiled code may take in addition, to compile it, s.
+COMPILING = 600.0
+
+
+@dataclass(frozen=True, eq=False)
+class Call:
+    """A function of a module with arguments that can be pickled, for one process.
+
+    `seconds` limits its wall time. `compiles` names the code that it may have to compile: of the calls with the same name one
+    goes first, with `COMPILING` s more, and the others wait for it. `key` is the caller's own, to know the call again.
+    """
+
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...] = ()
+    seconds: float = math.inf
+    compiles: str = ""
+    key: Any = None
+
+
+@dataclass(frozen=True, eq=False)
+class Ended:
+    """A call that has ended: its result, or the error that it or its process ended with."""
+
+    call: Call
+    result: Any = None
+    error: BaseException | None = None
+    #: How long it was given, s.
+    seconds: float = math.inf
+
+    @property
+    def fault(self) -> str:
+        """Why there is no result, in one line; empty where there is one."""
+        from pebble import ProcessExpired
+
+        if self.error is None:
+            return ""
+        if isinstance(self.error, TimeoutError):
+            return f"did not end within {self.seconds:g} s"
+        if isinstance(self.error, ProcessExpired):
+            return death(int(self.error.exitcode or 0))
+        if isinstance(self.error, MemoryError):
+            return "out of memory"
+        return printable(f"{type(self.error).__name__}: {self.error}", 300)
+
+
+@dataclass(eq=False)
+class Pool:
+    """`jobs` processes with one thread and at most `memory_mb` each (None: as much as there is).
+
+    A context: left by an exception (Ctrl-C is one), it ends whatever they do.
+    """
+
+    jobs: int
+    memory_mb: float | None = None
+    _pool: Any = field(default=None, init=False, repr=False)
+    _environment: dict[str, str | None] = field(default_factory=dict, init=False, repr=False)
+    _compiled: set[str] = field(default_factory=set, init=False, repr=False)
+
+    def __enter__(self) -> Self:
+        from pebble import ProcessPool
+
+        self._environment = {key: os.environ.get(key) for key in ONE_THREAD}
+        os.environ.update(ONE_THREAD)
+        self._pool = ProcessPool(
+            max_workers=self.jobs,
+            context=multiprocessing.get_context("spawn"),
+            initializer=prepare,
+            initargs=(self.memory_mb,),
+        )
+        try:
+            with _interrupts_held():
+                if not self._pool.active:  # asking starts it
+                    raise RuntimeError("the processes do not start")
+        except BaseException as error:
+            self.__exit__(type(error))
+            raise
+        return self
+
+    def __exit__(self, kind: object, *fault: object) -> None:
+        try:
+            self._pool.close() if kind is None else self._pool.stop()
+            self._pool.join()
+        finally:
+            for key, value in self._environment.items():
+                os.environ.pop(key, None) if value is None else os.environ.update({key: value})
+
+    def run(self, waiting: deque[Call], *, until: float = math.inf) -> Iterator[Ended]:
+        """Runs the calls and yields each as it ends. The caller may put calls into `waiting`, or take them out, meanwhile.
+
+        What has not ended at `until` (of `time.monotonic`) is ended and not yielded.
+        """
+        running: dict[Future[Any], tuple[Call, float]] = {}
+        try:
+            while waiting or running:
+                self._begin(waiting, running)
+                done = wait(running, None if until == math.inf else max(0.0, until - time.monotonic()), FIRST_COMPLETED).done
+                if not done:
+                    return
+                for future in done:
+                    call, seconds = running.pop(future)
+                    self._compiled.add(call.compiles)
+                    error = future.exception()
+                    yield Ended(call, None if error else future.result(), error, seconds)
+        finally:
+            for future in running:
+                future.cancel()
+
+    def _begin(self, waiting: deque[Call], running: dict[Future[Any], tuple[Call, float]]) -> None:
+        """Begins calls for all processes that have none; one that waits for a compiler is passed over."""
+        compiling = {call.compiles for call, _ in running.values()} - self._compiled
+        held: list[Call] = []
+        while waiting and len(running) < self.jobs:
+            call = waiting.popleft()
+            if call.compiles in compiling:
+                held.append(call)
+                continue
+            seconds = call.seconds
+            if call.compiles and call.compiles not in self._compiled:
+                compiling.add(call.compiles)
+                seconds += COMPILING
+            limit = None if seconds == math.inf else seconds
+            running[self._pool.schedule(call.function, args=call.arguments, timeout=limit)] = call, seconds
+        waiting.extendleft(reversed(held))
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Ctrl-C waits for the end of this block, and never reaches processes and threads that are started in it.
+
+    Ctrl-C goes to all processes of a terminal. One that starts would die of it, with a traceback, before `prepare` can say otherwise.
+    The pool's threads, which replace lost workers, keep this thread's mask.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # as it starts it lets SIGINT through again
+    came: list[int] = []
+    handler = signal.getsignal(signal.SIGINT)
+    ours = callable(handler) and threading.current_thread() is threading.main_thread()
+    if ours:  # whichever thread the signal comes to, its handler runs in this one
+        signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        if ours:
+            signal.signal(signal.SIGINT, handler)
+        if came:
+            signal.raise_signal(signal.SIGINT)
+
+
+def prepare(memory_mb: float | None) -> None:
+    """Make this process die with the run, and fail where it takes more memory than it may (where the system can say so)."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run itself ends its processes
+    if (run := multiprocessing.parent_process()) is not None:
+        threading.Thread(target=_follow, args=(run,), daemon=True).start()
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):  # the terminal is the run's; engines greet on it from C
+        os.dup2(nowhere, stream)
+    try:
+        import resource
+
+        if memory_mb is not None:
+            most = int(memory_mb * 2**20)
+            resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    except (ImportError, ValueError, OSError):
+        pass
+
+
+def _follow(run: Any) -> None:
+    """End this process, whatever it is doing, once the run has ended in whatever way."""
+    run.join()
+    os._exit(1)
+
+
+def death(code: int) -> str:
+    """How a process ended, from its exit code."""
+    if code < 0:
+        try:
+            return f"crashed: {signal.Signals(-code).name}"
+        except ValueError:
+            return f"crashed: signal {-code}"
+    return f"the process ended with code {code}"
