@@ -97,7 +97,8 @@ class _Past(NamedTuple):
 def march_adaptively(scene: Scene, base: BaseMotion, push: Push, longest: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Times (n) and states (n, 6) at step ends, and the accelerations (n-1, 2) felt in the steps, until |theta| = pi/2.
 
-    The scene is one of a block with R = 1, see `engines.engine.in_units_of`; `base` is its base motion. No step is longer than `longest` s.
+    The scene is one of a block with R = 1, see `engines.marching.in_units_of`; `base` is its base motion. No step is longer than
+    `longest` s.
     Raises `ModelFailure` if the motion blows up or needs very many steps.
     """
     contacts, limits = contacts_of(scene), _Limits.of(scene, longest)

@@ -1,4 +1,4 @@
-"""What every engine shares: its settings, the march through a scene, and the history that comes out."""
+"""The door that every engine stands behind: its settings, what it is asked for, and the history that comes out."""
 
 from __future__ import annotations
 
@@ -8,48 +8,24 @@ from abc import abstractmethod
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
-from typing import ClassVar, Literal, Protocol, Self
+from importlib.util import find_spec
+from typing import ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import field_validator, model_validator
 
-from rockcheck.engines.adaptive import Push, march_adaptively
+from rockcheck.engines.adaptive import march_adaptively
 from rockcheck.engines.base_motion import BaseMotion
 from rockcheck.engines.contacts import contacts_of
 from rockcheck.engines.events import events_of
-from rockcheck.scenes import Block, Cost, History, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall
+from rockcheck.engines.marching import Marched, at_output_times, in_units_of, march_fixed
+from rockcheck.engines.world import World
+from rockcheck.scenes import Cost, History, InputError, Scene
 from rockcheck.scenes.base import Frozen, Positive
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.observation import observe
-from rockcheck.scenes.progress import tell
 
-FloatArray = NDArray[np.float64]
-Marched = tuple[FloatArray, FloatArray, FloatArray]  # times (n) and states (n, 6) at step ends, felt accelerations (n-1, 2)
 MOST_STEPS = 5_000_000
-STEPS_AT_ONCE = 2048
-BLOWN_UP = 1e6  # m, rad, m/s or rad/s: no scene comes near it
-
-
-class World(Protocol):
-    """One scene as an engine holds it: a block of unit mass that is free to move in its plane."""
-
-    def place(self, state: FloatArray) -> None:
-        """Put the block where `state` (6) says."""
-
-    def march(self, felt: FloatArray, dt: float) -> FloatArray:
-        """States (n, 6) after each of n steps of `dt` s, with the `felt` accelerations (n, 2) in m/s^2."""
-
-    def close(self) -> None:
-        """Give back what the engine holds."""
-
-
-class RigidWorld(World, Protocol):
-    """A world whose contacts stop or bounce within one step, whatever the step, so that steps can vary."""
-
-    @property
-    def push(self) -> Push:
-        """The engine as a map of velocities."""
 
 
 class Engine(Frozen):
@@ -62,6 +38,13 @@ class Engine(Frozen):
     """
 
     name: ClassVar[str]
+    #: The module that it needs, and the extra of rockcheck that installs it; "" where it comes with rockcheck.
+    module: ClassVar[str] = ""
+    extra: ClassVar[str] = ""
+    #: Why its steps cannot vary; "" where they can.
+    fixed_because: ClassVar[str] = ""
+    #: The settings in which contacts have Newton's coefficient of restitution.
+    bounces_with: ClassVar[tuple[str, ...]] = ("best", "default")
     time_step: float | Literal["adaptive"] = 1e-4
     largest_step: Positive = 1e-3
     settings: Literal["best", "default"] = "best"
@@ -76,24 +59,41 @@ class Engine(Frozen):
         raise InputError(f'{printable(value)} is not allowed: a step above 0 s, or "adaptive", is asked for')
 
     @model_validator(mode="after")
-    def _rigid_if_adaptive(self) -> Self:
+    def _possible(self) -> Self:
         if self.settings == "default" and self.time_step == "adaptive":
             raise InputError('"adaptive" is not allowed with settings = "default": give a step in s', "time_step")
+        if self.fixed_because and self.time_step == "adaptive":
+            raise InputError(f'"adaptive" is not allowed: {self.fixed_because}; give a step in s', "time_step")
+        if not self.installed():
+            raise InputError(f"the engine {self.name} is not installed: pip install 'rockcheck[{self.extra}]'")
         return self
 
+    @classmethod
+    def installed(cls) -> bool:
+        """Whether the module that it needs can be imported."""
+        return not cls.module or find_spec(cls.module) is not None
+
     @abstractmethod
-    def rigid_world(self, scene: Scene) -> RigidWorld:
-        """The scene as this engine holds it at its best."""
+    def rigid_world(self, scene: Scene) -> World:
+        """The scene as this engine holds it at its best: contacts stop or bounce within one step, whatever the step."""
 
     @abstractmethod
     def stock_world(self, scene: Scene) -> World:
         """The scene as this engine holds it with its own contact parameters."""
 
+    def lacks(self) -> tuple[str, ...]:
+        """What these settings do not have at all: "restitution" or nothing."""
+        return () if self.settings in self.bounces_with else ("restitution",)
+
     def notes(self, scene: Scene) -> list[str]:
         """What this engine cannot do of the scene, a line each."""
-        if scene.floor.mu_s == scene.floor.friction:
-            return []
-        return [f"the engine has one friction coefficient: kinetic {scene.floor.friction:g} is used for static {scene.floor.mu_s:g}"]
+        notes = []
+        if scene.floor.mu_s != scene.floor.friction:
+            friction = f"kinetic {scene.floor.friction:g} is used for static {scene.floor.mu_s:g}"
+            notes.append(f"the engine has one friction coefficient: {friction}")
+        if "restitution" in self.lacks() and any(contact.restitution > 0.0 for contact in contacts_of(scene)):
+            notes.append(f"{self.name} has no coefficient of restitution with these settings; that of the scene is not used")
+        return notes
 
     def simulate(self, scene: Scene) -> History:
         """The history of the scene as the engine plays it.
@@ -111,15 +111,13 @@ class Engine(Frozen):
         base = BaseMotion(played)
         march: Callable[[], Marched]
         with ExitStack() as stack:
+            world = self.rigid_world(played) if self.settings == "best" else self.stock_world(played)
+            stack.callback(world.close)
             if self.time_step == "adaptive":
-                rigid = self.rigid_world(played)
-                stack.callback(rigid.close)
-                march = partial(march_adaptively, played, base, rigid.push, step)
+                march = partial(march_adaptively, played, base, world.push, step)
             else:
-                world = self.rigid_world(played) if self.settings == "best" else self.stock_world(played)
-                stack.callback(world.close)
                 times = step * np.arange(math.ceil(scene.output_times[-1] / step - 1e-9) + 1)
-                march = partial(_march, world, played, times, base.felt_acceleration(times))
+                march = partial(march_fixed, world, played, times, base.felt_acceleration(times))
             begin, begin_cpu = time.perf_counter(), time.process_time()
             times, states, felt = march()
             cost = Cost(
@@ -138,60 +136,3 @@ class Engine(Frozen):
             settings=self.model_dump(),
             notes=self.notes(scene),
         )
-
-
-def in_units_of(length: float, scene: Scene) -> Scene:
-    """The scene with all lengths in units of `length` m, so that the absolute tolerances of an engine fit any block."""
-
-    def rescaled(excitation: Rest | Ricker | Sine | Record) -> Rest | Ricker | Sine | Record:
-        sizes = {name: getattr(excitation, name) / length for name in ("amplitude", "scale") if hasattr(excitation, name)}
-        return excitation.model_copy(update=sizes)
-
-    return scene.replace(
-        block=Block(half_width=scene.block.half_width / length, half_height=scene.block.half_height / length),
-        walls=tuple(Wall(side=wall.side, gap=wall.gap / length, restitution=wall.restitution) for wall in scene.walls),
-        excitation=rescaled(scene.excitation),
-        vertical=rescaled(scene.vertical),
-        initial_velocity=scene.initial_velocity / length,
-        initial_height=scene.initial_height / length,
-        gravity=scene.gravity / length,
-    )
-
-
-def _march(world: World, scene: Scene, times: FloatArray, felt: FloatArray) -> Marched:
-    """Times, states at all step ends and felt accelerations, up to the first state with |theta| >= pi/2."""
-    dt = float(times[1]) if len(times) > 1 else 0.0
-    pieces = [np.array(scene.initial_state)[None, :]]
-    world.place(pieces[0][0])
-    for first in range(0, len(felt), STEPS_AT_ONCE):
-        tell(first, len(felt))
-        states = world.march(felt[first : first + STEPS_AT_ONCE], dt)
-        tipped = np.flatnonzero(np.abs(states[:, 2]) >= math.pi / 2)
-        if tipped.size:
-            states = states[: tipped[0] + 1]
-        if not np.all(np.abs(states) < BLOWN_UP):  # catches nan, too
-            raise ModelFailure(f"the motion blew up between t = {times[first]:g} and {times[first + len(states)]:g} s")
-        if np.any(states[:, 1] < 0.0):
-            raise ModelFailure(f"the block fell through the floor before t = {times[first + len(states)]:g} s: is the step too long?")
-        pieces.append(states)
-        if tipped.size:
-            break
-    marched = np.concatenate(pieces)
-    return times[: len(marched)], marched, felt
-
-
-def at_output_times(scene: Scene, times: FloatArray, states: FloatArray) -> FloatArray:
-    """States on the scene's output grid: positions by cubic Hermite interpolation between steps, velocities linear.
-
-    Velocities jump at impacts, where a cubic would overshoot.
-    """
-    from scipy.interpolate import CubicHermiteSpline
-
-    wanted = scene.output_times
-    wanted = wanted[wanted <= times[-1] * (1.0 + 1e-12) + 1e-12]
-    if len(times) == 1:
-        return states[: len(wanted)]
-    inside = np.minimum(wanted, times[-1])
-    positions = CubicHermiteSpline(times, states[:, :3], states[:, 3:])(inside)
-    velocities = np.column_stack([np.interp(inside, times, states[:, column]) for column in (3, 4, 5)])
-    return np.hstack([positions, velocities])

@@ -53,7 +53,9 @@ def events_of(scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: 
     if abs(states[-1, 2]) >= math.pi / 2:
         part = (math.pi / 2 - abs(states[-2, 2])) / (abs(states[-1, 2]) - abs(states[-2, 2]))
         side = "left" if states[-1, 2] > 0 else "right"
-        found.append((t[-2] + part * (t[-1] - t[-2]), f"overturned {side}", len(t) - 1, 0.0))
+        end = t[-2] + part * (t[-1] - t[-2])
+        found = [event for event in found if event[0] < end]
+        found.append((end, f"overturned {side}", len(t) - 1, 0.0))
     found.sort(key=lambda event: event[0])
     before = motion.modes([max(event[2] - 1, 0) for event in found])
     after = motion.modes([motion.later(event[2]) for event in found])

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from rockcheck.engines.adaptive import Vector
 from rockcheck.engines.contacts import Contact, contacts_of
-from rockcheck.engines.engine import Engine, RigidWorld, World
+from rockcheck.engines.engine import Engine
+from rockcheck.engines.world import State, World
 from rockcheck.scenes import ModelFailure, Scene
 from rockcheck.scenes.errors import printable
 
@@ -33,9 +34,10 @@ class MuJoCo(Engine):
     """
 
     name: ClassVar[str] = "mujoco"
+    bounces_with: ClassVar[tuple[str, ...]] = ("best",)
     cone_correction: bool = True
 
-    def rigid_world(self, scene: Scene) -> RigidWorld:
+    def rigid_world(self, scene: Scene) -> World:
         """The scene as MuJoCo holds it: point contacts of the corners."""
         friction = scene.floor.friction if self.cone_correction else 0.0
         return _RigidMuJoCoWorld(_point_contact_model(scene), contacts_of(scene), friction)
@@ -44,15 +46,8 @@ class MuJoCo(Engine):
         """The scene as MuJoCo holds it: a box among planes."""
         return _MuJoCoWorld(_stock_model(scene))
 
-    def notes(self, scene: Scene) -> list[str]:
-        """What MuJoCo cannot do of the scene, a line each."""
-        notes = super().notes(scene)
-        if self.settings == "default" and any(contact.restitution > 0.0 for contact in contacts_of(scene)):
-            notes.append("MuJoCo's default contact has no coefficient of restitution; that of the scene is not used")
-        return notes
 
-
-class _MuJoCoWorld:
+class _MuJoCoWorld(World):
     """A compiled model with its data, stepped by Euler's method."""
 
     def __init__(self, model_text: str) -> None:
@@ -68,27 +63,29 @@ class _MuJoCoWorld:
         # Views of the data, which are dear to make anew in each step.
         self.qpos, self.qvel, self.qacc = self.data.qpos, self.data.qvel, self.data.qacc
         self.force = self.data.qfrc_applied[:2]
+        self.dt = 0.0
 
-    def place(self, state: FloatArray) -> None:
+    def place(self, state: FloatArray | State) -> None:
         """Put the block where `state` says."""
         self.qpos[:] = state[:3]
         self.qvel[:] = state[3:]
 
+    def step(self, felt: tuple[float, float], dt: float) -> None:
+        """One step."""
+        self.force[:] = felt
+        if dt != self.dt:
+            self.model.opt.timestep = self.dt = dt
+        self.mujoco.mj_step(self.model, self.data)
+
+    def state(self) -> State:
+        """Where the block is."""
+        return (*self.qpos.tolist(), *self.qvel.tolist())
+
     def march(self, felt: FloatArray, dt: float) -> FloatArray:
         """States after each step."""
-        self.model.opt.timestep = dt
-        states = np.empty((len(felt), 6))
-        for state, acceleration in zip(states, felt, strict=True):
-            self.force[:] = acceleration
-            self.step()
-            state[:3] = self.qpos
-            state[3:] = self.qvel
+        states = super().march(felt, dt)
         self.check()
         return states
-
-    def step(self) -> None:
-        """One step."""
-        self.mujoco.mj_step(self.model, self.data)
 
     def check(self) -> None:
         """Raise `ModelFailure` if MuJoCo met a state or an acceleration that is huge or not finite."""
@@ -126,15 +123,15 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
         self.tuned = None
         return super().march(felt, dt)
 
-    def step(self) -> None:
+    def step(self, felt: tuple[float, float], dt: float) -> None:
         """One step; where a contact slips, it is done again with the corrected cone."""
         before = self.qpos.tolist(), self.qvel.tolist()
-        super().step()
+        super().step(felt, dt)
         if self.friction > 0.0 and (rows := self._slipping_rows()):
             self.qpos[:], self.qvel[:] = before
             self.mujoco.mj_step1(self.model, self.data)
             self.mujoco.mj_fwdAcceleration(self.model, self.data)
-            self._correct_cone(rows, self.model.opt.timestep)
+            self._correct_cone(rows, dt)
             self.mujoco.mj_Euler(self.model, self.data)
 
     def push(self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool) -> Vector:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable
 from functools import cache
 from typing import Any, ClassVar
 
@@ -13,7 +12,8 @@ from numpy.typing import NDArray
 
 from rockcheck.engines.adaptive import Vector
 from rockcheck.engines.contacts import contacts_of
-from rockcheck.engines.engine import Engine, RigidWorld, World
+from rockcheck.engines.engine import Engine
+from rockcheck.engines.world import State, World
 from rockcheck.scenes import Scene
 
 FloatArray = NDArray[np.float64]
@@ -27,8 +27,10 @@ class PyBullet(Engine):
     """PyBullet, with its default solver iterated until it has converged, without slop, damping and sleeping."""
 
     name: ClassVar[str] = "pybullet"
+    module: ClassVar[str] = "pybullet"
+    extra: ClassVar[str] = "pybullet"
 
-    def rigid_world(self, scene: Scene) -> RigidWorld:
+    def rigid_world(self, scene: Scene) -> World:
         """The scene as PyBullet holds it: point contacts of the corners."""
         return _RigidPyBulletWorld(scene)
 
@@ -56,7 +58,7 @@ def _aloft(scene: Scene) -> tuple[float, float, float]:
     return 0.0, 0.0, 10.0 * scene.block.radius
 
 
-class _PyBulletWorld:
+class _PyBulletWorld(World):
     """A physics server of its own with block, floor and walls, and PyBullet's default parameters."""
 
     inset = 0.0  # m: how far behind their surfaces floor and walls stand
@@ -66,6 +68,7 @@ class _PyBulletWorld:
         self.client: int = pybullet.connect(pybullet.DIRECT)
         self.options: dict[str, Any] = {"physicsClientId": self.client}
         self.body = self.make_block(scene)
+        self.dt = 0.0
         # A step in the air, in which Bullet takes notice of an inertia that was changed.
         pybullet.stepSimulation(**self.options)
         self._make_slab(0.0, 1.0, 0.0, scene.floor.friction, scene.floor.restitution)
@@ -89,25 +92,26 @@ class _PyBulletWorld:
         body = self.bullet.createMultiBody(0.0, shape, basePosition=[-normal_x * depth, 0.0, -normal_z * depth], **self.options)
         self.bullet.changeDynamics(body, -1, lateralFriction=friction, restitution=restitution, **self.options)
 
-    def place(self, state: Iterable[float]) -> None:
+    def place(self, state: FloatArray | State) -> None:
         """Put the block where `state` says. Bullet's y axis points into the plane: its angles are clockwise."""
         x, z, theta, vx, vz, w = map(float, state)
         turn = (0.0, -math.sin(0.5 * theta), 0.0, math.cos(0.5 * theta))
         self.bullet.resetBasePositionAndOrientation(self.body, (x, 0.0, z), turn, physicsClientId=self.client)
         self.bullet.resetBaseVelocity(self.body, (vx, 0.0, vz), (0.0, -w, 0.0), physicsClientId=self.client)
 
-    def march(self, felt: FloatArray, dt: float) -> FloatArray:
-        """States after each step."""
-        bullet, body, client = self.bullet, self.body, self.client
-        bullet.setTimeStep(dt, physicsClientId=client)
-        states = np.empty((len(felt), 6))
-        for row, (ax, az) in enumerate(felt.tolist()):
-            bullet.setGravity(ax, 0.0, az, physicsClientId=client)
-            bullet.stepSimulation(physicsClientId=client)
-            (x, _, z), (_, turn, _, whole) = bullet.getBasePositionAndOrientation(body, physicsClientId=client)
-            (vx, _, vz), (_, w, _) = bullet.getBaseVelocity(body, physicsClientId=client)
-            states[row] = x, z, -2.0 * math.atan2(turn, whole), vx, vz, -w
-        return states
+    def step(self, felt: tuple[float, float], dt: float) -> None:
+        """One step."""
+        if dt != self.dt:
+            self.bullet.setTimeStep(dt, physicsClientId=self.client)
+            self.dt = dt
+        self.bullet.setGravity(felt[0], 0.0, felt[1], physicsClientId=self.client)
+        self.bullet.stepSimulation(physicsClientId=self.client)
+
+    def state(self) -> State:
+        """Where the block is."""
+        (x, _, z), (_, turn, _, whole) = self.bullet.getBasePositionAndOrientation(self.body, physicsClientId=self.client)
+        (vx, _, vz), (_, w, _) = self.bullet.getBaseVelocity(self.body, physicsClientId=self.client)
+        return x, z, -2.0 * math.atan2(turn, whole), vx, vz, -w
 
     def close(self) -> None:
         """End the physics server."""
@@ -162,24 +166,17 @@ class _RigidPyBulletWorld(_PyBulletWorld):
 
     def march(self, felt: FloatArray, dt: float) -> FloatArray:
         """States after each step."""
-        self._bounce(True)
+        self.bounce(True)
         self.bullet.setPhysicsEngineParameter(contactERP=self.erp, **self.options)
         return super().march(felt, dt)
 
+    def bounce(self, bouncing: bool) -> None:
+        """Let all contacts have their restitution, or none."""
+        if bouncing is not self.bouncing and (self.bounces or self.bouncing is None):
+            self.bullet.setPhysicsEngineParameter(restitutionVelocityThreshold=0.0 if bouncing else 1e30, **self.options)
+            self.bouncing = bouncing
+
     def push(self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool) -> Vector:
         """Velocity after `dt` s with the contacts closed at `pose`."""
-        bullet, client = self.bullet, self.client
-        if self.bounces and bouncing is not self.bouncing:
-            self._bounce(bouncing)
         x, y, theta = pose
-        self.place((min(max(x, -self.far), self.far), y, theta, *velocity))
-        bullet.setTimeStep(dt, physicsClientId=client)
-        bullet.setGravity(felt[0], 0.0, felt[1], physicsClientId=client)
-        bullet.stepSimulation(physicsClientId=client)
-        (vx, _, vz), (_, w, _) = bullet.getBaseVelocity(self.body, physicsClientId=client)
-        return vx, vz, -w
-
-    def _bounce(self, bouncing: bool) -> None:
-        """Let all contacts have their restitution, or none."""
-        self.bullet.setPhysicsEngineParameter(restitutionVelocityThreshold=0.0 if bouncing else 1e30, **self.options)
-        self.bouncing = bouncing
+        return super().push((min(max(x, -self.far), self.far), y, theta), velocity, dt, felt, bouncing)

@@ -52,6 +52,9 @@ LOOKS = {
         Look("cm", "CM", "#009168", "#00b583", (5.0, 1.5), "D"),
         Look("mujoco", "MuJoCo", "#d55e00", "#e8762a", (2.0, 1.0), "^"),
         Look("pybullet", "PyBullet", "#bf5f92", "#d98ab4", (4.0, 1.0, 1.0, 1.0), "v"),
+        Look("pymunk", "pymunk", "#7a8a00", "#b5c334", (1.0, 1.0), "<"),
+        Look("dart", "DART", "#8c564b", "#c58a7f", (6.0, 1.0, 1.0, 1.0), ">"),
+        Look("drake", "Drake", "#6a51a3", "#a48fd6", (3.0, 1.0), "p"),
         Look("measured", "measured", "#6e6e6e", "#a0a0a0", (), "x"),
     )
 }

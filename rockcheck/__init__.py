@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rockcheck.cm import ContinuousModel, measured_restitution
     from rockcheck.ebm import EventBasedModel, Spectrum, overturning_spectrum, predictability_horizon
-    from rockcheck.engines import MuJoCo, PyBullet
+    from rockcheck.engines import Dart, Drake, MuJoCo, PyBullet, Pymunk
     from rockcheck.scenes import (
         Block,
         Cost,
@@ -54,7 +54,7 @@ _HOMES = {
     ),
     "rockcheck.ebm": ("EventBasedModel", "Spectrum", "overturning_spectrum", "predictability_horizon"),
     "rockcheck.cm": ("ContinuousModel", "measured_restitution"),
-    "rockcheck.engines": ("MuJoCo", "PyBullet"),
+    "rockcheck.engines": ("Dart", "Drake", "MuJoCo", "PyBullet", "Pymunk"),
     "rockcheck.validation": ("Discrepancy", "compare"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
@@ -81,8 +81,11 @@ __all__ = [  # noqa: RUF022 - in the order of the table above, which a test hold
     "predictability_horizon",
     "ContinuousModel",
     "measured_restitution",
+    "Dart",
+    "Drake",
     "MuJoCo",
     "PyBullet",
+    "Pymunk",
     "Discrepancy",
     "compare",
     "__version__",

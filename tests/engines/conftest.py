@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +12,33 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from rockcheck import engines
 from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
+
+ALL = [engine for engine in (getattr(engines, name) for name in engines.__all__) if engine.installed()]
+VARYING = [engine for engine in ALL if not engine.fixed_because]
+BOUNCING = [engine for engine in ALL if engine.bounces_with]
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Every engine that is installed: as a class, as one whose steps can vary, or as a model with its steps; Drake takes its time."""
+
+    def parameters(models: list[Any]) -> list:
+        return [pytest.param(one, marks=[pytest.mark.slow] if one.name == "drake" else []) for one in models]
+
+    fixed, bouncing = ([one(time_step=1e-4) for one in some] for some in (ALL, BOUNCING))
+    adaptive = [one(time_step="adaptive") for one in VARYING]
+    for name, models in {
+        "engine": ALL,
+        "varying_engine": VARYING,
+        "bouncing_engine": BOUNCING,
+        "model": [*fixed, *adaptive],
+        "bouncing_model": [*bouncing, *adaptive],
+    }.items():
+        if name in metafunc.fixturenames:
+            words = [f"{one.name} {one.time_step}" if "model" in name else one.name for one in models]
+            metafunc.parametrize(name, parameters(models), ids=words)
 
 
 @pytest.fixture(scope="session")

@@ -15,10 +15,8 @@ from rockcheck.scenes import Floor, Ricker, Scene, Wall
 CASES = Path(__file__).parents[1] / "data" / "unilateral_ricker_cases.csv"
 TILTS = (0.3, -0.4, 0.5, 0.6, 0.7, -0.8, 0.9)
 PULSES = ((1.5, 3.0), (3.0, 5.0), (4.0, 6.0), (-2.5, 4.5), (2.2, 3.8))  # amplitude in g tan(alpha), frequency in p
-each_engine = pytest.mark.parametrize("engine", [MuJoCo, PyBullet], ids=lambda engine: engine.name)
 
 
-@each_engine
 def test_fixed_steps_are_of_first_order(engine, free_rocking, rotation_error):
     """One run may be lucky by a factor of five: it is the median of several starts that falls with the step."""
     errors = {}
@@ -29,11 +27,10 @@ def test_fixed_steps_are_of_first_order(engine, free_rocking, rotation_error):
     assert 5.0 < errors[2e-3] / errors[2e-4] < 30.0
 
 
-@each_engine
-def test_adaptive_steps_are_of_third_order(engine, pulse, rotation_error):
+def test_adaptive_steps_are_of_third_order(varying_engine, pulse, rotation_error):
     errors = {}
     for step in (1.6e-2, 8e-3, 4e-3, 1e-3):
-        model = engine(time_step="adaptive", largest_step=step)
+        model = varying_engine(time_step="adaptive", largest_step=step)
         errors[step] = np.median([rotation_error(model.simulate(scene).channels["theta"], scene) for scene in (pulse(*p) for p in PULSES)])
     assert errors[1.6e-2] / errors[8e-3] > 5.0
     assert errors[8e-3] < 1e-5
@@ -41,11 +38,10 @@ def test_adaptive_steps_are_of_third_order(engine, pulse, rotation_error):
     assert errors[1e-3] < 2e-6  # what the impacts leave
 
 
-@each_engine
-def test_adaptive_steps_resolve_each_impact(engine, free_rocking, rotation_error):
+def test_adaptive_steps_resolve_each_impact(varying_engine, free_rocking, rotation_error):
     """Ten times better than a fixed step of a tenth of their length."""
-    adaptive = engine(time_step="adaptive", largest_step=4e-3)
-    fixed = engine(time_step=4e-4)
+    adaptive = varying_engine(time_step="adaptive", largest_step=4e-3)
+    fixed = varying_engine(time_step=4e-4)
     for tilt in (0.3, 0.7):
         scene = free_rocking(tilt)
         history = adaptive.simulate(scene)
@@ -55,7 +51,7 @@ def test_adaptive_steps_resolve_each_impact(engine, free_rocking, rotation_error
         assert error < 0.1 * rotation_error(fixed.simulate(scene).channels["theta"], scene)
 
 
-@each_engine
+@pytest.mark.parametrize("engine", [MuJoCo, PyBullet], ids=lambda engine: engine.name)
 def test_a_stock_engine_is_far_off(engine, free_rocking, rotation_error):
     """What "default" is there to show: contacts as they come do not get better with the step."""
     scene = free_rocking(0.7)
@@ -94,19 +90,17 @@ def peak_errors(engine, block, rows) -> list[float]:
     return errors
 
 
-@each_engine
-def test_walls_and_slip(engine, block):
+def test_walls_and_slip(varying_engine, block):
     """Outcomes and peaks beside walls with e = 0, 0.5 and 1, with and without slip."""
-    errors = peak_errors(engine(time_step="adaptive", largest_step=2e-3), block, cases(every=41))
+    errors = peak_errors(varying_engine(time_step="adaptive", largest_step=2e-3), block, cases(every=41))
     assert len(errors) >= 7
     assert np.median(errors) < 2e-5
     assert np.max(errors) < 5e-4
 
 
 @pytest.mark.slow
-@each_engine
-def test_walls_and_slip_throughout(engine, block):
-    errors = peak_errors(engine(time_step="adaptive", largest_step=2e-3), block, cases(every=5))
+def test_walls_and_slip_throughout(varying_engine, block):
+    errors = peak_errors(varying_engine(time_step="adaptive", largest_step=2e-3), block, cases(every=5))
     assert np.median(errors) < 1e-5
     assert np.quantile(errors, 0.95) < 1.5e-4
     assert np.max(errors) < 1e-3

@@ -15,25 +15,43 @@ from rockcheck.engines.engine import Engine
 from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Ricker, Scene, Sine, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
-each_engine = pytest.mark.parametrize("engine", [MuJoCo, PyBullet], ids=lambda engine: engine.name)
-
 
 def run(code: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True)
 
 
 def test_import_loads_no_engine():
-    code = "import sys, engines; print(sorted({'mujoco', 'pybullet', 'scipy', 'pandas', 'numba'} & set(sys.modules)))"
+    heavy = {"mujoco", "pybullet", "pymunk", "dartpy", "pydrake", "scipy", "pandas", "numba"}
+    code = f"import sys, rockcheck.engines; print(sorted({heavy} & set(sys.modules)))"
     assert run(code).stdout.strip() == "[]"
+
+
+def test_a_missing_extra_is_named(varying_engine, monkeypatch):
+    if not varying_engine.module:
+        return  # it comes with rockcheck
+    monkeypatch.setitem(sys.modules, varying_engine.module, None)
+    monkeypatch.setattr("rockcheck.engines.engine.find_spec", lambda name: None)
+    with pytest.raises(InputError, match=rf"not installed: pip install 'rockcheck\[{varying_engine.extra}\]'"):
+        varying_engine()
+
+
+def test_steps_that_cannot_vary_are_refused_with_the_reason(engine):
+    if not engine.fixed_because:
+        engine(time_step="adaptive")
+        return
+    with pytest.raises(InputError, match=engine.fixed_because):
+        engine(time_step="adaptive")
 
 
 def test_a_run_prints_nothing():
     code = """
-from rockcheck.engines import MuJoCo, PyBullet
+from rockcheck import engines
 from rockcheck.scenes import Block, Floor, Scene
 scene = Scene(name="quiet", block=Block(half_width=0.4, half_height=1.5), floor=Floor(friction=0.3), duration=0.01)
-for engine in (MuJoCo, PyBullet):
-    engine(time_step=1e-3).simulate(scene)
+for engine in (getattr(engines, name) for name in engines.__all__):
+    if engine.installed():
+        for settings in ("best", "default"):
+            engine(time_step=1e-3, settings=settings).simulate(scene)
 """
     done = run(code)
     assert done.stdout + done.stderr == ""
@@ -52,20 +70,17 @@ for engine in (MuJoCo, PyBullet):
         ({"step": 1e-3}, "step: unknown key"),
     ],
 )
-@each_engine
-def test_wrong_settings(engine, settings, words):
+def test_wrong_settings(varying_engine, settings, words):
     with pytest.raises(InputError, match=words):
-        engine(**settings)
+        varying_engine(**settings)
 
 
 @pytest.mark.parametrize("settings", [{"time_step": 1e-9}, {"time_step": "adaptive", "largest_step": 1e-9}])
-@each_engine
-def test_too_many_steps_are_refused_at_once(engine, settings, free_rocking):
+def test_too_many_steps_are_refused_at_once(varying_engine, settings, free_rocking):
     with pytest.raises(InputError, match="5000000 steps"):
-        engine(**settings).simulate(free_rocking(0.5))
+        varying_engine(**settings).simulate(free_rocking(0.5))
 
 
-@each_engine
 def test_history_says_how_it_came_about(engine, free_rocking):
     history = engine(time_step=1e-3).simulate(free_rocking(0.5).replace(duration=1.0))
     assert history.model == engine.name
@@ -78,39 +93,36 @@ def test_history_says_how_it_came_about(engine, free_rocking):
     assert history.notes == ()
 
 
-@each_engine
 def test_what_an_engine_cannot_do_is_noted(engine, free_rocking):
     scene = free_rocking(0.5).replace(duration=0.1, floor=Floor(friction=0.5, static_friction=0.7))
     assert any("kinetic 0.5 is used for static 0.7" in note for note in engine(time_step=1e-3).simulate(scene).notes)
 
 
-def test_stock_mujoco_has_no_restitution(free_rocking):
+@pytest.mark.parametrize("settings", ["best", "default"])
+def test_an_engine_says_that_it_has_no_restitution(engine, settings, free_rocking):
     scene = free_rocking(0.5).replace(duration=0.1, floor=Floor(friction=0.5, restitution=0.5))
-    assert any("restitution" in note for note in MuJoCo(time_step=1e-3, settings="default").simulate(scene).notes)
-    assert MuJoCo(time_step=1e-3).simulate(scene).notes == ()
+    notes = engine(time_step=1e-3, settings=settings).simulate(scene).notes
+    assert any("no coefficient of restitution" in note for note in notes) == (settings not in engine.bounces_with)
 
 
-@each_engine
 @pytest.mark.parametrize("step", [1e-3, "adaptive"])
-def test_scene_shorter_than_its_output_step(engine, step, free_rocking):
-    history = engine(time_step=step).simulate(free_rocking(0.5).replace(duration=1e-3, output_step=5e-3))
+def test_scene_shorter_than_its_output_step(varying_engine, step, free_rocking):
+    history = varying_engine(time_step=step).simulate(free_rocking(0.5).replace(duration=1e-3, output_step=5e-3))
     assert history.channels["t"].tolist() == [0.0]
 
 
-@each_engine
 @pytest.mark.parametrize("step", [7e-4, "adaptive"])
-def test_output_grid_need_not_fit_the_steps(engine, step, free_rocking):
-    coarse = engine(time_step=step).simulate(free_rocking(0.5).replace(duration=2.0, output_step=3.1e-3))
-    fine = engine(time_step=step).simulate(free_rocking(0.5).replace(duration=2.0, output_step=1e-4))
+def test_output_grid_need_not_fit_the_steps(varying_engine, step, free_rocking):
+    coarse = varying_engine(time_step=step).simulate(free_rocking(0.5).replace(duration=2.0, output_step=3.1e-3))
+    fine = varying_engine(time_step=step).simulate(free_rocking(0.5).replace(duration=2.0, output_step=1e-4))
     again = np.interp(coarse.channels["t"], fine.channels["t"], fine.channels["theta"])
     assert np.max(np.abs(coarse.channels["theta"] - again)) < (1e-7 if step == 7e-4 else 1e-5)
 
 
-@each_engine
-def test_events_of_a_pulse_beside_a_wall(engine, pulse):
+def test_events_of_a_pulse_beside_a_wall(varying_engine, pulse):
     """Times from an event-driven implementation of the unilateral model."""
     scene = pulse(3.0, 6.0, friction=0.6, walls=[Wall(side="left", gap=0.053, restitution=1.0)], duration=1.9)
-    history = engine(time_step="adaptive").simulate(scene)
+    history = varying_engine(time_step="adaptive").simulate(scene)
     expected = [
         ("uplift", 0.783060),
         ("wall impact", 0.941125),
@@ -128,18 +140,16 @@ def test_events_of_a_pulse_beside_a_wall(engine, pulse):
     assert hit.impulse == pytest.approx(0.407101, abs=1e-4)
 
 
-@each_engine
-def test_slip_and_stick_events(engine, pulse):
-    history = engine(time_step="adaptive").simulate(pulse(4.0, 4.5, friction=0.3, duration=1.6))
+def test_slip_and_stick_events(varying_engine, pulse):
+    history = varying_engine(time_step="adaptive").simulate(pulse(4.0, 4.5, friction=0.3, duration=1.6))
     found = {event.kind: event.t for event in history.event_list if event.kind in ("slip", "stick")}
     assert found["slip"] == pytest.approx(1.057406, abs=1.1e-3)  # of the unilateral model; known to one step
     assert found["stick"] == pytest.approx(1.366917, abs=1e-4)
 
 
-@each_engine
-def test_a_rocking_block_comes_to_rest_once(engine, block):
+def test_a_rocking_block_comes_to_rest_once(varying_engine, block):
     scene = Scene(name="decay", block=block, floor=Floor(friction=1.0), initial_rotation=0.1 * block.alpha, duration=8.0)
-    history = engine(time_step="adaptive").simulate(scene)
+    history = varying_engine(time_step="adaptive").simulate(scene)
     kinds = [event.kind for event in history.event_list]
     assert kinds.count("settled") == 1
     assert kinds[-1] == "settled"
@@ -173,8 +183,7 @@ def test_mirrored_adaptive_run(pulse):
     assert np.max(np.abs(one.channels["theta"] + other.channels["theta"])) < 1e-6
 
 
-@each_engine
-def test_record_with_kinks(engine):
+def test_record_with_kinks(varying_engine):
     """A sliding block feels the exact integral of a record that is linear between its samples."""
     rng = np.random.default_rng(5)
     samples = rng.normal(size=40)
@@ -185,7 +194,7 @@ def test_record_with_kinks(engine):
         excitation=Record.from_samples(samples, time_step=0.02),
         duration=0.76,
     )
-    history = engine(time_step="adaptive", largest_step=1e-3).simulate(scene)
+    history = varying_engine(time_step="adaptive", largest_step=1e-3).simulate(scene)
     velocity = -np.concatenate([[0.0], np.cumsum(0.01 * (samples[1:] + samples[:-1]))])
     every = history.channels["x_dot"][::4]
     assert np.max(np.abs(every - velocity[: len(every)])) < 2e-5  # linear between steps
@@ -230,12 +239,11 @@ HARD = [
 ]
 
 
-@each_engine
 @pytest.mark.parametrize("scene", HARD, ids=lambda scene: scene.name)
 @pytest.mark.parametrize("step", [1e-3, 1e-2, "adaptive"])
-def test_hard_scenes_end(engine, scene, step):
+def test_hard_scenes_end(varying_engine, scene, step):
     """Rattling, bouncing and flush contacts: bounded work, finite states, nothing through a wall."""
-    history = engine(time_step=step).simulate(scene)
+    history = varying_engine(time_step=step).simulate(scene)
     assert history.cost.steps < 40_000
     for channel in ("x", "y", "theta", "x_dot", "y_dot", "theta_dot"):
         assert np.all(np.isfinite(history.channels[channel]))
@@ -249,12 +257,11 @@ def test_hard_scenes_end(engine, scene, step):
 
 
 @pytest.mark.parametrize("step", [1e-3, "adaptive"])
-@each_engine
-def test_blow_up_is_a_failure(engine, step, block, tmp_path, monkeypatch):
+def test_blow_up_is_a_failure(varying_engine, step, block, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     blast = Record.from_samples([1e30] * 50, time_step=0.01)
     with pytest.raises(ModelFailure):
-        engine(time_step=step).simulate(Scene(name="blast", block=block, floor=Floor(friction=0.3), vertical=blast, duration=0.4))
+        varying_engine(time_step=step).simulate(Scene(name="blast", block=block, floor=Floor(friction=0.3), vertical=blast, duration=0.4))
     assert list(tmp_path.iterdir()) == []  # no log of the engine's own
 
 

@@ -90,7 +90,9 @@ def test_every_import_is_a_declared_dependency(top):
     """What a module needs to be imported comes with every installation; an extra is imported by the function that needs it."""
     everywhere = [one for one in PROJECT["project"]["dependencies"] if ";" not in one]  # not of some versions of Python only
     declared = names_of(everywhere) | {"llvmlite"}  # which is numba's
-    extras = {name for extra in ("iso", "cluster", "pybullet") for name in names_of(PROJECT["project"]["optional-dependencies"][extra])}
+    extras = {
+        name for extra in ("iso", "cluster", "pybullet", "engines") for name in names_of(PROJECT["project"]["optional-dependencies"][extra])
+    }
     for path, tree in sources(top).items():
         of_pytest = {"pytest"} if path.name == "plugin.py" else set()  # which pytest loads
         for name in imported(tree) - {"rockcheck"} - set(sys.stdlib_module_names):

@@ -83,7 +83,7 @@ FAULTS = [
         'inward = 1.0 if wall.side == "right"',
         15,
     ),
-    ("dt off by 1e-3", "engines/engine.py", r"\], dt\)", "], 1.001 * dt)", 15),
+    ("dt off by 1e-3", "engines/marching.py", r"\], dt\)", "], 1.001 * dt)", 15),
     ("a lost impact", "engines/events.py", r"in _rises\(flags\):", "in _rises(flags)[1:]:", 15),
     ("friction 5 % low", "ebm/natural.py", r"mu_k=scene\.floor\.friction", "mu_k=0.95 * scene.floor.friction", 15),
     ("Housner's ratio off by 1 %", "ebm/impacts.py", r"w2 = \(1\.0 - 1\.5 \* s \* s\) \* w1", "w2 = 1.01 * (1.0 - 1.5 * s * s) * w1", 15),

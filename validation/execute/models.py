@@ -65,6 +65,9 @@ FAMILIES: dict[str, Family] = {
     "cm": Family("rockcheck.cm", "ContinuousModel", "the paper's penalty-based continuous model", {}, COMPILED),
     "mujoco": Family("rockcheck.engines", "MuJoCo", "the physics engine MuJoCo", {}, ("mujoco", "numpy")),
     "pybullet": Family("rockcheck.engines", "PyBullet", "the physics engine PyBullet", {}, ("pybullet", "numpy")),
+    "pymunk": Family("rockcheck.engines", "Pymunk", "the physics engine pymunk (Chipmunk, in two dimensions)", {}, ("pymunk", "numpy")),
+    "dart": Family("rockcheck.engines", "Dart", "the physics engine DART", {}, ("dartpy", "numpy")),
+    "drake": Family("rockcheck.engines", "Drake", "the physics engine Drake", {}, ("drake", "numpy")),
     "measured": Family(
         "rockcheck.validation.discrepancy.measured", "Measured", "a CSV history from a shake table, or from any other program"
     ),

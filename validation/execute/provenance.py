@@ -135,9 +135,11 @@ def version_of(library: str) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Versions of everything that a run's figures may depend on."""
+    """Versions of everything installed that a run's figures may depend on."""
     libraries = sorted({library for known in FAMILIES.values() for library in known.libraries} | {"pandas"})
-    return {"rockcheck": version_of("rockcheck"), "python": platform.python_version()} | {name: version_of(name) for name in libraries}
+    found = {name: version_of(name) for name in libraries}
+    own = {"rockcheck": version_of("rockcheck"), "python": platform.python_version()}
+    return own | {name: version for name, version in found.items() if version != "absent"}
 
 
 def hardware() -> dict[str, str]:

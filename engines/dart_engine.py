@@ -1,0 +1,123 @@
+"""DART (dartpy) as a model of the rocking block."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.engines.engine import Engine
+from rockcheck.engines.world import State, World
+from rockcheck.scenes import Scene
+
+FloatArray = NDArray[np.float64]
+SLAB = 10.0  # half the thickness of floor and walls
+REACH = 100.0  # half their extent
+#: DART drops rebounds slower than 0.1 of its units of length a second, and caps them at 100: sqrt(g R) is made so many of them.
+NATURAL_SPEED = 30.0
+#: Of its iterative solver, which converges where steps are tiny; its direct one gives way by 3e-4 g dt in each step.
+SWEEPS, TOLERANCE = 100, 1e-8
+
+
+class Dart(Engine):
+    """DART, with FCL's collision detection; at its best penetration is corrected apart from velocity, and nothing sleeps."""
+
+    name: ClassVar[str] = "dart"
+    module: ClassVar[str] = "dartpy"
+    extra: ClassVar[str] = "dart"
+
+    def rigid_world(self, scene: Scene) -> World:
+        """The scene as DART holds it, in units in which even slow contacts bounce."""
+        scale = NATURAL_SPEED / math.sqrt(scene.gravity * scene.block.radius)
+        return _RigidDartWorld(scene, scale, iterative=self.time_step == "adaptive")
+
+    def stock_world(self, scene: Scene) -> World:
+        """The scene as DART holds it: a box among boxes."""
+        return _DartWorld(scene)
+
+
+class _DartWorld(World):
+    """A world with a box in its plane, floor and walls, and DART's default parameters; `scale` of its lengths are one of the scene's."""
+
+    def __init__(self, scene: Scene, scale: float = 1.0) -> None:
+        import dartpy
+
+        self.dart: Any = dartpy
+        self.scale = np.array([scale, scale, 1.0])
+        self.world = dartpy.simulation.World()
+        self.dt = 0.0
+        b, h = scale * scene.block.half_width, scale * scene.block.half_height
+        self.block = dartpy.dynamics.Skeleton("block")
+        joint, body = self.block.createPlanarJointAndBodyNodePair()
+        joint.setArbitraryPlane([1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+        inertia = (scale * scene.block.radius) ** 2 / 3.0
+        body.setInertia(dartpy.dynamics.Inertia(1.0, np.zeros(3), inertia * np.eye(3)))
+        # Restitutions of two bodies multiply, of frictions the smaller counts: the block's leave those of floor and walls.
+        self.contact = self._box(body, (2.0 * b, 2.0 * b, 2.0 * h), scene.floor.friction, 1.0)
+        self.world.addSkeleton(self.block)
+        self._slab("floor", (0.0, 1.0), 0.0, scene.floor.friction, scene.floor.restitution, scale)
+        for wall in scene.walls:
+            inward = 1.0 if wall.side == "left" else -1.0
+            self._slab(wall.side, (inward, 0.0), scene.block.half_width + wall.gap, 0.0, wall.restitution, scale)
+
+    def _box(self, body: Any, size: tuple[float, float, float], friction: float, restitution: float) -> Any:
+        """A box as a body's shape; returns what holds its friction and restitution."""
+        node = body.createShapeNode(self.dart.dynamics.BoxShape(size))
+        node.createCollisionAspect()
+        contact = node.createDynamicsAspect()
+        contact.setFrictionCoeff(friction)
+        contact.setRestitutionCoeff(restitution)
+        return contact
+
+    def _slab(self, name: str, normal: tuple[float, float], distance: float, friction: float, restitution: float, scale: float) -> None:
+        """A thick box whose face looks along the normal."""
+        slab = self.dart.dynamics.Skeleton(name)
+        joint, body = slab.createWeldJointAndBodyNodePair()
+        (nx, nz), depth = normal, distance + SLAB
+        place = self.dart.math.Isometry3()
+        place.set_translation([-scale * nx * depth, 0.0, -scale * nz * depth])
+        joint.setTransformFromParentBodyNode(place)
+        thick, wide = 2.0 * scale * SLAB, 2.0 * scale * REACH
+        self._box(body, (thick if nx else wide, wide, thick if nz else wide), friction, restitution)
+        self.world.addSkeleton(slab)
+
+    def place(self, state: FloatArray | State) -> None:
+        """Put the block where `state` says."""
+        self.block.setPositions(self.scale * state[:3])
+        self.block.setVelocities(self.scale * state[3:])
+
+    def step(self, felt: tuple[float, float], dt: float) -> None:
+        """One step."""
+        if dt != self.dt:
+            self.world.setTimeStep(dt)
+            self.dt = dt
+        scale = self.scale[0]
+        self.world.setGravity([scale * felt[0], 0.0, scale * felt[1]])
+        self.world.step()
+
+    def state(self) -> State:
+        """Where the block is."""
+        pose, velocity = self.block.getPositions() / self.scale, self.block.getVelocities() / self.scale
+        return (*pose.tolist(), *velocity.tolist())
+
+
+class _RigidDartWorld(_DartWorld):
+    """A block that never sleeps, and whose penetration is corrected apart from its velocity."""
+
+    def __init__(self, scene: Scene, scale: float, iterative: bool) -> None:
+        super().__init__(scene, scale)
+        solver = self.world.getConstraintSolver()
+        solver.setSplitImpulseEnabled(True)
+        if iterative:
+            options = self.dart.constraint.NsgsFrictionSolver.Options()
+            options.maxSweeps, options.tolerance = SWEEPS, TOLERANCE
+            solver.setBoxedLcpSolver(self.dart.constraint.NsgsFrictionSolver(options))
+        sleep = self.world.getDeactivationOptions()
+        sleep.mEnabled = False
+        self.world.setDeactivationOptions(sleep)
+
+    def bounce(self, bouncing: bool) -> None:
+        """Let contacts have their restitution, or none."""
+        self.contact.setRestitutionCoeff(float(bouncing))

@@ -1,0 +1,146 @@
+"""Drake as a model of the rocking block."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.engines.contacts import contacts_of
+from rockcheck.engines.engine import Engine
+from rockcheck.engines.world import State, World
+from rockcheck.scenes import ModelFailure, Scene
+from rockcheck.scenes.errors import printable
+
+FloatArray = NDArray[np.float64]
+CORNER_RADIUS = 1e-5  # of the block's radius
+STIFFNESS = 2e8  # of each of two bodies in contact, N/m for a block of 1 kg and R = 1 m
+DISSIPATION = 1e3  # of Hunt and Crossley, s/m: nothing bounces
+STICTION = 1e-7  # m/s: slower slip counts as none; at 1e-8 the solver often fails
+SLAB, REACH = 20.0, 600.0  # thickness and extent of floor and walls
+
+
+class Drake(Engine):
+    """Drake's discrete plant; at its best with tiny spheres as corners, stiff contacts, and TAMSI, whose friction does not lift."""
+
+    name: ClassVar[str] = "drake"
+    module: ClassVar[str] = "pydrake"
+    extra: ClassVar[str] = "drake"
+    bounces_with: ClassVar[tuple[str, ...]] = ()
+    fixed_because: ClassVar[str] = "Drake's discrete plant keeps the step it was made with"
+
+    def rigid_world(self, scene: Scene) -> World:
+        """The scene as Drake holds it: corners on slabs."""
+        return _RigidDrakeWorld(scene)
+
+    def stock_world(self, scene: Scene) -> World:
+        """The scene as Drake holds it: a box on a half-space."""
+        return _DrakeWorld(scene)
+
+
+class _DrakeWorld(World):
+    """A plant with a box in its plane, floor and walls, and Drake's default parameters; made when the step is known."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.dt = scene, 0.0
+        self.start: FloatArray | State = scene.initial_state
+
+    def place(self, state: FloatArray | State) -> None:
+        """Put the block where `state` says."""
+        self.start = state
+        if self.dt:
+            self.plant.SetPositionsAndVelocities(self.context, np.asarray(state))
+
+    def step(self, felt: tuple[float, float], dt: float) -> None:
+        """One step."""
+        if not self.dt:
+            self._make(dt)
+        self.force.set_value([felt[0], felt[1], 0.0])
+        self.steps += 1
+        try:
+            self.simulator.AdvanceTo(self.steps * dt)
+        except RuntimeError as error:  # its solver has not converged
+            raise ModelFailure(f"Drake: {printable(error, 200)}") from None
+
+    def state(self) -> State:
+        """Where the block is."""
+        state: State = tuple(self.plant.GetPositionsAndVelocities(self.context).tolist())
+        return state
+
+    def _make(self, dt: float) -> None:
+        from pydrake.math import RigidTransform, RotationMatrix
+        from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+        from pydrake.multibody.tree import FixedOffsetFrame, PlanarJoint, SpatialInertia, UnitInertia
+        from pydrake.systems.analysis import Simulator
+        from pydrake.systems.framework import DiagramBuilder
+
+        self.dt, self.steps = dt, 0
+        builder = DiagramBuilder()
+        self.plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=dt)
+        self.plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
+        inertia = self.scene.block.radius**2 / 3.0
+        body = self.plant.AddRigidBody("block", SpatialInertia(1.0, np.zeros(3), UnitInertia(inertia, inertia, inertia)))
+        # The joint's plane is its frame's x and y: to the right and up.
+        upright = RigidTransform(RotationMatrix([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]))
+        ends = {"plane of the world": self.plant.world_frame(), "plane of the block": body.body_frame()}
+        frames = [self.plant.AddFrame(FixedOffsetFrame(name, frame, upright)) for name, frame in ends.items()]
+        self.plant.AddJoint(PlanarJoint("plane", *frames, np.zeros(3)))
+        self.shape(body)
+        self.plant.Finalize()
+        diagram = builder.Build()
+        self.simulator = Simulator(diagram)
+        self.context = self.plant.GetMyMutableContextFromRoot(self.simulator.get_mutable_context())
+        port = self.plant.get_applied_generalized_force_input_port()
+        self.force = port.FixValue(self.context, np.zeros(3)).GetMutableData()
+        self.plant.SetPositionsAndVelocities(self.context, np.asarray(self.start))
+        self.simulator.Initialize()
+
+    def shape(self, body: Any) -> None:
+        """Give the block, the floor and the walls their shapes."""
+        from pydrake.geometry import Box, HalfSpace
+        from pydrake.math import RigidTransform
+        from pydrake.multibody.plant import CoulombFriction
+
+        b, h, mu = self.scene.block.half_width, self.scene.block.half_height, self.scene.floor.friction
+        rough, smooth = CoulombFriction(mu, mu), CoulombFriction(0.0, 0.0)
+        add, world = self.plant.RegisterCollisionGeometry, self.plant.world_body()
+        add(body, RigidTransform(), Box(2.0 * b, 2.0 * b, 2.0 * h), "box", rough)
+        logging.getLogger("drake").setLevel(logging.ERROR)  # it would warn that half-spaces do not meet deformable bodies
+        add(world, HalfSpace.MakePose([0.0, 0.0, 1.0], np.zeros(3)), HalfSpace(), "floor", rough)
+        for wall in self.scene.walls:
+            inward = 1.0 if wall.side == "left" else -1.0
+            place = HalfSpace.MakePose([inward, 0.0, 0.0], [-inward * (b + wall.gap), 0.0, 0.0])
+            add(world, place, HalfSpace(), wall.side, smooth)
+
+
+class _RigidDrakeWorld(_DrakeWorld):
+    """Contacts of tiny spheres on slabs, so stiff that a step stops them."""
+
+    def shape(self, body: Any) -> None:
+        """Give the block, the floor and the walls their shapes."""
+        from pydrake.geometry import AddContactMaterial, Box, ProximityProperties, Sphere
+        from pydrake.math import RigidTransform
+        from pydrake.multibody.plant import CoulombFriction, DiscreteContactApproximation
+
+        plant, scene = self.plant, self.scene
+        # SAP's and the lagged approximations' friction is convex: what slides lifts off, whatever the step.
+        plant.set_discrete_contact_approximation(DiscreteContactApproximation.kTamsi)
+
+        plant.set_stiction_tolerance(STICTION)
+
+        def material(mu: float) -> Any:
+            properties = ProximityProperties()
+            friction = CoulombFriction(mu, mu)
+            AddContactMaterial(dissipation=DISSIPATION, point_stiffness=STIFFNESS, friction=friction, properties=properties)
+            return properties
+
+        add, world = plant.RegisterCollisionGeometry, plant.world_body()
+        for n, (bx, bz) in enumerate(dict.fromkeys(contact.corner for contact in contacts_of(scene))):
+            add(body, RigidTransform([bx, 0.0, bz]), Sphere(CORNER_RADIUS), f"corner {n}", material(scene.floor.friction))
+        for name, contact in {contact.surface: contact for contact in contacts_of(scene)}.items():
+            (nx, nz), depth = contact.normal, contact.distance + CORNER_RADIUS + 0.5 * SLAB
+            box = Box(SLAB if nx else REACH, REACH, SLAB if nz else REACH)
+            mu = scene.floor.friction if name == "floor" else 0.0
+            add(world, RigidTransform([-nx * depth, 0.0, -nz * depth]), box, name, material(mu))

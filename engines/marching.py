@@ -1,0 +1,76 @@
+"""What stands around the march of any engine: its unit of length, fixed steps, and the states on a scene's output grid."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.engines.world import World
+from rockcheck.scenes import Block, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall
+from rockcheck.scenes.progress import tell
+
+FloatArray = NDArray[np.float64]
+Marched = tuple[FloatArray, FloatArray, FloatArray]  # times (n) and states (n, 6) at step ends, felt accelerations (n-1, 2)
+STEPS_AT_ONCE = 2048
+BLOWN_UP = 1e6  # m, rad, m/s or rad/s: no scene comes near it
+
+
+def in_units_of(length: float, scene: Scene) -> Scene:
+    """The scene with all lengths in units of `length` m, so that the absolute tolerances of an engine fit any block."""
+
+    def rescaled(excitation: Rest | Ricker | Sine | Record) -> Rest | Ricker | Sine | Record:
+        return excitation.scaled(1.0 / length)
+
+    return scene.replace(
+        block=Block(half_width=scene.block.half_width / length, half_height=scene.block.half_height / length),
+        walls=tuple(Wall(side=wall.side, gap=wall.gap / length, restitution=wall.restitution) for wall in scene.walls),
+        excitation=rescaled(scene.excitation),
+        vertical=rescaled(scene.vertical),
+        initial_velocity=scene.initial_velocity / length,
+        initial_height=scene.initial_height / length,
+        gravity=scene.gravity / length,
+    )
+
+
+def march_fixed(world: World, scene: Scene, times: FloatArray, felt: FloatArray) -> Marched:
+    """Times, states at all step ends and felt accelerations, up to the first state with |theta| >= pi/2.
+
+    Raises `ModelFailure` if the motion blows up or the block falls through the floor.
+    """
+    dt = float(times[1]) if len(times) > 1 else 0.0
+    pieces = [np.array(scene.initial_state)[None, :]]
+    world.place(pieces[0][0])
+    for first in range(0, len(felt), STEPS_AT_ONCE):
+        tell(first, len(felt))
+        states = world.march(felt[first : first + STEPS_AT_ONCE], dt)
+        tipped = np.flatnonzero(np.abs(states[:, 2]) >= math.pi / 2)
+        if tipped.size:
+            states = states[: tipped[0] + 1]
+        if not np.all(np.abs(states) < BLOWN_UP):  # catches nan, too
+            raise ModelFailure(f"the motion blew up between t = {times[first]:g} and {times[first + len(states)]:g} s")
+        if np.any(states[:, 1] < 0.0):
+            raise ModelFailure(f"the block fell through the floor before t = {times[first + len(states)]:g} s: is the step too long?")
+        pieces.append(states)
+        if tipped.size:
+            break
+    marched = np.concatenate(pieces)
+    return times[: len(marched)], marched, felt
+
+
+def at_output_times(scene: Scene, times: FloatArray, states: FloatArray) -> FloatArray:
+    """States on the scene's output grid: positions by cubic Hermite interpolation between steps, velocities linear.
+
+    Velocities jump at impacts, where a cubic would overshoot.
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    wanted = scene.output_times
+    wanted = wanted[wanted <= times[-1] * (1.0 + 1e-12) + 1e-12]
+    if len(times) == 1:
+        return states[: len(wanted)]
+    inside = np.minimum(wanted, times[-1])
+    positions = CubicHermiteSpline(times, states[:, :3], states[:, 3:])(inside)
+    velocities = np.column_stack([np.interp(inside, times, states[:, column]) for column in (3, 4, 5)])
+    return np.hstack([positions, velocities])

@@ -1,0 +1,106 @@
+"""pymunk (Chipmunk, in two dimensions) as a model of the rocking block."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.engines.adaptive import Vector
+from rockcheck.engines.engine import Engine
+from rockcheck.engines.world import State, World
+from rockcheck.scenes import Scene
+
+FloatArray = NDArray[np.float64]
+SLAB = 10.0  # half the thickness of floor and walls: Chipmunk's normals are exact where shapes do not cross each other's middle
+REACH = 1000.0  # half their extent
+KEPT = 0.5  # share of a penetration that is left after a second
+ITERATIONS = 200
+
+
+class Pymunk(Engine):
+    """pymunk; at its best with a converged solver and without slop."""
+
+    name: ClassVar[str] = "pymunk"
+    module: ClassVar[str] = "pymunk"
+    extra: ClassVar[str] = "pymunk"
+
+    def rigid_world(self, scene: Scene) -> World:
+        """The scene as pymunk holds it, with a converged solver."""
+        return _RigidPymunkWorld(scene)
+
+    def stock_world(self, scene: Scene) -> World:
+        """The scene as pymunk holds it: a box among segments."""
+        return _PymunkWorld(scene)
+
+
+class _PymunkWorld(World):
+    """A space of its own with a box, floor and walls, and Chipmunk's default parameters."""
+
+    slab = 0.0  # m: half the thickness of floor and walls
+
+    def __init__(self, scene: Scene) -> None:
+        import pymunk
+
+        b, h, slab = scene.block.half_width, scene.block.half_height, self.slab
+        self.space = pymunk.Space()
+        self.body = pymunk.Body(1.0, scene.block.radius**2 / 3.0)
+        # Friction and elasticity of two shapes multiply: the block's are 1, so that those of floor and walls count.
+        self.box = pymunk.Poly(self.body, [(-b, -h), (b, -h), (b, h), (-b, h)])
+        self.box.friction = self.box.elasticity = 1.0
+        self.space.add(self.body, self.box)
+        surfaces = [((-REACH, -slab), (REACH, -slab), scene.floor.friction, scene.floor.restitution)]
+        for wall in scene.walls:
+            place = (b + wall.gap + slab) * (-1.0 if wall.side == "left" else 1.0)
+            surfaces.append(((place, -REACH), (place, REACH), 0.0, wall.restitution))
+        for start, end, friction, restitution in surfaces:
+            surface = pymunk.Segment(self.space.static_body, start, end, slab)
+            surface.friction, surface.elasticity = friction, restitution
+            self.space.add(surface)
+
+    def place(self, state: FloatArray | State) -> None:
+        """Put the block where `state` says."""
+        x, y, theta, vx, vy, w = map(float, state)
+        self.body.position, self.body.angle = (x, y), theta
+        self.body.velocity, self.body.angular_velocity = (vx, vy), w
+
+    def step(self, felt: tuple[float, float], dt: float) -> None:
+        """One step."""
+        self.space.gravity = felt
+        self.space.step(dt)
+
+    def state(self) -> State:
+        """Where the block is."""
+        body = self.body
+        (x, y), (vx, vy) = body.position, body.velocity
+        return x, y, body.angle, vx, vy, body.angular_velocity
+
+
+class _RigidPymunkWorld(_PymunkWorld):
+    """Contacts without slop, solved to convergence."""
+
+    slab = SLAB
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene)
+        self.space.collision_slop = 0.0
+        self.space.collision_bias = KEPT
+        self.space.iterations = ITERATIONS
+        self.space.collision_persistence = 1  # steps after which a contact that has opened is forgotten
+        self.aloft = (0.0, 10.0 * scene.block.radius, 0.0, 0.0, 0.0, 0.0)
+
+    def bounce(self, bouncing: bool) -> None:
+        """Let contacts have their restitution, or none."""
+        self.box.elasticity = float(bouncing)
+
+    def push(self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool) -> Vector:
+        """Velocity after `dt` s with the contacts closed at `pose`.
+
+        Chipmunk begins with the impulses of the step before, which has to be as long: a step aloft makes it forget them.
+        It moves a body before it looks for contacts.
+        """
+        self.place(self.aloft)
+        self.step((0.0, 0.0), dt)
+        (x, y, theta), (vx, vy, w) = pose, velocity
+        return super().push((x - vx * dt, y - vy * dt, theta - w * dt), velocity, dt, felt, bouncing)

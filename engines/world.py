@@ -1,0 +1,53 @@
+"""What an engine gives: one scene as it holds it, to be placed, stepped and looked at."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.engines.adaptive import Vector
+
+FloatArray = NDArray[np.float64]
+State = tuple[float, float, float, float, float, float]
+
+
+class World(ABC):
+    """One scene as an engine holds it: a block of unit mass that is free to move in its plane.
+
+    A state is x, y, theta of the centroid and their rates; theta is counterclockwise positive.
+    """
+
+    @abstractmethod
+    def place(self, state: FloatArray | State) -> None:
+        """Put the block where `state` says."""
+
+    @abstractmethod
+    def step(self, felt: tuple[float, float], dt: float) -> None:
+        """One step of `dt` s with the `felt` acceleration, to the right and up, in units of length a s^2."""
+
+    @abstractmethod
+    def state(self) -> State:
+        """Where the block is."""
+
+    def march(self, felt: FloatArray, dt: float) -> FloatArray:
+        """States (n, 6) after each of n steps of `dt` s, with the `felt` accelerations (n, 2)."""
+        states = np.empty((len(felt), 6))
+        for row, (ax, ay) in enumerate(felt.tolist()):
+            self.step((ax, ay), dt)
+            states[row] = self.state()
+        return states
+
+    def bounce(self, bouncing: bool) -> None:  # noqa: B027 - asked of those alone whose steps can vary
+        """Let contacts have their restitution, or none."""
+
+    def push(self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool) -> Vector:
+        """The engine as a map of velocities, for adaptive steps: see `engines.adaptive.Push`."""
+        self.bounce(bouncing)
+        self.place((*pose, *velocity))
+        self.step(felt, dt)
+        return self.state()[3:]
+
+    def close(self) -> None:  # noqa: B027 - most engines hold nothing
+        """Give back what the engine holds."""
