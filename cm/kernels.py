@@ -182,6 +182,18 @@ def closes_in(parameters: Parameters, gap: float, before: float, rate: float, st
 
 
 @kernel
+def is_closed(memory: Floats, contact: int, gap: float, rate: float, ahead: float, t: float) -> bool:
+    """Whether a contact is closed; where it opens, `memory` holds when it was closed last.
+
+    A settled contact stays closed while it would close again within the step (`ahead`, s).
+    """
+    closed = gap < 0.0 or (memory[contact, CLOSED] != 0.0 and gap + ahead * rate < 0.0)
+    if memory[contact, CLOSED] != 0.0 and not closed:
+        memory[contact, CLOSED], memory[contact, LAST_CLOSED] = 0.0, t
+    return closed
+
+
+@kernel
 def press(
     memory: Floats, friction: Floats, parameters: Parameters, inverse: float, surface: int, x: float, y: float,
     corners: tuple[float, float, float, float], v: Velocity, v0: Velocity, step: float, ahead: float, t: float,
@@ -206,13 +218,7 @@ def press(
     rate1, rate2 = nx * v[0] + ny * v[1] + lever1 * v[2] - turn1, nx * v[0] + ny * v[1] + lever2 * v[2] - turn2
     before1 = nx * v0[0] + ny * v0[1] + lever1 * v0[2] + turn1
     before2 = nx * v0[0] + ny * v0[1] + lever2 * v0[2] + turn2
-    # A settled contact stays closed while it would close again within the step.
-    closed1 = gap1 < 0.0 or (memory[one, CLOSED] != 0.0 and gap1 + ahead * rate1 < 0.0)
-    closed2 = gap2 < 0.0 or (memory[two, CLOSED] != 0.0 and gap2 + ahead * rate2 < 0.0)
-    if memory[one, CLOSED] != 0.0 and not closed1:
-        memory[one, CLOSED], memory[one, LAST_CLOSED] = 0.0, t
-    if memory[two, CLOSED] != 0.0 and not closed2:
-        memory[two, CLOSED], memory[two, LAST_CLOSED] = 0.0, t
+    closed1, closed2 = is_closed(memory, one, gap1, rate1, ahead, t), is_closed(memory, two, gap2, rate2, ahead, t)
     fine = math.inf
     force1 = force2 = 0.0
     if closed1 or closed2:
@@ -283,6 +289,60 @@ def flush(memory: Floats, until: float, events: Floats, n_events: int) -> int:
 
 
 @kernel
+def kick(
+    memory: Floats, friction: Floats, parameters: Parameters, inverse: float, surfaces: Integers, x: float, y: float,
+    corners: tuple[float, float, float, float], v: Velocity, v0: Velocity, step: float, settled: bool, t: float,
+) -> tuple[Velocity, float, float, int]:  # fmt: skip
+    """The forces of all surfaces over a step, from the velocity `v` that the block would have without them and `v0` before it.
+
+    One surface alone is solved at once. Where a wall touches too, each surface in turn takes back its force (first that of the
+    last step) and replaces it, until they agree. Returns the velocity; the time until an open contact closes; the step that a
+    contact which closes asks for, else infinity; the sweeps over the surfaces.
+    """
+    touching = wall_force(memory) > 0.0
+    if touching:
+        for surface in surfaces:
+            v = with_forces(memory, friction, inverse, surface, corners, v, step)
+    closing = young = math.inf
+    sweeps = 0
+    for _ in range(MOST_SWEEPS):
+        sweeps += 1
+        closing, change, whole = math.inf, 0.0, 0.0
+        for surface in surfaces:
+            if touching:
+                v = with_forces(memory, friction, inverse, surface, corners, v, -step)
+            force1, force2 = memory[2 * surface, FORCE], memory[2 * surface + 1, FORCE]
+            v, next_closing, fine = press(
+                memory, friction, parameters, inverse, surface, x, y, corners, v, v0, step, step if settled else 0.0, t
+            )
+            closing, young = min(closing, next_closing), min(young, fine)
+            change += abs(memory[2 * surface, FORCE] - force1) + abs(memory[2 * surface + 1, FORCE] - force2)
+            whole += memory[2 * surface, FORCE] + memory[2 * surface + 1, FORCE]
+        if (not touching and wall_force(memory) == 0.0) or change <= SWEPT * whole:
+            break
+        touching = True
+    return v, closing, young, sweeps
+
+
+@kernel
+def stretch(
+    memory: Floats, friction: Floats, parameters: Parameters,
+    corners: tuple[float, float, float, float], v: Velocity, v0: Velocity, step: float,
+) -> None:  # fmt: skip
+    """The friction spring follows the lower corner over a step; one that slips keeps the length of its largest force."""
+    friction[SLIPPED] = friction[SLIPS]
+    load = memory[2 * FLOOR, FORCE] + memory[2 * FLOOR + 1, FORCE]
+    if load > 0.0:
+        arm, place = (corners[1], corners[0]) if corners[1] < corners[3] else (corners[3], corners[2])
+        friction[STRETCH] += step * (v[0] - v[2] * arm - 0.5 * step * v0[2] ** 2 * place)
+        if friction[SLIPS] != 0.0:  # the spring slips along, so that slip leaves no other memory
+            longest = parameters.mu_k * load / parameters.stiffness
+            friction[STRETCH] = min(max(friction[STRETCH], -longest), longest)
+    else:
+        friction[:] = 0.0
+
+
+@kernel
 def advance(
     parameters: Parameters,
     first_row: int,
@@ -307,9 +367,8 @@ def advance(
     over the surfaces that they took, and the time reached.
     """
     b, h = parameters.half_width, parameters.half_height
-    k = parameters.stiffness
     inverse = 3.0 / (b * b + h * h)
-    contact_time = 1.0 / math.sqrt(k)
+    contact_time = 1.0 / math.sqrt(parameters.stiffness)
     x, y, theta, vx, vy, w, calm, fine, closing, allowed, gross = state
     v = vx, vy, w
     first_strike = float(np.min(memory[:, STRUCK]))
@@ -326,8 +385,7 @@ def advance(
             middle = t + half
             t = end if step == end - t else t + step
             steps += 1
-            # Half a step of motion, then the kick. One surface alone is solved at once; where a wall touches too, each surface
-            # in turn takes back its force (first that of the last step) and replaces it, until they agree.
+            # Half a step of motion, then the kick.
             x += half * v[0]
             y += half * v[1]
             theta += half * v[2]
@@ -336,37 +394,9 @@ def advance(
             v0 = v
             u, vg = sampled(horizontal, horizontal_rate, middle), sampled(vertical, vertical_rate, middle)
             v = v[0] - step * u, v[1] - step * (parameters.gravity + vg), v[2]
-            touching = wall_force(memory) > 0.0
-            if touching:
-                for surface in surfaces:
-                    v = with_forces(memory, friction, inverse, surface, corners, v, step)
-            young = math.inf
-            for _ in range(MOST_SWEEPS):
-                sweeps += 1
-                closing, change, whole = math.inf, 0.0, 0.0
-                for surface in surfaces:
-                    if touching:
-                        v = with_forces(memory, friction, inverse, surface, corners, v, -step)
-                    force1, force2 = memory[2 * surface, FORCE], memory[2 * surface + 1, FORCE]
-                    v, next_closing, asked = press(
-                        memory, friction, parameters, inverse, surface, x, y, corners, v, v0, step, step if settled else 0.0, middle
-                    )
-                    closing, young = min(closing, next_closing), min(young, asked)
-                    change += abs(memory[2 * surface, FORCE] - force1) + abs(memory[2 * surface + 1, FORCE] - force2)
-                    whole += memory[2 * surface, FORCE] + memory[2 * surface + 1, FORCE]
-                if (not touching and wall_force(memory) == 0.0) or change <= SWEPT * whole:
-                    break
-                touching = True
-            friction[SLIPPED] = friction[SLIPS]
-            load = memory[2 * FLOOR, FORCE] + memory[2 * FLOOR + 1, FORCE]
-            if load > 0.0:
-                arm, place = (corners[1], corners[0]) if corners[1] < corners[3] else (corners[3], corners[2])
-                friction[STRETCH] += step * (v[0] - v[2] * arm - half * v0[2] ** 2 * place)
-                if friction[SLIPS] != 0.0:  # the spring slips along, so that slip leaves no other memory
-                    longest = parameters.mu_k * load / k
-                    friction[STRETCH] = min(max(friction[STRETCH], -longest), longest)
-            else:
-                friction[:] = 0.0
+            v, closing, young, swept = kick(memory, friction, parameters, inverse, surfaces, x, y, corners, v, v0, step, settled, middle)
+            sweeps += swept
+            stretch(memory, friction, parameters, corners, v, v0, step)
             if young < math.inf:
                 fine = young if settled else min(young, fine)
                 calm = middle + YOUNG * contact_time

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,6 +15,7 @@ from rockcheck.reports.show import words as display
 from rockcheck.reports.style import PAGE, figure_style, looks, save
 from rockcheck.reports.words import number
 from rockcheck.scenes import Scene
+from rockcheck.scenes.writing import table_text
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.discrepancy.statistics import CONFIDENCE, SMALLEST_PEAK, Sample, Samples
 from rockcheck.validation.suite.ensembles import Distribution, Ensemble
@@ -128,14 +127,9 @@ class EnsembleView:
 
     def table(self) -> str:
         """Peak rotation (alpha) and outcome of every scene by every model, as CSV."""
-        text = io.StringIO()
-        rows = csv.writer(text, lineterminator="\n")
-        models = list(self.samples)
-        rows.writerow(["scene", *(f"{what} {model}" for model in models for what in ("peak_rotation_alpha", "outcome"))])
-        for n in range(len(next(iter(self.samples.values())).peaks)):
-            values = ((repr(float(s.peaks[n])) if math.isfinite(s.peaks[n]) else "", s.outcomes[n]) for s in self.samples.values())
-            rows.writerow([n + 1, *(value for pair in values for value in pair)])
-        return text.getvalue()
+        columns = ["scene", *(f"{what} {model}" for model in self.samples for what in ("peak_rotation_alpha", "outcome"))]
+        values = [column for sample in self.samples.values() for column in (sample.peaks.tolist(), sample.outcomes)]
+        return table_text(columns, ([n, *row] for n, row in enumerate(zip(*values, strict=True), 1)))
 
 
 def distributions_figure(view: EnsembleView) -> Drawing:

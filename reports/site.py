@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -248,7 +249,16 @@ def _environment() -> Environment:
     )
     for filter in (words.number, words.unit, words.duration, words.moment, words.ratio, words.window, words.dash_array):
         environment.filters[filter.__name__] = filter
-    for function in (words.share, words.formula, tables.overrun, tables.measure_table, tables.scene_facts, tables.summary, figure_stem):
+    for function in (
+        words.share,
+        words.formula,
+        words.known,
+        tables.overrun,
+        tables.measure_table,
+        tables.scene_facts,
+        tables.summary,
+        figure_stem,
+    ):
         environment.globals[function.__name__] = function
-    environment.globals["VERDICTS"] = VERDICTS
+    environment.globals |= {"VERDICTS": VERDICTS, "finite": math.isfinite}
     return environment

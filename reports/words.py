@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from datetime import datetime
 
@@ -10,6 +11,11 @@ from rockcheck.reports.style import Look
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord
 from rockcheck.validation.suite.results import Check
 from rockcheck.validation.suite.tables import used
+
+
+def known(value: float, digits: int = 2) -> str:
+    """`number` where there is one, else a dash."""
+    return number(value, digits) if math.isfinite(value) else "–"
 
 
 def unit(name: str) -> str:

@@ -41,8 +41,13 @@ class Block(Frozen):
 
     @property
     def frequency_parameter(self) -> float:
-        """p = sqrt(3 g / (4 R)) in rad/s at g = 9.81 m/s^2."""
-        return math.sqrt(0.75 * 9.81 / self.radius)
+        """p = sqrt(3 g / (4 R)), rad/s, on Earth: g = 9.81 m/s^2. `Scene.frequency_parameter` has the scene's own gravity."""
+        return frequency_parameter(self.radius, 9.81)
+
+
+def frequency_parameter(radius: float, gravity: float) -> float:
+    """p = sqrt(3 g / (4 R)), rad/s, of a block of half diagonal R (m) under gravity g (m/s^2)."""
+    return math.sqrt(0.75 * gravity / radius)
 
 
 #: The block of the paper: R = 1.605 m, alpha = 0.25 rad, p = 2.14 rad/s.
@@ -144,7 +149,7 @@ class Scene(Shown, Frozen):
     @property
     def frequency_parameter(self) -> float:
         """p = sqrt(3 g / (4 R)) in rad/s with this scene's gravity."""
-        return math.sqrt(0.75 * self.gravity / self.block.radius)
+        return frequency_parameter(self.block.radius, self.gravity)
 
     @property
     def output_times(self) -> NDArray[np.float64]:

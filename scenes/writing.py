@@ -1,12 +1,18 @@
-"""Writing that leaves no half of a file."""
+"""Writing: no half of a file, tables as CSV, values as JSON."""
 
 from __future__ import annotations
 
+import csv
+import io
+import json
+import math
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 
 def write_whole(path: Path, content: str | bytes) -> Path:
@@ -64,3 +70,38 @@ def write_new(path: Path, content: str) -> Path:
 def _named(error: OSError, path: Path) -> OSError:
     """The same fault, which names the file that was to be written."""
     return OSError(error.errno, error.strerror or str(error), str(path))
+
+
+def table_text(columns: Sequence[str], rows: Iterable[Sequence[object]], *, digits: int | None = None) -> str:
+    """A table as CSV; floats with all their digits, or with so many significant ones. None and NaN are empty cells."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([_cell(value, digits) for value in row] for row in rows)
+    return text.getvalue()
+
+
+def _cell(value: object, digits: int | None) -> object:
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return ""
+    return f"{value:.{digits}g}" if digits is not None and isinstance(value, float) else value
+
+
+def records_text(kind: type, records: Iterable[Any]) -> str:
+    """Records of one dataclass as CSV, a column a field, floats with six significant digits."""
+    columns = [field.name for field in fields(kind)]
+    return table_text(columns, ([getattr(record, name) for name in columns] for record in records), digits=6)
+
+
+def finite(value: Any) -> Any:
+    """A value as JSON can hold it: tuples become lists, numbers that are not finite null."""
+    if isinstance(value, Mapping):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def json_text(value: Any) -> str:
+    """A value as indented JSON (see `finite`); what JSON does not know, such as a path, is written as text."""
+    return json.dumps(finite(value), indent=1, allow_nan=False, default=str)

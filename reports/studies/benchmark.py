@@ -7,8 +7,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rockcheck.reports.site import PAGES, Site
-from rockcheck.reports.style import LOOKS, PAGE, figure_style, looks, save
+from rockcheck.reports.site import PAGES
+from rockcheck.reports.studies.page import write_study
+from rockcheck.reports.style import LOOKS, PAGE, figure_style, save
 from rockcheck.validation.bench.ebm import CASES, EbmSpeed
 from rockcheck.validation.bench.ebm import LEVEL as BATCH_LEVEL
 from rockcheck.validation.bench.models import LEVEL, LINES, DiagramLine, Point, WorkPrecision
@@ -32,8 +33,6 @@ FLOOR = 1e-13
 
 def write_benchmark(found: Benchmark, folder: Path) -> Path:
     """Writes `index.html` with its diagrams into the folder of a benchmark; returns the page."""
-    site = Site(folder, f"rockcheck: {found.suite}")
-    site.assets()
     figures = folder / PAGES / "figures"
     sheets = []
     if found.models is not None:
@@ -45,19 +44,17 @@ def write_benchmark(found: Benchmark, folder: Path) -> Path:
         save(ratio_figure(found.models), figures / "ratios")
     if found.ebm is not None:
         save(batch_figure(found.ebm), figures / "batches")
-    return site.page(
-        "index.html",
+    return write_study(
+        found,
+        folder,
         "benchmark.html",
-        run=found,
         sheets=sheets,
-        looks=looks(LOOKS),
         lines=LINES,
         families=FAMILIES,
         cases=CASES,
         level=LEVEL,
         batch_level=BATCH_LEVEL,
         not_measured=NOT_MEASURED,
-        finite=math.isfinite,
     )
 
 

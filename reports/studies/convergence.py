@@ -6,9 +6,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rockcheck.reports.site import Site
 from rockcheck.reports.studies.benchmark import power_of_ten
-from rockcheck.reports.style import LOOKS, PAGE, figure_style, looks, save
+from rockcheck.reports.studies.page import write_study
+from rockcheck.reports.style import LOOKS, PAGE, figure_style, save
 from rockcheck.validation.bench.convergence import DURATION, LEVEL, PULSES, REFERENCE_TOLERANCE, REFERENCES, SWEEPS, Convergence
 
 if TYPE_CHECKING:
@@ -22,23 +22,18 @@ TITLES = {"ebm-unilateral": "Against the unilateral EBM: numerical error", "ebm"
 
 def write_convergence(found: Convergence, folder: Path) -> Path:
     """Writes `index.html` with its diagram into the folder of a study; returns the page."""
-    above = (("Report", "../index.html"),) if (folder.parent / "index.html").exists() else ()
-    site = Site(folder, "rockcheck: convergence", above)
-    site.assets()
     save(convergence_figure(found), folder / "figures" / DIAGRAM)
-    return site.page(
-        "index.html",
+    return write_study(
+        found,
+        folder,
         "convergence.html",
-        run=found,
         diagram=DIAGRAM,
-        looks=looks(LOOKS),
         references=REFERENCES,
         refinements=SWEEPS,
         pulses=PULSES,
         duration=DURATION,
         level=LEVEL,
         tolerance=power_of_ten(REFERENCE_TOLERANCE),
-        finite=math.isfinite,
     )
 
 

@@ -6,8 +6,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rockcheck.reports.site import Site
-from rockcheck.reports.style import LOOKS, PAGE, figure_style, looks, save
+from rockcheck.reports.studies.page import write_study
+from rockcheck.reports.style import PAGE, figure_style, save
 from rockcheck.validation.stress.invariants import EXCEPTIONS, INVARIANTS
 from rockcheck.validation.stress.players import PLAYERS
 from rockcheck.validation.stress.stability import AXIS_WORDS, STEPS, Stability
@@ -22,21 +22,16 @@ MAPS = "stable-steps"
 
 def write_stress(found: Stress, folder: Path) -> Path:
     """Writes `index.html` into the folder of a stress run; returns the page."""
-    above = (("Report", "../index.html"),) if (folder.parent / "index.html").exists() else ()
-    site = Site(folder, "rockcheck: stress", above)
-    site.assets()
     if found.stability is not None:
         save(stability_figure(found.stability), folder / "figures" / MAPS)
-    return site.page(
-        "index.html",
+    return write_study(
+        found,
+        folder,
         "stress.html",
-        run=found,
         maps=MAPS,
-        looks=looks(LOOKS),
         invariants=INVARIANTS,
         exceptions=EXCEPTIONS,
         players=PLAYERS,
-        finite=math.isfinite,
     )
 
 

@@ -8,7 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from rockcheck.scenes import Event, InputError
+from rockcheck.scenes import Event, Floor, InputError, Scene
+from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation import compare
 from rockcheck.validation.discrepancy.compare import describe
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, match_impacts
@@ -71,6 +72,13 @@ def test_hausdorff_counts_a_late_jump_as_lateness(made):
     found = compare(made(step, T), made(late, T))
     assert found["theta_peak"] == pytest.approx(1.0)
     assert found["theta_hausdorff"] == pytest.approx(0.01 * 2.14, rel=0.02)
+
+
+def test_hausdorff_scales_time_by_the_scene_s_own_gravity(made):
+    late = made(np.where(T < 5.01, 0.0, 1.0), T)
+    moon = Scene(name="moon", block=PAPER_BLOCK, floor=Floor(friction=0.5), duration=10.0, gravity=1.62)
+    on_earth, on_the_moon = (compare(made(np.where(T < 5.0, 0.0, 1.0), T), late, scene=scene)["theta_hausdorff"] for scene in (None, moon))
+    assert on_the_moon / on_earth == pytest.approx(math.sqrt(1.62 / 9.81), rel=0.02)
 
 
 @pytest.mark.parametrize("column", ["theta", "x", "slip_rate", "y_dot"])

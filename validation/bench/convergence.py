@@ -7,14 +7,12 @@ flight, ends at the difference in form between the two.
 from __future__ import annotations
 
 import itertools
-import json
 import math
 import os
 import time
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from statistics import median
@@ -26,12 +24,12 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.horizon import predictability_horizon
 from rockcheck.scenes import History, InputError, ModelFailure, Scene, Wall
 from rockcheck.scenes.progress import OnProgress, unheard
-from rockcheck.scenes.writing import write_whole
+from rockcheck.scenes.writing import json_text, records_text, write_whole
 from rockcheck.validation.bench.scenes import pulse
 from rockcheck.validation.discrepancy.compare import compare
-from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build
 from rockcheck.validation.execute.pool import Call, Pool
+from rockcheck.validation.execute.study import Study, header
 
 Reference = Literal["ebm-unilateral", "ebm"]
 REFERENCES: tuple[Reference, ...] = ("ebm-unilateral", "ebm")
@@ -130,17 +128,10 @@ class Order:
     scene: str = ""
 
 
-@dataclass(frozen=True)
-class Convergence:
-    """What was found, when, with what, on what."""
+@dataclass(frozen=True, kw_only=True)
+class Convergence(Study):
+    """What was found."""
 
-    suite: str
-    created: str
-    quick: bool
-    jobs: int
-    wall_seconds: float
-    versions: dict[str, str]
-    hardware: dict[str, str]
     cases: tuple[StudyScene, ...]
     plays: tuple[SweepRun, ...]
     levels: tuple[Level, ...]
@@ -223,7 +214,7 @@ def run_convergence(*, quick: bool = False, jobs: int | None = None, on_progress
     for found in itertools.starmap(play, planned) if jobs == 1 else _side_by_side(planned[::-1], jobs):  # the longest first
         plays.append(found)
         on_progress(len(plays), len(planned), f"{found.scene}, {found.model}")
-    return evaluated(cases, plays, quick=quick, jobs=jobs, wall_seconds=time.monotonic() - began)
+    return evaluated(cases, plays, quick=quick, jobs=jobs, began=began)
 
 
 def _side_by_side(planned: Sequence[tuple[str, str, float]], jobs: int) -> Iterable[SweepRun]:
@@ -234,9 +225,9 @@ def _side_by_side(planned: Sequence[tuple[str, str, float]], jobs: int) -> Itera
 
 
 def evaluated(
-    cases: Sequence[StudyScene], plays: Iterable[SweepRun], *, quick: bool = False, jobs: int = 1, wall_seconds: float = math.nan
+    cases: Sequence[StudyScene], plays: Iterable[SweepRun], *, quick: bool = False, jobs: int = 1, began: float = math.nan
 ) -> Convergence:
-    """What the runs say."""
+    """What the runs say; they `began` at that time (of `time.monotonic`)."""
     place = {name: n for n, name in enumerate([*SCENES, *SWEEPS])}
     ordered = sorted(plays, key=lambda one: (place[one.model], place[one.scene], -one.value))
     levels: list[Level] = []
@@ -252,13 +243,7 @@ def evaluated(
                 points = [(one.step, one.error(reference)) for one in mine if one.scene == case.scene]
                 orders.append(Order(model, reference, slope(points), case.scene))
     return Convergence(
-        suite=f"convergence{', quick' if quick else ''}",
-        created=datetime.now(UTC).isoformat(timespec="seconds"),
-        quick=quick,
-        jobs=jobs,
-        wall_seconds=wall_seconds,
-        versions=provenance.versions(),
-        hardware=provenance.hardware(),
+        **header("convergence", quick=quick, jobs=jobs, began=began),
         cases=tuple(cases),
         plays=tuple(ordered),
         levels=tuple(levels),
@@ -307,10 +292,12 @@ def _exceptions(plays: Sequence[SweepRun], orders: Sequence[Order]) -> Iterable[
 
 def save(found: Convergence, folder: Path) -> None:
     """Writes the tables as CSV, and run.json with all else, into a folder."""
-    import pandas as pd
-
-    tables: dict[str, Sequence[object]] = {"runs": found.plays, "levels": found.levels, "orders": found.orders}
-    for name, rows in tables.items():
-        write_whole(folder / f"{name}.csv", pd.DataFrame(list(rows)).to_csv(index=False, float_format="%.6g"))
+    tables: dict[str, tuple[type, Sequence[object]]] = {
+        "runs": (SweepRun, found.plays),
+        "levels": (Level, found.levels),
+        "orders": (Order, found.orders),
+    }
+    for name, (kind, rows) in tables.items():
+        write_whole(folder / f"{name}.csv", records_text(kind, rows))
     rest = {name: value for name, value in asdict(found).items() if name not in ("plays", "levels", "orders")}
-    write_whole(folder / "run.json", json.dumps(rest, indent=1) + "\n")
+    write_whole(folder / "run.json", json_text(rest) + "\n")

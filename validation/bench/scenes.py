@@ -42,16 +42,10 @@ def _free(k: int) -> Scene:
 
 def pulse(frequency_ratio: float, amplitude_ratio: float, friction: float, *, walls: tuple[Wall, ...] = (), name: str = "pulse") -> Scene:
     """A Ricker pulse of omega_p = ratio p and a_p = ratio g tan alpha, 3 s."""
-    amplitude = amplitude_ratio * 9.81 * math.tan(PAPER_BLOCK.alpha)
-    period = 2.0 * math.pi / (frequency_ratio * PAPER_BLOCK.frequency_parameter)
-    return Scene(
-        name=name,
-        block=PAPER_BLOCK,
-        floor=Floor(friction=friction),
-        walls=walls,
-        excitation=Ricker(amplitude=amplitude, period=period),
-        duration=3.0,
-    )
+    still = Scene(name=name, block=PAPER_BLOCK, floor=Floor(friction=friction), walls=walls, excitation=Rest(), duration=3.0)
+    amplitude = amplitude_ratio * still.gravity * math.tan(still.block.alpha)
+    period = 2.0 * math.pi / (frequency_ratio * still.frequency_parameter)
+    return still.replace(excitation=Ricker(amplitude=amplitude, period=period))
 
 
 def _pulses(name: str, frequency_ratio: float, amplitude_ratio: float, friction: float, *walls: Wall) -> SceneFamily:

@@ -164,107 +164,122 @@ def _rows(history: History) -> dict[float, float]:
 # --- steps of the engines themselves, in a row without anything between them
 
 _STEPS = 3000
+_TILTED = Scene(name="tilted", block=PAPER_BLOCK, floor=Floor(friction=1.0), duration=1.0, initial_rotation=0.3 * PAPER_BLOCK.alpha)
 
 
 def _mujoco_steps() -> Iterator[Saving]:
+    from rockcheck.engines import MuJoCo
+
+    text = _as_xml(MuJoCo().rigid_world(_TILTED.replace(walls=(FAR,), initial_rotation=0.0)))
+    whole, lean = _loaded(text), _loaded(text, _unpaired)
+    for thing, dear, cheap, remark in (
+        ("contact pairs", whole, lean, "wall pairs out of reach against none"),
+        ("collision search", _loaded(text, _all_collide), whole, "search among all geoms against listed pairs"),
+        ("out-of-plane motion", _loaded(text, _solid), whole, "a free joint against two slides and a hinge"),
+        ("unused features", _loaded(text, _flagged), whole, "energies, accelerometer and gyro that nobody reads"),
+    ):
+        yield _saving("mujoco, bare steps", thing, "μs a step", _one_by_one(dear), _one_by_one(cheap), remark=remark)
+    cost = _one_by_one(lean), _native(lean)
+    yield _saving("mujoco, bare steps", "Python between steps", "μs a step", *cost, remark="against mujoco.rollout")
+
+
+def _loaded(text: str, change: Callable[[ET.Element], None] = lambda root: None) -> Any:
+    """MuJoCo's model of a description that is changed before."""
+    import mujoco
+
+    root = ET.fromstring(text)
+    change(root)
+    model = mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
+    model.opt.gravity[:] = 0.0, 0.0, -9.81
+    model.opt.timestep = 1e-3
+    # The one-step contact that the engine's march sets, for pairs and for geoms alike.
+    one_step, impedance = (-0.01 / model.opt.timestep**2, -1.0 / model.opt.timestep), (0.9999, 0.9999, 0.001, 0.5, 1.0)
+    for solref, solimp in ((model.pair_solref, model.pair_solimp), (model.geom_solref, model.geom_solimp)):
+        solref[:], solimp[:] = one_step, impedance
+    return model
+
+
+def _started(model: Any) -> Any:
+    import mujoco
+
+    data = mujoco.MjData(model)
+    tilt, pose = _TILTED.initial_rotation, _TILTED.initial_state
+    if model.nq == 3:
+        data.qpos[:] = pose[:3]
+    else:
+        data.qpos[:] = pose[0], 0.0, pose[1], math.cos(0.5 * tilt), 0.0, -math.sin(0.5 * tilt), 0.0
+    return data
+
+
+def _one_by_one(model: Any) -> Callable[[], float]:
+    """What a step costs, us, called from Python each."""
+    import mujoco
+
+    def play() -> float:
+        data = _started(model)
+        began = time.process_time()
+        for _ in range(_STEPS):
+            mujoco.mj_step(model, data)
+        return 1e6 * (time.process_time() - began) / _STEPS
+
+    return play
+
+
+def _native(model: Any) -> Callable[[], float]:
+    """What a step costs, us, in one call of `mujoco.rollout`."""
     import mujoco
     from mujoco import rollout
 
-    from rockcheck.engines import MuJoCo
+    def play() -> float:
+        data = _started(model)
+        start = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
+        mujoco.mj_getState(model, data, start, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        began = time.process_time()
+        rollout.rollout(model, data, start, nstep=_STEPS)
+        return 1e6 * (time.process_time() - began) / _STEPS
 
-    scene = Scene(name="tilted", block=PAPER_BLOCK, floor=Floor(friction=1.0), walls=(FAR,), duration=1.0)
-    text = _as_xml(MuJoCo().rigid_world(scene))
+    return play
 
-    def loaded(change: Callable[[ET.Element], None] = lambda root: None) -> Any:
-        root = ET.fromstring(text)
-        change(root)
-        model = mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
-        model.opt.gravity[:] = 0.0, 0.0, -9.81
-        model.opt.timestep = 1e-3
-        # The one-step contact that the engine's march sets, for pairs and for geoms alike.
-        one_step, impedance = (-0.01 / model.opt.timestep**2, -1.0 / model.opt.timestep), (0.9999, 0.9999, 0.001, 0.5, 1.0)
-        for solref, solimp in ((model.pair_solref, model.pair_solimp), (model.geom_solref, model.geom_solimp)):
-            solref[:], solimp[:] = one_step, impedance
-        return model
 
-    def started(model: Any) -> Any:
-        data = mujoco.MjData(model)
-        tilt = 0.3 * PAPER_BLOCK.alpha
-        pose = scene.replace(initial_rotation=tilt).initial_state
-        if model.nq == 3:
-            data.qpos[:] = pose[:3]
-        else:
-            data.qpos[:] = pose[0], 0.0, pose[1], math.cos(0.5 * tilt), 0.0, -math.sin(0.5 * tilt), 0.0
-        return data
+def _found(root: ET.Element, path: str) -> ET.Element:
+    element = root.find(path)
+    assert element is not None
+    return element
 
-    def steps(model: Any) -> Callable[[], float]:
-        def play() -> float:
-            data = started(model)
-            began = time.process_time()
-            for _ in range(_STEPS):
-                mujoco.mj_step(model, data)
-            return 1e6 * (time.process_time() - began) / _STEPS
 
-        return play
+def _solid(root: ET.Element) -> None:
+    """Free in space."""
+    body = _found(root, "worldbody/body")
+    for joint in body.findall("joint"):
+        body.remove(joint)
+    body.insert(0, ET.Element("freejoint"))
 
-    def native(model: Any) -> Callable[[], float]:
-        def play() -> float:
-            data = started(model)
-            start = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
-            mujoco.mj_getState(model, data, start, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-            began = time.process_time()
-            rollout.rollout(model, data, start, nstep=_STEPS)
-            return 1e6 * (time.process_time() - began) / _STEPS
 
-        return play
+def _flagged(root: ET.Element) -> None:
+    """Energies, two sensors, and a touch of actuation that nobody reads."""
+    option = _found(root, "option")
+    flags = option.find("flag")
+    (ET.SubElement(option, "flag") if flags is None else flags).set("energy", "enable")
+    ET.SubElement(_found(root, "worldbody/body"), "site", {"name": "centre"})
+    sensors = ET.SubElement(root, "sensor")
+    ET.SubElement(sensors, "accelerometer", {"site": "centre"})
+    ET.SubElement(sensors, "gyro", {"site": "centre"})
 
-    def solid(root: ET.Element) -> None:
-        """Free in space."""
-        body = root.find("worldbody/body")
-        assert body is not None
-        for joint in body.findall("joint"):
-            body.remove(joint)
-        body.insert(0, ET.Element("freejoint"))
 
-    def flagged(root: ET.Element) -> None:
-        """Energies, two sensors, and a touch of actuation that nobody reads."""
-        option = root.find("option")
-        assert option is not None
-        flags = option.find("flag")
-        (ET.SubElement(option, "flag") if flags is None else flags).set("energy", "enable")
-        body = root.find("worldbody/body")
-        assert body is not None
-        ET.SubElement(body, "site", {"name": "centre"})
-        sensors = ET.SubElement(root, "sensor")
-        ET.SubElement(sensors, "accelerometer", {"site": "centre"})
-        ET.SubElement(sensors, "gyro", {"site": "centre"})
+def _unpaired(root: ET.Element) -> None:
+    """No contact with the wall that is out of reach."""
+    contact = _found(root, "contact")
+    for pair in contact.findall("pair"):
+        if "floor" not in (pair.get("geom1"), pair.get("geom2")):
+            contact.remove(pair)
 
-    def unpaired(root: ET.Element) -> None:
-        """No contact with the wall that is out of reach."""
-        contact = root.find("contact")
-        assert contact is not None
-        for pair in contact.findall("pair"):
-            if "floor" not in (pair.get("geom1"), pair.get("geom2")):
-                contact.remove(pair)
 
-    def all_collide(root: ET.Element) -> None:
-        """Every corner with every surface, found by the engine's broad phase in place of the pairs."""
-        contact = root.find("contact")
-        assert contact is not None
-        root.remove(contact)
-        for geom in root.iter("geom"):
-            for key, value in (("contype", "1"), ("conaffinity", "1"), ("condim", "3"), ("friction", "1 0 0")):
-                geom.set(key, value)
-
-    whole, lean = loaded(), loaded(unpaired)
-    for thing, dear, cheap, remark in (
-        ("contact pairs", whole, lean, "wall pairs out of reach against none"),
-        ("collision search", loaded(all_collide), whole, "search among all geoms against listed pairs"),
-        ("out-of-plane motion", loaded(solid), whole, "a free joint against two slides and a hinge"),
-        ("unused features", loaded(flagged), whole, "energies, accelerometer and gyro that nobody reads"),
-    ):
-        yield _saving("mujoco, bare steps", thing, "μs a step", steps(dear), steps(cheap), remark=remark)
-    yield _saving("mujoco, bare steps", "Python between steps", "μs a step", steps(lean), native(lean), remark="against mujoco.rollout")
+def _all_collide(root: ET.Element) -> None:
+    """Every corner with every surface, found by the engine's broad phase in place of the pairs."""
+    root.remove(_found(root, "contact"))
+    for geom in root.iter("geom"):
+        for key, value in (("contype", "1"), ("conaffinity", "1"), ("condim", "3"), ("friction", "1 0 0")):
+            geom.set(key, value)
 
 
 def _as_xml(world: Any) -> str:
@@ -278,11 +293,10 @@ def _as_xml(world: Any) -> str:
 def _pybullet_steps() -> Iterator[Saving]:
     from rockcheck.engines import PyBullet
 
-    tilted = Scene(name="tilted", block=PAPER_BLOCK, floor=Floor(friction=1.0), duration=1.0, initial_rotation=0.3 * PAPER_BLOCK.alpha)
-    start = np.array(tilted.initial_state)
+    start = np.array(_TILTED.initial_state)
 
     def steps(walls: tuple[Wall, ...] = (), each: Callable[[Any], object] = lambda world: None, count: int = _STEPS) -> Callable[[], float]:
-        scene = tilted.replace(walls=walls)
+        scene = _TILTED.replace(walls=walls)
 
         def play() -> float:
             world: Any = PyBullet().rigid_world(scene)

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import json
-import math
 import os
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from rockcheck.scenes.progress import OnProgress, unheard
-from rockcheck.scenes.writing import write_whole
-from rockcheck.validation.execute import provenance
+from rockcheck.scenes.writing import json_text, records_text, write_whole
+from rockcheck.validation.execute.study import Study, header
 
 if TYPE_CHECKING:
     from rockcheck.validation.bench.ebm import EbmSpeed
@@ -30,17 +25,10 @@ MINUTES, QUICK_MINUTES = 25.0, 2.0
 LAST_BEGINS = 0.92
 
 
-@dataclass(frozen=True)
-class Benchmark:
-    """What was measured, when, with what, on what; parts that were not asked for are None."""
+@dataclass(frozen=True, kw_only=True)
+class Benchmark(Study):
+    """What was measured; parts that were not asked for are None."""
 
-    suite: str
-    created: str
-    quick: bool
-    jobs: int
-    wall_seconds: float
-    versions: dict[str, str]
-    hardware: dict[str, str]
     ebm: EbmSpeed | None = None
     models: WorkPrecision | None = None
     savings: tuple[Saving, ...] | None = None
@@ -73,21 +61,12 @@ def run_benchmark(
         from rockcheck.validation.bench.models import work_precision
 
         parts["models"] = work_precision(quick=quick, jobs=jobs, deadline=deadline, on_progress=on_progress)
-    return Benchmark(
-        suite=f"benchmark {what}{', quick' if quick else ''}",
-        created=datetime.now(UTC).isoformat(timespec="seconds"),
-        quick=quick,
-        jobs=jobs,
-        wall_seconds=time.monotonic() - began,
-        versions=provenance.versions(),
-        hardware=provenance.hardware(),
-        **parts,
-    )
+    return Benchmark(**header(f"benchmark {what}", quick=quick, jobs=jobs, began=began), **parts)
 
 
 def save(found: Benchmark, folder: Path) -> None:
     """Writes run.json and the tables as CSV into a folder."""
-    write_whole(folder / "run.json", json.dumps(_plain(asdict(found)), indent=1) + "\n")
+    write_whole(folder / "run.json", json_text(asdict(found)) + "\n")
     tables: dict[str, Sequence[Any]] = {}
     if found.models is not None:
         tables |= {
@@ -101,22 +80,4 @@ def save(found: Benchmark, folder: Path) -> None:
     if found.savings is not None:
         tables |= {"savings": found.savings}
     for name, rows in tables.items():
-        write_whole(folder / f"{name}.csv", _csv([asdict(row) for row in rows]))
-
-
-def _plain(value: Any) -> Any:
-    """For JSON, which has no NaN."""
-    if isinstance(value, dict):
-        return {key: _plain(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _csv(rows: Iterable[dict[str, Any]]) -> str:
-    rows = list(rows)
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]) if rows else [], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({key: f"{value:.6g}" if isinstance(value, float) else value for key, value in row.items()} for row in rows)
-    return text.getvalue()
+        write_whole(folder / f"{name}.csv", records_text(type(rows[0]), rows) if rows else "")

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
-import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -18,6 +16,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rockcheck.scenes import InputError, named_scenes
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import OnProgress
+from rockcheck.scenes.writing import json_text
 
 OUT = Path("rockcheck-report")
 
@@ -61,15 +60,7 @@ def console() -> Console:
 def answer(value: Any) -> None:
     """The command's result as JSON on stdout, where `--json` asks for it; numbers that are not finite become null."""
     if _voice.get() == "json":
-        print(json.dumps(_finite(value), indent=1, allow_nan=False, default=str))
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        print(json_text(value))
 
 
 @contextmanager

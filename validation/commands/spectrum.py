@@ -8,11 +8,10 @@ import os
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
-from pydantic import BaseModel
 from rich.console import Console
 from rich.table import Table
 
@@ -21,7 +20,7 @@ from rockcheck.ebm.spectrum import LEFT, RIGHT
 from rockcheck.scenes import InputError, load_scene
 from rockcheck.scenes.errors import unknown_name
 from rockcheck.scenes.progress import Count
-from rockcheck.scenes.writing import write_whole
+from rockcheck.scenes.writing import table_text, write_whole
 from rockcheck.validation.commands import OUT, JobsOption, OutOption, SchedulerOption, answer, console, progress, scene_names, usable_folder
 from rockcheck.validation.execute.store import name_of
 from rockcheck.validation.spectra.study import (
@@ -39,6 +38,10 @@ from rockcheck.validation.spectra.study import (
     warm_up,
 )
 from rockcheck.validation.spectra.tiles import Tiles
+
+if TYPE_CHECKING:
+    from rockcheck.validation.spectra.agreement import Agreement
+    from rockcheck.validation.spectra.refinement import Refinement
 
 MOST_SIZE = 5000
 
@@ -235,7 +238,7 @@ def _verify(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, dat
     with progress("refined and full") as on_progress:
         tiles.count = Count(on_progress, 2 * nodes * len(panels))
         found = verify(panels, request, tiles)
-    _write_table("refinement", found, (COLUMNS, *found.rows), data)
+    _write_table("refinement", found, COLUMNS, data)
     screen.print(_table(COLUMNS, found.rows, words=1))
 
 
@@ -252,15 +255,15 @@ def _agreement(panels: Sequence[Panel], request: SpectrumRequest, count: int, ti
     with progress("agreement") as on_progress:
         tiles.count = Count(on_progress, count * len(CANDIDATES) * len(panels) + on_maps)
         found = agree(panels, spectra, request, count, tiles)
-    _write_table("agreement", found, (COLUMNS, *found.rows), data)
+    _write_table("agreement", found, COLUMNS, data)
     write(maps_figure(found, mapped(panels)), data / MAPS)
     screen.print(_table(COLUMNS[1:], [row[1:] for row in found.rows[: len(CANDIDATES)]], words=1))
 
 
-def _write_table(name: str, found: BaseModel, rows: Sequence[Sequence[str]], data: Path) -> None:
+def _write_table(name: str, found: Agreement | Refinement, columns: Sequence[str], data: Path) -> None:
     """Write what was found as JSON and its table as CSV."""
     write_whole(data / f"{name}.json", found.model_dump_json(indent=1) + "\n")
-    write_whole(data / f"{name}.csv", "\n".join(",".join(f'"{cell}"' if "," in cell else cell for cell in row) for row in rows) + "\n")
+    write_whole(data / f"{name}.csv", table_text(columns, found.rows))
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, words: int) -> Table:
@@ -277,7 +280,7 @@ def _fragility(
     panels: Sequence[Panel], request: SpectrumRequest, records: Sequence[Path], tiles: Tiles, data: Path, screen: Console
 ) -> None:
     from rockcheck.reports.studies.spectra import fragility_figure, write
-    from rockcheck.validation.spectra.fragility import PULSES, csv, fragility
+    from rockcheck.validation.spectra.fragility import PULSES, curves_table, fragility
 
     if len(panels) != 1:
         raise InputError("needs --scene", "--fragility")
@@ -287,7 +290,7 @@ def _fragility(
         tiles.count = Count(on_progress, motions * len(request.amplitudes) * (1 + bool(panels[0].scene.walls)))
         found = fragility(panels[0], request, records, tiles)
     write_whole(data / "fragility.json", found.model_dump_json(indent=1) + "\n")
-    write_whole(data / "fragility.csv", csv(found))
+    write_whole(data / "fragility.csv", curves_table(found))
     write(fragility_figure(found.model_dump()), data / "fragility")
     for case in found.cases:
         fit = "no curve fits" if case.median is None else f"median {case.median:.3g}, dispersion {case.dispersion:.3g}"

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.scenes import Block, Event, History, Scene, kinematics
+from rockcheck.scenes.scene import frequency_parameter
 
 Array = NDArray[np.float64]
 Value = float | tuple[float, str]
@@ -356,7 +357,7 @@ def peak_ratio(pair: Pair) -> float:
 
 @difference("Hausdorff distance of rotation's graphs", "1")
 def theta_hausdorff(pair: Pair) -> float:
-    """Hausdorff distance of the graphs of theta in the plane (p t, theta/alpha), p at 9.81 m/s^2.
+    """Hausdorff distance of the graphs of theta in the plane (p t, theta/alpha); p is of the scene's gravity, else of 9.81 m/s^2.
 
     The largest distance from a sample of one graph to the other graph, a broken line, either way. An impact that comes
     a millisecond late counts as a millisecond, not as the jump that it delays; used so for nonsmooth mechanics by the
@@ -364,7 +365,8 @@ def theta_hausdorff(pair: Pair) -> float:
     """
     if pair.alpha is None:
         raise Unavailable("the block's size is not known")
-    p = WindowedHistory(pair.reference if pair.reference.alpha is not None else pair.candidate, pair.scene).block.frequency_parameter
+    known = WindowedHistory(pair.reference if pair.reference.alpha is not None else pair.candidate, pair.scene)
+    p = frequency_parameter(known.block.radius, known.gravity)
     first, second = (np.column_stack([p * pair.time, column]) for column in pair.theta)
     if not (np.all(np.isfinite(first)) and np.all(np.isfinite(second))):
         return math.nan

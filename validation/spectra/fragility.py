@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm.spectrum import SAFE, Floats
 from rockcheck.scenes import InputError, Record, Scene
+from rockcheck.scenes.writing import table_text
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.spectra.study import Panel, SpectrumRequest
 from rockcheck.validation.spectra.tiles import Tiles
@@ -145,8 +146,7 @@ def fit_lognormal(intensities: Floats, overturned: NDArray[np.int64], motions: i
     return float(np.exp(found.x[0])), float(np.exp(found.x[1]))
 
 
-def csv(found: Fragility) -> str:
-    """The curves as a table."""
-    lines = ["case,intensity,share_overturned,band_low,band_high,lognormal_fit"]
-    lines += [f"{case.label}," + ",".join(map(repr, point)) for case in found.cases for point in case.points]
-    return "\n".join(lines) + "\n"
+def curves_table(found: Fragility) -> str:
+    """The curves as CSV."""
+    columns = ("case", "intensity", "share_overturned", "band_low", "band_high", "lognormal_fit")
+    return table_text(columns, ((case.label, *point) for case in found.cases for point in case.points))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -21,7 +21,7 @@ from rockcheck.ebm.spectrum import LEFT, RIGHT, TOLERANCE, Floats, play_nodes
 from rockcheck.scenes import Floor, InputError, Ricker, Scene, Wall
 from rockcheck.scenes.compiled import threads
 from rockcheck.scenes.scene import PAPER_BLOCK
-from rockcheck.scenes.writing import write_whole
+from rockcheck.scenes.writing import table_text, write_whole
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build
@@ -182,7 +182,7 @@ def save(panels: Sequence[Panel], spectra: Sequence[Spectrum], request: Spectrum
             right=float(np.mean(spectrum.outcomes == RIGHT)),
         )
         about = record.model_dump(exclude={"frequency_ratios", "amplitude_ratios"}) | {"versions": provenance.versions()}
-        _write_npz(folder / f"{record.name}.npz", spectrum, json.dumps(about))
+        write_whole(folder / f"{record.name}.npz", _npz(spectrum, json.dumps(about)))
         write_whole(folder / f"{record.name}.csv", _csv(spectrum, json.dumps(about)))
         records.append(record)
     index = read_index(folder)
@@ -213,7 +213,7 @@ def _plain_scene(scene: Scene) -> dict[str, Any]:
     return data
 
 
-def _write_npz(path: Path, spectrum: Spectrum, about: str) -> None:
+def _npz(spectrum: Spectrum, about: str) -> bytes:
     content = io.BytesIO()
     np.savez_compressed(
         content,
@@ -223,12 +223,11 @@ def _write_npz(path: Path, spectrum: Spectrum, about: str) -> None:
         undecided=spectrum.undecided,
         settings=np.array(about),
     )
-    write_whole(path, content.getvalue())
+    return content.getvalue()
 
 
 def _csv(spectrum: Spectrum, about: str) -> str:
     """One row an amplitude ratio, one column a frequency ratio: -1 overturned left, 0 safe, 1 overturned right."""
-    lines = [f"# rockcheck spectrum {about}", "amplitude_ratio\\frequency_ratio," + ",".join(map(repr, spectrum.frequency_ratios.tolist()))]
-    rows: Iterable[tuple[float, list[int]]] = zip(spectrum.amplitude_ratios.tolist(), spectrum.outcomes.tolist(), strict=True)
-    lines += [f"{amplitude!r}," + ",".join(map(str, row)) for amplitude, row in rows]
-    return "\n".join(lines) + "\n"
+    columns = ["amplitude_ratio\\frequency_ratio", *map(repr, spectrum.frequency_ratios.tolist())]
+    rows = zip(spectrum.amplitude_ratios.tolist(), spectrum.outcomes.tolist(), strict=True)
+    return f"# rockcheck spectrum {about}\n" + table_text(columns, ([amplitude, *row] for amplitude, row in rows))

@@ -58,23 +58,8 @@ def simplifications(scene: Scene) -> Iterator[Scene]:
 
 
 def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
-    for key in ("vertical", "excitation"):
-        if getattr(scene, key).kind != "rest":
-            yield {key: Rest()}
-    for n in range(len(scene.walls)):
-        yield {"walls": scene.walls[:n] + scene.walls[n + 1 :]}
-    starts = ("initial_height", "initial_velocity", "initial_angular_velocity", "initial_rotation")
-    for key in starts:
-        if getattr(scene, key) != 0.0:
-            yield {key: 0.0}
-    floor = scene.floor
-    if floor.restitution > 0.0:
-        yield {"floor": Floor(friction=floor.friction, static_friction=floor.static_friction)}
-    if floor.static_friction is not None:
-        yield {"floor": Floor(friction=floor.friction, restitution=floor.restitution)}
-    for n, wall in enumerate(scene.walls):
-        for change in ({"restitution": 0.0}, {"gap": 0.0}):
-            yield {"walls": (*scene.walls[:n], wall.model_copy(update=change), *scene.walls[n + 1 :])}
+    yield from _without(scene)
+    yield from _plainer_contacts(scene)
     unit = math.sqrt(scene.block.radius / scene.gravity)
     for factor in (0.25, 0.5, 0.9):
         if factor * scene.duration > 0.01 * unit:
@@ -90,6 +75,30 @@ def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
     if scene.gravity != 9.81:
         yield {"gravity": 9.81}
     yield from _rounded(scene)
+
+
+def _without(scene: Scene) -> Iterator[dict[str, Any]]:
+    """A base motion, a wall or a part of the initial state less."""
+    for key in ("vertical", "excitation"):
+        if getattr(scene, key).kind != "rest":
+            yield {key: Rest()}
+    for n in range(len(scene.walls)):
+        yield {"walls": scene.walls[:n] + scene.walls[n + 1 :]}
+    for key in ("initial_height", "initial_velocity", "initial_angular_velocity", "initial_rotation"):
+        if getattr(scene, key) != 0.0:
+            yield {key: 0.0}
+
+
+def _plainer_contacts(scene: Scene) -> Iterator[dict[str, Any]]:
+    """No restitution, one coefficient of friction, no gap."""
+    floor = scene.floor
+    if floor.restitution > 0.0:
+        yield {"floor": Floor(friction=floor.friction, static_friction=floor.static_friction)}
+    if floor.static_friction is not None:
+        yield {"floor": Floor(friction=floor.friction, restitution=floor.restitution)}
+    for n, wall in enumerate(scene.walls):
+        for change in ({"restitution": 0.0}, {"gap": 0.0}):
+            yield {"walls": (*scene.walls[:n], wall.model_copy(update=change), *scene.walls[n + 1 :])}
 
 
 def _shorter(samples: tuple[float, ...]) -> Iterator[tuple[float, ...]]:

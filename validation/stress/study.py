@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import time
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
 from rockcheck.scenes import Scene
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import OnProgress, unheard
-from rockcheck.scenes.writing import write_whole
-from rockcheck.validation.execute import provenance
+from rockcheck.scenes.writing import json_text, records_text, table_text, write_whole
 from rockcheck.validation.execute.pool import Call, Pool
+from rockcheck.validation.execute.study import Study, header
 from rockcheck.validation.stress import stability
 from rockcheck.validation.stress.invariants import INVARIANTS, CheckedRun
 from rockcheck.validation.stress.players import PLAYERS
 from rockcheck.validation.stress.shrinking import shrink, write_scene
-from rockcheck.validation.stress.stability import AXIS_WORDS, Stability
+from rockcheck.validation.stress.stability import AXIS_WORDS, Stability, Stable, Still
 
 What = Literal["all", "runs", "maps"]
 #: Runs that one task of a worker holds, and how long (s) one of them may take on the average: event-based runs, others.
@@ -104,18 +102,11 @@ class RunTotals:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stress:
-    """What was found, when, with what, on what."""
+class Stress(Study):
+    """What was found."""
 
-    suite: str
-    created: str
     seed: int
-    quick: bool
-    jobs: int
-    wall_seconds: float
     complete: bool
-    versions: dict[str, str]
-    hardware: dict[str, str]
     batches: dict[str, RunTotals]
     stability: Stability | None = None
 
@@ -241,15 +232,9 @@ def run_stress(
 
     def found(complete: bool = False) -> Stress:
         return Stress(
-            suite=f"stress{', quick' if quick else ''}",
-            created=datetime.now(UTC).isoformat(timespec="seconds"),
+            **header("stress", quick=quick, jobs=jobs, began=began),
             seed=seed,
-            quick=quick,
-            jobs=jobs,
-            wall_seconds=time.monotonic() - began,
             complete=complete,
-            versions=provenance.versions(),
-            hardware=provenance.hardware(),
             batches=batches,
             stability=stability.stability_of(place for _, place in sorted(places.items())) if places else None,
         )
@@ -378,6 +363,10 @@ def shrink_file(failure: Failure, folder: Path, seconds: float) -> None:
             _write(failure, smallest, folder)
 
 
+#: Columns of `summary_rows`.
+SUMMARY = ("model", "invariant", "runs", "failures", "worst", "in run", "bound")
+
+
 def summary_rows(found: Stress) -> list[dict[str, Any]]:
     """A row a model and invariant: runs that looked at it, failures, worst figure, its run, and the bound."""
     rows = []
@@ -460,17 +449,13 @@ def stability_markdown(found: Stability) -> list[str]:
 
 def save(found: Stress, folder: Path) -> None:
     """Writes invariants.csv, failures.csv, summary.md and run.json into a folder."""
-    import pandas as pd
-
-    write_whole(folder / "invariants.csv", pd.DataFrame(summary_rows(found)).to_csv(index=False, float_format="%.6g"))
-    columns = list(Failure.__dataclass_fields__)
-    failures = pd.DataFrame([asdict(failure) for failure in found.failures], columns=columns)
-    write_whole(folder / "failures.csv", failures.to_csv(index=False, float_format="%.6g"))
+    write_whole(folder / "invariants.csv", table_text(SUMMARY, (list(row.values()) for row in summary_rows(found)), digits=6))
+    write_whole(folder / "failures.csv", records_text(Failure, found.failures))
     if found.stability is not None:
-        for name, rows in (("stable-steps", found.stability.stable), ("stand-still", found.stability.still)):
-            write_whole(folder / f"{name}.csv", pd.DataFrame(list(rows)).to_csv(index=False, float_format="%.6g"))
+        write_whole(folder / "stable-steps.csv", records_text(Stable, found.stability.stable))
+        write_whole(folder / "stand-still.csv", records_text(Still, found.stability.still))
     write_whole(folder / "summary.md", markdown(found))
-    write_whole(folder / "run.json", json.dumps(as_data(found), indent=1) + "\n")
+    write_whole(folder / "run.json", json_text(as_data(found)) + "\n")
 
 
 def as_data(found: Stress) -> dict[str, Any]:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 from rich.table import Table
 from rich.text import Text
 
+from rockcheck.scenes.writing import table_text
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.suite.results import Cell, Check, Run
 
@@ -117,12 +116,12 @@ def checks_csv(run: Run) -> str:
     """All checks, a row each."""
     tolerance = ("expected", "limit", "drift", "verdict", "reason", "why")
     rows = ((*_row(cell, check.figure), check.kind, *(getattr(check, name) for name in tolerance)) for cell, check in run.checks())
-    return _csv((*ROW, "kind", *tolerance), rows)
+    return table_text((*ROW, "kind", *tolerance), rows)
 
 
 def figures_csv(run: Run) -> str:
     """All figures, judged or not, a row each."""
-    return _csv((*ROW, "note"), ((*_row(cell, figure), figure.note) for cell in run.cells for figure in cell.figures))
+    return table_text((*ROW, "note"), ((*_row(cell, figure), figure.note) for cell in run.cells for figure in cell.figures))
 
 
 ROW = ("scene", "model", "against", "measure", "window", "value", "unit")
@@ -130,11 +129,3 @@ ROW = ("scene", "model", "against", "measure", "window", "value", "unit")
 
 def _row(cell: Cell, figure: Figure) -> tuple[object, ...]:
     return cell.scene, cell.model, figure.against, figure.measure, figure.window, figure.value, figure.unit
-
-
-def _csv(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(head)
-    writer.writerows(["" if value is None else value for value in row] for row in rows)
-    return text.getvalue()
