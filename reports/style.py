@@ -7,6 +7,7 @@ white would fall below a contrast of 3:1. A dash pattern says the same once more
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from rockcheck.scenes.writing import write_whole
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: Widths of a text column and of a page of text in common journals, inches.
@@ -120,6 +122,23 @@ def figure_style() -> Iterator[None]:
     }
     with mpl.rc_context(settings):
         yield
+
+
+def log_scales(ax: Axes, *, decades: int = 7) -> None:
+    """Logarithmic axes in powers of ten, at most so many, written out: `figure_style` leaves the $ of matplotlib's labels as it is."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    for axis in (ax.xaxis, ax.yaxis):
+        if axis.get_scale() == "log":
+            axis.set_major_locator(LogLocator(numticks=decades))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+            axis.set_minor_locator(NullLocator())
+
+
+def power_of_ten(value: float) -> str:
+    """10⁻³; plain from 0.1 to 1000."""
+    exponent = round(math.log10(value))
+    return f"{value:g}" if -1 <= exponent <= 3 else "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def save(figure: Figure, stem: Path, formats: Iterable[str] = FORMATS) -> list[Path]:

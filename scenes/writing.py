@@ -93,6 +93,12 @@ def records_text(kind: type, records: Iterable[Any]) -> str:
     return table_text(columns, ([getattr(record, name) for name in columns] for record in records), digits=6)
 
 
+def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table as Markdown, without a line's end; a bar in a cell is escaped."""
+    lines = (columns, ["---"] * len(columns), *rows)
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
 def finite(value: Any) -> Any:
     """A value as JSON can hold it: tuples become lists, numbers that are not finite null."""
     if isinstance(value, Mapping):

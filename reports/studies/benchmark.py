@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rockcheck.reports.site import PAGES
 from rockcheck.reports.studies.page import write_study
-from rockcheck.reports.style import LOOKS, PAGE, figure_style, save
+from rockcheck.reports.style import LOOKS, PAGE, figure_style, log_scales, save
 from rockcheck.validation.bench.ebm import CASES, EbmSpeed
 from rockcheck.validation.bench.ebm import LEVEL as BATCH_LEVEL
 from rockcheck.validation.bench.models import LEVEL, LINES, DiagramLine, Point, WorkPrecision
@@ -77,7 +77,7 @@ def work_precision_figure(found: WorkPrecision, families: Sequence[str]) -> Figu
                 form = ax.axhline(found.model_form[family], color="#6e6e6e", linewidth=1.0, linestyle=(0, (6, 3)))
                 handles.setdefault("model form: EBM against unilateral", form)
             ax.set(xscale="log", yscale="log", ylim=(FLOOR, 3.0), title=family)
-            _log_scales(ax)
+            log_scales(ax)
         for ax in axes.flat[len(families) :]:
             ax.set_axis_off()
         for ax in axes[:, 0]:
@@ -87,23 +87,6 @@ def work_precision_figure(found: WorkPrecision, families: Sequence[str]) -> Figu
         names = {label: _label(label) for label in handles}
         figure.legend(handles.values(), [names[label] for label in handles], loc="outside lower center", ncols=4)
     return figure
-
-
-def _log_scales(ax: Axes) -> None:
-    """Both axes in powers of ten, written out: the common style leaves $ as it is, which matplotlib's own labels need."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-
-    for axis in (ax.xaxis, ax.yaxis):
-        if axis.get_scale() == "log":
-            axis.set_major_locator(LogLocator(numticks=7))
-            axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
-            axis.set_minor_locator(NullLocator())
-
-
-def power_of_ten(value: float) -> str:
-    """10⁻³; plain from 0.1 to 1000."""
-    exponent = round(math.log10(value))
-    return f"{value:g}" if -1 <= exponent <= 3 else "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def _drawn(point: Point) -> bool:
@@ -157,7 +140,7 @@ def ratio_figure(found: WorkPrecision) -> Figure:
         ax.set(xscale="log", xlabel=f"CPU time at an error of {LEVEL:g} α over the EBM's", ylim=(len(LINES) - 0.4, -0.6))
         low, high = ax.get_xlim()
         ax.set_xlim(low, high * 12.0)  # room for the words
-        _log_scales(ax)
+        log_scales(ax)
         ax.set_yticks(range(len(LINES)), [_label(label) for label in LINES])
         ax.grid(visible=False, axis="y")
     return figure
@@ -176,7 +159,7 @@ def batch_figure(speed: EbmSpeed) -> Figure:
             ax.plot(errors, costs, marker=marker, color=colour, label=f"{case.name}: {case.words}")
         ax.axvline(BATCH_LEVEL, color="#6e6e6e", linewidth=0.8, linestyle=(0, (6, 3)))
         ax.set(xscale="log", yscale="log", xlabel="p95 error of the peak, rad (rotation)", ylabel="CPU μs a trajectory, one core")
-        _log_scales(ax)
+        log_scales(ax)
         ax.set_ylim(3.0, 3000.0)
         ax.invert_xaxis()
         figure.legend(loc="outside right center")

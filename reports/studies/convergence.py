@@ -6,13 +6,11 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rockcheck.reports.studies.benchmark import power_of_ten
 from rockcheck.reports.studies.page import write_study
-from rockcheck.reports.style import LOOKS, PAGE, figure_style, save
+from rockcheck.reports.style import LOOKS, PAGE, figure_style, log_scales, power_of_ten, save
 from rockcheck.validation.bench.convergence import DURATION, LEVEL, PULSES, REFERENCE_TOLERANCE, REFERENCES, SWEEPS, Convergence
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: The name of the diagram's files, and the error (alpha) up to which it is drawn where a run failed.
@@ -54,7 +52,7 @@ def convergence_figure(found: Convergence) -> Figure:
                 look = LOOKS[model].line | {"marker": LOOKS[model].marker, "linewidth": 1.8}
                 ax.plot([level.step for level in levels], [min(level.median, FAILED) for level in levels], **look)
             ax.set(xscale="log", yscale="log", title=TITLES[reference], xlabel="step, s")
-            _powers_of_ten(ax)
+            log_scales(ax, decades=12)
         panels[0].set_ylabel("RMS error of θ / α")
         steps = [min(one.step for one in found.plays), max(one.step for one in found.plays)]
         panels[0].plot(steps, steps, color="#6e6e6e", linewidth=0.8, linestyle=(0, (1, 1.5)), label="first order")
@@ -63,13 +61,3 @@ def convergence_figure(found: Convergence) -> Figure:
         panels[0].plot([], [], **form, label="EBM against unilateral: model form, median")
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=5)
     return figure
-
-
-def _powers_of_ten(ax: Axes) -> None:
-    """Decades, written out: the common style leaves $ as it is, which matplotlib's own labels need."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_locator(LogLocator(numticks=12))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
-        axis.set_minor_locator(NullLocator())

@@ -10,8 +10,8 @@ from rockcheck.reports.studies.page import write_study
 from rockcheck.reports.style import PAGE, figure_style, save
 from rockcheck.validation.stress.invariants import EXCEPTIONS, INVARIANTS
 from rockcheck.validation.stress.players import PLAYERS
+from rockcheck.validation.stress.results import Stress
 from rockcheck.validation.stress.stability import AXIS_WORDS, STEPS, Stability
-from rockcheck.validation.stress.study import Stress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

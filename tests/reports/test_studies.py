@@ -22,7 +22,7 @@ from rockcheck.validation.bench import models as benchmark_models
 from rockcheck.validation.bench import study as benchmark
 from rockcheck.validation.bench.skipping import Saving
 from rockcheck.validation.spectra import study as spectra
-from rockcheck.validation.stress.study import Failure, RunTotals, Stress
+from rockcheck.validation.stress.results import Failure, RunTotals, Stress
 
 pytestmark = pytest.mark.browser
 

@@ -24,7 +24,8 @@ from rockcheck.validation.execute.store import HISTORIES, Store
 from rockcheck.validation.stress import study
 from rockcheck.validation.stress.invariants import CheckedRun
 from rockcheck.validation.stress.players import PLAYERS, EventBased
-from rockcheck.validation.stress.study import Chunk, Failure, RunTotals
+from rockcheck.validation.stress.results import Failure, RunTotals
+from rockcheck.validation.stress.study import Chunk
 
 ROCKCHECK = [sys.executable, "-m", "rockcheck"]
 posix = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX: its limits and signals")

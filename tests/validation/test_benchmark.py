@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rockcheck.reports.studies.benchmark import power_of_ten, write_benchmark
+from rockcheck.reports.studies.benchmark import write_benchmark
+from rockcheck.reports.style import power_of_ten
 from rockcheck.validation.bench import models as benchmark_models
 from rockcheck.validation.bench.ebm import CASES, LEVEL, EbmSpeed, _times
 from rockcheck.validation.bench.models import (

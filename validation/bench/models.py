@@ -11,10 +11,9 @@ from dataclasses import dataclass, field
 from statistics import median
 from typing import Any
 
-import numpy as np
-
 from rockcheck.scenes import History, InputError, ModelFailure
 from rockcheck.scenes.progress import OnProgress, unheard
+from rockcheck.validation.bench.convergence import slope
 from rockcheck.validation.bench.scenes import FAMILIES, MEMBERS, QUICK, prepared
 from rockcheck.validation.discrepancy.compare import compare
 from rockcheck.validation.discrepancy.measures import IMPACTS
@@ -378,11 +377,7 @@ def quantile(values: Sequence[float], share: float) -> float:
 
 def order_of(line: Sequence[Point]) -> float:
     """Slope of log median error over log of the swept setting, by least squares; NaN with fewer than two points."""
-    fitted = [(math.log(p.value), math.log(p.rms)) for p in line if FITTED[0] < p.rms < FITTED[1]]
-    if len(fitted) < 2:
-        return math.nan
-    x, y = np.array(fitted).T
-    return float(np.polyfit(x, y, 1)[0])
+    return slope((p.value, p.rms) for p in line if FITTED[0] < p.rms < FITTED[1])
 
 
 def cost_at(line: Sequence[Point], level: float = LEVEL) -> tuple[float, bool]:

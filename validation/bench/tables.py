@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from statistics import median
 
+from rockcheck.scenes.writing import markdown_table
 from rockcheck.validation.bench.ebm import CASES, EbmSpeed
 from rockcheck.validation.bench.models import LEVEL, LINES, WorkPrecision
 from rockcheck.validation.bench.scenes import FAMILIES
@@ -35,7 +36,7 @@ def _models(found: WorkPrecision) -> Iterable[str]:
     families = list(found.horizons)
     yield "## Scenes"
     rows = [[name, FAMILIES[name].words, _number(found.horizons[name]), _number(found.model_form[name])] for name in families]
-    yield _table(["scene", "what", "compared up to, s", "model form, α RMS"], rows)
+    yield markdown_table(["scene", "what", "compared up to, s", "model form, α RMS"], rows)
     yield f"## Run time at an error of {LEVEL:g} α, over the EBM's"
     yield "≤: already the coarsest setting is that good. –: not reached."
     trends = {(trend.line, trend.family): trend for trend in found.trends}
@@ -44,7 +45,7 @@ def _models(found: WorkPrecision) -> Iterable[str]:
         mine = [trends.get((label, family)) for family in families]
         cells = ["" if t is None else "–" if math.isnan(t.ratio) else f"{'≤ ' if t.at_coarsest else ''}{_number(t.ratio)}" for t in mine]
         rows.append([label, *cells])
-    yield _table(["model", *families], rows)
+    yield markdown_table(["model", *families], rows)
     yield "## Engines over whole kinds of scenes"
     yield "CPU: ms a simulated second. Error: RMS of θ, α. Adaptive: the error of adaptive steps at the same CPU time."
     rows = [
@@ -52,13 +53,13 @@ def _models(found: WorkPrecision) -> Iterable[str]:
          "" if math.isnan(p.at_the_cost) else f"{p.at_the_cost:.1e}"]
         for p in found.pooled
     ]  # fmt: skip
-    yield _table(["scenes", "line", "setting", "runs", "CPU", "median error", "worst", "adaptive"], rows)
+    yield markdown_table(["scenes", "line", "setting", "runs", "CPU", "median error", "worst", "adaptive"], rows)
     yield "## Order of convergence in the swept setting"
     rows = [
         [label, line.knob, *("" if (t := trends.get((label, f))) is None else _number(t.order) for f in families)]
         for label, line in LINES.items()
     ]
-    yield _table(["model", "setting", *families], rows)
+    yield markdown_table(["model", "setting", *families], rows)
     yield "## Median RMS error of θ, α, up to the horizon"
     yield "CPU: ms a simulated second, median over the scenes."
     points = {(point.line, point.value, point.family): point for point in found.points}
@@ -70,7 +71,7 @@ def _models(found: WorkPrecision) -> Iterable[str]:
             if known:
                 errors = ["" if p is None else f"{p.rms:.1e}" + (f" ({p.runs})" if p.runs < 10 else "") for p in row]
                 rows.append([label, f"{line.knob} {value:g}", _number(median(known)), *errors])
-    yield _table(["model", "setting", "CPU", *families], rows)
+    yield markdown_table(["model", "setting", "CPU", *families], rows)
 
 
 def _batches(found: EbmSpeed) -> Iterable[str]:
@@ -90,7 +91,7 @@ def _batches(found: EbmSpeed) -> Iterable[str]:
                     f"{case.name} ({case.words})", f"{row.tolerance:g}", f"**{cost}**" if row is best else cost,
                     f"{row.evaluations:.0f}", f"{row.error_95:.1e}", wrong,
                 ])  # fmt: skip
-    yield _table(["batch", "tolerance", "CPU μs a run", "right-hand sides", "p95 error", "wrong outcomes"], rows)
+    yield markdown_table(["batch", "tolerance", "CPU μs a run", "right-hand sides", "p95 error", "wrong outcomes"], rows)
     for start in found.cold_starts:
         seconds = f"import {start.importing:.2f} s, first simulation {start.first_simulation:.2f} s"
         yield f"Fresh process, compile cache {start.cache}: {seconds}."
@@ -102,14 +103,9 @@ def _savings(found: Sequence[Saving]) -> Iterable[str]:
     for saving in found:
         costs = _number(saving.cost_with), _number(saving.cost_without), saving.unit, f"{saving.ratio:.2f}"
         rows.append([saving.model, saving.thing, *costs, _number(saving.change), saving.remark])
-    yield _table(["model", "thing", "with", "without", "unit", "with/without", "change, α", "what was compared"], rows)
+    yield markdown_table(["model", "thing", "with", "without", "unit", "with/without", "change, α", "what was compared"], rows)
     yield f"Not measured: {'; '.join(NOT_MEASURED)}."
 
 
 def _number(value: float) -> str:
     return f"{value:.2g}" if abs(value) < 100.0 else f"{value:.0f}" if math.isfinite(value) else "–"
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = ["| " + " | ".join(cells) + " |" for cells in (head, ["---"] * len(head), *rows)]
-    return "\n".join(lines)

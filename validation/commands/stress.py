@@ -12,8 +12,8 @@ from rockcheck.scenes.errors import unknown_name
 from rockcheck.validation.commands import OUT, JobsOption, OutOption, answer, console, progress, usable_folder
 
 if TYPE_CHECKING:
+    from rockcheck.validation.stress.results import Stress
     from rockcheck.validation.stress.stability import Stability
-    from rockcheck.validation.stress.study import Stress
 
 
 WhatArgument = Annotated[str, typer.Argument(metavar="[WHAT]", help="all, runs (random scenes) or maps (where engines break).")]
@@ -34,7 +34,7 @@ def run(
     tables as CSV, a summary in Markdown, and of failures the smallest scene files that show them.
     Exit 1 where an event-based model breaks an invariant.
     """
-    from rockcheck.validation.stress import study
+    from rockcheck.validation.stress import study, tables
     from rockcheck.validation.stress.players import PLAYERS
 
     if what not in get_args(study.What):
@@ -47,13 +47,13 @@ def run(
         found = study.run_stress(
             cast("study.What", what), seed=seed, quick=quick, runs=runs, jobs=jobs, models=model, folder=folder, on_progress=on_progress
         )
-    study.save(found, folder)
+    tables.save(found, folder)
     from rockcheck.reports.studies.stress import write_stress
 
     index = write_stress(found, folder)
     show(found, console())
     console().print(f"report: {index}", soft_wrap=True)
-    answer(study.as_data(found) | {"report": index})
+    answer(tables.as_data(found) | {"report": index})
     if not found.complete:
         raise KeyboardInterrupt
     raise typer.Exit(int(bool(found.broken)))
@@ -62,7 +62,7 @@ def run(
 def show(found: Stress, out: Console) -> None:
     """For each model runs, failures by invariant and the worst figures; then the failures with their files."""
     from rockcheck.validation.stress.invariants import EXCEPTIONS
-    from rockcheck.validation.stress.study import summary_rows
+    from rockcheck.validation.stress.tables import summary_rows
 
     if found.stability is not None:
         out.print(stable_table(found.stability))
@@ -112,10 +112,11 @@ def stable_table(found: Stability) -> Table:
 
 def still_table(found: Stability) -> Table:
     """A row a case and model: what moves of a block that should stand."""
+    from rockcheck.validation.stress.tables import MOVES
+
     table = Table(box=None, pad_edge=False)
-    names = ("creep", "sinking", "rotation", "uplift", "jitter")
-    for column in ("block", "model", "for, s", *names):
+    for column in ("block", "model", "for, s", *MOVES):
         table.add_column(column, justify="left" if column in ("block", "model") else "right")
     for one in found.still:
-        table.add_row(one.case, one.line, f"{one.simulated:g}", *(f"{getattr(one, name):.0e}" for name in names), one.fault)
+        table.add_row(one.case, one.line, f"{one.simulated:g}", *(f"{getattr(one, name):.0e}" for name in MOVES), one.fault)
     return table

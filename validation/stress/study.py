@@ -1,4 +1,4 @@
-"""`rockcheck stress`: many random runs of every model, what they break, and the smallest scenes that show it."""
+"""`rockcheck stress`: many random runs of every model, and the smallest scenes that show what they break."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ import os
 import time
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from rockcheck.scenes import Scene
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import OnProgress, unheard
-from rockcheck.scenes.writing import json_text, records_text, table_text, write_whole
 from rockcheck.validation.execute.pool import Call, Pool
-from rockcheck.validation.execute.study import Study, header
+from rockcheck.validation.execute.study import header
 from rockcheck.validation.stress import stability
 from rockcheck.validation.stress.invariants import INVARIANTS, CheckedRun
 from rockcheck.validation.stress.players import PLAYERS
+from rockcheck.validation.stress.results import Failure, RunTotals, Stress
 from rockcheck.validation.stress.shrinking import shrink, write_scene
-from rockcheck.validation.stress.stability import AXIS_WORDS, Stability, Stable, Still
+from rockcheck.validation.stress.tables import save
 
 What = Literal["all", "runs", "maps"]
 #: Runs that one task of a worker holds, and how long (s) one of them may take on the average: event-based runs, others.
@@ -38,87 +38,6 @@ SHRINKING, SHRINKING_QUICK, ONE_FAILURE = 120.0, 10.0, 0.25
 STARTING, HANGING = 10.0, 5.0
 #: How often (s) what was found is saved during the runs.
 SAVING = 60.0
-
-
-@dataclass(frozen=True)
-class Failure:
-    """A run that breaks an invariant; `file` holds its scene, as small as was found in time."""
-
-    model: str
-    invariant: str
-    seed: int
-    number: int
-    figure: float
-    words: str = ""
-    file: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class RunTotals:
-    """What some runs of one model showed, one after the other."""
-
-    model: str
-    runs: int = 0
-    cpu_seconds: float = 0.0
-    #: How many runs looked at an invariant; its worst figure, and in which run.
-    looked_at: Counter[str] = field(default_factory=Counter)
-    worst: dict[str, tuple[float, int]] = field(default_factory=dict)
-    failures: tuple[Failure, ...] = ()
-    outcomes: Counter[str] = field(default_factory=Counter)
-    events: int = 0
-    #: Runs in which an impact added energy as its law is known to, and the most that one added.
-    gaining: int = 0
-    largest_gain: float = 0.0
-    #: Runs whose comparison had to be ended by the horizon of predictability.
-    horizons: int = 0
-    #: Runs that an exception of the model excuses from an invariant, by its name.
-    exceptions: Counter[str] = field(default_factory=Counter)
-    #: Runs in which an invariant that was to be looked at could not be judged, by its name.
-    unjudged: Counter[str] = field(default_factory=Counter)
-
-    def __add__(self, other: RunTotals) -> RunTotals:
-        worst = dict(self.worst)
-        for name, found in other.worst.items():
-            worst[name] = max(found, worst.get(name, found))
-        return RunTotals(
-            model=self.model,
-            runs=self.runs + other.runs,
-            cpu_seconds=self.cpu_seconds + other.cpu_seconds,
-            looked_at=self.looked_at + other.looked_at,
-            worst=worst,
-            failures=self.failures + other.failures,
-            outcomes=self.outcomes + other.outcomes,
-            events=self.events + other.events,
-            gaining=self.gaining + other.gaining,
-            largest_gain=max(self.largest_gain, other.largest_gain),
-            horizons=self.horizons + other.horizons,
-            exceptions=self.exceptions + other.exceptions,
-            unjudged=self.unjudged + other.unjudged,
-        )
-
-    def failed(self, invariant: str) -> int:
-        """How many runs break it."""
-        return sum(failure.invariant == invariant for failure in self.failures)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Stress(Study):
-    """What was found."""
-
-    seed: int
-    complete: bool
-    batches: dict[str, RunTotals]
-    stability: Stability | None = None
-
-    @property
-    def broken(self) -> list[Failure]:
-        """The failures of event-based models, which fail the command."""
-        return [failure for label, batch in self.batches.items() if PLAYERS[label].event_based for failure in batch.failures]
-
-    @property
-    def failures(self) -> list[Failure]:
-        """All failures."""
-        return [failure for batch in self.batches.values() for failure in batch.failures]
 
 
 def _checked(label: str, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
@@ -361,104 +280,3 @@ def shrink_file(failure: Failure, folder: Path, seconds: float) -> None:
         smallest, complete = shrink(scene, shows, seconds=seconds, smaller=keep)
         if complete:
             _write(failure, smallest, folder)
-
-
-#: Columns of `summary_rows`.
-SUMMARY = ("model", "invariant", "runs", "failures", "worst", "in run", "bound")
-
-
-def summary_rows(found: Stress) -> list[dict[str, Any]]:
-    """A row a model and invariant: runs that looked at it, failures, worst figure, its run, and the bound."""
-    rows = []
-    for label, batch in found.batches.items():
-        for name, invariant in INVARIANTS.items():
-            if batch.looked_at[name] or batch.failed(name) or batch.unjudged[name]:
-                worst, number = batch.worst.get(name, (math.inf if batch.failed(name) else math.nan, -1))
-                failures = batch.failed(name)
-                row = {"model": label, "invariant": name, "runs": batch.looked_at[name], "not judged": batch.unjudged[name]}
-                row |= {"failures": failures}
-                rows.append(row | {"worst": worst, "in run": number, "bound": invariant.bound})
-    return rows
-
-
-def invariants_markdown(found: Stress) -> list[str]:
-    """The random runs as tables: a row a model, a row an invariant."""
-    lines = [
-        "| model | runs | failures | events | runs with energy gained in an impact (most) | horizon needed | excepted |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for label, batch in found.batches.items():
-        broken = len({failure.number for failure in batch.failures})
-        gains = f"{batch.gaining} ({100.0 * batch.largest_gain:.2g} %)" if batch.gaining else "0"
-        excepted = ", ".join(f"{count} {name}" for name, count in batch.exceptions.items()) or "0"
-        lines.append(f"| {label} | {batch.runs} | {broken} | {batch.events} | {gains} | {batch.horizons} | {excepted} |")
-    lines += ["", "| invariant | bound | " + " | ".join(found.batches) + " |", "|---|---|" + "---|" * len(found.batches)]
-    for name, invariant in INVARIANTS.items():
-        cells = []
-        for batch in found.batches.values():
-            failures, unjudged = batch.failed(name), batch.unjudged[name]
-            worst = [f"{batch.worst.get(name, (math.inf, -1))[0]:.1e}"] if batch.looked_at[name] or failures else []
-            cells.append(", ".join([*worst, *[f"**{failures} fail**"] * (failures > 0), *[f"{unjudged} not judged"] * (unjudged > 0)]))
-        lines.append(f"| {invariant.words} | {invariant.bound:g} | " + " | ".join(cells) + " |")
-    return lines
-
-
-def markdown(found: Stress) -> str:
-    """What was found as a section for a page of documentation."""
-    command = " ".join(["rockcheck stress", *(["--quick"] if found.quick else []), f"--seed {found.seed}"])
-    runs = sum(batch.runs for batch in found.batches.values())
-    broken = len({(failure.model, failure.number) for failure in found.broken})
-    lines = [
-        f"## Figures of one {'quick' if found.quick else 'whole'} run",
-        "",
-        f"{found.created[:10]}, `{command}`, rockcheck {found.versions.get('rockcheck', '')}: "
-        f"{found.wall_seconds / 60.0:.1f} min with {found.jobs} processes; {', '.join(found.hardware.values())}."
-        + (f" {runs:,} runs; event-based models fail in {broken}." if runs else "")
-        + ("" if found.complete else " The run was interrupted."),
-    ]
-    if found.batches:
-        lines += ["", *invariants_markdown(found)]
-    if shown := [failure for failure in found.failures if failure.file]:
-        lines += ["", "| failure of | invariant | run | figure | in words |", "|---|---|---|---|---|"]
-        for one in shown:
-            words = one.words.replace("|", "\\|")
-            lines.append(f"| {one.model} | {one.invariant} | {one.number} | {one.figure:.2g} | {words} |")
-    if found.stability is not None:
-        lines += ["", *stability_markdown(found.stability)]
-    return "\n".join(lines) + "\n"
-
-
-def stability_markdown(found: Stability) -> list[str]:
-    """The maps as tables: largest stable step by axis, and what moves that should stand still."""
-    lines = []
-    labels = list(dict.fromkeys(one.line for one in found.stable))
-    for axis, words in AXIS_WORDS.items():
-        values = list(dict.fromkeys(one.value for one in found.stable if one.axis == axis))
-        lines += [f"| {words} | " + " | ".join(f"{value:g}" for value in values) + " |", "|---|" + "---|" * len(values)]
-        for label in labels:
-            here = [found.step(label, axis, value) for value in values]
-            lines.append(f"| {label} | " + " | ".join(f"{one.step:g} {one.fault}".strip() if one else "" for one in here) + " |")
-        lines.append("")
-    names = ("creep", "sinking", "rotation", "uplift", "jitter")
-    lines += ["| case | model | simulated, s | step, s | " + " | ".join(names) + " |", "|---|---|" + "---|" * (2 + len(names))]
-    for one in found.still:
-        figures = [f"{getattr(one, name):.1e}" for name in names] if not one.fault else [one.fault, *[""] * (len(names) - 1)]
-        lines.append(f"| {one.case} | {one.line} | {one.simulated:g} | {one.step:.2g} | " + " | ".join(figures) + " |")
-    return lines
-
-
-def save(found: Stress, folder: Path) -> None:
-    """Writes invariants.csv, failures.csv, summary.md and run.json into a folder."""
-    write_whole(folder / "invariants.csv", table_text(SUMMARY, (list(row.values()) for row in summary_rows(found)), digits=6))
-    write_whole(folder / "failures.csv", records_text(Failure, found.failures))
-    if found.stability is not None:
-        write_whole(folder / "stable-steps.csv", records_text(Stable, found.stability.stable))
-        write_whole(folder / "stand-still.csv", records_text(Still, found.stability.still))
-    write_whole(folder / "summary.md", markdown(found))
-    write_whole(folder / "run.json", json_text(as_data(found)) + "\n")
-
-
-def as_data(found: Stress) -> dict[str, Any]:
-    """The whole run as plain data."""
-    batches = {label: vars(batch) | {"failures": [asdict(failure) for failure in batch.failures]} for label, batch in found.batches.items()}
-    return vars(found) | {"batches": batches, "stability": found.stability and asdict(found.stability)}

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
 
+from rockcheck.scenes.writing import markdown_table
 from rockcheck.validation.suite.results import Cell, Check, Run
 from rockcheck.validation.suite.tables import share, title, verdict_lines
 
@@ -60,11 +61,8 @@ def markdown(run: Run) -> str:
     reasons = list(verdict_lines(run))
     if reasons:
         lines += [*(f"- {_plain(reason)}" for reason in reasons), ""]
-    lines += ["| scene | " + " | ".join(run.models) + " |", "|---" * (len(run.models) + 1) + "|"]
-    for scene in run.places:
-        row = [run.cell(scene, model) for model in run.models]
-        lines.append(f"| {_plain(scene)} | " + " | ".join(_entry(cell) for cell in row) + " |")
-    return "\n".join(lines) + "\n"
+    rows = ((_plain(scene), *(_entry(run.cell(scene, model)) for model in run.models)) for scene in run.places)
+    return "\n".join([*lines, markdown_table(("scene", *run.models), rows)]) + "\n"
 
 
 def _entry(cell: Cell | None) -> str:
@@ -79,4 +77,4 @@ def _worst(checks: tuple[Check, ...]) -> str:
 
 
 def _plain(text: str) -> str:
-    return text.replace("|", "\\|").replace("<", "&lt;")
+    return text.replace("<", "&lt;")

@@ -11,7 +11,7 @@ from rockcheck.scenes import Scene
 from rockcheck.validation.stress import study
 from rockcheck.validation.stress.invariants import CheckedRun
 from rockcheck.validation.stress.players import EventBased
-from rockcheck.validation.stress.study import Failure, RunTotals
+from rockcheck.validation.stress.results import Failure, RunTotals
 
 
 def play_some(label: str, seed: int, first: int, count: int) -> RunTotals:
