@@ -37,6 +37,19 @@ def test_every_page_is_in_the_navigation(site):
         assert f'href="{name}.html' in index or name == "index", name
 
 
+def test_names_of_the_glossary_are_in_the_code():
+    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| **")]
+    assert len(rows) >= 20
+    paths = [path for folder in ("scenes", "ebm", "engines", "validation") for path in (ROOT / folder).rglob("*.py")]
+    words = {
+        word for path in paths for word in (*path.relative_to(ROOT).with_suffix("").parts, *re.findall(r"\w+", path.read_text("utf-8")))
+    }
+    for *_, place in rows:
+        for name in re.findall(r"`([^`]+)`", place):
+            assert set(re.findall(r"[^\W\d]\w*", name)) <= words, name
+
+
 @pytest.mark.browser
 @pytest.mark.parametrize("name", SOURCES)
 def test_pages_open_from_the_file_system_and_ask_for_nothing(site, page, name):
