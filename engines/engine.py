@@ -22,7 +22,7 @@ from rockcheck.engines.marching import Marched, at_output_times, in_units_of, ma
 from rockcheck.engines.world import World
 from rockcheck.scenes import Cost, History, InputError, Scene
 from rockcheck.scenes.base import Frozen, Positive
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes.errors import NotInstalled, printable
 from rockcheck.scenes.observation import observe
 
 MOST_STEPS = 5_000_000
@@ -64,8 +64,6 @@ class Engine(Frozen):
             raise InputError('"adaptive" is not allowed with settings = "default": give a step in s', "time_step")
         if self.fixed_because and self.time_step == "adaptive":
             raise InputError(f'"adaptive" is not allowed: {self.fixed_because}; give a step in s', "time_step")
-        if not self.installed():
-            raise InputError(f"the engine {self.name} is not installed: pip install 'rockcheck[{self.extra}]'")
         return self
 
     @classmethod
@@ -99,8 +97,11 @@ class Engine(Frozen):
         """The history of the scene as the engine plays it.
 
         The cost's `wall_seconds` and `cpu_seconds` are those of the march alone. Raises `InputError` if the scene needs
-        more than five million steps, `ModelFailure` if the motion blows up or its events do not end.
+        more than five million steps, `NotInstalled` if the engine is missing, `ModelFailure` if the motion blows up or its
+        events do not end.
         """
+        if not self.installed():
+            raise NotInstalled(f"the engine {self.name} is not installed: pip install 'rockcheck[{self.extra}]'", self.name)
         step = self.largest_step if self.time_step == "adaptive" else self.time_step
         if scene.duration / step > MOST_STEPS:
             key = "largest_step" if self.time_step == "adaptive" else "time_step"

@@ -45,7 +45,13 @@ STATISTICS_SHOWN = (
 #: Fewer pages than this are written by the process itself.
 FEW = 3
 #: What a verdict is called and the sign that goes with its colour.
-VERDICTS = {"pass": ("within tolerance", "✓"), "changed": ("changed", "△"), "fail": ("out of tolerance", "✕"), "error": ("failed", "!")}
+VERDICTS = {
+    "pass": ("within tolerance", "✓"),
+    "incomplete": ("not installed", "–"),
+    "changed": ("changed", "△"),
+    "fail": ("out of tolerance", "✕"),
+    "error": ("failed", "!"),
+}
 
 
 @dataclass(frozen=True)

@@ -245,7 +245,7 @@ def slugs_of(names: Iterable[str]) -> dict[str, str]:
 def _read(cells: Iterable[Cell], folder: Path) -> tuple[dict[str, History], dict[str, str]]:
     histories, missing = {}, {}
     for cell in cells:
-        if cell.status == "failed" or cell.history is None:
+        if cell.status != "done" or cell.history is None:
             missing[cell.model] = cell.reason or "no history"
             continue
         path = folder / cell.history

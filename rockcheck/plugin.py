@@ -1,13 +1,16 @@
-"""A pytest plugin: `check("my-scene", model="mujoco")` in a test of your own holds a cell against its suite's tolerances.
+"""A pytest plugin: `rockcheck_check("my-scene", model="mujoco")` in a test of your own holds a cell against its suite's tolerances.
 
 The suite is the ini option `rockcheck_suite` (a named suite or a .toml file, relative to pytest's root), by default
 `rockcheck.toml` in the root where there is one, else `paper`. Histories are kept in pytest's cache and read back while
-nothing that they depend on has changed.
+nothing that they depend on has changed. `check` is the fixture's old name, kept for one release where no other plugin
+(such as pytest-check) has a fixture of that name.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,15 +22,15 @@ if TYPE_CHECKING:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """The ini option `rockcheck_suite`."""
-    parser.addini("rockcheck_suite", "suite that the fixture `check` takes scenes, models and tolerances from", default="")
+    parser.addini("rockcheck_suite", "suite that the fixture `rockcheck_check` takes scenes, models and tolerances from", default="")
 
 
 @pytest.fixture
-def check(request: pytest.FixtureRequest) -> Callable[..., Cell]:
-    """`check(scene, model=..., suite=None, strict=False)`: runs that cell and its references, fails the test out of tolerance.
+def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., Cell]:
+    """`rockcheck_check(scene, model=..., suite=None, strict=False)`: runs that cell and its references, fails the test out of tolerance.
 
     Returns the finished `validation.suite.results.Cell`, whose figures a test may look at. With `strict` a figure that left its
-    drift band fails too.
+    drift band fails too. A model that is not installed fails.
     """
     config = request.config
 
@@ -50,3 +53,12 @@ def check(request: pytest.FixtureRequest) -> Callable[..., Cell]:
         return cell
 
     return check
+
+
+if find_spec("pytest_check") is None:
+
+    @pytest.fixture
+    def check(rockcheck_check: Callable[..., Cell]) -> Callable[..., Cell]:
+        """The old name of `rockcheck_check`; it goes with the next release."""
+        warnings.warn("rockcheck's fixture `check` is called `rockcheck_check` now", DeprecationWarning, stacklevel=2)
+        return rockcheck_check

@@ -22,6 +22,10 @@ class InputError(ValueError):
         super().__init__(f"{key}: {message}" if key else message)
 
 
+class NotInstalled(InputError):
+    """A model's engine is not installed; the message says how to install it."""
+
+
 class ModelFailure(RuntimeError):
     """A model could not finish a scene (blow-up, unsupported physics, a cap reached); its cell fails, the run goes on."""
 

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from rockcheck.scenes.errors import NotInstalled
+
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
 
 #: What may be skipped while `CI` is set: how the reason begins, and where it is no fault of the job. All else that is skipped fails it.
 MAY_BE_SKIPPED: dict[str, bool] = {
-    "needs PyBullet": sys.version_info >= (3, 12),  # which has wheels for 3.11 only
+    "needs pybullet": sys.version_info >= (3, 12),  # which has wheels for 3.11 only
     "needs Linux": sys.platform != "linux",
     "needs POSIX": sys.platform == "win32",
 }
@@ -46,6 +48,15 @@ def _judged(report: Any) -> None:
     if not _may_be_skipped(reason):
         report.outcome = "failed"
         report.longrepr = f"skipped in CI, and tests/conftest.py lists no such reason: {reason}"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call() -> Iterator[None]:
+    """A test that comes to play an engine that is not installed is skipped."""
+    try:
+        return (yield)
+    except NotInstalled as error:
+        pytest.skip(f"needs {error.key}: {error.reason}")
 
 
 @pytest.hookimpl(wrapper=True)

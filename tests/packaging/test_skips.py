@@ -16,7 +16,7 @@ import pytest
 @pytest.mark.skip(reason="no mood")
 def test_marked(): pass
 
-@pytest.mark.skipif(True, reason="needs PyBullet: it is played")
+@pytest.mark.skipif(True, reason="needs pybullet: it is played")
 def test_listed(): pass
 
 def test_inside():

@@ -28,16 +28,16 @@ theta_rms = { expected = 0.001, limit = 0.01, drift = 0.001, why = "a test" }
 theta_peak = { expected = 0.0, limit = 0.01, drift = 0.001, why = "a test" }
 """
 TESTS = """
-def test_near(check):
-    assert check("my-scene", model="near").figures
-def test_strict(check):
-    check("my-scene", model="near", strict=True)
-def test_broken(check):
-    check("my-scene", model="broken")
-def test_reference(check):
-    check("my-scene", model="still")
-def test_unknown(check):
-    check("my-scene", model="nera")
+def test_near(rockcheck_check):
+    assert rockcheck_check("my-scene", model="near").figures
+def test_strict(rockcheck_check):
+    rockcheck_check("my-scene", model="near", strict=True)
+def test_broken(rockcheck_check):
+    rockcheck_check("my-scene", model="broken")
+def test_reference(rockcheck_check):
+    rockcheck_check("my-scene", model="still")
+def test_unknown(rockcheck_check):
+    rockcheck_check("my-scene", model="nera")
 """
 
 
@@ -55,3 +55,26 @@ def test_check_holds_a_cell_against_its_suite(pytester):
             "*did you mean 'near'*",
         ]
     )
+
+
+PLUGIN = """
+import pytest
+@pytest.fixture
+def check():
+    return "of another plugin"
+"""
+
+
+def test_the_old_name_warns_and_leaves_other_plugins_theirs(pytester, monkeypatch):
+    """`check` was its name; pytest-check has a fixture of that name, which is the one to have where it is installed."""
+    shutil.copy(Path(__file__).parent / "models" / "faulty.py", pytester.path / "faulty.py")
+    (pytester.path / "rockcheck.toml").write_text(SUITE, encoding="utf-8")
+    pytester.makepyfile('def test_old(check):\n    assert check("my-scene", model="near").figures\n')
+    result = pytester.runpytest_subprocess("-W", "default::DeprecationWarning")
+    result.assert_outcomes(passed=1, warnings=1)
+    result.stdout.fnmatch_lines(["*fixture `check` is called `rockcheck_check` now*"])
+    (pytester.path / "elsewhere").mkdir()
+    (pytester.path / "elsewhere" / "pytest_check.py").write_text(PLUGIN, encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(pytester.path / "elsewhere"))
+    pytester.makepyfile('def test_theirs(check):\n    assert check == "of another plugin"\n')
+    pytester.runpytest_subprocess("-p", "pytest_check").assert_outcomes(passed=1)

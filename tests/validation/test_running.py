@@ -7,6 +7,7 @@ import re
 import shutil
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -15,6 +16,8 @@ from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.runner import Executor, run_suite
 from rockcheck.validation.suite.suites import load_suite
+from rockcheck.validation.suite.tables import verdict_lines
+from rockcheck.validation.suite.verdicts import junit
 
 SUITE = """
 reference = "still"
@@ -74,6 +77,23 @@ def test_every_kind_of_failure_fails_its_cell_alone(tmp_path, run):
     assert {cell.model for cell in done.cells if cell.status == "done"} == {"still", "again"}
     assert done.cell("short", "again").verdict == "pass"
     assert done.exit_code == 3
+
+
+@pytest.mark.parametrize("strict", [False, True])
+def test_a_model_that_is_not_installed_is_named(tmp_path, run, monkeypatch, strict):
+    """Its cells are not played, all others are; the run is incomplete, which `--strict` does not accept."""
+    monkeypatch.setattr("rockcheck.validation.suite.runner.not_installed", lambda name: "not installed: so" * (name == "pybullet"))
+    path = write_suite(tmp_path, {"a": 'model = "faulty:Still"', "pybullet": "time_step = 1e-3"}, FINE.format(model="a"))
+    path.write_text(path.read_text() + FINE.format(model="pybullet"))
+    done = run(path, strict=strict)
+    assert done.cell("short", "a").verdict == "pass"
+    absent = done.cell("short", "pybullet")
+    assert (absent.status, absent.verdict, absent.reason) == ("absent", "incomplete", "not installed: so")
+    assert done.verdict == "incomplete"
+    assert done.exit_code == int(strict)
+    assert list(verdict_lines(done)) == ["pybullet: not installed: so"]
+    (suite,) = ElementTree.fromstring(junit(done))
+    assert (suite.get("skipped"), suite.get("failures")) == (("0", "1") if strict else ("1", "0"))
 
 
 def test_only_what_changed_runs_again(tmp_path, run):

@@ -27,7 +27,7 @@ from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.writing import json_text, records_text, write_whole
 from rockcheck.validation.bench.scenes import pulse
 from rockcheck.validation.discrepancy.compare import compare
-from rockcheck.validation.execute.models import build
+from rockcheck.validation.execute.models import build, not_installed
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.execute.study import Study, header
 
@@ -196,7 +196,7 @@ def _rms(reference: History, candidate: History) -> float:
 
 
 def run_convergence(*, quick: bool = False, jobs: int | None = None, on_progress: OnProgress = unheard) -> Convergence:
-    """Plays every scene with every model at every setting in `jobs` processes (default: one a core).
+    """Plays every scene with every model that is installed at every setting in `jobs` processes (default: one a core).
 
     `quick`: the scenes `QUICK` without the finest settings, in this process.
     """
@@ -207,6 +207,7 @@ def run_convergence(*, quick: bool = False, jobs: int | None = None, on_progress
         (name, sweep.model, value)
         for place in range(2 if quick else 3)
         for sweep in SWEEPS.values()
+        if not not_installed(sweep.model)
         for name in names
         for value in (sweep.values[place],)
     ]

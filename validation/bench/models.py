@@ -17,7 +17,7 @@ from rockcheck.validation.bench.convergence import slope
 from rockcheck.validation.bench.scenes import FAMILIES, MEMBERS, QUICK, prepared
 from rockcheck.validation.discrepancy.compare import compare
 from rockcheck.validation.discrepancy.measures import IMPACTS
-from rockcheck.validation.execute.models import build
+from rockcheck.validation.execute.models import build, not_installed
 from rockcheck.validation.execute.pool import Call, Pool
 
 #: Errors for which each model's cost is told, alpha.
@@ -246,12 +246,13 @@ PlannedRun = tuple[str, int, str, float]
 
 
 def planned(*, quick: bool = False) -> list[PlannedRun]:
-    """All runs: family, member, line and value of its setting."""
+    """All runs of models that are installed: family, member, line and value of its setting."""
     return [
         (family, member, line.label, value)
         for member in range(MEMBERS)
         for family in (QUICK if quick else tuple(FAMILIES))
         for line in LINES.values()
+        if not not_installed(line.model)
         for value in (line.quick if quick else line.values)
     ]
 

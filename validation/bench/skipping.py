@@ -18,7 +18,7 @@ from rockcheck.scenes import Floor, History, Record, Scene, Wall
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.bench.scenes import pulse
-from rockcheck.validation.execute.models import Model, build
+from rockcheck.validation.execute.models import Model, build, not_installed
 
 #: A wall that the block cannot reach, m.
 FAR = Wall(side="left", gap=100.0)
@@ -132,6 +132,8 @@ def _histories() -> Iterator[Saving]:
         ("pybullet", slow),
         ("pybullet", {"time_step": "adaptive"}),
     ):
+        if not_installed(name):
+            continue
         model = build(name, settings)
         label = f"{name} adaptive" if "adaptive" in settings.values() else name
         remark = "a wall out of reach against none" + (", and with it another share of penetration removed" if label == "pybullet" else "")
@@ -291,6 +293,8 @@ def _as_xml(world: Any) -> str:
 
 
 def _pybullet_steps() -> Iterator[Saving]:
+    if not_installed("pybullet"):
+        return
     from rockcheck.engines import PyBullet
 
     start = np.array(_TILTED.initial_state)

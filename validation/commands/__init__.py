@@ -57,6 +57,15 @@ def console() -> Console:
     return _Screen(markup=False, highlight=False, quiet=_voice.get() != "tables")
 
 
+def tell_missing() -> None:
+    """Names the models that are left out of a study of all models, since they are not installed."""
+    from rockcheck.validation.execute.models import FAMILIES, not_installed
+
+    for name in FAMILIES:
+        if missing := not_installed(name):
+            console().print(f"left out: {name}, {missing}", style="yellow", soft_wrap=True)
+
+
 def answer(value: Any) -> None:
     """The command's result as JSON on stdout, where `--json` asks for it; numbers that are not finite become null."""
     if _voice.get() == "json":

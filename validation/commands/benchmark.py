@@ -11,7 +11,7 @@ from rich.table import Table
 
 from rockcheck.scenes.errors import unknown_name
 from rockcheck.scenes.writing import write_whole
-from rockcheck.validation.commands import OUT, JobsOption, OutOption, answer, console, progress, usable_folder
+from rockcheck.validation.commands import OUT, JobsOption, OutOption, answer, console, progress, tell_missing, usable_folder
 
 if TYPE_CHECKING:
     from rockcheck.validation.bench.ebm import EbmSpeed
@@ -37,6 +37,7 @@ def run(
     if what not in get_args(benchmark.What):
         raise unknown_name("benchmark", what, get_args(benchmark.What))
     folder = usable_folder(out)
+    tell_missing()
     with progress("benchmark") as on_progress:
         found = benchmark.run_benchmark(what, quick=quick, jobs=jobs, minutes=minutes, on_progress=on_progress)  # type: ignore[arg-type]
         from rockcheck.reports.studies.benchmark import write_benchmark

@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from rockcheck.validation.commands import OUT, JobsOption, OutOption, answer, console, progress, usable_folder
+from rockcheck.validation.commands import OUT, JobsOption, OutOption, answer, console, progress, tell_missing, usable_folder
 
 if TYPE_CHECKING:
     from rockcheck.validation.bench.convergence import Convergence
@@ -29,6 +29,7 @@ def run(
     from rockcheck.validation.bench import convergence
 
     folder = usable_folder(out)
+    tell_missing()
     with progress("convergence") as on_progress:
         found = convergence.run_convergence(quick=quick, jobs=jobs, on_progress=on_progress)
         convergence.save(found, folder)

@@ -18,7 +18,7 @@ from rich.table import Table
 from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT
 from rockcheck.scenes import InputError, load_scene
-from rockcheck.scenes.errors import unknown_name
+from rockcheck.scenes.errors import NotInstalled, unknown_name
 from rockcheck.scenes.progress import Count
 from rockcheck.scenes.writing import table_text, write_whole
 from rockcheck.validation.commands import OUT, JobsOption, OutOption, SchedulerOption, answer, console, progress, scene_names, usable_folder
@@ -244,10 +244,14 @@ def _verify(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, dat
 
 def _agreement(panels: Sequence[Panel], request: SpectrumRequest, count: int, tiles: Tiles, data: Path, screen: Console) -> None:
     from rockcheck.reports.studies.spectra import MAPS, maps_figure, write
+    from rockcheck.validation.execute.models import not_installed
     from rockcheck.validation.spectra.agreement import CANDIDATES, COLUMNS, MAP_SIZE, agree, mapped
 
     if request.model != "ebm":
         raise InputError("cannot be given together with --model or --pivot: all models are compared", "--agreement")
+    for model in CANDIDATES:
+        if missing := not_installed(model):
+            raise NotInstalled(missing, model)
     if not 2 <= count <= len(request.frequencies) * len(request.amplitudes):
         raise InputError(f"{count} is not allowed: 2 up to the spectrum's nodes are asked for", "--agreement")
     spectra = play_panels(panels, request, tiles)

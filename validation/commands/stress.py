@@ -8,8 +8,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from rockcheck.scenes.errors import unknown_name
-from rockcheck.validation.commands import OUT, JobsOption, OutOption, answer, console, progress, usable_folder
+from rockcheck.scenes.errors import NotInstalled, unknown_name
+from rockcheck.validation.commands import OUT, JobsOption, OutOption, answer, console, progress, tell_missing, usable_folder
 
 if TYPE_CHECKING:
     from rockcheck.validation.stress.results import Stress
@@ -34,6 +34,7 @@ def run(
     tables as CSV, a summary in Markdown, and of failures the smallest scene files that show them.
     Exit 1 where an event-based model breaks an invariant.
     """
+    from rockcheck.validation.execute.models import not_installed
     from rockcheck.validation.stress import study, tables
     from rockcheck.validation.stress.players import PLAYERS
 
@@ -42,7 +43,10 @@ def run(
     for name in model or ():
         if name not in PLAYERS:
             raise unknown_name("model", name, PLAYERS)
+        if not study.installed(name):
+            raise NotInstalled(not_installed(name), name)
     folder = usable_folder(out)
+    tell_missing()
     with progress("stress") as on_progress:
         found = study.run_stress(
             cast("study.What", what), seed=seed, quick=quick, runs=runs, jobs=jobs, models=model, folder=folder, on_progress=on_progress

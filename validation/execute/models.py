@@ -37,6 +37,7 @@ class Family:
         return "numba" in self.libraries
 
 
+ENGINES = "rockcheck.engines"
 COMPILED = ("numba", "llvmlite", "numpy", "scipy")
 FAMILIES: dict[str, Family] = {
     "ebm": Family(
@@ -63,11 +64,11 @@ FAMILIES: dict[str, Family] = {
         flies=False,
     ),
     "cm": Family("rockcheck.cm", "ContinuousModel", "the paper's penalty-based continuous model", {}, COMPILED),
-    "mujoco": Family("rockcheck.engines", "MuJoCo", "the physics engine MuJoCo", {}, ("mujoco", "numpy")),
-    "pybullet": Family("rockcheck.engines", "PyBullet", "the physics engine PyBullet", {}, ("pybullet", "numpy")),
-    "pymunk": Family("rockcheck.engines", "Pymunk", "the physics engine pymunk (Chipmunk, in two dimensions)", {}, ("pymunk", "numpy")),
-    "dart": Family("rockcheck.engines", "Dart", "the physics engine DART", {}, ("dartpy", "numpy")),
-    "drake": Family("rockcheck.engines", "Drake", "the physics engine Drake", {}, ("drake", "numpy")),
+    "mujoco": Family(ENGINES, "MuJoCo", "the physics engine MuJoCo", {}, ("mujoco", "numpy")),
+    "pybullet": Family(ENGINES, "PyBullet", "the physics engine PyBullet", {}, ("pybullet", "numpy")),
+    "pymunk": Family(ENGINES, "Pymunk", "the physics engine pymunk (Chipmunk, in two dimensions)", {}, ("pymunk", "numpy")),
+    "dart": Family(ENGINES, "Dart", "the physics engine DART", {}, ("dartpy", "numpy")),
+    "drake": Family(ENGINES, "Drake", "the physics engine Drake", {}, ("drake", "numpy")),
     "measured": Family(
         "rockcheck.validation.discrepancy.measured", "Measured", "a CSV history from a shake table, or from any other program"
     ),
@@ -82,6 +83,14 @@ def family(name: str) -> Family:
     if name not in FAMILIES:
         raise unknown_name("model", name, FAMILIES)
     return FAMILIES[name]
+
+
+def not_installed(name: str) -> str:
+    """What to say where the engine of that model is not installed; empty where it is, or needs none."""
+    if family(name).module != ENGINES:
+        return ""
+    engine = _class_of(name)
+    return "" if engine.installed() else f"not installed: pip install 'rockcheck[{engine.extra}]'"
 
 
 def is_own(name: str) -> bool:

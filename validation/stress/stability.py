@@ -17,7 +17,7 @@ import numpy as np
 from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.scene import PAPER_BLOCK
-from rockcheck.validation.execute.models import build
+from rockcheck.validation.execute.models import build, not_installed
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.stress.players import energy_without_source
 
@@ -233,14 +233,15 @@ class MapTask:
 
 
 def tasks(quick: bool = False) -> list[MapTask]:
-    """The maps of all `SETUPS`, the longest tasks first; `quick` has fewer values and steps, and seconds for the hour."""
+    """The maps of all `SETUPS` that are installed, the longest tasks first; `quick` has fewer values, steps and seconds."""
     steps = QUICK_STEPS if quick else STEPS
     values = {axis: some[:: max(1, len(some) // QUICK_VALUES)] if quick else some for axis, some in AXES.items()}
+    labels = [label for label, setup in SETUPS.items() if not not_installed(setup.family)]
     still = [
         MapTask(stand_still, (label, case, QUICK_REST if quick else PUSHED if CASES[case] else HOUR, REST_STEP))
-        for case, label in itertools.product(CASES, SETUPS)
+        for case, label in itertools.product(CASES, labels)
     ]
-    return still + [MapTask(largest_stable, (label, axis, value, steps)) for axis in AXES for value in values[axis] for label in SETUPS]
+    return still + [MapTask(largest_stable, (label, axis, value, steps)) for axis in AXES for value in values[axis] for label in labels]
 
 
 def play(work: Sequence[MapTask], jobs: int) -> Iterator[tuple[int, Still | Stable]]:

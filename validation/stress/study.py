@@ -14,6 +14,7 @@ from typing import Literal
 from rockcheck.scenes import Scene
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import OnProgress, unheard
+from rockcheck.validation.execute.models import FAMILIES, not_installed
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.execute.study import header
 from rockcheck.validation.stress import stability
@@ -113,6 +114,11 @@ class Chunk:
         return [Chunk(self.label, self.seed, self.first, half), Chunk(self.label, self.seed, self.first + half, self.count - half)]
 
 
+def installed(label: str) -> bool:
+    """Whether the model of that player can be played here."""
+    return label not in FAMILIES or not not_installed(label)
+
+
 def chunks(seed: int, runs: int | None, quick: bool, models: Sequence[str]) -> list[Chunk]:
     """The work, the slowest models first, so that all cores end together."""
     found = []
@@ -137,14 +143,15 @@ def run_stress(
     folder: Path | None = None,
     on_progress: OnProgress = unheard,
 ) -> Stress:
-    """Plays `runs` scenes with each of the `models` (default: all, as many as `PLAYERS` says) in `jobs` processes (one a core).
+    """Plays `runs` scenes with each of the `models` (default: all that are installed, as many as `PLAYERS` says) in `jobs`
+    processes (one a core).
 
     Then ("all", or "maps" alone) it maps where engines and the continuous model break. Interrupted (Ctrl-C), it gives what was
     finished till then; `complete` is then false. In `folder` it saves what was found on the way, and the scenes of failures, which
     it shrinks as long as `SHRINKING` says.
     """
     began, jobs = time.monotonic(), jobs or os.cpu_count() or 1
-    labels = list(models or PLAYERS) if what != "maps" else []
+    labels = list(models or filter(installed, PLAYERS)) if what != "maps" else []
     work, maps = chunks(seed, runs, quick, labels), stability.tasks(quick) if what != "runs" else []
     batches = {label: RunTotals(model=label) for label in labels}
     places: dict[int, stability.Still | stability.Stable] = {}

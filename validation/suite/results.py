@@ -30,9 +30,9 @@ FORMAT = 1
 
 #: Verdict on one check: inside the limit; inside, but outside the drift band; outside the limit or not to be judged.
 CheckVerdict = Literal["pass", "changed", "fail"]
-#: Verdict on a cell or a run: the worst of its checks, or "error" where a model failed.
-Verdict = Literal["pass", "changed", "fail", "error"]
-SEVERITY: tuple[Verdict, ...] = ("pass", "changed", "fail", "error")
+#: Verdict on a cell or a run: the worst of its checks, "incomplete" where a model is not installed, or "error" where one failed.
+Verdict = Literal["pass", "incomplete", "changed", "fail", "error"]
+SEVERITY: tuple[Verdict, ...] = ("pass", "incomplete", "changed", "fail", "error")
 #: "numerical": two solutions of the same equations. "model form": the reference forbids free flight, the candidate does not.
 #: "measured": one of the two was measured. "exact": against a closed form. "absolute": a figure of the cell itself against
 #: its expected value.
@@ -75,7 +75,8 @@ class CostRecord(Stored):
 class Cell(Stored):
     """One scene played by one model.
 
-    `status` "failed" means no history (`reason` says why: a model's failure, a crash, a hang, memory). `history` is the
+    `status` "failed" means no history (`reason` says why: a model's failure, a crash, a hang, memory), "absent" that the model
+    is not installed (`reason` says what to install). `history` is the
     path of its CSV relative to the run's folder. `read_back` is true where nothing that the cell depends on had changed.
     `figures` are all measures, judged or not; `checks` those with a tolerance or in need of one.
     """
@@ -84,7 +85,7 @@ class Cell(Stored):
     model: str
     settings: dict[str, Any] = Field(default_factory=dict)
     key: str = ""
-    status: Literal["done", "failed"]
+    status: Literal["done", "failed", "absent"]
     reason: str = ""
     read_back: bool = False
     history: str | None = None
@@ -103,9 +104,9 @@ class Cell(Stored):
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of the cell's checks; "error" if the model failed."""
-        if self.status == "failed":
-            return "error"
+        """The worst of the cell's checks; "error" if the model failed, "incomplete" if it is not installed."""
+        if self.status != "done":
+            return "error" if self.status == "failed" else "incomplete"
         return worst(check.verdict for check in self.checks)
 
 
@@ -158,8 +159,8 @@ class Run(Stored):
 
     @property
     def exit_code(self) -> int:
-        """0 pass, 1 out of tolerance (under `strict` also changed), 3 a model failed."""
-        return {"pass": 0, "changed": int(self.strict), "fail": 1, "error": 3}[self.verdict]
+        """0 pass, 1 out of tolerance (under `strict` also changed or incomplete), 3 a model failed."""
+        return {"pass": 0, "incomplete": int(self.strict), "changed": int(self.strict), "fail": 1, "error": 3}[self.verdict]
 
     @property
     def up_to_date(self) -> int:

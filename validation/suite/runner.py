@@ -22,7 +22,7 @@ from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.execute import provenance, workers
-from rockcheck.validation.execute.models import is_own
+from rockcheck.validation.execute.models import is_own, not_installed
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, Store, name_of
 from rockcheck.validation.suite.ensembles import Ensemble
 from rockcheck.validation.suite.results import Cell, CostRecord, EnsembleRecord, Run
@@ -108,7 +108,8 @@ def run_suite(
             if found is not None:
                 records[item] = found
     read_back = set(records)
-    waiting = [item for item in items if item not in records]
+    failures |= {item: missing for item in items if (missing := not_installed(item.variant.family_name))}
+    waiting = [item for item in items if item not in records and item not in failures]
     on_progress(len(records), len(items), f"{len(records)} up to date")
     limits = [suite.suite_of(item.place).limits for item in waiting]
     for index, result in play(
@@ -226,6 +227,8 @@ def _ensemble_cell(
         "read_back": all(batch in read_back for batch in batches),
         "cost": CostRecord(**{key: sum(cost[key] for cost in costs) for key in (costs[0] if costs else ())}),
     }
+    if missing := not_installed(variant.family_name):
+        return Cell(**about, status="absent", reason=missing)
     if own.failures:
         reason = next(outcome for peak, outcome in zip(own.peaks, own.outcomes, strict=True) if not math.isfinite(peak))
         return Cell(**about, status="failed", reason=f"{own.failures} of {len(own.peaks)} scenes failed; the first: {reason}")
@@ -262,7 +265,8 @@ def _cell(
     scene, label = planned.scene, planned.variant.label
     about: dict[str, Any] = {"scene": scene.name, "model": label, "key": planned.key, "read_back": read_back}
     if planned in failures:
-        return Cell(**about, status="failed", reason=failures[planned], settings=dict(planned.variant.settings))
+        about["status"] = "absent" if not_installed(planned.variant.family_name) else "failed"
+        return Cell(**about, reason=failures[planned], settings=dict(planned.variant.settings))
     record = records[planned]
     required = suite.required(scene.name, label)
     own = suite.suite_of(scene.name)

@@ -13,7 +13,7 @@ from rockcheck.scenes.writing import table_text
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.suite.results import Cell, Check, Run
 
-COLOURS = {"pass": "green", "changed": "yellow", "fail": "red", "error": "red"}
+COLOURS = {"pass": "green", "incomplete": "yellow", "changed": "yellow", "fail": "red", "error": "red"}
 
 
 def verdict_table(run: Run) -> Table:
@@ -27,7 +27,7 @@ def verdict_table(run: Run) -> Table:
     before = ""
     for cell in run.cells:
         near = nearest(cell)
-        words = f"{cell.reason or 'failed'}" if cell.status == "failed" else windowed(near) if near else "nothing judged"
+        words = f"{cell.reason or 'failed'}" if cell.status != "done" else windowed(near) if near else "nothing judged"
         verdict = Text("-") if cell.status == "done" and not cell.checks else Text(cell.verdict, COLOURS[cell.verdict])
         table.add_row("" if cell.scene == before else cell.scene, cell.model, Text(words), percent(near) if near else "", verdict)
         before = cell.scene
@@ -47,7 +47,7 @@ def summary(run: Run) -> dict[str, Any]:
                 "model": cell.model,
                 "outcome": cell.outcome,
                 "checks": len(cell.checks),
-                "verdict": cell.verdict if cell.checks or cell.status == "failed" else None,
+                "verdict": cell.verdict if cell.checks or cell.status != "done" else None,
             }
             for cell in run.cells
         ],
@@ -58,15 +58,18 @@ def summary(run: Run) -> dict[str, Any]:
 def verdict_lines(run: Run) -> Iterator[str]:
     """Why anything is not a pass, a line each."""
     yield from run.faults
+    absent = {cell.model: cell.reason for cell in run.cells if cell.status == "absent"}
+    yield from (f"{model}: {reason}" for model, reason in absent.items())
     for cell in run.cells:
-        yield from cell_lines(cell)
-    if not any(cell.checks or cell.status == "failed" for cell in run.cells):
+        if cell.status != "absent":
+            yield from cell_lines(cell)
+    if not any(cell.checks or cell.status != "done" for cell in run.cells):
         yield "nothing was judged: the suite requires no measure and has no tolerance"
 
 
 def cell_lines(cell: Cell) -> Iterator[str]:
     """Why a cell is not a pass, a line each."""
-    if cell.status == "failed":
+    if cell.status != "done":
         yield f"{cell.scene}, {cell.model}: {cell.reason}"
     for check in cell.checks:
         if check.verdict != "pass":

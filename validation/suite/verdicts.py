@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
+from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
 from rockcheck.scenes.writing import markdown_table
 from rockcheck.validation.suite.results import Cell, Check, Run
 from rockcheck.validation.suite.tables import share, title, verdict_lines
 
-MARKS = {"pass": "✅", "changed": "🟡", "fail": "❌", "error": "💥"}
+MARKS = {"pass": "✅", "incomplete": "⚪", "changed": "🟡", "fail": "❌", "error": "💥"}
 
 
 def junit(run: Run) -> str:
     """JUnit XML: a test suite a scene, a test case a check and one for each cell's run, which is an error where it failed.
 
-    A figure that changed within its limit is a failure only in a strict run.
+    A figure that changed within its limit, and a model that is not installed, are failures only in a strict run.
     """
     document = JUnitXml(f"rockcheck {run.suite}")
     for scene in run.places:
@@ -35,7 +35,8 @@ def junit(run: Run) -> str:
 
 def _cases(cell: Cell, strict: bool) -> Iterator[TestCase]:
     place = f"{cell.scene}.{cell.model}"
-    ran = _case(place, "runs", Error(cell.reason) if cell.status == "failed" else None)
+    missing = Failure(cell.reason) if strict else Skipped(cell.reason)
+    ran = _case(place, "runs", {"failed": Error(cell.reason), "absent": missing}.get(cell.status))
     ran.time = cell.cost.worker_seconds
     yield ran
     for check in cell.checks:
@@ -43,7 +44,7 @@ def _cases(cell: Cell, strict: bool) -> Iterator[TestCase]:
         yield _case(place, title(check), Failure(check.reason, check.verdict) if failed else None)
 
 
-def _case(place: str, name: str, result: Failure | Error | None) -> TestCase:
+def _case(place: str, name: str, result: Failure | Error | Skipped | None) -> TestCase:
     case = TestCase(name, place)
     if result is not None:
         case.result = [result]
