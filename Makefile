@@ -1,9 +1,13 @@
 # Everything is set up on the first call: a virtual environment in .venv, the package and its tools.
-PYTHON ?= python3
+# Python 3.11 where there is one: PyBullet has wheels for no newer one.
+PYTHON ?= $(shell for p in python3.11 python3; do $$p -c "" 2>/dev/null && echo $$p && break; done)
+# In CI everything comes from the lock file, by hash; UNLOCKED=1 takes the newest that pyproject.toml allows.
+LOCKED := $(if $(UNLOCKED),,$(CI))
+LOCK := .ci/requirements.txt
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: install validate test test-all lint format docs gallery wheel clean
+.PHONY: install validate test test-all nightly lint format docs gallery wheel lock clean
 
 install: $(VENV)/.ready ## the command `rockcheck` in .venv/bin
 
@@ -15,6 +19,10 @@ test: $(VENV)/.ready ## the everyday tests
 
 test-all: $(VENV)/.ready ## also the slow ones
 	$(BIN)/python -m pytest -q
+
+nightly: $(VENV)/.ready ## what is too long for each change; NIGHTLY_QUICK=1 for a short form; the results go to docs/nightly.json
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[audit,fuzz]'
+	$(BIN)/python .ci/nightly.py
 
 lint: $(VENV)/.ready ## linter, formatter's check, type checker
 	$(BIN)/ruff check .
@@ -36,13 +44,20 @@ gallery: $(VENV)/.ready ## the pictures of docs/gallery.md
 wheel: ## build the wheel, install it into a clean environment, and validate with it outside of the repository
 	PYTHON=$(PYTHON) .ci/wheel
 
+lock: $(VENV)/.ready ## the lock file anew, from what pyproject.toml allows today
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+	echo 'setuptools>=77' | $(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes --no-annotate \
+		--no-emit-index-url --no-header --extra test --extra docs --extra lint --output-file $(LOCK) pyproject.toml -
+
 clean:
 	rm -rf $(VENV) build dist *.egg-info rockcheck-report site
 
-$(VENV)/.ready: pyproject.toml
+$(VENV)/.ready: pyproject.toml $(if $(LOCKED),$(LOCK))
 	$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "rockcheck needs Python 3.11 or newer: make PYTHON=python3.12")'
+	@$(PYTHON) -c 'import sys; v = sys.version_info; print("Python", ".".join(map(str, v[:3])), "from $(PYTHON)" + ("" if v < (3, 12) else "; PyBullet has wheels for Python 3.11 only and is left out here (make PYTHON=python3.11)"))'
 	$(PYTHON) -m venv $(VENV)
 	mkdir -p build/typed/rockcheck # the folders as they are installed, for tools that do not follow the install
 	for part in rockcheck/*.py scenes ebm cm engines validation reports; do ln -sfn ../../../$$part build/typed/rockcheck/; done
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,docs,lint]'
+	$(if $(LOCKED),$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement $(LOCK))
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check $(if $(LOCKED),--no-deps --no-build-isolation --editable .,--editable '.[test,docs,lint]')
 	touch $@
