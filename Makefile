@@ -55,7 +55,7 @@ clean:
 $(VENV)/.ready: pyproject.toml $(if $(LOCKED),$(LOCK))
 	$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "rockcheck needs Python 3.11 or newer: make PYTHON=python3.12")'
 	@$(PYTHON) -c 'import sys; v = sys.version_info; print("Python", ".".join(map(str, v[:3])), "from $(PYTHON)" + ("" if v < (3, 12) else "; PyBullet has wheels for Python 3.11 only and is left out here (make PYTHON=python3.11)"))'
-	$(PYTHON) -m venv $(VENV)
+	$(PYTHON) -m venv --clear $(VENV)
 	mkdir -p build/typed/rockcheck # the folders as they are installed, for tools that do not follow the install
 	for part in rockcheck/*.py scenes ebm cm engines validation reports; do ln -sfn ../../../$$part build/typed/rockcheck/; done
 	$(if $(LOCKED),$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement $(LOCK))
