@@ -32,7 +32,7 @@ def test_a_missing_extra_is_named(varying_engine, monkeypatch):
     monkeypatch.setitem(sys.modules, varying_engine.module, None)
     monkeypatch.setattr("rockcheck.engines.engine.find_spec", lambda name: None)
     with pytest.raises(InputError, match=rf"not installed: pip install 'rockcheck\[{varying_engine.extra}\]'"):
-        varying_engine().simulate(Scene(name="a", block=PAPER_BLOCK, duration=0.1))
+        varying_engine().simulate(Scene(name="a", block=PAPER_BLOCK, floor=Floor(friction=0.3), duration=0.1))
 
 
 def test_steps_that_cannot_vary_are_refused_with_the_reason(engine):
