@@ -78,11 +78,13 @@ def sources(top: str) -> dict[Path, ast.Module]:
 
 
 DISTRIBUTIONS = packages_distributions()
+#: Distributions of modules called otherwise, for where they are not installed.
+ELSEWHERE = {"pydrake": "drake"}
 
 
 def owners_of(name: str) -> set[str]:
     """Distributions that install a module of this name."""
-    return {owner.lower().replace("_", "-") for owner in DISTRIBUTIONS.get(name, [name])}
+    return {owner.lower().replace("_", "-") for owner in DISTRIBUTIONS.get(name, [ELSEWHERE.get(name, name)])}
 
 
 @pytest.mark.parametrize("top", sorted(FOLDERS.values()))
