@@ -86,6 +86,7 @@ STUDIES = (
     ("Convergence", "convergence/index.html"),
     ("Benchmark", "benchmark/index.html"),
     ("Stress", "stress/index.html"),
+    ("Conformance", "conformance/index.html"),
     ("Overturning spectra", "spectra.html"),
 )
 

@@ -31,6 +31,7 @@ from rockcheck.validation.commands import (
     stress,
     validate,
 )
+from rockcheck.validation.commands.engines import conformance
 
 #: The commands, in the order of the help, each with an example.
 COMMANDS = {
@@ -43,6 +44,7 @@ COMMANDS = {
     spectrum: "rockcheck spectrum --figure 8 --size 50 --refine",
     benchmark: "rockcheck benchmark --quick",
     convergence: "rockcheck convergence --quick",
+    conformance: "rockcheck conformance --engine mujoco --settings default",
     stress: "rockcheck stress --quick",
     report: "rockcheck report rockcheck-report",
 }

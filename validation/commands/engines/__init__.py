@@ -1,0 +1,1 @@
+"""Commands about one engine: its conformance card, and the parameters that it needs."""
