@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from functools import partial
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +74,15 @@ class ContinuousModel(Frozen):
         if self.stiffness is not None and "penetration" in self.model_fields_set:
             raise InputError("cannot be given together with penetration", "stiffness")
         return self
+
+    def coarser(self, factor: float) -> Self:
+        """The same model with steps `factor` times as long, and the contacts as much softer as that allows (step ~ 1/sqrt(k/m))."""
+        change: dict[str, float] = {"penetration": factor**2 * self.penetration}
+        if self.stiffness is not None:
+            change = {"stiffness": self.stiffness / factor**2}
+        if self.time_step is not None:
+            change["time_step"] = factor * self.time_step
+        return self.model_copy(update=change)
 
     def stiffness_in(self, scene: Scene) -> float:
         """Stiffness of a contact per unit mass in that scene, 1/s^2."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, Strict
@@ -52,6 +52,10 @@ class EventBasedModel(Frozen):
     def order(self) -> int:
         """Order of the Taylor series: about half the digits of the tolerance, as usual for such methods, and a few more."""
         return min(HIGHEST_ORDER, math.ceil(-0.5 * math.log(self.tolerance)) + 4)
+
+    def finer(self) -> Self:
+        """The same model at a hundredth of its tolerance, as far as double precision goes."""
+        return self.model_copy(update={"tolerance": max(self.tolerance / 100.0, 1e-15)})
 
     def check(self, scene: Scene) -> None:
         """Raises `InputError` where the scene asks for physics that this model excludes."""

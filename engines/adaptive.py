@@ -26,7 +26,9 @@ FloatArray = NDArray[np.float64]
 Vector = tuple[float, float, float]  # along x, y and theta
 Touching = tuple[list[Contact], list[Contact]]  # the closed contacts with the floor and with walls
 
-# Lengths in units of the block's radius R, times in units of 1/p.
+# Lengths in units of the block's radius R, times in units of 1/p where the longest step is `USUAL_STEP`; they scale with it, so that
+# all of the error does.
+USUAL_STEP = 1e-3  # s
 CLOSED = 5e-8  # a corner nearer than this touches
 EMBEDDED = 5e-9  # how deep the engine sees a corner that touches
 IMPACT_STEP = 2e-6
@@ -62,7 +64,7 @@ class _Limits:
     @classmethod
     def of(cls, scene: Scene, longest: float) -> _Limits:
         """Those of a scene whose steps are at most `longest` s."""
-        moment = 1.0 / scene.frequency_parameter
+        moment = longest / USUAL_STEP / scene.frequency_parameter
         return cls(
             longest=longest,
             impact=min(IMPACT_STEP * moment, longest),

@@ -71,6 +71,11 @@ class Engine(Frozen):
         """Whether the module that it needs can be imported."""
         return not cls.module or find_spec(cls.module) is not None
 
+    def coarser(self, factor: float) -> Self:
+        """The same engine with steps `factor` times as long."""
+        knob = "largest_step" if self.time_step == "adaptive" else "time_step"
+        return self.model_copy(update={knob: factor * getattr(self, knob)})
+
     @abstractmethod
     def rigid_world(self, scene: Scene) -> World:
         """The scene as this engine holds it at its best: contacts stop or bounce within one step, whatever the step."""

@@ -11,6 +11,7 @@ from typing import Any
 from rockcheck.scenes.errors import InputError, printable, unknown_name
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.scene import Scene
+from rockcheck.scenes.uncertain import UncertainScene, split, uncertain_scene
 
 DATA = Path(str(resources.files("rockcheck.scenes"))) / "data"
 
@@ -25,15 +26,29 @@ def load_scene(source: str | Path) -> Scene:
 
     Raises `InputError` naming the file, the key, the value and what is allowed.
     """
+    return _read(_path_of(source)).scene
+
+
+def load_uncertain_scene(source: str | Path) -> UncertainScene:
+    """A scene with what its file says of the numbers that are not known exactly (see `scenes.uncertain`). Raises as `load_scene`."""
+    return _read(_path_of(source))
+
+
+def _path_of(source: str | Path) -> Path:
     known = named_scenes()
-    path = Path(source)
     if str(source) in known:
-        path = known[str(source)]
-    elif path.suffix.lower() != ".toml":
+        return known[str(source)]
+    path = Path(source)
+    if path.suffix.lower() != ".toml":
         raise InputError(f"{unknown_name('scene', str(source), known)}; or the path of a .toml file")
+    return path
+
+
+def _read(path: Path) -> UncertainScene:
     data = read_toml(path)
     try:
-        return scene_from(data, folder=path.parent, default_name=path.stem)
+        plain, spreads, correlations = split(data)
+        return uncertain_scene(scene_from(plain, folder=path.parent, default_name=path.stem), spreads, correlations)
     except InputError as error:
         raise InputError(f"{printable(path)}: {error}") from None
 
