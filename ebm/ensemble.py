@@ -35,7 +35,7 @@ class Ensemble:
 def play_ensemble(scenes: Sequence[Scene], model: EventBasedModel, *, rows: int = 0) -> Ensemble:
     """Play scenes of one duration to their end. Raises what `simulate` raises."""
     first = scenes[0]
-    step = max(first.output_step, first.duration / max(rows, 1))
+    step = max(first.output_step, first.duration / rows) if rows else first.output_step
     t = first.replace(output_step=step).output_times
     theta = np.empty((len(scenes), len(t) if rows else 0))
     side, peak, slip = np.zeros(len(scenes), dtype=np.int8), np.empty(len(scenes)), np.empty(len(scenes))

@@ -29,6 +29,7 @@ from rockcheck.validation.commands import (
     speaking,
     spectrum,
     stress,
+    uncertainty,
     validate,
 )
 from rockcheck.validation.commands.engines import conformance
@@ -39,6 +40,7 @@ COMMANDS = {
     new: "rockcheck new bookcase.toml",
     simulate: "rockcheck simulate fig5a --model mujoco --set time_step=1e-3 -o mujoco.csv",
     compare: "rockcheck compare ebm.csv mujoco.csv --until 8",
+    uncertainty: "rockcheck uncertainty fig5a --model mujoco --set time_step=1e-3",
     validate: "rockcheck validate smoke --out rockcheck-report",
     accept: 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"',
     spectrum: "rockcheck spectrum --figure 8 --size 50 --refine",

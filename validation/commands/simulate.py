@@ -29,7 +29,7 @@ def run(
     """
     if is_own(model):
         sys.path.append(str(Path.cwd()))
-    player = build(model, dict(_setting(text) for text in settings or []))
+    player = build(model, dict(setting_of(text) for text in settings or []))
     what = load_scene(scene)
     path = output or Path(f"{name_of(what.name, model)}.csv")
     if not path.parent.is_dir():
@@ -58,7 +58,7 @@ def run(
     )
 
 
-def _setting(text: str) -> tuple[str, Any]:
+def setting_of(text: str) -> tuple[str, Any]:
     """key=value, the value as in TOML; a bare word is a string."""
     key, equals, value = text.partition("=")
     if not equals or not key.isidentifier():

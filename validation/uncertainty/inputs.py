@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.ebm.ensemble import Ensemble, play_ensemble
+from rockcheck.ebm.batch import pack, run_batch
+from rockcheck.ebm.ensemble import play_ensemble
 from rockcheck.scenes import InputError
 from rockcheck.scenes.uncertain import UncertainScene
 from rockcheck.validation.discrepancy.figures import Stored
@@ -101,10 +102,10 @@ def propagate(
     model = model or EventBasedModel(pivot="unilateral", tolerance=1e-8)
     count = 1 << max(1, (samples - 1).bit_length())
     values = given.values(qmc.Sobol(len(given.spreads), seed=np.random.default_rng(seed)).random(count))
-    played = _play(given, values, model)
+    played = play_ensemble([given.at(row) for row in values], model, rows=MOST_ROWS)
     own = play_ensemble([given.scene], model)
-    capacity, fallen = _capacity(played, given), played.side != 0
-    figures = [_interval("peak_rotation", "alpha", float(_capacity(own, given)[0]), capacity)]
+    capacity, fallen = _capacity(played.peak, played.alpha), played.side != 0
+    figures = [_interval("peak_rotation", "alpha", float(_capacity(own.peak, own.alpha)[0]), capacity)]
     if np.any(~fallen):
         figures.append(_interval("last_slip", "m", float(own.last_slip[0]), played.last_slip[~fallen]))
     share = binomtest(int(np.sum(fallen)), count).proportion_ci(CONFIDENCE, method="wilson")
@@ -130,7 +131,9 @@ def sensitivities(given: UncertainScene, model: EventBasedModel, *, samples: int
     from scipy.stats import sobol_indices
 
     def peak(points: Floats) -> Floats:
-        return _capacity(_play(given, points.T, model, histories=False), given)[None, :]
+        scenes = [given.at(row) for row in points.T]
+        found = run_batch(pack(scenes, model), model, until_decided=False)
+        return _capacity(found.peak, np.array([scene.block.alpha for scene in scenes]))[None, :]
 
     laws: list[Any] = [spread.law for spread in given.spreads.values()]
     try:
@@ -144,13 +147,9 @@ def sensitivities(given: UncertainScene, model: EventBasedModel, *, samples: int
     return tuple(sorted(rows, key=lambda row: -row.total))
 
 
-def _play(given: UncertainScene, values: Floats, model: EventBasedModel, *, histories: bool = True) -> Ensemble:
-    return play_ensemble([given.at(row) for row in values], model, rows=MOST_ROWS if histories else 0)
-
-
-def _capacity(played: Ensemble, given: UncertainScene) -> Floats:
+def _capacity(peak: Floats, alpha: Floats) -> Floats:
     """Peak rotation in units of alpha of the drawn blocks, at most 1: what is beyond the balance point says no more."""
-    return np.minimum(played.peak / played.alpha, 1.0)
+    return np.minimum(peak / alpha, 1.0)
 
 
 def _interval(name: str, unit: str, value: float, draws: Floats) -> Interval:
