@@ -78,6 +78,8 @@ class History(Shown):
     #: Of the block, m and rad; None for a history read from a file that does not say.
     half_width: float | None = None
     half_height: float | None = None
+    #: Of figures that are not exact by their source, such as a mean of tests: the 95 % interval's half width by measure, SI.
+    uncertainty: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def frame(self) -> pd.DataFrame:
@@ -120,6 +122,7 @@ class History(Shown):
             "half_height": self.half_height,
             "settings": dict(self.settings),
             "notes": list(self.notes),
+            "uncertainty": dict(self.uncertainty),
             "cost": {key: value for key, value in vars(self.cost).items() if value is not None},
         }
         text = io.StringIO()
@@ -167,6 +170,7 @@ class History(Shown):
             notes=tuple(printable(note, 1000) for note in about.get("notes", ())),
             half_width=_size(about, "half_width", shown),
             half_height=_size(about, "half_height", shown),
+            uncertainty=_uncertainty(about, shown),
         )
 
 
@@ -212,6 +216,13 @@ def _size(about: Mapping[str, Any], key: str, shown: str) -> float | None:
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
         raise InputError(f"{printable(value)} is not allowed: a positive length in m is asked for", f"{shown}: {key}")
     return float(value)
+
+
+def _uncertainty(about: Mapping[str, Any], shown: str) -> dict[str, float]:
+    found = about.get("uncertainty", {})
+    if not isinstance(found, dict) or not all(isinstance(u, int | float) and 0.0 <= u < math.inf for u in found.values()):
+        raise InputError(f"{shown}: not a header written by rockcheck", "uncertainty")
+    return {printable(name): float(u) for name, u in found.items()}
 
 
 def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]]:

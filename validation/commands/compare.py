@@ -12,12 +12,14 @@ from rockcheck.scenes import load_scene
 from rockcheck.validation.commands import answer, console, scene_names
 from rockcheck.validation.discrepancy.compare import compare
 from rockcheck.validation.discrepancy.measured import read_measured
+from rockcheck.validation.discrepancy.repeats import shifted, time_shift
 
 
 def run(
     reference: Annotated[Path, typer.Argument(help="History of the reference, CSV.")],
     candidate: Annotated[Path, typer.Argument(help="History of the candidate, CSV.")],
     offset: Annotated[float, typer.Option("--offset", help="Added to the candidate's times, s, to align a measured history.")] = 0.0,
+    align: Annotated[bool, typer.Option("--align", help="Shift the candidate in time to where the rotations agree best.")] = False,
     until: Annotated[float | None, typer.Option("--until", help="End of the window, s (default: the whole common time).")] = None,
     scene: Annotated[str | None, typer.Option("--scene", help="Scene of both: its block and gravity.", autocompletion=scene_names)] = None,
 ) -> None:
@@ -26,7 +28,9 @@ def run(
     Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg, time_ms, x_mm, ...).
     """
     what = load_scene(scene) if scene else None
-    found = compare(read_measured(reference), read_measured(candidate, offset=offset), until=until, scene=what)
+    given, other = read_measured(reference), read_measured(candidate, offset=offset)
+    shift = time_shift(given, other) if align else 0.0
+    found = compare(given, shifted(other, shift), until=until, scene=what)
     out = console()
     table = Table(box=None, pad_edge=False)
     for name, justify in (("measure", "left"), ("value", "right"), ("unit", "left"), ("", "left")):
@@ -35,6 +39,8 @@ def run(
         table.add_row(figure.label, "-" if figure.value is None else f"{figure.value:.6g}", figure.unit, figure.note)
     out.print(f"{found.candidate} against {found.reference}, {found.start:g} to {found.end:g} s")
     out.print(table)
+    if align:
+        out.print(f"the candidate is shifted by {shift:+.4g} s")
     if found.gap:
         out.print(f"not the whole time: {found.gap}")
     answer(
@@ -43,6 +49,7 @@ def run(
             "candidate": found.candidate,
             "start": found.start,
             "end": found.end,
+            "shift": shift,
             "gap": found.gap,
             "figures": [{"measure": f.measure, "value": f.value, "unit": f.unit, "note": f.note} for f in found.figures],
         }

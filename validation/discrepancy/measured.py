@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -20,6 +20,7 @@ from rockcheck.scenes.base import Finite, Frozen
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.history import outcome_of
 from rockcheck.scenes.reading import read_table
+from rockcheck.validation.discrepancy.repeats import mean_history, shifted, time_shift
 
 TIMES = {"s": 1.0, "ms": 1e-3}
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
@@ -36,30 +37,46 @@ UNITS: Mapping[str, Mapping[str, float]] = {
 class Measured(Frozen):
     """Plays back the file of each scene it knows; `offset` (s) is added to the file's times, to align it with the scene's.
 
-    `files` maps names of scenes to CSV files.
+    `files` maps names of scenes to CSV files; several files are repeats of one test, whose mean is played back with its
+    scatter (`History.uncertainty`). `align` shifts the repeats to the first one by cross-correlation, and says by how much.
     """
 
     name: ClassVar[str] = "measured"
-    files: dict[str, str]
+    files: dict[str, str | tuple[str, ...]]
     offset: Finite = 0.0
+    align: bool = False
 
     def simulate(self, scene: Scene) -> History:
         """The measured history of the scene, from its t = 0 to its end. Raises `InputError` for a file that is not usable."""
         if scene.name not in self.files:
             raise InputError(f"no measured history of scene {scene.name!r}", "files")
-        history = read_measured(self.files[scene.name], offset=self.offset)
+        given = self.files[scene.name]
+        paths = (given,) if isinstance(given, str) else given
+        history = self._mean(paths)
         t = history.channels["t"]
         inside = (t >= -1e-9) & (t <= scene.duration + 1e-9)
         if not np.any(inside):
-            raise InputError(f"nothing of {printable(self.files[scene.name])} lies within the scene's 0 to {scene.duration:g} s", "offset")
+            raise InputError(f"nothing of {', '.join(map(printable, paths))} lies within the scene's 0 to {scene.duration:g} s", "offset")
         return dataclasses.replace(
             history,
             name=scene.name,
             channels={key: column[inside] for key, column in history.channels.items()},
             half_width=scene.block.half_width,
             half_height=scene.block.half_height,
-            settings={"file": Path(self.files[scene.name]).name, "offset": self.offset},
+            settings={"file": ", ".join(Path(path).name for path in paths), "offset": self.offset},
         )
+
+    def _mean(self, paths: Sequence[str]) -> History:
+        if not paths:
+            raise InputError("no file is given", "files")
+        tests = [read_measured(path, offset=self.offset) for path in paths]
+        said: list[str] = []
+        if self.align:
+            offsets = [0.0, *(time_shift(tests[0], test) for test in tests[1:])]
+            tests = [shifted(test, offset) for test, offset in zip(tests, offsets, strict=True)]
+            said = [f"{Path(path).name} is shifted by {offset:+.4g} s" for path, offset in zip(paths[1:], offsets[1:], strict=True)]
+        mean = mean_history(tests)
+        return dataclasses.replace(mean, notes=(*mean.notes, *said))
 
 
 def read_measured(path: str | Path, *, offset: float = 0.0) -> History:

@@ -27,7 +27,7 @@ def cell_key(scene: Scene, name: str, settings: Mapping[str, Any]) -> str:
         "scene": scene.model_dump(mode="json"),
         "model": name,
         "settings": dict(settings),
-        "files": {name: hashlib.sha256(Path(file).read_bytes()).hexdigest() for name, file in _files(settings, scene).items()},
+        "files": [hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in _files(settings, scene)],
         "code": code_digest(home(name)),
         "libraries": {library: version_of(library) for library in family(name).libraries},
         "python": platform.python_version(),
@@ -36,9 +36,10 @@ def cell_key(scene: Scene, name: str, settings: Mapping[str, Any]) -> str:
     return digest(json.dumps(depends, sort_keys=True, default=str))
 
 
-def _files(settings: Mapping[str, Any], scene: Scene) -> dict[str, str]:
-    """The file that a measured history of this scene is read from, where it can be."""
-    return {name: file for name, file in settings.get("files", {}).items() if name == scene.name and Path(file).is_file()}
+def _files(settings: Mapping[str, Any], scene: Scene) -> list[str]:
+    """The files that a measured history of this scene is read from, where they can be."""
+    given = settings.get("files", {}).get(scene.name, [])
+    return [file for file in ([given] if isinstance(given, str) else given) if Path(file).is_file()]
 
 
 def digest(text: str) -> str:

@@ -324,7 +324,10 @@ def _variant(label: str, settings: Mapping[str, Any], folder: Path) -> ModelVari
     settings = dict(settings)
     name = str(settings.pop("model", label))
     if name == "measured" and isinstance(settings.get("files"), dict):
-        settings["files"] = {scene: str(folder / str(file)) for scene, file in settings["files"].items()}
+        settings["files"] = {
+            scene: [str(folder / str(one)) for one in files] if isinstance(files, list) else str(folder / str(files))
+            for scene, files in settings["files"].items()
+        }
     build(name, settings)
     return ModelVariant(label, name, settings)
 
