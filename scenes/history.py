@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.scenes.errors import InputError, printable
+from rockcheck.scenes.experience import Expected, expected, known
 from rockcheck.scenes.reading import MOST_LINE, MOST_TABLE_BYTES, open_regular, read_table
 from rockcheck.scenes.shown import Shown
 from rockcheck.scenes.writing import write_together
@@ -107,6 +108,16 @@ class History(Shown):
     def peak_rotation(self) -> float:
         """Largest |theta| on the output grid, rad."""
         return float(np.max(np.abs(self.channels["theta"])))
+
+    def expected(self, quantity: str = "peak_rotation") -> Expected:
+        """A figure corrected by what the suites found about this model, with its 95 % interval (rad): `scenes.experience`.
+
+        Raises `InputError` where nothing is known of the model, or of the figure.
+        """
+        known_of = known().trust.get(self.model, {})
+        if quantity not in known_of:
+            raise InputError(f"the suites say nothing of {quantity} by {self.model}; known: {', '.join(known_of) or 'nothing'}", "quantity")
+        return expected(known_of[quantity], float(getattr(self, quantity)))
 
     def save(self, path: str | Path) -> None:
         """Write a CSV whose remarks (#) hold outcome, model and settings; its events go to `<stem>.events.csv` beside it.

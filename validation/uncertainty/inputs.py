@@ -130,18 +130,18 @@ def sensitivities(given: UncertainScene, model: EventBasedModel, *, samples: int
     """
     from scipy.stats import sobol_indices
 
-    def peak(points: Floats) -> Floats:
+    def peak_and_fall(points: Floats) -> Floats:
         scenes = [given.at(row) for row in points.T]
         found = run_batch(pack(scenes, model), model, until_decided=False)
-        return _capacity(found.peak, np.array([scene.block.alpha for scene in scenes]))[None, :]
+        return np.array([_capacity(found.peak, np.array([scene.block.alpha for scene in scenes])), found.side != 0], dtype=float)
 
     laws: list[Any] = [spread.law for spread in given.spreads.values()]
     try:
-        found = sobol_indices(func=peak, n=samples, dists=laws, rng=np.random.default_rng(seed))
+        found = sobol_indices(func=peak_and_fall, n=samples, dists=laws, rng=np.random.default_rng(seed))
     except TypeError:  # scipy before 1.15 calls it random_state
-        found = sobol_indices(func=peak, n=samples, dists=laws, random_state=np.random.default_rng(seed))
-    first, total = np.atleast_2d(found.first_order)[0], np.atleast_2d(found.total_order)[0]
-    if not np.all(np.isfinite(total)):
+        found = sobol_indices(func=peak_and_fall, n=samples, dists=laws, random_state=np.random.default_rng(seed))
+    first, total = found.first_order[0], found.total_order[0]
+    if not np.any(total):
         return ()
     rows = (Sensitivity(name=name, first=float(a), total=float(b)) for name, a, b in zip(given.names, first, total, strict=True))
     return tuple(sorted(rows, key=lambda row: -row.total))

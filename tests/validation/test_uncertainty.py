@@ -1,0 +1,299 @@
+"""How sure a figure is: the grid convergence index on problems with a known answer, draws of inputs, repeats, verdicts."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from rockcheck import Block, ContinuousModel, EventBasedModel, Floor, InputError, Ricker, Scene, Wall
+from rockcheck.scenes.experience import Experience, Range, Trust, axes_of, expected, outside
+from rockcheck.scenes.files import load_scene, load_uncertain_scene
+from rockcheck.scenes.observation import observe
+from rockcheck.validation.commands.cli import main
+from rockcheck.validation.discrepancy.repeats import mean_history, shifted, time_shift
+from rockcheck.validation.uncertainty import verdict
+from rockcheck.validation.uncertainty.experience import bias_and_scatter
+from rockcheck.validation.uncertainty.inputs import propagate, sensitivities
+from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
+
+BOOKCASE = Scene(
+    name="bookcase",
+    block=Block(half_width=0.397, half_height=1.555),
+    floor=Floor(friction=0.3),
+    walls=[Wall(side="left", gap=0.053, restitution=0.0)],
+    excitation=Ricker(amplitude=3.5, period=1.5),
+    duration=6.0,
+)
+UNCERTAIN = """
+duration = 4.0
+[block]
+half_width = 0.397
+half_height = 1.555
+[floor]
+friction = { value = 0.5, sd = 0.05 }
+[[walls]]
+side = "left"
+gap = { low = 0.05, high = 0.06 }
+[excitation]
+kind = "ricker"
+amplitude = { value = 6.0, sd = 0.2, distribution = "lognormal" }
+period = 1.0
+"""
+
+
+@dataclass(frozen=True)
+class Made:
+    """A model whose rotation is sin t times a factor that depends on its step: exactly 1 for a step of zero."""
+
+    factor: object
+    step: float = 1e-3
+    falls: object = field(default=lambda step: False)
+
+    def coarser(self, factor):
+        return replace(self, step=factor * self.step)
+
+    def simulate(self, scene):
+        t = scene.output_times
+        state = np.zeros((len(t), 6))
+        state[:, 2] = 0.5 * scene.block.alpha * np.sin(t) * self.factor(self.step)
+        state[:, 1] = scene.block.radius * np.cos(scene.block.alpha - np.abs(state[:, 2]))
+        outcome = "overturned left" if self.falls(self.step) else "moving"
+        return observe(scene, "made", state, outcome=outcome)
+
+
+@pytest.mark.parametrize("order", [0.6, 1.0, 2.0, 2.5])
+def test_the_index_bounds_the_error_where_it_falls_like_a_power_of_the_step(order):
+    found = numerical_uncertainty(Made(lambda h: 1.0 + 0.01 * (h / 1e-3) ** order), BOOKCASE)
+    quantities = {q.name: q for q in found.quantities}
+    assert found.converged
+    for name, error in (("peak_rotation", 0.005), ("theta_rms", 0.005 / math.sqrt(2.0))):
+        assert quantities[name].order == pytest.approx(order, abs=1e-6)
+        # Roache's index is 1.25 times the error that remains; of an order above 1 only the first is relied on.
+        assert quantities[name].u_num == pytest.approx(1.25 * error * max(2.0**order - 1.0, 1.0), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("factor", "reason"),
+    [
+        (lambda h: 1.0 + 0.1 * math.cos(1e4 * h), "not asymptotic: peak_rotation does not change monotonically"),
+        (lambda h: 1.0 + 0.005 * (h / 1e-3) ** 4, "the order of theta_rms is 4.0"),
+        (lambda h: 1.0 + 0.1 * (h / 1e-3) ** 0.2, "the order of theta_rms is 0.2"),
+    ],
+)
+def test_it_refuses_where_the_order_says_nothing(factor, reason):
+    found = numerical_uncertainty(Made(factor), BOOKCASE)
+    assert not found.converged
+    assert any(reason in line for line in found.reasons)
+    assert found.u_num("peak_rotation") is None
+
+
+def test_small_changes_need_no_order_and_get_the_larger_factor():
+    found = numerical_uncertainty(Made(lambda h: 1.0 + 1e-4 * math.cos(1e4 * h)), BOOKCASE)
+    values = [0.5 * 1e-4 * math.cos(1e4 * h) for h in (1e-3, 2e-3, 4e-3)]
+    assert found.converged
+    assert found.u_num("peak_rotation") == pytest.approx(3.0 * max(abs(np.ptp(values)), 0.0), rel=1e-3)
+
+
+def test_an_outcome_that_changes_with_the_step_is_not_converged():
+    found = numerical_uncertainty(Made(lambda h: 1.0, falls=lambda h: h > 3e-3), BOOKCASE)
+    assert not found.converged
+    assert found.reasons == ("the outcome changes with the step: stands, stands, left at h, 2h, 4h",)
+
+
+def test_a_model_without_a_step_is_not_judged():
+    assert numerical_uncertainty(object(), BOOKCASE) is None
+
+
+def test_the_interval_covers_as_often_as_it_says():
+    """Errors a h + b h^1.5 + c h^2 with random signs, and powers with noise: at least 95 % of the intervals hold the truth."""
+    chance = np.random.default_rng(5)
+    inside = judged = 0
+    for k in range(400):
+        a, b, c, d = 0.02 * chance.standard_normal(4)
+        if k % 2:
+            error = {h: a * n + 0.5 * b * n**1.5 + 0.25 * c * n**2 for h, n in ((1e-3, 1.0), (2e-3, 2.0), (4e-3, 4.0))}
+        else:
+            order = chance.uniform(0.9, 2.0)
+            error = {h: 0.02 * n**order + 0.1 * d * chance.standard_normal() for h, n in ((1e-3, 1.0), (2e-3, 2.0), (4e-3, 4.0))}
+        u = numerical_uncertainty(Made(lambda h, e=error: 1.0 + e[h]), BOOKCASE).u_num("peak_rotation")
+        if u is not None:
+            judged += 1
+            inside += abs(0.5 * error[1e-3]) <= u
+    assert judged > 300
+    assert inside / judged >= 0.95
+
+
+def test_event_based_and_continuous_models_are_within_their_own_error():
+    scene = BOOKCASE.replace(excitation=Ricker(amplitude=3.0, period=1.0), floor=Floor(friction=0.6), duration=4.0)
+    truth = EventBasedModel(pivot="unilateral", tolerance=1e-13).simulate(scene)
+    for model in (EventBasedModel(pivot="unilateral", tolerance=1e-6), ContinuousModel(penetration=1e-7)):
+        found, history = numerical_uncertainty(model, scene), model.simulate(scene)
+        assert found.converged
+        error = abs(history.peak_rotation - truth.peak_rotation) / BOOKCASE.block.alpha
+        assert error <= found.u_num("peak_rotation") + 1e-12
+
+
+# --- what is not known about the inputs
+
+
+@pytest.fixture
+def uncertain(tmp_path):
+    path = tmp_path / "shelf.toml"
+    path.write_text(UNCERTAIN, encoding="utf-8")
+    return path
+
+
+def test_a_scene_file_says_what_is_not_known(uncertain):
+    given = load_uncertain_scene(uncertain)
+    assert load_scene(uncertain) == given.scene
+    assert given.names == ("floor.friction", "walls.left.gap", "excitation.amplitude")
+    assert given.scene.wall("left").gap == pytest.approx(0.055)
+    values = given.values(np.random.default_rng(1).random((20000, 3)))
+    np.testing.assert_allclose(values.mean(axis=0), [0.5, 0.055, 6.0], rtol=2e-3)
+    np.testing.assert_allclose(values.std(axis=0), [0.05, 0.01 / math.sqrt(12.0), 0.2], rtol=2e-2)
+    assert given.at(values[0]).floor.friction == values[0, 0]
+
+
+def test_correlated_numbers(uncertain):
+    uncertain.write_text(UNCERTAIN + '[correlation]\n"floor.friction, excitation.amplitude" = 0.8\n', encoding="utf-8")
+    values = load_uncertain_scene(uncertain).values(np.random.default_rng(1).random((20000, 3)))
+    assert np.corrcoef(values.T)[0, 2] == pytest.approx(0.8, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("sd = 0.05", "sd = -0.05", "floor.friction.sd: -0.05 is not allowed"),
+        ("value = 0.5, sd", "valu = 0.5, sd", "floor.friction.valu: unknown key; did you mean 'value'?"),
+        ("value = 0.5, sd", "sd", "floor.friction.value: is missing beside sd"),
+        ("low = 0.05, high", "low = 0.07, high", "walls.left.gap.high: 0.06 is not allowed: more than low, 0.07"),
+        ('"lognormal"', '"gamma"', "excitation.amplitude.distribution"),
+        ("value = 6.0", "value = -6.0", "a lognormal number is positive"),
+        ("period = 1.0", 'period = 1.0\n[correlation]\n"floor.frction, walls.left.gap" = 0.1', "did you mean 'floor.friction'?"),
+        ("period = 1.0", 'period = 1.0\n[correlation]\n"floor.friction, walls.left.gap" = 1.5', "a number between -1 and 1"),
+    ],
+)
+def test_faults_of_the_file_are_one_line(uncertain, old, new, said):
+    uncertain.write_text(UNCERTAIN.replace(old, new), encoding="utf-8")
+    with pytest.raises(InputError) as fault:
+        load_uncertain_scene(uncertain)
+    assert said in str(fault.value)
+    assert "\n" not in str(fault.value)
+
+
+def test_draws_agree_with_many_more_draws(uncertain):
+    given = load_uncertain_scene(uncertain)
+    few, many = (propagate(given, samples=n, seed=seed, indices=False) for n, seed in ((256, 1), (2048, 7)))
+    (a, b), (c, d) = ((f.low, f.high) for f in (few.inputs.figures[0], many.inputs.figures[0]))
+    assert abs(a - c) < 0.05
+    assert abs(b - d) < 0.05
+    assert few.bands.shape == (5, len(few.t))
+    assert np.all(np.diff(few.bands, axis=0) >= 0.0)
+    assert few.inputs.u_input("peak_rotation") > 0.0
+    assert propagate(given, samples=256, seed=1, indices=False).inputs == few.inputs
+
+
+def test_a_scene_without_uncertain_numbers_is_refused():
+    with pytest.raises(InputError, match="no number of this scene is uncertain"):
+        propagate(load_uncertain_scene("fig4a"))
+
+
+def test_sobol_indices_of_a_free_slide(tmp_path):
+    """A block that slides to rest: the peak rotation does not vary, and no index is made up."""
+    path = tmp_path / "slide.toml"
+    block = "duration = 1.0\ninitial_velocity = 0.1\n[block]\nhalf_width = 1.0\nhalf_height = 0.5\n"
+    path.write_text(block + "[floor]\nfriction = { value = 0.3, sd = 0.01 }\n", encoding="utf-8")
+    assert sensitivities(load_uncertain_scene(path), EventBasedModel(), samples=16) == ()
+
+
+# --- repeats of a test
+
+
+def swing(scale=1.0, delay=0.0):
+    t = np.linspace(0.0, 4.0, 401)
+    state = np.zeros((401, 6))
+    state[:, 2] = 0.1 * scale * np.exp(-4.0 * (t - 1.2 - delay) ** 2) * np.cos(3.0 * (t - 1.2 - delay))
+    return observe(BOOKCASE.replace(duration=4.0, output_step=0.01), "measured", state)
+
+
+def test_a_shift_in_time_is_found():
+    for delay in (0.0, 0.35, 1.0):
+        assert time_shift(swing(), swing(delay=delay)) == pytest.approx(-delay, abs=2e-3)
+    assert shifted(swing(), 0.5).channels["t"][0] == 0.5
+    with pytest.raises(InputError, match="no rotation"):
+        time_shift(swing(), swing(scale=0.0))
+
+
+def test_the_interval_of_a_mean_covers_as_often_as_it_says():
+    chance = np.random.default_rng(3)
+    inside = 0
+    for _ in range(400):
+        mean = mean_history([swing(scale) for scale in 1.0 + 0.1 * chance.standard_normal(4)])
+        truth = swing().peak_rotation
+        inside += abs(mean.peak_rotation - truth) <= mean.uncertainty["peak_rotation"]
+    assert 0.92 <= inside / 400 <= 0.98
+
+
+def test_repeats_that_end_differently_have_no_mean():
+    fallen = swing()
+    fallen = replace(fallen, channels={**fallen.channels, "theta": np.linspace(0.0, 1.57, 401)})
+    with pytest.raises(InputError, match="1 of 2 tests overturn"):
+        mean_history([swing(), fallen])
+
+
+# --- verdicts
+
+
+@pytest.mark.parametrize(
+    ("error", "u_num", "u_input", "u_data", "said"),
+    [
+        (0.01, 0.02, 0.0, 0.0, verdict.NUMERICAL),
+        (0.03, 0.02, 0.04, 0.0, verdict.INPUTS),
+        (0.03, 0.02, 0.01, 0.04, verdict.DATA),
+        (0.10, 0.03, 0.04, 0.0, "not explained: model form or set-up, at least 0.05 alpha"),
+        (0.10, None, 0.04, 0.0, verdict.NOT_CONVERGED),
+    ],
+)
+def test_what_a_difference_says(error, u_num, u_input, u_data, said):
+    found = verdict.explain("theta_rms", "alpha", error, u_num, u_input, u_data)
+    assert found.verdict == said
+    assert found.explained == (said in (verdict.NUMERICAL, verdict.INPUTS, verdict.DATA))
+
+
+def test_bias_and_scatter_are_recovered_and_cover():
+    chance = np.random.default_rng(2)
+    truth = chance.uniform(0.1, 0.9, 4000)
+    model = 1.1 * truth * np.exp(0.05 * chance.standard_normal(4000) - 0.5 * 0.05**2)
+    bias, scatter = bias_and_scatter(list(zip(truth[:2000], model[:2000], strict=True)))
+    assert bias == pytest.approx(1.1, rel=5e-3)
+    assert scatter == pytest.approx(0.05, rel=0.05)
+    trust = Trust(bias=bias, scatter=scatter, count=2000)
+    found = [expected(trust, m) for m in model[2000:]]
+    inside = [one.low <= e <= one.high for e, one in zip(truth[2000:], found, strict=True)]
+    assert 0.93 <= np.mean(inside) <= 0.97
+
+
+def test_the_domain_names_the_axis_that_leaves_it():
+    inside = {axis: Range(low=min(v), high=max(v)) for axis, v in axes_of(BOOKCASE).items()}
+    assert outside(BOOKCASE, inside) == []
+    assert outside(BOOKCASE.replace(floor=Floor(friction=0.9)), inside) == ["friction is 0.9; the suites cover 0.3 to 0.3"]
+    assert Experience(domain=inside).domain["alpha"].low == BOOKCASE.block.alpha
+
+
+# --- the command
+
+
+def test_the_command_says_converged_and_not(uncertain, capsys, tmp_path):
+    assert main(["uncertainty", str(uncertain), "--samples", "16", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["converged"] is True
+    assert {"name", "value", "u_num", "order", "verdict"} <= found["quantities"][0].keys()
+    assert found["inputs"]["samples"] == 16
+    assert main(["uncertainty", str(uncertain), "--model", "mujoco", "--set", "time_step=4e-3", "--samples", "2", "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["converged"] is False
+    assert any(q["reason"] for q in found["quantities"])
