@@ -26,9 +26,7 @@ FloatArray = NDArray[np.float64]
 Vector = tuple[float, float, float]  # along x, y and theta
 Touching = tuple[list[Contact], list[Contact]]  # the closed contacts with the floor and with walls
 
-# Lengths in units of the block's radius R, times in units of 1/p where the longest step is `USUAL_STEP`; they scale with it, so that
-# all of the error does.
-USUAL_STEP = 1e-3  # s
+# Lengths in units of the block's radius R, times in units of 1/p.
 CLOSED = 5e-8  # a corner nearer than this touches
 EMBEDDED = 5e-9  # how deep the engine sees a corner that touches
 IMPACT_STEP = 2e-6
@@ -62,9 +60,9 @@ class _Limits:
     resting: float
 
     @classmethod
-    def of(cls, scene: Scene, longest: float) -> _Limits:
-        """Those of a scene whose steps are at most `longest` s."""
-        moment = longest / USUAL_STEP / scene.frequency_parameter
+    def of(cls, scene: Scene, longest: float, short: float) -> _Limits:
+        """Those of a scene whose steps are at most `longest` s, and at events `short` times the usual."""
+        moment = short / scene.frequency_parameter
         return cls(
             longest=longest,
             impact=min(IMPACT_STEP * moment, longest),
@@ -96,14 +94,16 @@ class _Past(NamedTuple):
     touching: Touching
 
 
-def march_adaptively(scene: Scene, base: BaseMotion, push: Push, longest: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def march_adaptively(
+    scene: Scene, base: BaseMotion, push: Push, longest: float, short: float = 1.0
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Times (n) and states (n, 6) at step ends, and the accelerations (n-1, 2) felt in the steps, until |theta| = pi/2.
 
     The scene is one of a block with R = 1, see `engines.marching.in_units_of`; `base` is its base motion. No step is longer than
-    `longest` s.
+    `longest` s; those at impacts and after events are `short` times the usual.
     Raises `ModelFailure` if the motion blows up or needs very many steps.
     """
-    contacts, limits = contacts_of(scene), _Limits.of(scene, longest)
+    contacts, limits = contacts_of(scene), _Limits.of(scene, longest, short)
     sides = contacts[:2], contacts[2:]
     starts, end, gravity = [*base.starts, math.inf], float(scene.output_times[-1]), scene.gravity
     most_steps = 100_000 + 20 * int(end / longest)

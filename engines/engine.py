@@ -31,10 +31,10 @@ MOST_STEPS = 5_000_000
 class Engine(Frozen):
     """A physics engine as a model of the block.
 
-    `time_step` in s, or "adaptive": then steps end at the events and are at most `largest_step` s long, which has no
-    meaning otherwise. `settings` "best" is the set-up that converges to rigid contact with Coulomb friction and Newton's
-    restitution; "default" is the engine as it comes, a box on a floor with the engine's own contact parameters, which
-    cannot step adaptively.
+    `time_step` in s, or "adaptive": then steps end at the events and are at most `largest_step` s long, and those at
+    impacts and just after events `short_steps` times their usual length; neither has a meaning otherwise. `settings`
+    "best" is the set-up that converges to rigid contact with Coulomb friction and Newton's restitution; "default" is the
+    engine as it comes, a box on a floor with the engine's own contact parameters, which cannot step adaptively.
     """
 
     name: ClassVar[str]
@@ -47,6 +47,7 @@ class Engine(Frozen):
     bounces_with: ClassVar[tuple[str, ...]] = ("best", "default")
     time_step: float | Literal["adaptive"] = 1e-4
     largest_step: Positive = 1e-3
+    short_steps: Positive = 1.0
     settings: Literal["best", "default"] = "best"
 
     @field_validator("time_step", mode="plain")
@@ -72,9 +73,9 @@ class Engine(Frozen):
         return not cls.module or find_spec(cls.module) is not None
 
     def coarser(self, factor: float) -> Self:
-        """The same engine with steps `factor` times as long."""
-        knob = "largest_step" if self.time_step == "adaptive" else "time_step"
-        return self.model_copy(update={knob: factor * getattr(self, knob)})
+        """The same engine with all steps `factor` times as long; of adaptive ones those at the events, too."""
+        knobs = ("largest_step", "short_steps") if self.time_step == "adaptive" else ("time_step",)
+        return self.model_copy(update={knob: factor * getattr(self, knob) for knob in knobs})
 
     @abstractmethod
     def rigid_world(self, scene: Scene) -> World:
@@ -120,7 +121,7 @@ class Engine(Frozen):
             world = self.rigid_world(played) if self.settings == "best" else self.stock_world(played)
             stack.callback(world.close)
             if self.time_step == "adaptive":
-                march = partial(march_adaptively, played, base, world.push, step)
+                march = partial(march_adaptively, played, base, world.push, step, self.short_steps)
             else:
                 times = step * np.arange(math.ceil(scene.output_times[-1] / step - 1e-9) + 1)
                 march = partial(march_fixed, world, played, times, base.felt_acceleration(times))
