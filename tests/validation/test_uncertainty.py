@@ -15,8 +15,8 @@ from rockcheck.scenes.files import load_scene, load_uncertain_scene
 from rockcheck.scenes.observation import observe
 from rockcheck.validation.commands.cli import main
 from rockcheck.validation.discrepancy.repeats import mean_history, shifted, time_shift
+from rockcheck.validation.suite.experience import bias_and_scatter
 from rockcheck.validation.uncertainty import verdict
-from rockcheck.validation.uncertainty.experience import bias_and_scatter
 from rockcheck.validation.uncertainty.inputs import propagate, sensitivities
 from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
 
