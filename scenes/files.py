@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -47,10 +48,15 @@ def _path_of(source: str | Path) -> Path:
 def _read(path: Path) -> UncertainScene:
     data = read_toml(path)
     try:
-        plain, spreads, correlations = split(data)
-        return uncertain_scene(scene_from(plain, folder=path.parent, default_name=path.stem), spreads, correlations)
+        return uncertain_scene_from(data, folder=path.parent, default_name=path.stem)
     except InputError as error:
         raise InputError(f"{printable(path)}: {error}") from None
+
+
+def uncertain_scene_from(data: Mapping[str, Any], *, folder: Path, default_name: str) -> UncertainScene:
+    """A scene from the tables of a scene file, with what they say of numbers that are not known exactly."""
+    plain, spreads, correlations = split(data)
+    return uncertain_scene(scene_from(plain, folder=folder, default_name=default_name), spreads, correlations)
 
 
 def scene_from(data: dict[str, Any], *, folder: Path, default_name: str) -> Scene:

@@ -15,10 +15,14 @@ from rockcheck.scenes.files import load_scene, load_uncertain_scene
 from rockcheck.scenes.observation import observe
 from rockcheck.validation.commands.cli import main
 from rockcheck.validation.discrepancy.repeats import mean_history, shifted, time_shift
+from rockcheck.validation.suite.confidence import explanations
 from rockcheck.validation.suite.experience import bias_and_scatter
+from rockcheck.validation.suite.runner import run_suite
+from rockcheck.validation.suite.suites import load_suite
+from rockcheck.validation.suite.verdicts import junit, markdown
 from rockcheck.validation.uncertainty import verdict
-from rockcheck.validation.uncertainty.inputs import propagate, sensitivities
-from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
+from rockcheck.validation.uncertainty.inputs import Inputs, Interval, propagate, sensitivities
+from rockcheck.validation.uncertainty.numerical import Numerical, Quantity, numerical_uncertainty
 
 BOOKCASE = Scene(
     name="bookcase",
@@ -297,3 +301,50 @@ def test_the_command_says_converged_and_not(uncertain, capsys, tmp_path):
     found = json.loads(capsys.readouterr().out)
     assert found["converged"] is False
     assert any(q["reason"] for q in found["quantities"])
+
+
+# --- in a suite
+
+
+SUITE = """
+reference = "ebm-unilateral"
+model_form = "ebm"
+uncertainty = true
+scenes = ["shelf.toml"]
+[models.ebm-unilateral]
+[models.ebm]
+[models.cm]
+[models.coarse]
+model = "mujoco"
+time_step = 4e-3
+"""
+
+
+def test_a_suite_explains_its_differences(uncertain, tmp_path):
+    (tmp_path / "suite.toml").write_text(SUITE, encoding="utf-8")
+    run = run_suite(load_suite(tmp_path / "suite.toml"), tmp_path / "out", jobs=1)
+    cells = {cell.model: cell for cell in run.cells}
+    assert cells["cm"].converged
+    assert cells["coarse"].converged is False
+    said = {e.quantity: e for e in cells["cm"].explanations if e.against == "ebm-unilateral"}
+    assert said["theta_rms"].verdict == verdict.NUMERICAL
+    assert said["theta_rms"].u_input > 0.0
+    assert all(e.verdict == verdict.NOT_CONVERGED for e in cells["coarse"].explanations)
+    assert run.inputs["shelf"].names == ("floor.friction", "walls.left.gap", "excitation.amplitude")
+    assert "not converged" in markdown(run)
+    assert "<skipped" in junit(run)
+    again = run_suite(load_suite(tmp_path / "suite.toml"), tmp_path / "out", jobs=1)
+    assert again.up_to_date == 4
+    assert [cell.explanations for cell in again.cells] == [cell.explanations for cell in run.cells]
+
+
+def test_two_outcomes_are_explained_by_inputs_that_decide_them():
+    converged = Numerical(method="", quantities=(Quantity(name="outcome", unit="", value="", verdict="converged"),))
+    records = {"ebm": {"outcome": "overturned left", "numerical": converged.model_dump()}}
+    own = {"outcome": "at rest", "numerical": converged.model_dump()}
+    (found,) = explanations(BOOKCASE, (), {"ebm": ()}, records, own, None)
+    assert found.verdict.startswith("not explained")
+    shares = Interval(name="overturns", unit="1", value=0.3, low=0.2, high=0.4)
+    inputs = Inputs(samples=64, model="ebm-unilateral", names=("floor.friction",), figures=(), overturns=shares, sensitivities=())
+    (found,) = explanations(BOOKCASE, (), {"ebm": ()}, records, own, inputs)
+    assert found.verdict == verdict.INPUTS

@@ -18,6 +18,7 @@ from rockcheck.scenes import History, InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.execute.models import build, family
 from rockcheck.validation.execute.pool import Call, Pool
+from rockcheck.validation.uncertainty.numerical import failed, numerical_uncertainty
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,9 +36,10 @@ class Work:
 
 @dataclass(frozen=True, kw_only=True)
 class Task(Work):
-    """One scene, whose history counts."""
+    """One scene, whose history counts; `uncertainty` asks for its numerical error, too."""
 
     scene: Scene
+    uncertainty: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,6 +75,8 @@ def play(task: Task | BatchTask) -> TaskResult:
         "outcome": history.outcome,
         "notes": list(history.notes),
         "settings": _plain(history.settings),
+        "uncertainty": dict(history.uncertainty),
+        "numerical": _numerical(task, history) if task.uncertainty else None,
         "cost": {**cost, "worker_seconds": time.perf_counter() - began},
     }
     return TaskResult(files=files, record=record)
@@ -105,6 +109,15 @@ def _simulate(task: Work, scene: Scene) -> tuple[History | None, str]:
         return None, printable(f"{type(error).__name__}: {error}", 300)
     fault = _not_finite(history)
     return (None, fault) if fault else (history, "")
+
+
+def _numerical(task: Task, history: History) -> dict[str, Any] | None:
+    """The numerical uncertainty of a run, None for a model without a step; a coarser run that fails is not converged."""
+    try:
+        found = numerical_uncertainty(build(task.family, task.settings), task.scene, history)
+    except (ModelFailure, InputError) as error:
+        found = failed(history, f"a coarser run failed: {printable(error)}")
+    return None if found is None else found.model_dump(mode="json")
 
 
 def _not_finite(history: History) -> str:

@@ -23,6 +23,9 @@ from rockcheck.scenes.errors import from_validation, printable
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
+from rockcheck.validation.uncertainty.inputs import Inputs
+from rockcheck.validation.uncertainty.numerical import Numerical
+from rockcheck.validation.uncertainty.verdict import Explanation
 
 RUN_FILE = "run.json"
 SCHEMA_FILE = "run.schema.json"
@@ -78,7 +81,8 @@ class Cell(Stored):
     `status` "failed" means no history (`reason` says why: a model's failure, a crash, a hang, memory), "absent" that the model
     is not installed (`reason` says what to install). `history` is the
     path of its CSV relative to the run's folder. `read_back` is true where nothing that the cell depends on had changed.
-    `figures` are all measures, judged or not; `checks` those with a tolerance or in need of one.
+    `figures` are all measures, judged or not; `checks` those with a tolerance or in need of one. `numerical` is the run's
+    numerical uncertainty, where the suite asks for it, and `explanations` what it says of the differences.
     """
 
     scene: str
@@ -94,6 +98,8 @@ class Cell(Stored):
     cost: CostRecord = CostRecord()
     figures: tuple[Figure, ...] = ()
     checks: tuple[Check, ...] = ()
+    numerical: Numerical | None = None
+    explanations: tuple[Explanation, ...] = ()
 
     @field_validator("history")
     @classmethod
@@ -101,6 +107,11 @@ class Cell(Stored):
         if history is not None and (PurePath(history).is_absolute() or ".." in PurePath(history).parts or not history.isprintable()):
             raise InputError(f"{printable(history)} is not allowed: a path within the run's folder is asked for")
         return history
+
+    @property
+    def converged(self) -> bool | None:
+        """Whether the run's numerical error is known; None where it was not asked for or the model has no step."""
+        return None if self.numerical is None else self.numerical.converged
 
     @property
     def verdict(self) -> Verdict:
@@ -150,6 +161,8 @@ class Run(Stored):
     strict: bool = False
     tolerances_file: str = ""
     ensembles: tuple[EnsembleRecord, ...] = ()
+    #: By scene, what the spread of its inputs makes of its figures.
+    inputs: dict[str, Inputs] = Field(default_factory=dict)
 
     @property
     def verdict(self) -> Verdict:

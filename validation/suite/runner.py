@@ -24,10 +24,12 @@ from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samp
 from rockcheck.validation.execute import provenance, workers
 from rockcheck.validation.execute.models import is_own, not_installed
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, Store, name_of
+from rockcheck.validation.suite.confidence import explanations, inputs_of, key_of, numerical_of
 from rockcheck.validation.suite.ensembles import Ensemble
 from rockcheck.validation.suite.results import Cell, CostRecord, EnsembleRecord, Run
 from rockcheck.validation.suite.suites import ModelVariant, Suite
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Place, Windowed, judge
+from rockcheck.validation.uncertainty.inputs import Inputs
 
 #: Plays tasks somewhere: yields (index, result) as they end.
 Executor = Callable[..., Iterator[tuple[int, workers.TaskResult]]]
@@ -96,7 +98,8 @@ def run_suite(
     except OSError as error:
         raise InputError(f"{folder}: cannot be used as the output folder: {error.strerror}") from None
     planned_cells = [
-        PlannedCell(scene, variant, provenance.cell_key(scene, variant.family_name, variant.settings)) for scene, variant in suite.cells()
+        PlannedCell(scene, variant, provenance.cell_key(scene, variant.family_name, {**variant.settings, **key_of(_asks(suite, scene))}))
+        for scene, variant in suite.cells()
     ]
     batches = [batch for found in suite.ensemble_cells() for batch in _batches(*found)]
     items: list[Planned] = [*planned_cells, *batches]
@@ -113,7 +116,7 @@ def run_suite(
     on_progress(len(records), len(items), f"{len(records)} up to date")
     limits = [suite.suite_of(item.place).limits for item in waiting]
     for index, result in play(
-        [_task(item, suite.path.parent) for item in waiting],
+        [_task(item, suite) for item in waiting],
         jobs=jobs or os.cpu_count() or 1,
         seconds=[limit.seconds for limit in limits],
         memory_mb=max((limit.memory_mb for limit in limits), default=0.0),
@@ -129,9 +132,10 @@ def run_suite(
                 store.put_record(COMPARISONS, item.name, result.record)
         on_progress(len(records) + len(failures), len(items), f"{item.place}, {item.variant.label}")
     by_place = {(planned.scene.name, planned.variant.label): planned for planned in planned_cells}
+    inputs = {name: inputs_of(store, given) for name, given in suite.uncertain.items()}
     cells = [_cell(suite, planned, by_place, records, failures, store, planned in read_back) for planned in planned_cells]
     ensembles, ensemble_cells = _ensembles(suite, batches, records, failures, read_back)
-    cells += ensemble_cells
+    cells = [_explained(suite, cell, cells, by_place, records, inputs.get(cell.scene)) for cell in cells] + ensemble_cells
     store.prune()
     return Run(
         suite=suite.name,
@@ -143,6 +147,7 @@ def run_suite(
         models=tuple(suite.models),
         cells=tuple(cells),
         ensembles=tuple(ensembles),
+        inputs=inputs,
         faults=_without_cell(suite, {(cell.scene, cell.model) for cell in cells}),
         measures=tuple(MeasureRecord(name=m.name, label=m.label, unit=m.unit, formula=m.formula) for m in MEASURES.values()),
         versions=provenance.versions(),
@@ -165,16 +170,21 @@ def _batches(ensemble: Ensemble, base: Scene, variant: ModelVariant) -> Iterator
         yield PlannedBatch(ensemble, base, variant, numbers, provenance.cell_key(base, variant.family_name, settings))
 
 
-def _task(item: Planned, folder: Path) -> workers.Task | workers.BatchTask:
+def _asks(suite: Suite, scene: Scene) -> bool:
+    """Whether the suite that a scene comes from asks for numerical uncertainties."""
+    return suite.suite_of(scene.name).uncertainty
+
+
+def _task(item: Planned, suite: Suite) -> workers.Task | workers.BatchTask:
     variant = item.variant
     model: dict[str, Any] = {
         "label": variant.label,
         "family": variant.family_name,
         "settings": dict(variant.settings),
-        "search_path": (str(folder),) if is_own(variant.family_name) else (),
+        "search_path": (str(suite.path.parent),) if is_own(variant.family_name) else (),
     }
     if isinstance(item, PlannedCell):
-        return workers.Task(scene=item.scene, **model)
+        return workers.Task(scene=item.scene, uncertainty=_asks(suite, item.scene), **model)
     return workers.BatchTask(scenes=tuple(item.ensemble.drawn(item.base, n) for n in item.numbers), **model)
 
 
@@ -297,7 +307,39 @@ def _cell(
         cost=CostRecord(**record["cost"]),
         figures=tuple(figures),
         checks=tuple(checks),
+        numerical=numerical_of(record),
     )
+
+
+def _explained(
+    suite: Suite,
+    cell: Cell,
+    cells: Sequence[Cell],
+    planned: Mapping[tuple[str, str], PlannedCell],
+    records: Mapping[Planned, Mapping[str, Any]],
+    inputs: Inputs | None,
+) -> Cell:
+    """The cell with the verdicts on its differences from the references that finished; unchanged where nothing is known."""
+    own = suite.suite_of(cell.scene)
+    if cell.numerical is None:
+        return cell
+    others = {
+        other.model: other
+        for other in cells
+        if other.scene == cell.scene
+        and other.model in (own.reference, own.model_form)
+        and other.model != cell.model
+        and other.status == "done"
+    }
+    found = explanations(
+        own.scenes[cell.scene],
+        cell.figures,
+        {name: other.figures for name, other in others.items()},
+        {name: records[planned[cell.scene, name]] for name in others},
+        records[planned[cell.scene, cell.model]],
+        inputs,
+    )
+    return cell.model_copy(update={"explanations": tuple(found)})
 
 
 def _figure(figures: Sequence[Figure], place: Place) -> Figure:

@@ -48,10 +48,11 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from rockcheck.scenes import InputError, Scene, load_scene
+from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.base import Frozen, Positive
 from rockcheck.scenes.errors import printable, unknown_name
-from rockcheck.scenes.files import named_scenes, read_toml, scene_from
+from rockcheck.scenes.files import load_uncertain_scene, named_scenes, read_toml, scene_from, uncertain_scene_from
+from rockcheck.scenes.uncertain import UncertainScene, uncertain_scene
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS
 from rockcheck.validation.execute.models import Family, build, family, is_own
@@ -104,6 +105,7 @@ class SuiteFile(Frozen):
     limits: Limits = Limits()
     ensemble: tuple[Ensemble, ...] = ()
     tolerances: dict[str, Any] | None = None
+    uncertainty: bool = False
 
 
 @dataclass(frozen=True)
@@ -140,6 +142,9 @@ class Suite:
     ensembles: Mapping[str, tuple[Ensemble, Scene]] = field(default_factory=dict)
     #: The suites that this one joins.
     included: tuple[Suite, ...] = ()
+    #: Whether the numerical error of each cell is asked for (two coarser runs a cell), and scenes with uncertain numbers, by name.
+    uncertainty: bool = False
+    uncertain: Mapping[str, UncertainScene] = field(default_factory=dict)
 
     def suite_of(self, scene: str) -> Suite:
         """The suite that a scene or an ensemble comes from: this one, or the included one."""
@@ -235,7 +240,8 @@ def _suite(given: SuiteFile, path: Path, shipped: bool) -> Suite:
     if own and str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))
     models = {label: _variant(label, settings, path.parent) for label, settings in given.models.items()}
-    scenes = _scenes(given, path.parent)
+    uncertain = _scenes(given, path.parent)
+    scenes = {name: found.scene for name, found in uncertain.items()}
     ensembles = {e.name: (e, scene_from(e.scene, folder=path.parent, default_name=e.name)) for e in given.ensemble}
     _check_names(given, models, scenes, ensembles)
     tolerances_path, tables = _tolerance_tables(given, path, shipped)
@@ -252,6 +258,8 @@ def _suite(given: SuiteFile, path: Path, shipped: bool) -> Suite:
         limits=given.limits,
         tolerances=_tolerances(tolerances_path, tables, scenes, models),
         tolerances_path=tolerances_path,
+        uncertainty=given.uncertainty,
+        uncertain={name: one for name, one in uncertain.items() if one.spreads},
     )
 
 
@@ -316,6 +324,7 @@ def _joined(given: SuiteFile, path: Path) -> Suite:
         limits=given.limits,
         tolerances={place: line for suite in included for place, line in suite.tolerances.items()},
         tolerances_path=path,
+        uncertain={name: scene for suite in included for name, scene in suite.uncertain.items()},
         included=tuple(included),
     )
 
@@ -332,16 +341,17 @@ def _variant(label: str, settings: Mapping[str, Any], folder: Path) -> ModelVari
     return ModelVariant(label, name, settings)
 
 
-def _scenes(given: SuiteFile, folder: Path) -> dict[str, Scene]:
-    found: dict[str, Scene] = {}
+def _scenes(given: SuiteFile, folder: Path) -> dict[str, UncertainScene]:
+    found: dict[str, UncertainScene] = {}
     for scene in itertools.chain(
-        (load_scene(name if name in named_scenes() or Path(name).suffix != ".toml" else folder / name) for name in given.scenes),
-        (scene_from(table, folder=folder, default_name=f"scene {n}") for n, table in enumerate(given.scene, 1)),
-        (scene for grid in given.grid for scene in _combined(grid, folder)),
+        (load_uncertain_scene(name if name in named_scenes() or Path(name).suffix != ".toml" else folder / name) for name in given.scenes),
+        (uncertain_scene_from(table, folder=folder, default_name=f"scene {n}") for n, table in enumerate(given.scene, 1)),
+        (uncertain_scene(scene, {}, {}) for grid in given.grid for scene in _combined(grid, folder)),
     ):
-        if scene.name in found:
-            raise InputError(f"scene {scene.name!r} is named twice", "scenes")
-        found[scene.name] = scene
+        name = scene.scene.name
+        if name in found:
+            raise InputError(f"scene {name!r} is named twice", "scenes")
+        found[name] = scene
     return found
 
 

@@ -29,6 +29,8 @@ def verdict_table(run: Run) -> Table:
         near = nearest(cell)
         words = f"{cell.reason or 'failed'}" if cell.status != "done" else windowed(near) if near else "nothing judged"
         verdict = Text("-") if cell.status == "done" and not cell.checks else Text(cell.verdict, COLOURS[cell.verdict])
+        if cell.converged is False:
+            verdict.append(", not converged", "yellow")
         table.add_row("" if cell.scene == before else cell.scene, cell.model, Text(words), percent(near) if near else "", verdict)
         before = cell.scene
     return table
@@ -48,6 +50,8 @@ def summary(run: Run) -> dict[str, Any]:
                 "outcome": cell.outcome,
                 "checks": len(cell.checks),
                 "verdict": cell.verdict if cell.checks or cell.status != "done" else None,
+                "converged": cell.converged,
+                "explanations": [f"{e.quantity} against {e.against}: {e.verdict}" for e in cell.explanations],
             }
             for cell in run.cells
         ],

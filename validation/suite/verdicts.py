@@ -39,6 +39,8 @@ def _cases(cell: Cell, strict: bool) -> Iterator[TestCase]:
     ran = _case(place, "runs", {"failed": Error(cell.reason), "absent": missing}.get(cell.status))
     ran.time = cell.cost.worker_seconds
     yield ran
+    if cell.converged is not None:
+        yield _case(place, "converged", None if cell.converged else Skipped("; ".join(cell.numerical.reasons) if cell.numerical else ""))
     for check in cell.checks:
         failed = check.verdict == "fail" or (strict and check.verdict == "changed")
         yield _case(place, title(check), Failure(check.reason, check.verdict) if failed else None)
@@ -69,7 +71,8 @@ def markdown(run: Run) -> str:
 def _entry(cell: Cell | None) -> str:
     if cell is None:
         return ""
-    return f"{MARKS[cell.verdict]} {_plain(_worst(cell.checks))}".strip()
+    sure = " (not converged)" if cell.converged is False else ""
+    return f"{MARKS[cell.verdict]} {_plain(_worst(cell.checks))}{sure}".strip()
 
 
 def _worst(checks: tuple[Check, ...]) -> str:

@@ -69,10 +69,16 @@ class Inputs(Stored):
     figures: tuple[Interval, ...]
     overturns: Interval
     sensitivities: tuple[Sensitivity, ...]
+    theta_band: float = 0.0
     note: str = ""
 
     def u_input(self, name: str) -> float | None:
-        """Half the 95 % interval of a figure, on its longer side; None for a figure that is not among them."""
+        """Half the 95 % interval of a figure, on its longer side; None for a figure that is not among them.
+
+        Of theta_rms the RMS over time of half the band's width, alpha.
+        """
+        if name == "theta_rms":
+            return self.theta_band
         return next((figure.half_width for figure in self.figures if figure.name == name), None)
 
 
@@ -108,6 +114,7 @@ def propagate(
     figures = [_interval("peak_rotation", "alpha", float(_capacity(own.peak, own.alpha)[0]), capacity)]
     if np.any(~fallen):
         figures.append(_interval("last_slip", "m", float(own.last_slip[0]), played.last_slip[~fallen]))
+    bands = np.quantile(played.theta / given.scene.block.alpha, BANDS, axis=0)
     share = binomtest(int(np.sum(fallen)), count).proportion_ci(CONFIDENCE, method="wilson")
     note = "" if given.independent else "inputs are correlated: Sobol indices, which are for independent ones, are left out"
     found = Inputs(
@@ -117,9 +124,9 @@ def propagate(
         figures=tuple(figures),
         overturns=Interval(name="overturns", unit="1", value=float(np.mean(fallen)), low=share.low, high=share.high),
         sensitivities=sensitivities(given, model, seed=seed) if indices and given.independent else (),
+        theta_band=float(np.sqrt(np.mean((0.5 * (bands[-1] - bands[0])) ** 2))),
         note=note,
     )
-    bands = np.quantile(played.theta / given.scene.block.alpha, BANDS, axis=0)
     return Propagated(found, played.t, bands, values, capacity, fallen)
 
 

@@ -124,6 +124,12 @@ def numerical_uncertainty(model: object, scene: Scene, history: History | None =
     return None
 
 
+def failed(history: History, reason: str) -> Numerical:
+    """What is said of a run whose coarser or finer run failed."""
+    outcome = Quantity(name="outcome", unit="", value=history.outcome, verdict="not converged", reason=reason)
+    return Numerical(method="", quantities=(outcome,))
+
+
 def _from_steps(scene: Scene, runs: Sequence[History]) -> tuple[Quantity, ...]:
     sides = [_side(history) for history in runs]
     shown: list[tuple[str, str, float | str]] = [*_scalars(scene, runs[0]), ("outcome", "", runs[0].outcome)]

@@ -32,6 +32,7 @@ class Explanation(Stored):
 
     quantity: str
     unit: str
+    against: str = ""
     error: float | None
     u_num: float | None
     u_input: float = 0.0
@@ -51,12 +52,28 @@ class Explanation(Stored):
 
 
 def explain(
-    quantity: str, unit: str, error: float | None, u_num: float | None, u_input: float = 0.0, u_data: float = 0.0, reason: str = ""
+    quantity: str,
+    unit: str,
+    error: float | None,
+    u_num: float | None,
+    u_input: float = 0.0,
+    u_data: float = 0.0,
+    *,
+    reason: str = "",
+    against: str = "",
 ) -> Explanation:
-    """The verdict on a difference; `u_num` holds both runs' numerical uncertainties, `reason` why it is None."""
+    """The verdict on a difference; `u_num` holds both runs' numerical uncertainties, `reason` why it is None, `against` the reference."""
     verdict = _verdict(unit, error, u_num, u_input, u_data)
     return Explanation(
-        quantity=quantity, unit=unit, error=error, u_num=u_num, u_input=u_input, u_data=u_data, verdict=verdict, reason=reason
+        quantity=quantity,
+        unit=unit,
+        against=against,
+        error=error,
+        u_num=u_num,
+        u_input=u_input,
+        u_data=u_data,
+        verdict=verdict,
+        reason=reason,
     )
 
 
