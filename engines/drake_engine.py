@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import math
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,7 +13,7 @@ from numpy.typing import NDArray
 from rockcheck.engines.contacts import contacts_of
 from rockcheck.engines.engine import Engine
 from rockcheck.engines.world import State, World
-from rockcheck.scenes import ModelFailure, Scene
+from rockcheck.scenes import Floor, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
 
 FloatArray = NDArray[np.float64]
@@ -19,6 +21,7 @@ CORNER_RADIUS = 1e-5  # of the block's radius
 STIFFNESS = 2e8  # of each of two bodies in contact, N/m for a block of 1 kg and R = 1 m
 DISSIPATION = 1e3  # of Hunt and Crossley, s/m: nothing bounces
 STICTION = 1e-7  # m/s: slower slip counts as none; at 1e-8 the solver often fails
+IMPACT_STEPS = 40  # in which an impact can bounce
 SLAB, REACH = 20.0, 600.0  # thickness and extent of floor and walls
 
 
@@ -38,6 +41,15 @@ class Drake(Engine):
     def stock_world(self, scene: Scene) -> World:
         """The scene as Drake holds it: a box on a half-space."""
         return _DrakeWorld(scene)
+
+    def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
+        """Corners on slabs, so soft that an impact lasts for some steps, with `restitution` as Hunt and Crossley's dissipation."""
+        floor = Floor(friction=parameters["friction"])
+        return _RigidDrakeWorld(scene.replace(floor=floor), self.tuned(step)["stiffness"], parameters["restitution"], stiction=1e-4)
+
+    def tuned(self, step: float) -> dict[str, float]:
+        """The stiffness with which a block of 1 kg is in contact for `IMPACT_STEPS`, N/m."""
+        return {"stiffness": (math.pi / (IMPACT_STEPS * step)) ** 2}
 
 
 class _DrakeWorld(World):
@@ -116,7 +128,11 @@ class _DrakeWorld(World):
 
 
 class _RigidDrakeWorld(_DrakeWorld):
-    """Contacts of tiny spheres on slabs, so stiff that a step stops them."""
+    """Contacts of tiny spheres on slabs, so stiff, as they come, that a step stops them."""
+
+    def __init__(self, scene: Scene, stiffness: float = STIFFNESS, dissipation: float = DISSIPATION, stiction: float = STICTION) -> None:
+        super().__init__(scene)
+        self.stiffness, self.dissipation, self.stiction = stiffness, dissipation, stiction
 
     def shape(self, body: Any) -> None:
         """Give the block, the floor and the walls their shapes."""
@@ -128,12 +144,12 @@ class _RigidDrakeWorld(_DrakeWorld):
         # SAP's and the lagged approximations' friction is convex: what slides lifts off, whatever the step.
         plant.set_discrete_contact_approximation(DiscreteContactApproximation.kTamsi)
 
-        plant.set_stiction_tolerance(STICTION)
+        plant.set_stiction_tolerance(self.stiction)
 
         def material(mu: float) -> Any:
             properties = ProximityProperties()
             friction = CoulombFriction(mu, mu)
-            AddContactMaterial(dissipation=DISSIPATION, point_stiffness=STIFFNESS, friction=friction, properties=properties)
+            AddContactMaterial(dissipation=self.dissipation, point_stiffness=self.stiffness, friction=friction, properties=properties)
             return properties
 
         add, world = plant.RegisterCollisionGeometry, plant.world_body()

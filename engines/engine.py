@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from functools import partial
 from importlib.util import find_spec
@@ -20,7 +20,7 @@ from rockcheck.engines.contacts import contacts_of
 from rockcheck.engines.events import events_of
 from rockcheck.engines.marching import Marched, at_output_times, in_units_of, march_fixed
 from rockcheck.engines.world import World
-from rockcheck.scenes import Cost, History, InputError, Scene
+from rockcheck.scenes import Cost, Floor, History, InputError, Scene
 from rockcheck.scenes.base import Frozen, Positive
 from rockcheck.scenes.errors import NotInstalled, printable
 from rockcheck.scenes.observation import observe
@@ -84,6 +84,15 @@ class Engine(Frozen):
     @abstractmethod
     def stock_world(self, scene: Scene) -> World:
         """The scene as this engine holds it with its own contact parameters."""
+
+    def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
+        """The scene with the engine's own parameters of contact, by default "restitution" and "friction" of its floor."""
+        floor = Floor.model_construct(friction=parameters["friction"], restitution=parameters["restitution"])
+        return self.stock_world(scene.model_copy(update={"floor": floor}))
+
+    def tuned(self, step: float) -> dict[str, float]:
+        """Further parameters of contact that `tuned_world` chooses at a step of `step` s."""
+        return {}
 
     def lacks(self) -> tuple[str, ...]:
         """What these settings do not have at all: "restitution" or nothing."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -44,7 +44,19 @@ class MuJoCo(Engine):
 
     def stock_world(self, scene: Scene) -> World:
         """The scene as MuJoCo holds it: a box among planes."""
-        return _MuJoCoWorld(_stock_model(scene))
+        return _MuJoCoWorld(_stock_model(scene, scene.floor.friction))
+
+    def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
+        """A box on a plane whose contacts stop within a step, with `restitution` in steps of damping."""
+        friction, damping = parameters["friction"], parameters["restitution"] / step
+        impedance = " ".join(map(repr, IMPEDANCE))
+        solref = f"{-PUSHED_OUT / step**2!r} {-damping!r}"
+        settings = f'<option cone="elliptic"/><default><geom solref="{solref}" solimp="{impedance}"/></default>'
+        return _MuJoCoWorld(_stock_model(scene, friction, settings))
+
+    def tuned(self, step: float) -> dict[str, float]:
+        """The share of a penetration that one step removes."""
+        return {"erp": PUSHED_OUT}
 
 
 class _MuJoCoWorld(World):
@@ -240,11 +252,11 @@ def _point_contact_model(scene: Scene) -> str:
     return _model(planes + _planar_body(scene, spheres), settings)
 
 
-def _stock_model(scene: Scene) -> str:
-    """A box on a plane, beside planes, with MuJoCo's default contact parameters, solver and cone."""
-    mu, block = scene.floor.friction, scene.block
+def _stock_model(scene: Scene, mu: float, settings: str = "") -> str:
+    """A box on a plane, beside planes; without `settings` with MuJoCo's default contact parameters, solver and cone."""
+    block = scene.block
     planes = _plane("floor", scene, 0.0, f'condim="3" friction="{mu!r} 0 0"')
     planes += "".join(_plane(wall.side, scene, 0.0, 'condim="1"') for wall in scene.walls)
     size = f"{block.half_width!r} {block.half_width!r} {block.half_height!r}"
     box = f'<geom type="box" size="{size}" condim="1" friction="0 0 0"/>'
-    return _model(planes + _planar_body(scene, box))
+    return _model(planes + _planar_body(scene, box), settings)

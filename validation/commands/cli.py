@@ -32,7 +32,7 @@ from rockcheck.validation.commands import (
     uncertainty,
     validate,
 )
-from rockcheck.validation.commands.engines import conformance
+from rockcheck.validation.commands.engines import calibrate, conformance
 
 #: The commands, in the order of the help, each with an example.
 COMMANDS = {
@@ -47,6 +47,7 @@ COMMANDS = {
     benchmark: "rockcheck benchmark --quick",
     convergence: "rockcheck convergence --quick",
     conformance: "rockcheck conformance --engine mujoco --settings default",
+    calibrate: "rockcheck calibrate --engine mujoco --restitution 0.5 --step 1e-3",
     stress: "rockcheck stress --quick",
     report: "rockcheck report rockcheck-report",
 }

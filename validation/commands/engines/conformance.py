@@ -80,7 +80,7 @@ def run(
 def _asked(names: list[str] | None, settings: str | None, step: float, elsewhere: bool) -> list[Asked]:
     """What is to be played; nothing where histories are given and no engine is named."""
     from rockcheck.validation.conformance.study import Asked, engines_here
-    from rockcheck.validation.execute.models import FAMILIES, build, is_own
+    from rockcheck.validation.execute.models import FAMILIES, build, is_own, not_installed
 
     if not 0.0 < step <= 0.1:
         raise InputError(f"{step:g} is not allowed: a step above 0 and up to 0.1 s is asked for", "--step")
@@ -95,7 +95,9 @@ def _asked(names: list[str] | None, settings: str | None, step: float, elsewhere
             raise InputError(f"{printable(name)!r} is not allowed: one of {known}, or module:Class is asked for", "--engine")
         mine = [""] if is_own(name) and settings is None else kinds
         found += [Asked(name, kind, step) for kind in mine]
-    for one in found:  # an engine that is not installed is told before others have run
+        if reason := not_installed(name):  # told before others have run
+            raise InputError(reason, f"--engine {name}")
+    for one in found:
         build(one.engine, {"time_step": one.step} | ({"settings": one.settings} if one.settings else {}))
     return found
 
