@@ -550,6 +550,8 @@ def test_flight_of_a_block_whose_floor_falls_away():
     assert held.tilted  # it hangs on a corner and turns about it
     # Where nothing else tells left from right, the corner on which it stood does; the mirror image does alike.
     assert {corner: Core(at.scene, "bilateral").select(at.state, corner).side for corner in (1, -1)} == {1: -1, -1: 1}
+    slides = {v: Core(at.scene, "bilateral").select((*at.state[:3], v, 0.0, 0.0)) for v in (0.1, -0.1)}
+    assert {v: mode.side for v, mode in slides.items()} == {0.1: -1, -0.1: 1}
 
 
 def test_the_model_starts_as_the_selection_says():

@@ -8,17 +8,18 @@ import numpy as np
 import pytest
 from scipy.stats import ttest_1samp
 
+from rockcheck.scenes import InputError
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.suite.results import Cell, Check, Run
-from rockcheck.validation.suite.tolerances import Tolerance, judge
+from rockcheck.validation.suite.tolerances import Tolerance, judge, parse_tolerances
 from rockcheck.validation.suite.verdicts import junit, markdown
 
 LINE = Tolerance(expected=0.25, limit=0.5, drift=0.125, why="a test")
 
 
-def check(value: float, measure: str = "theta_rms", line: Tolerance = LINE) -> Check:
+def check(value: float | None, measure: str = "theta_rms", line: Tolerance = LINE) -> Check:
     figure = Figure(measure=measure, label=measure, unit="alpha", value=value, against="r")
     return judge(figure, line, kind="numerical", measure=DIFFERENCES[measure])
 
@@ -93,6 +94,18 @@ def test_the_summary_names_what_is_not_a_pass():
 def test_limit_and_drift_themselves_are_inside(value, expected):
     """Numbers that a computer holds exactly: a figure just at its drift passes, one just at its limit does not fail."""
     assert check(value).verdict == expected
+
+
+def test_a_figure_that_is_missing_is_not_the_worst_of_those_that_are_there():
+    text = markdown(run_of(cell("a", "m", check(0.9, "theta_peak"), check(None, "x_rms"))))
+    assert "| a |  | ❌ theta_peak 9.00e-01 / 0.5 |" in text
+
+
+def test_a_line_for_every_scene_is_completed_by_the_same_line_only():
+    """Another measure's line leaves it as it is: without a limit."""
+    tables = {"*": {"m": {"r": {"theta_rms": {"why": "a test"}}}}, "a": {"m": {"r": {"x_rms": {"expected": 0.1, "limit": 1.0}}}}}
+    with pytest.raises(InputError, match="theta_rms: limit: is missing"):
+        parse_tolerances(tables, [("a", "m")])
 
 
 def test_a_limit_of_zero_asks_for_the_figure_itself():

@@ -1,0 +1,174 @@
+"""Do the tests notice? `python tests/mutation.py` plants small faults in the source, one at a time, and runs the tests that should fail.
+
+A sample of all faults that the operators below can make, drawn with a seed: comparisons that include their limit or do not, signs,
+products for quotients, `and` for `or`, negated conditions, changed numbers. Each is planted in a copy of the packages, which is
+interpreted (NUMBA_DISABLE_JIT=1). Faults that survive are printed with file and line; those that nothing can notice are in EQUIVALENT.
+Arguments: `--sample N` faults a file, `--seed N`, `--file NAME`, and after `--` what pytest is given too, such as `--ignore=FILE`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import copy
+import importlib
+import os
+import random
+import shutil
+import signal
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PARTS = ("scenes", "ebm", "cm", "engines", "validation", "reports")
+CLOSED = "tests/ebm/test_closed_forms.py::test_"
+#: Where faults are planted, and the tests that should notice them, the quickest first.
+TARGETS = {
+    "ebm/series.py": ["tests/ebm/test_core_parts.py"],
+    "ebm/impacts.py": [
+        "tests/ebm/test_impact_laws.py",
+        f"{CLOSED}wall_impact_balances_momentum",
+        f"{CLOSED}floor_impact_balances_momentum",
+    ],
+    "ebm/contact_impacts.py": ["tests/ebm/test_impact_laws.py", f"{CLOSED}contact_impact_leaves_no_approach", "tests/ebm/test_edges.py"],
+    "ebm/transitions.py": ["tests/ebm/test_core_parts.py", "tests/ebm/test_edges.py"],
+    "validation/suite/tolerances.py": ["tests/validation/test_verdicts.py", "tests/validation/test_tolerances.py"],
+    "validation/suite/verdicts.py": ["tests/validation/test_verdicts.py", "tests/validation/test_cli.py"],
+    "validation/discrepancy/statistics.py": ["tests/validation/test_verdicts.py", "tests/validation/test_ensembles.py"],
+    "validation/discrepancy/compare.py": ["tests/validation/test_measures.py", "tests/validation/test_measured.py"],
+}
+SECONDS = 240
+#: Faults that change no result, by file and the text of the fault, and why.
+EQUIVALENT = {
+    ("ebm/series.py", "top + 2  ->  top - 2"): "the narrowest interval ends the search before the stack is full",
+}
+
+#: Names of numbers that are 1 or -1.
+SIGNS = {"S", "S1", "S2", "Sw", "Sr", "sy", "d", "sense", "side", "sign"}
+SWAPS: dict[type, type] = {
+    ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
+    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.And: ast.Or, ast.Or: ast.And,
+}  # fmt: skip
+
+
+def changed(node: ast.AST) -> Iterator[ast.AST]:
+    """The node with a fault, once for each that it can have."""
+    fault = copy.deepcopy(node)
+    if isinstance(fault, ast.Compare) and len(fault.ops) == 1 and type(fault.ops[0]) in SWAPS:
+        fault.ops = [SWAPS[type(fault.ops[0])]()]
+        yield fault
+    elif isinstance(fault, ast.BinOp) and isinstance(fault.right, ast.Name) and fault.right.id in SIGNS:
+        return  # to divide by one is to multiply by it
+    elif isinstance(fault, ast.BinOp | ast.AugAssign | ast.BoolOp) and type(fault.op) in SWAPS:
+        fault.op = SWAPS[type(fault.op)]()
+        yield fault
+    elif isinstance(fault, ast.UnaryOp) and isinstance(fault.op, ast.Not | ast.USub):
+        yield fault.operand
+    elif isinstance(fault, ast.If | ast.While | ast.IfExp):
+        fault.test = ast.UnaryOp(ast.Not(), fault.test)
+        yield fault
+    elif isinstance(fault, ast.Constant) and type(fault.value) in (int, float):
+        fault.value = fault.value * 100.0 if isinstance(fault.value, float) and fault.value else fault.value + 1
+        yield fault
+
+
+class Plant(ast.NodeTransformer):
+    """Puts one fault in the place of the `index`-th node; without an index it lists them all."""
+
+    def __init__(self, index: int = -1) -> None:
+        self.index, self.found = index, list[tuple[int, str]]()
+
+    def visit(self, node: ast.AST) -> ast.AST:
+        """The texts of errors and the numbers of an enumeration hold no fault."""
+        if isinstance(node, ast.Raise | ast.JoinedStr) or (
+            isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple) and not node.col_offset
+        ):
+            return node
+        for fault in changed(node):
+            line = getattr(node, "lineno", 0)
+            self.found.append((line, f"{shown(node)}  ->  {shown(fault)}"))
+            if len(self.found) - 1 == self.index:
+                return ast.copy_location(fault, node)
+        return self.generic_visit(node)
+
+
+def shown(node: ast.AST) -> str:
+    return ast.unparse(node.test if isinstance(node, ast.If | ast.While) else node).replace("\n", " ")[:90]
+
+
+def survives(tree: Path, name: str, source: str, arguments: list[str]) -> bool:
+    """Whether all tests pass with this source; what hangs is noticed. In a process that begins with the libraries loaded."""
+    path = tree / "rockcheck" / name
+    plain = path.read_text(encoding="utf-8")
+    path.write_text(source, encoding="utf-8")
+    child = os.fork()
+    if child == 0:
+        try:
+            signal.alarm(SECONDS)
+            quiet = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(quiet, 1)
+            os.dup2(quiet, 2)
+            import pytest
+
+            code = int(pytest.main(["-x", "-q", "-p", "no:cacheprovider", "-m", "not slow and not browser", *arguments]))
+        except BaseException:
+            code = 9
+        finally:
+            os._exit(code)
+    _, status = os.waitpid(child, 0)
+    path.write_text(plain, encoding="utf-8")
+    return status == 0
+
+
+def main() -> None:
+    """Plants, runs, counts; exit 1 where fewer than nine of ten are noticed."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--sample", type=int, default=12)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--file", default="")
+    parser.add_argument("pytest", nargs="*")
+    asked = parser.parse_args()
+    os.environ["NUMBA_DISABLE_JIT"] = "1"
+    os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+    sys.dont_write_bytecode = True
+    os.chdir(ROOT)
+    killed = total = 0
+    with tempfile.TemporaryDirectory() as folder:
+        tree = Path(folder)
+        shutil.copytree(ROOT / "rockcheck", tree / "rockcheck", ignore=shutil.ignore_patterns("__pycache__"))
+        for part in PARTS:
+            shutil.copytree(ROOT / part, tree / "rockcheck" / part, ignore=shutil.ignore_patterns("__pycache__"))
+        sys.path.insert(0, folder)
+        os.environ["PYTHONPATH"] = folder
+        for library in ("numba", "pandas", "pydantic", "scipy.integrate", "scipy.stats"):
+            importlib.import_module(library)  # once for all children
+        for name, tests in TARGETS.items():
+            if asked.file not in name:
+                continue
+            source = (ROOT / name).read_text(encoding="utf-8")
+            listed = Plant()
+            listed.visit(ast.parse(source))
+            if not survives(tree, name, source, [*tests, *asked.pytest]):
+                sys.exit(f"{name}: its tests fail without a fault")
+            chosen = sorted(random.Random(f"{asked.seed} {name}").sample(range(len(listed.found)), min(asked.sample, len(listed.found))))
+            noticed = judged = 0
+            for index in chosen:
+                line, text = listed.found[index]
+                if (name, text) in EQUIVALENT:
+                    continue
+                fault = ast.unparse(ast.fix_missing_locations(Plant(index).visit(ast.parse(source))))
+                judged += 1
+                lives = survives(tree, name, fault, [*tests, *asked.pytest])
+                noticed += not lives
+                if lives:
+                    print(f"survives  {name}:{line}  {text}", flush=True)
+            print(f"{name}: {noticed} of {judged} noticed ({len(listed.found)} possible)", flush=True)
+            killed, total = killed + noticed, total + judged
+    print(f"{killed} of {total} noticed, {100.0 * killed / max(total, 1):.0f} %")
+    sys.exit(killed < 0.9 * total)
+
+
+if __name__ == "__main__":
+    main()
