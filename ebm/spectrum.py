@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rockcheck.ebm.model import EventBasedModel
+from rockcheck.scenes.base import Shown
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.excitations import Record
 from rockcheck.scenes.scene import Block, Scene
-from rockcheck.scenes.shown import Shown
 
 Floats = NDArray[np.float64]
 MOST_NODES = 50_000_000

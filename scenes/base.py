@@ -1,12 +1,23 @@
-"""What all scene objects share: frozen, strictly validated, faults told in one line."""
+"""What all scene objects share: frozen, strictly validated, faults told in one line; and how they ask to be shown.
+
+The contract draws nothing. How a scene, a history, a spectrum or a comparison shows itself is said above: a package registers a
+`View` for a class by an entry point of the group `rockcheck.views`; rockcheck's own is `rockcheck.reports.show`.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, ValidationError
 
 from rockcheck.scenes.errors import from_validation
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: Sizes of numbers in SI units that still have a square, a cube and an inverse.
 LEAST, MOST = 1e-30, 1e30
@@ -34,3 +45,35 @@ class Frozen(BaseModel):
             super().__init__(**data)
         except ValidationError as error:
             raise from_validation(error, type(self).model_fields) from None
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """How objects of one class show themselves: as HTML in a notebook, and as a figure."""
+
+    html: Callable[[Any], str]
+    figure: Callable[[Any], Figure]
+
+
+class Shown:
+    """Something that a notebook can show, and that has a figure."""
+
+    def plot(self) -> Figure:
+        """It as a matplotlib figure."""
+        return _view_of(type(self)).figure(self)
+
+    def _repr_html_(self) -> str:
+        return _view_of(type(self)).html(self)
+
+
+@cache
+def _views() -> dict[type, View]:
+    views: dict[type, View] = {}
+    for entry in entry_points(group="rockcheck.views"):
+        views.update(entry.load())
+    return views
+
+
+def _view_of(kind: type) -> View:
+    views = _views()
+    return next(views[base] for base in kind.__mro__ if base in views)

@@ -12,7 +12,7 @@ from typing import Any
 from rockcheck.scenes.errors import InputError, printable, unknown_name
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.scene import Scene
-from rockcheck.scenes.uncertain import UncertainScene, split, uncertain_scene
+from rockcheck.scenes.trust.inputs import UncertainScene, split, uncertain_scene
 
 DATA = Path(str(resources.files("rockcheck.scenes"))) / "data"
 
@@ -31,7 +31,7 @@ def load_scene(source: str | Path) -> Scene:
 
 
 def load_uncertain_scene(source: str | Path) -> UncertainScene:
-    """A scene with what its file says of the numbers that are not known exactly (see `scenes.uncertain`). Raises as `load_scene`."""
+    """A scene with what its file says of the numbers that are not known exactly (see `scenes.trust.inputs`). Raises as `load_scene`."""
     return _read(_path_of(source))
 
 

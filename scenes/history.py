@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.scenes.base import Shown
 from rockcheck.scenes.errors import InputError, printable
-from rockcheck.scenes.experience import Expected, expected, known
 from rockcheck.scenes.reading import MOST_LINE, MOST_TABLE_BYTES, open_regular, read_table
-from rockcheck.scenes.shown import Shown
+from rockcheck.scenes.trust.experience import Expected, expected, known
 from rockcheck.scenes.writing import write_together
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ class History(Shown):
         return float(np.max(np.abs(self.channels["theta"])))
 
     def expected(self, quantity: str = "peak_rotation") -> Expected:
-        """A figure corrected by what the suites found about this model, with its 95 % interval (rad): `scenes.experience`.
+        """A figure corrected by what the suites found about this model, with its 95 % interval (rad): `scenes.trust.experience`.
 
         Raises `InputError` where nothing is known of the model, or of the figure.
         """

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, StringConstraints, field_validator, model_validator
 
-from rockcheck.scenes.base import Finite, Frozen, NonNegative, Positive, Restitution
+from rockcheck.scenes.base import Finite, Frozen, NonNegative, Positive, Restitution, Shown
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.excitations import Excitation, Rest
-from rockcheck.scenes.shown import Shown
 
 MOST_SAMPLES = 5_000_000
 #: At mu = 4/3 the pivot of a slender block can jam while it slips (Painleve); physics beyond it is not unique.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rockcheck.ebm.spectrum import Spectrum
 from rockcheck.reports.show import words
 from rockcheck.scenes import History, Scene
-from rockcheck.scenes.shown import View
+from rockcheck.scenes.base import View
 from rockcheck.validation.discrepancy import Discrepancy
 
 if TYPE_CHECKING:

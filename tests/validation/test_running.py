@@ -202,5 +202,5 @@ def test_a_run_is_saved_whole_and_says_what_it_is(tmp_path, run):
 @pytest.mark.parametrize("name", sorted(FAMILIES))
 def test_how_things_look_plays_no_cell_again(name):
     code = provenance.reachable(provenance.home(name))
-    assert "rockcheck.scenes.shown" in code
+    assert "rockcheck.scenes.base" in code
     assert not [module for module in code if module.startswith("rockcheck.reports")]

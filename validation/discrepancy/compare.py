@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from rockcheck.scenes import History, InputError, Scene
-from rockcheck.scenes.shown import Shown
+from rockcheck.scenes.base import Shown
 from rockcheck.validation.discrepancy import closed_forms as _closed_forms  # noqa: F401 - registers them
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, TURNS, Measure, Pair, Unavailable, WindowedHistory

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from rockcheck.scenes import Scene
-from rockcheck.scenes.uncertain import UncertainScene
+from rockcheck.scenes.trust.inputs import UncertainScene
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.store import COMPARISONS, Store, name_of

@@ -1,6 +1,6 @@
 """u_input: how far a figure may lie from the scene's because the scene itself is not known exactly.
 
-The numbers of a scene that have a spread (`scenes.uncertain`) are drawn together, quasi-randomly, and the event-based
+The numbers of a scene that have a spread (`scenes.trust.inputs`) are drawn together, quasi-randomly, and the event-based
 model plays every draw. What comes out is the distribution of the peak, of the outcome and of the last slip, bands on the
 history, and Sobol indices: which number matters most. ASME V&V 20-2009, section 4, by sampling.
 """
@@ -17,7 +17,7 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.ebm.ensemble import play_ensemble
 from rockcheck.scenes import InputError
-from rockcheck.scenes.uncertain import UncertainScene
+from rockcheck.scenes.trust.inputs import UncertainScene
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.discrepancy.statistics import CONFIDENCE
 
