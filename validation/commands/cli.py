@@ -19,20 +19,17 @@ from rockcheck.scenes import InputError, ModelFailure
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.commands import (
     accept,
-    benchmark,
     compare,
-    convergence,
     new,
     report,
     scenes,
     simulate,
     speaking,
-    spectrum,
-    stress,
     uncertainty,
     validate,
 )
 from rockcheck.validation.commands.engines import calibrate, conformance
+from rockcheck.validation.commands.studies import benchmark, convergence, spectrum, stress
 
 #: The commands, in the order of the help, each with an example.
 COMMANDS = {
