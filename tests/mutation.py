@@ -3,7 +3,7 @@
 A sample of all faults that the operators below can make, drawn with a seed: comparisons that include their limit or do not, signs,
 products for quotients, `and` for `or`, negated conditions, changed numbers. Each is planted in a copy of the packages, which is
 interpreted (NUMBA_DISABLE_JIT=1). Faults that survive are printed with file and line; those that nothing can notice are in EQUIVALENT.
-Arguments: `--sample N` faults a file, `--seed N`, `--file NAME`, and after `--` what pytest is given too, such as `--ignore=FILE`.
+Arguments: `--sample N` faults a file, `--seed N`, `--file NAME`, and after `--` what pytest is given too, such as `--deselect=FILE`.
 """
 
 from __future__ import annotations
