@@ -21,8 +21,12 @@ if TYPE_CHECKING:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The ini option `rockcheck_suite`."""
+    """The ini options `rockcheck_suite` and `rockcheck_allow_code`, and the command line's own `--rockcheck-allow-code`."""
     parser.addini("rockcheck_suite", "suite that the fixture `rockcheck_check` takes scenes, models and tolerances from", default="")
+    parser.addini("rockcheck_allow_code", "models of your own, module:Class, that may be run", type="args", default=[])
+    parser.addoption(
+        "--rockcheck-allow-code", action="append", default=[], metavar="MODULE:CLASS", help="a model of your own that rockcheck may run"
+    )
 
 
 @pytest.fixture
@@ -41,7 +45,8 @@ def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., Cell]:
 
         own = config.rootpath / "rockcheck.toml"
         chosen = str(suite or config.getini("rockcheck_suite") or (own if own.exists() else "paper"))
-        loaded = load_suite(chosen if chosen in named_suites() else config.rootpath / chosen)
+        allowed = [*config.getini("rockcheck_allow_code"), *config.getoption("--rockcheck-allow-code")]
+        loaded = load_suite(chosen if chosen in named_suites() else config.rootpath / chosen, allow_code=allowed)
         run = run_suite(loaded.only(scene, model), config.cache.mkdir("rockcheck"), strict=strict)
         cell = run.cell(scene, model)
         assert cell is not None

@@ -10,6 +10,7 @@ import pytest
 from rockcheck.scenes import History
 from rockcheck.validation.commands.cli import main
 
+STILL = "faulty:Still", "--allow-code", "faulty:Still"
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 SCENE = "duration = 0.2\nblock = { half_width = 0.4, half_height = 1.5 }\nfloor = { friction = 0.5 }\n"
 
@@ -61,14 +62,14 @@ def test_bad_input_is_one_line_and_exit_2(words, said, capsys):
 
 def test_simulate_writes_a_history(capsys):
     write("scene.toml", SCENE)
-    assert main(["simulate", "scene.toml", "--model", "faulty:Still", "--set", "offset=0.001", "-o", "out.csv"]) == 0
+    assert main(["simulate", "scene.toml", "--model", *STILL, "--set", "offset=0.001", "-o", "out.csv"]) == 0
     assert History.load("out.csv").channels["theta"][0] == 0.001
     assert "out.csv" in capsys.readouterr().out
 
 
 def test_a_model_that_fails_is_exit_3(capsys):
     write("scene.toml", SCENE)
-    assert main(["simulate", "scene.toml", "--model", "faulty:Fails"]) == 3
+    assert main(["simulate", "scene.toml", "--model", "faulty:Fails", "--allow-code", "faulty:Fails"]) == 3
     assert capsys.readouterr().err == "rockcheck: more than 10 events\n"
     assert not Path("scene--faulty_Fails.csv").exists()
 
@@ -76,7 +77,20 @@ def test_a_model_that_fails_is_exit_3(capsys):
 def test_compare_two_histories(capsys):
     write("scene.toml", SCENE)
     for offset in ("0.0", "0.001"):
-        main(["simulate", "scene.toml", "--model", "faulty:Still", "--set", f"offset={offset}", "-o", f"{offset}.csv"])
+        main(
+            [
+                "simulate",
+                "scene.toml",
+                "--model",
+                "faulty:Still",
+                "--allow-code",
+                "faulty:Still",
+                "--set",
+                f"offset={offset}",
+                "-o",
+                f"{offset}.csv",
+            ]
+        )
     assert main(["compare", "0.0.csv", "0.001.csv"]) == 0
     out = capsys.readouterr().out
     assert "RMS difference of rotation" in out
@@ -102,7 +116,7 @@ floor = { friction = 0.5 }
     expected = {"0.01": 0, "0.001": 1}
     for limit, code in expected.items():
         write("mine.toml", suite + line % limit)
-        assert main(["validate", "mine.toml", "--no-report", "--jobs", "1"]) == code
+        assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1"]) == code
         out = capsys.readouterr().out
         assert max(map(len, out.splitlines())) <= 80
         assert f"verdict: {'pass' if code == 0 else 'fail'}" in out
@@ -116,8 +130,8 @@ floor = { friction = 0.5 }
     assert 'failures="1"' in Path("rockcheck-report/junit.xml").read_text()
     assert "theta_peak against still: 0.003837 is more than 0.001" in Path("rockcheck-report/summary.md").read_text()
     write("mine.toml", suite.replace("offset = 1e-3", "offset = 1.2e-3") + line % "0.01")
-    assert main(["validate", "mine.toml", "--no-report", "--jobs", "1"]) == 0
-    assert main(["validate", "mine.toml", "--no-report", "--jobs", "1", "--strict"]) == 1
+    assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1"]) == 0
+    assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1", "--strict"]) == 1
     assert "verdict: changed" in capsys.readouterr().out
-    assert main(["accept", "mine.toml", "--jobs", "1"]) == 0
-    assert main(["validate", "mine.toml", "--no-report", "--jobs", "1", "--strict"]) == 0
+    assert main(["accept", "mine.toml", "--allow-code", "faulty:Still", "--jobs", "1"]) == 0
+    assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1", "--strict"]) == 0

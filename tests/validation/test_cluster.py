@@ -13,6 +13,8 @@ from rockcheck.validation.execute.remote import OnCluster
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 
+OWN = [f"faulty:{name}" for name in ("Still", "Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")]
+
 MODELS = "\n".join(f'[models.{name}]\nmodel = "faulty:{name}"' for name in ("Segfault", "Hang", "Hog", "Fails"))
 
 
@@ -38,7 +40,7 @@ floor = {{ friction = 0.5 }}
 """,
         encoding="utf-8",
     )
-    suite = load_suite(path)
+    suite = load_suite(path, allow_code=OWN)
     run = run_suite(suite, tmp_path / "out", play=OnCluster("local:2"))
     reasons = {cell.model: cell.reason for cell in run.cells}
     assert reasons == {

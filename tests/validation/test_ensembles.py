@@ -18,6 +18,8 @@ from rockcheck.validation.suite.ensembles import Distribution
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 
+OWN = [f"faulty:{name}" for name in ("Still", "Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")]
+
 SUITE = """
 reference = "still"
 [models.still]
@@ -63,7 +65,7 @@ def in_this_process(tasks, **limits):
 
 
 def test_scenes_are_drawn_alike_whatever_the_count(suite_file):
-    ensemble, base = load_suite(suite_file).ensembles["crowd"]
+    ensemble, base = load_suite(suite_file, allow_code=OWN).ensembles["crowd"]
     first = [ensemble.drawn(base, n) for n in range(10)]
     again = [ensemble.model_copy(update={"count": 5}).drawn(base, n) for n in range(5)]
     assert first[:5] == again
@@ -76,7 +78,7 @@ def test_scenes_are_drawn_alike_whatever_the_count(suite_file):
 
 
 def test_noise_has_the_spectrum_that_it_states(suite_file):
-    ensemble, _ = load_suite(suite_file).ensembles["crowd"]
+    ensemble, _ = load_suite(suite_file, allow_code=OWN).ensembles["crowd"]
     noise = ensemble.noise.model_copy(update={"strong": 40.0})
     power = sum(np.abs(np.fft.rfft(noise.draw(np.random.default_rng(n)).samples)) ** 2 for n in range(40))
     frequency = np.fft.rfftfreq(20000, 0.002)
@@ -117,7 +119,7 @@ def test_statistics_of_known_samples():
 
 
 def test_an_ensemble_is_judged_and_read_back(suite_file, tmp_path):
-    run = run_suite(load_suite(suite_file), tmp_path / "out", play=in_this_process)
+    run = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", play=in_this_process)
     near, broken = run.cell("crowd", "near"), run.cell("crowd", "broken")
     assert [check.verdict for check in near.checks] == ["pass", "pass"]
     assert near.outcome == "0 of 10 overturned"
@@ -125,7 +127,7 @@ def test_an_ensemble_is_judged_and_read_back(suite_file, tmp_path):
     assert broken.status == "failed"
     assert broken.reason == "10 of 10 scenes failed; the first: more than 10 events"
     assert run.exit_code == 3
-    again = run_suite(load_suite(suite_file), tmp_path / "out", play=in_this_process)
+    again = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", play=in_this_process)
     assert [cell.read_back for cell in again.cells] == [True, True, True]
     assert again.cells == tuple(cell.model_copy(update={"read_back": True}) for cell in run.cells)
     run.save(tmp_path / "out")
@@ -134,14 +136,14 @@ def test_an_ensemble_is_judged_and_read_back(suite_file, tmp_path):
 
 def test_accept_writes_what_an_ensemble_is_judged_by(suite_file, tmp_path):
     suite_file.write_text(SUITE.partition("[tolerances")[0], encoding="utf-8")
-    first = run_suite(load_suite(suite_file), tmp_path / "out", play=in_this_process)
+    first = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", play=in_this_process)
     assert first.cell("crowd", "near").verdict == "fail"
-    changes, refused = accept(load_suite(suite_file), first, None)
+    changes, refused = accept(load_suite(suite_file, allow_code=OWN), first, None)
     assert [change.partition(":")[0] for change in changes] == [
         f"[crowd.near.still] {measure}" for measure in ("ks_distance", "overturning_accuracy")
     ]
     assert not refused
-    again = run_suite(load_suite(suite_file), tmp_path / "out", play=in_this_process)
+    again = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", play=in_this_process)
     assert [check.verdict for check in again.cell("crowd", "near").checks] == ["pass", "pass"]
 
 

@@ -18,6 +18,7 @@ from rockcheck.scenes import Block, Floor, InputError, Scene, Wall, load_scene
 from rockcheck.scenes.progress import listening, tell
 from rockcheck.validation.commands.cli import COMMANDS, app, main
 
+STILL = "faulty:Still", "--allow-code", "faulty:Still"
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 NAMES = [module.__name__.rpartition(".")[2] for module in COMMANDS]
 SUITE = """
@@ -118,10 +119,10 @@ def test_new_overwrites_nothing(capsys):
 def test_quiet_says_nothing_but_errors(capsys):
     main(["new", "mine.toml"])
     capsys.readouterr()
-    assert main(["simulate", "mine.toml", "--model", "faulty:Still", "--quiet", "-o", "a.csv"]) == 0
+    assert main(["simulate", "mine.toml", "--model", *STILL, "--quiet", "-o", "a.csv"]) == 0
     assert capsys.readouterr() == ("", "")
     assert Path("a.csv").exists()
-    assert main(["simulate", "mine.toml", "--model", "faulty:Fails", "-q"]) == 3
+    assert main(["simulate", "mine.toml", "--model", "faulty:Fails", "--allow-code", "faulty:Fails", "-q"]) == 3
     assert capsys.readouterr() == ("", "rockcheck: more than 10 events\n")
 
 
@@ -132,20 +133,20 @@ def test_json_is_all_that_is_on_stdout(capsys):
 
     assert result("new", "mine.toml") == {"file": "mine.toml"}
     assert "fig4a" in result("scenes")["scenes"]
-    history = result("simulate", "mine.toml", "--model", "faulty:Still", "--set", "offset=0.001", "-o", "a.csv")
+    history = result("simulate", "mine.toml", "--model", *STILL, "--set", "offset=0.001", "-o", "a.csv")
     assert history["history"] == "a.csv"
     assert history["scene"] == "mine"
-    main(["simulate", "mine.toml", "--model", "faulty:Still", "-o", "b.csv", "-q"])
+    main(["simulate", "mine.toml", "--model", *STILL, "-o", "b.csv", "-q"])
     found = result("compare", "b.csv", "a.csv")
     rms = next(figure for figure in found["figures"] if figure["measure"] == "theta_rms")
     assert rms["value"] == pytest.approx(0.001 / load_scene("mine.toml").block.alpha)
     assert result("spectrum", "--scene", "mine.toml", "--size", "3")["report"] == "rockcheck-report/spectra.html"
     Path("suite.toml").write_text(SUITE)
-    run = result("validate", "suite.toml", "--no-report", "--jobs", "1", code=1)
+    run = result("validate", "suite.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1", code=1)
     assert run["verdict"] == "fail"
     assert run["reasons"] == ["nothing was judged: the suite requires no measure and has no tolerance"]
     assert run["cells"] == [{"scene": "short", "model": "still", "outcome": "at rest", "checks": 0, "verdict": None}]
-    assert result("accept", "suite.toml", "--jobs", "1")["refused"] == []
+    assert result("accept", "suite.toml", "--allow-code", "faulty:Still", "--jobs", "1")["refused"] == []
 
 
 def test_without_a_terminal_no_colour_and_no_progress():
@@ -155,7 +156,7 @@ def test_without_a_terminal_no_colour_and_no_progress():
     assert "\x1b" not in done.stdout
     assert max(map(len, done.stdout.splitlines())) <= 80
     rockcheck("new", "mine.toml")
-    done = rockcheck("simulate", "mine.toml", "--model", "faulty:Still")
+    done = rockcheck("simulate", "mine.toml", "--model", *STILL)
     assert (done.returncode, done.stderr) == (0, "")
     assert "\x1b" not in done.stdout
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -24,6 +25,10 @@ OutOption = Annotated[Path, typer.Option("--out", help="Folder to write; the pag
 JobsOption = Annotated[int | None, typer.Option("--jobs", min=1, help="Worker processes (default: one a core).")]
 SchedulerOption = Annotated[
     str | None, typer.Option("--scheduler", help="Run on a Dask cluster instead: its address, or local:N for N local workers.")
+]
+AllowCodeOption = Annotated[
+    list[str] | None,
+    typer.Option("--allow-code", metavar="MODULE:CLASS", help="A model of your own that may be run: its code is imported; repeatable."),
 ]
 
 #: What a command says: tables and progress, one JSON value instead, or nothing but errors.
@@ -94,6 +99,17 @@ def progress(title: str) -> Iterator[OnProgress]:
             bar.update(task, completed=done, total=total, description=f"{title}: {printable(what, 24)}" if what else title)
 
         yield on_progress
+
+
+def report_file(text: str) -> str:
+    """Write a traceback into a file that only the user can read; returns its path, "" where that cannot be done."""
+    try:
+        handle, path = tempfile.mkstemp(prefix="rockcheck-fault-", suffix=".txt")
+        with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as stream:
+            stream.write(text)
+    except OSError:
+        return ""
+    return path
 
 
 def usable_folder(path: Path) -> Path:

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from rockcheck.validation.commands import OUT, JobsOption, OutOption, SchedulerOption, answer, console, usable_folder
-from rockcheck.validation.commands.validate import ForceOption, SuiteArgument, play_suite
+from rockcheck.validation.commands import OUT, AllowCodeOption, JobsOption, OutOption, SchedulerOption, answer, console, usable_folder
+from rockcheck.validation.commands.validate import ForceOption, SuiteArgument, play_suite, tell_faults
 from rockcheck.validation.suite.acceptance import accept
 from rockcheck.validation.suite.suites import load_suite
 
@@ -19,14 +19,16 @@ def run(
     jobs: JobsOption = None,
     force: ForceOption = False,
     scheduler: SchedulerOption = None,
+    allow_code: AllowCodeOption = None,
 ) -> None:
     """Make today's figures the expected ones.
 
     They are written into the suite's tolerances, each change is shown. Limits are loosened only with --reason.
     """
     name = suite or "paper"
-    finished = play_suite(name, usable_folder(out), jobs, force, False, scheduler)
-    changes, refused = accept(load_suite(name), finished, reason)
+    folder = usable_folder(out)
+    finished = play_suite(name, folder, jobs, force, False, scheduler, allow_code)
+    changes, refused = accept(load_suite(name, allow_code=allow_code or ()), finished, reason)
     screen = console()
     for line in changes:
         screen.print(line, soft_wrap=True)
@@ -34,5 +36,6 @@ def run(
     for line in refused:
         screen.print(f"not accepted: {line}", style="red", soft_wrap=True)
     answer({"changes": changes, "refused": refused, "file": finished.tolerances_file})
-    failed = any(cell.status == "failed" for cell in finished.cells)
-    raise typer.Exit(3 if failed else int(bool(refused)))
+    tell_faults(finished, folder)
+    failed = finished.exit_code if finished.verdict == "error" else 0
+    raise typer.Exit(failed or int(bool(refused)))

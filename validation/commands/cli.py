@@ -6,7 +6,6 @@ import contextlib
 import inspect
 import os
 import sys
-import tempfile
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
@@ -22,6 +21,7 @@ from rockcheck.validation.commands import (
     compare,
     new,
     report,
+    report_file,
     scenes,
     simulate,
     speaking,
@@ -30,6 +30,7 @@ from rockcheck.validation.commands import (
 )
 from rockcheck.validation.commands.engines import calibrate, conformance
 from rockcheck.validation.commands.studies import benchmark, convergence, spectrum, stress
+from rockcheck.validation.suite.results import FAULT
 
 #: The commands, in the order of the help, each with an example.
 COMMANDS = {
@@ -49,8 +50,8 @@ COMMANDS = {
     report: "rockcheck report rockcheck-report",
 }
 
-#: Exit codes that no verdict has: a fault of rockcheck's own (EX_SOFTWARE of sysexits), and Ctrl-C.
-FAULT, INTERRUPTED = 70, 130
+#: Exit code of a run that Ctrl-C ended.
+INTERRUPTED = 130
 EXIT_CODES = {
     0: "done; of a verdict: within tolerance",
     1: "out of tolerance, or an invariant is broken",
@@ -122,22 +123,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except MemoryError:
             return _told("out of memory; what was finished is kept", 3)
         except Exception as error:
-            return _told(f"a fault of rockcheck itself, {type(error).__name__}: please report it with {_reported(error)}", FAULT)
+            trace = "".join([f"rockcheck {version('rockcheck')}, Python {sys.version}\n", *traceback.format_exception(error)])
+            where = report_file(trace) or f"this: {error}"
+            return _told(f"a fault of rockcheck itself, {type(error).__name__}: please report it with {where}", FAULT)
         if code == INTERRUPTED:  # Typer has caught it
             return _told("interrupted; what was finished is kept", INTERRUPTED)
         return code if isinstance(code, int) else 0
-
-
-def _reported(error: Exception) -> str:
-    """Write the traceback into a file of its own, readable by the user only; returns its path."""
-    text = "".join([f"rockcheck {version('rockcheck')}, Python {sys.version}\n", *traceback.format_exception(error)])
-    try:
-        handle, path = tempfile.mkstemp(prefix="rockcheck-fault-", suffix=".txt")
-        with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as stream:
-            stream.write(text)
-    except OSError:
-        return f"this: {error}"
-    return path
 
 
 class _Pipe:

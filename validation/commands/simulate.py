@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import sys
+import math
+import tempfile
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from rockcheck.scenes import InputError, load_scene
+from rockcheck.scenes import History, InputError, ModelFailure, Scene, load_scene
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import listening
-from rockcheck.validation.commands import answer, console, model_names, progress, scene_names
-from rockcheck.validation.execute.models import FAMILIES, build, family, is_own
+from rockcheck.validation.commands import AllowCodeOption, answer, console, model_names, progress, report_file, scene_names
+from rockcheck.validation.execute import workers
+from rockcheck.validation.execute.models import FAMILIES, build, check_allowed, family, is_own
 from rockcheck.validation.execute.store import name_of
 
 
@@ -22,21 +24,22 @@ def run(
     model: Annotated[str, typer.Option("--model", help=f"One of {', '.join(FAMILIES)}.", autocompletion=model_names)],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="CSV to write (default: SCENE--MODEL.csv).")] = None,
     settings: Annotated[list[str] | None, typer.Option("--set", help="A setting of the model, such as time_step=1e-4; repeatable.")] = None,
+    allow_code: AllowCodeOption = None,
 ) -> None:
     """Simulate one scene with one model.
 
     Writes the history as CSV; its events go to a second file beside it.
     """
-    if is_own(model):
-        sys.path.append(str(Path.cwd()))
-    player = build(model, dict(setting_of(text) for text in settings or []))
+    check_allowed(model, allow_code or ())
+    given = dict(setting_of(text) for text in settings or [])
+    player = None if is_own(model) else build(model, given)
     what = load_scene(scene)
     path = output or Path(f"{name_of(what.name, model)}.csv")
     if not path.parent.is_dir():
         raise InputError(f"{printable(path.parent)}: no such folder", "--output")
     compiles = ", a first run compiles" if family(model).compiled else ""
     with progress(f"{what.name}, {model}{compiles}") as on_progress, listening(on_progress):
-        history = player.simulate(what)
+        history = player.simulate(what) if player else _played_apart(what, model, given)
     try:
         history.save(path)
     except OSError as error:
@@ -56,6 +59,21 @@ def run(
             "history": path,
         }
     )
+
+
+def _played_apart(scene: Scene, model: str, settings: dict[str, Any]) -> History:
+    """The history by a model of the user's own, whose code is imported by a process of its own."""
+    task = workers.Task(label=model, family=model, settings=settings, search_path=(str(Path.cwd()),), scene=scene)
+    ((_, result),) = workers.local([task], jobs=1, seconds=[math.inf], memory_mb=None)
+    if result.bad_input:
+        raise InputError(result.failure)
+    if result.failure:
+        where = f"; its traceback: {report_file(result.traceback)}" if result.traceback else ""
+        raise ModelFailure(f"{result.failure}{where}")
+    with tempfile.TemporaryDirectory() as folder:
+        for suffix, text in result.files.items():
+            (Path(folder) / f"history{suffix}").write_text(text, encoding="utf-8")
+        return History.load(Path(folder) / "history.csv")
 
 
 def setting_of(text: str) -> tuple[str, Any]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +11,19 @@ import typer
 from rich.console import Console
 
 from rockcheck.scenes import InputError
-from rockcheck.validation.commands import OUT, JobsOption, OutOption, SchedulerOption, answer, console, progress, suite_names, usable_folder
+from rockcheck.scenes.errors import printable
+from rockcheck.validation.commands import (
+    OUT,
+    AllowCodeOption,
+    JobsOption,
+    OutOption,
+    SchedulerOption,
+    answer,
+    console,
+    progress,
+    suite_names,
+    usable_folder,
+)
 from rockcheck.validation.commands.publish import keep, publish
 from rockcheck.validation.execute import remote, workers
 from rockcheck.validation.suite.results import Run
@@ -29,29 +43,33 @@ def run(
     force: ForceOption = False,
     strict: Annotated[bool, typer.Option("--strict", help="Figures that changed beyond their drift band fail.")] = False,
     scheduler: SchedulerOption = None,
+    allow_code: AllowCodeOption = None,
     report: Annotated[bool, typer.Option("--report/--no-report", help="Render the pages; without them only run.json and tables.")] = True,
 ) -> None:
     """Run a suite, compare, judge, write the report.
 
     Every model on every scene; cells whose results are up to date are read back.
 
-    Exit 0: within tolerance. 1: out of tolerance. 2: bad input. 3: a model failed.
+    Exit 0: within tolerance. 1: out of tolerance. 2: bad input. 3: a model failed. 70: a fault of rockcheck itself.
     """
     if quick and suite not in (None, "smoke"):
         raise InputError(f"cannot be given together with the suite {suite!r}", "--quick")
     folder = usable_folder(out)
-    finished = play_suite(suite or ("smoke" if quick else "paper"), folder, jobs, force, strict, scheduler)
+    finished = play_suite(suite or ("smoke" if quick else "paper"), folder, jobs, force, strict, scheduler, allow_code)
     kept = keep(finished, folder)
     show(finished, console())
+    tell_faults(finished, folder)
     page = _published(folder, jobs) if report else kept
     console().print(f"report: {page}", soft_wrap=True)
     answer(summary(finished) | {"report": page})
     raise typer.Exit(finished.exit_code)
 
 
-def play_suite(suite: str, folder: Path, jobs: int | None, force: bool, strict: bool, scheduler: str | None) -> Run:
+def play_suite(
+    suite: str, folder: Path, jobs: int | None, force: bool, strict: bool, scheduler: str | None, allow_code: Sequence[str] | None
+) -> Run:
     """Run a suite with a progress bar on stderr."""
-    loaded = load_suite(suite)
+    loaded = load_suite(suite, allow_code=allow_code or ())
     play = workers.local if scheduler is None else remote.OnCluster(scheduler)
     with progress(loaded.name) as on_progress:
         return run_suite(loaded, folder, jobs=jobs, force=force, strict=strict, play=play, on_progress=on_progress)
@@ -60,6 +78,17 @@ def play_suite(suite: str, folder: Path, jobs: int | None, force: bool, strict: 
 def _published(folder: Path, jobs: int | None) -> Path:
     with progress("pages") as on_progress:
         return publish(folder, jobs=jobs, on_progress=on_progress)
+
+
+def tell_faults(finished: Run, folder: Path) -> None:
+    """A line on stderr for each exception that no model of rockcheck's own may raise."""
+    for cell in finished.cells:
+        if cell.unexpected:
+            where = f"{cell.scene}, {cell.model}: {cell.reason}"
+            print(
+                printable(f"rockcheck: a fault of rockcheck itself, {where}: please report it with {folder / cell.traceback}", 1400),
+                file=sys.stderr,
+            )
 
 
 def show(finished: Run, out: Console) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+import sys
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -94,13 +95,27 @@ def not_installed(name: str) -> str:
 
 
 def is_own(name: str) -> bool:
-    """Whether that is a model of the user's own, which may lie beside the suite or in the working directory."""
+    """Whether that is a model of the user's own: code that may lie beside the suite or in the working directory."""
     return ":" in name
 
 
+def check_allowed(name: str, allow_code: Container[str]) -> None:
+    """Raises `InputError` for a model of the user's own that is not in `allow_code`, or cannot be one. Imports nothing.
+
+    A suite is data: it may name code, but only who calls rockcheck says that it is run.
+    """
+    if not is_own(name):
+        return
+    module = family(name).module
+    if module in sys.stdlib_module_names:
+        raise InputError(f"{printable(name)!r} is no model: {module} is part of Python's standard library")
+    if name not in allow_code:
+        raise InputError(f"{printable(name)!r} is code, which is run only where the command line says so: --allow-code {printable(name)}")
+
+
 def home(name: str) -> str:
-    """The module in which the model of that name is defined."""
-    return str(_class_of(name).__module__)
+    """The module in which the model of that name is defined; for one of the user's own the one that it is named after."""
+    return family(name).module if is_own(name) else str(_class_of(name).__module__)
 
 
 def _class_of(name: str) -> Any:
@@ -112,12 +127,34 @@ def _class_of(name: str) -> Any:
 
 
 def build(name: str, settings: Mapping[str, Any] | None = None) -> Model:
-    """The model of that name with these settings; raises `InputError` naming the setting that is not usable."""
+    """The model of that name with these settings; raises `InputError` naming the setting that is not usable.
+
+    A model of the user's own is not built here but by the process that plays it: `build_own`.
+    """
+    if is_own(name):
+        raise InputError(f"model {printable(name)!r} is one of your own, which `validate` and `simulate` can play")
+    return _built(name, _class_of(name), settings)
+
+
+def build_own(name: str, settings: Mapping[str, Any] | None = None) -> Model:
+    """`build`, also for a model of the user's own, whose code is imported: for worker processes, of what was allowed."""
+    if not is_own(name):
+        return build(name, settings)
+    check_allowed(name, (name,))
+    kind = _class_of(name)
+    if not isinstance(kind, type) or not callable(getattr(kind, "simulate", None)):
+        raise InputError(f"{printable(name)!r} is no model: a class with a method `simulate` is asked for")
+    if kind.__module__.partition(".")[0] in sys.stdlib_module_names:
+        raise InputError(f"{printable(name)!r} is no model: it is part of Python's standard library")
+    return _built(name, kind, settings)
+
+
+def _built(name: str, model_class: Any, settings: Mapping[str, Any] | None) -> Model:
     kind, settings = family(name), dict(settings or {})
     for key in kind.fixed.keys() & settings.keys():
         raise InputError(f"is fixed by the name of the model, {name}", f"{name}.{key}")
     try:
-        model: Model = _class_of(name)(**kind.fixed, **settings)
+        model: Model = model_class(**kind.fixed, **settings)
     except InputError as error:
         raise InputError(error.reason, f"{name}.{error.key}" if error.key else name) from None
     return model

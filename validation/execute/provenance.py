@@ -11,6 +11,7 @@ import platform
 from collections.abc import Container, Iterable, Mapping
 from functools import cache
 from importlib import metadata
+from importlib.machinery import PathFinder
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +22,17 @@ from rockcheck.validation.execute.models import FAMILIES, family, home
 OWN_PACKAGE = "rockcheck"
 
 
-def cell_key(scene: Scene, name: str, settings: Mapping[str, Any]) -> str:
-    """Hash of all that a cell's history depends on: scene, settings, the code it can reach, and the libraries' versions."""
+def cell_key(scene: Scene, name: str, settings: Mapping[str, Any], search_path: tuple[str, ...] = ()) -> str:
+    """Hash of all that a cell's history depends on: scene, settings, the code it can reach, and the libraries' versions.
+
+    `search_path` holds folders in which a model of the user's own may lie. Its source is read, not run.
+    """
     depends = {
         "scene": scene.model_dump(mode="json"),
         "model": name,
         "settings": dict(settings),
         "files": [hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in _files(settings, scene)],
-        "code": code_digest(home(name)),
+        "code": code_digest(home(name), search_path),
         "libraries": {library: version_of(library) for library in family(name).libraries},
         "python": platform.python_version(),
         "machine": platform.machine(),
@@ -48,15 +52,15 @@ def digest(text: str) -> str:
 
 
 @cache
-def code_digest(module: str) -> str:
+def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
     """Hash of the code of a module and of all project modules that it imports, at its top or inside functions.
 
     Of the syntax trees without docstrings: comments, layout and documentation do not count.
     """
-    return digest("".join(f"{name}\n{_essence(path)}\n" for name, path in sorted(reachable(module).items())))
+    return digest("".join(f"{name}\n{_essence(path)}\n" for name, path in sorted(reachable(module, search_path).items())))
 
 
-def reachable(module: str) -> dict[str, Path]:
+def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]:
     """Names and files of the project modules that `module` can import, itself included.
 
     The packages that a module lies in count themselves, but not what else they import.
@@ -67,7 +71,7 @@ def reachable(module: str) -> dict[str, Path]:
     followed: set[str] = set()
     while waiting:
         name = waiting.pop()
-        path = _source(name) if name.split(".")[0] in packages else None
+        path = _source(name, search_path) if name.split(".")[0] in packages else None
         if path is None or name in followed:
             continue
         followed.add(name)
@@ -75,19 +79,21 @@ def reachable(module: str) -> dict[str, Path]:
         parents = name.split(".")[:-1]
         for depth in range(len(parents)):
             parent = ".".join(parents[: depth + 1])
-            found.setdefault(parent, _source(parent) or path)
-        waiting += _imports(path, name if path.name == "__init__.py" else ".".join(parents), packages)
+            found.setdefault(parent, _source(parent, search_path) or path)
+        waiting += _imports(path, name if path.name == "__init__.py" else ".".join(parents), packages, search_path)
     return found
 
 
-def _source(name: str) -> Path | None:
-    """The file of a module, None where there is none (a name inside a module)."""
+def _source(name: str, search_path: tuple[str, ...]) -> Path | None:
+    """The file of a module, None where there is none (a name inside a module). No code of `search_path` is run."""
     parts = name.split(".")
     for depth in range(min(2, len(parts)), 0, -1):  # rockcheck's folders do not lie in each other
         try:
-            spec = importlib.util.find_spec(".".join(parts[:depth]))
-        except ModuleNotFoundError:
+            spec = importlib.util.find_spec(".".join(parts[:depth])) if depth == 1 or parts[0] == OWN_PACKAGE else None
+        except (ModuleNotFoundError, ValueError):
             continue
+        if spec is None and depth == 1:
+            spec = PathFinder.find_spec(parts[0], list(search_path))
         if spec is None or spec.origin is None:
             continue
         if depth == len(parts):
@@ -97,7 +103,7 @@ def _source(name: str) -> Path | None:
     return None
 
 
-def _imports(path: Path, package: str, packages: Container[str]) -> Iterable[str]:
+def _imports(path: Path, package: str, packages: Container[str], search_path: tuple[str, ...]) -> Iterable[str]:
     """Names of the modules that a file of `package` imports; of a package only where something that is no module is taken from it."""
     for node in ast.walk(syntax(path)):
         if isinstance(node, ast.Import):
@@ -108,7 +114,7 @@ def _imports(path: Path, package: str, packages: Container[str]) -> Iterable[str
                 base = ".".join(filter(None, [*package.split(".")[: len(package.split(".")) - node.level + 1], base]))
             for alias in node.names:
                 inner = f"{base}.{alias.name}"
-                yield inner if base.split(".")[0] in packages and _source(inner) else base
+                yield inner if base.split(".")[0] in packages and _source(inner, search_path) else base
 
 
 @cache

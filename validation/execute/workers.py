@@ -6,6 +6,7 @@ import dataclasses
 import sys
 import tempfile
 import time
+import traceback
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -16,7 +17,7 @@ import numpy as np
 
 from rockcheck.scenes import History, InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
-from rockcheck.validation.execute.models import build, family
+from rockcheck.validation.execute.models import build_own, family
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.uncertainty.numerical import failed, numerical_uncertainty
 
@@ -51,11 +52,16 @@ class BatchTask(Work):
 
 @dataclass(frozen=True)
 class TaskResult:
-    """What a worker gives back: the history's files by suffix and the record, or the reason of its failure."""
+    """What a worker gives back: the history's files by suffix and the record, or the reason of its failure.
+
+    `bad_input` says that the model refused what it was given. `traceback` is that of an exception which no model may raise.
+    """
 
     files: dict[str, str] = field(default_factory=dict, repr=False)
     record: dict[str, Any] = field(default_factory=dict)
     failure: str = ""
+    bad_input: bool = False
+    traceback: str = ""
 
 
 def play(task: Task | BatchTask) -> TaskResult:
@@ -64,9 +70,9 @@ def play(task: Task | BatchTask) -> TaskResult:
     sys.path.extend(path for path in task.search_path if path not in sys.path)
     if isinstance(task, BatchTask):
         return _play_batch(task, began)
-    history, fault = _simulate(task, task.scene)
+    history, failed = _simulate(task, task.scene)
     if history is None:
-        return TaskResult(failure=fault)
+        return failed
     with tempfile.TemporaryDirectory() as folder:
         history.save(Path(folder) / "history.csv")
         files = {path.name.removeprefix("history"): path.read_text(encoding="utf-8") for path in Path(folder).iterdir()}
@@ -87,34 +93,36 @@ def _play_batch(task: BatchTask, began: float) -> TaskResult:
     peaks: list[float | None] = []
     outcomes: list[str] = []
     cost = {"wall_seconds": 0.0, "cpu_seconds": 0.0, "set_up": 0.0, "steps": 0, "evaluations": 0}
+    trace = ""
     for scene in task.scenes:
-        history, fault = _simulate(task, scene)
+        history, failed = _simulate(task, scene)
+        trace = trace or failed.traceback
         peaks.append(None if history is None else history.peak_rotation / scene.block.alpha)
-        outcomes.append(fault if history is None else history.outcome)
+        outcomes.append(failed.failure if history is None else history.outcome)
         if history is not None:
             cost = {key: value + getattr(history.cost, key) for key, value in cost.items()}
     cost["worker_seconds"] = time.perf_counter() - began
-    return TaskResult(record={"peaks": peaks, "outcomes": outcomes, "cost": cost})
+    return TaskResult(record={"peaks": peaks, "outcomes": outcomes, "cost": cost}, traceback=trace)
 
 
-def _simulate(task: Work, scene: Scene) -> tuple[History | None, str]:
-    """The history under the model's label in the suite, or the reason why there is none."""
+def _simulate(task: Work, scene: Scene) -> tuple[History | None, TaskResult]:
+    """The history under the model's label in the suite, or None and the reason why there is none."""
     try:
-        history = dataclasses.replace(build(task.family, task.settings).simulate(scene), model=task.label)
+        history = dataclasses.replace(build_own(task.family, task.settings).simulate(scene), model=task.label)
+        fault = _not_finite(history)
     except (ModelFailure, InputError) as error:
-        return None, printable(error, 300)
+        return None, TaskResult(failure=printable(error, 300), bad_input=isinstance(error, InputError))
     except MemoryError:
-        return None, "out of memory"
+        return None, TaskResult(failure="out of memory")
     except Exception as error:  # a model of whatever kind must not end the run
-        return None, printable(f"{type(error).__name__}: {error}", 300)
-    fault = _not_finite(history)
-    return (None, fault) if fault else (history, "")
+        return None, TaskResult(failure=printable(f"{type(error).__name__}: {error}", 300), traceback=traceback.format_exc())
+    return (None, TaskResult(failure=fault)) if fault else (history, TaskResult())
 
 
 def _numerical(task: Task, history: History) -> dict[str, Any] | None:
     """The numerical uncertainty of a run, None for a model without a step; a coarser run that fails is not converged."""
     try:
-        found = numerical_uncertainty(build(task.family, task.settings), task.scene, history)
+        found = numerical_uncertainty(build_own(task.family, task.settings), task.scene, history)
     except (ModelFailure, InputError) as error:
         found = failed(history, f"a coarser run failed: {printable(error)}")
     return None if found is None else found.model_dump(mode="json")
@@ -136,7 +144,9 @@ def _plain(settings: Any) -> dict[str, Any]:
     return dict(sorted(plain.items()))
 
 
-def local(tasks: Sequence[Task | BatchTask], *, jobs: int, seconds: Sequence[float], memory_mb: float) -> Iterator[tuple[int, TaskResult]]:
+def local(
+    tasks: Sequence[Task | BatchTask], *, jobs: int, seconds: Sequence[float], memory_mb: float | None
+) -> Iterator[tuple[int, TaskResult]]:
     """Play tasks in `jobs` processes; yields (index, result) as they end. `seconds` limits each task's wall time.
 
     Of each package that compiles, one task goes first, with time for that, and the others of the package wait for it.

@@ -30,6 +30,8 @@ from rockcheck.validation.uncertainty.verdict import Explanation
 RUN_FILE = "run.json"
 SCHEMA_FILE = "run.schema.json"
 FORMAT = 1
+#: Exit code of a fault of rockcheck's own, EX_SOFTWARE of sysexits: no verdict has it.
+FAULT = 70
 
 #: Verdict on one check: inside the limit; inside, but outside the drift band; outside the limit or not to be judged.
 CheckVerdict = Literal["pass", "changed", "fail"]
@@ -83,6 +85,8 @@ class Cell(Stored):
     path of its CSV relative to the run's folder. `read_back` is true where nothing that the cell depends on had changed.
     `figures` are all measures, judged or not; `checks` those with a tolerance or in need of one. `numerical` is the run's
     numerical uncertainty, where the suite asks for it, and `explanations` what it says of the differences.
+    `traceback` is the path of a file beside them: of an exception that no model may raise, which is `unexpected` where the
+    model is one of rockcheck's own.
     """
 
     scene: str
@@ -91,6 +95,8 @@ class Cell(Stored):
     key: str = ""
     status: Literal["done", "failed", "absent"]
     reason: str = ""
+    traceback: str = ""
+    unexpected: bool = False
     read_back: bool = False
     history: str | None = None
     outcome: str = ""
@@ -172,7 +178,9 @@ class Run(Stored):
 
     @property
     def exit_code(self) -> int:
-        """0 pass, 1 out of tolerance (under `strict` also changed or incomplete), 3 a model failed."""
+        """0 pass, 1 out of tolerance (under `strict` also changed or incomplete), 3 a model failed, `FAULT` where unexpectedly."""
+        if any(cell.unexpected for cell in self.cells):
+            return FAULT
         return {"pass": 0, "incomplete": int(self.strict), "changed": int(self.strict), "fail": 1, "error": 3}[self.verdict]
 
     @property

@@ -7,7 +7,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import groupby
 from pathlib import Path
@@ -17,6 +17,7 @@ import numpy as np
 
 from rockcheck.scenes import History, InputError, Scene
 from rockcheck.scenes.progress import OnProgress, unheard
+from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.discrepancy.compare import compare, describe, evaluate, too_short
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
@@ -31,6 +32,7 @@ from rockcheck.validation.suite.suites import ModelVariant, Suite
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Place, Windowed, judge
 from rockcheck.validation.uncertainty.inputs import Inputs
 
+FAULTS = "faults"
 #: Plays tasks somewhere: yields (index, result) as they end.
 Executor = Callable[..., Iterator[tuple[int, workers.TaskResult]]]
 
@@ -98,13 +100,14 @@ def run_suite(
     except OSError as error:
         raise InputError(f"{folder}: cannot be used as the output folder: {error.strerror}") from None
     planned_cells = [
-        PlannedCell(scene, variant, provenance.cell_key(scene, variant.family_name, {**variant.settings, **key_of(_asks(suite, scene))}))
+        PlannedCell(scene, variant, _key(scene, replace(variant, settings={**variant.settings, **key_of(_asks(suite, scene))})))
         for scene, variant in suite.cells()
     ]
     batches = [batch for found in suite.ensemble_cells() for batch in _batches(*found)]
     items: list[Planned] = [*planned_cells, *batches]
     records: dict[Planned, dict[str, Any]] = {}
     failures: dict[Planned, str] = {}
+    faults: dict[tuple[str, str], dict[str, Any]] = {}
     if not force:
         for item in items:
             found = store.get(item.name) if isinstance(item, PlannedCell) else store.get_record(COMPARISONS, item.name)
@@ -122,8 +125,12 @@ def run_suite(
         memory_mb=max((limit.memory_mb for limit in limits), default=0.0),
     ):
         item = waiting[index]
+        if result.traceback:
+            faults[item.place, item.variant.label] = _fault(item, result.traceback, folder)
         if result.failure:
             failures[item] = result.failure
+        elif result.traceback:
+            records[item] = result.record  # some scenes of a batch: not to be read back
         else:
             records[item] = result.record
             if isinstance(item, PlannedCell):
@@ -136,6 +143,7 @@ def run_suite(
     cells = [_cell(suite, planned, by_place, records, failures, store, planned in read_back) for planned in planned_cells]
     ensembles, ensemble_cells = _ensembles(suite, batches, records, failures, read_back)
     cells = [_explained(suite, cell, cells, by_place, records, inputs.get(cell.scene)) for cell in cells] + ensemble_cells
+    cells = [cell.model_copy(update=faults.get((cell.scene, cell.model), {})) for cell in cells]
     store.prune()
     return Run(
         suite=suite.name,
@@ -158,6 +166,17 @@ def run_suite(
     )
 
 
+def _fault(item: Planned, traceback: str, folder: Path) -> dict[str, Any]:
+    """Keep the traceback of an exception that no model may raise; what a cell says of it. One of the user's own model is that model's."""
+    (folder / FAULTS).mkdir(exist_ok=True)
+    path = write_whole(folder / FAULTS / f"{item.name}.txt", traceback)
+    return {"traceback": f"{FAULTS}/{path.name}", "unexpected": not is_own(item.variant.family_name)}
+
+
+def _key(scene: Scene, variant: ModelVariant) -> str:
+    return provenance.cell_key(scene, variant.family_name, variant.settings, variant.search_path)
+
+
 def _batches(ensemble: Ensemble, base: Scene, variant: ModelVariant) -> Iterator[PlannedBatch]:
     """An ensemble cut into batches; a batch's key covers how its scenes are drawn, so that they need not be drawn to look it up."""
     drawing = {
@@ -167,7 +186,7 @@ def _batches(ensemble: Ensemble, base: Scene, variant: ModelVariant) -> Iterator
     for start in range(0, ensemble.count, ensemble.batch):
         numbers = range(start, min(start + ensemble.batch, ensemble.count))
         settings = {**variant.settings, "drawn": {**drawing, "numbers": [numbers.start, numbers.stop]}}
-        yield PlannedBatch(ensemble, base, variant, numbers, provenance.cell_key(base, variant.family_name, settings))
+        yield PlannedBatch(ensemble, base, variant, numbers, _key(base, replace(variant, settings=settings)))
 
 
 def _asks(suite: Suite, scene: Scene) -> bool:
@@ -181,7 +200,7 @@ def _task(item: Planned, suite: Suite) -> workers.Task | workers.BatchTask:
         "label": variant.label,
         "family": variant.family_name,
         "settings": dict(variant.settings),
-        "search_path": (str(suite.path.parent),) if is_own(variant.family_name) else (),
+        "search_path": variant.search_path,
     }
     if isinstance(item, PlannedCell):
         return workers.Task(scene=item.scene, uncertainty=_asks(suite, item.scene), **model)

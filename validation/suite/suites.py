@@ -39,7 +39,6 @@ out as `[[scene]]` tables. Tolerances (validation.suite.tolerances) are a table 
 from __future__ import annotations
 
 import itertools
-import sys
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
@@ -55,7 +54,7 @@ from rockcheck.scenes.files import load_uncertain_scene, named_scenes, read_toml
 from rockcheck.scenes.trust.inputs import UncertainScene, uncertain_scene
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS
-from rockcheck.validation.execute.models import Family, build, family, is_own
+from rockcheck.validation.execute.models import Family, build, check_allowed, family, is_own
 from rockcheck.validation.suite.ensembles import Ensemble
 from rockcheck.validation.suite.results import Kind
 from rockcheck.validation.suite.tolerances import OWN_FIGURES, Place, Tolerances, Windowed, parse_tolerances
@@ -115,6 +114,8 @@ class ModelVariant:
     label: str
     family_name: str
     settings: Mapping[str, Any]
+    #: Folders in which a model of the user's own may lie: that of the suite.
+    search_path: tuple[str, ...] = ()
 
     @property
     def family(self) -> Family:
@@ -215,10 +216,11 @@ def describe_suite(path: Path) -> str:
     return str(read_toml(path).get("description", ""))
 
 
-def load_suite(source: str | Path) -> Suite:
+def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
     """A suite from a TOML file, or by the name of one that comes with the package.
 
-    Raises `InputError` naming the file, the key, the value and what is allowed.
+    Nothing is run or imported that the file names: a model "module:Class" must be in `allow_code`, and is imported only by the
+    processes that play it. Raises `InputError` naming the file, the key, the value and what is allowed.
     """
     known = named_suites()
     shipped = str(source) in known
@@ -227,19 +229,16 @@ def load_suite(source: str | Path) -> Suite:
         raise InputError(f"{unknown_name('suite', str(source), known)}; or the path of a .toml file")
     tables = read_toml(path)
     try:
-        return _suite(SuiteFile(**tables), path, shipped)
+        return _suite(SuiteFile(**tables), path, shipped, allow_code)
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(printable(path.parent)) else f"{printable(path)}: {text}") from None
 
 
-def _suite(given: SuiteFile, path: Path, shipped: bool) -> Suite:
+def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[str]) -> Suite:
     if given.include:
-        return _joined(given, path)
-    own = any(is_own(str(settings.get("model", label))) for label, settings in given.models.items())
-    if own and str(path.parent) not in sys.path:
-        sys.path.append(str(path.parent))
-    models = {label: _variant(label, settings, path.parent) for label, settings in given.models.items()}
+        return _joined(given, path, allow_code)
+    models = {label: _variant(label, settings, path.parent, allow_code) for label, settings in given.models.items()}
     uncertain = _scenes(given, path.parent)
     scenes = {name: found.scene for name, found in uncertain.items()}
     ensembles = {e.name: (e, scene_from(e.scene, folder=path.parent, default_name=e.name)) for e in given.ensemble}
@@ -297,9 +296,9 @@ def _played(scenes: Iterable[str], models: Mapping[str, ModelVariant]) -> Iterat
         yield from ((scene, label) for label, model in models.items() if scene in model.settings.get("files", {scene: ""}))
 
 
-def _joined(given: SuiteFile, path: Path) -> Suite:
+def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
     """Several suites as one; their scenes must have different names, their references must agree."""
-    included = [load_suite(name if name in named_suites() else path.parent / name) for name in given.include]
+    included = [load_suite(name if name in named_suites() else path.parent / name, allow_code=allow_code) for name in given.include]
     scenes: dict[str, Scene] = {}
     ensembles: dict[str, tuple[Ensemble, Scene]] = {}
     models: dict[str, ModelVariant] = {}
@@ -329,7 +328,7 @@ def _joined(given: SuiteFile, path: Path) -> Suite:
     )
 
 
-def _variant(label: str, settings: Mapping[str, Any], folder: Path) -> ModelVariant:
+def _variant(label: str, settings: Mapping[str, Any], folder: Path, allow_code: Container[str]) -> ModelVariant:
     settings = dict(settings)
     name = str(settings.pop("model", label))
     if name == "measured" and isinstance(settings.get("files"), dict):
@@ -337,6 +336,12 @@ def _variant(label: str, settings: Mapping[str, Any], folder: Path) -> ModelVari
             scene: [str(folder / str(one)) for one in files] if isinstance(files, list) else str(folder / str(files))
             for scene, files in settings["files"].items()
         }
+    if is_own(name):
+        try:
+            check_allowed(name, allow_code)
+        except InputError as error:
+            raise InputError(error.reason, f"models.{printable(label)}") from None
+        return ModelVariant(label, name, settings, (str(folder.absolute()),))
     build(name, settings)
     return ModelVariant(label, name, settings)
 
