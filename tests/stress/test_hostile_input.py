@@ -27,7 +27,7 @@ from rockcheck.scenes.records import read_record
 from rockcheck.validation.commands.cli import main
 from rockcheck.validation.discrepancy.measured import read_measured
 from rockcheck.validation.execute.models import build
-from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
+from rockcheck.validation.execute.store import COMPARISONS, Store, _sealed, name_of
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.suites import load_suite
 
@@ -467,9 +467,9 @@ def test_a_record_names_no_file_but_its_own(tmp_path, stored):
     store.put("a", {suffix: stored[suffix] for suffix in (".csv", ".events.csv")}, {})
     assert store.get("a") == {}
     record = tmp_path / "histories" / "a.json"
-    files = json.loads(record.read_text())["files"]
+    files = json.loads(record.read_text())["content"]["files"]
     for name in ("x" * 5000, "/../../../../etc/passwd", "\0", "\ud800"):
-        record.write_text(json.dumps({"files": {**files, name: "0"}}))
+        record.write_text(_sealed("a", {"files": {**files, name: "0"}}))
         assert store.get("a") is None
 
 

@@ -190,7 +190,6 @@ IMPORT = {
 def test_no_code_is_made_of_what_is_read():
     """No pickle, no eval, no import of a name: whoever needs one is listed here with the reason."""
     unpickle, imports = set(), set()
-    parts = ("rockcheck", "scenes", "ebm", "cm", "engines", "validation", "reports")
     for path in (
         path for part in ("rockcheck", "scenes", "ebm", "cm", "engines", "validation", "reports") for path in (ROOT / part).rglob("*.py")
     ):

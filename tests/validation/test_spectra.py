@@ -475,17 +475,17 @@ def test_the_lognormal_curve_is_found_again():
     intensities = np.linspace(0.5, 8.0, 60)
     motions = 10**7
     counts = np.round(motions * fragility.lognormal(intensities, 2.5, 0.4)).astype(np.int64)
-    median, dispersion = fragility.fit_lognormal(intensities, counts, motions)
+    median, dispersion = fragility.fit_lognormal(intensities, counts, np.full(len(counts), motions))
     assert median == pytest.approx(2.5, rel=1e-4)
     assert dispersion == pytest.approx(0.4, rel=1e-3)
-    assert fragility.fit_lognormal(intensities, np.zeros(60, dtype=np.int64), 10) is None
-    assert fragility.fit_lognormal(intensities, np.full(60, 10), 10) is None
+    assert fragility.fit_lognormal(intensities, np.zeros(60, dtype=np.int64), np.full(60, 10)) is None
+    assert fragility.fit_lognormal(intensities, np.full(60, 10), np.full(60, 10)) is None
 
 
 def test_the_band_holds_the_binomial_spread():
     overturned = np.zeros((100, 2, 3), dtype=bool)
     overturned[:50, :, 1] = overturned[:, :, 2] = True  # directions alike: no more is known than from 100 runs
-    case = fragility.curve_of("made", overturned, 0, np.array([1.0, 2.0, 3.0]))
+    case = fragility.curve_of("made", overturned, np.zeros_like(overturned), np.array([1.0, 2.0, 3.0]))
     (_, share, low, high, _) = case.points[1]
     assert share == 0.5
     assert low == pytest.approx(0.5 - 1.96 * 0.05, abs=0.015)  # the normal approximation of the binomial
@@ -502,7 +502,33 @@ def test_records_are_scaled_to_the_intensity(tmp_path, monkeypatch):
     found = fragility.fragility(panel, request, [tmp_path / "0.csv", tmp_path / "1.csv"], Tiles(tmp_path / "tiles"))
     (case,) = found.cases
     assert (case.motions, case.undecided) == (2, 0)
+
     # The two records differ only in their size, which the intensity takes out: both directions of each overturn together.
     assert {point[1] for point in case.points} <= {0.0, 0.5, 1.0}
     with pytest.raises(InputError, match="too few"):
         fragility.fragility(panel, request, [tmp_path / "0.csv"], Tiles(tmp_path / "tiles"))
+
+
+def test_a_fragility_curve_never_counts_a_failed_run_as_safe():
+    """Of four motions in both directions: what failed is in no share, no band and no fit."""
+    intensities = np.array([1.0, 2.0, 3.0])
+    overturned = np.zeros((4, 2, 3), dtype=bool)
+    overturned[:, :, 2] = True
+    overturned[:2, :, 1] = True
+    failed = np.zeros_like(overturned)
+    plain = fragility.curve_of("made", overturned, failed, intensities)
+    failed[2:, :, 1] = True  # all that did not overturn at 2: now nothing is known to be safe there
+    failed[0, 0, 2] = True
+    curve = fragility.curve_of("made", overturned, failed, intensities)
+    assert [point[1] for point in plain.points] == [0.0, 0.5, 1.0]
+    assert [point[1] for point in curve.points] == [0.0, 1.0, 1.0]
+    assert curve.points[1][2:4] == (1.0, 1.0)
+    assert curve.undecided == 5
+    assert curve.median < plain.median
+    failed[:, :, 1] = True
+    nowhere = fragility.curve_of("made", overturned, failed, intensities)
+    assert math.isnan(nowhere.points[1][1])
+    assert [nowhere.points[n][1] for n in (0, 2)] == [0.0, 1.0]
+    assert nowhere.median is not None
+    failed[:] = True
+    assert fragility.curve_of("made", overturned, failed, intensities).median is None

@@ -7,7 +7,8 @@
 | `tiles/` | `.json`: outcomes at some nodes of a spectrum |
 
 A name contains the hash of everything that the content depends on. So runs that share a folder can only ever write the same
-thing, and a reader never meets a half-written or outdated result.
+thing, and a reader never meets a half-written or outdated result. Each record holds the hash of its own name and content: one
+that was damaged, edited or exchanged is as good as none.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rockcheck.scenes.errors import InputError
+from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.writing import write_whole
 
 HISTORIES = "histories"
@@ -58,7 +61,7 @@ class Store:
         for suffix, text in files.items():
             write_whole(self.folder / HISTORIES / f"{name}{suffix}", text)
         hashes = {suffix: _hash(text.encode()) for suffix, text in files.items()}
-        write_whole(self.folder / HISTORIES / f"{name}.json", json.dumps({**record, "files": hashes}, sort_keys=True) + "\n")
+        write_whole(self.folder / HISTORIES / f"{name}.json", _sealed(name, {**record, "files": hashes}))
 
     def get(self, name: str) -> dict[str, Any] | None:
         """The record of a history whose files are whole, else None."""
@@ -76,7 +79,7 @@ class Store:
 
     def put_record(self, kind: str, name: str, content: Mapping[str, Any]) -> None:
         """Keep a result that is one record, such as a cell's figures."""
-        write_whole(self.folder / kind / f"{name}.json", json.dumps(content, sort_keys=True) + "\n")
+        write_whole(self.folder / kind / f"{name}.json", _sealed(name, content))
 
     def get_record(self, kind: str, name: str) -> dict[str, Any] | None:
         """A result that is one record, or None."""
@@ -99,12 +102,24 @@ class Store:
                 continue  # another run was quicker
 
 
+def _sealed(name: str, content: Mapping[str, Any]) -> str:
+    """A record with the hash of its name and content."""
+    return json.dumps({"content": content, "sha256": _seal(name, content)}, sort_keys=True) + "\n"
+
+
+def _seal(name: str, content: Mapping[str, Any]) -> str:
+    return _hash(json.dumps([name, content], sort_keys=True).encode())
+
+
 def _read(path: Path) -> dict[str, Any] | None:
+    """The content of a record that is whole, else None."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        found = json.loads(read_text(path))
+        content, seal = found["content"], found["sha256"]
+        whole = isinstance(content, dict) and seal == _seal(path.stem, content)
+    except (InputError, KeyError, TypeError, ValueError, RecursionError):
         return None
-    return found if isinstance(found, dict) else None
+    return content if whole else None
 
 
 def _touch(path: Path) -> None:

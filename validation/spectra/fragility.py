@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -26,7 +27,8 @@ class FragilityCurve(Stored):
 
     The fit is a lognormal curve: `median` is the intensity at which its probability is one half, `dispersion` the standard
     deviation of its logarithm; both None (and the probabilities NaN) where all or none overturn. `motions` are the records or
-    pulses, each in both directions; `undecided` runs, which failed, count as safe.
+    pulses, each in both directions; `undecided` runs failed, and count neither as overturned nor as safe: shares, bands and the
+    fit are those of the others (NaN at an intensity where all failed).
     """
 
     label: str
@@ -60,14 +62,14 @@ def fragility(panel: Panel, request: SpectrumRequest, records: Sequence[Path], t
         raise InputError(f"{len(records)} is too few: give at least {FEWEST} records", "--record")
     for label, case in [*walls, ("without a wall", scene.replace(walls=()))]:
         sides, failed = _play_records(case, request, records, tiles) if records else _play_pulses(case, request, tiles)
-        cases.append(curve_of(label, sides != SAFE, int(failed.sum()), request.amplitudes))
+        cases.append(curve_of(label, sides != SAFE, failed, request.amplitudes))
     motions = f"{len(records)} records" if records else f"{PULSES} pulses"
     about = (
         f"{motions}, each in both directions. Lines: share of the runs that overturn the block; bands: {CONFIDENCE:.0%}, by drawing the"
         f" {'records' if records else 'pulses'} anew {BOOTSTRAPS} times; dots: the lognormal curve of the greatest likelihood."
     )
     if undecided := sum(case.undecided for case in cases):
-        about += f" {undecided} runs failed and count as safe."
+        about += f" {undecided} runs failed: they count neither as overturned nor as safe."
     return Fragility(title=f"{panel.title}, {motions}", about=about, intensity="peak acceleration / (g tan α)", cases=tuple(cases))
 
 
@@ -100,20 +102,25 @@ def _play_records(scene: Scene, request: SpectrumRequest, records: Sequence[Path
     return np.array(sides), np.array(failed)
 
 
-def curve_of(label: str, overturned: NDArray[np.bool_], undecided: int, intensities: Floats) -> FragilityCurve:
-    """The curve of one case from its runs (motion, direction, intensity).
+def curve_of(label: str, overturned: NDArray[np.bool_], failed: NDArray[np.bool_], intensities: Floats) -> FragilityCurve:
+    """The curve of one case from its runs (motion, direction, intensity): which overturned, and which failed.
 
     The two directions of a motion are drawn together for the band, since they tell of the same motion.
     """
-    motions, directions, _ = overturned.shape
+    motions = len(overturned)
     drawn = np.random.default_rng(1).integers(motions, size=(BOOTSTRAPS, motions))
-    each = overturned.mean(axis=1)
-    low, high = np.quantile([each[chosen].mean(axis=0) for chosen in drawn], [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2], axis=0)
-    fit = fit_lognormal(intensities, overturned.sum(axis=(0, 1)), motions * directions)
+    fallen, decided = (overturned & ~failed).sum(axis=1), (~failed).sum(axis=1)  # (motion, intensity)
+    with np.errstate(invalid="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # an intensity at which all failed has no quantiles
+        share = fallen.sum(axis=0) / decided.sum(axis=0)
+        shares = fallen[drawn].sum(axis=1) / decided[drawn].sum(axis=1)
+        low, high = np.nanquantile(shares, [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2], axis=0)
+    fit = fit_lognormal(intensities, fallen.sum(axis=0), decided.sum(axis=0))
     fitted = lognormal(intensities, *fit) if fit else np.full(len(intensities), np.nan)
-    columns = (intensities, each.mean(axis=0), low, high, fitted)
-    points = tuple((float(x), float(share), float(lo), float(hi), float(p)) for x, share, lo, hi, p in zip(*columns, strict=True))
+    columns = (intensities, share, low, high, fitted)
+    points = tuple((float(x), float(y), float(lo), float(hi), float(p)) for x, y, lo, hi, p in zip(*columns, strict=True))
     median, dispersion = fit or (None, None)
+    undecided = int(failed.sum())
     return FragilityCurve(label=label, motions=motions, undecided=undecided, median=median, dispersion=dispersion, points=points)
 
 
@@ -125,20 +132,20 @@ def lognormal(intensities: Floats, median: float, dispersion: float) -> Floats:
     return p
 
 
-def fit_lognormal(intensities: Floats, overturned: NDArray[np.int64], motions: int) -> tuple[float, float] | None:
+def fit_lognormal(intensities: Floats, overturned: NDArray[np.int64], runs: NDArray[np.int64]) -> tuple[float, float] | None:
     """Median and dispersion of the lognormal curve of the greatest likelihood (Baker 2015); None where all or none overturn.
 
-    `overturned` counts the motions, of `motions`, that overturn the block at each intensity.
+    `overturned` counts the runs, of those that were decided, that overturn the block at each intensity.
     """
     from scipy.optimize import minimize
     from scipy.special import log_ndtr
 
-    if not 0 < overturned.sum() < motions * len(overturned):
+    if not 0 < overturned.sum() < runs.sum():
         return None
 
     def unlikelihood(place: Floats) -> float:
         linear = (np.log(intensities) - place[0]) / np.exp(place[1])
-        return -float(np.sum(overturned * log_ndtr(linear) + (motions - overturned) * log_ndtr(-linear)))
+        return -float(np.sum(overturned * log_ndtr(linear) + (runs - overturned) * log_ndtr(-linear)))
 
     found = minimize(
         unlikelihood, [float(np.mean(np.log(intensities))), -0.7], method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-9}

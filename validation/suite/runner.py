@@ -19,7 +19,7 @@ from rockcheck.scenes import History, InputError, Scene
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.discrepancy.compare import compare, describe, evaluate, too_short
-from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord
+from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.execute import provenance, workers
@@ -80,6 +80,38 @@ class PlannedBatch:
 Planned = PlannedCell | PlannedBatch
 
 
+class CellRecord(Stored):
+    """What is kept of a cell beside its history."""
+
+    outcome: str
+    notes: tuple[str, ...]
+    settings: dict[str, Any]
+    cost: CostRecord
+
+
+class BatchRecord(Stored):
+    """What is kept of a batch: peak |theta| in alpha and outcome of each scene, None and the reason where the model failed."""
+
+    peaks: tuple[float | None, ...]
+    outcomes: tuple[str, ...]
+    cost: CostRecord
+
+
+class ComparisonRecord(Stored):
+    """The figures of a comparison; by window, what could not be compared, and whether because one block fell."""
+
+    figures: tuple[Figure, ...]
+    gaps: dict[str, tuple[str, bool]]
+
+
+def _is(kind: type[Stored], found: Mapping[str, Any] | None) -> bool:
+    """Whether what was read back has the fields that it must have."""
+    try:
+        return found is not None and bool(kind.model_validate(found))
+    except ValueError:
+        return False
+
+
 def run_suite(
     suite: Suite,
     folder: Path,
@@ -111,8 +143,8 @@ def run_suite(
     if not force:
         for item in items:
             found = store.get(item.name) if isinstance(item, PlannedCell) else store.get_record(COMPARISONS, item.name)
-            if found is not None:
-                records[item] = found
+            if _is(CellRecord if isinstance(item, PlannedCell) else BatchRecord, found):
+                records[item] = found or {}
     read_back = set(records)
     failures |= {item: missing for item in items if (missing := not_installed(item.variant.family_name))}
     waiting = [item for item in items if item not in records and item not in failures]
@@ -379,7 +411,7 @@ def _horizon(store: Store, scene: Scene) -> float:
     key = provenance.cell_key(scene, "ebm-unilateral", {"of": "horizon"})
     name = name_of(scene.name, HORIZON, key)
     found = store.get_record(COMPARISONS, name)
-    if found is None:
+    if found is None or not isinstance(found.get("horizon"), float | int):
         from rockcheck.ebm.horizon import predictability_horizon
 
         found = {"horizon": predictability_horizon(scene)}
@@ -399,7 +431,7 @@ def _compared(
     key = provenance.digest(json.dumps([planned.key, reference.key if reference else "", list(map(str, windowed)), horizon, code]))
     name = name_of(scene.name, planned.variant.label, reference.variant.label if reference else OWN_FIGURES, key)
     found = store.get_record(COMPARISONS, name)
-    if found is None:
+    if found is None or not _is(ComparisonRecord, found):
         found = _compute(store, scene, planned, reference, windowed, horizon)
         store.put_record(COMPARISONS, name, found)
     return found

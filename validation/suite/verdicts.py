@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
+from rockcheck.scenes.errors import printable
 from rockcheck.scenes.writing import markdown_table
 from rockcheck.validation.suite.results import Cell, Check, Run
 from rockcheck.validation.suite.tables import share, title, verdict_lines
@@ -30,7 +32,8 @@ def junit(run: Run) -> str:
             suite.add_testcase(_case("tolerances", fault, Failure(fault)))
         document.add_testsuite(suite)
     document.update_statistics()
-    return bytes(document.tostring()).decode() + "\n"
+    text = bytes(document.tostring()).decode()
+    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text) + "\n"  # XML knows no control characters
 
 
 def _cases(cell: Cell, strict: bool) -> Iterator[TestCase]:
@@ -56,7 +59,7 @@ def _case(place: str, name: str, result: Failure | Error | Skipped | None) -> Te
 def markdown(run: Run) -> str:
     """A summary for a job's page: the verdict, what is not a pass and why, and a table of scenes by models."""
     lines = [
-        f"## {MARKS[run.verdict]} rockcheck {run.suite}: {run.verdict}",
+        f"## {MARKS[run.verdict]} rockcheck {_plain(run.suite)}: {run.verdict}",
         "",
         f"{len(run.cells)} simulations, {run.up_to_date} up to date, {sum(1 for _ in run.checks())} checks, {run.wall_seconds:.1f} s.",
         "",
@@ -65,7 +68,7 @@ def markdown(run: Run) -> str:
     if reasons:
         lines += [*(f"- {_plain(reason)}" for reason in reasons), ""]
     rows = ((_plain(scene), *(_entry(run.cell(scene, model)) for model in run.models)) for scene in run.places)
-    return "\n".join([*lines, markdown_table(("scene", *run.models), rows)]) + "\n"
+    return "\n".join([*lines, markdown_table(("scene", *map(_plain, run.models)), rows)]) + "\n"
 
 
 def _entry(cell: Cell | None) -> str:
@@ -81,4 +84,5 @@ def _worst(checks: tuple[Check, ...]) -> str:
 
 
 def _plain(text: str) -> str:
-    return text.replace("<", "&lt;")
+    """Text that somebody else may have chosen, as Markdown that shows it and does nothing: no tag, link, picture or new line."""
+    return re.sub(r"([\\`*\[\]!#~])", r"\\\1", printable(text, 1000)).replace("&", "&amp;").replace("<", "&lt;").replace("://", ":&#47;/")

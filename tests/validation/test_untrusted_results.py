@@ -1,0 +1,154 @@
+"""What is read back is not trusted: a result that was damaged, edited or exchanged is found, and played or compared again."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from rockcheck.validation.execute import workers
+from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, Store, _sealed
+from rockcheck.validation.suite.results import Cell, Run
+from rockcheck.validation.suite.runner import run_suite
+from rockcheck.validation.suite.suites import load_suite
+from rockcheck.validation.suite.verdicts import junit, markdown
+
+SUITE = """
+reference = "still"
+[models.still]
+model = "faulty:Still"
+[models.near]
+model = "faulty:Still"
+offset = 1e-3
+[[scene]]
+name = "short"
+duration = 0.5
+block = { half_width = 0.4, half_height = 1.5 }
+floor = { friction = 0.5 }
+[[ensemble]]
+name = "crowd"
+count = 4
+[ensemble.scene]
+duration = 0.2
+block = { half_width = 0.4, half_height = 1.5 }
+floor = { friction = 0.5 }
+[tolerances.short.near.still]
+theta_peak = { expected = 0.0038, limit = 0.01, drift = 0.001, why = "a test" }
+[tolerances.crowd.near.still]
+ks_distance = { expected = 1.0, limit = 1.0, drift = 0.0, why = "a test" }
+"""
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch) -> Callable[[], Run]:
+    monkeypatch.setattr(sys, "path", list(sys.path))  # the suite's folder joins it
+    monkeypatch.delitem(sys.modules, "faulty", raising=False)
+    shutil.copy(Path(__file__).parent / "models" / "faulty.py", tmp_path / "faulty.py")
+    (tmp_path / "mine.toml").write_text(SUITE)
+
+    def run() -> Run:
+        suite = load_suite(tmp_path / "mine.toml", allow_code=["faulty:Still"])
+        return run_suite(suite, tmp_path / "out", play=lambda tasks, **_: enumerate(map(workers.play, tasks)))
+
+    return run
+
+
+def records(folder: Path) -> list[Path]:
+    return sorted(path for kind in (HISTORIES, COMPARISONS) for path in (folder / "out" / kind).glob("*.json"))
+
+
+def plain(run: Run) -> list[Any]:
+    return [(cell.figures, cell.verdict, cell.outcome, cell.reason) for cell in run.cells]
+
+
+def edited(path: Path, change: Callable[[Any], Any]) -> None:
+    """Change every number and outcome of a record, as an editor would; its hash is not told."""
+
+    def walk(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: item if key == "sha256" else walk(item) for key, item in value.items()}
+        return [walk(item) for item in value] if isinstance(value, list) else change(value)
+
+    path.write_text(json.dumps(walk(json.loads(path.read_text()))))
+
+
+DAMAGE: dict[str, Callable[[Path], Any]] = {
+    "a figure edited": lambda path: edited(path, lambda value: 0.5 * value + 7.0 if isinstance(value, float) else value),
+    "an outcome edited": lambda path: edited(path, lambda value: "overturned left" if value == "at rest" else value),
+    "no content": lambda path: path.write_text("{}"),
+    "a list": lambda path: path.write_text("[]"),
+    "a number": lambda path: path.write_text("7"),
+    "null": lambda path: path.write_text("null"),
+    "empty": lambda path: path.write_text(""),
+    "cut short": lambda path: path.write_text(path.read_text()[:-40]),
+    "no hash": lambda path: path.write_text(json.dumps({"content": json.loads(path.read_text())["content"]})),
+    "not text": lambda path: path.write_bytes(b"\xff\xfe\x00"),
+    "deep": lambda path: path.write_text("[" * 100_000),
+    "another shape, well hashed": lambda path: path.write_text(_sealed(path.stem, {"figures": 7, "peaks": [1], "outcome": 3})),
+    "empty, well hashed": lambda path: path.write_text(_sealed(path.stem, {})),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_a_damaged_record_is_found_and_made_again(tmp_path, run, damage):
+    """The same figures and verdicts as before, and no traceback."""
+    before = plain(run())
+    whole = {path: path.read_text() for path in records(tmp_path)}
+    assert len(whole) >= 6
+    for path in whole:
+        DAMAGE[damage](path)
+    changed = [path for path, text in whole.items() if path.read_bytes() != text.encode()]
+    assert changed
+    assert plain(run()) == before
+    again = run()
+    assert plain(again) == before
+    assert all(cell.read_back for cell in again.cells)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with a name are POSIX")
+def test_a_record_that_is_a_pipe_is_not_waited_for(tmp_path, run):
+    before = plain(run())
+    for path in records(tmp_path):
+        path.unlink()
+        os.mkfifo(path)
+    for path in records(tmp_path):
+        assert Store(tmp_path / "out").get_record(path.parent.name, path.stem) is None
+        path.unlink()
+    assert plain(run()) == before
+
+
+def test_a_record_under_another_name_is_none(tmp_path, run):
+    """The figures of one cell, copied over those of another."""
+    before = plain(run())
+    paths = [path for path in records(tmp_path) if path.parent.name == COMPARISONS]
+    texts = [path.read_text() for path in paths]
+    for path, text in zip(paths, [*texts[1:], texts[0]], strict=True):
+        path.write_text(text)
+    assert plain(run()) == before
+
+
+EVIL = "a|b](http://x.y/?z)<img src=x onerror=alert(1)>`c`![p](http://x.y/p.png)\n# title\x00\x1b[2J&amp; https://x.y www"
+
+
+def test_names_in_the_summary_and_in_junit_are_text(tmp_path):
+    """A model, scene, suite or reason may be called anything: no tag, link, picture, line or control character comes of it."""
+    cell = Cell(scene=EVIL, model=EVIL, status="failed", reason=EVIL)
+    made = Run(suite=EVIL, created="2026", reference="x", scenes={}, models=(EVIL,), cells=(cell,), faults=(EVIL,))
+    text = markdown(made)
+    assert text.replace("\n", "").isprintable()
+    assert len([line for line in text.splitlines() if line.startswith("#")]) == 1
+    assert "<" not in text
+    assert "://" not in text
+    for mark in ("](", "![", "`"):
+        assert mark not in text.replace("\\[", "").replace("\\]", "").replace("\\`", "").replace("\\!", ""), mark
+    rows = [line for line in text.splitlines() if line.startswith("|")]
+    assert len(rows) == 3
+    assert {line.replace("\\|", "").count("|") for line in rows} == {3}
+    assert ElementTree.fromstring(junit(made)).get("errors") == "1"
