@@ -74,6 +74,7 @@ def test_the_old_name_warns_and_leaves_other_plugins_theirs(pytester, monkeypatc
     shutil.copy(Path(__file__).parent / "models" / "faulty.py", pytester.path / "faulty.py")
     (pytester.path / "rockcheck.toml").write_text(SUITE, encoding="utf-8")
     pytester.makepyfile('def test_old(check):\n    assert check("my-scene", model="near").figures\n')
+    pytester.makeini("[pytest]\nrockcheck_allow_code = faulty:Still faulty:Fails\n")
     result = pytester.runpytest_subprocess("-W", "default::DeprecationWarning")
     result.assert_outcomes(passed=1, warnings=1)
     result.stdout.fnmatch_lines(["*fixture `check` is called `rockcheck_check` now*"])

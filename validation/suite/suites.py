@@ -11,7 +11,7 @@ A suite is a TOML file that a user can write:
     [models.ebm]
     [models.mujoco]
     time_step = 1e-4
-    [models.mujoco-coarse]                       # a second variant of a model; "my_module:MyModel" is one of your own
+    [models.mujoco-coarse]                       # a second variant of a model; "my_module:MyModel" is one of your own, see --allow-code
     model = "mujoco"
     time_step = 1e-3
     [models.table]                               # a measured history, for the scenes that it names (validation.discrepancy.measured)
