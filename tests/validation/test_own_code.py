@@ -64,7 +64,7 @@ def traces(folder: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("model", ["os:system", "subprocess:run", "subprocess:Popen", "spy:Told", "builtins:exec", "faulty:Still"])
-@pytest.mark.parametrize("command", ["validate", "accept", "simulate", "spectrum"])
+@pytest.mark.parametrize("command", ["validate", "accept", "simulate", "spectrum", "conformance"])
 def test_a_suite_or_a_name_alone_runs_nothing(folder, capsys, model, command):
     """One line that names the option; exit 2; nothing is imported."""
     before = set(sys.modules)
@@ -72,6 +72,7 @@ def test_a_suite_or_a_name_alone_runs_nothing(folder, capsys, model, command):
     words = {
         "simulate": ["simulate", "scene.toml", "--model", model, "--set", "command=touch ran"],
         "spectrum": ["spectrum", "--scene", "scene.toml", "--size", "3", "--model", model],
+        "conformance": ["conformance", "--engine", model],
     }
     assert main(words.get(command, [command, "mine.toml"])) == 2
     (line,) = capsys.readouterr().err.splitlines()

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-import tomllib
+import sys
+from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rockcheck.scenes import History, InputError, Scene
+from rockcheck.scenes import History, InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
-from rockcheck.scenes.progress import OnProgress
+from rockcheck.scenes.files import read_toml
+from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.validation.conformance.cards import Card, make_card
 from rockcheck.validation.conformance.phenomena import SCENES
 from rockcheck.validation.discrepancy.measured import Measured
-from rockcheck.validation.execute.models import FAMILIES, build, family, is_own
+from rockcheck.validation.execute.models import FAMILIES, build_own, family, is_own
+from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.execute.provenance import version_of
 
 #: What a folder of histories says of itself.
@@ -46,7 +49,7 @@ def slug_of(scene: str) -> str:
 def card_of(asked: Asked, on_progress: OnProgress) -> Card:
     """The card of an engine by name, or of a model of the user's own by "module:Class"."""
     settings: dict[str, Any] = {"time_step": asked.step} | ({"settings": asked.settings} if asked.settings else {})
-    model: Any = build(asked.engine, settings)
+    model: Any = build_own(asked.engine, settings)
     kind = family(asked.engine)
     version = str(getattr(model, "version", "")) if is_own(asked.engine) else version_of(kind.libraries[0])
     lacks: Iterable[str] = model.lacks() if hasattr(model, "lacks") else ()
@@ -61,15 +64,25 @@ def card_of(asked: Asked, on_progress: OnProgress) -> Card:
     return make_card(model.simulate, lacks=lacks, on_scene=on_scene, **about)
 
 
+def card_of_own(asked: Asked, folder: str) -> Card:
+    """The card of a model of the user's own that may lie in `folder`, by a process that imports its code."""
+    with Pool(1) as pool:
+        (ended,) = pool.run(deque([Call(_card_apart, (asked, folder))]))
+    if ended.error is not None:
+        raise ended.error if isinstance(ended.error, InputError | ModelFailure) else ModelFailure(f"{asked.engine}: {ended.fault}")
+    card: Card = ended.result
+    return card
+
+
+def _card_apart(asked: Asked, folder: str) -> Card:
+    sys.path.append(folder)
+    return card_of(asked, unheard)
+
+
 def card_of_histories(folder: Path) -> Card:
     """The card of a folder with a CSV for each scene, and an `engine.toml` that says whose they are."""
     path = folder / ABOUT
-    try:
-        about = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{printable(path)}: cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{printable(path)}: not valid TOML: {printable(error)}") from None
+    about = read_toml(path)
     allowed = {"engine": str, "version": str, "settings": str, "step": float, "lacks": list}
     for key, value in about.items():
         if key not in allowed or not isinstance(value, allowed[key]):

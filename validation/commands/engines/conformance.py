@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -13,7 +13,7 @@ from rich.table import Table
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.writing import write_together, write_whole
-from rockcheck.validation.commands import OUT, OutOption, answer, console, model_names, progress, usable_folder
+from rockcheck.validation.commands import OUT, AllowCodeOption, OutOption, answer, console, model_names, progress, usable_folder
 
 if TYPE_CHECKING:
     from rockcheck.validation.conformance.cards import Card
@@ -39,6 +39,7 @@ def run(
     compare: Annotated[
         tuple[Path, Path] | None, typer.Option("--compare", help="What changed between two files of cards, and stop.")
     ] = None,
+    allow_code: AllowCodeOption = None,
     out: OutOption = OUT / "conformance",
 ) -> None:
     """Hold engines against phenomena with a certain answer.
@@ -53,14 +54,15 @@ def run(
         return
     from rockcheck.reports.studies.conformance import write_conformance
     from rockcheck.validation.conformance.cards import as_json, junit, markdown
-    from rockcheck.validation.conformance.study import card_of, card_of_histories
+    from rockcheck.validation.conformance.study import card_of, card_of_histories, card_of_own
+    from rockcheck.validation.execute.models import is_own
 
-    asked = _asked(engine, settings, step, bool(histories))
+    asked = _asked(engine, settings, step, bool(histories), allow_code or ())
     folder = usable_folder(out)
     cards: list[Card] = []
     for one in asked:
         with progress("conformance") as on_progress:
-            cards.append(card_of(one, on_progress))
+            cards.append(card_of_own(one, str(Path.cwd())) if is_own(one.engine) else card_of(one, on_progress))
     cards += [card_of_histories(path) for path in histories or []]
     data = as_json(cards)
     write_together(
@@ -77,10 +79,10 @@ def run(
     raise typer.Exit(int(any(card.failed for card in cards)))
 
 
-def _asked(names: list[str] | None, settings: str | None, step: float, elsewhere: bool) -> list[Asked]:
+def _asked(names: list[str] | None, settings: str | None, step: float, elsewhere: bool, allow_code: Sequence[str]) -> list[Asked]:
     """What is to be played; nothing where histories are given and no engine is named."""
     from rockcheck.validation.conformance.study import Asked, engines_here
-    from rockcheck.validation.execute.models import FAMILIES, build, is_own, not_installed
+    from rockcheck.validation.execute.models import FAMILIES, build, check_allowed, is_own, not_installed
 
     if not 0.0 < step <= 0.1:
         raise InputError(f"{step:g} is not allowed: a step above 0 and up to 0.1 s is asked for", "--step")
@@ -89,7 +91,7 @@ def _asked(names: list[str] | None, settings: str | None, step: float, elsewhere
     found = []
     for name in names:
         if is_own(name):
-            sys.path.append(str(Path.cwd()))
+            check_allowed(name, allow_code)
         elif name not in FAMILIES or FAMILIES[name].module != "rockcheck.engines":
             known = ", ".join(key for key, kind in FAMILIES.items() if kind.module == "rockcheck.engines")
             raise InputError(f"{printable(name)!r} is not allowed: one of {known}, or module:Class is asked for", "--engine")
@@ -98,7 +100,8 @@ def _asked(names: list[str] | None, settings: str | None, step: float, elsewhere
         if reason := not_installed(name):  # told before others have run
             raise InputError(reason, f"--engine {name}")
     for one in found:
-        build(one.engine, {"time_step": one.step} | ({"settings": one.settings} if one.settings else {}))
+        if not is_own(one.engine):
+            build(one.engine, {"time_step": one.step} | ({"settings": one.settings} if one.settings else {}))
     return found
 
 
