@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 from rockcheck.scenes import Scene
@@ -36,11 +37,11 @@ def inputs_of(store: Store, given: UncertainScene) -> Inputs:
     code = provenance.code_digest("rockcheck.validation.uncertainty.inputs")
     key = provenance.cell_key(given.scene, "ebm-unilateral", {"spreads": spreads, "correlation": given.correlation.tolist(), "code": code})
     name = name_of(given.scene.name, "inputs", key)
-    found = store.get_record(COMPARISONS, name)
-    if found is None:
-        found = propagate(given).inputs.model_dump(mode="json")
-        store.put_record(COMPARISONS, name, found)
-    return Inputs(**found)
+    with suppress(TypeError, ValueError):  # what is kept is not trusted to have the fields that it must have
+        return Inputs(**(store.get_record(COMPARISONS, name) or {}))
+    found = propagate(given).inputs
+    store.put_record(COMPARISONS, name, found.model_dump(mode="json"))
+    return found
 
 
 def explanations(

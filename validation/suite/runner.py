@@ -31,6 +31,7 @@ from rockcheck.validation.suite.results import Cell, CostRecord, EnsembleRecord,
 from rockcheck.validation.suite.suites import ModelVariant, Suite
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Place, Windowed, judge
 from rockcheck.validation.uncertainty.inputs import Inputs
+from rockcheck.validation.uncertainty.numerical import Numerical
 
 FAULTS = "faults"
 #: Plays tasks somewhere: yields (index, result) as they end.
@@ -86,6 +87,8 @@ class CellRecord(Stored):
     outcome: str
     notes: tuple[str, ...]
     settings: dict[str, Any]
+    uncertainty: dict[str, Any]
+    numerical: Numerical | None
     cost: CostRecord
 
 
