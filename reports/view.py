@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.scenes import History, InputError, Scene, kinematics
+from rockcheck.scenes.trust import experience
 from rockcheck.validation.suite.results import Cell, Run
+from rockcheck.validation.uncertainty.inputs import Inputs
 
 Array = NDArray[np.float64]
 
@@ -95,6 +97,21 @@ class SceneView:
     def cells(self) -> tuple[Cell, ...]:
         """The scene's cells, in the models' order."""
         return self.run.of_scene(self.name)
+
+    @property
+    def explained(self) -> tuple[Cell, ...]:
+        """The cells whose differences from a reference are held against their uncertainty."""
+        return tuple(cell for cell in self.cells if cell.explanations)
+
+    @property
+    def inputs(self) -> Inputs | None:
+        """What the spread of the scene's inputs makes of its figures."""
+        return self.run.inputs.get(self.name)
+
+    @cached_property
+    def outside(self) -> list[str]:
+        """The axes on which the scene lies outside of what the suites cover; empty where nothing is known of them."""
+        return experience.outside(self.scene) if experience.known().domain else []
 
     @cached_property
     def t(self) -> Array:

@@ -74,6 +74,17 @@ def ks_distance(samples: Samples) -> tuple[float, str]:
     return float(found.statistic), f"p = {found.pvalue:.2g}"
 
 
+@statistic("area between the distributions", "1", resolution=1e-4)
+def area_metric(samples: Samples) -> tuple[float, str]:
+    """Area between the distribution functions of peak |theta|/alpha (ASME V&V 10-2006; Ferson 2008), the fallen at 1, the balance point."""
+    from scipy.stats import wasserstein_distance
+
+    r, c = (np.where(sample.fallen, 1.0, np.minimum(sample.peaks, 1.0)) for sample in (samples.reference, samples.candidate))
+    if np.any(np.isnan(r)) or np.any(np.isnan(c)):
+        return math.nan, "a model failed in some of the scenes"
+    return float(wasserstein_distance(r, c)), ""
+
+
 @statistic("agreement on overturning", "1", ideal=1.0, resolution=1e-3)
 def overturning_accuracy(samples: Samples) -> tuple[float, str]:
     """Share of scenes in which both fall or both stay; the remark gives its 95 % confidence interval (Wilson 1927)."""
