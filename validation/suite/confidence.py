@@ -109,7 +109,7 @@ def _both(name: str, mine: Numerical, other: Numerical | None) -> tuple[float | 
             continue
         u = found.u_num(name)
         if u is None:
-            return None, "; ".join(found.reasons)
+            return None, found.reason(name)
         total = math.hypot(total, u)
     return total, ""
 

@@ -102,6 +102,10 @@ class Numerical(Stored):
         """The uncertainty of a quantity; None where it is not converged or not known."""
         return next((q.u_num for q in self.quantities if q.name == name and q.verdict == "converged"), None)
 
+    def reason(self, name: str) -> str:
+        """Why a quantity is not converged; of one that the runs do not have, why nothing is."""
+        return next((q.reason for q in self.quantities if q.name == name), "; ".join(self.reasons))
+
     @property
     def reasons(self) -> tuple[str, ...]:
         """Why what is not converged is not, each reason once."""
