@@ -1,0 +1,209 @@
+"""Two hundred hostile cases: files, caches, environments, signals and limits. `python tests/stress/hostile.py` tries all of them.
+
+Each ends within 60 s with an exit code that it may have, at most one line on stderr, no traceback, and no file where none belongs.
+`test_hostile.py` beside this file tries a tenth of them.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+SECONDS = 60.0
+SCENE = """name = "a"
+duration = 0.5
+output_step = 0.01
+block = { half_width = 0.3, half_height = 1.0 }
+floor = { friction = 0.4 }
+excitation = { kind = "ricker", amplitude = 4.0, period = 0.7 }
+"""
+SUITE = 'reference = "ebm"\nscenes = ["a.toml"]\n[models.ebm]\n'
+HISTORY = "t,theta,x\n0.0,0.1,0.0\n0.1,0.05,0.0\n0.2,-0.01,0.001\n"
+AT2 = "ACCELERATION IN UNITS OF G\nNPTS= 4, DT= .01 SEC\n.1 .2 .3 .4\n"
+RECORD = "time_s,acceleration_g\n0.0,0.1\n0.01,0.2\n0.02,0.1\n"
+
+#: What a file of any kind may be instead of what it says that it is.
+WHOLE: dict[str, Callable[[Path, bytes], object]] = {
+    "empty": lambda path, _: path.write_bytes(b""),
+    "a null byte": lambda path, _: path.write_bytes(b"\0"),
+    "random bytes": lambda path, _: path.write_bytes(bytes(range(256)) * 40),
+    "UTF-16": lambda path, valid: path.write_bytes(valid.decode().encode("utf-16")),
+    "a byte-order mark": lambda path, valid: path.write_bytes(b"\xef\xbb\xbf" + valid),
+    "cut short": lambda path, valid: path.write_bytes(valid[: len(valid) // 2]),
+    "twice": lambda path, valid: path.write_bytes(valid + valid),
+    "a line of a megabyte": lambda path, valid: path.write_bytes(valid + b"x" * 1_000_000),
+    "digits": lambda path, valid: path.write_bytes(valid + b"1" * 100_000 + b"x\n"),
+    "blanks": lambda path, valid: path.write_bytes(b" " * 100_000 + b"\n" + valid),
+    "commas": lambda path, valid: path.write_bytes(valid + b"," * 200_000),
+    "quotes": lambda path, valid: path.write_bytes(valid + b'"' * 100_001),
+    "brackets": lambda path, valid: path.write_bytes(b"[" * 100_000 + valid),
+    "dots": lambda path, valid: path.write_bytes(b"a" + b".a" * 100_000 + b" = 1\n" + valid),
+    "lines": lambda path, valid: path.write_bytes(valid + b"\n" * 1_000_000),
+    "remarks": lambda path, valid: path.write_bytes(b"# remark\n" * 100_000 + valid),
+    "escapes": lambda path, valid: path.write_bytes(b"\x1b[2J\x1b]0;x\x07" + valid),
+    "a pipe": lambda path, _: os.mkfifo(path),
+    "a device": lambda path, _: path.symlink_to("/dev/zero"),
+    "a folder": lambda path, _: path.mkdir(),
+    "a link to itself": lambda path, _: path.symlink_to(path),
+    "a link to nowhere": lambda path, _: path.symlink_to(path.with_name("nowhere")),
+    "a sparse terabyte": lambda path, _: _sparse(path),
+}
+
+
+def _sparse(path: Path) -> None:
+    with path.open("wb") as stream:
+        stream.truncate(2**40)
+
+
+#: Of each reader: the file, what is valid there, and the command that reads it.
+READERS: dict[str, tuple[str, str, tuple[str, ...]]] = {
+    "scene": ("a.toml", SCENE, ("simulate", "a.toml", "--model", "ebm", "-o", "o.csv")),
+    "suite": ("s.toml", SUITE, ("validate", "s.toml", "--no-report", "--jobs", "1", "--out", "out")),
+    "history": ("h.csv", HISTORY, ("compare", "h.csv", "good.csv")),
+    "AT2": ("r.AT2", AT2, ("simulate", "at2.toml", "--model", "ebm", "-o", "o.csv")),
+    "record": ("r.csv", RECORD, ("simulate", "record.toml", "--model", "ebm", "-o", "o.csv")),
+    "run": ("run/run.json", "{}", ("report", "run")),
+}
+#: Numbers and words in place of a scene's.
+VALUES = ("nan", "inf", "-1.0", "0.0", "1e308", "1e-308", "true", '"x"', "[]", "{}", "1979-05-27", "9" * 400)
+KEYS = ("duration", "half_width", "friction", "amplitude")
+#: Names of models that a suite or a command line may name, and that run nothing.
+CODE = ("os:system", "subprocess:Popen", "builtins:exec", "spy:Told", "a.b:C", "os:", ":system", "../spy:Told")
+#: Environments in which `rockcheck scenes` and `--version` work, or say in a line why not.
+ENVIRONMENTS = (
+    {"NUMBA_DISABLE_JIT": "1"},
+    {"NUMBA_CACHE_DIR": "/dev/null/x"},
+    {"HOME": "/nonexistent", "XDG_CACHE_HOME": "/nonexistent"},
+    {"COLUMNS": "1"},
+    {"COLUMNS": "x"},
+    {"LC_ALL": "C", "PYTHONUTF8": "0"},
+    {"PYTHONIOENCODING": "ascii"},
+    {"TERM": "x\x1b"},
+    {"TMPDIR": "/nonexistent"},
+    {"NO_COLOR": "1", "FORCE_COLOR": "1"},
+)
+LIMITED = """
+import resource, signal, sys
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(getattr(resource, sys.argv[1]), (int(sys.argv[2]),) * 2)
+from rockcheck.validation.commands.cli import main
+sys.exit(main(sys.argv[3:]))
+"""
+ROCKCHECK = (sys.executable, "-m", "rockcheck")
+SPY = "from pathlib import Path\n(Path(__file__).parent / 'imported').write_text('')\nclass Told: pass\n"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A command in a prepared folder, the exit codes that it may have, and a signal that it gets after some seconds."""
+
+    name: str
+    words: tuple[str, ...]
+    prepare: Callable[[Path], object] = lambda folder: None
+    codes: tuple[int, ...] = (0, 1, 2, 3)
+    environment: dict[str, str] = field(default_factory=dict)
+    signal_after: float | None = None
+    limit: tuple[str, ...] = ()
+
+
+def cases() -> Iterator[Case]:
+    """All cases, always in the same order."""
+    for reader, (file, valid, words) in READERS.items():
+        for kind, spoil in WHOLE.items():
+            yield Case(f"{reader}: {kind}", words, lambda folder, f=file, v=valid, s=spoil: _replaced(folder / f, v, s))
+    for key in KEYS:
+        for value in VALUES:
+            text = re.sub(rf"\b{key} = [^,}}\n]+", lambda _, k=key, v=value: f"{k} = {v}", SCENE)
+            words = ("simulate", "a.toml", "--model", "ebm", "-o", "o.csv")
+            yield Case(f"scene: {key} = {value[:12]}", words, lambda folder, t=text: (folder / "a.toml").write_text(t))
+    for name in CODE:
+        text = f'reference = "ebm"\nscenes = ["a.toml"]\n[models.ebm]\n[models.x]\nmodel = "{name}"\ncommand = "touch imported"\n'
+        yield Case(f"code: {name}", ("validate", "s.toml"), lambda folder, t=text: (folder / "s.toml").write_text(t), (2,))
+    for environment in ENVIRONMENTS:
+        yield Case(f"environment: {environment}", ("scenes",), environment=environment, codes=(0, 2))
+    for size in (0, 100, 3000):
+        yield Case(f"disk: {size} bytes", ("simulate", "a.toml", "--model", "ebm", "-o", "o.csv"), limit=("RLIMIT_FSIZE", str(size)))
+    for count in (12, 24):
+        yield Case(f"files: {count}", ("scenes",), limit=("RLIMIT_NOFILE", str(count)), codes=(0, 1, 2, 70))
+    fast = SCENE.replace("amplitude = 4.0, period = 0.7", "amplitude = 1e30, period = 1e-28").replace("ricker", "sine")
+    for wait in (1.5, 4.0):
+        words = ("simulate", "a.toml", "--model", "ebm", "-o", "o.csv")
+        spoil = lambda folder: (folder / "a.toml").write_text(fast)  # noqa: E731
+        yield Case(f"Ctrl-C after {wait} s", words, spoil, (0, 2, 3, 130, -2), signal_after=wait)
+
+
+def _replaced(path: Path, valid: str, spoil: Callable[[Path, bytes], object]) -> None:
+    path.unlink(missing_ok=True)
+    spoil(path, valid.encode())
+
+
+def _folder(place: Path) -> Path:
+    """Valid files of every kind."""
+    (place / "run").mkdir()
+    for name, text in {
+        "a.toml": SCENE,
+        "s.toml": SUITE,
+        "h.csv": HISTORY,
+        "good.csv": HISTORY,
+        "r.AT2": AT2,
+        "r.csv": RECORD,
+        "spy.py": SPY,
+    }.items():
+        (place / name).write_text(text)
+    for name, file in {"at2.toml": "r.AT2", "record.toml": "r.csv"}.items():
+        (place / name).write_text(re.sub(r"excitation = .*", f'excitation = {{ kind = "record", file = "{file}" }}', SCENE))
+    return place
+
+
+def try_case(case: Case) -> str:
+    """Why a case is not as it should be; empty where it is."""
+    with tempfile.TemporaryDirectory() as inside:
+        folder = _folder(Path(inside))
+        case.prepare(folder)
+        command = [sys.executable, "-c", LIMITED, *case.limit, *case.words] if case.limit else [*ROCKCHECK, *case.words]
+        running = subprocess.Popen(
+            command, cwd=folder, env={**os.environ, **case.environment}, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        )
+        try:
+            if case.signal_after is not None:
+                time.sleep(case.signal_after)
+                running.send_signal(signal.SIGINT)
+            _, said = running.communicate(timeout=SECONDS)
+        except subprocess.TimeoutExpired:
+            running.kill()
+            running.communicate()
+            return f"did not end within {SECONDS:g} s"
+        text = said.decode("utf-8", "replace")
+        lines = [line for line in text.splitlines() if "no private folder for compiled code" not in line]
+        if running.returncode not in case.codes:
+            return f"exit code {running.returncode}: {text[-300:]}"
+        if running.returncode != -2 and ("Traceback" in text or len(lines) > 1 or any(not line.isprintable() for line in lines)):
+            return f"stderr: {text[-300:]}"
+        if (folder / "imported").exists():
+            return "code was run"
+        leavings = [path.name for path in folder.rglob("*.part")]
+        return f"left behind: {leavings}" if leavings else ""
+
+
+def main() -> int:
+    """Try all; exit 1 where one is not as it should be."""
+    wrong = 0
+    tried = list(cases())
+    for case in tried:
+        if fault := try_case(case):
+            wrong += 1
+            print(f"{case.name}: {fault}", flush=True)
+    print(f"{len(tried)} hostile cases, {wrong} not as they should be")
+    return int(bool(wrong))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,24 @@
+"""A tenth of the hostile cases of `hostile.py`; `make nightly` tries all."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from hostile import Case, cases, try_case
+
+sys.path.pop(0)
+
+
+def test_there_are_two_hundred():
+    assert len(list(cases())) >= 200
+    assert len({case.name for case in cases()}) == len(list(cases()))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes, devices, limits and signals as POSIX has them")
+@pytest.mark.parametrize("case", list(cases())[::10], ids=lambda case: case.name)
+def test_a_hostile_case_ends_with_a_result_or_one_clear_line(case: Case):
+    assert try_case(case) == ""
