@@ -235,3 +235,22 @@ def test_scene_files_of_all_phenomena_are_apart(tmp_path):
         write_scene_file(scene, tmp_path, slug_of(name))
     assert len(list(tmp_path.glob("*.toml"))) == len(SCENES)
     assert set(cards_module.VERDICTS) == {"pass", "fail", "lacks", "error", "reported"}
+
+
+def test_a_fault_in_code_of_ones_own_costs_its_cards_only(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "halfway.py").write_text(
+        "from rockcheck.engines import MuJoCo\n\n\nclass Halfway(MuJoCo):\n"
+        "    def simulate(self, scene):\n"
+        "        if scene.name == 'coast':\n"
+        "            raise RuntimeError('no such road')\n"
+        "        return super().simulate(scene)\n",
+        encoding="utf-8",
+    )
+    own = "halfway:Halfway"
+    assert main(["conformance", "--engine", own, "--allow-code", own, "--settings", "default", "--json"]) == 1
+    (found,) = json.loads(capsys.readouterr().out)["cards"]
+    rows = {row["id"]: row for row in found["phenomena"]}
+    assert "no such road" in rows["RC-05"]["reason"]
+    assert rows["RC-06"]["verdict"] == "lacks"
+    assert rows["RC-11"]["verdict"] == "pass"

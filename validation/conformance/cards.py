@@ -83,6 +83,8 @@ def make_card(
             histories[name] = play(scene)
         except (ModelFailure, InputError) as error:
             faults[name] = printable(error, 200)
+        except Exception as error:  # one's own model may raise anything: it costs the cards that need this scene
+            faults[name] = printable(f"{type(error).__name__}: {error}", 200)
     notes = tuple(dict.fromkeys(note for history in histories.values() for note in history.notes))
     rows = tuple(_row(phenomenon, histories, faults, tuple(lacks)) for phenomenon in PHENOMENA)
     return Card(engine, version, settings, step, rows, notes)
