@@ -195,6 +195,7 @@ def try_case(case: Case) -> str:
 
 def main() -> int:
     """Try all; exit 1 where one is not as it should be."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs, and all that they start, ignore Ctrl-C
     wrong = 0
     tried = list(cases())
     for case in tried:
