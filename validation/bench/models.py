@@ -22,6 +22,8 @@ from rockcheck.validation.execute.pool import Call, Pool
 
 #: Errors for which each model's cost is told, alpha.
 LEVEL = 1e-3
+#: The cost at which engines are compared in their league, CPU s a simulated second.
+EQUAL_COST = 0.02
 #: Runs at least this long (s) are timed once, shorter ones `REPEATS` times.
 LONG_ENOUGH, REPEATS = 0.02, 3
 #: An engine's step (s) below which its runs are played side by side in worker processes, after all others.
@@ -54,6 +56,8 @@ class DiagramLine:
 _TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 _STEPS = (1e-2, 1e-3, 1e-4, 1e-5)
 _LARGEST = (8e-3, 4e-3, 2e-3, 1e-3)
+#: The dearer a step, the fewer of them: the time of the whole benchmark is limited.
+ENGINE_STEPS = {"mujoco": _STEPS, "pybullet": _STEPS, "pymunk": _STEPS[:3], "dart": _STEPS[:3], "drake": _STEPS[:2]}
 LINES = {
     line.label: line
     for line in (
@@ -65,12 +69,13 @@ LINES = {
         ),
         *(
             line
-            for engine in ("mujoco", "pybullet")
+            for engine, steps in ENGINE_STEPS.items()
             for line in (
-                DiagramLine(engine, engine, "time_step", _STEPS, quick=_STEPS[:3]),
+                DiagramLine(engine, engine, "time_step", steps, quick=steps[:3]),
                 DiagramLine(f"{engine} adaptive", engine, "largest_step", _LARGEST, {"time_step": "adaptive"}, quick=_LARGEST[1:3]),
-                DiagramLine(f"{engine} default", engine, "time_step", _STEPS[:3], {"settings": "default"}, quick=_STEPS[:2]),
+                DiagramLine(f"{engine} default", engine, "time_step", steps[:3], {"settings": "default"}, quick=_STEPS[:2]),
             )
+            if engine != "drake" or "adaptive" not in line.label  # its steps cannot vary
         ),
     )
 }
@@ -80,6 +85,7 @@ KINDS = {"free, pulses": ("free", "pulse"), "slip, walls": ("slip", "wall"), "re
 LEFT_OUT = (
     "default settings at a step of 1e-5 s: at 1e-4 s they have stopped converging, or converge as at larger steps",
     "PyBullet's other solvers and MuJoCo's RK4 and pyramidal cone: no better limit, or none, at more cost",
+    "pymunk and DART at 1e-5 s and Drake below 1e-3 s: a simulated second of Drake at 1e-4 s takes it more than a second",
     "native batches of an engine (mujoco.rollout): they cannot end a step at an event; their cost is in the table of savings",
     "measured histories: they have no cost",
 )
@@ -348,7 +354,7 @@ def pooled(samples: Sequence[BenchmarkRun]) -> Iterable[Pooled]:
         points = {
             (label, value): _point(group)
             for label, line in LINES.items()
-            if line.model in ("mujoco", "pybullet")
+            if line.model in ENGINE_STEPS
             for value in line.values
             if (group := [s for s in mine if (s.line, s.value) == (label, value)])
         }
@@ -359,7 +365,34 @@ def pooled(samples: Sequence[BenchmarkRun]) -> Iterable[Pooled]:
             yield Pooled(kind, label, value, point.runs, point.failed, point.cpu, point.rms, worst, error_at(adaptive, point.cpu))
 
 
-def error_at(line: Sequence[Point], cpu: float) -> float:
+@dataclass(frozen=True)
+class Standing:
+    """A line's place in the league of engines, over pulses and free rocking: NaN where it does not reach so far.
+
+    `error` is the RMS error (alpha) at `EQUAL_COST`, `cost` the CPU time (s a simulated second) of an error of `LEVEL`,
+    `best` the least error at any setting that was played, with its cost.
+    """
+
+    line: str
+    error: float
+    cost: float
+    best: float
+    best_cost: float
+
+
+def league(found: Sequence[Pooled]) -> list[Standing]:
+    """The engines' lines, the cheapest at an error of `LEVEL` first; those that never reach it last, by their best error."""
+    standings = []
+    for label in dict.fromkeys(one.line for one in found):
+        mine = [one for one in found if (one.kind, one.line) == (next(iter(KINDS)), label)]
+        good = [one for one in mine if math.isfinite(one.rms)]
+        if good:
+            best = min(good, key=lambda one: one.rms)
+            standings.append(Standing(label, error_at(mine, EQUAL_COST), cost_at(mine)[0], best.rms, best.cpu))
+    return sorted(standings, key=lambda one: (math.isnan(one.cost), one.best if math.isnan(one.cost) else one.cost))
+
+
+def error_at(line: Sequence[Point | Pooled], cpu: float) -> float:
     """Median error of a line, coarse to fine, at a CPU time, both interpolated on logarithmic axes; NaN outside its range."""
     for a, b in itertools.pairwise(line):
         if a.cpu <= cpu <= b.cpu and a.cpu < b.cpu and b.rms > 0.0 and math.isfinite(a.rms):
@@ -381,7 +414,7 @@ def order_of(line: Sequence[Point]) -> float:
     return slope((p.value, p.rms) for p in line if FITTED[0] < p.rms < FITTED[1])
 
 
-def cost_at(line: Sequence[Point], level: float = LEVEL) -> tuple[float, bool]:
+def cost_at(line: Sequence[Point | Pooled], level: float = LEVEL) -> tuple[float, bool]:
     """CPU s a simulated second at a median error of `level`, and whether the coarsest setting already reaches it.
 
     Between settings both logarithms are interpolated linearly; NaN where no setting reaches the level. The cheapest counts.

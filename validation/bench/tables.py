@@ -8,7 +8,7 @@ from statistics import median
 
 from rockcheck.scenes.writing import markdown_table
 from rockcheck.validation.bench.ebm import CASES, EbmSpeed
-from rockcheck.validation.bench.models import LEVEL, LINES, WorkPrecision
+from rockcheck.validation.bench.models import EQUAL_COST, LEVEL, LINES, WorkPrecision, league
 from rockcheck.validation.bench.scenes import FAMILIES
 from rockcheck.validation.bench.skipping import NOT_MEASURED, Saving
 from rockcheck.validation.bench.study import Benchmark
@@ -34,6 +34,19 @@ def markdown(found: Benchmark) -> str:
 
 def _models(found: WorkPrecision) -> Iterable[str]:
     families = list(found.horizons)
+    standings = league(found.pooled)
+    if standings:
+        yield "## League of engines"
+        yield (
+            f"Free rocking and pulses. Error: RMS of θ, α, at {1e3 * EQUAL_COST:g} ms of CPU a simulated second. Cost: CPU ms a simulated"
+            f" second at an error of {LEVEL:g} α. –: not reached, or beyond the settings that were played."
+        )
+        rows = [
+            [one.line, _number(1e3 * one.cost), f"{one.error:.1e}" if math.isfinite(one.error) else "–", f"{one.best:.1e}",
+             _number(1e3 * one.best_cost)]
+            for one in standings
+        ]  # fmt: skip
+        yield markdown_table(["engine", "cost at equal error", "error at equal cost", "least error", "at a cost of"], rows)
     yield "## Scenes"
     rows = [[name, FAMILIES[name].words, _number(found.horizons[name]), _number(found.model_form[name])] for name in families]
     yield markdown_table(["scene", "what", "compared up to, s", "model form, α RMS"], rows)

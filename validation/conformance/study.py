@@ -16,7 +16,7 @@ from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.validation.conformance.cards import Card, make_card
 from rockcheck.validation.conformance.phenomena import SCENES
 from rockcheck.validation.discrepancy.measured import Measured
-from rockcheck.validation.execute.models import FAMILIES, build_own, family, is_own
+from rockcheck.validation.execute.models import build_own, engine_names, family, is_own, not_installed
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.execute.provenance import version_of
 
@@ -35,10 +35,7 @@ class Asked:
 
 def engines_here() -> list[str]:
     """Names of the engines that are installed."""
-    import rockcheck.engines as engines
-
-    found = {getattr(engines, name).name: getattr(engines, name) for name in engines.__all__}
-    return [name for name in FAMILIES if name in found and found[name].installed()]
+    return [name for name in engine_names() if not not_installed(name)]
 
 
 def slug_of(scene: str) -> str:

@@ -86,6 +86,11 @@ def family(name: str) -> Family:
     return FAMILIES[name]
 
 
+def engine_names() -> tuple[str, ...]:
+    """Names of the physics engines, installed or not."""
+    return tuple(name for name, kind in FAMILIES.items() if kind.module == ENGINES)
+
+
 def not_installed(name: str) -> str:
     """What to say where the engine of that model is not installed; empty where it is, or needs none."""
     if family(name).module != ENGINES:

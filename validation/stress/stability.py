@@ -74,6 +74,11 @@ SETUPS = {
         ModelSetup("pybullet default", "pybullet", (("settings", "default"),)),
         ModelSetup("pybullet", "pybullet", ()),
         ModelSetup("pybullet adaptive", "pybullet", (("time_step", "adaptive"),), "largest_step"),
+        ModelSetup("pymunk default", "pymunk", (("settings", "default"),)),
+        ModelSetup("pymunk", "pymunk", ()),
+        ModelSetup("pymunk adaptive", "pymunk", (("time_step", "adaptive"),), "largest_step"),
+        ModelSetup("dart default", "dart", (("settings", "default"),)),
+        ModelSetup("dart", "dart", ()),
         ModelSetup("cm paper", "cm", (("damping_rule", "paper"),)),
         ModelSetup("cm", "cm", ()),
     )

@@ -82,7 +82,7 @@ def run(
 def _asked(names: list[str] | None, settings: str | None, step: float, elsewhere: bool, allow_code: Sequence[str]) -> list[Asked]:
     """What is to be played; nothing where histories are given and no engine is named."""
     from rockcheck.validation.conformance.study import Asked, engines_here
-    from rockcheck.validation.execute.models import FAMILIES, build, check_allowed, is_own, not_installed
+    from rockcheck.validation.execute.models import build, check_allowed, engine_names, is_own, not_installed
 
     if not 0.0 < step <= 0.1:
         raise InputError(f"{step:g} is not allowed: a step above 0 and up to 0.1 s is asked for", "--step")
@@ -92,9 +92,10 @@ def _asked(names: list[str] | None, settings: str | None, step: float, elsewhere
     for name in names:
         if is_own(name):
             check_allowed(name, allow_code)
-        elif name not in FAMILIES or FAMILIES[name].module != "rockcheck.engines":
-            known = ", ".join(key for key, kind in FAMILIES.items() if kind.module == "rockcheck.engines")
-            raise InputError(f"{printable(name)!r} is not allowed: one of {known}, or module:Class is asked for", "--engine")
+        elif name not in engine_names():
+            raise InputError(
+                f"{printable(name)!r} is not allowed: one of {', '.join(engine_names())}, or module:Class is asked for", "--engine"
+            )
         mine = [""] if is_own(name) and settings is None else kinds
         found += [Asked(name, kind, step) for kind in mine]
         if reason := not_installed(name):  # told before others have run
