@@ -7,11 +7,7 @@ LOCK := .ci/requirements.txt
 VENV := .venv
 BIN := $(VENV)/bin
 
-<<<<<<< HEAD
-.PHONY: install validate test test-all nightly lint format docs gallery wheel lock clean
-=======
-.PHONY: install validate test test-all coverage mutation lint format docs gallery wheel clean
->>>>>>> 61e24a0 (make coverage: branch coverage by folder, the core interpreted; make mutation: seeded faults that a test must notice)
+.PHONY: install validate test test-all nightly coverage mutation lint format docs gallery wheel lock clean
 
 install: $(VENV)/.ready ## the command `rockcheck` in .venv/bin
 
@@ -24,11 +20,10 @@ test: $(VENV)/.ready ## the everyday tests
 test-all: $(VENV)/.ready ## also the slow ones
 	$(BIN)/python -m pytest -q
 
-<<<<<<< HEAD
 nightly: $(VENV)/.ready ## what is too long for each change; NIGHTLY_QUICK=1 for a short form; the results go to docs/nightly.json
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[audit,fuzz]'
 	$(BIN)/python .ci/nightly.py
-=======
+
 # The core is compiled, and its lines are then not seen: the second run interprets it, on fewer tests.
 INTERPRETED := tests/ebm/test_core_parts.py tests/ebm/test_impact_laws.py tests/ebm/test_edges.py tests/ebm/test_rare_scenes.py::test_it_runs \
 	tests/cm/test_contact.py
@@ -42,7 +37,6 @@ coverage: $(VENV)/.ready ## branch coverage by folder, and the lines that no tes
 
 mutation: $(VENV)/.ready ## small faults planted in a sample of places: which ones no test notices
 	$(BIN)/python tests/mutation.py
->>>>>>> 61e24a0 (make coverage: branch coverage by folder, the core interpreted; make mutation: seeded faults that a test must notice)
 
 lint: $(VENV)/.ready ## linter, formatter's check, type checker
 	$(BIN)/ruff check .
