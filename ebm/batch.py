@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import natural
 from rockcheck.ebm.ground import Ground
+from rockcheck.ebm.march import DONE, FAILURES, OVERTURNED, Control, run
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.ebm.motion import Setting, workspace
-from rockcheck.ebm.trajectory import DONE, FAILURES, OVERTURNED, Control, run
 from rockcheck.scenes.compiled import kernel, threads
 from rockcheck.scenes.errors import ModelFailure
 from rockcheck.scenes.scene import Scene
@@ -63,7 +63,7 @@ class Outcomes:
     peak: Floats
     t_end: Floats
     series: NDArray[np.int64]
-    #: How each run ended, a key of `ebm.trajectory.FAILURES` where it failed.
+    #: How each run ended, a key of `ebm.march.FAILURES` where it failed.
     ending: NDArray[np.int64]
 
     @property
@@ -123,7 +123,11 @@ def pack_pulses(scene: Scene, model: EventBasedModel, amplitudes: Floats, period
 
 def _setting(scene: Scene, model: EventBasedModel) -> Setting:
     return natural.setting_of(
-        scene, unilateral=model.pivot == "unilateral", no_slip=model.friction == "no-slip", energy_cap=model.energy_cap
+        scene,
+        unilateral=model.pivot == "unilateral",
+        no_slip=model.friction == "no-slip",
+        energy_cap=model.energy_cap,
+        floor_first=model.impacts == "floor-first",
     )
 
 
@@ -216,6 +220,7 @@ def _run_rows(settings, horizontal, vertical, states, durations, samples, contro
             no_slip=r.no_slip,
             unilateral=r.unilateral,
             energy_cap=r.energy_cap,
+            floor_first=r.floor_first,
         )
         z[:] = states[i]
         tally = run(

@@ -21,9 +21,25 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from rockcheck.ebm.ground import acceleration, fill_series, next_kink
+from rockcheck.ebm.contacts import SLOW, closed_wall, slip_velocity, stop, upright
+from rockcheck.ebm.ground import acceleration, fill_series
+from rockcheck.ebm.guards import (
+    G_CONE_MINUS,
+    G_CONE_PLUS,
+    G_FAR_GAP,
+    G_FAR_PUSH,
+    G_LOADS,
+    G_PUSH,
+    G_SLIP,
+    G_TIP_GAP,
+    G_TIP_PUSH,
+    G_UPLIFT_PLUS,
+    drop,
+    fill_guards,
+    first_event,
+    guard,
+)
+from rockcheck.ebm.modes import LEAST_SLACK, SLACK, SOON, tips_first
 from rockcheck.ebm.motion import (
     COS,
     FAMILY,
@@ -32,7 +48,6 @@ from rockcheck.ebm.motion import (
     FLOOR,
     GUARD,
     LEAST_FRICTION,
-    MODE_SIZE,
     NA,
     NB,
     OMEGA,
@@ -47,7 +62,6 @@ from rockcheck.ebm.motion import (
     TILT,
     TIP,
     VX,
-    VY,
     XI,
     G,
     P,
@@ -57,74 +71,30 @@ from rockcheck.ebm.motion import (
     W,
     X,
     flat_series,
-    flat_state,
     sine_cosine,
     tilt_series,
-    tilt_state,
     workspace,
 )
-from rockcheck.ebm.series import FORCE_NOISE, INSTANT, NO_ROOT, POSITION_NOISE, first_root, leading, value
-from rockcheck.ebm.trajectory import (
-    _HANDED_OVER,
-    _MOST_ZERO_STEPS,
-    _OPEN_CONTACTS,
-    _PASSED,
-    _REST_BILATERAL,
-    DONE,
-    FLOOR_IMPACT,
-    LEFT,
-    NO_MODE,
-    NOT_FINITE,
-    OVERTURNED,
-    RELEASE,
-    RIGHT,
-    SETTLED,
-    SLIPS,
-    STICKS,
-    TOO_MANY_EVENTS,
-    TOO_MANY_STEPS,
-    UPLIFT,
-    WALL_IMPACT,
-    Tally,
-    _first_event,
-    _impact,
-    _note,
-    _step_size,
-    resting_speed,
-)
-from rockcheck.ebm.transitions import (
-    CREEP,
-    G_CONE_MINUS,
-    G_CONE_PLUS,
-    G_FAR_GAP,
-    G_FAR_PUSH,
-    G_PUSH,
-    G_SLIP,
-    G_TIP_GAP,
-    G_TIP_PUSH,
-    G_TOPPLE,
-    G_UPLIFT_PLUS,
-    GUARDS,
-    SOON,
-    closed_wall,
-    guard,
-    guards_of,
-    slip_velocity,
-    tips_first,
-)
+from rockcheck.ebm.rules import LEAST_CONTRADICTION, PULLS
+from rockcheck.ebm.running import CORNER, GOING, HOLDS, RELEASE, SLIPS, STICKS, UPLIFT, ZETA, T, mode_code, note
+from rockcheck.ebm.series import FORCE, NO_ROOT, NOISE, POSITION, first_root, leading, step_size, value
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 # Rows of the workspace after those of ebm.motion: z, V and what the recurrences need.
 Z, V, Z2, SPIN2, WEIGHT, ARM, TURN, REACH, INERTIA, LOAD, PUSH, ZA, LEVER, DEN, TORQUE = range(ROWS, ROWS + 15)
 _ROWS = ROWS + 15
 
-# A guard besides those of ebm.transitions: z comes to the sign of V, from where the pivot loads.
-_G_LOADS = GUARDS
-# The friction of a wedged block, which does not slip, is what z makes it: it has no cone to leave.
-_CONE = 1 << G_CONE_PLUS | 1 << G_CONE_MINUS
 _LOOK = 6
 # z nears 1 for ever. So near to it what hangs on the difference (a block that tips just as it slips) is noise: it has yielded.
 _YIELDS = 1e-6
+# Nearer to it than the tolerance, a multiple, and than rounding it has yielded, too.
+_NEARLY = 10.0
+
+
+@kernel
+def friction_workspace():
+    """Scratch for one run with Bouc-Wen friction."""
+    return workspace(_ROWS)
 
 
 @inner_kernel
@@ -166,7 +136,7 @@ def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order
     a[G, 0] += 1.0
     a[XI, 0], a[XI, 1] = sign * z[X], sign * z[VX]
     a[Z, 0] = sign * zeta
-    loads = m[SLIP] * a[Z, 0] > -1e-13
+    loads = m[SLIP] * a[Z, 0] > -NOISE[POSITION]
     friction = b.mu_k * m[PULL]
     for k in range(order + 1):
         a[P, k] = a[Q, k] = a[NA, k] = a[NB, k] = 0.0
@@ -230,7 +200,7 @@ def _held(b, z, gh, gv, t):
     """Whether a flat block without speed stays at rest: the base neither lifts nor slides it, or presses it on a wall."""
     slope, g, u = b.sin_alpha / b.cos_alpha, 1.0 + acceleration(gv, t), acceleration(gh, t)
     least = min(slope, b.mu_s)
-    if abs(abs(u) - (least if g >= 0.0 else slope) * abs(g)) < FORCE_NOISE:  # at its limit: where it goes decides
+    if abs(abs(u) - (least if g >= 0.0 else slope) * abs(g)) < NOISE[FORCE]:  # at its limit: where it goes decides
         g, u = 1.0 + acceleration(gv, t + SOON), acceleration(gh, t + SOON)
     left, right = closed_wall(b, z, 1, False), closed_wall(b, z, -1, False)
     if g < 0.0:  # hanging: only a wall on which it is pressed holds it flat
@@ -248,18 +218,18 @@ def _rest(b, m, z, gv, t):
 
 
 @inner_kernel
-def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, a):
+def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, rules, a):
     """The block at rest starts to slide, or to tilt, as u of sign `sense` grows; returns z = -u/(mu_k G0), +-1 if it slides."""
     u, g = acceleration(gh, t), 1.0 + acceleration(gv, t)
     soon = 1.0 + acceleration(gv, t + SOON) <= 0.0  # friction falls with P: nothing tips until the floor pulls
-    hangs = g <= 0.0 if abs(g) > FORCE_NOISE else soon
+    hangs = g <= 0.0 if abs(g) > NOISE[FORCE] else soon
     tips = b.mu_k * b.cos_alpha > b.sin_alpha or hangs
     if tips:
-        zeta = min(max(-u / max(b.mu_k * abs(g), 1e-300), -1.0), 1.0)
-        if u != 0.0 and abs(abs(u) - g * min(b.sin_alpha / b.cos_alpha, b.mu_k)) < FORCE_NOISE:
+        zeta = min(max(-u / max(b.mu_k * abs(g), SLOW), -1.0), 1.0)
+        if u != 0.0 and abs(abs(u) - g * min(b.sin_alpha / b.cos_alpha, b.mu_k)) < NOISE[FORCE]:
             # Just where it tips or slips: near g = 0 the quotient says no more, and its rounding would be a moment.
             zeta = -math.copysign(min(b.sin_alpha / (b.cos_alpha * b.mu_k), 1.0) if b.mu_k > 0.0 else 1.0, u)
-        if _tip(b, m, z, sense, zeta, yield_displacement, gh, gv, t, a):
+        if _tip(b, m, z, sense, zeta, yield_displacement, gh, gv, t, rules, a):
             return zeta
     if hangs or soon or closed_wall(b, z, sense, False) or (tips and abs(u) < g * max((1.0 + _YIELDS) * b.sin_alpha / b.cos_alpha, b.mu_k)):
         _rest(b, m, z, gv, t)
@@ -270,26 +240,26 @@ def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, a):
 
 
 @inner_kernel
-def _tip(b, m, z, first, zeta, yield_displacement, gh, gv, t, a):
+def _tip(b, m, z, first, zeta, yield_displacement, gh, gv, t, rules, a):
     """Lets a flat block tilt to the side on which its rotation grows, `first` if it can; returns whether there is one."""
     v = slip_velocity(b, z)
     for sense in (first, -first):
         m[:] = 0
         m[FAMILY], m[S], m[SLIP] = TILT, sense, 1 if sense * v > 0.0 else -1
-        _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a)
-        if leading(a, PHI, _LOOK, POSITION_NOISE) > 0:
+        _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a)
+        if leading(a, PHI, _LOOK, NOISE[POSITION]) > 0:
             return True
     return False
 
 
 @inner_kernel
-def _begin(b, m, z, zeta, yield_displacement, gh, gv, t, a):
+def _begin(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a):
     """The contacts of a block that starts, or goes on after an impact, into m; returns z, changed only where it was at rest."""
     v = slip_velocity(b, z)
     if z[THETA] == 0.0 and z[W] == 0.0:
         if v == 0.0:
             if not _held(b, z, gh, gv, t):
-                return _leave_rest(b, m, z, tips_first(b, m, z, gh, t), yield_displacement, gh, gv, t, a)
+                return _leave_rest(b, m, z, tips_first(b, m, z, gh, t, rules), yield_displacement, gh, gv, t, rules, a)
             _rest(b, m, z, gv, t)
             return 0.0
         m[:] = 0
@@ -298,7 +268,7 @@ def _begin(b, m, z, zeta, yield_displacement, gh, gv, t, a):
     sense = 1 if (z[THETA] if z[THETA] != 0.0 else z[W]) > 0.0 else -1
     m[:] = 0
     m[FAMILY], m[S], m[SLIP] = TILT, sense, 1 if sense * v > 0.0 else -1
-    _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a)
+    _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a)
     return zeta
 
 
@@ -316,7 +286,7 @@ def _wedged_series(b, m, z, zeta, gh, gv, t, order, reach, a):
 
 
 @inner_kernel
-def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a):
+def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a):
     """Lets the corners of a tilting block rest on the walls that they touch and that would push them; more of them come first."""
     touched = (1 if closed_wall(b, z, m[S], False) else 0) + (2 if closed_wall(b, z, -m[S], True) else 0)
     for attempt in range(5):  # where none fits, but for rounding, it rests on all that it touches
@@ -331,10 +301,10 @@ def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a):
             aimed = True
         else:
             m[FLOOR] = SLIPPING
-            aimed = _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a)
+            aimed = _aim(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a)
         if attempt == 4 or (aimed and _walls_hold(b, m, touched, a)):
             if walls == 3:
-                z[W] = z[VX] = z[VY] = 0.0
+                stop(z)
             return
 
 
@@ -343,17 +313,18 @@ def _walls_hold(b, m, touched, a):
     """Whether the walls of the mode push and those that are touched besides are left."""
     for which in range(2):
         if m[TIP if which == 0 else FAR] != 0:
-            if leading(a, NA if which == 0 else NB, _LOOK - 2, FORCE_NOISE) < 0:
+            if leading(a, NA if which == 0 else NB, _LOOK - 2, NOISE[FORCE]) < 0:
                 return False
         elif touched >> which & 1:
-            guard(b, m, G_TIP_GAP if which == 0 else G_FAR_GAP, _LOOK, 0.0, a)
-            if leading(a, GUARD, _LOOK, POSITION_NOISE) < 0:
+            fill_guards(b, m, 0.0, a)
+            guard(G_TIP_GAP if which == 0 else G_FAR_GAP, _LOOK, a)
+            if leading(a, GUARD, _LOOK, NOISE[POSITION]) < 0:
                 return False
     return True
 
 
 @inner_kernel
-def _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a):
+def _aim(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a):
     """Sets the sign of P, whose series the workspace then holds; returns whether P has it.
 
     Below Painleve's limit it does not depend on the sign that is assumed for it. Beyond, where a push would pull itself along (its
@@ -361,18 +332,19 @@ def _aim(b, m, z, zeta, yield_displacement, gh, gv, t, a):
     """
     m[PULL] = 1
     friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
-    if leading(a, P, _LOOK - 2, FORCE_NOISE) >= 0 and a[DEN, 0] > 0.0:
+    if leading(a, P, _LOOK - 2, NOISE[FORCE]) >= 0 and a[DEN, 0] > 0.0:
         return True
     m[PULL] = -1
+    rules[PULLS] += 1
     friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
-    return leading(a, P, _LOOK - 2, FORCE_NOISE) <= 0
+    return leading(a, P, _LOOK - 2, NOISE[FORCE]) <= 0
 
 
 @inner_kernel
 def _initial_friction(b, m, z, gh, gv, t, a):
     """z at the start: sgn V for a pivot that slips, else the value that lets it stand still (at most 1 in size)."""
     v = slip_velocity(b, z)
-    if abs(v) > CREEP:
+    if abs(v) > SLOW:
         return 1.0 if v > 0.0 else -1.0
     if z[THETA] == 0.0 and z[W] == 0.0:
         return 0.0
@@ -391,180 +363,130 @@ def _initial_friction(b, m, z, gh, gv, t, a):
 
 
 @inner_kernel
-def _has_yielded(b, m, z, zeta):
-    """Whether the pivot slips with z = +-1."""
-    return m[FLOOR] == SLIPPING and abs(zeta) == 1.0 and zeta * slip_velocity(b, z) > CREEP
+def begin(b, gh, gv, r, yields, a):
+    """The contacts of a block that starts, or goes on after an impact, and its z."""
+    z, m, t = r.z, r.m, r.now[T]
+    upright(b, z)
+    zeta = _initial_friction(b, m, z, gh, gv, t, a) if math.isnan(r.now[ZETA]) else r.now[ZETA]
+    m[S] = r.counts[CORNER]
+    r.now[ZETA] = _begin(b, m, z, zeta, yields, gh, gv, t, r.rules, a)
+    # It has yielded where the pivot slips with z = +-1.
+    _holds(r, m[FLOOR] != SLIPPING or abs(r.now[ZETA]) != 1.0 or r.now[ZETA] * slip_velocity(b, z) <= SLOW)
 
 
 @inner_kernel
-def _label(m, yielded):
-    """Index into trajectory.MODE_NAMES: rest, slide, rock, slide-rock, lean, ladder."""
-    if m[FAMILY] == FLAT:
-        return 0 if m[FLOOR] == STICK else 1
-    return (4 if m[TIP] != 0 or m[FAR] != 0 else 2) + (1 if yielded else 0)
-
-
-@kernel
-def run(b, gh, gv, z, yield_displacement, t_end, control, out, out_mode, log):
-    """Simulates from state z (changed in place) at t = 0 to t_end; returns a Tally. Arguments as of trajectory.run."""
-    a, stack = workspace(_ROWS)
-    m, left = np.zeros(MODE_SIZE, dtype=np.int64), np.zeros(MODE_SIZE, dtype=np.int64)
-    impulse, gains = np.zeros(2), np.zeros(2)
-    rattle = np.array([_REST_BILATERAL, -1.0, -1.0, 0.0, 0.0])
-    t = 0.0
-    steps = events = wall_impacts = zero_steps = 0
-    rows = min(1, out.shape[0])
-    peak = abs(z[THETA])
-    ending = DONE
-    flipped = waits = False
-    corner = 0  # the one that it last stood on
-    zeta = _begin(b, m, z, _initial_friction(b, m, z, gh, gv, t, a), yield_displacement, gh, gv, t, a)
-    yielded = _has_yielded(b, m, z, zeta)
-    if rows > 0:
-        out[0] = z
-        out_mode[0] = _label(m, yielded)
-    while t < t_end:
-        if steps >= control.most_steps:
-            ending = TOO_MANY_STEPS
-            break
-        steps += 1
-        kink = min(next_kink(gh, t), next_kink(gv, t))
-        reach = min(kink, t_end) - t
-        order = control.order
-        moving = m[FLOOR] == SLIPPING
-        if moving:
-            friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order, a)
-        elif m[FAMILY] == FLAT:
-            order = flat_series(b, m, z, gh, gv, t, order, a)
-        else:
-            order = _wedged_series(b, m, z, zeta, gh, gv, t, order, reach, a)
-        h = _step_size(a, U, G, order - 1, control.tolerance, reach)
-        if moving:
-            h = _step_size(a, XI, Z, order - 1, control.tolerance, h)
-            if m[FAMILY] == TILT:
-                h = _step_size(a, PHI, COS, order, control.tolerance, h)
-        mask = guards_of(b, m)
-        if m[FAMILY] == TILT:
-            mask &= ~_CONE
-        tau, which = _first_event(b, m, order, 0.0, h, mask, a, stack)
-        waits = zero_steps >= _HANDED_OVER and tau <= 0.0 and which > G_FAR_GAP and not waits
-        if waits:  # as in trajectory.run
-            zero_steps += 1
-            h = min(h, INSTANT * 2.0 ** (0.5 * (zero_steps - _HANDED_OVER)))
-            tau, which = _first_event(b, m, order, 0.0, h, mask & _OPEN_CONTACTS, a, stack)
-        if moving and m[SLIP] * a[Z, 0] <= -1e-13:
-            for k in range(order):
-                a[GUARD, k] = -m[SLIP] * a[Z, k]
-            root = first_root(a, GUARD, order - 1, tau, POSITION_NOISE, stack)
-            if root != NO_ROOT:
-                tau, which = root, _G_LOADS
-        if which == G_SLIP and tau <= 0.0 and flipped and m[FAMILY] == TILT:
-            # Whichever sign is assumed, V leaves zero with the other: it is rounding, so any will do for a little while.
-            tau, which, zero_steps = min(h, 1e-2 * math.sqrt(yield_displacement)), -1, 0
-        flipped = which == G_SLIP and tau <= 0.0
-        if not math.isfinite(tau) or zero_steps > _MOST_ZERO_STEPS:
-            ending = NO_MODE if math.isfinite(tau) else NOT_FINITE
-            break
-        whole = which < 0 and tau >= reach
-        end = min(kink, t_end) if whole else t + tau
-        while rows < out.shape[0] and rows * control.output_step < end:
-            out[rows] = z
-            _state(b, m, order, rows * control.output_step - t, a, out[rows])
-            out_mode[rows] = _label(m, yielded)
-            rows += 1
-        _state(b, m, order, tau, a, z)
-        t = end
-        peak = max(peak, abs(z[THETA]))
-        if m[FAMILY] == TILT:
-            corner = m[S]
-        before = _label(m, yielded)
-        kind = -1
-        if moving and not yielded:
-            zeta = m[S] * value(a, Z, order - 1, tau)
-            towards = m[S] * m[SLIP] * zeta
-            if towards > 0.0 and 1.0 - towards < max(10.0 * control.tolerance, 1e-12):
-                zeta, yielded = math.copysign(1.0, zeta), True
-                kind = SLIPS
-        if which >= 0:
-            zero_steps = zero_steps + 1 if tau <= 0.0 else 0
-        elif not waits and tau > _PASSED:
-            zero_steps = 0
-        # --- what follows it
-        impulse[:] = 0.0
-        if which == G_TOPPLE:
-            ending = OVERTURNED
-            kind = LEFT if m[S] > 0 else RIGHT
-            z[THETA] = math.copysign(0.5 * math.pi, z[THETA])
-            peak = 0.5 * math.pi
-        elif which == _G_LOADS:
-            zeta = 0.0
-        elif which == G_PUSH:
-            if m[FAMILY] == TILT:
-                _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a)
-            else:
-                m[PULL] = -m[PULL]
-        elif which == G_SLIP:
-            if yielded:
-                kind = STICKS
-            yielded = False
-            m[SLIP] = -m[SLIP]
-            if m[FAMILY] == FLAT and _held(b, z, gh, gv, t):
-                z[VX] = 0.0
-                kind = STICKS
-                _rest(b, m, z, gv, t)
-        elif which == G_TIP_PUSH or which == G_FAR_PUSH:
-            kind = RELEASE
-            if m[FAMILY] == FLAT:
-                m[S] = corner
-                zeta = _leave_rest(b, m, z, tips_first(b, m, z, gh, t), yield_displacement, gh, gv, t, a)
-                yielded = abs(zeta) == 1.0
-            else:
-                _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, a)
-        elif which >= G_UPLIFT_PLUS and moving:  # tilts while it slides
-            left[:] = m
-            if not yielded and 1.0 - m[SLIP] * zeta < _YIELDS:
-                zeta, yielded, kind = float(m[SLIP]), True, SLIPS
-            elif _tip(b, m, z, -m[SLIP], zeta, yield_displacement, gh, gv, t, a):
-                kind = UPLIFT
-            else:
-                m[:] = left
-                zero_steps = max(zero_steps, _HANDED_OVER)
-        elif which > G_FAR_PUSH:  # the cone, or uplift from rest
-            m[S] = corner
-            zeta = _leave_rest(b, m, z, tips_first(b, m, z, gh, t), yield_displacement, gh, gv, t, a)
-            yielded = abs(zeta) == 1.0
-            kind = UPLIFT if m[FAMILY] == TILT else SLIPS
-        elif which >= 0:
-            kind, _, _ = _impact(b, m, z, which, gh, t, resting_speed(rattle, t, _REST_BILATERAL, zero_steps), impulse, gains)
-            wall_impacts += kind == WALL_IMPACT
-            zeta = _begin(b, m, z, zeta, yield_displacement, gh, gv, t, a)
-            yielded = _has_yielded(b, m, z, zeta)
-        if kind >= 0:
-            events += 1
-            if events >= control.most_events:
-                ending = TOO_MANY_EVENTS
-                break
-            if log.shape[0] >= events:
-                _note(log, events, t, kind, before, _label(m, yielded), impulse[0] + impulse[1])
-            if (kind == FLOOR_IMPACT or kind == WALL_IMPACT) and _label(m, yielded) == 0 and log.shape[0] > events:
-                events += 1
-                _note(log, events, t, SETTLED, before, 0, 0.0)
-        if ending == OVERTURNED:
-            break
-    at_rest = m[FAMILY] == FLAT and m[FLOOR] == STICK
-    if ending == DONE and not math.isfinite(z[THETA]):
-        ending = NOT_FINITE
-    while ending == DONE and rows < out.shape[0]:
-        out[rows] = z
-        out_mode[rows] = _label(m, yielded)
-        rows += 1
-    return Tally(ending, t, peak, at_rest, steps, events, wall_impacts, int(gains[0]), gains[1], rows, np.nan)
+def _holds(r, whether):
+    """Notes whether the pivot holds or has yielded."""
+    r.counts[HOLDS] = 1 if whether else 0
 
 
 @inner_kernel
-def _state(b, m, order, tau, a, z):
-    """The state at tau after the start of the step."""
-    if m[FAMILY] == FLAT:
-        flat_state(b, m, order, tau, a, z)
+def expand(b, gh, gv, r, reach, control, yields, a):
+    """Series of the motion: their order, the place of the pivot, and the step they are good for."""
+    z, m, t, zeta = r.z, r.m, r.now[T], r.now[ZETA]
+    order = control.order
+    if m[FLOOR] == SLIPPING:
+        friction_series(b, m, z, zeta, r.counts[HOLDS] == 0, yields, gh, gv, t, order, a)
+    elif m[FAMILY] == FLAT:
+        order = flat_series(b, m, z, gh, gv, t, order, a)
     else:
-        tilt_state(b, m, order, tau, m[S] * z[X] - a[SIN, 0], a, z)
+        order = _wedged_series(b, m, z, zeta, gh, gv, t, order, reach, a)
+    h = step_size(a, U, G, order - 1, control.tolerance, reach)
+    if m[FLOOR] == SLIPPING:
+        h = step_size(a, XI, Z, order - 1, control.tolerance, h)
+        if m[FAMILY] == TILT:
+            h = step_size(a, PHI, COS, order, control.tolerance, h)
+    return order, m[S] * z[X] - a[SIN, 0], h
+
+
+@inner_kernel
+def locate(b, m, order, h, slack, a, stack):
+    """The first event of the step, as with Coulomb's friction; one more is that z comes to the sign of V, from where the pivot loads."""
+    fill_guards(b, m, 0.0, a)
+    if m[FAMILY] == TILT:  # the friction of a wedged block, which does not slip, is what z makes it: it has no cone to leave
+        drop(a, G_CONE_PLUS)
+        drop(a, G_CONE_MINUS)
+    tau, which = first_event(order, h, slack, a, stack)
+    if m[FLOOR] == SLIPPING and m[SLIP] * a[Z, 0] <= -NOISE[POSITION]:
+        for k in range(order):
+            a[GUARD, k] = -m[SLIP] * a[Z, k]
+        root = first_root(a, GUARD, order - 1, tau, NOISE[POSITION], stack)
+        if root != NO_ROOT:
+            return root, G_LOADS
+    return tau, which
+
+
+@inner_kernel
+def wind_up(r, order, tau, tolerance, log, a):
+    """Takes z to the end of a step of tau; where it has come to +-1 the pivot has yielded."""
+    m = r.m
+    if m[FLOOR] != SLIPPING or r.counts[HOLDS] == 0:
+        return
+    zeta = m[S] * value(a, Z, order - 1, tau)
+    towards = m[S] * m[SLIP] * zeta
+    if towards > 0.0 and 1.0 - towards < _NEARLY * max(tolerance, NOISE[POSITION]):
+        before = mode_code(r)
+        zeta = math.copysign(1.0, zeta)
+        _holds(r, False)
+        note(r, log, SLIPS, before)
+    r.now[ZETA] = zeta
+
+
+@inner_kernel
+def follow(b, gh, gv, r, which, before, yields, log, a):
+    """What follows an event that is no impact."""
+    z, m, t = r.z, r.m, r.now[T]
+    kind = -1
+    # At one instant each further event doubles the slack, as in a selection (ebm.modes).
+    r.memory[SLACK] = r.memory[LEAST_SLACK]
+    r.memory[LEAST_SLACK] *= 2.0
+    if which == G_LOADS:
+        r.now[ZETA] = 0.0
+    elif which == G_SLIP:
+        kind = _turn(b, gh, gv, r, t)
+    elif which == G_PUSH and m[FAMILY] == FLAT:
+        m[PULL] = -m[PULL]
+    elif m[FAMILY] == TILT:  # the push of the floor or of a wall ends
+        kind = -1 if which == G_PUSH else RELEASE
+        _close_walls(b, m, z, r.now[ZETA], yields, gh, gv, t, r.rules, a)
+    elif which >= G_UPLIFT_PLUS and m[FLOOR] == SLIPPING:
+        kind = _tip_sliding(b, gh, gv, r, yields, a)
+    else:  # the cone, uplift from rest, or a wall that lets go of a standing block
+        m[S] = r.counts[CORNER]
+        r.now[ZETA] = _leave_rest(b, m, z, tips_first(b, m, z, gh, t, r.rules), yields, gh, gv, t, r.rules, a)
+        _holds(r, abs(r.now[ZETA]) != 1.0)
+        kind = RELEASE if which == G_TIP_PUSH or which == G_FAR_PUSH else (UPLIFT if m[FAMILY] == TILT else SLIPS)
+    if kind >= 0:
+        note(r, log, kind, before)
+    return GOING
+
+
+@inner_kernel
+def _turn(b, gh, gv, r, t):
+    """The slip has come to its end: the pivot slips back, or a flat block rests. The event's kind, -1 for none."""
+    z, m = r.z, r.m
+    kind = -1 if r.counts[HOLDS] != 0 else STICKS
+    _holds(r, True)
+    m[SLIP] = -m[SLIP]
+    if m[FAMILY] == FLAT and _held(b, z, gh, gv, t):
+        z[VX] = 0.0
+        _rest(b, m, z, gv, t)
+        kind = STICKS
+    return kind
+
+
+@inner_kernel
+def _tip_sliding(b, gh, gv, r, yields, a):
+    """A block tilts while it slides; the event's kind, -1 where rounding keeps it flat for a while."""
+    z, m = r.z, r.m
+    slip = m[SLIP]
+    if r.counts[HOLDS] != 0 and 1.0 - slip * r.now[ZETA] < _YIELDS:
+        r.now[ZETA] = float(slip)
+        _holds(r, False)
+        return SLIPS
+    if _tip(b, m, z, -slip, r.now[ZETA], yields, gh, gv, r.now[T], r.rules, a):
+        return UPLIFT
+    r.rules[LEAST_CONTRADICTION] += 1
+    m[:] = 0
+    m[FAMILY], m[S], m[PULL], m[FLOOR], m[SLIP] = FLAT, 1, 1, SLIPPING, slip
+    return -1

@@ -2,28 +2,42 @@
 
 In the pivot's frame (see ebm.motion), natural units. Six contacts: the pivot F and the other bottom corner E on the floor, the
 top and bottom corner on the tip wall, the bottom and top corner on the far wall; E and the second corner of a wall touch
-only at theta = 0. Candidate sets of contacts that receive an impulse are enumerated, with the floor sticking, slipping
-either way or frictionless; those are feasible in which impulses push, the other touched contacts do not close, and friction
-obeys Coulomb; of several the one that leaves the least kinetic energy is taken.
+only at theta = 0.
 
-Contacts struck at one instant form a cascade, floor before walls, until none approaches. A wall stage with e > 0 takes along
-only the floor; contacts that rest already take part in every other stage. A block that slides flat into a wall is one group.
+Contacts that touch at one instant strike in *stages*, until none approaches. A law of impacts says which contacts take part in a
+stage, the set A. In it the impulses p_j and the velocities u_j across the contacts obey
+
+    0 <= p_j  complementary to  u_j+ - e_j max(-u_j-, 0) >= 0,    |T| <= mu sum P on the floor.
+
+- "moreau": whatever touches takes part; at an elastic wall (e = 1), where nothing rests, only the corners that approach.
+- "floor-first": one contact after another, in the order of neighbouring trajectories: first the floor, then each wall corner when
+  it would arrive had the wall stood a little farther off.
+
+The two differ where a block lands flush against a bouncing wall; no law that is right there follows from rigid-body mechanics.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 
-from rockcheck.ebm.motion import inverse_of
+from rockcheck.ebm.contacts import CLOSED
+from rockcheck.ebm.series import NOISE, POSITION
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 F, E, TIP_TOP, TIP_BOTTOM, FAR_BOTTOM, FAR_TOP = range(6)
 CONTACTS = 6
+_TANGENT = 6
 _NONE, _STICK, _PLUS, _MINUS = range(4)
-_TINY = 1e-13
+# Every set of at most three contacts: their number, then the contacts.
+_SETS = np.array([[n, *some, *[0] * (3 - n)] for n in range(4) for some in itertools.combinations(range(CONTACTS), n)])
+# Rounding of a velocity, of the velocities at play; rows of contacts that are nearer to parallel than this give no solution.
+_ROUNDING, _PARALLEL = NOISE[POSITION], CLOSED
 _MOST_STAGES = 40
+#: What a whole impact was: it obeys the law, or in a stage only contradicts it least, or its stages do not end.
+ENDLESS, FITS, LEAST_WRONG = range(3)
 _HALVINGS = 45
 
 
@@ -39,7 +53,7 @@ def contact_rows(alpha, phi):
     rows[TIP_BOTTOM, 0], rows[TIP_BOTTOM, 2] = 1.0, c
     rows[FAR_BOTTOM, 0], rows[FAR_BOTTOM, 2] = -1.0, -cp
     rows[FAR_TOP, 0], rows[FAR_TOP, 2] = -1.0, c
-    rows[6, 0], rows[6, 2] = 1.0, c
+    rows[_TANGENT, 0], rows[_TANGENT, 2] = 1.0, c
     return rows
 
 
@@ -49,108 +63,178 @@ def _dot(row, v):
 
 
 @inner_kernel
+def _mass_dot(row, column):
+    """Row times inverse mass times column: unit mass, moment of inertia 1/3."""
+    return row[0] * column[0] + row[1] * column[1] + 3.0 * row[2] * column[2]
+
+
+@inner_kernel
 def kinetic_energy(v):
     """Kinetic energy of velocities (xi, y, phi), per unit mass."""
     return 0.5 * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] / 3.0)
 
 
+@inner_kernel
+def _size(v):
+    return abs(v[0]) + abs(v[1]) + abs(v[2])
+
+
 @kernel
-def _strike(rows, taking, target, mu_s, mu_k, v, after, impulse):
-    """One simultaneous impact over the contacts in `taking`: writes the velocities after it and the impulses; True if feasible."""
-    best = np.inf
-    lam = np.zeros(4)
-    members = np.zeros(3, dtype=np.int64)
-    matrix = np.zeros((6, 3))  # and its inverse
-    column = np.zeros((3, 3))
-    trial = np.zeros(3)
-    for mask in range(1 << CONTACTS):
-        count = 0
-        inside = True
-        for j in range(CONTACTS):
-            if mask >> j & 1:
-                if not taking[j] or count == 3:
-                    inside = False
-                    break
-                members[count] = j
-                count += 1
-        if not inside:
-            continue
-        on_floor = (mask & 3) != 0
-        for friction in range(4):
-            if (friction != _NONE and not on_floor) or (friction == _NONE and on_floor and mu_s > 0.0):
-                continue
-            unknowns = count + (1 if friction == _STICK else 0)
-            if unknowns > 3:
-                continue
-            kappa = mu_k if friction == _PLUS else (-mu_k if friction == _MINUS else 0.0)
-            for i in range(unknowns):
-                index = members[i] if i < count else 6
-                for k in range(3):
-                    column[i, k] = rows[index, k] - (kappa * rows[6, k] if index <= E else 0.0)
-            for i in range(unknowns):
-                row = rows[members[i]] if i < count else rows[6]
-                for j in range(unknowns):
-                    matrix[i, j] = row[0] * column[j, 0] + row[1] * column[j, 1] + 3.0 * row[2] * column[j, 2]
-            inverse_of(matrix, 0, 3, unknowns)
-            if unknowns > 0 and not _well_posed(matrix, unknowns):
-                continue
-            feasible = True
-            for k in range(3):
-                trial[k] = v[k]
-            floor_normal = 0.0
-            for i in range(unknowns):
-                lam[i] = 0.0
-                for j in range(unknowns):
-                    want = target[members[j]] - _dot(rows[members[j]], v) if j < count else -_dot(rows[6], v)
-                    lam[i] += matrix[3 + i, j] * want
-                if i < count and lam[i] < -_TINY:
-                    feasible = False
-                if i < count and members[i] <= E:
-                    floor_normal += lam[i]
-                trial[0] += column[i, 0] * lam[i]
-                trial[1] += column[i, 1] * lam[i]
-                trial[2] += 3.0 * column[i, 2] * lam[i]
-            if not feasible:
-                continue
-            slip = _dot(rows[6], trial)
-            if friction == _STICK and abs(lam[count]) > mu_s * floor_normal + _TINY:
-                continue
-            if (friction == _PLUS and slip < -_TINY) or (friction == _MINUS and slip > _TINY):
-                continue
-            for j in range(CONTACTS):
-                if taking[j] and not mask >> j & 1 and _dot(rows[j], trial) < target[j] - _TINY:
-                    feasible = False
-            if not feasible:
-                continue
-            energy = kinetic_energy(trial)
-            if energy < best - 1e-15:
-                best = energy
-                for k in range(3):
-                    after[k] = trial[k]
-                for j in range(CONTACTS):
-                    impulse[j] = 0.0
-                for i in range(count):
-                    impulse[members[i]] = max(lam[i], 0.0)
-                if friction == _STICK:
-                    after[0] -= _dot(rows[6], after)  # rounding only: the pivot stands
-    return best < np.inf
+def solve(system, n):
+    """Solves the n x n system whose right-hand side is column n, in place, by elimination; False where it is singular.
+
+    The residual is rounding even where the solution is ill-conditioned, which an inverse does not give.
+    """
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(system[i, k]) > abs(system[best, k]):
+                best = i
+        if not abs(system[best, k]) > _PARALLEL:
+            return False
+        for j in range(k, n + 1):
+            system[k, j], system[best, j] = system[best, j], system[k, j]
+        for i in range(k + 1, n):
+            factor = system[i, k] / system[k, k]
+            for j in range(k, n + 1):
+                system[i, j] -= factor * system[k, j]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            system[k, n] -= system[k, j] * system[j, n]
+        system[k, n] /= system[k, k]
+    return True
 
 
 @inner_kernel
-def _well_posed(matrix, n):
-    """Whether the inverse (rows 3 to 5) of the small matrix is finite and not mere rounding (parallel contacts give none)."""
-    size = 0.0
-    for i in range(n):
-        for j in range(n):
-            if not math.isfinite(matrix[3 + i, j]):
-                return False
-            size = max(size, abs(matrix[3 + i, j]) * abs(matrix[j, i]))
-    return size < 1e10
+def _fits(members, friction, taking, slippery):
+    """Whether a set of contacts is one to try: all take part, at most three unknowns, friction where the floor is in it."""
+    count = members[0]
+    on_floor = False
+    for i in range(count):
+        if not taking[members[1 + i]]:
+            return False
+        on_floor = on_floor or members[1 + i] <= E
+    if friction == _STICK:
+        return on_floor and count <= 2
+    return on_floor != (friction == _NONE) or (slippery and friction == _NONE)
+
+
+@kernel
+def _try_set(rows, members, friction, target, mu_k, v, system, trial, lam):
+    """The impulses of the contacts in the set, and the velocities after them; False where there are none."""
+    count = members[0]
+    n = count + (1 if friction == _STICK else 0)
+    kappa = mu_k if friction == _PLUS else (-mu_k if friction == _MINUS else 0.0)
+    column = np.zeros(3)
+    for k in range(3):
+        trial[k] = v[k]
+    for j in range(n):
+        index = members[1 + j] if j < count else _TANGENT
+        for k in range(3):
+            column[k] = rows[index, k] - (kappa * rows[_TANGENT, k] if index <= E else 0.0)
+        for i in range(n):
+            system[i, j] = _mass_dot(rows[members[1 + i] if i < count else _TANGENT], column)
+        system[j, n] = (target[index] if j < count else 0.0) - _dot(rows[index], v)
+    if not solve(system, n):
+        return False
+    for j in range(n):
+        lam[j] = system[j, n]
+        index = members[1 + j] if j < count else _TANGENT
+        for k in range(3):
+            push = rows[index, k] - (kappa * rows[_TANGENT, k] if index <= E else 0.0)
+            trial[k] += (3.0 if k == 2 else 1.0) * push * lam[j]
+    return True
+
+
+@inner_kernel
+def _violation(rows, members, friction, taking, target, mu_s, trial, lam):
+    """By how much a solution contradicts the law: a pull, a contact that still closes, friction beyond its cone or the wrong way."""
+    count = members[0]
+    worst = 0.0
+    floor_normal = 0.0
+    for i in range(count):
+        worst = max(worst, -lam[i])
+        if members[1 + i] <= E:
+            floor_normal += lam[i]
+    slip = _dot(rows[_TANGENT], trial)
+    if friction == _STICK:
+        worst = max(worst, abs(lam[count]) - mu_s * floor_normal)
+    elif friction != _NONE:
+        worst = max(worst, -slip if friction == _PLUS else slip)
+    for j in range(CONTACTS):
+        if taking[j]:
+            worst = max(worst, target[j] - _dot(rows[j], trial))
+    return worst
+
+
+@kernel
+def _strike(rows, taking, target, mu_s, mu_k, v, after, impulse, system):
+    """One stage over the contacts in `taking`: writes the velocities after it and the impulses; False where only the least wrong fits.
+
+    Every set of contacts is tried with every friction. Of those that obey the law the one that leaves the least energy is taken; where
+    none does, but for rounding or for friction that jams (Painleve), the one that contradicts it least.
+    """
+    least, lowest = np.inf, np.inf
+    lam = np.zeros(4)
+    trial = np.zeros(3)
+    for number in range(_SETS.shape[0]):
+        members = _SETS[number]
+        for friction in range(4):
+            if not _fits(members, friction, taking, mu_s == 0.0) or not _try_set(
+                rows, members, friction, target, mu_k, v, system, trial, lam
+            ):
+                continue
+            scale = _size(v) + _size(trial) + _size(lam)
+            wrong = _violation(rows, members, friction, taking, target, mu_s, trial, lam)
+            wrong = 0.0 if wrong <= _ROUNDING * scale else wrong
+            energy = kinetic_energy(trial)
+            if not wrong < least and not (wrong == least and energy < lowest - _ROUNDING * scale * scale):
+                continue
+            least, lowest = wrong, energy
+            impulse[:] = 0.0
+            for i in range(members[0]):
+                impulse[members[1 + i]] = max(lam[i], 0.0)
+            for k in range(3):
+                after[k] = trial[k]
+            if friction == _STICK:
+                after[0] -= _dot(rows[_TANGENT], after)  # rounding only: the pivot stands
+    return least == 0.0
+
+
+@inner_kernel
+def _moreau(touching, approach, restitution, rounding, taking):
+    """Whatever touches takes part; at an elastic wall only the corners that approach."""
+    for j in range(CONTACTS):
+        taking[j] = touching[j] and (j <= E or approach[j] < -rounding or restitution[j] < 1.0)
+
+
+@inner_kernel
+def _floor_first(touching, approach, stage, rounding, ahead, taking):
+    """The contacts that are struck next, in the order of a neighbouring trajectory, and those that rest meanwhile.
+
+    `ahead` keeps how far each contact is from its next impact there: where the floor is struck first, a wall is one unit away.
+    """
+    floor = approach[F] < -rounding or approach[E] < -rounding
+    if stage == 0:
+        for j in range(CONTACTS):
+            ahead[j] = 1.0 if floor and j > E else 0.0
+    soonest = np.inf
+    for j in range(CONTACTS):
+        if approach[j] < -rounding:
+            soonest = min(soonest, ahead[j] / -approach[j])
+    for j in range(CONTACTS):
+        taking[j] = False
+        if approach[j] < -rounding and ahead[j] <= -approach[j] * soonest * (1.0 + _PARALLEL):
+            ahead[j] = 0.0
+            taking[j] = True
+        elif touching[j]:
+            ahead[j] = max(0.0, ahead[j] + approach[j] * soonest)
+            taking[j] = abs(approach[j]) <= rounding and ahead[j] <= _PARALLEL
 
 
 @kernel
 def contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, tally):
-    """The whole cascade at one instant; v (xi, y, phi rates) becomes the velocities after it. Returns False where none was found.
+    """All stages at one instant; v (xi, y, phi rates) becomes the velocities after them. Returns FITS, LEAST_WRONG or ENDLESS.
 
     `touching[6]` says which gaps are closed, `resting` is the approach speed below which a contact closes for good.
     `impulse[2]` gathers the normal impulses of floor and walls; `tally[0]` counts stages that added energy and `tally[1]` keeps the
@@ -158,51 +242,61 @@ def contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, tally):
     """
     rows = contact_rows(b.alpha, phi)
     taking = np.zeros(CONTACTS, dtype=np.bool_)
-    target = np.zeros(CONTACTS)
+    restitution, target, part, approach, ahead = np.zeros(CONTACTS), np.zeros(7), np.zeros(CONTACTS), np.zeros(CONTACTS), np.zeros(CONTACTS)
     after = np.zeros(3)
-    part = np.zeros(CONTACTS)
-    approach = np.zeros(CONTACTS)
+    system = np.zeros((3, 4))
+    rounding = _ROUNDING * _size(v)
+    found = FITS
     for stage in range(_MOST_STAGES):
-        group = -1
+        plastic = 2 * stage >= _MOST_STAGES  # what goes to and fro between floor and wall ends plastic
+        closes = False
         for j in range(CONTACTS):
             approach[j] = _dot(rows[j], v) if touching[j] else 0.0
-            if group < 0 and approach[j] < -_TINY:
-                group = j // 2
-        if group < 0:
-            _close(rows, touching, resting, v)
-            return True
-        e = b.e_floor if group == 0 else (e_tip if group == 1 else e_far)
-        if 2 * stage >= _MOST_STAGES:
-            e = 0.0  # what goes to and fro between floor and wall ends plastic
-        scale, low, high = 1.0, 0.0, 1.0
+            closes = closes or approach[j] < -rounding
+            restitution[j] = 0.0 if plastic else (b.e_floor if j <= E else (e_tip if j <= TIP_BOTTOM else e_far))
+        if not closes:
+            _close(rows, touching, resting, v, system)
+            return found
+        if b.floor_first and not plastic:
+            _floor_first(touching, approach, stage, rounding, ahead, taking)
+        else:
+            _moreau(touching, approach, restitution, rounding, taking)
+        for j in range(CONTACTS):
+            target[j] = -restitution[j] * approach[j] if taking[j] and approach[j] < -resting else 0.0
         before = kinetic_energy(v)
-        for trial in range(_HALVINGS + 1):
-            for j in range(CONTACTS):
-                mine = j // 2 == group
-                alone = group > 0 and e > 0.0
-                taking[j] = touching[j] and (mine or j <= E or (not alone and approach[j] >= -_TINY))
-                target[j] = 0.0
-                if mine and approach[j] < -resting:
-                    target[j] = -scale * e * approach[j]
-            if not _strike(rows, taking, target, b.mu_s, b.mu_k, v, after, part):
-                return False
-            gain = kinetic_energy(after) - before
-            if not b.energy_cap or e == 0.0 or (trial == 0 and gain <= 0.0) or trial == _HALVINGS:
-                break
-            low, high = (low, scale) if gain > 0.0 else (scale, high)
-            scale = low if trial == _HALVINGS - 1 else 0.5 * (low + high)  # the largest restitution that adds no energy
-        if gain > 1e-12 * before + 1e-18:
+        if not _strike(rows, taking, target, b.mu_s, b.mu_k, v, after, part, system):
+            found = LEAST_WRONG
+        if b.energy_cap and not plastic and kinetic_energy(after) > before:
+            _strike_without_gain(b, rows, taking, target, v, after, part, system, before)
+        gain = kinetic_energy(after) - before
+        if gain > 2.0 * _ROUNDING * before:
             tally[0] += 1.0
             tally[1] = max(tally[1], gain / before)
         for j in range(CONTACTS):
             impulse[0 if j <= E else 1] += part[j]
         for k in range(3):
             v[k] = after[k]
-    return False
+    return ENDLESS
 
 
 @kernel
-def _close(rows, touching, resting, v):
+def _strike_without_gain(b, rows, taking, target, v, after, part, system, before):
+    """Strikes with the largest share of the rebound at which no energy is gained."""
+    full = target.copy()
+    low, high = 0.0, 1.0
+    for trial in range(_HALVINGS + 1):
+        scale = low if trial == _HALVINGS else 0.5 * (low + high)
+        for j in range(CONTACTS):
+            target[j] = scale * full[j]
+        _strike(rows, taking, target, b.mu_s, b.mu_k, v, after, part, system)
+        if kinetic_energy(after) > before:
+            high = scale
+        else:
+            low = scale
+
+
+@kernel
+def _close(rows, touching, resting, v, system):
     """Contacts that part more slowly than `resting` are closed: the velocity is projected onto them, mass-orthogonally."""
     members = np.zeros(3, dtype=np.int64)
     count = 0
@@ -211,21 +305,13 @@ def _close(rows, touching, resting, v):
             members[count] = j
             count += 1
     while count > 0:
-        matrix = np.zeros((6, 3))
         for i in range(count):
             for j in range(count):
-                r, q = rows[members[i]], rows[members[j]]
-                matrix[i, j] = r[0] * q[0] + r[1] * q[1] + 3.0 * r[2] * q[2]
-        inverse_of(matrix, 0, 3, count)
-        if _well_posed(matrix, count):
-            change = np.zeros(3)
+                system[i, j] = _mass_dot(rows[members[i]], rows[members[j]])
+            system[i, count] = -_dot(rows[members[i]], v)
+        if solve(system, count):
             for i in range(count):
-                for j in range(count):
-                    share = -matrix[3 + i, j] * _dot(rows[members[j]], v)
-                    change[0] += rows[members[i], 0] * share
-                    change[1] += rows[members[i], 1] * share
-                    change[2] += 3.0 * rows[members[i], 2] * share
-            for k in range(3):
-                v[k] += change[k]
+                for k in range(3):
+                    v[k] += (3.0 if k == 2 else 1.0) * rows[members[i], k] * system[i, count]
             return
         count -= 1

@@ -38,6 +38,8 @@ class Ground(NamedTuple):
 
 
 _NO_SAMPLES = np.zeros(1)
+#: Times nearer to each other than this part of a sample interval, or of a pulse, are one; rounding of a double.
+_SAME, _EPSILON = 2.0**-30, 2.0**-52
 STILL_GROUND = Ground(STILL, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _NO_SAMPLES)
 _RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, 40)])
 
@@ -62,7 +64,7 @@ def ground_of(excitation: Rest | Ricker | Sine | Record, gravity: float, time_un
 @inner_kernel
 def interval(g, t):
     """Index of the sample interval that holds t; its right end belongs to the next one."""
-    return int(math.floor(t / g.step + 1e-9))
+    return int(math.floor(t / g.step + _SAME))
 
 
 @inner_kernel
@@ -141,12 +143,12 @@ def _next_extremum(g, t):
         return next_kink(g, t)
     if g.kind == SINE:
         quarter = 0.5 * math.pi / g.rate
-        k = math.floor((t / quarter + 1.0) / 2.0 + 1e-9)
+        k = math.floor((t / quarter + 1.0) / 2.0 + _SAME)
         return min((2.0 * k + 1.0) * quarter, g.quiet) if t < g.quiet else NEVER
     if g.kind == STILL:
         return NEVER
-    # Extrema within 1e-9 pulse widths of t count as passed, or rounding would find the same one for ever.
-    past = t - g.centre + 1e-9 / math.sqrt(g.rate)
+    # Extrema within _SAME pulse widths of t count as passed, or rounding would find the same one for ever.
+    past = t - g.centre + _SAME / math.sqrt(g.rate)
     best = NEVER
     if g.c1 == 0.0 and g.c3 == 0.0:  # (c0 + c2 tau^2) bell: at 0 and where c2 = rate (c0 + c2 tau^2)
         a, b, c = 0.0, -g.rate * g.c2, g.c2 - g.rate * g.c0
@@ -198,6 +200,35 @@ def impulse_ahead(g, t):
 
 
 @inner_kernel
+def _passage(g, a, b, fa, fb, level):
+    """Where the acceleration passes the level between a, inside it by fa, and b, beyond it by fb; it is monotone in between.
+
+    Regula falsi (Illinois), never nearer to an end than rounding, so that the bracket closes on the root; returns its outer end.
+    """
+    rising = fb > 0.0
+    close = 2.0 * _EPSILON * abs(b)
+    for _ in range(200):
+        if b - a <= close:
+            break
+        guess = a - fa * (b - a) / (fb - fa)
+        middle = min(max(guess, a + close), b - close)
+        if not a < middle < b:
+            middle = 0.5 * (a + b)
+            if not a < middle < b:
+                break
+        f = acceleration(g, middle) - level
+        if (f > 0.0) == rising and f != 0.0:
+            if fb * f > 0.0:
+                fa *= 0.5
+            b, fb = middle, f
+        else:
+            if fa * f > 0.0:
+                fb *= 0.5
+            a, fa = middle, f
+    return b
+
+
+@inner_kernel
 def next_exceedance(g, t, low, high):
     """The first time from t on at which the acceleration is below `low` or above `high`, on that side; else NEVER."""
     here = acceleration(g, t)
@@ -210,30 +241,7 @@ def next_exceedance(g, t, low, high):
         there = g.samples[interval(g, end)] if g.kind == SAMPLED else acceleration(g, end)  # just before it, where a record ends
         if there < low or there > high:
             level = low if there < low else high
-            rising = there > level
-            a, b = t, end  # monotone in between: a is inside, b outside
-            fa, fb = here - level, there - level
-            close = 4e-16 * abs(b)
-            for _ in range(200):
-                if b - a <= close:
-                    break
-                # Regula falsi (Illinois), never nearer to an end than rounding, so that the bracket closes on the root.
-                guess = a - fa * (b - a) / (fb - fa)
-                middle = min(max(guess, a + close), b - close)
-                if not a < middle < b:
-                    middle = 0.5 * (a + b)
-                    if not a < middle < b:
-                        break
-                f = acceleration(g, middle) - level
-                if (f > 0.0) == rising and f != 0.0:
-                    if fb * f > 0.0:
-                        fa *= 0.5
-                    b, fb = middle, f
-                else:
-                    if fa * f > 0.0:
-                        fb *= 0.5
-                    a, fa = middle, f
-            return b
+            return _passage(g, t, end, here - level, there - level, level)
         if end <= t:
             return NEVER
         t, here = end, acceleration(g, end)

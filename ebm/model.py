@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, Strict
 
+from rockcheck.ebm.rules import NAMES
 from rockcheck.scenes.base import Frozen, Positive
 from rockcheck.scenes.errors import InputError, ModelFailure
 from rockcheck.scenes.history import Cost, Event, History
@@ -17,7 +18,11 @@ from rockcheck.scenes.observation import observe
 from rockcheck.scenes.scene import Scene
 
 if TYPE_CHECKING:
-    from rockcheck.ebm.trajectory import Tally
+    from rockcheck.ebm.march import Tally
+
+
+#: The finest tolerance.
+FINEST = 1e-15
 
 
 class EventBasedModel(Frozen):
@@ -26,15 +31,18 @@ class EventBasedModel(Frozen):
     `tolerance` bounds the local truncation error of each Taylor step, in natural units (rotation in rad, lengths in R).
     `pivot`: "bilateral" is the paper's model, in which the pivot never leaves the floor; "unilateral" lets the floor only
     push, so that the block may hop. `friction`: "coulomb" switches exactly between stick and slip, "bouc-wen" is the paper's
-    regularisation (9) with the `yield_displacement` u_y in m, "no-slip" is Housner's block. `energy_cap` (unilateral) lowers
+    regularisation (9) with the `yield_displacement` u_y in m, "no-slip" is Housner's block. `impacts` (unilateral) is the law of
+    impacts at several contacts at once: "moreau" strikes all that touch together, "floor-first" one after another; they differ
+    where a block lands flush against a bouncing wall. `energy_cap` (unilateral) lowers
     the restitution of an impact that would add kinetic energy to the largest that does not. `estimate_error` runs the scene
     again at tolerance/100 and puts the largest change of theta/alpha into `cost.error_estimate`. A run that reaches
     `most_steps` or `most_events` is a `ModelFailure`.
     """
 
-    tolerance: Annotated[float, Strict(), Field(ge=1e-15, le=1e-2)] = 1e-10
+    tolerance: Annotated[float, Strict(), Field(ge=FINEST, le=1e-2)] = 1e-10
     pivot: Literal["bilateral", "unilateral"] = "bilateral"
     friction: Literal["coulomb", "bouc-wen", "no-slip"] = "coulomb"
+    impacts: Literal["moreau", "floor-first"] = "moreau"
     energy_cap: bool = False
     yield_displacement: Positive = 1e-5
     estimate_error: bool = False
@@ -96,7 +104,7 @@ class EventBasedModel(Frozen):
         history = self._simulate(scene, self.tolerance)
         if not self.estimate_error:
             return history
-        finer = self._simulate(scene, max(self.tolerance / 100.0, 1e-15))
+        finer = self._simulate(scene, max(self.tolerance / 100.0, FINEST))
         rows = min(len(finer.channels["theta"]), len(history.channels["theta"]))
         change = np.max(np.abs(finer.channels["theta"][:rows] - history.channels["theta"][:rows])) / scene.block.alpha
         cost = Cost(**(vars(history.cost) | {"error_estimate": float(change)}))
@@ -104,36 +112,36 @@ class EventBasedModel(Frozen):
 
     def _simulate(self, scene: Scene, tolerance: float) -> History:
         start = time.perf_counter()
-        from rockcheck.ebm import motion, natural, trajectory
+        from rockcheck.ebm import bouc_wen, march, motion, natural
         from rockcheck.scenes.compiled import interruptible
 
-        b = natural.setting_of(scene, unilateral=self.pivot == "unilateral", no_slip=self.friction == "no-slip", energy_cap=self.energy_cap)
+        b = natural.setting_of(
+            scene,
+            unilateral=self.pivot == "unilateral",
+            no_slip=self.friction == "no-slip",
+            energy_cap=self.energy_cap,
+            floor_first=self.impacts == "floor-first",
+        )
         horizontal, vertical = natural.grounds_of(scene)
         unit = natural.time_unit(scene)
         state = natural.state_of(scene)
         times = scene.output_times
         order = type(self)(tolerance=tolerance).order
-        control = trajectory.Control(tolerance, order, self.most_steps, self.most_events, False, scene.output_step / unit)
+        control = march.Control(tolerance, order, self.most_steps, self.most_events, False, scene.output_step / unit)
         out = np.empty((len(times), 6))
         out_mode = np.zeros(len(times), dtype=np.int8)
         log = np.empty((self.most_events, 5))
+        yields = None
         if self.friction == "bouc-wen":
-            from rockcheck.ebm import bouc_wen
-
             yields = self.yield_displacement / scene.block.radius
-            march = partial(bouc_wen.run, b, horizontal, vertical)
-            march(state.copy(), yields, 0.0, control, out[:0], out_mode[:0], log)  # loads or compiles
-            march = partial(march, state, yields, scene.duration / unit, control, out, out_mode, log)
-        else:
-            _compiled()
-            march = partial(
-                trajectory.run, b, horizontal, vertical, state, scene.duration / unit, control, out, out_mode, log, *motion.workspace()
-            )
+        scratch = motion.workspace() if yields is None else (*bouc_wen.friction_workspace(), yields)
+        _compiled(scratch)
+        go = partial(march.run, b, horizontal, vertical, state, scene.duration / unit, control, out, out_mode, log, *scratch)
         ready, cpu = time.perf_counter(), time.process_time()
-        tally = interruptible(march)
+        tally = interruptible(go)
         seconds, cpu = time.perf_counter() - ready, time.process_time() - cpu
-        if tally.ending in trajectory.FAILURES:
-            raise ModelFailure(f"{self.name}: {trajectory.FAILURES[tally.ending]} at t = {tally.t * unit:.6g} s")
+        if tally.ending in march.FAILURES:
+            raise ModelFailure(f"{self.name}: {march.FAILURES[tally.ending]} at t = {tally.t * unit:.6g} s")
         rows = max(tally.rows, 1)
         out[0] = natural.state_of(scene) if tally.rows == 0 else out[0]
         events = _events(log[: min(tally.events, len(log))], unit, scene.block.radius)
@@ -145,12 +153,13 @@ class EventBasedModel(Frozen):
             evaluations=tally.steps,
             energy_gains=tally.gains,
             largest_energy_gain=tally.largest_gain,
+            rules={name: int(count) for name, count in zip(NAMES, tally.rules, strict=True) if count},
         )
         return observe(
             scene,
             self.name,
             natural.to_si(scene, out[:rows]),
-            mode=np.array(trajectory.MODE_NAMES)[out_mode[:rows]],
+            mode=np.array(march.MODE_NAMES)[out_mode[:rows]],
             events=events,
             outcome=_outcome(tally, state[2]),
             cost=cost,
@@ -159,18 +168,18 @@ class EventBasedModel(Frozen):
 
 
 def _outcome(tally: Tally, theta: float) -> str:
-    from rockcheck.ebm import trajectory
+    from rockcheck.ebm import march
 
-    if tally.ending == trajectory.OVERTURNED:
+    if tally.ending == march.OVERTURNED:
         return "overturned left" if theta > 0 else "overturned right"
     return "at rest" if tally.at_rest else "moving"
 
 
 def _events(log: np.ndarray, unit: float, radius: float) -> list[Event]:
     """The event log (natural units) as events (SI)."""
-    from rockcheck.ebm import trajectory
+    from rockcheck.ebm import march
 
-    modes, kinds, speed = trajectory.MODE_NAMES, trajectory.EVENT_NAMES, radius / unit
+    modes, kinds, speed = march.MODE_NAMES, march.EVENT_NAMES, radius / unit
     return [
         Event(t=t * unit, kind=kinds[int(kind)], mode_before=modes[int(before)], mode_after=modes[int(after)], impulse=impulse * speed)
         for t, kind, before, after, impulse in log.tolist()
@@ -182,34 +191,24 @@ def vars_of(history: History) -> dict[str, Any]:
     return {name: getattr(history, name) for name in History.__dataclass_fields__}
 
 
-def _compiled() -> None:
+def _compiled(scratch: tuple[Any, ...]) -> None:
     """Loads or compiles the event loop by a run of no steps, so that no run's time holds it."""
-    global _READY
-    if _READY:
+    if len(scratch) in _READY:
         return
-    from rockcheck.ebm import motion, natural, trajectory
+    from rockcheck.ebm import march, natural
     from rockcheck.scenes.excitations import Rest
     from rockcheck.scenes.scene import Block, Floor
 
     scene = Scene(name="warm-up", block=Block(half_width=1.0, half_height=4.0), floor=Floor(friction=0.5), excitation=Rest(), duration=1.0)
     b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
-    control = trajectory.Control(1e-8, 12, 1, 1, False, 1.0)
-    gh, gv = natural.grounds_of(scene)
-    trajectory.run(
-        b,
-        gh,
-        gv,
-        natural.state_of(scene),
-        1.0,
-        control,
-        np.empty((0, 6)),
-        np.empty(0, dtype=np.int8),
-        np.empty((0, 5)),
-        *motion.workspace(),
-    )
-    _READY = True
+    control = march.Control(WARM_UP_TOLERANCE, 12, 1, 1, False, 1.0)
+    nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
+    march.run(b, *natural.grounds_of(scene), natural.state_of(scene), 1.0, control, *nothing, *scratch)
+    _READY.add(len(scratch))
 
 
-_READY = False
+#: The kinds of scratch for which the event loop is compiled: with Coulomb and with Bouc-Wen friction.
+_READY: set[int] = set()
+WARM_UP_TOLERANCE = 0.01
 #: Highest order of a Taylor step (see ebm.series, which is not imported here because it needs the compiler).
 HIGHEST_ORDER = 28

@@ -52,14 +52,16 @@ class Setting(NamedTuple):
     unilateral: bool
     #: Largest impact restitution that adds no energy is used instead of e.
     energy_cap: bool
+    #: Unilateral impacts one contact after another, the floor first (otherwise all that touch at once, Moreau).
+    floor_first: bool
 
 
 #: Static friction of a frictionless floor: with less, the rounding of a base acceleration that dies out moves a resting block.
 LEAST_FRICTION = 1e-9
 
 # A mode is a small integer vector.
-FAMILY, S, FLOOR, SLIP, PULL, TIP, FAR, LOOSE = range(8)
-MODE_SIZE = 8
+FAMILY, S, FLOOR, SLIP, PULL, TIP, FAR = range(7)
+MODE_SIZE = 7
 # m[FAMILY]: FLAT has theta = 0; m[S] is the sign of theta, also what phi = 0 is about to become.
 FLAT, TILT = 0, 1
 # m[FLOOR]: what the pivot (or, flat, the base) does; m[SLIP] is the direction of slip (frame; world where flat).
@@ -67,15 +69,16 @@ OFF, STICK, SLIPPING = 0, 1, 2
 # m[PULL]: sign assumed for the normal force P, which gives friction its sense; -1 only with the bilateral pivot.
 # m[TIP], m[FAR]: the corner rests on the wall it tips to, or on the other one. Where flat: the side rests on the left wall, on
 # the right wall; on the floor a block at rest is then held on that side, whatever the base does.
-# m[LOOSE]: its guards are held to more than their noise only, for within that no mode fitted.
 
 # Rows of the workspace that hold series.
 PHI, OMEGA, SIN, COS, U, G, XI, Y, P, Q, NA, NB, GUARD, KNOWN, FORCE, FLOOR_ARM, WALL_ARM, WALL_PUSH = range(18)
 # Rows in which the small linear system of the contacts is put together, three each.
 ROW, COLUMN, MATRIX, INVERSE = range(18, 30, 3)
 # The last angle whose sine and cosine were taken, and these: the end of a step is the start of the next one.
-ANGLE = 30
-ROWS = 31
+ANGLE, ACCELERATION = 30, 31
+# The guards of the mode, a row each: the weights of the series in it (see ebm.guards).
+TABLE = 32
+ROWS = TABLE + 14
 
 RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, MOST_TERMS + 2)])
 
@@ -158,7 +161,9 @@ def _rock_series(still_vertical, order, enough, reach, need_forces, a):
         a[COS, k + 1] = dc * r
         a[OMEGA, k + 1] = 0.75 * (push - weight) * r
         scale *= reach
-        small = small + 1 if abs(a[OMEGA, k + 1]) * scale < enough else 0
+        # A uniform rotation has no rates left, but its sine and cosine have.
+        size = abs(a[OMEGA, k + 1]) + abs(a[SIN, k + 1]) + abs(a[COS, k + 1])
+        small = small + 1 if size * scale < enough else 0
         if not still_vertical and abs(a[G, k]) * scale >= enough:  # at its balance point only P feels the vertical motion
             small = 0
         if small == 3:
@@ -224,12 +229,11 @@ def _contact_rows(b, kappa, floor, stick, tip, far, a):
 def _contact_series(b, m, order, enough, reach, a):
     """Newton-Euler with the mode's constraints, solved term by term: the matrix of the unknown forces is the same each time."""
     floor, tip, far = m[FLOOR] != OFF, m[TIP] != 0, m[FAR] != 0
-    stick = m[FLOOR] == STICK and not (tip and far)  # wedged between two walls the block needs no friction
     static = tip and far
+    stick = m[FLOOR] == STICK and not static  # wedged between two walls the block needs no friction
     kappa = b.mu_k * m[SLIP] * m[PULL] if m[FLOOR] == SLIPPING else 0.0  # Q = -kappa P
     n = _contact_rows(b, kappa, floor, stick, tip, far, a)
     s0, c0 = a[SIN, 0], a[COS, 0]
-    cp0 = b.sin_2alpha * s0 + b.cos_2alpha * c0
     scale = 1.0
     small = 0
     for k in range(order + 1):
@@ -237,76 +241,26 @@ def _contact_series(b, m, order, enough, reach, a):
     a[PHI, 1], a[SIN, 1], a[COS, 1] = a[OMEGA, 0], -a[OMEGA, 0] * c0, a[OMEGA, 0] * s0
     for k in range(order - 1):
         i = k + 2
-        per = float(i * (i - 1))
         # The rates of sine and cosine at order k + 1 lack only the term of phi's acceleration at order k, the unknown.
         ds = 0.0
         dc = 0.0
         for j in range(k + 1):
             ds -= a[OMEGA, j] * a[COS, k + 1 - j]
             dc += a[OMEGA, j] * a[SIN, k + 1 - j]
-        ks = ds * (i - 1.0)
-        kc = dc * (i - 1.0)
-        kp = b.sin_2alpha * kc - b.cos_2alpha * ks  # of s' = sin(alpha + phi)
-        # Moments of the forces' lower orders.
-        moment = 0.0
-        if floor:
-            a[FLOOR_ARM, k] = a[SIN, k] + kappa * a[COS, k]
-            for j in range(1, k + 1):
-                moment -= a[FLOOR_ARM, j] * a[P, k - j]
-        if stick:
-            for j in range(1, k + 1):
-                moment += a[COS, j] * a[Q, k - j]
-        if tip or far:
-            a[WALL_ARM, k] = b.sin_2alpha * a[SIN, k] + b.cos_2alpha * a[COS, k]
-            for j in range(1, k + 1):
-                moment -= a[WALL_ARM, j] * a[WALL_PUSH, k - j]
-        ax, ay, aphi = -a[U, k], -a[G, k], 3.0 * moment
-        r = 0
-        if floor:
-            a[KNOWN, r] = kc - ay + s0 * aphi
-            r += 1
-        if stick:
-            a[KNOWN, r] = ks - ax - c0 * aphi
-            r += 1
-        if tip:
-            a[KNOWN, r] = kp - ax + cp0 * aphi
-            r += 1
-        if far:
-            a[KNOWN, r] = kp + ax + cp0 * aphi
-            r += 1
-        for r in range(n):
-            force = 0.0
-            for j in range(n):
-                force += a[INVERSE + r, j] * a[KNOWN, j]
-            a[FORCE, r] = force
-            ax += a[COLUMN + r, 0] * force
-            ay += a[COLUMN + r, 1] * force
-            aphi += 3.0 * a[COLUMN + r, 2] * force
-        r = 0
-        if floor:
-            a[P, k] = a[FORCE, r]
-            a[Q, k] = -kappa * a[P, k]
-            r += 1
-        if stick:
-            a[Q, k] = a[FORCE, r]
-            r += 1
-        if tip:
-            a[NA, k] = a[FORCE, r]
-            r += 1
-        if far:
-            a[NB, k] = a[FORCE, r]
-        a[WALL_PUSH, k] = a[NA, k] + a[NB, k]
+        a[ACCELERATION, 0], a[ACCELERATION, 1] = -a[U, k], -a[G, k]
+        a[ACCELERATION, 2] = 3.0 * _moment_of_lower_orders(b, kappa, floor, stick, tip or far, k, a)
+        _forces(b, n, kappa, floor, stick, tip, far, ds * (i - 1.0), dc * (i - 1.0), k, a)
         if static:
-            ax = aphi = 0.0
-            ay = 0.0 if floor else ay
-        a[XI, i] = ax / per
-        a[Y, i] = ay / per
-        a[OMEGA, k + 1] = aphi * RECIPROCAL[k + 1]
+            a[ACCELERATION, 0] = a[ACCELERATION, 2] = 0.0
+            a[ACCELERATION, 1] = 0.0 if floor else a[ACCELERATION, 1]
+        a[XI, i] = a[ACCELERATION, 0] / (i * (i - 1.0))
+        a[Y, i] = a[ACCELERATION, 1] / (i * (i - 1.0))
+        a[OMEGA, k + 1] = a[ACCELERATION, 2] * RECIPROCAL[k + 1]
         a[PHI, i] = a[OMEGA, k + 1] * RECIPROCAL[i]
         a[SIN, i] = (ds - a[OMEGA, k + 1] * c0) * RECIPROCAL[i]
         a[COS, i] = (dc + a[OMEGA, k + 1] * s0) * RECIPROCAL[i]
         scale *= reach
-        size = abs(aphi) + abs(ax) + abs(ay) + abs(a[SIN, k + 1]) + abs(a[COS, k + 1])
+        size = abs(a[ACCELERATION, 2]) + abs(a[ACCELERATION, 0]) + abs(a[ACCELERATION, 1]) + abs(a[SIN, k + 1]) + abs(a[COS, k + 1])
         size += abs(a[P, k]) + abs(a[Q, k]) + abs(a[NA, k]) + abs(a[NB, k])
         small = small + 1 if size * scale < enough else 0
         if small == 3:
@@ -316,6 +270,58 @@ def _contact_series(b, m, order, enough, reach, a):
     a[OMEGA, i] = 0.0
     a[P, i] = a[P, i - 1] = a[Q, i] = a[Q, i - 1] = a[NA, i] = a[NA, i - 1] = a[NB, i] = a[NB, i - 1] = 0.0
     return order
+
+
+@inner_kernel
+def _moment_of_lower_orders(b, kappa, floor, stick, wall, k, a):
+    """Coefficient k of the moment about the centroid that the forces' coefficients below k give, by their arms' later terms."""
+    moment = 0.0
+    if floor:
+        a[FLOOR_ARM, k] = a[SIN, k] + kappa * a[COS, k]
+        for j in range(1, k + 1):
+            moment -= a[FLOOR_ARM, j] * a[P, k - j]
+    if stick:
+        for j in range(1, k + 1):
+            moment += a[COS, j] * a[Q, k - j]
+    if wall:
+        a[WALL_ARM, k] = b.sin_2alpha * a[SIN, k] + b.cos_2alpha * a[COS, k]
+        for j in range(1, k + 1):
+            moment -= a[WALL_ARM, j] * a[WALL_PUSH, k - j]
+    return moment
+
+
+@inner_kernel
+def _forces(b, n, kappa, floor, stick, tip, far, ks, kc, k, a):
+    """Coefficient k of the n contact forces, so that the constraints hold; adds what they do to ACCELERATION (xi, y, phi).
+
+    `ks`, `kc` are the accelerations of sine and cosine but for phi's own.
+    """
+    kp = b.sin_2alpha * kc - b.cos_2alpha * ks  # of s' = sin(alpha + phi)
+    s, c = a[SIN, 0], a[COS, 0]
+    cp = b.sin_2alpha * s + b.cos_2alpha * c
+    ax, ay, aphi = a[ACCELERATION, 0], a[ACCELERATION, 1], a[ACCELERATION, 2]
+    r = 0
+    for which in range(4):
+        if (floor, stick, tip, far)[which]:
+            a[KNOWN, r] = (kc - ay + s * aphi, ks - ax - c * aphi, kp - ax + cp * aphi, kp + ax + cp * aphi)[which]
+            r += 1
+    for r in range(n):
+        force = 0.0
+        for j in range(n):
+            force += a[INVERSE + r, j] * a[KNOWN, j]
+        a[FORCE, r] = force
+        ax += a[COLUMN + r, 0] * force
+        ay += a[COLUMN + r, 1] * force
+        aphi += 3.0 * a[COLUMN + r, 2] * force
+    a[ACCELERATION, 0], a[ACCELERATION, 1], a[ACCELERATION, 2] = ax, ay, aphi
+    r = 0
+    for which in range(4):
+        if (floor, stick, tip, far)[which]:
+            a[(P, Q, NA, NB)[which], k] = a[FORCE, r]
+            r += 1
+    if not stick:
+        a[Q, k] = -kappa * a[P, k]
+    a[WALL_PUSH, k] = a[NA, k] + a[NB, k]
 
 
 @inner_kernel

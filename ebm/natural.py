@@ -19,7 +19,7 @@ def time_unit(scene: Scene) -> float:
     return math.sqrt(scene.block.radius / scene.gravity)
 
 
-def setting_of(scene: Scene, *, unilateral: bool, no_slip: bool, energy_cap: bool) -> Setting:
+def setting_of(scene: Scene, *, unilateral: bool, no_slip: bool, energy_cap: bool, floor_first: bool = False) -> Setting:
     """Block, floor and walls of a scene in natural units."""
     alpha, radius = scene.block.alpha, scene.block.radius
     left, right = scene.wall("left"), scene.wall("right")
@@ -40,6 +40,7 @@ def setting_of(scene: Scene, *, unilateral: bool, no_slip: bool, energy_cap: boo
         no_slip=no_slip,
         unilateral=unilateral,
         energy_cap=energy_cap,
+        floor_first=floor_first,
     )
 
 

@@ -9,19 +9,23 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from rockcheck.scenes.compiled import inner_kernel
 
 #: Width of the arrays that hold a polynomial: orders up to 28, and two numbers that the root search keeps behind them.
 MOST_TERMS = 32
 #: Natural time over which the first coefficients of a guard are weighed against each other.
 AHEAD = 2e-2
-#: A coefficient below this, scaled to AHEAD, is rounding noise: of a position, a velocity, a force. They fit each other: what
-#: a force of 5e-10 moves in that time is 1e-13, so that where a contact pulls by more than noise, its gap opens by more than noise.
-POSITION_NOISE, RATE_NOISE, FORCE_NOISE = 1e-13, 1e-12, 5e-10
-#: A guard that is negative, but will not be after this time, is at its zero: the time of an event is not known better.
+#: The error bound of a position, of a velocity, of a force: a coefficient below it is rounding. They are one bound: what a velocity
+#: or a force of this size moves within AHEAD, so that where a contact pulls by more than noise, its gap opens by more than noise.
+POSITION, RATE, FORCE = range(3)
+_ERROR = 1e-13
+NOISE = np.array([_ERROR, _ERROR / AHEAD, 2.0 * _ERROR / AHEAD**2])
+#: The zero in time: what happens within it is one event, for the time of an event is not known better.
 INSTANT = 1e-9
 NO_ROOT = -1.0
-_NARROWEST = 2.0**-44
+_NARROWEST, _EPSILON, _SMALL = 2.0**-44, 2.0**-52, 2.0**-10
 _WIDTH, _START = 30, 31  # where the root search keeps an interval's width and left end
 
 
@@ -44,6 +48,21 @@ def slope(a, row, n, tau):
 
 
 @inner_kernel
+def step_size(a, first, second, order, tolerance, reach):
+    """The step at which the last two terms of the series stay below the tolerance, at most `reach`.
+
+    In a step shorter than the unit of time the error of the velocity, h times fewer, is the larger one.
+    """
+    longest = math.inf  # its logarithm
+    for k in (order, order - 1):
+        size = abs(a[first, k]) + abs(a[second, k])
+        if size > 0.0:
+            spare = math.log(tolerance / size)
+            longest = min(longest, spare / k if spare > 0.0 else spare / (k - 1))
+    return min(reach, math.exp(longest))
+
+
+@inner_kernel
 def leading(a, row, n, floor):
     """The sign with which c leaves tau = 0: +1, -1, or 0 where it is zero throughout."""
     k = _order_of_zero(a, row, n, floor)
@@ -53,15 +72,22 @@ def leading(a, row, n, floor):
 
 
 @inner_kernel
+def contradiction(a, row, n, floor):
+    """The least noise, a multiple of `floor`, for which c would not leave tau = 0 downward."""
+    while leading(a, row, n, floor) < 0:
+        floor *= 4.0
+    return floor
+
+
+@inner_kernel
 def _order_of_zero(a, row, n, floor):
     """The index of the first coefficient of c that counts; n + 1 where there is none.
 
-    Coefficients that are rounding noise (below `floor`, see POSITION_NOISE), by themselves or with the noise before them, or
-    turn positive within an INSTANT, are taken as zero, so that a guard that has just fired (and is zero by construction) does
-    not fire again.
+    Coefficients that are rounding (below `floor`, see NOISE), by themselves or with the noise before them, or turn positive within
+    an INSTANT, are taken as zero, so that a guard that has just fired (and is zero by construction) does not fire again.
     """
     noise = floor
-    scale = 1e-13
+    scale = _ERROR
     for k in range(min(n, 2) + 1):  # later terms may grow without bound where friction nearly jams the pivot (Painleve)
         noise = max(noise, abs(a[row, k]) * scale)
         scale *= AHEAD
@@ -88,7 +114,7 @@ def first_root(a, row, n, h, floor, stack):
     low = 0.0
     for k in range(n, 0, -1):
         low = (low + min(a[row, k], 0.0)) * h
-    if a[row, 0] > floor and a[row, 0] + low > 1e-13 * a[row, 0]:
+    if a[row, 0] > floor and a[row, 0] + low > _ERROR * a[row, 0]:
         return NO_ROOT
     zeros = _order_of_zero(a, row, n, floor)
     lift = 0.0
@@ -172,7 +198,7 @@ def _falling_root(stack, row, n, end):
         if not newton:
             new = 0.5 * (a + b)
         step = abs(new - z)
-        rounding = 2e-16 * (abs(new) + 1e-3 * b)
+        rounding = _EPSILON * (abs(new) + _SMALL * b)
         if step <= rounding or step * step * step <= rounding * last * last:
             return new
         z, last = new, step if newton else 0.0

@@ -54,6 +54,8 @@ class Cost:
     #: Impacts at which the impact law added kinetic energy, and the most that one of them added, relative.
     energy_gains: int = 0
     largest_energy_gain: float = 0.0
+    #: How often each modelling choice of the event-based model was made, by its name; those that never were are left out.
+    rules: Mapping[str, int] = field(default_factory=dict)
     #: Largest change of theta/alpha against the same run at a tighter tolerance, where that was asked for.
     error_estimate: float | None = None
 

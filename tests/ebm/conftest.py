@@ -48,18 +48,20 @@ def block() -> Block:
 @pytest.fixture(scope="session")
 def run_to_end() -> Runner:
     """Runs a scene to its end without sampling it; the compiled loop is called as the model calls it."""
-    from rockcheck.ebm import motion, natural, trajectory
+    from rockcheck.ebm import march, motion, natural
 
     scratch = motion.workspace()
 
-    def run(scene: Scene, *, pivot: str = "bilateral", tolerance: float = 1e-12) -> Run:
-        setting = natural.setting_of(scene, unilateral=pivot == "unilateral", no_slip=False, energy_cap=False)
+    def run(scene: Scene, *, pivot: str = "bilateral", tolerance: float = 1e-12, impacts: str = "moreau") -> Run:
+        setting = natural.setting_of(
+            scene, unilateral=pivot == "unilateral", no_slip=False, energy_cap=False, floor_first=impacts == "floor-first"
+        )
         state = natural.state_of(scene)
         order = EventBasedModel(tolerance=tolerance).order
-        control = trajectory.Control(tolerance, order, 1_000_000, 200_000, False, 1.0)
+        control = march.Control(tolerance, order, 1_000_000, 200_000, False, 1.0)
         unit, radius = natural.time_unit(scene), scene.block.radius
         nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
-        tally = trajectory.run(setting, *natural.grounds_of(scene), state, scene.duration / unit, control, *nothing, *scratch)
+        tally = march.run(setting, *natural.grounds_of(scene), state, scene.duration / unit, control, *nothing, *scratch)
         return Run(
             ending=tally.ending,
             t=tally.t * unit,

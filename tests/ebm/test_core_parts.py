@@ -13,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from rockcheck.ebm import EventBasedModel, ground, motion, natural, series, transitions
+from rockcheck.ebm import EventBasedModel, ground, guards, modes, motion, natural, rules, series
 from rockcheck.scenes import Block, Floor, Record, Scene, Wall
 
 PIVOTS = ["bilateral", "unilateral"]
 #: Order of the series that guards are taken from.
 ORDER = 8
-NOISES = [series.POSITION_NOISE, series.RATE_NOISE, series.FORCE_NOISE]
+NOISES = series.NOISE.tolist()
 
 
 class Mode(NamedTuple):
@@ -48,13 +48,13 @@ class Core:
     """The core as these tests call it. Natural units: R, g, sqrt(R/g)."""
 
     @staticmethod
-    def first_root(coefficients, h: float, noise: float = series.POSITION_NOISE) -> float | None:
+    def first_root(coefficients, h: float, noise: float = series.NOISE[series.POSITION]) -> float | None:
         """First time in [0, h] at which the polynomial (constant first) turns negative."""
         found = series.first_root(_row(coefficients), 0, len(coefficients) - 1, h, noise, np.zeros((48, series.MOST_TERMS)))
         return None if found == series.NO_ROOT else found
 
     @staticmethod
-    def leading(coefficients, noise: float = series.POSITION_NOISE) -> int:
+    def leading(coefficients, noise: float = series.NOISE[series.POSITION]) -> int:
         """Sign with which the polynomial leaves zero."""
         return series.leading(_row(coefficients), 0, len(coefficients) - 1, noise)
 
@@ -66,9 +66,13 @@ class Core:
 
     def select(self, state, last: int = 0) -> Mode | None:
         """The mode in which the state (x, y, theta and their rates) goes on; `last` is the corner on which the block stood before."""
-        before, m = np.full(motion.MODE_SIZE, -9, dtype=np.int64), np.zeros(motion.MODE_SIZE, dtype=np.int64)
+        m, tried, memory = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.zeros(modes.MODES, dtype=bool), np.zeros(3)
+        modes.forget(tried, memory, 0.0)
         m[motion.S] = last
-        if not transitions.select(self.setting, np.array(state), *self.grounds, 0.0, before, m, self.work):
+        chosen = np.zeros(rules.RULES, dtype=np.int64)
+        if not modes.select(self.setting, np.array(state), *self.grounds, 0.0, m, tried, memory, chosen, self.work):
+            return None
+        if chosen[rules.LEAST_CONTRADICTION]:
             return None
         floor = {motion.OFF: "off", motion.STICK: "stick", motion.SLIPPING: "slip"}[m[motion.FLOOR]]
         at = (bool(m[motion.TIP]), bool(m[motion.FAR]))
@@ -83,14 +87,15 @@ class Core:
         z = np.array(state)
         order = motion.tilt_series(self.setting, m, z, *self.grounds, 0.0, ORDER, 0.0, 0.0, self.work)
         pivot = mode.side * z[0] - self.work[motion.SIN, 0]
-        names = {"far gap": transitions.G_FAR_GAP, "tip gap": transitions.G_TIP_GAP, "landing": transitions.G_LANDING}
-        names |= {"push": transitions.G_PUSH, "tip push": transitions.G_TIP_PUSH, "far push": transitions.G_FAR_PUSH}
-        names |= {"cone +": transitions.G_CONE_PLUS, "cone -": transitions.G_CONE_MINUS, "slip": transitions.G_SLIP}
-        names |= {"topple": transitions.G_TOPPLE, "phi": transitions.G_PHI}
+        names = {"far gap": guards.G_FAR_GAP, "tip gap": guards.G_TIP_GAP, "landing": guards.G_LANDING}
+        names |= {"push": guards.G_PUSH, "tip push": guards.G_TIP_PUSH, "far push": guards.G_FAR_PUSH}
+        names |= {"cone +": guards.G_CONE_PLUS, "cone -": guards.G_CONE_MINUS, "slip": guards.G_SLIP}
+        names |= {"topple": guards.G_TOPPLE, "phi": guards.G_PHI}
+        guards.fill_guards(self.setting, m, pivot, self.work)
         found = {}
         for name, which in names.items():
-            degree = transitions.guard(self.setting, m, which, order, pivot, self.work)
-            if degree >= 0 and transitions.guards_of(self.setting, m) >> which & 1:
+            degree = guards.guard(which, order, self.work)
+            if degree >= 0:
                 found[name] = self.work[motion.GUARD, : degree + 1].copy()
         rock = mode.floor == "stick" and not mode.tip and not mode.far
         rows = {"phi": self.work[motion.PHI, : order + 1].copy()}
@@ -440,7 +445,7 @@ def test_selection_of_a_tilted_block(touch, pivot):
             continue
         if mode not in fitting:
             assert not fitting, (at, mode, fitting)
-            continue  # an attempt beyond the rules, where nothing fits (Painleve): `_STANDING`
+            continue  # an attempt beyond the rules, where nothing fits (Painleve)
         judged += 1
         seen.add((mode.floor, mode.tip, mode.far))
         assert mode.contacts == max(one.contacts for one in fitting), (at, mode, fitting)

@@ -81,8 +81,8 @@ def test_of_the_bilateral_model_on_request() -> None:
 
 @pytest.mark.parametrize(("side", "sign"), [("left", -1.0), ("right", 1.0)])
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
-def test_a_landing_flush_against_a_bouncing_wall_has_no_unique_answer(side: str, sign: float, restitution: float) -> None:
-    """A block that stands against the wall and is tilted away from it lands on floor and wall at once, at its first impact."""
+def test_it_ends_where_the_laws_of_impacts_part(side: str, sign: float, restitution: float) -> None:
+    """A block that stands against a bouncing wall and is tilted away from it lands on floor and wall at once, at its first impact."""
     tilt = sign * 0.3 * PAPER_BLOCK.alpha
     scene = balanced(initial_rotation=tilt, walls=[Wall(side=side, gap=0.0, restitution=restitution)])
     first = next(event.t for event in EventBasedModel(pivot="unilateral").simulate(scene).event_list if event.kind == "floor impact")
@@ -90,4 +90,4 @@ def test_a_landing_flush_against_a_bouncing_wall_has_no_unique_answer(side: str,
     if restitution == 0.0:
         assert found > first + 0.1
     else:
-        assert first - scene.output_step <= found <= first
+        assert first - scene.output_step <= found <= first + 0.02

@@ -162,7 +162,21 @@ def test_impulse_ahead_is_the_integral(symmetric):
 
 def test_inner_kernels_return_no_arrays(monkeypatch):
     """They are compiled without reference counts, so that an array that they returned would be freed too early."""
-    from rockcheck.ebm import contact_impacts, ground, impacts, motion, natural, series, trajectory, transitions
+    from rockcheck.ebm import (
+        contact_impacts,
+        contacts,
+        decide,
+        ground,
+        guards,
+        impacts,
+        march,
+        modes,
+        motion,
+        natural,
+        series,
+        settle,
+        strike,
+    )
 
     seen = set()
 
@@ -177,15 +191,15 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
         return call
 
     # The event loop in the interpreter, with every function of it that is no kernel under watch.
-    run, scratch, scene = trajectory.run.py_func, motion.workspace(), SCENES["wedged"]
-    for module in (contact_impacts, ground, impacts, motion, series, trajectory, transitions):
+    run, scratch, scene = march.run.py_func, motion.workspace(), SCENES["wedged"]
+    for module in (contact_impacts, contacts, decide, ground, guards, impacts, march, modes, motion, series, settle, strike):
         for name, function in list(vars(module).items()):
             if hasattr(function, "py_func"):
                 monkeypatch.setattr(module, name, function.py_func)
             elif inspect.isfunction(function):
                 monkeypatch.setattr(module, name, watched(function))
     setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
-    control = trajectory.Control(1e-8, 14, 200, 200, False, 1.0)
+    control = march.Control(1e-8, 14, 200, 200, False, 1.0)
     nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
     with np.errstate(all="ignore"):
         run(setting, *natural.grounds_of(scene), natural.state_of(scene), 3.0, control, *nothing, *scratch)

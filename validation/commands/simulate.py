@@ -55,6 +55,7 @@ def run(
             "outcome": history.outcome,
             "peak_rotation_alpha": peak,
             "wall_seconds": history.cost.wall_seconds,
+            "rules": dict(history.cost.rules),
             "notes": history.notes,
             "history": path,
         }

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,6 +90,8 @@ class CheckedRun:
     #: Impacts that added energy where the impact law is known to (see `rules`), and the most that one added.
     gains: int = 0
     largest_gain: float = 0.0
+    #: How often each modelling choice was made.
+    rules: Mapping[str, int] = field(default_factory=dict)
     #: Whether the horizon of predictability had to be found.
     horizons: int = 0
     #: Name of an exception of the model by which an invariant is not asked of this run, see EXCEPTIONS.
@@ -141,6 +143,7 @@ def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: boo
         events=len(history.event_list),
         gains=gains,
         largest_gain=history.cost.largest_energy_gain,
+        rules=history.cost.rules,
         horizons=horizon.found,
         failure=horizon.failure,
         exception=exception,

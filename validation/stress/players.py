@@ -14,6 +14,7 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import History, InputError, ModelFailure, Record, Scene, kinematics
 from rockcheck.scenes.excitations import Excitation
 from rockcheck.validation.execute.models import build
+from rockcheck.validation.stress.exact import exact_scene
 from rockcheck.validation.stress.generator import Kind, random_scene
 from rockcheck.validation.stress.invariants import CheckedRun, check_run
 
@@ -58,12 +59,20 @@ class EventBased(Player):
     """A variant of the event-based model."""
 
     friction: Literal["coulomb", "bouc-wen", "no-slip"] = "coulomb"
+    impacts: Literal["moreau", "floor-first"] = "moreau"
+    #: Whether its scenes are those at which rounding decides.
+    exact: bool = False
+
+    def scene(self, seed: int, number: int) -> Scene:
+        """Its scene of that number."""
+        return (exact_scene if self.exact else random_scene)(seed, number, self.kind)
 
     def model(self, scene: Scene, number: int) -> EventBasedModel:
         """The model as it plays this scene: every other unilateral run has the energy cap, Bouc-Wen yields within R/1000."""
         return EventBasedModel(
             pivot="unilateral" if self.kind == "unilateral" else "bilateral",
             friction=self.friction,
+            impacts=self.impacts,
             energy_cap=self.kind == "unilateral" and number % 2 == 1,
             yield_displacement=1e-3 * scene.block.radius,
             most_steps=MOST_STEPS,
@@ -79,6 +88,8 @@ class EventBased(Player):
         """The options of `rockcheck simulate` with which this run can be made again."""
         name = {"unilateral": "ebm-unilateral", "bouc-wen": "ebm-bouc-wen"}.get(self.kind, "ebm")
         options = [f"--model {name}" if self.friction != "no-slip" else "--model ebm:EventBasedModel --set friction=no-slip"]
+        if self.impacts != "moreau":
+            options.append(f"--set impacts={self.impacts}")
         if self.kind == "unilateral" and number % 2 == 1:
             options.append("--set energy_cap=true")
         if self.friction == "bouc-wen":
@@ -190,6 +201,11 @@ PLAYERS: dict[str, Player] = {
         EventBased("ebm no-slip", "no-slip", 100_000, 500, "the paper's pivot, which never slips", "no-slip"),
         EventBased("ebm-unilateral", "unilateral", 100_000, 1000, "a floor that can only push; every other run with the energy cap"),
         EventBased("ebm-bouc-wen", "bouc-wen", 100_000, 300, "regularised friction, which yields within R/1000", "bouc-wen"),
+        EventBased("ebm-unilateral floor-first", "unilateral", 20_000, 200, "one contact after another", impacts="floor-first"),
+        EventBased("ebm exact", "bilateral", 20_000, 200, "scenes at which rounding decides", exact=True),
+        EventBased("ebm no-slip exact", "no-slip", 20_000, 200, "scenes at which rounding decides", "no-slip", exact=True),
+        EventBased("ebm-unilateral exact", "unilateral", 20_000, 200, "scenes at which rounding decides", exact=True),
+        EventBased("ebm-bouc-wen exact", "bouc-wen", 5000, 50, "scenes at which rounding decides", "bouc-wen", exact=True),
         Approximate("cm", "unilateral", 2000, 40, "continuous model, standing 1e-8 R deep", "cm"),
         Approximate("mujoco", "unilateral", 2000, 40, "MuJoCo, best settings, steps of 0.002 sqrt(R/g)", "mujoco"),
         Approximate("pybullet", "unilateral", 2000, 40, "PyBullet, best settings, steps of 0.002 sqrt(R/g)", "pybullet"),

@@ -39,6 +39,8 @@ class RunTotals:
     #: Runs in which an impact added energy as its law is known to, and the most that one added.
     gaining: int = 0
     largest_gain: float = 0.0
+    #: How often each modelling choice of the model was made, by its name.
+    rules: Counter[str] = field(default_factory=Counter)
     #: Runs whose comparison had to be ended by the horizon of predictability.
     horizons: int = 0
     #: Runs that an exception of the model excuses from an invariant, by its name.
@@ -61,6 +63,7 @@ class RunTotals:
             events=self.events + other.events,
             gaining=self.gaining + other.gaining,
             largest_gain=max(self.largest_gain, other.largest_gain),
+            rules=self.rules + other.rules,
             horizons=self.horizons + other.horizons,
             exceptions=self.exceptions + other.exceptions,
             unjudged=self.unjudged + other.unjudged,

@@ -57,6 +57,7 @@ def play_some(label: str, seed: int, first: int, count: int) -> RunTotals:
     outcomes: Counter[str] = Counter()
     exceptions: Counter[str] = Counter()
     unjudged: Counter[str] = Counter()
+    rules: Counter[str] = Counter()
     worst: dict[str, tuple[float, int]] = {}
     failures: list[Failure] = []
     events = gaining = horizons = 0
@@ -73,6 +74,7 @@ def play_some(label: str, seed: int, first: int, count: int) -> RunTotals:
         gaining += played.gains > 0
         largest_gain = max(largest_gain, played.largest_gain)
         horizons += played.horizons
+        rules.update(played.rules)
         if played.exception:
             exceptions[played.exception] += 1
         unjudged.update(played.unjudged)
@@ -88,6 +90,7 @@ def play_some(label: str, seed: int, first: int, count: int) -> RunTotals:
         gaining=gaining,
         largest_gain=largest_gain,
         horizons=horizons,
+        rules=rules,
         exceptions=exceptions,
         unjudged=unjudged,
     )

@@ -44,7 +44,7 @@ def markdown(found: Stress) -> str:
         + ("" if found.complete else " The run was interrupted."),
     ]
     if found.batches:
-        parts += [_totals(found), invariants_markdown(found)]
+        parts += [_totals(found), *_rules(found), invariants_markdown(found)]
     if shown := [failure for failure in found.failures if failure.file]:
         rows = [(one.model, one.invariant, str(one.number), f"{one.figure:.2g}", one.words) for one in shown]
         parts.append(markdown_table(("failure of", "invariant", "run", "figure", "in words"), rows))
@@ -63,6 +63,17 @@ def _totals(found: Stress) -> str:
         excepted = ", ".join(f"{count} {name}" for name, count in batch.exceptions.items()) or "0"
         rows.append((label, str(batch.runs), str(broken), str(batch.events), gains, str(batch.horizons), excepted))
     return markdown_table(columns, rows)
+
+
+def _rules(found: Stress) -> list[str]:
+    """The modelling choices that were made, a row a model, if there were any."""
+    rows = [(label, rules_text(batch)) for label, batch in found.batches.items() if batch.rules]
+    return [markdown_table(("model", "modelling choices made"), rows)] if rows else []
+
+
+def rules_text(batch: RunTotals) -> str:
+    """The modelling choices that a model made in its runs, the most frequent first."""
+    return ", ".join(f"{name} {count:,}" for name, count in batch.rules.most_common())
 
 
 def invariants_markdown(found: Stress) -> str:

@@ -73,6 +73,7 @@ class CostRecord(Stored):
     evaluations: int = 0
     energy_gains: int = 0
     largest_energy_gain: float = 0.0
+    rules: dict[str, int] = Field(default_factory=dict)
     error_estimate: float | None = None
     worker_seconds: float = 0.0
 

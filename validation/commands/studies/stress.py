@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, cast, get_args
 
 import typer
@@ -65,7 +66,6 @@ def run(
 
 def show(found: Stress, out: Console) -> None:
     """For each model runs, failures by invariant and the worst figures; then the failures with their files."""
-    from rockcheck.validation.stress.invariants import EXCEPTIONS
     from rockcheck.validation.stress.tables import summary_rows
 
     if found.stability is not None:
@@ -86,18 +86,28 @@ def show(found: Stress, out: Console) -> None:
     out.print(table)
     for failure in [one for one in found.failures if one.file]:
         out.print(f"{failure.model}, {failure.invariant}, run {failure.number}: {failure.file} {failure.words}", soft_wrap=True)
-    for label, batch in found.batches.items():
-        if batch.gaining:
-            out.print(f"{label}: an impact adds energy in {batch.gaining} runs, at most {100.0 * batch.largest_gain:.2g} %, by its law")
-    for label, batch in found.batches.items():
-        for name, count in batch.exceptions.items():
-            out.print(f"{label}: {count} runs excepted, {name}: {EXCEPTIONS[name]}", soft_wrap=True)
-        for name, count in batch.unjudged.items():
-            out.print(f"{label}: {name} could not be judged in {count} of {count + batch.looked_at[name]} runs")
+    for line in _remarks(found):
+        out.print(line, soft_wrap=True)
     runs = sum(batch.runs for batch in found.batches.values())
     broken = len(found.broken)
     verdict = "no failure of an event-based model" if not broken else f"{broken} failures of event-based models"
     out.print(f"seed {found.seed}: {runs} runs, {verdict}; {found.wall_seconds:.0f} s with {found.jobs} processes")
+
+
+def _remarks(found: Stress) -> Iterator[str]:
+    """What is known of a model: impacts that add energy, modelling choices, exceptions, and what could not be judged."""
+    from rockcheck.validation.stress.invariants import EXCEPTIONS
+    from rockcheck.validation.stress.tables import rules_text
+
+    for label, batch in found.batches.items():
+        if batch.gaining:
+            yield f"{label}: an impact adds energy in {batch.gaining} runs, at most {100.0 * batch.largest_gain:.2g} %, by its law"
+        if batch.rules:
+            yield f"{label}: modelling choices made: {rules_text(batch)}"
+        for name, count in batch.exceptions.items():
+            yield f"{label}: {count} runs excepted, {name}: {EXCEPTIONS[name]}"
+        for name, count in batch.unjudged.items():
+            yield f"{label}: {name} could not be judged in {count} of {count + batch.looked_at[name]} runs"
 
 
 def stable_table(found: Stability) -> Table:

@@ -1,0 +1,112 @@
+"""Which corners rest on floor and walls, and how a block is put exactly onto a contact that it reaches.
+
+Natural units. A contact is closed where its gap and the gap's rate are zero; there is one zero of position, one of velocity.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rockcheck.ebm.motion import HEIGHT, THETA, VX, VY, W, X
+from rockcheck.scenes.compiled import inner_kernel
+
+#: The zero of position (R) and of velocity (sqrt(g R)): a contact nearer and slower than this is closed, a pivot that slips more
+#: slowly stands, a block tilted and turning by less is upright.
+CLOSED = 1e-10
+SLOW = 1e-9
+
+
+@inner_kernel
+def slip_velocity(b, z):
+    """V of the lower corner."""
+    return z[VX] + math.cos(b.alpha - abs(z[THETA])) * z[W]
+
+
+@inner_kernel
+def stand(b, z):
+    """Stops the pivot: the velocity is that of a rotation about it."""
+    z[VX] = -math.cos(b.alpha - abs(z[THETA])) * z[W]
+
+
+@inner_kernel
+def stop(z):
+    """Nothing moves."""
+    z[W] = z[VX] = z[VY] = 0.0
+
+
+@inner_kernel
+def wall_gap(b, z, side):
+    """The clear gap between the wall on `side` (+1 left, -1 right) and the corner that faces it; infinite without a wall."""
+    gap = b.gap_left if side > 0 else b.gap_right
+    return side * z[X] + b.sin_alpha + gap - math.sin(b.alpha + abs(z[THETA]))
+
+
+@inner_kernel
+def closed_wall(b, z, side, lower):
+    """Whether the corner facing the wall on `side` rests on it.
+
+    A tilted block has one such corner; `lower` picks, at theta = 0, the corner that keeps touching while it tilts away.
+    """
+    phi = side * z[THETA]  # positive: tips toward that wall, top corner
+    arm = math.cos(b.alpha + abs(phi))
+    if phi < 0.0 or (phi == 0.0 and lower):
+        arm = -arm
+    rate = side * (z[VX] - arm * z[W])
+    return abs(wall_gap(b, z, side)) < CLOSED and abs(rate) < SLOW
+
+
+@inner_kernel
+def floor_gap(b, z):
+    """Height of the lower corner over the floor."""
+    return z[HEIGHT] - math.cos(b.alpha - abs(z[THETA]))
+
+
+@inner_kernel
+def closed_floor(b, z):
+    """Whether the lower corner rests on the floor."""
+    turns = z[W] if z[THETA] > 0.0 or (z[THETA] == 0.0 and z[W] > 0.0) else -z[W]
+    rate = z[VY] - math.sin(b.alpha - abs(z[THETA])) * turns
+    return abs(floor_gap(b, z)) < CLOSED and abs(rate) < SLOW
+
+
+@inner_kernel
+def closed_gap(gap, rate):
+    """A gap and its rate, zero where it touches and closes so slowly that it rests: then its acceleration decides."""
+    if abs(gap) < CLOSED:
+        if -SLOW < rate < 0.0:
+            return 0.0, 0.0
+        if gap < 0.0:
+            return 0.0, rate
+    return gap, rate
+
+
+@inner_kernel
+def upright(b, z):
+    """Sets a tilt and a rotation that are rounding to zero, and a slip with them."""
+    if (z[THETA] != 0.0 or z[W] != 0.0) and abs(z[THETA]) < CLOSED and abs(z[W]) < SLOW:
+        v = slip_velocity(b, z)
+        z[HEIGHT] += b.cos_alpha - math.cos(b.alpha - abs(z[THETA]))
+        z[THETA] = z[W] = 0.0
+        z[VX] = v if abs(v) > SLOW else 0.0
+
+
+@inner_kernel
+def land_upright(b, z, sign, on_floor):
+    """Sets theta from nearly to exactly zero, the pivot keeping its place; a side that then touches a wall touches it exactly."""
+    z[X] += sign * (b.sin_alpha - math.sin(b.alpha - sign * z[THETA]))
+    if on_floor:
+        z[HEIGHT] = b.cos_alpha
+    z[THETA] = 0.0
+    left, right = abs(wall_gap(b, z, 1)), abs(wall_gap(b, z, -1))
+    if left < CLOSED and left < right:
+        z[X] = -b.gap_left
+    elif right < CLOSED and right < left:
+        z[X] = b.gap_right
+
+
+@inner_kernel
+def between_walls(b, z):
+    """Whether the block touches both walls at once."""
+    return b.gap_left < np.inf and b.gap_right < np.inf and wall_gap(b, z, 1) + wall_gap(b, z, -1) < CLOSED

@@ -1,0 +1,93 @@
+"""When the outcome and the peak of a run are certain before its end. Only spectra ask for it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rockcheck.ebm.ground import GAUSSIAN, STILL, acceleration, impulse_ahead, largest_ahead
+from rockcheck.ebm.motion import FAMILY, FAR, FLAT, FLOOR, HEIGHT, STICK, THETA, TILT, TIP, VX, VY, S, W
+from rockcheck.scenes.compiled import inner_kernel
+
+# A pulse is over when this part of the tolerance is left of it; a bound on the energy keeps this margin where impacts may add some.
+_LEFT, _MARGIN = 1e-3, 0.9
+_TINIEST = math.ulp(0.0)
+
+
+@inner_kernel
+def quiet_from(gh, gv, tolerance):
+    """The time from which the base stands still as far as an outcome can tell."""
+    if gv.kind == STILL and gh.kind == GAUSSIAN:
+        return gh.centre + math.sqrt(-math.log(_LEFT * tolerance) / gh.rate)
+    return 0.0 if gv.kind == STILL and gh.kind == STILL else max(gh.quiet, gv.quiet)
+
+
+@inner_kernel
+def decided(b, m, z, gh, gv, t, quiet, peak):
+    """The final peak rotation (>= pi/2: overturns) if the rest of the motion is certain, else -1."""
+    still = gv.kind == STILL
+    ahead = 0.0 if t >= quiet else (impulse_ahead(gh, t) if still else math.inf)
+    verdict = _by_energy(b, m, z, ahead, peak)
+    if verdict <= 0.0 and ahead > 0.0 and still and abs(z[THETA]) > b.alpha:
+        verdict = _falls(b, m, z, gh, t)
+    return verdict
+
+
+@inner_kernel
+def _by_energy(b, m, z, ahead, peak):
+    """The verdict of the energy that the block has and can get.
+
+    `ahead` bounds the integral of |u| to come, I. The energy E of block and floor, counted from standing, grows by no other
+    work: dE/dt <= |u| sqrt(2 E), so that sqrt(2 E) grows by at most I. A block that can never reach the energy of standing on
+    its corner cannot overturn: it is safe once that energy cannot lift it above the peak it has had. After the excitation a
+    block that only rocks conserves its energy up to its next impact, so that its peak is known at once.
+    """
+    phi = abs(z[THETA])
+    if ahead > 0.0 and (b.walls or phi >= peak):
+        return -1.0
+    energy = 0.5 * (z[VX] * z[VX] + z[VY] * z[VY] + z[W] * z[W] / 3.0) + z[HEIGHT] - b.cos_alpha
+    corner = 1.0 - b.cos_alpha
+    most = 0.5 * (math.sqrt(2.0 * max(energy, 0.0)) + ahead) ** 2
+    margin = _MARGIN if b.walls else 1.0
+    rocks = m[FAMILY] == TILT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0 and not b.walls and ahead == 0.0
+    rocks = rocks and (b.no_slip or _sticks_for_good(b, energy))
+    if most < corner and phi < b.alpha:
+        highest = b.alpha - math.acos(min(b.cos_alpha + most, 1.0))
+        if rocks:
+            return max(peak, highest if m[S] * z[W] > 0.0 else phi)
+        return max(peak, _TINIEST) if highest <= peak and most < margin * corner else -1.0
+    if rocks and m[S] * z[W] >= 0.0 and (phi > b.alpha or energy > corner):
+        return 0.5 * math.pi
+    return -1.0
+
+
+@inner_kernel
+def _falls(b, m, z, gh, t):
+    """pi/2 if a block past its balance point falls whatever the rest of the excitation does, else -1.
+
+    Turning outward, beyond tan(phi - alpha) > mu and > |u| for all time to come, it is accelerated outward in every mode:
+    sticking by (3), slipping by (7), by an impulse of the floor, or not at all in flight. Walls it could meet are left out.
+    """
+    if m[FAMILY] == FLAT or m[S] * z[W] < 0.0 or (b.gap_left if m[S] > 0 else b.gap_right) < np.inf:
+        return -1.0
+    steepness = math.tan(abs(z[THETA]) - b.alpha)
+    if (not b.no_slip and steepness <= b.mu_s) or steepness <= abs(acceleration(gh, t)) or steepness <= largest_ahead(gh, t):
+        return -1.0
+    return 0.5 * math.pi
+
+
+@inner_kernel
+def _sticks_for_good(b, energy):
+    """Whether a pivot cannot slip in free rocking of this energy (up to its balance point), impacts included.
+
+    |Q| <= max(3/4 s c, s w^2) and P >= 1 - 3/4 s^2 - w^2, with w^2 <= 3/2 energy; the landing sticks if
+    mu >= 3 t/(4 + t^2), t = tan alpha.
+    """
+    s, c = b.sin_alpha, b.cos_alpha
+    square = 1.5 * energy
+    push = 1.0 - 0.75 * s * s - square
+    # s c rises with s only up to 45 degrees.
+    pull = 0.75 * (s * c if b.alpha < 0.25 * math.pi else 0.5)
+    t = s / c
+    return push > 0.0 and b.mu_s * push >= max(pull, s * square) and b.mu_s >= 3.0 * t / (4.0 + t * t)

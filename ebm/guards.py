@@ -1,0 +1,245 @@
+"""The guards of a mode: what must not turn negative as long as it lasts.
+
+Contact forces that push, friction inside the cone, slip that keeps its direction, open contacts that stay open. A guard is a linear
+combination of the series of a step (positions and forces) or of their rates; GUARDS lists them, and a table in the workspace
+holds the weights that a mode gives them. The first root of a guard is an event; the signs with which they leave zero select the
+mode (see ebm.modes).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rockcheck.ebm.contacts import CLOSED, closed_gap
+from rockcheck.ebm.motion import (
+    COS,
+    FAMILY,
+    FAR,
+    FLAT,
+    FLOOR,
+    GUARD,
+    LEAST_FRICTION,
+    NA,
+    NB,
+    OFF,
+    PHI,
+    PULL,
+    SIN,
+    SLIP,
+    SLIPPING,
+    STICK,
+    TABLE,
+    TIP,
+    XI,
+    P,
+    Q,
+    Y,
+    delta,
+)
+from rockcheck.ebm.series import FORCE, INSTANT, NO_ROOT, NOISE, POSITION, RATE, first_root
+from rockcheck.scenes.compiled import inner_kernel
+
+# In the order in which those of one instant count: floor before walls, contacts before friction.
+(
+    G_PHI,
+    G_TOPPLE,
+    G_LANDING,
+    G_TIP_GAP,
+    G_FAR_GAP,
+    G_PUSH,
+    G_TIP_PUSH,
+    G_FAR_PUSH,
+    G_CONE_PLUS,
+    G_CONE_MINUS,
+    G_SLIP,
+    G_UPLIFT_PLUS,
+    G_UPLIFT_MINUS,
+    G_LOADS,
+) = range(14)
+GUARDS = 14
+# What a guard is; a rate is the rate of its combination.
+KIND = np.array((POSITION,) * 5 + (FORCE,) * 5 + (RATE,) + (FORCE,) * 2 + (POSITION,))
+# The columns of the table: the weight of each series, a constant, and how many terms fewer than the order the guard has (-1: no guard).
+_SERIES, _CONSTANT, _SHORTER = 12, 30, 31
+
+
+@inner_kernel
+def _has(a, which, shorter):
+    a[TABLE + which, _SHORTER] = shorter
+
+
+@inner_kernel
+def drop(a, which):
+    """Takes a guard from the table."""
+    a[TABLE + which, _SHORTER] = -1.0
+
+
+@inner_kernel
+def fill_guards(b, m, pivot, a):
+    """Writes the guards of mode m into the table; `pivot` is the place of a sticking pivot."""
+    for which in range(GUARDS):
+        for column in range(_SERIES):
+            a[TABLE + which, column] = 0.0
+        a[TABLE + which, _CONSTANT] = 0.0
+        a[TABLE + which, _SHORTER] = -1.0
+    if m[FAMILY] == FLAT:
+        _fill_flat(b, m, a)
+        return
+    a[TABLE + G_PHI, PHI] = 1.0
+    _has(a, G_PHI, 0)
+    if a[PHI, 0] >= 0.5 or m[FLOOR] == OFF:  # else no step on the floor is long enough to turn the block over
+        a[TABLE + G_TOPPLE, PHI], a[TABLE + G_TOPPLE, _CONSTANT] = -1.0, 0.5 * math.pi
+        _has(a, G_TOPPLE, 0)
+    if m[FLOOR] == OFF:
+        a[TABLE + G_LANDING, Y], a[TABLE + G_LANDING, COS] = 1.0, -1.0
+        _has(a, G_LANDING, 0)
+    else:
+        _fill_friction(b, m, b.mu_s * m[PULL], a)
+    if m[FLOOR] == SLIPPING:
+        along_wall = m[TIP] != 0 or m[FAR] != 0
+        # Along a wall V = (c + C) dtheta/dt, and C = -c at theta = 0: the rotation tells the sense of slip everywhere.
+        a[TABLE + G_SLIP, PHI if along_wall else XI] = m[SLIP]
+        a[TABLE + G_SLIP, SIN] = 0.0 if along_wall else -m[SLIP]
+    if b.walls:
+        _fill_gap(b, m, True, pivot, a)
+        _fill_gap(b, m, False, pivot, a)
+        a[TABLE + G_TIP_PUSH, NA] = a[TABLE + G_FAR_PUSH, NB] = 1.0
+        _has(a, G_TIP_PUSH, 2 if m[TIP] != 0 else -1)
+        _has(a, G_FAR_PUSH, 2 if m[FAR] != 0 else -1)
+
+
+@inner_kernel
+def _fill_friction(b, m, mu, a):
+    """The floor's push, the two sides of the friction cone |Q| <= mu P, and the sense of slip (whose weights are the family's)."""
+    a[TABLE + G_PUSH, P] = m[PULL]
+    _has(a, G_PUSH, 2 if b.unilateral or m[FLOOR] == SLIPPING else -1)
+    if m[FLOOR] == STICK and not b.no_slip:
+        a[TABLE + G_CONE_PLUS, P] = a[TABLE + G_CONE_MINUS, P] = mu
+        a[TABLE + G_CONE_PLUS, Q], a[TABLE + G_CONE_MINUS, Q] = -1.0, 1.0
+        _has(a, G_CONE_PLUS, 2)
+        _has(a, G_CONE_MINUS, 2)
+    if m[FLOOR] == SLIPPING:
+        _has(a, G_SLIP, 1)
+
+
+@inner_kernel
+def _fill_gap(b, m, tip, pivot, a):
+    """The clear gap of the corner that faces the tip wall, +-xi + delta - s', or the far wall."""
+    which = G_TIP_GAP if tip else G_FAR_GAP
+    distance = delta(b, m, tip)
+    if m[TIP if tip else FAR] != 0 or distance == np.inf:
+        return
+    sense = 1.0 if tip else -1.0
+    rock = m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
+    if rock and not tip and distance - pivot - 2.0 * b.sin_alpha > -CLOSED:
+        # About a fixed pivot the far gap shrinks with phi, down to this value as the block lands: it cannot close before.
+        return
+    row = TABLE + which
+    a[row, COS], a[row, SIN], a[row, _CONSTANT] = -b.sin_2alpha, b.cos_2alpha, distance
+    if rock:  # xi is s and a constant
+        a[row, SIN] += sense
+        a[row, _CONSTANT] += sense * pivot
+    else:
+        a[row, XI] = sense
+    _has(a, which, 0)
+
+
+@inner_kernel
+def _fill_flat(b, m, a):
+    """The guards of a translating block; the tip wall is the left one, the far wall the right one."""
+    on_wall = m[TIP] != 0 or m[FAR] != 0
+    hangs = m[FLOOR] != OFF and m[PULL] < 0  # a floor that pulls at what a wall holds
+    for which in (G_TIP_GAP, G_FAR_GAP):
+        gap = b.gap_left if which == G_TIP_GAP else b.gap_right
+        a[TABLE + which, XI] = 1.0 if which == G_TIP_GAP else -1.0
+        a[TABLE + which, _CONSTANT] = gap
+        _has(a, which, -1 if gap == np.inf or m[TIP if which == G_TIP_GAP else FAR] != 0 else 0)
+    if m[TIP] != m[FAR] and (m[FLOOR] == OFF or hangs):  # on the floor, Q is the base acceleration that the wall takes
+        a[TABLE + G_TIP_PUSH, NA if m[FLOOR] == OFF else Q] = 1.0 if m[FLOOR] == OFF else m[TIP] - m[FAR]
+        _has(a, G_TIP_PUSH, 2)
+    if m[FLOOR] == OFF:
+        a[TABLE + G_LANDING, Y], a[TABLE + G_LANDING, _CONSTANT] = 1.0, -b.cos_alpha
+        _has(a, G_LANDING, 0)
+        return
+    a[TABLE + G_SLIP, XI] = m[SLIP]
+    if b.mu_s == LEAST_FRICTION:  # a force below rounding, which is to stay what it is where P vanishes
+        _fill_friction(b, m, 0.0, a)
+        a[TABLE + G_CONE_PLUS, _CONSTANT] = a[TABLE + G_CONE_MINUS, _CONSTANT] = b.mu_s
+    else:
+        _fill_friction(b, m, b.mu_s, a)
+    if not b.unilateral and not on_wall:  # the paper's floor holds what no wall does
+        _has(a, G_PUSH, -1)
+    else:
+        _has(a, G_PUSH, 2)
+    for plus in (True, False):
+        held = m[TIP if plus else FAR] != 0
+        uplift = G_UPLIFT_PLUS if plus else G_UPLIFT_MINUS
+        a[TABLE + uplift, P], a[TABLE + uplift, Q] = b.sin_alpha, -b.cos_alpha if plus else b.cos_alpha
+        _has(a, uplift, -1 if m[FLOOR] == STICK and held else 2)
+        if held or hangs:
+            _has(a, G_CONE_PLUS if plus else G_CONE_MINUS, -1)
+
+
+@inner_kernel
+def guard(which, order, a):
+    """Writes a guard of the table into the workspace and returns its degree, or -1 where the mode has no such guard."""
+    row = TABLE + which
+    if a[row, _SHORTER] < 0.0:
+        return -1
+    degree = order - int(a[row, _SHORTER])
+    for k in range(degree + 1):
+        a[GUARD, k] = 0.0
+    for series in range(_SERIES):
+        weight = a[row, series]
+        if weight == 0.0:
+            continue
+        if KIND[which] == RATE:
+            for k in range(degree + 1):
+                a[GUARD, k] += weight * (k + 1) * a[series, k + 1]
+        else:
+            for k in range(degree + 1):
+                a[GUARD, k] += weight * a[series, k]
+    a[GUARD, 0] += a[row, _CONSTANT]
+    if G_LANDING <= which <= G_FAR_GAP:
+        a[GUARD, 0], a[GUARD, 1] = closed_gap(a[GUARD, 0], a[GUARD, 1])
+    return degree
+
+
+@inner_kernel
+def first_event(order, h, slack, a, stack):
+    """The first time within the step at which a guard ends the mode, and which; h and -1 where none does.
+
+    A gap that closes within an INSTANT of it is the event: contacts before forces.
+    """
+    tau, which = h, -1
+    for k in range(GUARDS):
+        degree = guard(k, order, a)
+        if degree >= 0:
+            root = first_root(a, GUARD, degree, h, slack * NOISE[KIND[k]], stack)  # in h, not tau: the mirror image has another order
+            closes = 0 <= which <= G_FAR_GAP < k
+            if root != NO_ROOT and root < tau - (INSTANT if closes else 0.0):
+                tau, which = root, k
+    if which >= 0 and KIND[which] == FORCE and tau > 0.25 * h:
+        # A force is the second derivative of a truncated series: its zero is found to rounding from nearby only.
+        return 0.9 * tau, -1
+    return tau, which
+
+
+@inner_kernel
+def rock_guards_hold(b, order, h, a):
+    """A cheap proof that a rocking block keeps every guard of ROCK but G_PHI through a step h, or False where it is open.
+
+    Each guard is bounded from below by its value now less the sum of its other terms.
+    """
+    if b.walls or a[PHI, 0] > 0.5:
+        return False
+    if b.no_slip and not b.unilateral:
+        return True
+    spread = 0.0
+    push = 0.0
+    for k in range(order - 2, 0, -1):
+        spread = (spread + b.mu_s * abs(a[P, k]) + abs(a[Q, k])) * h
+        push = (push + abs(a[P, k])) * h
+    return b.mu_s * a[P, 0] - abs(a[Q, 0]) > spread and a[P, 0] > push

@@ -1,0 +1,251 @@
+"""Which mode follows an event: the one in which every guard leaves zero upward.
+
+A mode is consistent as long as its guards are not negative. As Taylor polynomials they are the events of a step (their first root)
+and the test that selects the next mode (the sign with which they leave zero), so that a selected mode can never end at once.
+Applied to the bilateral pivot this selection is the paper's: its rules for uplift and slip (Shenton's map among them), for the
+tilted block and for the corner that stays on the wall come out as the one consistent candidate; tests hold the closed forms
+against it.
+
+Termination. At one instant a mode is selected once: one that has ended there is taken again only where no other fits, and then, as
+where none fits at all, the one that contradicts itself least goes on with a *slack*, the noise that its guards are allowed. Each
+further such selection at that instant doubles the least slack, so that it soon exceeds all forces and time goes on.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rockcheck.ebm.contacts import SLOW, closed_floor, closed_wall, slip_velocity, stand, stop, upright
+from rockcheck.ebm.ground import acceleration
+from rockcheck.ebm.guards import G_FAR_GAP, G_PHI, G_SLIP, GUARDS, KIND, fill_guards, guard
+from rockcheck.ebm.motion import (
+    FAMILY,
+    FAR,
+    FLAT,
+    FLOOR,
+    GUARD,
+    MODE_SIZE,
+    OFF,
+    PULL,
+    SIN,
+    SLIP,
+    SLIPPING,
+    STICK,
+    THETA,
+    TILT,
+    TIP,
+    VX,
+    S,
+    W,
+    X,
+    flat_series,
+    tilt_series,
+)
+from rockcheck.ebm.rules import LEAST_CONTRADICTION, MODE_AGAIN, TIPS
+from rockcheck.ebm.series import INSTANT, MOST_TERMS, NOISE, contradiction, leading
+from rockcheck.scenes.compiled import inner_kernel
+
+#: Order of the series that a selection looks at.
+_LOOK = 6
+#: A base acceleration that is zero shows where it goes so soon (samples of a record may be much nearer than AHEAD).
+SOON = 1e-6
+# What a run remembers of the selections at one instant: the slack of the mode, in noises, the least slack of the next one that does not
+# fit, and when the instant began. The modes tried in it are a row of flags.
+SLACK, LEAST_SLACK, SINCE = range(3)
+MODES = 128
+
+
+def _candidates() -> np.ndarray:
+    """All modes in the order in which they are tried: more contacts first, sticking before slipping, a pushing floor before a pull.
+
+    Columns: family, sense of tilting or slip, what the pivot does, slip, pull, walls (1 tip or left, 2 far or right, 3 both), whether
+    only a flat block tries it. For a flat block all senses are relative to that of `tips_first`.
+    """
+    stands = [(FLAT, 1, STICK, 0, pull, walls, 0) for walls in (3, 1, 2, 0) for pull in (1, -1)]
+    # Static friction above kinetic can leave both rocking and sliding consistent: it holds as long as it can.
+    rows = [*stands, (TILT, 1, STICK, 0, 1, 0, 1)]
+    for family, sense in ((FLAT, 1), (TILT, 1), (TILT, -1)):
+        pivot = ((STICK, 0), (SLIPPING, -1), (SLIPPING, 1))
+        for walls in (3, 1, 2, 0):
+            for pull in (1, -1):
+                rows += [(family, sense, floor, slip, pull, walls, 0) for floor, slip in pivot[family == FLAT :]]
+            rows.append((family, sense, OFF, 0, 1, walls, 0))
+    return np.array(rows)
+
+
+_CANDIDATES = _candidates()
+
+
+@inner_kernel
+def code_of(m):
+    """A number for the mode, below MODES."""
+    floor = 3 if m[FLOOR] == OFF else m[SLIP] + 1
+    return (((m[FAMILY] * 2 + (m[S] > 0)) * 4 + floor) * 2 + (m[PULL] > 0)) * 4 + m[TIP] + 2 * m[FAR]
+
+
+@inner_kernel
+def forget(tried, memory, t):
+    """A new instant begins: no mode has been tried in it."""
+    for k in range(MODES):
+        tried[k] = False
+    memory[SLACK] = memory[LEAST_SLACK] = 1.0
+    memory[SINCE] = t
+
+
+@inner_kernel
+def leave(m, tried, memory, t):
+    """Mode m has ended at time t."""
+    if t - memory[SINCE] > INSTANT:
+        forget(tried, memory, t)
+    tried[code_of(m)] = True
+
+
+@inner_kernel
+def wrong_by(b, m, z, gh, gv, t, a):
+    """0 where mode m can begin at state z: every guard leaves zero upward; else the slack, in noises, with which it could.
+
+    It is infinite where what must begin to move does not.
+    """
+    look = min(_LOOK, MOST_TERMS)  # the plain constant would make numba compile all series once more, for it alone
+    pivot = 0.0
+    if m[FAMILY] == FLAT:
+        order = flat_series(b, m, z, gh, gv, t, look, a)
+    else:
+        order = tilt_series(b, m, z, gh, gv, t, look, 0.0, 0.0, a)
+        pivot = m[S] * z[X] - a[SIN, 0]
+    fill_guards(b, m, pivot, a)
+    worst = 0.0
+    for which in range(GUARDS):
+        degree = guard(which, order, a)
+        if degree < 0 or (which <= G_FAR_GAP and a[GUARD, 1] < -SLOW):
+            continue  # a contact that closes is the impact's
+        noise = NOISE[KIND[which]]
+        sign = leading(a, GUARD, degree, noise)
+        if not math.isfinite(a[GUARD, 0]) or (sign <= 0 and which == G_PHI and (m[FLOOR] != OFF or sign < 0)):
+            return np.inf
+        if sign < 0:
+            worst = max(worst, contradiction(a, GUARD, degree, noise) / noise)
+        elif sign == 0 and which == G_SLIP:
+            worst = max(worst, 1.0)
+    return worst
+
+
+@inner_kernel
+def tips_first(b, m, z, gh, t, rules):
+    """The side to which a flat block is first asked to tip, +1 left or -1 right: the sense in which all of it is calculated.
+
+    Both fit only for rounding, or where the floor falls away faster than g under a pivot that cannot let go: then the base
+    acceleration decides, now or soon, or the friction, its place between walls, the corner m[S] on which it last stood (0 where
+    there was none): a mirror image does alike.
+    """
+    toward = acceleration(gh, t)
+    if toward == 0.0:
+        toward = acceleration(gh, t + SOON)
+    if toward == 0.0:
+        toward = -z[VX]
+    if toward == 0.0 and abs(z[X]) > NOISE[0]:
+        toward = z[X]
+    if toward == 0.0 and b.gap_left != b.gap_right:
+        toward = b.gap_left - b.gap_right
+    if toward == 0.0:
+        rules[TIPS] += 1
+        toward = float(-m[S])
+    return 1 if toward >= 0.0 else -1
+
+
+@inner_kernel
+def _write(number, flat, first, m):
+    """Writes candidate `number` into m; False where it is none of this block's family, or of a tilted one's other sense."""
+    family, sense = _CANDIDATES[number, 0], _CANDIDATES[number, 1]
+    if not flat and (family == FLAT or sense < 0 or _CANDIDATES[number, 6] != 0):
+        return False
+    m[FAMILY], m[S] = family, 1 if family == FLAT else sense * first
+    m[FLOOR], m[PULL] = _CANDIDATES[number, 2], _CANDIDATES[number, 4]
+    walls = _CANDIDATES[number, 5]
+    m[SLIP] = _CANDIDATES[number, 3]
+    m[TIP], m[FAR] = walls & 1, walls >> 1
+    if family == FLAT and first < 0:
+        m[SLIP] = -m[SLIP]
+        m[TIP], m[FAR] = walls >> 1, walls & 1
+    return True
+
+
+@inner_kernel
+def _possible(b, m, z, floor, left, right, walls):
+    """Whether the contacts of m are closed, and its slip is not against the motion; `walls` touched by a tilted block, as bits."""
+    flat = m[FAMILY] == FLAT
+    if m[FLOOR] == OFF:
+        if floor and not b.unilateral:
+            return False
+    elif not floor:
+        return False
+    if m[FLOOR] != OFF and m[PULL] < 0 and (b.unilateral or (flat and m[TIP] == 0 and m[FAR] == 0)):
+        return False
+    if b.no_slip and (m[FLOOR] == SLIPPING or (not flat and m[PULL] < 0)):
+        return False
+    mine = m[TIP] + 2 * m[FAR]
+    if not flat:
+        if mine & ~walls:
+            return False
+        v = m[S] * (slip_velocity(b, z) if mine == 0 else z[W])  # along a wall the pivot slips as the block turns
+    else:
+        # At rest it is held on the walls that it touches; sliding it touches none; between two walls that it fills it leans on both.
+        touched = (1 if left else 0) + (2 if right else 0)
+        held = touched if m[FLOOR] == STICK or (m[FLOOR] == OFF and touched == 3) else mine & touched
+        if mine != held or (m[FLOOR] == SLIPPING and mine != 0):
+            return False
+        v = z[VX]
+    return m[FLOOR] == OFF or (v == 0.0 if m[FLOOR] == STICK else m[SLIP] * v >= 0.0)
+
+
+@inner_kernel
+def _clean(b, z, floor):
+    """Sets to zero what is zero but for rounding: a tilt, a slip, the motion of a block that stands on floor and wall."""
+    upright(b, z)
+    if floor and abs(slip_velocity(b, z)) < SLOW:
+        stand(b, z)
+    stands = floor and b.walls and z[THETA] != 0.0 and abs(z[W]) < SLOW
+    if stands and (closed_wall(b, z, 1, False) or closed_wall(b, z, -1, False)):
+        stop(z)
+
+
+@inner_kernel
+def select(b, z, gh, gv, t, m, tried, memory, rules, a):
+    """Writes into m the mode that is consistent at state z, or contradicts itself least; False where the state is not finite."""
+    floor = closed_floor(b, z) or not b.unilateral
+    _clean(b, z, floor)
+    flat = z[THETA] == 0.0 and z[W] == 0.0
+    lean = z[THETA] if z[THETA] != 0.0 else z[W]
+    first = tips_first(b, m, z, gh, t, rules) if flat else (1 if lean > 0.0 else -1)
+    left, right = b.walls and closed_wall(b, z, 1, False), b.walls and closed_wall(b, z, -1, False)
+    least, chosen = np.inf, -1
+    for number in range(_CANDIDATES.shape[0]):
+        if not _write(number, flat, first, m):
+            continue
+        walls = 0
+        if b.walls and m[FAMILY] != FLAT:
+            walls = (1 if closed_wall(b, z, m[S], False) else 0) + (2 if closed_wall(b, z, -m[S], True) else 0)
+        if not _possible(b, m, z, floor, left, right, walls):
+            continue
+        wrong = wrong_by(b, m, z, gh, gv, t, a)
+        again = tried[code_of(m)]
+        if wrong == 0.0 and not again:
+            memory[SLACK] = 1.0
+            return True
+        wrong = max(wrong, memory[LEAST_SLACK] if again else 0.0)
+        if wrong < least:
+            least, chosen = wrong, number
+    if chosen < 0:
+        return False
+    _write(chosen, flat, first, m)
+    rules[MODE_AGAIN if least <= memory[LEAST_SLACK] else LEAST_CONTRADICTION] += 1
+    memory[SLACK] = max(least, memory[LEAST_SLACK])
+    memory[LEAST_SLACK] *= 2.0
+    return True
+
+
+def mode_vector() -> np.ndarray:
+    """An empty mode."""
+    return np.zeros(MODE_SIZE, dtype=np.int64)

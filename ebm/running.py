@@ -1,0 +1,129 @@
+"""What a run is asked for, what it keeps from step to step, what it reports; the codes of modes and events."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.ebm.motion import FAMILY, FAR, FLAT, FLOOR, OFF, STICK, TIP
+from rockcheck.scenes.compiled import inner_kernel
+
+#: Names of the mode codes that `mode_code` gives, and of the event codes.
+MODE_NAMES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight")
+EVENT_NAMES = (
+    "uplift",
+    "slip",
+    "stick",
+    "floor impact",
+    "wall impact",
+    "lift-off",
+    "landing",
+    "release",
+    "settled",
+    "overturned left",
+    "overturned right",
+)
+(UPLIFT, SLIPS, STICKS, FLOOR_IMPACT, WALL_IMPACT, LIFT_OFF, LANDS, RELEASE, SETTLED, LEFT, RIGHT) = range(11)
+#: No event of the log; the end of rest, whose event the mode that follows tells.
+NO_EVENT, LEAVES_REST = -1, -2
+
+# How a run ended; while it has not: GOING in its mode, or CHANGING it.
+DONE, OVERTURNED, TOO_MANY_STEPS, TOO_MANY_EVENTS, NO_MODE, NO_IMPACT, NOT_FINITE, GOING, CHANGING = range(9)
+FAILURES = {
+    TOO_MANY_STEPS: "the cap on steps was reached",
+    TOO_MANY_EVENTS: "the cap on events was reached",
+    NO_MODE: "no mode of motion is consistent",
+    NO_IMPACT: "no impact is consistent",
+    NOT_FINITE: "the motion is not finite",
+}
+
+
+class Control(NamedTuple):
+    """What a run is asked for."""
+
+    tolerance: float
+    order: int
+    most_steps: int
+    most_events: int
+    #: Stop as soon as the outcome and the peak are decided.
+    until_decided: bool
+    #: Spacing of the rows of `out`; with no rows nothing is sampled.
+    output_step: float
+
+
+class Tally(NamedTuple):
+    """What a run reports besides its samples."""
+
+    ending: int
+    t: float
+    peak: float
+    at_rest: bool
+    steps: int
+    events: int
+    wall_impacts: int
+    gains: int
+    largest_gain: float
+    rows: int
+    t_rest: float
+    #: How often each modelling choice was made (ebm.rules).
+    rules: NDArray[np.int64]
+
+
+class Run(NamedTuple):
+    """What a run keeps from step to step: state, mode, clock and counts, and what its parts remember."""
+
+    z: NDArray[np.float64]
+    m: NDArray[np.int64]
+    now: NDArray[np.float64]
+    counts: NDArray[np.int64]
+    rules: NDArray[np.int64]
+    tried: NDArray[np.bool_]
+    memory: NDArray[np.float64]
+    rattle: NDArray[np.float64]
+    gains: NDArray[np.float64]
+    impulse: NDArray[np.float64]
+    row: NDArray[np.float64]
+
+
+class Records(NamedTuple):
+    """Where a run writes: rows of states, their modes, the log of events."""
+
+    out: NDArray[np.float64]
+    out_mode: NDArray[np.int8]
+    log: NDArray[np.float64]
+
+
+# The clock: time, largest |theta|, largest |omega| since the last event, since when it rests, from when the base is quiet; and the
+# variable z of Bouc-Wen friction.
+T, PEAK, SWING, T_REST, QUIET, ZETA = range(6)
+# The counts; the corner that the block last stood on (0: none); with Bouc-Wen friction, whether the pivot has not yielded; the event
+# that has ended a mode, and that mode's code.
+STEPS, EVENTS, WALL_IMPACTS, ROWS, CORNER, HOLDS, KIND, BEFORE = range(8)
+
+
+@inner_kernel
+def mode_code(r):
+    """Index into MODE_NAMES."""
+    m = r.m
+    if m[FLOOR] == OFF:
+        return 6
+    if m[FAMILY] == FLAT:
+        return 0 if m[FLOOR] == STICK else 1
+    wall = m[TIP] != 0 or m[FAR] != 0
+    if m[FLOOR] == STICK or r.counts[HOLDS] != 0:
+        return 4 if wall else 2
+    return 5 if wall else 3
+
+
+@inner_kernel
+def note(r, log, kind, before):
+    """One row of the log; a change at rest has no impulse."""
+    count = r.counts[EVENTS]
+    r.counts[EVENTS] = count + 1
+    if count < log.shape[0]:
+        strikes = kind == FLOOR_IMPACT or kind == WALL_IMPACT or kind == LANDS
+        log[count, 0], log[count, 1], log[count, 2] = r.now[T], kind, before
+        log[count, 3] = 0 if kind == SETTLED else mode_code(r)
+        log[count, 4] = r.impulse[0] + r.impulse[1] if strikes else 0.0
