@@ -127,7 +127,7 @@ def _setting(scene: Scene, model: EventBasedModel) -> Setting:
         unilateral=model.pivot == "unilateral",
         no_slip=model.friction == "no-slip",
         energy_cap=model.energy_cap,
-        floor_first=model.impacts == "floor-first",
+        impacts=model.impacts,
     )
 
 
@@ -220,7 +220,7 @@ def _run_rows(settings, horizontal, vertical, states, durations, samples, contro
             no_slip=r.no_slip,
             unilateral=r.unilateral,
             energy_cap=r.energy_cap,
-            floor_first=r.floor_first,
+            law=int(r.law),
         )
         z[:] = states[i]
         tally = run(

@@ -9,7 +9,8 @@ stage, the set A. In it the impulses p_j and the velocities u_j across the conta
 
     0 <= p_j  complementary to  u_j+ - e_j max(-u_j-, 0) >= 0,    |T| <= mu sum P on the floor.
 
-- "moreau": whatever touches takes part; at an elastic wall (e = 1), where nothing rests, only the corners that approach.
+- "moreau": whatever touches takes part; at an elastic wall (e = 1), where nothing rests, only the corners that approach. The first of
+  these is the branch "closed", the second "open", whatever e.
 - "floor-first": one contact after another, in the order of neighbouring trajectories: first the floor, then each wall corner when
   it would arrive had the wall stood a little farther off.
 
@@ -24,6 +25,7 @@ import math
 import numpy as np
 
 from rockcheck.ebm.contacts import CLOSED
+from rockcheck.ebm.motion import CLOSED_BRANCH, FLOOR_FIRST, MOREAU
 from rockcheck.ebm.series import NOISE, POSITION
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
@@ -202,10 +204,11 @@ def _strike(rows, taking, target, mu_s, mu_k, v, after, impulse, system):
 
 
 @inner_kernel
-def _moreau(touching, approach, restitution, rounding, taking):
+def _moreau(law, touching, approach, restitution, rounding, taking):
     """Whatever touches takes part; at an elastic wall only the corners that approach."""
     for j in range(CONTACTS):
-        taking[j] = touching[j] and (j <= E or approach[j] < -rounding or restitution[j] < 1.0)
+        rests = law == CLOSED_BRANCH or (law == MOREAU and restitution[j] < 1.0)
+        taking[j] = touching[j] and (j <= E or approach[j] < -rounding or rests)
 
 
 @inner_kernel
@@ -257,10 +260,10 @@ def contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, tally):
         if not closes:
             _close(rows, touching, resting, v, system)
             return found
-        if b.floor_first and not plastic:
+        if b.law == FLOOR_FIRST and not plastic:
             _floor_first(touching, approach, stage, rounding, ahead, taking)
         else:
-            _moreau(touching, approach, restitution, rounding, taking)
+            _moreau(MOREAU if plastic else b.law, touching, approach, restitution, rounding, taking)
         for j in range(CONTACTS):
             target[j] = -restitution[j] * approach[j] if taking[j] and approach[j] < -resting else 0.0
         before = kinetic_energy(v)

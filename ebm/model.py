@@ -33,7 +33,8 @@ class EventBasedModel(Frozen):
     push, so that the block may hop. `friction`: "coulomb" switches exactly between stick and slip, "bouc-wen" is the paper's
     regularisation (9) with the `yield_displacement` u_y in m, "no-slip" is Housner's block. `impacts` (unilateral) is the law of
     impacts at several contacts at once: "moreau" strikes all that touch together, "floor-first" one after another; they differ
-    where a block lands flush against a bouncing wall. `energy_cap` (unilateral) lowers
+    where a block lands flush against a bouncing wall. ("closed" and "open" are the two branches that "moreau" takes there.)
+    `energy_cap` (unilateral) lowers
     the restitution of an impact that would add kinetic energy to the largest that does not. `estimate_error` runs the scene
     again at tolerance/100 and puts the largest change of theta/alpha into `cost.error_estimate`. A run that reaches
     `most_steps` or `most_events` is a `ModelFailure`.
@@ -42,7 +43,7 @@ class EventBasedModel(Frozen):
     tolerance: Annotated[float, Strict(), Field(ge=FINEST, le=1e-2)] = 1e-10
     pivot: Literal["bilateral", "unilateral"] = "bilateral"
     friction: Literal["coulomb", "bouc-wen", "no-slip"] = "coulomb"
-    impacts: Literal["moreau", "floor-first"] = "moreau"
+    impacts: Literal["moreau", "closed", "open", "floor-first"] = "moreau"
     energy_cap: bool = False
     yield_displacement: Positive = 1e-5
     estimate_error: bool = False
@@ -120,7 +121,7 @@ class EventBasedModel(Frozen):
             unilateral=self.pivot == "unilateral",
             no_slip=self.friction == "no-slip",
             energy_cap=self.energy_cap,
-            floor_first=self.impacts == "floor-first",
+            impacts=self.impacts,
         )
         horizontal, vertical = natural.grounds_of(scene)
         unit = natural.time_unit(scene)

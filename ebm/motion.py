@@ -29,6 +29,10 @@ from rockcheck.ebm.ground import STILL, fill_series
 from rockcheck.ebm.series import MOST_TERMS, slope, value
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
+#: The laws of impacts at several contacts (see ebm.contact_impacts).
+LAWS = ("moreau", "closed", "open", "floor-first")
+MOREAU, CLOSED_BRANCH, OPEN_BRANCH, FLOOR_FIRST = range(4)
+
 
 class Setting(NamedTuple):
     """Block, floor and walls in natural units; a gap is infinite where there is no wall."""
@@ -52,8 +56,8 @@ class Setting(NamedTuple):
     unilateral: bool
     #: Largest impact restitution that adds no energy is used instead of e.
     energy_cap: bool
-    #: Unilateral impacts one contact after another, the floor first (otherwise all that touch at once, Moreau).
-    floor_first: bool
+    #: The law of impacts at several contacts, an index into LAWS.
+    law: int
 
 
 #: Static friction of a frictionless floor: with less, the rounding of a base acceleration that dies out moves a resting block.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm.ground import GAUSSIAN, Ground, ground_of
-from rockcheck.ebm.motion import LEAST_FRICTION, Setting
+from rockcheck.ebm.motion import LAWS, LEAST_FRICTION, Setting
 from rockcheck.scenes.scene import Scene
 
 __all__ = ["GAUSSIAN", "grounds_of", "setting_of", "state_of", "time_unit", "to_si"]
@@ -19,7 +19,7 @@ def time_unit(scene: Scene) -> float:
     return math.sqrt(scene.block.radius / scene.gravity)
 
 
-def setting_of(scene: Scene, *, unilateral: bool, no_slip: bool, energy_cap: bool, floor_first: bool = False) -> Setting:
+def setting_of(scene: Scene, *, unilateral: bool, no_slip: bool, energy_cap: bool, impacts: str = "moreau") -> Setting:
     """Block, floor and walls of a scene in natural units."""
     alpha, radius = scene.block.alpha, scene.block.radius
     left, right = scene.wall("left"), scene.wall("right")
@@ -40,7 +40,7 @@ def setting_of(scene: Scene, *, unilateral: bool, no_slip: bool, energy_cap: boo
         no_slip=no_slip,
         unilateral=unilateral,
         energy_cap=energy_cap,
-        floor_first=floor_first,
+        law=LAWS.index(impacts),
     )
 
 

@@ -53,9 +53,7 @@ def run_to_end() -> Runner:
     scratch = motion.workspace()
 
     def run(scene: Scene, *, pivot: str = "bilateral", tolerance: float = 1e-12, impacts: str = "moreau") -> Run:
-        setting = natural.setting_of(
-            scene, unilateral=pivot == "unilateral", no_slip=False, energy_cap=False, floor_first=impacts == "floor-first"
-        )
+        setting = natural.setting_of(scene, unilateral=pivot == "unilateral", no_slip=False, energy_cap=False, impacts=impacts)
         state = natural.state_of(scene)
         order = EventBasedModel(tolerance=tolerance).order
         control = march.Control(tolerance, order, 1_000_000, 200_000, False, 1.0)
