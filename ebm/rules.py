@@ -9,33 +9,30 @@ from __future__ import annotations
 TIPS = 0
 #: A mode is taken once at an instant; one that has just ended goes on only where no other fits.
 MODE_AGAIN = 1
-#: Where no mode fits, for rounding or beyond Painleve's limit, the one that contradicts itself least.
+#: Where no mode, or no set of contacts at an impact, fits, for rounding or beyond Painleve's limit, the one that is wrong by least.
 LEAST_CONTRADICTION = 2
-#: Where no impact fits, the one that contradicts the law least.
-LEAST_WRONG_IMPACT = 3
 #: Impacts that go on at one instant end plastic.
-ENDLESS_STAGES = 4
+ENDLESS_STAGES = 3
 #: A landing or rebound slower than the settling speed ends in rest.
-SETTLES = 5
+SETTLES = 4
 #: The settling speed is raised as impacts accumulate (Zeno).
-RATTLES = 6
+RATTLES = 5
 #: Between two walls that it touches at once nothing rebounds.
-WEDGED = 7
+WEDGED = 6
 #: Landing flush against a wall in the bilateral model: the closed branch.
-FLUSH_LANDING = 8
+FLUSH_LANDING = 7
 #: A hanging block that comes down with less energy than the tolerance has not touched the floor.
-GRAZES = 9
+GRAZES = 8
 #: A corner that meets the wall as the block lands belongs to the landing.
-LANDS_ALONG = 10
+LANDS_ALONG = 9
 #: Bouc-Wen: beyond Painleve's limit on a wall the motion goes on with the pull.
-PULLS = 11
-RULES = 12
+PULLS = 10
+RULES = 11
 
 NAMES = (
     "tips to the corner it stood on",
     "mode goes on",
     "least contradiction",
-    "least wrong impact",
     "endless stages",
     "settles",
     "rattles",

@@ -27,7 +27,7 @@ from rockcheck.ebm.contacts import CLOSED, SLOW, between_walls, closed_floor, fl
 from rockcheck.ebm.guards import G_FAR_GAP, G_LANDING, G_PHI, G_TIP_GAP
 from rockcheck.ebm.modes import tips_first
 from rockcheck.ebm.motion import FAMILY, FAR, FLAT, FLOOR, HEIGHT, OFF, PULL, STICK, THETA, TILT, TIP, VX, VY, S, W, X
-from rockcheck.ebm.rules import ENDLESS_STAGES, FLUSH_LANDING, LANDS_ALONG, LEAST_WRONG_IMPACT, SETTLES, WEDGED
+from rockcheck.ebm.rules import ENDLESS_STAGES, FLUSH_LANDING, LANDS_ALONG, LEAST_CONTRADICTION, SETTLES, WEDGED
 from rockcheck.ebm.series import NOISE, POSITION
 from rockcheck.ebm.settle import SETTLE
 from rockcheck.scenes.compiled import inner_kernel, kernel
@@ -198,7 +198,7 @@ def _strike_all(b, m, z, gh, t, resting, impulse, gains, rules):
         e_tip = e_far = 0.0
     found = contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, gains)
     if found != FITS:
-        rules[LEAST_WRONG_IMPACT if found == LEAST_WRONG else ENDLESS_STAGES] += 1
+        rules[LEAST_CONTRADICTION if found == LEAST_WRONG else ENDLESS_STAGES] += 1
     z[VX], z[VY], z[W] = sign * v[0], v[1], sign * v[2]
     if touching[F] and abs(slip_velocity(b, z)) < SLOW:
         stand(b, z)
