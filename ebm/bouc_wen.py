@@ -39,7 +39,7 @@ from rockcheck.ebm.guards import (
     first_event,
     guard,
 )
-from rockcheck.ebm.modes import LEAST_SLACK, SLACK, SOON, tips_first
+from rockcheck.ebm.modes import SOON, slacken, tips_first
 from rockcheck.ebm.motion import (
     COS,
     FAMILY,
@@ -438,8 +438,7 @@ def follow(b, gh, gv, r, which, before, yields, log, a):
     z, m, t = r.z, r.m, r.now[T]
     kind = -1
     # At one instant each further event doubles the slack, as in a selection (ebm.modes).
-    r.memory[SLACK] = r.memory[LEAST_SLACK]
-    r.memory[LEAST_SLACK] *= 2.0
+    slacken(r.memory)
     if which == G_LOADS:
         r.now[ZETA] = 0.0
     elif which == G_SLIP:

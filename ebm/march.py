@@ -27,7 +27,7 @@ from rockcheck.ebm.guards import (
     first_event,
     rock_guards_hold,
 )
-from rockcheck.ebm.modes import MODES, SLACK, forget, leave, select
+from rockcheck.ebm.modes import MODES, SLACK, forget, leave, select, slacken
 from rockcheck.ebm.motion import (
     COS,
     FAMILY,
@@ -372,19 +372,22 @@ def _resolve(b, gh, gv, r, which, yields, records, a):
     before = mode_code(r)
     if m[FAMILY] == TILT:
         r.counts[CORNER] = m[S]
+    leave(m, r.tried, r.memory, t)
     if which <= G_FAR_GAP:
-        forget(r.tried, r.memory, t)
         r.impulse[:] = 0.0
         resting = settling_speed(r.rattle, t, r.rules)
         if m[FAMILY] == FLAT:
             m[S] = r.counts[CORNER]
         struck, known = strike(b, m, z, which, gh, t, resting, r.impulse, r.gains, r.rules)
         kind = WALL_IMPACT if struck == ON_WALL else (LANDS if struck == LANDING else FLOOR_IMPACT)
-    else:
-        leave(m, r.tried, r.memory, t)
-        if yields is not None:
-            return bouc_wen.follow(b, gh, gv, r, which, before, yields, records.log, a)
+        if r.impulse[0] + r.impulse[1] > 0.0:
+            forget(r.tried, r.memory, t)  # a new motion: all modes are open again
+        elif yields is not None:
+            slacken(r.memory)
+    elif yields is None:
         kind, known = _release(b, m, z, which), False
+    else:
+        return bouc_wen.follow(b, gh, gv, r, which, before, yields, records.log, a)
     if m[FAMILY] == FLAT:
         m[S] = r.counts[CORNER]
     if which <= G_FAR_GAP and b.unilateral and r.impulse[0] + r.impulse[1] == 0.0:

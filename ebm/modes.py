@@ -103,6 +103,13 @@ def leave(m, tried, memory, t):
 
 
 @inner_kernel
+def slacken(memory):
+    """The next slack at this instant is twice the last one."""
+    memory[SLACK] = memory[LEAST_SLACK]
+    memory[LEAST_SLACK] *= 2.0
+
+
+@inner_kernel
 def wrong_by(b, m, z, gh, gv, t, a):
     """0 where mode m can begin at state z: every guard leaves zero upward; else the slack, in noises, with which it could.
 

@@ -106,12 +106,14 @@ def _floor_impact(b, m, z, resting, impulse, rules):
     s, c = b.sin_alpha, b.cos_alpha
     S1 = m[S]
     if m[TIP] != 0 or m[FAR] != 0:  # from LADDER: every contact plastic, flush rest
+        impulse[0] = abs(z[VY])
         stop(z)
         return False
     if wall_gap(b, z, -S1) < CLOSED:
         # Flush with the wall toward which it would rock: the closed branch of "moreau" (the paper is silent).
         rules[FLUSH_LANDING] += 1
         e = b.e_right if S1 > 0 else b.e_left
+        impulse[0] = (1.0 + e) * s * abs(w1)
         z[W] = -e * w1 if e * abs(w1) > resting else 0.0
         z[VX] = (-e * v1 if S1 * v1 > 0.0 else v1) - c * z[W]
         z[VY] = S1 * s * z[W]
@@ -130,6 +132,7 @@ def _wall_impact(b, m, z, tip, resting, impulse, gains, rules):
     """Bilateral pivot: a corner (case I, II) or the side (case III) strikes a wall. Returns whether m is already right."""
     if between_walls(b, z) or m[TIP] != 0 or m[FAR] != 0:  # wedged: between both walls at once nothing rebounds
         rules[WEDGED] += 1
+        impulse[1] = abs(z[VX])
         stop(z)
         return False
     left = tip if m[FAMILY] == FLAT else (m[S] > 0) == tip
