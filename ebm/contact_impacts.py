@@ -33,8 +33,10 @@ F, E, TIP_TOP, TIP_BOTTOM, FAR_BOTTOM, FAR_TOP = range(6)
 CONTACTS = 6
 _TANGENT = 6
 _NONE, _STICK, _PLUS, _MINUS = range(4)
-# Every set of at most three contacts: their number, then the contacts.
-_SETS = np.array([[n, *some, *[0] * (3 - n)] for n in range(4) for some in itertools.combinations(range(CONTACTS), n)])
+# Every set of at most three contacts: their number, the contacts, and these as bits.
+_CHOSEN = [some for n in range(4) for some in itertools.combinations(range(CONTACTS), n)]
+_SETS = np.array([[len(some), *some, *[0] * (3 - len(some)), sum(1 << j for j in some)] for some in _CHOSEN])
+_ON_FLOOR = 1 << F | 1 << E
 # Rounding of a velocity, of the velocities at play; rows of contacts that are nearer to parallel than this give no solution.
 _ROUNDING, _PARALLEL = NOISE[POSITION], CLOSED
 _MOST_STAGES = 40
@@ -81,7 +83,7 @@ def _size(v):
     return abs(v[0]) + abs(v[1]) + abs(v[2])
 
 
-@kernel
+@inner_kernel
 def solve(system, n):
     """Solves the n x n system whose right-hand side is column n, in place, by elimination; False where it is singular.
 
@@ -108,55 +110,56 @@ def solve(system, n):
 
 
 @inner_kernel
-def _fits(members, friction, taking, slippery):
-    """Whether a set of contacts is one to try: all take part, at most three unknowns, friction where the floor is in it."""
-    count = members[0]
-    on_floor = False
-    for i in range(count):
-        if not taking[members[1 + i]]:
-            return False
-        on_floor = on_floor or members[1 + i] <= E
+def _fits(number, friction, slippery):
+    """Whether a set is to be tried with this friction: at most three unknowns, friction where the floor is in it."""
+    on_floor = _SETS[number, 4] & _ON_FLOOR != 0
     if friction == _STICK:
-        return on_floor and count <= 2
+        return on_floor and _SETS[number, 0] <= 2
     return on_floor != (friction == _NONE) or (slippery and friction == _NONE)
 
 
-@kernel
-def _try_set(rows, members, friction, target, mu_k, v, system, trial, lam):
+@inner_kernel
+def _push(rows, index, kappa, k):
+    """What a contact's impulse does to velocity k, times the mass: its row, and of a slipping floor's the friction."""
+    return rows[index, k] - (kappa * rows[_TANGENT, k] if index <= E else 0.0)
+
+
+@inner_kernel
+def _try_set(rows, number, friction, target, mu_k, v, system, trial, lam):
     """The impulses of the contacts in the set, and the velocities after them; False where there are none."""
-    count = members[0]
+    count = _SETS[number, 0]
     n = count + (1 if friction == _STICK else 0)
     kappa = mu_k if friction == _PLUS else (-mu_k if friction == _MINUS else 0.0)
-    column = np.zeros(3)
+    for i in range(n):
+        row = _SETS[number, 1 + i] if i < count else _TANGENT
+        system[i, n] = target[row] if i < count else 0.0
+        for k in range(3):
+            system[i, n] -= rows[row, k] * v[k]
+        for j in range(n):
+            column = _SETS[number, 1 + j] if j < count else _TANGENT
+            system[i, j] = rows[row, 0] * _push(rows, column, kappa, 0) + rows[row, 1] * _push(rows, column, kappa, 1)
+            system[i, j] += 3.0 * rows[row, 2] * _push(rows, column, kappa, 2)
+    if not solve(system, n):
+        return False
     for k in range(3):
         trial[k] = v[k]
     for j in range(n):
-        index = members[1 + j] if j < count else _TANGENT
-        for k in range(3):
-            column[k] = rows[index, k] - (kappa * rows[_TANGENT, k] if index <= E else 0.0)
-        for i in range(n):
-            system[i, j] = _mass_dot(rows[members[1 + i] if i < count else _TANGENT], column)
-        system[j, n] = (target[index] if j < count else 0.0) - _dot(rows[index], v)
-    if not solve(system, n):
-        return False
-    for j in range(n):
         lam[j] = system[j, n]
-        index = members[1 + j] if j < count else _TANGENT
+        index = _SETS[number, 1 + j] if j < count else _TANGENT
         for k in range(3):
-            push = rows[index, k] - (kappa * rows[_TANGENT, k] if index <= E else 0.0)
-            trial[k] += (3.0 if k == 2 else 1.0) * push * lam[j]
+            trial[k] += (3.0 if k == 2 else 1.0) * _push(rows, index, kappa, k) * lam[j]
     return True
 
 
 @inner_kernel
-def _violation(rows, members, friction, taking, target, mu_s, trial, lam):
+def _violation(rows, number, friction, taking, target, mu_s, trial, lam):
     """By how much a solution contradicts the law: a pull, a contact that still closes, friction beyond its cone or the wrong way."""
-    count = members[0]
+    count = _SETS[number, 0]
     worst = 0.0
     floor_normal = 0.0
     for i in range(count):
         worst = max(worst, -lam[i])
-        if members[1 + i] <= E:
+        if _SETS[number, 1 + i] <= E:
             floor_normal += lam[i]
     slip = _dot(rows[_TANGENT], trial)
     if friction == _STICK:
@@ -179,23 +182,25 @@ def _strike(rows, taking, target, mu_s, mu_k, v, after, impulse, system):
     least, lowest = np.inf, np.inf
     lam = np.zeros(4)
     trial = np.zeros(3)
+    bits = 0
+    for j in range(CONTACTS):
+        bits |= (1 if taking[j] else 0) << j
     for number in range(_SETS.shape[0]):
-        members = _SETS[number]
+        if _SETS[number, 4] & ~bits:
+            continue
         for friction in range(4):
-            if not _fits(members, friction, taking, mu_s == 0.0) or not _try_set(
-                rows, members, friction, target, mu_k, v, system, trial, lam
-            ):
+            if not _fits(number, friction, mu_s == 0.0) or not _try_set(rows, number, friction, target, mu_k, v, system, trial, lam):
                 continue
             scale = _size(v) + _size(trial) + _size(lam)
-            wrong = _violation(rows, members, friction, taking, target, mu_s, trial, lam)
+            wrong = _violation(rows, number, friction, taking, target, mu_s, trial, lam)
             wrong = 0.0 if wrong <= _ROUNDING * scale else wrong
             energy = kinetic_energy(trial)
             if not wrong < least and not (wrong == least and energy < lowest - _ROUNDING * scale * scale):
                 continue
             least, lowest = wrong, energy
             impulse[:] = 0.0
-            for i in range(members[0]):
-                impulse[members[1 + i]] = max(lam[i], 0.0)
+            for i in range(_SETS[number, 0]):
+                impulse[_SETS[number, 1 + i]] = max(lam[i], 0.0)
             for k in range(3):
                 after[k] = trial[k]
             if friction == _STICK:

@@ -189,18 +189,22 @@ def guard(which, order, a):
     if a[row, _SHORTER] < 0.0:
         return -1
     degree = order - int(a[row, _SHORTER])
-    for k in range(degree + 1):
-        a[GUARD, k] = 0.0
+    first = True
     for series in range(_SERIES):
         weight = a[row, series]
         if weight == 0.0:
             continue
         if KIND[which] == RATE:
             for k in range(degree + 1):
-                a[GUARD, k] += weight * (k + 1) * a[series, k + 1]
+                rate = weight * (k + 1) * a[series, k + 1]
+                a[GUARD, k] = rate if first else a[GUARD, k] + rate
+        elif first:
+            for k in range(degree + 1):
+                a[GUARD, k] = weight * a[series, k]
         else:
             for k in range(degree + 1):
                 a[GUARD, k] += weight * a[series, k]
+        first = False
     a[GUARD, 0] += a[row, _CONSTANT]
     if G_LANDING <= which <= G_FAR_GAP:
         a[GUARD, 0], a[GUARD, 1] = closed_gap(a[GUARD, 0], a[GUARD, 1])

@@ -76,6 +76,9 @@ def _candidates() -> np.ndarray:
 
 
 _CANDIDATES = _candidates()
+# Where those of a block that is tilted stand.
+_TILTED = int(np.argmax((_CANDIDATES[:, 0] == TILT) & (_CANDIDATES[:, 6] == 0)))
+_TILTED_END = int(np.argmax((_CANDIDATES[:, 0] == TILT) & (_CANDIDATES[:, 1] < 0)))
 
 
 @inner_kernel
@@ -163,48 +166,47 @@ def tips_first(b, m, z, gh, t, rules):
 
 
 @inner_kernel
-def _write(number, flat, first, m):
-    """Writes candidate `number` into m; False where it is none of this block's family, or of a tilted one's other sense."""
-    family, sense = _CANDIDATES[number, 0], _CANDIDATES[number, 1]
-    if not flat and (family == FLAT or sense < 0 or _CANDIDATES[number, 6] != 0):
-        return False
+def _write(number, first, m):
+    """Writes candidate `number` into m."""
+    family, sense, walls = _CANDIDATES[number, 0], _CANDIDATES[number, 1], _CANDIDATES[number, 5]
     m[FAMILY], m[S] = family, 1 if family == FLAT else sense * first
-    m[FLOOR], m[PULL] = _CANDIDATES[number, 2], _CANDIDATES[number, 4]
-    walls = _CANDIDATES[number, 5]
-    m[SLIP] = _CANDIDATES[number, 3]
+    m[FLOOR], m[SLIP], m[PULL] = _CANDIDATES[number, 2], _CANDIDATES[number, 3], _CANDIDATES[number, 4]
     m[TIP], m[FAR] = walls & 1, walls >> 1
     if family == FLAT and first < 0:
         m[SLIP] = -m[SLIP]
         m[TIP], m[FAR] = walls >> 1, walls & 1
-    return True
 
 
 @inner_kernel
-def _possible(b, m, z, floor, left, right, walls):
-    """Whether the contacts of m are closed, and its slip is not against the motion; `walls` touched by a tilted block, as bits."""
+def _possible(b, m, z, v, floor, walls):
+    """Whether the contacts of m are closed, and its slip is not against the motion; v is the slip rate, `walls` those touched, as bits."""
     flat = m[FAMILY] == FLAT
-    if m[FLOOR] == OFF:
-        if floor and not b.unilateral:
-            return False
-    elif not floor:
+    if (not b.unilateral and floor) if m[FLOOR] == OFF else not floor:
         return False
-    if m[FLOOR] != OFF and m[PULL] < 0 and (b.unilateral or (flat and m[TIP] == 0 and m[FAR] == 0)):
+    if m[FLOOR] != OFF and m[PULL] < 0 and (b.unilateral or (b.no_slip and not flat) or (flat and m[TIP] == 0 and m[FAR] == 0)):
         return False
-    if b.no_slip and (m[FLOOR] == SLIPPING or (not flat and m[PULL] < 0)):
+    if b.no_slip and m[FLOOR] == SLIPPING:
         return False
     mine = m[TIP] + 2 * m[FAR]
-    if not flat:
-        if mine & ~walls:
-            return False
-        v = m[S] * (slip_velocity(b, z) if mine == 0 else z[W])  # along a wall the pivot slips as the block turns
-    else:
+    if mine & ~walls:
+        return False
+    if flat:
         # At rest it is held on the walls that it touches; sliding it touches none; between two walls that it fills it leans on both.
-        touched = (1 if left else 0) + (2 if right else 0)
-        held = touched if m[FLOOR] == STICK or (m[FLOOR] == OFF and touched == 3) else mine & touched
-        if mine != held or (m[FLOOR] == SLIPPING and mine != 0):
+        held = m[FLOOR] == STICK or (m[FLOOR] == OFF and walls == 3)
+        if (held and mine != walls) or (m[FLOOR] == SLIPPING and mine != 0):
             return False
         v = z[VX]
+    else:
+        v = m[S] * (v if mine == 0 else z[W])  # along a wall the pivot slips as the block turns
     return m[FLOOR] == OFF or (v == 0.0 if m[FLOOR] == STICK else m[SLIP] * v >= 0.0)
+
+
+@inner_kernel
+def _touched(b, z, sense, flat):
+    """The walls that the block touches, as bits: flat, left and right; else, as it tips to `sense`, the tip wall and the far one."""
+    if not b.walls:
+        return 0
+    return (1 if closed_wall(b, z, 1 if flat else sense, False) else 0) + (2 if closed_wall(b, z, -1 if flat else -sense, not flat) else 0)
 
 
 @inner_kernel
@@ -226,27 +228,27 @@ def select(b, z, gh, gv, t, m, tried, memory, rules, a):
     flat = z[THETA] == 0.0 and z[W] == 0.0
     lean = z[THETA] if z[THETA] != 0.0 else z[W]
     first = tips_first(b, m, z, gh, t, rules) if flat else (1 if lean > 0.0 else -1)
-    left, right = b.walls and closed_wall(b, z, 1, False), b.walls and closed_wall(b, z, -1, False)
+    upright_walls = _touched(b, z, 1, True) if flat else 0
+    near, away = _touched(b, z, first, False), _touched(b, z, -first, False) if flat else 0
+    v = slip_velocity(b, z)
+    begin, end = (0, _CANDIDATES.shape[0]) if flat else (_TILTED, _TILTED_END)
     least, chosen = np.inf, -1
-    for number in range(_CANDIDATES.shape[0]):
-        if not _write(number, flat, first, m):
-            continue
-        walls = 0
-        if b.walls and m[FAMILY] != FLAT:
-            walls = (1 if closed_wall(b, z, m[S], False) else 0) + (2 if closed_wall(b, z, -m[S], True) else 0)
-        if not _possible(b, m, z, floor, left, right, walls):
-            continue
-        wrong = wrong_by(b, m, z, gh, gv, t, a)
-        again = tried[code_of(m)]
-        if wrong == 0.0 and not again:
-            memory[SLACK] = 1.0
-            return True
-        wrong = max(wrong, memory[LEAST_SLACK] if again else 0.0)
-        if wrong < least:
-            least, chosen = wrong, number
+    for again in (False, True):
+        for number in range(begin, end):
+            _write(number, first, m)
+            walls = upright_walls if m[FAMILY] == FLAT else (near if m[S] == first else away)
+            if tried[code_of(m)] != again or not _possible(b, m, z, v, floor, walls):
+                continue
+            wrong = wrong_by(b, m, z, gh, gv, t, a)
+            if wrong == 0.0 and not again:
+                memory[SLACK] = 1.0
+                return True
+            wrong = max(wrong, memory[LEAST_SLACK] if again else 0.0)
+            if wrong < least:
+                least, chosen = wrong, number
     if chosen < 0:
         return False
-    _write(chosen, flat, first, m)
+    _write(chosen, first, m)
     rules[MODE_AGAIN if least <= memory[LEAST_SLACK] else LEAST_CONTRADICTION] += 1
     memory[SLACK] = max(least, memory[LEAST_SLACK])
     memory[LEAST_SLACK] *= 2.0
