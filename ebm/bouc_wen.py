@@ -78,7 +78,7 @@ from rockcheck.ebm.motion import (
 from rockcheck.ebm.rules import LEAST_CONTRADICTION, PULLS
 from rockcheck.ebm.running import CORNER, GOING, HOLDS, RELEASE, SLIPS, STICKS, UPLIFT, ZETA, T, mode_code, note
 from rockcheck.ebm.series import FORCE, NO_ROOT, NOISE, POSITION, first_root, leading, step_size, value
-from rockcheck.scenes.compiled import inner_kernel, kernel
+from rockcheck.scenes.compiled import inner_kernel, kernel, placed_kernel
 
 # Rows of the workspace after those of ebm.motion: z, V and what the recurrences need.
 Z, V, Z2, SPIN2, WEIGHT, ARM, TURN, REACH, INERTIA, LOAD, PUSH, ZA, LEVER, DEN, TORQUE = range(ROWS, ROWS + 15)
@@ -362,7 +362,7 @@ def _initial_friction(b, m, z, gh, gv, t, a):
     return -sense * a[Q, 0] / most if abs(a[Q, 0]) < most else -math.copysign(1.0, sense * a[Q, 0])
 
 
-@inner_kernel
+@placed_kernel
 def begin(b, gh, gv, r, yields, a):
     """The contacts of a block that starts, or goes on after an impact, and its z."""
     z, m, t = r.z, r.m, r.now[T]
@@ -374,13 +374,13 @@ def begin(b, gh, gv, r, yields, a):
     _holds(r, m[FLOOR] != SLIPPING or abs(r.now[ZETA]) != 1.0 or r.now[ZETA] * slip_velocity(b, z) <= SLOW)
 
 
-@inner_kernel
+@placed_kernel
 def _holds(r, whether):
     """Notes whether the pivot holds or has yielded."""
     r.counts[HOLDS] = 1 if whether else 0
 
 
-@inner_kernel
+@placed_kernel
 def expand(b, gh, gv, r, reach, control, yields, a):
     """Series of the motion: their order, the place of the pivot, and the step they are good for."""
     z, m, t, zeta = r.z, r.m, r.now[T], r.now[ZETA]
@@ -416,7 +416,7 @@ def locate(b, m, order, h, slack, a, stack):
     return tau, which
 
 
-@inner_kernel
+@placed_kernel
 def wind_up(r, order, tau, tolerance, log, a):
     """Takes z to the end of a step of tau; where it has come to +-1 the pivot has yielded."""
     m = r.m
@@ -432,7 +432,7 @@ def wind_up(r, order, tau, tolerance, log, a):
     r.now[ZETA] = zeta
 
 
-@inner_kernel
+@placed_kernel
 def follow(b, gh, gv, r, which, before, yields, log, a):
     """What follows an event that is no impact."""
     z, m, t = r.z, r.m, r.now[T]
@@ -460,7 +460,7 @@ def follow(b, gh, gv, r, which, before, yields, log, a):
     return GOING
 
 
-@inner_kernel
+@placed_kernel
 def _turn(b, gh, gv, r, t):
     """The slip has come to its end: the pivot slips back, or a flat block rests. The event's kind, -1 for none."""
     z, m = r.z, r.m
@@ -474,7 +474,7 @@ def _turn(b, gh, gv, r, t):
     return kind
 
 
-@inner_kernel
+@placed_kernel
 def _tip_sliding(b, gh, gv, r, yields, a):
     """A block tilts while it slides; the event's kind, -1 where rounding keeps it flat for a while."""
     z, m = r.z, r.m

@@ -236,3 +236,8 @@ def inner_kernel(function: Callable[..., Any]) -> Any:
     makes an array; one that returns an array would free it too early.
     """
     return register_jitable(error_model="numpy", _nrt=False)(function)
+
+
+def placed_kernel(function: Callable[..., Any]) -> Any:
+    """An inner kernel whose code stands where it is called: for what is called once a step and is given much."""
+    return register_jitable(error_model="numpy", _nrt=False, forceinline=True)(function)
