@@ -1,4 +1,4 @@
-"""Counts which law of impacts each engine follows at flush landings: the table of docs/laws.md.
+"""Counts which law of impacts each engine follows at flush landings, as a table.
 
 `python docs/site_tools/impact_laws.py [LANDINGS]` prints it as Markdown. The landings are drawn with a seed: a random block stands against
 a wall, is tilted away from it and let go.
