@@ -12,11 +12,11 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, StringConstraints, model_validator
 
 from rockcheck.scenes.base import Finite, Frozen, Positive
 from rockcheck.scenes.errors import InputError
-from rockcheck.scenes.records import GRAVITY_OF_RECORDS, read_record
+from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Reading, Recording, read_record
 
 FloatArray = NDArray[np.float64]
 
@@ -131,7 +131,8 @@ class Record(Motion):
     """A sampled ground motion: linear between its samples, zero after the last one.
 
     Usually made by `Record.from_file` or `Record.from_samples`. `unscaled` holds the samples in m/s^2 as recorded, and
-    `scale` multiplies them. A scene longer than its record goes on with a base at rest.
+    `scale` multiplies them. A scene longer than its record goes on with a base at rest. `notes` say what the file's reader did,
+    such as a first time that is not 0.
     """
 
     _size: ClassVar[str] = "scale"
@@ -141,29 +142,32 @@ class Record(Motion):
     time_step: Positive
     scale: Finite = 1.0
     source: str = "samples"
+    notes: Annotated[tuple[Annotated[str, StringConstraints(max_length=300)], ...], Field(max_length=20)] = ()
 
     @model_validator(mode="before")
     @classmethod
     def _read_file(cls, data: Any) -> Any:
         if isinstance(data, dict) and "file" in data:
-            extra = {"unscaled", "time_step", "source"} & data.keys()
+            extra = {"unscaled", "source", "notes"} & data.keys()
             if extra:
                 raise InputError("cannot be given together with file", sorted(extra)[0])
             data = dict(data)
             path = data.pop("file")
             if not isinstance(path, str | Path):
-                raise InputError(f"{path!r} is not allowed: the path of a .AT2 or .csv file is asked for", "file")
-            samples, time_step = read_record(Path(path))
-            data |= {"unscaled": tuple(samples.tolist()), "time_step": time_step, "source": Path(path).name}
+                raise InputError(f"{path!r} is not allowed: the path of a record file is asked for", "file")
+            reading = Reading(**{name: data.pop(name) for name in Reading.model_fields if name in data})
+            data |= _told(read_record(Path(path), reading), Path(path))
         return data
 
     @classmethod
-    def from_file(cls, path: str | Path, scale: float = 1.0) -> Self:
-        """The record in a PEER .AT2 file, or in a CSV with `time_s` and `acceleration_g` or `acceleration_m_s2`.
+    def from_file(cls, path: str | Path, scale: float = 1.0, **reading: Any) -> Self:
+        """The record in a file of one of the formats of `rockcheck.scenes.recordings`.
 
-        Raises `InputError`, naming file and line, where the file is not what it says it is.
+        `reading` holds what the file does not say, or which part of it is wanted: the options of `recordings.Reading`, such as
+        `unit="cm/s2"`, `time_step=0.005`, `column=2` or `component="360 Deg"`.
+        Raises `InputError`, naming file and line, where the file is not what it says it is, or something is not known.
         """
-        settings: dict[str, Any] = {"file": path, "scale": scale}
+        settings: dict[str, Any] = {"file": path, "scale": scale} | reading
         return cls(**settings)
 
     @classmethod
@@ -190,6 +194,12 @@ class Record(Motion):
     def peak(self) -> float:
         """Largest absolute scaled acceleration in units of standard gravity."""
         return float(np.max(np.abs(self.samples))) / GRAVITY_OF_RECORDS
+
+
+def _told(found: Recording, path: Path) -> dict[str, Any]:
+    """A file's recording as fields of a `Record`."""
+    samples = tuple(found.samples.tolist())
+    return {"unscaled": samples, "time_step": found.time_step, "source": path.name, "notes": found.notes}
 
 
 Excitation = Annotated[Rest | Ricker | Sine | Record, Field(discriminator="kind")]

@@ -61,11 +61,15 @@ def observe(
 
 def scene_notes(scene: Scene) -> tuple[str, ...]:
     """What a reader of any history of this scene should know."""
-    return tuple(
-        f"the {which} record ends at {excitation.quiet_after:g} s, before the scene's {scene.duration:g} s; the base is at rest after it"
-        for which, excitation in (("horizontal", scene.excitation), ("vertical", scene.vertical))
-        if excitation.kind == "record" and excitation.quiet_after < scene.duration
-    )
+    said: list[str] = []
+    for which, excitation in (("horizontal", scene.excitation), ("vertical", scene.vertical)):
+        if excitation.kind != "record":
+            continue
+        said += [f"the {which} record: {note}" for note in excitation.notes]
+        if excitation.quiet_after < scene.duration:
+            end = f"{excitation.quiet_after:g} s, before the scene's {scene.duration:g} s"
+            said.append(f"the {which} record ends at {end}; the base is at rest after it")
+    return tuple(said)
 
 
 def modes_of(scene: Scene, channels: Mapping[str, NDArray[Any]]) -> NDArray[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import stat
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -37,8 +38,11 @@ def open_regular(path: Path, most: int) -> IO[bytes]:
     raise InputError(f"{shown}: larger than {most} bytes" if stat.S_ISREG(about.st_mode) else f"{shown}: cannot be read: not a file")
 
 
-def read_text(path: Path, most: int = MOST_BYTES) -> str:
-    """The text of a file without a byte-order mark. Raises `InputError` where it is no file, too large or not UTF-8."""
+def read_text(path: Path, most: int = MOST_BYTES, *, latin: bool = False) -> str:
+    """The text of a file without a byte-order mark. Raises `InputError` where it is no file, too large or not UTF-8.
+
+    With `latin` a file that is not UTF-8 is read as UTF-16, where it has such a mark, else as Latin-1, where it has no controls.
+    """
     with open_regular(path, most) as stream:
         try:
             content = stream.read(most + 1)
@@ -47,9 +51,17 @@ def read_text(path: Path, most: int = MOST_BYTES) -> str:
     if len(content) > most:  # it has grown
         raise InputError(f"{printable(path)}: larger than {most} bytes")
     try:
-        return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+        text = content.decode("utf-16") if latin and _NOT_UTF8.match(content) else content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise InputError(f"{printable(path)}: not a text file") from None
+        if not latin or _CONTROLS.search(content):
+            raise InputError(f"{printable(path)}: not a text file") from None
+        text = content.decode("latin-1")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+#: The marks of UTF-16, and bytes that no text holds.
+_NOT_UTF8 = re.compile(rb"\xff\xfe|\xfe\xff")
+_CONTROLS = re.compile(rb"[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")
 
 
 def read_table(path: Path, **options: Any) -> pd.DataFrame:

@@ -11,6 +11,7 @@ from matplotlib.patches import Polygon, Rectangle
 
 from rockcheck.reports.style import SPARE, looks
 from rockcheck.scenes import History, InputError, Scene
+from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
 from rockcheck.validation.discrepancy import Discrepancy
 from rockcheck.validation.discrepancy.measures import Pair
 
@@ -119,4 +120,27 @@ def discrepancy_figure(found: Discrepancy) -> Figure:
     below.plot(pair.time, theta[1] - theta[0], color=other.light, linewidth=0.9)
     below.set(xlabel="t, s", ylabel="difference, α" if pair.alpha else "difference, rad")
     below.grid(color=SHADE, linewidth=0.5)
+    return figure
+
+
+def recordings_figure(recordings: list[tuple[str, Recording]]) -> Figure:
+    """Acceleration (g) and velocity (m/s) of each recording over time, and its spectral acceleration at 5 % damping."""
+    figure = new_figure(9.0, 1.9 * len(recordings) + 0.4)
+    for (name, record), (acceleration, velocity, spectrum) in zip(
+        recordings, figure.subplots(len(recordings), 3, squeeze=False, width_ratios=(3, 3, 2)), strict=True
+    ):
+        time = record.time_step * np.arange(len(record.samples))
+        acceleration.plot(time, record.samples / GRAVITY_OF_RECORDS, color=INK, linewidth=0.6)
+        velocity.plot(time, intensity.velocity(record), color=ACCENT, linewidth=0.8)
+        periods = np.geomspace(intensity.PERIODS[0], intensity.PERIODS[-1], 40)
+        spectrum.plot(periods, [intensity.spectral_acceleration(record, float(period)) for period in periods], color=INK, linewidth=0.9)
+        acceleration.set_title(name.replace("$", "\\$"), loc="left", fontsize=8)
+        for axes, label, below in (
+            (acceleration, "acceleration, g", "time, s"),
+            (velocity, "velocity, m/s", "time, s"),
+            (spectrum, "Sa(T), 5 %, g", "period T, s"),
+        ):
+            axes.set_ylabel(label, fontsize=7)
+            axes.set_xlabel(below, fontsize=7)
+            axes.tick_params(labelsize=7)
     return figure

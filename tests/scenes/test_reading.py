@@ -11,7 +11,7 @@ import pytest
 
 from rockcheck.scenes import History, InputError, load_scene
 from rockcheck.scenes.files import read_toml
-from rockcheck.scenes.records import read_record
+from rockcheck.scenes.recordings import read_record
 from rockcheck.validation.discrepancy.measured import read_measured
 from rockcheck.validation.suite.results import Run
 
@@ -24,6 +24,17 @@ LONG = {
     "step.AT2": "UNITS OF G\nNPTS=1 DT=" + "1" * 100_000 + "\n1",
     "digits.csv": "time_s,acceleration_g\n0,1\n0.1," + "1" * 100_000 + "x\n",
     "field.csv": 'time_s,acceleration_g\n0,1\n0.1,"' + "1" * 200_000 + '"\n',
+    "count.V2": "1 points of accel data equally spaced at " + "1" * 100_000 + " sec\n1",
+    "blanks.V2": "1 points of accel data equally spaced at .01 sec" + " " * 100_000 + "\n" + " " * 100_000,
+    "blocks.V2": "1 points of accel data equally spaced at .01 sec, in g\n1\n" * 20_000,
+    "wide.V2": "9 Real-header values follow on 9 lines, Format= (999F999.1)\n" * 20_000,
+    "keys.ASC": "SAMPLING_INTERVAL_S: 1\n" + "A" * 1_000_000,
+    "lines.ASC": "SAMPLING_INTERVAL_S: 1\n" * 50_000,
+    "scale.NS": "Origin Time\nScale Factor      " + "1" * 1_000_000 + "\nSampling Freq(Hz) 1\nMemo.\n1",
+    "commas.txt": "1," * 500_000,
+    "digits.txt": "1" * 1_000_000 + "," + "1" * 1_000_000,
+    "words.txt": "a " * 500_000,
+    "brackets.txt": "time_s acc" + "[" * 500_000 + "\n1 2\n",
     "word.toml": "a" * 1_000_000,
     "blanks.toml": "a = 1\n" + " " * 1_000_000 + "\n",
     "dots.toml": "a = '" + "x. " * 300_000 + "'",
@@ -41,12 +52,12 @@ from pathlib import Path
 import pandas
 from rockcheck.scenes import History, InputError
 from rockcheck.scenes.files import read_toml
-from rockcheck.scenes.records import read_record
+from rockcheck.scenes.recordings import read_record
 from rockcheck.validation.discrepancy.measured import read_measured
 used = resource.getrusage(resource.RUSAGE_SELF).ru_utime
 resource.setrlimit(resource.RLIMIT_CPU, (int(used) + 10,) * 2)
 path = Path(sys.argv[1])
-for read in {".AT2": [read_record], ".toml": [read_toml], ".csv": [read_record, History.load, read_measured]}[path.suffix]:
+for read in {".toml": [read_toml], ".csv": [read_record, History.load, read_measured]}.get(path.suffix, [read_record]):
     try:
         read(path)
     except InputError as error:
@@ -121,7 +132,7 @@ def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
     (tmp_path / "a.toml").write_text(scene, encoding="utf-8-sig")
     assert load_scene(tmp_path / "a.toml").name == "a"
     (tmp_path / "a.csv").write_text("time_s,acceleration_m_s2\n0.0,0.1\n0.5,0.2\n", encoding="utf-8-sig")
-    assert read_record(tmp_path / "a.csv")[1] == 0.5
+    assert read_record(tmp_path / "a.csv").time_step == 0.5
     for remark in ("", '# rockcheck history {"name": "kept", "outcome": "at rest"}\n'):
         path = tmp_path / "h.csv"
         path.write_text(remark + "t,theta\n0,0.5\n1,0.25\n", encoding="utf-8-sig")

@@ -120,8 +120,8 @@ HEAD = "time_s,acceleration_g\n"
     [
         ("", "empty"),
         ("# only a remark\n", "empty"),
-        ("t,acceleration_g\n0,0\n1,0\n", "line 1: columns 't, acceleration_g'; time_s and exactly one of"),
-        ("time_s,acceleration\n0,0\n1,0\n", "line 1: columns"),
+        ("x,acceleration_g\n0,0\n1,0\n", "line 1: columns 'x, acceleration_g'; time_s and exactly one of"),
+        ("time_s,acceleration\n0,0\n1,0\n", "the unit of acceleration is not stated; give it: --unit g (in a scene file: unit"),
         ("# r\ntime_s,acceleration_g,acceleration_m_s2\n0,0,0\n1,0,0\n", "line 2: columns"),
         (HEAD + "0,0\n", "1 sample(s); at least 2"),
         (HEAD + "0,0\n0.1,nan\n", "line 3: 'nan' is not a finite number"),
@@ -129,7 +129,6 @@ HEAD = "time_s,acceleration_g\n"
         (HEAD + "0,0\n# r\n0.1,x\n", "line 4: 'x' is not a finite number"),
         (HEAD + "0,0\n0.1,1,2\n", "line 3: 3 fields where the header names 2"),
         (HEAD + "0,0\n0.1\n", "line 3: 1 fields where the header names 2"),
-        (HEAD + "1,0\n2,0\n", "line 2: the first time is 1 s, not 0"),
         (HEAD + "0,0\n0,0\n", "time_s does not increase"),
         (HEAD + "0,0\n-0.1,0\n", "time_s does not increase"),
         (HEAD + "0,0\n0.1,0\n0.3,0\n0.4,0\n", "off the uniform step"),
@@ -145,7 +144,7 @@ def test_csv_faults(text, said, tmp_path):
 
 def test_files_that_cannot_be_read(tmp_path):
     assert "cannot be read: No such file" in fault_of(tmp_path / "nowhere.AT2")
-    assert "not a record file" in fault_of(written(tmp_path, "1 2 3", "motion.txt"))
+    assert "3 columns; give that of the accelerations: --column 2" in fault_of(written(tmp_path, "1 2 3", "motion.txt"))
     binary = tmp_path / "motion.csv"
     binary.write_bytes(bytes(range(256)))
     assert "not a text file" in fault_of(binary)

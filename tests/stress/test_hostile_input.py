@@ -23,7 +23,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rockcheck.scenes import History, InputError, load_scene
-from rockcheck.scenes.records import read_record
+from rockcheck.scenes.recordings import read_components
 from rockcheck.validation.commands.cli import main
 from rockcheck.validation.discrepancy.measured import read_measured
 from rockcheck.validation.execute.models import build
@@ -47,6 +47,29 @@ NPTS=      6, DT=   .0100 SEC,
    .6000000E-02
 """
 CSV = "# a remark\ntime_s,acceleration_m_s2\n0.0,0.1\n0.01,-0.2\n0.02,0.3\n"
+V2 = """Corrected accelerogram   89146-L2500-12044.02       Chan  1: 360 Deg     from
+ 100 Integer-header values follow on  10 lines, Format= (10I8)
+ 100 Real-header values follow on  4 lines, Format= (10F8.3)
+     0.0     0.0     0.0
+     0.0     0.0     0.0
+     0.0     0.0     0.0
+     0.0     0.0     0.0   0.005
+       9 acceleration pts, approx    4 secs, units=cm/sec2 (04),Format=(8F10.5)
+   0.10000   0.20000   0.30000   0.40000   0.50000  -0.60000   0.70000   0.80000
+   0.90000
+ 3 points of accel data equally spaced at  .005 sec, in cm/sec2. (8f10.6)
+  -.000010  -.000009  -.000010
+"""
+ESM = "EVENT_NAME: X\nSAMPLING_INTERVAL_S: 0.005000\nNDATA: 3\nSTREAM: HNN\nUNITS: cm/s^2\nDATA_TYPE: ACCELERATION\n0.1\n-0.2\n0.3\n"
+KNET = """Origin Time       2011/03/11 14:46:00
+Sampling Freq(Hz) 100Hz
+Duration Time(s)  .08
+Dir.              N-S
+Scale Factor      3920(gal)/6182761
+Memo.
+     4711     4712     4709     4711     4715     4711     4700     4711
+"""
+COLUMNS = "of a table\n t [s];acc [cm/s2];x\n5,00;0,1;0\n5,01;0,2;0\n5,02;-0,3;0\n"
 SCENE = """duration = 2.0
 output_step = 0.01
 [block]
@@ -208,11 +231,10 @@ def result_or_line(read: Callable[[], Any]) -> Any:
 def feed_record(content: bytes, folder: Path, name: str) -> None:
     path = folder / name
     path.write_bytes(content)
-    if found := result_or_line(lambda: read_record(path)):
-        samples, step = found
-        assert len(samples) >= 1
-        assert all(map(math.isfinite, samples))
-        assert step > 0.0
+    for found in result_or_line(lambda: read_components(path)) or []:
+        assert len(found.samples) >= 1
+        assert all(map(math.isfinite, found.samples))
+        assert 0.0 < found.time_step < math.inf
 
 
 def feed_scene(content: bytes, folder: Path) -> None:
@@ -300,6 +322,10 @@ def feed_command_line(content: bytes, folder: Path) -> None:
 READERS: dict[str, tuple[Callable[[bytes, Path], None], Callable[[], str]]] = {
     "at2": (functools.partial(feed_record, name="a.AT2"), lambda: AT2),
     "record_csv": (functools.partial(feed_record, name="a.csv"), lambda: CSV),
+    "record_v2": (functools.partial(feed_record, name="a.V2"), lambda: V2),
+    "record_esm": (functools.partial(feed_record, name="a.ASC"), lambda: ESM),
+    "record_knet": (functools.partial(feed_record, name="a.NS"), lambda: KNET),
+    "record_columns": (functools.partial(feed_record, name="a.txt"), lambda: COLUMNS),
     "scene_toml": (feed_scene, lambda: SCENE),
     "suite_toml": (feed_suite, lambda: SUITE),
     "history_csv": (feed_history, lambda: HISTORY),
@@ -382,7 +408,7 @@ import pandas, numba, ebm.march  # what a run needs in any case
 resource.setrlimit(resource.RLIMIT_DATA, (2**30, 2**30))
 from rockcheck.validation.commands.cli import main
 from rockcheck.scenes import InputError
-from rockcheck.scenes.records import read_record
+from rockcheck.scenes.recordings import read_record
 for path in sorted(Path(sys.argv[1]).iterdir()):
     began = time.monotonic()
     if path.suffix == ".toml":

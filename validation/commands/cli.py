@@ -20,6 +20,7 @@ from rockcheck.validation.commands import (
     accept,
     compare,
     new,
+    record,
     report,
     report_file,
     scenes,
@@ -36,6 +37,7 @@ from rockcheck.validation.suite.results import FAULT
 COMMANDS = {
     scenes: "rockcheck scenes",
     new: "rockcheck new bookcase.toml",
+    record: "rockcheck record station.V2 --component 1 --plot station.png",
     simulate: "rockcheck simulate fig5a --model mujoco --set time_step=1e-3 -o mujoco.csv",
     compare: "rockcheck compare ebm.csv mujoco.csv --until 8",
     uncertainty: "rockcheck uncertainty fig5a --model mujoco --set time_step=1e-3",

@@ -1,0 +1,84 @@
+"""Recorded ground motions in the formats of strong-motion networks and data bases, and as tables.
+
+| format | file | what the file must say |
+|---|---|---|
+| PEER | `.AT2` | NPTS, DT, UNITS OF G |
+| COSMOS V2, CSMIP V2 | `.V2` | points, format, unit, time step; one or several channels |
+| ESM (DYNA 1.2) | `.ASC` | NDATA, SAMPLING_INTERVAL_S, UNITS |
+| K-NET, KiK-net | `.NS`, `.EW1`, ... | Scale Factor, Sampling Freq(Hz), Duration Time(s) |
+| CSV | any | columns `time_s` and `acceleration_g`, `_m_s2`, `_cm_s2`, `_gal` or `_mm_s2` |
+| columns of text | any | whatever is not there is an option of `Reading` |
+
+A format is known by what the file holds; `.AT2` and `.csv` by the name. Every reader takes time in proportion to the file.
+ObsPy reads K-NET among these, but neither PEER, V2, ESM nor tables, and weighs more than all of rockcheck.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rockcheck.scenes.errors import printable
+from rockcheck.scenes.reading import read_text
+from rockcheck.scenes.recordings.headed import AT2_HEADER, AT2_HEADER_PLAIN, read_at2, read_esm, read_knet
+from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS, UNITS, Reading, Recording, fault, option
+from rockcheck.scenes.recordings.tables import read_table
+from rockcheck.scenes.recordings.volumes import is_volume, read_volume
+
+__all__ = ["GRAVITY_OF_RECORDS", "UNITS", "Reading", "Recording", "read_components", "read_record"]
+
+#: How far the beginning of a file is looked at to know its format.
+_LOOKED_AT = 100
+
+
+def read_components(path: Path, reading: Reading | None = None) -> list[Recording]:
+    """All components of a record file, or the one that `reading` names; at least one.
+
+    Raises `InputError`, naming the file and the line, where the file is missing, is in no known format, has another count than it
+    says, a time step that is not positive or not uniform, a value that is not finite, or where something is not known: then the
+    message shows the option that says it.
+    """
+    asked = reading or Reading()
+    lines = read_text(path, latin=True).split("\n")
+    kind = _format_of(path, lines)
+    if kind == "table":
+        return [read_table(path, lines, asked)]
+    if kind == "v2":
+        found = read_volume(path, lines, asked)
+    else:
+        found = [{"at2": read_at2, "esm": read_esm, "knet": read_knet}[kind](path, lines, asked)]
+    return found if asked.component is None else [_chosen(path, found, asked.component)]
+
+
+def read_record(path: Path, reading: Reading | None = None) -> Recording:
+    """The one component of a record file, or the one that `reading` names. Raises as `read_components`."""
+    found = read_components(path, reading)
+    if len(found) > 1:
+        raise fault(path, f"{len(found)} components, {_listed(found)}; give one: {option('component', 1)}")
+    return found[0]
+
+
+def _format_of(path: Path, lines: list[str]) -> str:
+    suffix = path.suffix.lower()
+    if suffix in (".at2", ".csv"):
+        return {".at2": "at2", ".csv": "table"}[suffix]
+    head = [line[:200] for line in lines[:_LOOKED_AT]]
+    if head[0].startswith("Origin Time"):
+        return "knet"
+    if any(line.startswith("SAMPLING_INTERVAL_S:") for line in head):
+        return "esm"
+    if any(map(is_volume, head)):
+        return "v2"
+    return "at2" if any(AT2_HEADER.search(line) or AT2_HEADER_PLAIN.search(line) for line in head[:20]) else "table"
+
+
+def _chosen(path: Path, found: list[Recording], component: int | str) -> Recording:
+    if isinstance(component, int) and component <= len(found):
+        return found[component - 1]
+    named = [one for one in found if one.component == component]
+    if len(named) == 1:
+        return named[0]
+    raise fault(path, f"no single component {printable(repr(component))}; there are {_listed(found)}")
+
+
+def _listed(found: list[Recording]) -> str:
+    return printable(", ".join(f"{n} {one.component!r}" if one.component else str(n) for n, one in enumerate(found, 1)), 300)

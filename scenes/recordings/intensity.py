@@ -1,0 +1,59 @@
+"""How strong a recorded motion is, in the measures of earthquake engineering."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS, Recording
+
+#: Periods at which spectral accelerations are given, s.
+PERIODS = (0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0)
+#: Steps a period, so that the largest sample is the peak within 0.1 %; and most steps in all.
+_STEPS, _MOST_STEPS = 80, 50_000_000
+
+
+def peak_acceleration(record: Recording) -> float:
+    """PGA, the largest absolute acceleration, in g."""
+    return float(np.max(np.abs(record.samples))) / GRAVITY_OF_RECORDS
+
+
+def velocity(record: Recording) -> NDArray[np.float64]:
+    """Ground velocity at the samples in m/s, from rest, exact for straight lines between samples; no baseline correction."""
+    from scipy.integrate import cumulative_trapezoid
+
+    return np.asarray(cumulative_trapezoid(record.samples, dx=record.time_step, initial=0.0))
+
+
+def peak_velocity(record: Recording) -> float:
+    """PGV, the largest absolute velocity, in m/s."""
+    return float(np.max(np.abs(velocity(record))))
+
+
+def arias(record: Recording) -> float:
+    """Arias intensity pi/(2 g) int a^2 dt in m/s, exact for straight lines between samples."""
+    before, after = record.samples[:-1], record.samples[1:]
+    squares = float(np.sum(before * before + before * after + after * after)) / 3.0 * record.time_step
+    return math.pi / (2.0 * GRAVITY_OF_RECORDS) * squares
+
+
+def spectral_acceleration(record: Recording, period: float, damping: float = 0.05) -> float:
+    """Pseudo-spectral acceleration of an oscillator of `period` (s) and `damping` (of critical) in g.
+
+    The oscillator is exact for straight lines between samples (first-order hold), and goes on for a period after the last.
+    """
+    from scipy.signal import cont2discrete, lfilter
+
+    rate = 2.0 * math.pi / period
+    end = record.time_step * (len(record.samples) - 1)
+    parts = max(math.ceil(_STEPS * record.time_step / period), 1)
+    parts = max(min(parts, _MOST_STEPS // len(record.samples)), 1)
+    step = record.time_step / parts
+    count = (len(record.samples) - 1) * parts + 1
+    ground = np.interp(step * np.arange(count), record.time_step * np.arange(len(record.samples)), record.samples)
+    tail = np.zeros(min(math.ceil(period / step), _MOST_STEPS))
+    above, below, _ = cont2discrete(([rate * rate], [1.0, 2.0 * damping * rate, rate * rate]), step, method="foh")
+    response = lfilter(np.ravel(above), below, np.concatenate([ground, tail]) if end > 0.0 else ground)
+    return float(np.max(np.abs(response))) / GRAVITY_OF_RECORDS

@@ -1,0 +1,158 @@
+"""A recorded ground motion as read from a file, and what its reader may have to be told."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, Strict, StringConstraints
+
+from rockcheck.scenes.base import LEAST, MOST, Frozen, Positive
+from rockcheck.scenes.errors import InputError, printable
+
+GRAVITY_OF_RECORDS = 9.80665  # m/s^2, the unit "g" of record files (standard gravity)
+MOST_SAMPLES = 10_000_000
+
+Unit = Literal["g", "m/s2", "cm/s2", "gal", "mm/s2"]
+#: m/s^2 in each unit that a record may have.
+UNITS: dict[str, float] = {"g": GRAVITY_OF_RECORDS, "m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "mm/s2": 0.001}
+
+# Whatever repeats is possessive: what does not match ends after one pass, however long the line.
+NUMBER = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eEdD][-+]?\d++)?"
+_NUMBER = re.compile(NUMBER)
+_EXPONENT = str.maketrans("dD", "ee")
+_SPELLINGS = {
+    "g": r"g(?:'?s)?",
+    "m/s2": r"m/s/s|m/s(?:\^|\*\*)?2|m/sec/sec|m/sec(?:\^|\*\*)?2",
+    "cm/s2": r"cm/s/s|cm/s(?:\^|\*\*)?2|cm/sec/sec|cm/sec(?:\^|\*\*)?2",
+    "gal": r"gals?",
+    "mm/s2": r"mm/s/s|mm/s(?:\^|\*\*)?2|mm/sec/sec|mm/sec(?:\^|\*\*)?2",
+}
+_SPELT = {unit: re.compile(pattern, re.IGNORECASE) for unit, pattern in _SPELLINGS.items()}
+
+Word = Annotated[str, StringConstraints(min_length=1, max_length=100)]
+Place = Annotated[int, Strict(), Field(ge=1, le=1000)]
+
+
+class Reading(Frozen):
+    """What a record file does not say of itself, and which part of it is wanted; None: as the file says.
+
+    | option | meaning |
+    |---|---|
+    | `unit` | of the accelerations |
+    | `time_step` | s, where neither a header nor a column of times gives it |
+    | `column` | of a table: the column of accelerations, its number from 1 or its name |
+    | `header_lines` | of a table: so many first lines are no data |
+    | `decimal` | of a table: what stands before the decimals |
+    | `component` | of a file with several: its number from 1 or its name |
+    """
+
+    unit: Unit | None = None
+    time_step: Positive | None = None
+    column: Place | Word | None = None
+    header_lines: Annotated[int, Strict(), Field(ge=0, le=10_000)] | None = None
+    decimal: Literal[".", ","] | None = None
+    component: Place | Word | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """One component of a record: samples in m/s^2 every `time_step` s, the first at t = 0, none of them scaled.
+
+    `unit` is that of the file, `form` its format, `component` the direction or channel ("" where the file names none), `notes`
+    what was done to the samples or taken for granted.
+    """
+
+    samples: NDArray[np.float64]
+    time_step: float
+    unit: str
+    form: str
+    component: str = ""
+    notes: tuple[str, ...] = ()
+
+    def noted(self, *notes: str) -> Recording:
+        """The same recording with further notes."""
+        return replace(self, notes=(*self.notes, *notes))
+
+
+def fault(path: Path, said: str, line: int | None = None) -> InputError:
+    """What is wrong with a file, and in which line."""
+    return InputError(f"{printable(path)}, line {line}: {said}" if line else f"{printable(path)}: {said}")
+
+
+def option(name: str, value: str | float) -> str:
+    """How an option is given, on the command line and in a scene file."""
+    in_file = value if not isinstance(value, str) else f'"{value}"'
+    return f"--{name.replace('_', '-')} {value} (in a scene file: {name} = {in_file})"
+
+
+def number(path: Path, line: int, word: str) -> float:
+    """The finite number that `word` is, in Fortran's notation or C's. Raises `InputError` where it is none."""
+    if _NUMBER.fullmatch(word):
+        value = float(word.translate(_EXPONENT))
+        if abs(value) <= MOST:
+            return value
+        if math.isfinite(value):
+            raise fault(path, f"{printable(word, 30)} is larger than {MOST:g}", line)
+    raise fault(path, f"{printable(word, 30)!r} is not a finite number", line)
+
+
+def is_number(word: str) -> bool:
+    """Whether `number` would read it, apart from its size."""
+    return _NUMBER.fullmatch(word) is not None
+
+
+def numbers(path: Path, lines: Iterable[tuple[int, str]]) -> list[float]:
+    """All numbers of numbered lines, between blanks."""
+    return [number(path, n, word) for n, line in lines for word in line.split()]
+
+
+def known_unit(text: str) -> str:
+    """The unit that `text` spells, such as cm/sec/sec for cm/s2; "" where it spells none."""
+    word = text.strip().strip("()[] .").replace("²", "2").replace(" ", "")[:20]
+    return next((unit for unit, spelt in _SPELT.items() if spelt.fullmatch(word)), "")
+
+
+def settled_unit(path: Path, stated: str, reading: Reading) -> str:
+    """The unit that the file states or the reader was told; raises `InputError` where neither is, or both and they differ."""
+    if not stated and reading.unit is None:
+        raise fault(path, f"the unit of acceleration is not stated; give it: {option('unit', 'g')}, or one of {', '.join(UNITS)}")
+    if stated and reading.unit and UNITS[stated] != UNITS[reading.unit]:
+        raise fault(path, f"the file states the unit {stated}, not {reading.unit}; leave the option unit out")
+    return stated or str(reading.unit)
+
+
+def settled_step(path: Path, stated: float, reading: Reading) -> float:
+    """The time step in s that a header states; raises `InputError` where the reader was told another."""
+    if reading.time_step is not None and abs(stated - reading.time_step) > 1e-6 * stated:
+        raise fault(path, f"the file states a time step of {stated:g} s, not {reading.time_step:g} s; leave the option time_step out")
+    return stated
+
+
+def only_for_tables(path: Path, reading: Reading, form: str) -> None:
+    """Raises `InputError` where an option is given that means nothing to a format with a header of its own."""
+    for name in ("column", "header_lines", "decimal"):
+        if getattr(reading, name) is not None:
+            raise fault(path, f"is {form}, which says by itself where its numbers stand; leave the option {name} out")
+
+
+def checked_count(path: Path, line: int, name: str, count: str) -> int:
+    """A count of samples that a header states."""
+    value = int(count[:12])
+    if not 1 <= value <= MOST_SAMPLES:
+        raise fault(path, f"{name} {count[:20]} is not in 1..{MOST_SAMPLES}", line)
+    return value
+
+
+def checked_step(path: Path, line: int, name: str, word: str) -> float:
+    """A time step that a header states, s."""
+    value = number(path, line, word)
+    if value < LEAST:
+        raise fault(path, f"{name} {word} is {'not positive' if value <= 0.0 else f'below {LEAST:g}'}", line)
+    return value

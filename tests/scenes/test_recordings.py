@@ -1,0 +1,370 @@
+"""Records as they come: one motion of three components, whose peaks are known, in every format that is read."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rockcheck.scenes import InputError, Record, load_scene
+from rockcheck.scenes.observation import scene_notes
+from rockcheck.scenes.recordings import Reading, intensity, read_components, read_record
+from rockcheck.scenes.recordings.recording import Recording
+from rockcheck.validation.commands.cli import main
+
+G = 9.80665
+STEP = 0.01
+#: Peaks in g.
+PEAKS = {"N-S": 0.31, "E-W": -0.27, "U-D": 0.15}
+
+
+def motion(component: str) -> NDArray[np.float64]:
+    """Accelerations in m/s^2, 401 of them: a burst without a mean, whose largest one stands at a sample."""
+    t = STEP * np.arange(401)
+    shape = np.sin(2 * np.pi * (t - 2.0) * 1.5 + np.pi / 2) * np.exp(-((t - 2.0) ** 2) / 0.4)
+    return PEAKS[component] * G * shape
+
+
+def _fixed(values: NDArray[np.float64], across: int, form: str) -> str:
+    words = [format(value, form) for value in values]
+    return "".join("".join(words[k : k + across]) + "\n" for k in range(0, len(words), across))
+
+
+def at2(component: str, header: str = "NPTS=  {n}, DT= {dt:.4f} SEC,") -> bytes:
+    values = motion(component) / G
+    head = header.format(n=len(values), dt=STEP)
+    text = f"PEER NGA STRONG MOTION DATABASE RECORD\nM\xe9xico, 9/19/1985, {component}\nACCELERATION TIME SERIES IN UNITS OF G\n{head}\n"
+    return (text + _fixed(values, 5, "15.7E")).encode("latin-1")
+
+
+def at2_plain(component: str) -> bytes:
+    return at2(component, " {n}  {dt:.4f}  NPTS, DT").replace(b"\n", b"\r\n")
+
+
+def _cosmos_channel(component: str) -> str:
+    values = motion(component) * 100
+    integers, reals = [-999] * 100, [-999.0] * 100
+    integers[53] = {"N-S": 360, "E-W": 90, "U-D": 400}[component]
+    reals[33] = STEP
+    reals[41] = 426212.0  # touches its neighbour
+    return (
+        "Corrected acceleration   (Format v01.20 with 13 text lines) Src: 052S7466.CE\n"
+        + "".join(f"text line {n}\n" for n in range(2, 14))
+        + " 100 Integer-header values follow on  10 lines, Format= (10I8)\n"
+        + _fixed(np.array(integers), 10, "8d")
+        + " 100 Real-header values follow on  17 lines, Format= (6F13.6)\n"
+        + _fixed(np.array(reals), 6, "13.6f")
+        + '   2 Comment lines follow, each starting with a "|":\n| a remark\n| accel of another\n'
+        + f"    {len(values)} acceleration pts, approx    4 secs, units=cm/sec2 (04),Format=(8F10.5)\n"
+        + _fixed(values, 8, "10.5f")
+        + f"    {len(values)} velocity pts, approx    4 secs, units=cm/sec (05),Format=(8F10.5)\n"
+        + _fixed(values * 0 + 999.0, 8, "10.5f")
+        + "End-of-data for Chan  1 acceleration\n"
+    )
+
+
+def cosmos(component: str) -> bytes:
+    return _cosmos_channel(component).encode()
+
+
+def cosmos_three() -> bytes:
+    return "".join(map(_cosmos_channel, PEAKS)).encode()
+
+
+def _csmip_channel(component: str) -> str:
+    values = motion(component) * 100
+    direction = {"N-S": "360 Deg", "E-W": " 90 Deg", "U-D": "Up"}[component]
+    return (
+        f"Corrected accelerogram   89146-L2500-12044.02       Chan  1: {direction}     from   \n"
+        + "Uncorrected Accelerogram Data             Processed: 02/13/12, CGS  146be002\n"
+        + " 401 points of instrument- and baseline-corrected accel, veloc and displ data\n"
+        + f" {len(values)} points of accel data equally spaced at  .010 sec, in cm/sec2. (8f10.6)\n"
+        + _fixed(values, 8, "10.5f")
+        + f" {len(values)} points of veloc data equally spaced at  .010 sec, in cm/sec.  (8f10.6)\n"
+        + _fixed(values * 0 + 999.0, 8, "10.5f")
+        + "/&  ---------- End of data for channel  1 ----------\n"
+    )
+
+
+def csmip(component: str) -> bytes:
+    return _csmip_channel(component).encode()
+
+
+def csmip_three() -> bytes:
+    return "".join(map(_csmip_channel, PEAKS)).encode()
+
+
+def esm(component: str) -> bytes:
+    values = motion(component) * 100
+    stream = {"N-S": "HNN", "E-W": "HNE", "U-D": "HNZ"}[component]
+    text = (
+        f"EVENT_NAME: GREECE\nSTATION_NAME: Town Hall,Argos\nSAMPLING_INTERVAL_S: {STEP:.6f}\nNDATA: {len(values)}\nDURATION_S: 4.010\n"
+        f"STREAM: {stream}\nUNITS: cm/s^2\nPGA_CM/S^2: 304\nDATA_TYPE: ACCELERATION\nUSER5: \n"
+    )
+    return (text + _fixed(values, 1, ".6f")).encode()
+
+
+def knet(component: str, direction: str = "") -> bytes:
+    """Counts of a digitiser with an offset; 400 samples."""
+    values = motion(component)[:400]
+    counts = np.round((values - values.mean()) * 100 / (3920 / 6182761)).astype(int) + 4711
+    rows = {
+        "Origin Time": "2011/03/11 14:46:00",
+        "Lat.": "38.103",
+        "Station Code": "MYG004",
+        "Sampling Freq(Hz)": "100Hz",
+        "Duration Time(s)": "4",
+        "Dir.": direction or component,
+        "Scale Factor": "3920(gal)/6182761",
+        "Max. Acc. (gal)": f"{abs(PEAKS[component]) * G * 100:.3f}",
+        "Last Correction": "2011/03/11 14:46:21",
+        "Memo.": "",
+    }
+    return ("".join(f"{key:<18}{value}\n" for key, value in rows.items()) + _fixed(counts, 8, "9d")).encode()
+
+
+def kiknet(component: str) -> bytes:
+    return knet(component, {"N-S": "4", "E-W": "5", "U-D": "6"}[component])
+
+
+def csv_gal(component: str) -> bytes:
+    """As a spreadsheet saves it that writes commas before the decimals: semicolons, a mark, a start at 5 s."""
+    rows = "".join(f"{5 + STEP * n:.2f};{value * 100:.6f}\n".replace(".", ",") for n, value in enumerate(motion(component)))
+    return ("time_s;acceleration_gal\n" + rows).encode("utf-8-sig")
+
+
+def columns(component: str) -> bytes:
+    """Blanks, a header of words, times and two columns."""
+    rows = "".join(f" {STEP * n:8.2f} {value:12.7f} {0.0:9.3f}\n" for n, value in enumerate(motion(component)))
+    return ("Shake table of the institute\n  t [s]   acc [m/s2]   displacement\n" + rows).encode()
+
+
+@dataclass(frozen=True)
+class Made:
+    """A format: what writes it, the name of its files, the sizes of its printed digits in g."""
+
+    write: Callable[[str], bytes]
+    name: str
+    digit: float = 1e-7
+    start: float = 0.0
+
+
+FORMATS = {
+    "PEER": Made(at2, "RSN1_{}.AT2"),
+    "PEER, older": Made(at2_plain, "RSN2_{}.AT2"),
+    "COSMOS V2": Made(cosmos, "station-{}.V2"),
+    "CSMIP V2": Made(csmip, "csmip-{}.v2"),
+    "ESM": Made(esm, "HI.ARS1..{}.D.ACC.ASC"),
+    "K-NET": Made(knet, "MYG004-{}.knet", 2e-6),
+    "CSV": Made(csv_gal, "{}.csv", start=5.0),
+    "columns": Made(columns, "table-{}.txt"),
+}
+
+
+def folder_of_records(folder: Path) -> dict[str, tuple[Made, str]]:
+    """Twenty-four files of three components in eight formats; what each was made of."""
+    made = {}
+    for form in FORMATS.values():
+        for component in PEAKS:
+            name = form.name.format(component)
+            (folder / name).write_bytes(form.write(component))
+            made[name] = form, component
+    return made
+
+
+def test_a_folder_of_24_files_in_eight_formats_is_read_whole(tmp_path):
+    made = folder_of_records(tmp_path)
+    assert len(made) == 24
+    for name, (form, component) in made.items():
+        record = read_record(tmp_path / name)
+        expected = motion(component)[: len(record.samples)]
+        if "knet" in name:
+            expected = expected - expected.mean()
+        assert record.time_step == STEP, name
+        np.testing.assert_allclose(record.samples, expected, rtol=0, atol=form.digit * G * 1.01, err_msg=name)
+        assert intensity.peak_acceleration(record) == pytest.approx(abs(PEAKS[component]), abs=3e-4 if "knet" in name else form.digit), name
+        assert any("it is 0 here" in note for note in record.notes) == (form.start != 0.0), name
+
+
+def test_the_command_reads_that_folder(tmp_path, capsys):
+    made = folder_of_records(tmp_path)
+    assert main(["record", str(tmp_path), "--json"]) == 0
+    records = json.loads(capsys.readouterr().out)["records"]
+    assert [Path(one["file"]).name for one in records] == sorted(made)
+    for one in records:
+        form, component = made[Path(one["file"]).name]
+        assert one["pga_g"] == pytest.approx(abs(PEAKS[component]), abs=3e-4)
+        assert one["step_s"] == STEP
+        assert one["samples"] == (400 if form.write is knet else 401)
+
+
+@pytest.mark.parametrize(("write", "names"), [(cosmos_three, ["360 deg", "90 deg", "up"]), (csmip_three, ["360 Deg", "90 Deg", "Up"])])
+def test_several_components_in_one_file(write, names, tmp_path, capsys):
+    path = tmp_path / "three.V2"
+    path.write_bytes(write())
+    found = read_components(path)
+    assert [one.component for one in found] == names
+    for one, component in zip(found, PEAKS, strict=True):
+        np.testing.assert_allclose(one.samples, motion(component), atol=1.01e-7)
+    with pytest.raises(InputError, match=r"3 components, 1 '360 .eg', .* give one: --component 1 \(in a scene file: component = 1\)"):
+        Record.from_file(path)
+    assert Record.from_file(path, component=2).peak == pytest.approx(0.27, abs=1e-7)
+    assert Record.from_file(path, component=names[2]).peak == pytest.approx(0.15, abs=1e-7)
+    assert main(["record", str(path), "--component", names[1], "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["component"], said["unit"], said["samples"]) == (names[1], "cm/s2", 401)
+    assert said["duration_s"] == pytest.approx(4.0)
+    with pytest.raises(InputError, match="no single component 4; there are 1 "):
+        Record.from_file(path, component=4)
+
+
+def test_k_net_takes_out_the_offset_and_says_so(tmp_path):
+    path = tmp_path / "MYG0041103111446.NS"
+    path.write_bytes(kiknet("N-S"))
+    record = read_record(path)
+    assert record.component == "4"
+    assert abs(record.samples.mean()) < 1e-12
+    assert record.notes == ("the mean, 2.987 gal, is taken out: the offset of the digitiser",)
+    path.write_bytes(b"\n".join(knet("N-S").split(b"\n")[:-9]))
+    with pytest.raises(InputError, match=r"Duration Time\(s\) 4 is 400 samples, the file has 336"):
+        read_record(path)
+
+
+# --- tables, and what has to be told of them
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "samples", "step"),
+    [
+        ("0.1\n0.2\n-0.3\n", {"unit": "g", "time_step": 0.02}, [0.1 * G, 0.2 * G, -0.3 * G], 0.02),
+        ("0.1 0.2\n0.3 0.4\n", {"unit": "m/s2", "time_step": 0.02, "column": 2}, [0.2, 0.4], 0.02),
+        ("0 10\n0.5 20\n", {"unit": "gal"}, [0.1, 0.2], 0.5),
+        ("0 10\n0.5 20\n", {"unit": "mm/s2"}, [0.01, 0.02], 0.5),
+        ("0,0 1,5\n0,5 2,5\n", {"unit": "cm/s2"}, [0.015, 0.025], 0.5),
+        ("0,5\n1,5\n", {"unit": "m/s2", "decimal": ",", "time_step": 0.1}, [0.5, 1.5], 0.1),
+        ("0;1,5\n0,5;2\n", {"unit": "m/s2"}, [1.5, 2.0], 0.5),
+        ("0\t1.5\n0.5\t2\n", {"unit": "m/s2"}, [1.5, 2.0], 0.5),
+        ("17 words\n3 4\n0.5 1\n1.0 2\n", {"unit": "m/s2", "header_lines": 2}, [1.0, 2.0], 0.5),
+        ("time_s,acceleration_cm_s2\n0,100\n0.1,50\n", {}, [1.0, 0.5], 0.1),
+        ("time_s,acceleration_gal\n0,100\n0.1,50\n", {}, [1.0, 0.5], 0.1),
+        ("time_s,acceleration_mm_s2\n0,100\n0.1,50\n", {}, [0.1, 0.05], 0.1),
+        ("time_s,acceleration_g,acceleration_m_s2\n0,9,1\n1,9,2\n", {"column": "acceleration_m_s2"}, [1.0, 2.0], 1.0),
+        ("time (s);acc [cm/s^2]\n0;1\n1;2\n", {}, [0.01, 0.02], 1.0),
+    ],
+)
+def test_tables(text, options, samples, step, tmp_path):
+    path = tmp_path / "motion.txt"
+    for content in (text.encode(), text.encode("utf-8-sig"), text.encode("utf-16"), text.replace("\n", "\r\n").encode()):
+        path.write_bytes(content)
+        record = read_record(path, Reading(**options))
+        np.testing.assert_allclose(record.samples, samples, rtol=1e-14)
+        assert record.time_step == pytest.approx(step, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "said"),
+    [
+        ("0 1\n0.5 2\n", {}, 'the unit of acceleration is not stated; give it: --unit g (in a scene file: unit = "g")'),
+        ("1\n2\n", {"unit": "g"}, "no column of times; give the time step: --time-step 0.01 (in a scene file: time_step = 0.01)"),
+        ("1 2 3\n4 5 6\n", {"unit": "g"}, "3 columns; give that of the accelerations: --column 2 (in a scene file: column = 2)"),
+        ("1 2 3\n4 5 6\n", {"column": 4}, "no single column 4; there are 1 to 3"),
+        (
+            "words\nand more of them\n",
+            {"unit": "g"},
+            "no line of numbers within the first 200; give the lines to leave out: --header-lines",
+        ),
+        ("0,5\n1,5\n", {"unit": "g"}, "a comma between columns or before the decimals? --decimal ,"),
+        ("time_s,acceleration_g\n0,1\n1,1\n", {"unit": "gal"}, "the file states the unit g, not gal"),
+        ("0 1\n0.5\n", {"unit": "g"}, "line 2: 1 fields where the first line has 2"),
+        ("0 1\n1 2\n", {"component": 1}, "a table has columns; give the option column"),
+    ],
+)
+def test_what_is_not_known_is_asked_for(text, options, said, tmp_path):
+    path = tmp_path / "motion.txt"
+    path.write_text(text)
+    with pytest.raises(InputError) as fault:
+        read_record(path, Reading(**options))
+    assert said in str(fault.value)
+    assert str(fault.value).isprintable()
+
+
+@pytest.mark.parametrize("option", [{"column": 1}, {"header_lines": 3}, {"decimal": ","}, {"unit": "gal"}, {"time_step": 0.02}])
+def test_options_do_not_overrule_a_header(option, tmp_path):
+    path = tmp_path / "a.AT2"
+    path.write_bytes(at2("N-S"))
+    with pytest.raises(InputError, match="leave the option"):
+        read_record(path, Reading(**option))
+
+
+@pytest.mark.parametrize(("rate", "decimals"), [(300, 3), (300, 4), (128, 4), (128, 3), (100, 2), (200, 3), (60, 3), (75, 2)])
+def test_times_are_judged_by_their_digits(rate, decimals, tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("time_s,acceleration_g\n" + "".join(f"{n / rate:.{decimals}f},0.1\n" for n in range(1000)))
+    if 10.0**-decimals <= 0.5 / rate or rate in (100, 200):
+        assert read_record(path).time_step == pytest.approx(1 / rate, rel=1e-12)
+    else:
+        with pytest.raises(InputError, match=r"is off the uniform step .*; times of 0.01 s may hide it: --time-step"):
+            read_record(path)
+        assert read_record(path, Reading(time_step=1 / rate)).time_step == 1 / rate
+
+
+def test_a_missing_sample_is_not_taken_for_rounding(tmp_path):
+    path = tmp_path / "a.csv"
+    kept = [n for n in range(1000) if n != 500]
+    path.write_text("time_s,acceleration_g\n" + "".join(f"{n / 300:.3f},0.1\n" for n in kept))
+    with pytest.raises(InputError, match="is off the uniform step"):
+        read_record(path)
+
+
+def test_a_late_start_is_zero_for_the_scene_and_a_note_says_so(tmp_path):
+    (tmp_path / "late.csv").write_text("time_s,acceleration_g\n5.0,0\n5.5,0.5\n6.0,0\n")
+    (tmp_path / "a.toml").write_text(
+        "duration = 1.0\nblock = { half_width = 0.3, half_height = 1.0 }\nfloor = { friction = 0.4 }\n"
+        '[excitation]\nkind = "record"\nfile = "late.csv"\n'
+    )
+    scene = load_scene(tmp_path / "a.toml")
+    np.testing.assert_allclose(scene.excitation.acceleration([0.0, 0.5, 1.0]), [0.0, 0.5 * G, 0.0])
+    assert scene_notes(scene) == ("the horizontal record: the first time is 5 s; it is 0 here",)
+
+
+# --- intensity
+
+
+def test_intensities_of_a_sine_are_its_closed_forms():
+    """a = A sin(w t) over ten cycles: PGV 2 A/w from rest, Arias pi/(2 g) A^2 T/2; resonance builds up as 1 - exp(-z w t)."""
+    amplitude, rate, step = 2.0, 2 * math.pi, 1e-3
+    samples = amplitude * np.sin(rate * step * np.arange(10_001))
+    record = Recording(samples=samples, time_step=step, unit="m/s2", form="CSV")
+    assert intensity.peak_acceleration(record) == pytest.approx(amplitude / G, rel=1e-9)
+    assert intensity.peak_velocity(record) == pytest.approx(2 * amplitude / rate, rel=1e-5)
+    assert intensity.arias(record) == pytest.approx(math.pi / (2 * G) * amplitude**2 * 5.0, rel=1e-5)
+    built_up = amplitude / G / (2 * 0.05) * (1 - math.exp(-0.05 * rate * 10.0))
+    assert intensity.spectral_acceleration(record, 1.0) == pytest.approx(built_up, rel=0.01)
+    assert intensity.spectral_acceleration(record, 0.01) == pytest.approx(amplitude / G, rel=0.01)
+
+
+def test_the_command_shows_and_draws(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("a.AT2").write_bytes(at2("N-S"))
+    assert main(["record", "a.AT2", "--plot", "a.png"]) == 0
+    said = capsys.readouterr().out
+    for part in ("PEER AT2, unit g", "401 every 0.01 s, 4 s", "0.31 g", "Sa(T)", "1 s: ", "█", "picture: a.png"):
+        assert part in said, part
+    assert Path("a.png").read_bytes().startswith(b"\x89PNG")
+    assert main(["record", "a.AT2", "--plot", "a.jpg"]) == 2
+    assert "ends in .png" in capsys.readouterr().err
+
+
+def test_one_bad_file_does_not_hide_the_others(tmp_path, capsys):
+    (tmp_path / "a.AT2").write_bytes(at2("N-S"))
+    (tmp_path / "b.txt").write_text("1 2 3\n")
+    assert main(["record", str(tmp_path), "--json"]) == 2
+    captured = capsys.readouterr()
+    assert json.loads(captured.out)["samples"] == 401
+    assert "b.txt, line 1: 3 columns" in captured.err
