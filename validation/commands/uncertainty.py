@@ -27,7 +27,7 @@ def run(
         int, typer.Option("--samples", min=2, help="Draws of the scene's uncertain numbers (a power of two is taken).")
     ] = SAMPLES,
 ) -> None:
-    """How sure the figures of a scene are: numerical error, and what is not known about its inputs.
+    """How sure the figures of a scene are.
 
     The numerical error comes from runs at two coarser steps (or a finer tolerance). Numbers that the scene file gives as
     { value = 0.3, sd = 0.03 } are drawn, played by the event-based model, and ranked by what matters most.
