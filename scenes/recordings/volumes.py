@@ -1,7 +1,8 @@
 """V2 files of strong-motion networks: COSMOS 1.20 and the older one of CSMIP (CDMG), of one or several channels.
 
 Numbers stand in fields of the width that the file states, and may touch. Only the blocks of acceleration are read.
-Source: COSMOS Strong Motion Data Format, version 1.20 (2001): integer header 54 is the azimuth, real header 34 the time step in s.
+Source: COSMOS Strong Motion Data Format, version 1.20 (2001): integer header 54 is the azimuth, real header 62
+the time step of these samples in ms, and 34 that of the raw record in s, which counts only where 62 is not known.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ from rockcheck.scenes.recordings.recording import (
 _WIDE = 160
 _FORMAT = r"\(?\s*+(\d{1,3})[FEI](\d{1,3})(?:\.\d++)?"
 COSMOS_BLOCK = re.compile(
-    rf"\s*+(\d++)\s++(?:[a-z]++\.?\s++)?accel[a-z]*+\.?\s++pts\b[^=]*+=\s*+([^,(]*+)(?:\((\d++)\))?[^=]*+=\s*+{_FORMAT}", re.IGNORECASE
+    rf"\s*+(\d++)\s++(?:[a-z]++\.?\s++)?accel[a-z]*+\.?\s++pts\b[^=\d]*+(\d++)?[^=]*+=\s*+([^,(]*+)(?:\((\d++)\))?[^=]*+=\s*+{_FORMAT}",
+    re.IGNORECASE,
 )
 CSMIP_BLOCK = re.compile(rf"\s*+(\d++)\s++points\s++of\s++accel\s++data\s++equally\s++spaced\s++at\s*+({NUMBER})\s*+sec", re.IGNORECASE)
 _HEADER = re.compile(
@@ -50,7 +52,7 @@ class _Channel:
     """What the headers have said so far of the next block of accelerations."""
 
     name: str = ""
-    step: tuple[int, str] | None = None
+    step: tuple[int, float] | None = None
 
 
 def is_volume(line: str) -> bool:
@@ -73,15 +75,18 @@ def read_volume(path: Path, lines: list[str], reading: Reading) -> list[Recordin
         elif block := COSMOS_BLOCK.match(line):
             if channel.step is None:
                 raise fault(path, "no real header before this block states the time step", index)
-            stated = known_unit(block[2]) or _COSMOS_UNITS.get(block[3] or "", "")
-            found.append(_recording(path, lines, index, block[1], channel.step, stated, (block[4], block[5]), channel.name, reading))
-            channel, index = _Channel(), index + _height(int(block[1][:12]), int(block[4]))
+            stated = known_unit(block[3]) or _COSMOS_UNITS.get(block[4] or "", "")
+            found.append(_recording(path, lines, index, block[1], channel.step, stated, (block[5], block[6]), channel.name, reading))
+            _check_seconds(path, index, block[2], found[-1])
+            channel, index = _Channel(), index + _height(int(block[1][:12]), int(block[5]))
         elif block := CSMIP_BLOCK.match(line):
             rest = line[block.end() :]
             shape, unit = _CSMIP_FORMAT.search(rest), _CSMIP_UNIT.search(rest)
             fields = (shape[1], shape[2]) if shape else ("8", "10")
             stated = known_unit(unit[1]) if unit else ""
-            found.append(_recording(path, lines, index, block[1], (index, block[2]), stated, fields, channel.name, reading))
+            found.append(
+                _recording(path, lines, index, block[1], (index, number(path, index, block[2])), stated, fields, channel.name, reading)
+            )
             channel, index = _Channel(), index + _height(int(block[1][:12]), int(fields[0]))
         elif named := _CHANNEL.search(line):
             channel.name = named[2]
@@ -98,19 +103,23 @@ def _height(count: int, across: int) -> int:
 def _heed(path: Path, lines: list[str], index: int, header: re.Match[str], channel: _Channel) -> int:
     """Takes direction and time step from a block of header values; returns the line after it."""
     across, width = int(header[4]), int(header[5])
-    whole = header[2].lower() == "integer"
-    place = 53 if whole else 33
-    if across < 1 or width < 1:
-        raise fault(path, "a format without fields", index)
-    row, column = divmod(place, across)
-    if row < min(int(header[3][:6]), len(lines) - index):
-        word = lines[index + row][column * width : (column + 1) * width].strip()
-        if not whole:
-            channel.step = index + row + 1, word
-        elif re.fullmatch(r"[0-9]{1,3}", word):
-            degrees = int(word)
+    rows = min(int(header[3][:6]), len(lines) - index)
+
+    def word(place: int) -> tuple[int, str]:
+        row, column = divmod(place - 1, across)
+        return index + row + 1, lines[index + row][column * width : (column + 1) * width].strip() if row < rows else ""
+
+    if header[2].lower() == "integer":
+        if re.fullmatch(r"[0-9]{1,3}", word(54)[1]):
+            degrees = int(word(54)[1])
             channel.name = _UP.get(degrees, f"{degrees} deg" if degrees <= 360 else channel.name)
-    return min(index + int(header[3][:6]), len(lines))
+    else:
+        for place, seconds in ((62, 1e-3), (34, 1.0)):
+            n, text = word(place)
+            if text and (value := number(path, n, text)) > 0.0:
+                channel.step = n, float(f"{value * seconds:.12g}")
+                break
+    return index + rows
 
 
 def _recording(
@@ -118,7 +127,7 @@ def _recording(
     lines: list[str],
     index: int,
     count_word: str,
-    step: tuple[int, str],
+    step: tuple[int, float],
     stated: str,
     fields: tuple[str, str],
     name: str,
@@ -128,7 +137,7 @@ def _recording(
     across, width = int(fields[0]), int(fields[1])
     if across < 1 or width < 1:
         raise fault(path, "a format without fields", index)
-    seconds = settled_step(path, checked_step(path, step[0], "the time step", step[1]), reading)
+    seconds = settled_step(path, checked_step(path, step[0], "the time step", f"{step[1]!r}"), reading)
     unit = settled_unit(path, stated, reading)
     values: list[float] = []
     for n, line in enumerate(lines[index : index + _height(count, across)], index + 1):
@@ -140,3 +149,10 @@ def _recording(
     if len(values) != count:
         raise fault(path, f"the header says {count} points of acceleration, the block has {len(values)}", index)
     return Recording(samples=np.array(values) * UNITS[unit], time_step=seconds, unit=unit, form="V2", component=printable(name, 30))
+
+
+def _check_seconds(path: Path, index: int, stated: str | None, record: Recording) -> None:
+    """The whole seconds that a block states must be those of its samples: a time step of another record would be a silent fault."""
+    length = len(record.samples) * record.time_step
+    if stated and abs(length - int(stated[:9])) > 1.0 + 0.01 * length:
+        raise fault(path, f"{len(record.samples)} points every {record.time_step:g} s are {length:.6g} s, not {stated[:9]} secs", index)

@@ -51,7 +51,7 @@ def _cosmos_channel(component: str) -> str:
     values = motion(component) * 100
     integers, reals = [-999] * 100, [-999.0] * 100
     integers[53] = {"N-S": 360, "E-W": 90, "U-D": 400}[component]
-    reals[33] = STEP
+    reals[33], reals[61] = 2 * STEP, 1000 * STEP  # of the raw record in s, of these samples in ms
     reals[41] = 426212.0  # touches its neighbour
     return (
         "Corrected acceleration   (Format v01.20 with 13 text lines) Src: 052S7466.CE\n"
@@ -222,6 +222,23 @@ def test_several_components_in_one_file(write, names, tmp_path, capsys):
     assert said["duration_s"] == pytest.approx(4.0)
     with pytest.raises(InputError, match="no single component 4; there are 1 "):
         Record.from_file(path, component=4)
+
+
+def test_a_v2_file_has_its_own_time_step_not_that_of_the_raw_record(tmp_path):
+    path = tmp_path / "a.V2"
+    text = cosmos("N-S").decode()
+    raw, own = f"{2 * STEP:13.6f}", f"{1000 * STEP:13.6f}"
+    assert text.count(raw) == text.count(own) == 1
+    path.write_text(text)
+    assert read_record(path).time_step == STEP
+    path.write_text(text.replace(own, f"{-999:13.6f}").replace(raw, f"{STEP:13.6f}"))
+    assert read_record(path).time_step == STEP
+    path.write_text(text.replace(own, f"{-999:13.6f}"))
+    with pytest.raises(InputError, match=r"401 points every 0.02 s are 8.02 s, not 4 secs"):
+        read_record(path)
+    path.write_text(text.replace(own, f"{-999:13.6f}").replace(raw, f"{-999:13.6f}"))
+    with pytest.raises(InputError, match="no real header before this block states the time step"):
+        read_record(path)
 
 
 def test_k_net_takes_out_the_offset_and_says_so(tmp_path):

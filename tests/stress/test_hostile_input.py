@@ -54,7 +54,7 @@ V2 = """Corrected accelerogram   89146-L2500-12044.02       Chan  1: 360 Deg    
      0.0     0.0     0.0
      0.0     0.0     0.0
      0.0     0.0     0.0   0.005
-       9 acceleration pts, approx    4 secs, units=cm/sec2 (04),Format=(8F10.5)
+       9 acceleration pts, approx    0 secs, units=cm/sec2 (04),Format=(8F10.5)
    0.10000   0.20000   0.30000   0.40000   0.50000  -0.60000   0.70000   0.80000
    0.90000
  3 points of accel data equally spaced at  .005 sec, in cm/sec2. (8f10.6)
