@@ -10,7 +10,7 @@
 | columns of text | any | whatever is not there is an option of `Reading` |
 
 A format is known by what the file holds; `.AT2` and `.csv` by the name. Every reader takes time in proportion to the file.
-ObsPy reads K-NET among these, but neither PEER, V2, ESM nor tables, and weighs more than all of rockcheck.
+ObsPy reads K-NET among these, but neither PEER, V2, ESM nor tables.
 """
 
 from __future__ import annotations
