@@ -96,6 +96,7 @@ def test_statistics_of_known_samples():
     perfect = {name: measure.evaluate(same) for name, measure in STATISTICS.items()}
     assert {name: value[0] for name, value in perfect.items()} == {
         "ks_distance": 0.0,
+        "area_metric": 0.0,
         "overturning_accuracy": 1.0,
         "overturning_precision": 1.0,
         "overturning_recall": 1.0,

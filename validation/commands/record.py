@@ -35,7 +35,7 @@ def run(
     component: ComponentOption = None,
     plot: Annotated[Path | None, typer.Option("--plot", help="PNG to draw: acceleration, velocity and Sa(T).")] = None,
 ) -> None:
-    """Show what record files hold: samples, step, unit, PGA, PGV, Arias intensity and Sa(T).
+    """Show what files of recorded ground motions hold.
 
     Reads PEER AT2, COSMOS and CSMIP V2, ESM, K-NET and KiK-net, CSV and columns of text; what a file does not say is an option.
     """
