@@ -20,7 +20,6 @@ MAY_BE_SKIPPED: dict[str, bool] = {
     "needs pybullet": sys.version_info >= (3, 12),  # which has wheels for 3.11 only
     "needs Linux": sys.platform != "linux",
     "needs POSIX": sys.platform == "win32",
-    "a pivot that never slips does not start with slip": True,  # of each exact scene by each kind of friction, the pairs with no meaning
 }
 CHROMIUM = Path("/usr/bin/chromium")
 #: How a request ends that was under way as its page was left.
