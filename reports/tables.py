@@ -103,5 +103,6 @@ def summary(view: SceneView) -> str:
     said = []
     for model, history in view.histories.items():
         impacts = sum(event.kind in ("floor impact", "wall impact") for event in history.event_list)
-        said.append(f"{model}: peak {number(history.peak_rotation / view.scene.block.alpha)} α, {impacts} impacts, {history.outcome}")
+        reached = f"peak {number(history.peak_rotation / view.scene.block.alpha)} α, " if history.overturned_at is None else ""
+        said.append(f"{model}: {reached}{impacts} impacts, {history.fate}")
     return "; ".join(said) + "."

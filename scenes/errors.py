@@ -51,7 +51,9 @@ def printable(value: object, limit: int = 80) -> str:
 
 def from_validation(error: ValidationError, keys: Iterable[str] = ()) -> InputError:
     """The first fault that pydantic found, as one line: key, value, what is allowed. `keys` are those that could be given."""
-    fault = error.errors(include_url=False)[0]
+    faults = error.errors(include_url=False)
+    # A key that is misspelt is unknown, and the right one missing: the first says what to mend.
+    fault = next((one for one in faults if one["type"] == "extra_forbidden"), faults[0]) if faults[0]["type"] == "missing" else faults[0]
     path = [printable(part) for part in fault["loc"]]
     if path[:1] in (["excitation"], ["vertical"]):
         del path[1:2]  # the excitation's kind, which pydantic adds

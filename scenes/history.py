@@ -19,7 +19,7 @@ from rockcheck.scenes.base import Shown
 from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.reading import MOST_LINE, MOST_TABLE_BYTES, open_regular, read_table
 from rockcheck.scenes.trust.experience import Expected, expected, known
-from rockcheck.scenes.writing import write_together
+from rockcheck.scenes.writing import json_text, write_together
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,6 +27,11 @@ if TYPE_CHECKING:
 COLUMNS = ("t", "x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate", "mode")
 EVENT_COLUMNS = ("t", "kind", "mode_before", "mode_after", "impulse")
 OUTCOMES = ("at rest", "moving", "overturned left", "overturned right")
+#: |theta| of a block that has fallen, rad.
+LYING = math.pi / 2 - 0.05
+#: Endings of files that a history can be written to, and the columns that hold words.
+FORMATS = ("", ".csv", ".json", ".mat")
+WORDS = ("kind", "mode_before", "mode_after")
 #: The modes of motion that a `mode` column may hold.
 MODES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight", "overturned")
 
@@ -111,6 +116,23 @@ class History(Shown):
         """Largest |theta| on the output grid, rad."""
         return float(np.max(np.abs(self.channels["theta"])))
 
+    @property
+    def overturned_at(self) -> float | None:
+        """When the block overturned, s: at |theta| = pi/2, or where a history of an overturned block ends; None for one that stays."""
+        if not self.outcome.startswith("overturned"):
+            return None
+        event = next((one.t for one in self.event_list if one.kind == self.outcome), None)
+        if event is not None:
+            return event
+        down = np.flatnonzero(np.abs(self.channels["theta"]) >= LYING)
+        return float(self.channels["t"][down[0] if down.size else -1])
+
+    @property
+    def fate(self) -> str:
+        """The outcome in words, with the time of overturning: "overturned left at 3.21 s"."""
+        at = self.overturned_at
+        return self.outcome if at is None else f"{self.outcome} at {at:.3g} s"
+
     def expected(self, quantity: str = "peak_rotation") -> Expected:
         """A figure corrected by what the suites found about this model, with its 95 % interval (rad): `scenes.trust.experience`.
 
@@ -122,11 +144,19 @@ class History(Shown):
         return expected(known_of[quantity], float(getattr(self, quantity)))
 
     def save(self, path: str | Path) -> None:
-        """Write a CSV whose remarks (#) hold outcome, model and settings; its events go to `<stem>.events.csv` beside it.
+        """Write a file of the format that its name ends in; CSV where it has no ending, as /dev/stdout.
 
-        Both are written whole, or neither is touched. Raises `OSError` that names the file which cannot be written.
+        | ending | what is written |
+        |---|---|
+        | .csv | the table; a first line (#) with outcome, model and settings; the events in `<stem>.events.csv` beside it |
+        | .json | {"outcome", "model", "settings", ..., "channels": {name: [...]}, "events": {column: [...]}} |
+        | .mat | the same as a MATLAB file: structures `about`, `channels` and `events` |
+
+        All is written whole, or nothing is touched. `load` reads the CSV. Raises `InputError` for another ending, and `OSError`
+        that names the file which cannot be written.
         """
         path = Path(path)
+        check_format(path)
         about = {
             "name": self.name,
             "model": self.model,
@@ -138,6 +168,10 @@ class History(Shown):
             "uncertainty": dict(self.uncertainty),
             "cost": {key: value for key, value in vars(self.cost).items() if value is not None},
         }
+        if path.suffix.lower() in (".json", ".mat"):
+            events = {name: [getattr(event, name) for event in self.event_list] for name in EVENT_COLUMNS}
+            write_together({path: (_json if path.suffix.lower() == ".json" else _mat)(about, self.channels, events)})
+            return
         text = io.StringIO()
         text.write(f"# rockcheck history {json.dumps(about, sort_keys=True, default=str)}\n")
         self.frame.to_csv(text, index=False, lineterminator="\n")
@@ -187,10 +221,33 @@ class History(Shown):
         )
 
 
+def check_format(path: Path) -> None:
+    """Raises `InputError` where no history can be written into a file of that name."""
+    if path.suffix.lower() not in FORMATS:
+        raise InputError(f"{printable(path)}: a history is written as .csv, .json or .mat, not as {printable(path.suffix)}")
+
+
+def _json(about: Mapping[str, Any], channels: Mapping[str, NDArray[Any]], events: Mapping[str, list[Any]]) -> str:
+    columns = {name: column.tolist() for name, column in channels.items()}
+    return json_text({**about, "channels": columns, "events": events}) + "\n"
+
+
+def _mat(about: Mapping[str, Any], channels: Mapping[str, NDArray[Any]], events: Mapping[str, list[Any]]) -> bytes:
+    from scipy.io import savemat
+
+    said = {name: value for name, value in about.items() if isinstance(value, str | int | float)}
+    said |= {name: json.dumps(value, default=str) for name, value in about.items() if isinstance(value, dict | list)}
+    columns = {name: column.astype(object) if column.dtype.kind in "UO" else column for name, column in channels.items()}
+    happened = {name: np.array(column, dtype=object if name in WORDS else float) for name, column in events.items()}
+    content = io.BytesIO()
+    savemat(content, {"about": said, "channels": columns, "events": happened}, oned_as="column", do_compression=True)
+    return content.getvalue()
+
+
 def outcome_of(channels: Mapping[str, NDArray[Any]], *, still: float = 1e-4) -> str:
     """The outcome that a table of motion shows at its end; at rest is |theta| and |theta_dot| below `still` (rad, rad/s)."""
     theta = channels["theta"]
-    if abs(theta[-1]) >= math.pi / 2 - 0.05:
+    if abs(theta[-1]) >= LYING:
         return "overturned left" if theta[-1] > 0 else "overturned right"
     quiet = abs(theta[-1]) < still and all(abs(channels[c][-1]) < still for c in ("theta_dot", "x_dot") if c in channels)
     return "at rest" if quiet else "moving"

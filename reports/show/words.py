@@ -79,8 +79,8 @@ def history_facts(history: History) -> list[tuple[str, str]]:
     peak = f"{number(history.peak_rotation)} rad" if alpha is None else f"{number(history.peak_rotation / alpha)} α"
     impacts = {kind: sum(event.kind == kind for event in history.event_list) for kind in ("floor impact", "wall impact")}
     facts = [
-        ("outcome", history.outcome),
-        ("peak rotation", peak),
+        ("outcome", history.fate),
+        *([("peak rotation", peak)] if history.overturned_at is None else []),
         ("impacts", f"{impacts['floor impact']} on the floor, {impacts['wall impact']} on walls"),
         ("time", f"{number(float(time[0]))} to {number(float(time[-1]), 4)} s, {len(time)} rows"),
     ]

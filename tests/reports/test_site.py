@@ -110,7 +110,7 @@ def test_index_says_what_the_models_are(site: Path) -> None:
 
 
 def test_a_run_without_tolerances_says_how_to_get_them(tmp_path: Path, finished: Run) -> None:
-    missing = {"limit": None, "expected": None, "drift": None, "verdict": "fail", "reason": "no tolerance is written down"}
+    missing = {"limit": None, "expected": None, "drift": None, "verdict": "fail", "reason": "no tolerance yet"}
     cells = [
         cell.model_copy(update={"checks": tuple(check.model_copy(update=missing) for check in cell.checks)})
         for cell in finished.of_scene("free")

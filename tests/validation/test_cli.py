@@ -31,7 +31,6 @@ def write(name, text):
         (["validate", "paper", "--out", "scene.toml"], "scene.toml: cannot be used as a folder"),
         (["simulate", "fig4", "--model", "ebm"], "did you mean 'fig4b'"),
         (["simulate", "fig4a", "--model", "mujcoo"], "did you mean 'mujoco'"),
-        (["simulate", "fig4a"], "--model"),
         (["simulate", "scene.toml", "--model", "ebm", "--set", "tolerance"], "key=value"),
         (["simulate", "scene.toml", "--model", "ebm", "--set", "tolerance=tight"], "ebm.tolerance"),
         (["simulate", "scene.toml", "--model", "ebm", "-o", "no/such/out.csv"], "no such folder"),

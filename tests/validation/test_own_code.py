@@ -151,6 +151,10 @@ def test_a_fault_of_a_model_leaves_its_traceback(folder, monkeypatch):
         done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env={**os.environ, "BROKEN": broken})
         assert done.returncode == code, done.stderr
         lines = done.stderr.splitlines()
+        own = [line for line in lines if line.startswith("rockcheck: short, a: ZeroDivisionError: a bug")]
+        assert len(own) == 1
+        assert "traceback in rockcheck-report/faults/short--a--" in own[0]
+        lines.remove(own[0])
         assert len(lines) == bool(broken)
         if broken:
             assert lines[0].startswith("rockcheck: a fault of rockcheck itself, short, ebm: AttributeError")

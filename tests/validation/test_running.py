@@ -177,7 +177,8 @@ def test_models_of_different_form_may_fall_apart_where_that_is_accepted(tmp_path
 
 def test_missing_tolerance_missing_cell_and_nothing_judged_do_not_pass(tmp_path, run):
     missing = run(write_suite(tmp_path, {"a": 'model = "faulty:Still"'}))
-    assert missing.cell("short", "a").checks[0].reason == "no tolerance is written down"
+    assert missing.cell("short", "a").checks[0].reason == "no tolerance yet"
+    assert missing.words == "no tolerance yet"
     assert missing.exit_code == 1
     assert missing.without_tolerance == 1
     alone = run(write_suite(tmp_path, {}))

@@ -14,7 +14,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from rockcheck.scenes import InputError, named_scenes
+from rockcheck.scenes import History, InputError, named_scenes
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import OnProgress
 from rockcheck.scenes.writing import json_text
@@ -69,6 +69,12 @@ def tell_missing() -> None:
     for name in FAMILIES:
         if missing := not_installed(name):
             console().print(f"left out: {name}, {missing}", style="yellow", soft_wrap=True)
+
+
+def tell_notes(history: History, of: str = "") -> None:
+    """What a reader of a history should know, a line each; `of` says whose."""
+    for note in history.notes:
+        console().print(f"note{f' on {of}' if of else ''}: {note}", style="yellow", soft_wrap=True)
 
 
 def answer(value: Any) -> None:

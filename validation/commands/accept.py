@@ -19,6 +19,7 @@ def run(
     jobs: JobsOption = None,
     force: ForceOption = False,
     scheduler: SchedulerOption = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Show the changes, write none.")] = False,
     allow_code: AllowCodeOption = None,
 ) -> None:
     """Make today's figures the expected ones.
@@ -28,14 +29,15 @@ def run(
     name = suite or "paper"
     folder = usable_folder(out)
     finished = play_suite(name, folder, jobs, force, False, scheduler, allow_code)
-    changes, refused = accept(load_suite(name, allow_code=allow_code or ()), finished, reason)
+    changes, refused = accept(load_suite(name, allow_code=allow_code or ()), finished, reason, write=not dry_run)
     screen = console()
     for line in changes:
         screen.print(line, soft_wrap=True)
-    screen.print(f"{len(changes)} changes in {finished.tolerances_file}", soft_wrap=True)
+    done = "would be written to" if dry_run else "in"
+    screen.print(f"{len(changes)} changes {done} {finished.tolerances_file}", soft_wrap=True)
     for line in refused:
         screen.print(f"not accepted: {line}", style="red", soft_wrap=True)
-    answer({"changes": changes, "refused": refused, "file": finished.tolerances_file})
+    answer({"changes": changes, "refused": refused, "file": finished.tolerances_file, "written": not dry_run})
     tell_faults(finished, folder)
     failed = finished.exit_code if finished.verdict == "error" else 0
     raise typer.Exit(failed or int(bool(refused)))

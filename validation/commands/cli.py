@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any, TextIO, cast
 
 import typer
+import typer.core
 
 from rockcheck.scenes import InputError, ModelFailure
 from rockcheck.scenes.errors import printable
@@ -92,6 +93,18 @@ def spoken(run: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
+class _EachOnce(typer.core.TyperCommand):
+    """A command whose options may be given once, but for those that gather several values: the last would silently win."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        _, _, order = self.make_parser(ctx).parse_args(args=list(args))
+        for option in order:
+            single = isinstance(option, typer.core.TyperOption) and not (option.multiple or option.is_flag or option.count)
+            if single and sum(one is option for one in order) > 1:
+                raise InputError("is given twice: one value is asked for", option.opts[-1])
+        return super().parse_args(ctx, args)
+
+
 def _version(asked: bool) -> None:
     if asked:
         print(f"rockcheck {version('rockcheck')}")
@@ -106,7 +119,7 @@ def common(
 
 
 for module, example in COMMANDS.items():
-    app.command(name=module.__name__.rpartition(".")[2], epilog=f"Example: {example}")(spoken(module.run))
+    app.command(name=module.__name__.rpartition(".")[2], cls=_EachOnce, epilog=f"Example: {example}")(spoken(module.run))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

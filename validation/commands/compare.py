@@ -9,9 +9,11 @@ import typer
 from rich.table import Table
 
 from rockcheck.scenes import load_scene
-from rockcheck.validation.commands import answer, console, scene_names
-from rockcheck.validation.discrepancy.compare import compare
+from rockcheck.validation.commands import answer, console, scene_names, tell_notes
+from rockcheck.validation.discrepancy.compare import Discrepancy, compare
+from rockcheck.validation.discrepancy.figures import value_words
 from rockcheck.validation.discrepancy.measured import read_measured
+from rockcheck.validation.discrepancy.measures import DIFFERENCES
 from rockcheck.validation.discrepancy.repeats import shifted, time_shift
 
 
@@ -32,17 +34,21 @@ def run(
     shift = time_shift(given, other) if align else 0.0
     found = compare(given, shifted(other, shift), until=until, scene=what)
     out = console()
+    out.print(headline(found), style="bold")
     table = Table(box=None, pad_edge=False)
     for name, justify in (("measure", "left"), ("value", "right"), ("unit", "left"), ("", "left")):
         table.add_column(name, justify=justify)  # type: ignore[arg-type]
     for figure in found.figures:
-        table.add_row(figure.label, "-" if figure.value is None else f"{figure.value:.6g}", figure.unit, figure.note)
+        yes_no = DIFFERENCES[figure.measure].yes_no
+        table.add_row(figure.label, value_words(figure.value, yes_no=yes_no), "" if yes_no else figure.unit, figure.note)
     out.print(f"{found.candidate} against {found.reference}, {found.start:g} to {found.end:g} s")
     out.print(table)
     if align:
         out.print(f"the candidate is shifted by {shift:+.4g} s")
     if found.gap:
         out.print(f"not the whole time: {found.gap}")
+    for role, history in (("the reference", given), ("the candidate", other)):
+        tell_notes(history, role)
     answer(
         {
             "reference": found.reference,
@@ -51,6 +57,19 @@ def run(
             "end": found.end,
             "shift": shift,
             "gap": found.gap,
+            "headline": headline(found),
+            "notes": {"reference": given.notes, "candidate": other.notes},
             "figures": [{"measure": f.measure, "value": f.value, "unit": f.unit, "note": f.note} for f in found.figures],
         }
     )
+
+
+def headline(found: Discrepancy) -> str:
+    """The comparison in one sentence: whether the outcomes agree, and how far the rotations are apart."""
+    assert found.histories is not None
+    reference, candidate = (history.fate for history in found.histories)
+    same = found["outcome_agrees"] == 1.0
+    fate = f"same outcome, {candidate}" if same else f"outcomes differ, {candidate} against {reference}"
+    rms = found.figure("theta_rms")
+    apart = "" if rms.value is None else f"; rotations {rms.value:.3g} {rms.unit} apart (RMS)"
+    return f"{fate}{apart}"

@@ -12,23 +12,38 @@ import typer
 
 from rockcheck.scenes import History, InputError, ModelFailure, Scene, load_scene
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.history import check_format
 from rockcheck.scenes.progress import listening
-from rockcheck.validation.commands import AllowCodeOption, answer, console, model_names, progress, report_file, scene_names
+from rockcheck.validation.commands import (
+    AllowCodeOption,
+    answer,
+    console,
+    model_names,
+    progress,
+    report_file,
+    scene_names,
+    tell_notes,
+)
 from rockcheck.validation.execute import workers
 from rockcheck.validation.execute.models import FAMILIES, build, check_allowed, family, is_own
 from rockcheck.validation.execute.store import name_of
 
+#: The model that plays where none is named: the fair reference for engines.
+REFERENCE = "ebm-unilateral"
+
 
 def run(
     scene: Annotated[str, typer.Argument(help="A named scene or a .toml file.", autocompletion=scene_names)],
-    model: Annotated[str, typer.Option("--model", help=f"One of {', '.join(FAMILIES)}.", autocompletion=model_names)],
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="CSV to write (default: SCENE--MODEL.csv).")] = None,
+    model: Annotated[str, typer.Option("--model", help=f"One of {', '.join(FAMILIES)}.", autocompletion=model_names)] = REFERENCE,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="File to write: .csv, .json or .mat (default: SCENE--MODEL.csv).")
+    ] = None,
     settings: Annotated[list[str] | None, typer.Option("--set", help="A setting of the model, such as time_step=1e-4; repeatable.")] = None,
     allow_code: AllowCodeOption = None,
 ) -> None:
     """Simulate one scene with one model.
 
-    Writes the history as CSV; its events go to a second file beside it.
+    Writes the history as CSV, its events to a second file beside it; or both to one .json or .mat.
     """
     check_allowed(model, allow_code or ())
     given = dict(setting_of(text) for text in settings or [])
@@ -37,6 +52,7 @@ def run(
     path = output or Path(f"{name_of(what.name, model)}.csv")
     if not path.parent.is_dir():
         raise InputError(f"{printable(path.parent)}: no such folder", "--output")
+    check_format(path)
     compiles = ", a first run compiles" if family(model).compiled else ""
     with progress(f"{what.name}, {model}{compiles}") as on_progress, listening(on_progress):
         history = player.simulate(what) if player else _played_apart(what, model, given)
@@ -44,9 +60,11 @@ def run(
         history.save(path)
     except OSError as error:
         raise InputError(f"{printable(path)}: cannot be written: {error.strerror}", "--output") from None
-    peak = history.peak_rotation / what.block.alpha
+    peak = None if history.overturned_at is not None else history.peak_rotation / what.block.alpha
+    reached = "" if peak is None else f", peak rotation {peak:.4g} alpha"
     took = f"simulated in {history.cost.wall_seconds:.2g} s"
-    console().print(f"{what.name}, {model}: {history.outcome}, peak rotation {peak:.4g} alpha, {took}")
+    console().print(f"{what.name}, {model}: {history.fate}{reached}, {took}")
+    tell_notes(history)
     console().print(f"history: {path}", soft_wrap=True)
     answer(
         {
@@ -54,6 +72,7 @@ def run(
             "model": model,
             "outcome": history.outcome,
             "peak_rotation_alpha": peak,
+            "overturned_at_s": history.overturned_at,
             "wall_seconds": history.cost.wall_seconds,
             "rules": dict(history.cost.rules),
             "notes": history.notes,

@@ -81,14 +81,13 @@ def _published(folder: Path, jobs: int | None) -> Path:
 
 
 def tell_faults(finished: Run, folder: Path) -> None:
-    """A line on stderr for each exception that no model of rockcheck's own may raise."""
+    """A line on stderr for each exception that no model may raise: of rockcheck's own models to report, of one's own to mend."""
     for cell in finished.cells:
-        if cell.unexpected:
-            where = f"{cell.scene}, {cell.model}: {cell.reason}"
-            print(
-                printable(f"rockcheck: a fault of rockcheck itself, {where}: please report it with {folder / cell.traceback}", 1400),
-                file=sys.stderr,
-            )
+        if not cell.traceback:
+            continue
+        where, path = f"{cell.scene}, {cell.model}: {cell.reason}", folder / cell.traceback
+        said = f"a fault of rockcheck itself, {where}: please report it with {path}" if cell.unexpected else f"{where}: traceback in {path}"
+        print(printable(f"rockcheck: {said}", 1400), file=sys.stderr)
 
 
 def show(finished: Run, out: Console) -> None:
@@ -99,4 +98,4 @@ def show(finished: Run, out: Console) -> None:
     if finished.without_tolerance:
         out.print(f"{finished.without_tolerance} figures have no tolerance yet: `rockcheck accept` makes today's the expected ones")
     out.print(f"{finished.up_to_date} of {len(finished.cells)} simulations were up to date; {finished.wall_seconds:.1f} s")
-    out.print(f"verdict: {finished.verdict}", style="bold")
+    out.print(f"verdict: {finished.words}", style="bold")

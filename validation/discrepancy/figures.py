@@ -13,6 +13,13 @@ class Stored(Frozen):
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="null")
 
 
+def value_words(value: float | None, *, yes_no: bool) -> str:
+    """A figure's value for people: "-" where there is none, yes or no where the measure asks a question."""
+    if value is None:
+        return "-"
+    return ("yes" if value else "no") if yes_no else f"{value:.6g}"
+
+
 class MeasureRecord(Stored):
     """How a measure is defined, for the pages: see `validation.discrepancy.measures`."""
 

@@ -55,6 +55,8 @@ class Measure:
     on_request: bool = False
     #: The distance from a closed form.
     exact: bool = False
+    #: 1 for yes, 0 for no: neither near a limit nor far from it.
+    yes_no: bool = False
     #: Changes below this mean nothing (in the measure's unit); 0 for what is counted.
     resolution: float = 1e-6
 
@@ -409,7 +411,7 @@ def overturning_time(pair: Pair) -> float:
     return 0.0 if first == second else abs(second - first)
 
 
-@difference("outcome agrees", "1", resolution=0.0, ideal=1.0)
+@difference("outcome agrees", "1", resolution=0.0, ideal=1.0, yes_no=True)
 def outcome_agrees(pair: Pair) -> tuple[float, str]:
     """1 if both overturn to the same side or neither overturns, else 0; of the whole histories, whatever the window."""
     first, second = pair.reference.outcome, pair.candidate.outcome

@@ -108,7 +108,10 @@ def _play_batch(task: BatchTask, began: float) -> TaskResult:
 def _simulate(task: Work, scene: Scene) -> tuple[History | None, TaskResult]:
     """The history under the model's label in the suite, or None and the reason why there is none."""
     try:
-        history = dataclasses.replace(build_own(task.family, task.settings).simulate(scene), model=task.label)
+        returned: object = build_own(task.family, task.settings).simulate(scene)
+        if not isinstance(returned, History):
+            raise ModelFailure(f"{task.family} returned {type(returned).__name__}; `simulate` must return a rockcheck.History")
+        history = dataclasses.replace(returned, model=task.label)
         fault = _not_finite(history)
     except (ModelFailure, InputError) as error:
         return None, TaskResult(failure=printable(error, 300), bad_input=isinstance(error, InputError))

@@ -14,7 +14,7 @@ from rockcheck.scenes.errors import printable
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.suite.results import Check, Run
 from rockcheck.validation.suite.suites import Suite
-from rockcheck.validation.suite.tolerances import OWN_FIGURES, Windowed
+from rockcheck.validation.suite.tolerances import OWN_FIGURES, Tolerance, Windowed, judge
 
 #: New lines: the limit and the drift band as shares of a difference from perfection, and of a figure of the cell itself.
 ROOM, DRIFT = 2.0, 0.2
@@ -23,20 +23,21 @@ OWN_ROOM, OWN_DRIFT = 0.02, 0.002
 LEAST_LIMIT, LEAST_DRIFT, LEAST_SHARE = 10.0, 1.0, 0.01
 
 
-def accept(suite: Suite, run: Run, reason: str | None) -> tuple[list[str], list[str]]:
+def accept(suite: Suite, run: Run, reason: str | None, *, write: bool = True) -> tuple[list[str], list[str]]:
     """Write the figures of `run` into the tolerance file of `suite`.
 
     Returns the changes and what was refused, a line each. A limit that the figure is outside of is loosened only with a
-    `reason`, which goes into the file; a check without a figure is always refused. A limit is never tightened.
+    `reason`, which goes into the file; a check without a figure, and a line that would not pass now, is always refused. A limit is
+    never tightened. Without `write` the file stays as it is.
     """
     changes: list[str] = []
     refused: list[str] = []
     for included in suite.included or (suite,):
-        _accept(included, run, reason, changes, refused)
+        _accept(included, run, reason, changes, refused, write)
     return changes, refused
 
 
-def _accept(suite: Suite, run: Run, reason: str | None, changes: list[str], refused: list[str]) -> None:
+def _accept(suite: Suite, run: Run, reason: str | None, changes: list[str], refused: list[str], write: bool) -> None:
     path = suite.tolerances_path
     document = tomlkit.parse(path.read_text(encoding="utf-8")) if path.exists() else tomlkit.document()
     tables: Any = document.setdefault("tolerances", tomlkit.table()) if path == suite.path else document
@@ -58,7 +59,7 @@ def _accept(suite: Suite, run: Run, reason: str | None, changes: list[str], refu
             entry = tomlkit.inline_table()
             entry.update(line)
             table[key] = entry
-    if len(changes) > before:
+    if write and len(changes) > before:
         try:
             write_whole(path, re.sub(r"}\n+\[", "}\n\n[", tomlkit.dumps(document)))
         except OSError as error:
@@ -72,6 +73,8 @@ def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
         return check.reason
     measure = Windowed.parse(check.figure.measure).definition
     at_least = measure.sense == "at least"
+    if check.gap:
+        return check.gap
     outside = check.limit is not None and (value < check.limit if at_least else abs(value - (check.ideal or 0.0)) > check.limit)
     if check.verdict == "fail" and check.limit is not None and not outside:
         return check.reason  # such as a window that was not compared whole
@@ -83,12 +86,18 @@ def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
     if limit is None or outside:
         room = max((OWN_ROOM if own else ROOM) * size, LEAST_LIMIT * measure.resolution)
         limit = _round(0.9 * value, down=True) if at_least else _round(room)
+        if measure.yes_no:
+            limit = size  # 0: must be yes; 1: need not be
         why = reason or "first accepted figure"
     drift = check.drift
     if drift is None:
         drift = _round(max((OWN_DRIFT if own else DRIFT) * size, LEAST_SHARE * limit, LEAST_DRIFT * measure.resolution))
+        if measure.yes_no:
+            drift = 0.0
     expected = value if check.verdict != "pass" or check.expected is None else check.expected
-    return {"expected": _short(expected), "limit": limit, "drift": drift, "why": why}
+    line: dict[str, Any] = {"expected": _short(expected), "limit": limit, "drift": drift, "why": why}
+    again = judge(check.figure, Tolerance(**line), kind=check.kind, measure=measure)
+    return line if again.verdict == "pass" else again.reason
 
 
 def _table(tables: MutableMapping[str, Any], path: tuple[str, ...]) -> Any:

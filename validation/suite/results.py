@@ -49,7 +49,7 @@ class Check(Stored):
 
     The figure's distance from `ideal` (0 for differences, 1 for ratios, `expected` for absolute figures) may be at most
     `limit`; a value further than `drift` from `expected` is "changed". `limit` is None where no tolerance is written down,
-    which never passes. `reason` says why a check did not pass, one line.
+    which never passes. `reason` says why a check did not pass, one line; `gap` what part of the window could not be compared.
     """
 
     figure: Figure
@@ -61,6 +61,12 @@ class Check(Stored):
     limit: float | None = None
     drift: float | None = None
     why: str = ""
+    gap: str = ""
+
+    @property
+    def words(self) -> str:
+        """The verdict for people: a figure that waits for its tolerance has not failed."""
+        return "no tolerance yet" if self.limit is None and not self.gap and self.figure.value is not None else self.verdict
 
 
 class CostRecord(Stored):
@@ -127,6 +133,13 @@ class Cell(Stored):
             return "error" if self.status == "failed" else "incomplete"
         return worst(check.verdict for check in self.checks)
 
+    @property
+    def words(self) -> str:
+        """The verdict for people; "no tolerance yet" where nothing else keeps the cell from passing."""
+        waits = self.status == "done" and any(check.words == "no tolerance yet" for check in self.checks)
+        failed = any(check.words == "fail" for check in self.checks)
+        return "no tolerance yet" if waits and not failed else self.verdict
+
 
 class EnsembleRecord(Stored):
     """What each model made of an ensemble: by model, peak |theta| in alpha and outcome of each scene (None and why it failed).
@@ -176,6 +189,13 @@ class Run(Stored):
         """The worst cell; "fail" at least where there are faults, and never "pass" without a single check."""
         found = worst([cell.verdict for cell in self.cells] + (["fail"] if self.faults else []))
         return found if any(cell.checks for cell in self.cells) else worst([found, "fail"])
+
+    @property
+    def words(self) -> str:
+        """The verdict for people; "no tolerance yet" where nothing else keeps the run from passing."""
+        found = {cell.words for cell in self.cells}
+        bad = bool(self.faults) or bool(found & {"fail", "error"})
+        return "no tolerance yet" if "no tolerance yet" in found and not bad else self.verdict
 
     @property
     def exit_code(self) -> int:

@@ -350,6 +350,8 @@ def _cell(
         figure = _figure(figures, place)
         text, fall = gaps.get((place.against, place.what.window), ("", False))
         gap = "" if fall and kind == "model form" else text
+        if gap and kind == "measured" and not fall:
+            gap += "; `offset` of the measured model shifts its times, a window such as theta_rms@8s ends sooner"
         checks.append(judge(figure, own.tolerances.get(place), kind=kind, measure=place.what.definition, gap=gap))
     return Cell(
         **about,

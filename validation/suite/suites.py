@@ -228,6 +228,9 @@ def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
     if path.suffix.lower() != ".toml":
         raise InputError(f"{unknown_name('suite', str(source), known)}; or the path of a .toml file")
     tables = read_toml(path)
+    if "block" in tables:
+        names = f"scenes = [{printable(path.name)!r}], and tables [models.NAME]"
+        raise InputError(f"{printable(path)}: a scene, where a suite is asked for: a file with {names}")
     try:
         return _suite(SuiteFile(**tables), path, shipped, allow_code)
     except InputError as error:

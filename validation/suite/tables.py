@@ -10,8 +10,9 @@ from rich.table import Table
 from rich.text import Text
 
 from rockcheck.scenes.writing import table_text
-from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.discrepancy.figures import Figure, value_words
 from rockcheck.validation.suite.results import Cell, Check, Run
+from rockcheck.validation.suite.tolerances import MEASURES
 
 COLOURS = {"pass": "green", "incomplete": "yellow", "changed": "yellow", "fail": "red", "error": "red"}
 
@@ -27,8 +28,9 @@ def verdict_table(run: Run) -> Table:
     before = ""
     for cell in run.cells:
         near = nearest(cell)
-        words = f"{cell.reason or 'failed'}" if cell.status != "done" else windowed(near) if near else "nothing judged"
-        verdict = Text("-") if cell.status == "done" and not cell.checks else Text(cell.verdict, COLOURS[cell.verdict])
+        judged = windowed(near) if near else "as it must be" if cell.checks else "nothing judged"
+        words = judged if cell.status == "done" else cell.reason or "failed"
+        verdict = Text("-") if cell.status == "done" and not cell.checks else Text(cell.words, COLOURS[cell.verdict])
         if cell.converged is False:
             verdict.append(", not converged", "yellow")
         table.add_row("" if cell.scene == before else cell.scene, cell.model, Text(words), percent(near) if near else "", verdict)
@@ -96,24 +98,43 @@ def used(check: Check) -> float:
     value, limit = check.figure.value, check.limit
     if check.verdict == "fail" or value is None or limit is None:
         return math.inf
+    if asks(check):
+        return 0.0
     if check.ideal is None:  # an "at least" measure: what is there of what is needed
         return limit / value if value > 0.0 else 0.0
     return abs(value - check.ideal) / limit if limit > 0.0 else 0.0
 
 
 def percent(check: Check) -> str:
-    """`used` in words."""
+    """`used` in words; a question's answer has no share."""
+    if asks(check):
+        return value_words(check.figure.value, yes_no=True)
+    if check.words == "no tolerance yet":
+        return "-"
     return f"{100.0 * used(check):.0f} %" if math.isfinite(used(check)) else "beyond"
 
 
 def nearest(cell: Cell) -> Check | None:
-    """The check that failed, else the one nearest to its limit."""
-    return max(cell.checks, key=used, default=None)
+    """The check that failed, else the one nearest to its limit; what can only be met or not, a limit of 0 among it, is near to none."""
+    return max((check for check in cell.checks if check.verdict == "fail" or graded(check)), key=used, default=None)
+
+
+def asks(check: Check) -> bool:
+    """Whether the measure asks a question, to be answered by yes or no."""
+    measure = MEASURES.get(check.figure.measure)
+    return measure is not None and measure.yes_no
+
+
+def graded(check: Check) -> bool:
+    """Whether a check has a limit that can be used up in part."""
+    return bool(check.limit) and not asks(check)
 
 
 def share(check: Check) -> str:
     """A check in a few words: name, figure, limit."""
     figure = check.figure
+    if asks(check):
+        return f"{windowed(check)} {value_words(figure.value, yes_no=True)}"
     value = "-" if figure.value is None else f"off {abs(figure.value - check.ideal):.1e}" if check.ideal else f"{figure.value:.2e}"
     limit = "none" if check.limit is None else f"{check.limit:.2g}"
     return f"{windowed(check)} {value} / {limit}"

@@ -159,12 +159,12 @@ def judge(figure: Figure, tolerance: Tolerance | None, *, kind: Kind, measure: M
     value = figure.value
     verdict: CheckVerdict = "fail"
     reason = ""
-    if tolerance is None:
-        reason = "no tolerance is written down"
-    elif value is None or not math.isfinite(value):
+    if value is None or not math.isfinite(value):
         reason = figure.note or "not a number"
     elif gap:
         reason = gap
+    elif tolerance is None:
+        reason = "no tolerance yet"
     elif measure.sense == "at least" and not value >= tolerance.limit:
         reason = f"{value:.4g} is below the limit {tolerance.limit:.4g}"
     elif measure.sense == "at most" and (ideal is None or not abs(value - ideal) <= tolerance.limit):
@@ -186,4 +186,5 @@ def judge(figure: Figure, tolerance: Tolerance | None, *, kind: Kind, measure: M
         limit=None if tolerance is None else tolerance.limit,
         drift=given.drift,
         why=given.why,
+        gap=gap,
     )

@@ -10,7 +10,7 @@ from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.writing import markdown_table
 from rockcheck.validation.suite.results import Cell, Check, Run
-from rockcheck.validation.suite.tables import share, title, verdict_lines
+from rockcheck.validation.suite.tables import share, title, used, verdict_lines
 
 MARKS = {"pass": "✅", "incomplete": "⚪", "changed": "🟡", "fail": "❌", "error": "💥"}
 
@@ -59,7 +59,7 @@ def _case(place: str, name: str, result: Failure | Error | Skipped | None) -> Te
 def markdown(run: Run) -> str:
     """A summary for a job's page: the verdict, what is not a pass and why, and a table of scenes by models."""
     lines = [
-        f"## {MARKS[run.verdict]} rockcheck {_plain(run.suite)}: {run.verdict}",
+        f"## {MARKS[run.verdict]} rockcheck {_plain(run.suite)}: {run.words}",
         "",
         f"{len(run.cells)} simulations, {run.up_to_date} up to date, {sum(1 for _ in run.checks())} checks, {run.wall_seconds:.1f} s.",
         "",
@@ -80,7 +80,7 @@ def _entry(cell: Cell | None) -> str:
 
 def _worst(checks: tuple[Check, ...]) -> str:
     against_others = [check for check in checks if check.figure.against and check.kind == "numerical"]
-    return share(max(against_others, key=lambda check: (check.figure.value or 0.0) / (check.limit or 1.0))) if against_others else ""
+    return share(max(against_others, key=used)) if against_others else ""
 
 
 def _plain(text: str) -> str:

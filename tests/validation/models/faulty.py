@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 
-from rockcheck.scenes import History, ModelFailure, Scene
+from rockcheck.scenes import Event, History, ModelFailure, Scene
 from rockcheck.scenes.base import Frozen
 from rockcheck.scenes.observation import observe
 
@@ -62,3 +62,21 @@ class Hog(Frozen):
     def simulate(self, scene: Scene) -> History:
         taken = [np.zeros(100 * 2**17) for _ in range(80)]
         return Still(offset=float(taken[0][0])).simulate(scene)
+
+
+class Nothing(Frozen):
+    """Forgets to return its history."""
+
+    def simulate(self, scene: Scene) -> History:
+        return None  # type: ignore[return-value]
+
+
+class Falls(Frozen):
+    """Turns at 1 rad/s and lies after pi/2 s; a note says so."""
+
+    def simulate(self, scene: Scene) -> History:
+        t = scene.output_times
+        state = np.zeros((len(t), 6))
+        state[:, 1] = scene.block.half_height
+        state[:, 2] = np.minimum(t, 2.0)
+        return observe(scene, "falls", state, events=(Event(t=np.pi / 2, kind="overturned left"),), notes=("made to fall",))

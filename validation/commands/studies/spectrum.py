@@ -62,7 +62,10 @@ def run(
     amplitudes: Annotated[
         tuple[float, float], typer.Option("--amplitudes", help="Range of a_p/(g tan alpha); with a record, of its scale.")
     ] = AMPLITUDES,
-    pivot: Annotated[str, typer.Option("--pivot", help="bilateral (the paper's) or unilateral (the block may hop).")] = "bilateral",
+    pivot: Annotated[
+        str | None,
+        typer.Option("--pivot", help="bilateral (default) or unilateral: the block may hop (default of a --scene with a wall)."),
+    ] = None,
     model: Annotated[str | None, typer.Option("--model", help="Another model: cm, mujoco, pybullet (slow: mind --size).")] = None,
     tolerance: Annotated[float | None, typer.Option("--tolerance", help="Of the event-based model.")] = None,
     refine: Annotated[bool, typer.Option("--refine", help="Run only what lies near a boundary.")] = False,
@@ -88,6 +91,8 @@ def run(
     --scene shelf.toml --fragility --record a.AT2 --record b.AT2
     """
     panels = _panels(figure, scene)
+    if pivot is None:  # beside a wall a block hops, which the bilateral pivot of the paper's figures forbids
+        pivot = "unilateral" if model is None and scene is not None and panels[0].scene.walls else "bilateral"
     request = _request(size, frequencies, amplitudes, pivot, model, tolerance, refine)
     if records and not fragility:
         raise InputError("needs --fragility", "--record")
