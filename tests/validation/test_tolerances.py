@@ -217,7 +217,7 @@ def test_accept_writes_a_scene_s_own_line_beside_one_for_every_scene(tmp_path):
     changes, refused = accepted(path, made_run(check(0.0, lines["outcome_agrees"], "outcome_agrees")), "one falls now")
     assert (len(changes), refused) == (1, [])
     written = tomllib.loads(path.read_text())
-    assert written["s"]["m"]["r"]["outcome_agrees"] == {"expected": 0.0, "limit": 2.0, "drift": 0.0, "why": "one falls now"}
+    assert written["s"]["m"]["r"]["outcome_agrees"] == {"expected": 0.0, "limit": 1.0, "drift": 0.0, "why": "one falls now"}
     assert written["*"] == tomllib.loads(EVERYWHERE)["*"]
 
 
