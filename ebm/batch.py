@@ -7,19 +7,20 @@ chunks of rows; the result of a row does not depend on the others, nor on the nu
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import natural
-from rockcheck.ebm.ground import Ground
-from rockcheck.ebm.march import DONE, FAILURES, OVERTURNED, Control, run
+from rockcheck.ebm.core.ground import Ground
+from rockcheck.ebm.core.march import DONE, FAILURES, OVERTURNED, Control, run
+from rockcheck.ebm.core.motion import Setting, workspace
 from rockcheck.ebm.model import EventBasedModel
-from rockcheck.ebm.motion import Setting, workspace
 from rockcheck.scenes.compiled import kernel, threads
 from rockcheck.scenes.errors import ModelFailure
+from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -63,7 +64,7 @@ class Outcomes:
     peak: Floats
     t_end: Floats
     series: NDArray[np.int64]
-    #: How each run ended, a key of `ebm.march.FAILURES` where it failed.
+    #: How each run ended, a key of `ebm.core.march.FAILURES` where it failed.
     ending: NDArray[np.int64]
 
     @property
@@ -138,12 +139,12 @@ def run_batch(
     until_decided: bool = True,
     strict: bool = True,
     jobs: int | None = None,
-    progress: Callable[[int], None] | None = None,
+    on_progress: OnProgress = unheard,
 ) -> Outcomes:
     """Runs every row; with `until_decided` to the moment when outcome and peak are certain, whatever its duration.
 
-    `jobs` threads (default: all cores). `progress` is called with the number of rows just done. Where a row
-    reaches a cap or has no consistent motion: `ModelFailure` if `strict`, else only its `ending` says so.
+    `jobs` threads (default: all cores). `on_progress` is told the rows done. Where a row reaches
+    a cap or has no consistent motion: `ModelFailure` if `strict`, else only its `ending` says so.
     """
     count = len(packed)
     side, peak, t_end = np.zeros(count, dtype=np.int8), np.zeros(count), np.zeros(count)
@@ -170,9 +171,10 @@ def run_batch(
         return rows.stop - rows.start
 
     with threads(jobs or os.cpu_count() or 1) as pool:
-        for done in pool.map(chunk, range(0, count, _CHUNK)):
-            if progress is not None:
-                progress(done)
+        done = 0
+        for rows in pool.map(chunk, range(0, count, _CHUNK)):
+            done += rows
+            on_progress(done, count)
     found = Outcomes(side=side, peak=peak, t_end=t_end, series=series, ending=ending)
     if strict and found.failed.any():
         first = int(np.argmax(found.failed))

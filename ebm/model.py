@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, Strict
 
-from rockcheck.ebm.rules import NAMES
+from rockcheck.ebm.core.rules import NAMES
 from rockcheck.scenes.base import Frozen, Positive
 from rockcheck.scenes.errors import InputError, ModelFailure
 from rockcheck.scenes.history import Cost, Event, History
@@ -18,7 +18,7 @@ from rockcheck.scenes.observation import observe
 from rockcheck.scenes.scene import Scene
 
 if TYPE_CHECKING:
-    from rockcheck.ebm.march import Tally
+    from rockcheck.ebm.core.march import Tally
 
 
 #: The finest tolerance.
@@ -113,7 +113,8 @@ class EventBasedModel(Frozen):
 
     def _simulate(self, scene: Scene, tolerance: float) -> History:
         start = time.perf_counter()
-        from rockcheck.ebm import bouc_wen, march, motion, natural
+        from rockcheck.ebm import natural
+        from rockcheck.ebm.core import bouc_wen, march, motion
         from rockcheck.scenes.compiled import interruptible
 
         b = natural.setting_of(
@@ -169,7 +170,7 @@ class EventBasedModel(Frozen):
 
 
 def _outcome(tally: Tally, theta: float) -> str:
-    from rockcheck.ebm import march
+    from rockcheck.ebm.core import march
 
     if tally.ending == march.OVERTURNED:
         return "overturned left" if theta > 0 else "overturned right"
@@ -178,7 +179,7 @@ def _outcome(tally: Tally, theta: float) -> str:
 
 def _events(log: np.ndarray, unit: float, radius: float) -> list[Event]:
     """The event log (natural units) as events (SI)."""
-    from rockcheck.ebm import march
+    from rockcheck.ebm.core import march
 
     modes, kinds, speed = march.MODE_NAMES, march.EVENT_NAMES, radius / unit
     return [
@@ -196,7 +197,8 @@ def _compiled(scratch: tuple[Any, ...]) -> None:
     """Loads or compiles the event loop by a run of no steps, so that no run's time holds it."""
     if len(scratch) in _READY:
         return
-    from rockcheck.ebm import march, natural
+    from rockcheck.ebm import natural
+    from rockcheck.ebm.core import march
     from rockcheck.scenes.excitations import Rest
     from rockcheck.scenes.scene import Block, Floor
 
@@ -211,5 +213,5 @@ def _compiled(scratch: tuple[Any, ...]) -> None:
 #: The kinds of scratch for which the event loop is compiled: with Coulomb and with Bouc-Wen friction.
 _READY: set[int] = set()
 WARM_UP_TOLERANCE = 0.01
-#: Highest order of a Taylor step (see ebm.series, which is not imported here because it needs the compiler).
+#: Highest order of a Taylor step (see ebm.core.series, which is not imported here because it needs the compiler).
 HIGHEST_ORDER = 28

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.ebm.ground import GAUSSIAN, Ground, ground_of
-from rockcheck.ebm.motion import LAWS, LEAST_FRICTION, Setting
+from rockcheck.ebm.core.ground import GAUSSIAN, Ground, ground_of
+from rockcheck.ebm.core.motion import LAWS, LEAST_FRICTION, Setting
 from rockcheck.scenes.scene import Scene
 
 __all__ = ["GAUSSIAN", "grounds_of", "setting_of", "state_of", "time_unit", "to_si"]

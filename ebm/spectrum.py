@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,7 @@ from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes.base import Shown
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.excitations import Record
+from rockcheck.scenes.progress import Count, OnProgress, unheard
 from rockcheck.scenes.scene import Block, Scene
 
 Floats = NDArray[np.float64]
@@ -26,8 +28,10 @@ COARSEST, FEWEST_CELLS, FOLLOWED = 8, 12, 3
 #: The outcome codes of a spectrum.
 LEFT, SAFE, RIGHT = -1, 0, 1
 _UNKNOWN = 9
+#: Of nodes: their sides, and whether the run failed.
+Nodes = tuple[NDArray[np.int8], NDArray[np.bool_]]
 #: Plays nodes of a spectrum: scene, amplitude ratios and frequency ratios (1-D, of one length) to sides and failures, see `play_nodes`.
-Player = Callable[[Scene, Floats, Floats], tuple[NDArray[np.int8], NDArray[np.bool_]]]
+Player = Callable[[Scene, Floats, Floats], Nodes]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +78,7 @@ def overturning_spectrum(
     model: EventBasedModel | None = None,
     refine: bool = False,
     jobs: int | None = None,
-    progress: Callable[[int], None] | None = None,
+    on_progress: OnProgress = unheard,
     play: Player | None = None,
 ) -> Spectrum:
     """The outcomes of a scene under pulses of its own kind, each run until its outcome is decided.
@@ -83,8 +87,8 @@ def overturning_spectrum(
     gives block, floor, walls and the kind of pulse (Ricker or sine); its duration and the pulse's own size are not used.
     Where the scene's excitation is a record, `frequency_ratios` are sizes of the block relative to its own (the gaps stay as
     they are) and `amplitude_ratios` multiply the record. With `refine` only every eighth node is run at first (more of a
-    small grid), then those between nodes that differ (and their neighbours). `jobs` threads, default all cores; `progress` is
-    called with the number of runs just done. `play` runs the nodes elsewhere or by another model, instead of `model` here.
+    small grid), then those between nodes that differ (and their neighbours). `jobs` threads, default all cores; `on_progress` is
+    told the nodes done by `model`. `play` runs the nodes elsewhere or by another model, instead of `model` here.
     Raises `InputError`.
     """
     frequencies, amplitudes = _axis(frequency_ratios, "frequency_ratios"), _axis(amplitude_ratios, "amplitude_ratios")
@@ -94,7 +98,8 @@ def overturning_spectrum(
     if play is None:
         model = model or EventBasedModel(tolerance=TOLERANCE)
         model.check(scene)
-        play = partial(play_nodes, model=model, jobs=jobs, progress=progress)
+        count = Count(on_progress, len(frequencies) * len(amplitudes))
+        play = partial(_play_part, model=model, jobs=jobs, count=count)
     outcomes = np.full((len(amplitudes), len(frequencies)), _UNKNOWN, dtype=np.int8)
     undecided = np.zeros(outcomes.shape, dtype=bool)
     evaluations = 0
@@ -128,17 +133,21 @@ def play_nodes(
     *,
     model: EventBasedModel,
     jobs: int | None = None,
-    progress: Callable[[int], None] | None = None,
-) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
+    on_progress: OnProgress = unheard,
+) -> Nodes:
     """The outcomes at nodes of a spectrum (1-D arrays of one length): sides (-1, 0, +1), and whether the run failed.
 
     A run that fails is made once more at a hundredth of the tolerance.
     """
-    sides, failed = _batch_of(scene, amplitude_ratios, frequency_ratios, model, jobs, progress)
+    sides, failed = _batch_of(scene, amplitude_ratios, frequency_ratios, model, jobs, on_progress)
     if failed.any():
         finer = model.model_copy(update={"tolerance": max(1e-2 * model.tolerance, 1e-15)})
-        sides[failed], failed[failed] = _batch_of(scene, amplitude_ratios[failed], frequency_ratios[failed], finer, jobs, None)
+        sides[failed], failed[failed] = _batch_of(scene, amplitude_ratios[failed], frequency_ratios[failed], finer, jobs, unheard)
     return sides, failed
+
+
+def _play_part(scene: Scene, amplitude_ratios: Floats, frequency_ratios: Floats, *, count: Count, **how: Any) -> Nodes:
+    return play_nodes(scene, amplitude_ratios, frequency_ratios, on_progress=count.part(), **how)
 
 
 def _batch_of(
@@ -147,8 +156,8 @@ def _batch_of(
     frequency_ratios: Floats,
     model: EventBasedModel,
     jobs: int | None,
-    progress: Callable[[int], None] | None,
-) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
+    on_progress: OnProgress,
+) -> Nodes:
     from rockcheck.ebm import batch
 
     if scene.excitation.kind == "record":
@@ -157,7 +166,7 @@ def _batch_of(
         p, tan_alpha = scene.frequency_parameter, scene.block.half_width / scene.block.half_height
         periods = 2.0 * math.pi / (frequency_ratios * p)
         packed = batch.pack_pulses(scene, model, amplitude_ratios * scene.gravity * tan_alpha, periods)
-    found = batch.run_batch(packed, model, jobs=jobs, progress=progress, strict=False)
+    found = batch.run_batch(packed, model, jobs=jobs, on_progress=on_progress, strict=False)
     return found.side, found.failed
 
 

@@ -1,8 +1,9 @@
 """Compiled functions whose cache can be trusted.
 
 numba's own cache looks at a function's own file only: after a change in a function that it calls, the old machine code would
-be used silently. Here the cache folder is named after the content of all source files of the function's package. And it would
-run whatever lies in its cache; here only what this user wrote is read, and only where it is whole.
+be used silently. Here the cache folder is named after the content of all source files of the function's package, such as
+rockcheck.ebm with all below it. And it would run whatever lies in its cache; here only what this user wrote is read, and only where
+it is whole.
 """
 
 from __future__ import annotations
@@ -66,6 +67,12 @@ class _NoCollection(Listener):
 register("numba:compile", _NoCollection())
 
 
+def _package(function: Callable[..., Any]) -> Path:
+    """The folder of the function's package: that of rockcheck.ebm for one of rockcheck.ebm.core.march."""
+    below = max(len(function.__module__.split(".")) - 3, 0)
+    return Path(function.__code__.co_filename).parents[below]
+
+
 @cache
 def _cache_folder(package: Path) -> Path | None:
     """The private folder for the compiled code of a package; None, with a line on stderr, where there can be none.
@@ -74,7 +81,7 @@ def _cache_folder(package: Path) -> Path | None:
     the user, the package's owner or root may change.
     """
     digest = hashlib.sha256()
-    for source in [Path(__file__), *sorted(package.glob("*.py"))]:
+    for source in [Path(__file__), *sorted(package.rglob("*.py"))]:
         digest.update(source.name.encode() + b"\0" + source.read_bytes())
     name = f"{package.name}-kernels-{digest.hexdigest()[:16]}"
     user_wide = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "rockcheck"
@@ -188,7 +195,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     if config.DISABLE_JIT:
         return np.errstate(all="ignore")(function)
     compiled = numba.njit(nogil=True, error_model="numpy", _nrt=True, no_cfunc_wrapper=True)(function)
-    folder = _cache_folder(Path(function.__code__.co_filename).parent)
+    folder = _cache_folder(_package(function))
     if folder is not None:
         compiled._cache = _Cache(function, folder)
     return compiled

@@ -57,3 +57,14 @@ class Count:
         with self._lock:
             self.done += parts
             self.on_progress(self.done, self.total)
+
+    def part(self) -> OnProgress:
+        """An `OnProgress` for somebody whose work is a part of all."""
+        before = 0.0
+
+        def told(done: float, total: float, what: str = "") -> None:
+            nonlocal before
+            self.add(done - before)
+            before = done
+
+        return told

@@ -12,6 +12,7 @@ import sys
 import tempfile
 import tomllib
 from collections import defaultdict
+from fnmatch import fnmatch
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -30,7 +31,7 @@ def main() -> None:
     short = []
     for name, one in sorted(found.items()):
         module = Path(name).with_suffix("").as_posix().replace("/", ".")
-        inner = f"rockcheck.{module}" in compiled
+        inner = any(fnmatch(f"rockcheck.{module}", pattern) for pattern in compiled)
         summary = one["summary"]
         rows[f"{Path(name).parent.as_posix()}{', compiled' if inner else ''}"].append(summary)
         if share(summary) < LEAST:

@@ -26,24 +26,28 @@ PARTS = ("scenes", "ebm", "cm", "engines", "validation", "reports")
 CLOSED = "tests/ebm/test_closed_forms.py::test_"
 #: Where faults are planted, and the tests that should notice them, the quickest first.
 TARGETS = {
-    "ebm/series.py": ["tests/ebm/test_core_parts.py"],
-    "ebm/impacts.py": [
-        "tests/ebm/test_impact_laws.py",
+    "ebm/core/series.py": ["tests/ebm/core/test_core_parts.py"],
+    "ebm/core/laws/impacts.py": [
+        "tests/ebm/core/test_impact_laws.py",
         f"{CLOSED}wall_impact_balances_momentum",
         f"{CLOSED}floor_impact_balances_momentum",
     ],
-    "ebm/contact_impacts.py": ["tests/ebm/test_impact_laws.py", f"{CLOSED}contact_impact_leaves_no_approach", "tests/ebm/test_edges.py"],
-    "ebm/guards.py": ["tests/ebm/test_core_parts.py", "tests/ebm/test_edges.py"],
-    "ebm/modes.py": ["tests/ebm/test_core_parts.py", "tests/ebm/test_edges.py"],
-    "validation/suite/tolerances.py": ["tests/validation/test_verdicts.py", "tests/validation/test_tolerances.py"],
-    "validation/suite/verdicts.py": ["tests/validation/test_verdicts.py", "tests/validation/test_cli.py"],
-    "validation/discrepancy/statistics.py": ["tests/validation/test_verdicts.py", "tests/validation/test_ensembles.py"],
-    "validation/discrepancy/compare.py": ["tests/validation/test_measures.py", "tests/validation/test_measured.py"],
+    "ebm/core/laws/contact_impacts.py": [
+        "tests/ebm/core/test_impact_laws.py",
+        f"{CLOSED}contact_impact_leaves_no_approach",
+        "tests/ebm/test_edges.py",
+    ],
+    "ebm/core/guards.py": ["tests/ebm/core/test_core_parts.py", "tests/ebm/test_edges.py"],
+    "ebm/core/modes.py": ["tests/ebm/core/test_core_parts.py", "tests/ebm/test_edges.py"],
+    "validation/suite/tolerances.py": ["tests/validation/suite/test_verdicts.py", "tests/validation/suite/test_tolerances.py"],
+    "validation/suite/verdicts.py": ["tests/validation/suite/test_verdicts.py", "tests/validation/commands/test_cli.py"],
+    "validation/discrepancy/statistics.py": ["tests/validation/suite/test_verdicts.py", "tests/validation/suite/test_ensembles.py"],
+    "validation/discrepancy/compare.py": ["tests/validation/discrepancy/test_measures.py", "tests/validation/discrepancy/test_measured.py"],
 }
 SECONDS = 240
 #: Faults that change no result, by file and the text of the fault, and why.
 EQUIVALENT = {
-    ("ebm/series.py", "top + 2  ->  top - 2"): "the narrowest interval ends the search before the stack is full",
+    ("ebm/core/series.py", "top + 2  ->  top - 2"): "the narrowest interval ends the search before the stack is full",
 }
 
 #: Names of numbers that are 1 or -1.

@@ -48,7 +48,8 @@ def block() -> Block:
 @pytest.fixture(scope="session")
 def run_to_end() -> Runner:
     """Runs a scene to its end without sampling it; the compiled loop is called as the model calls it."""
-    from rockcheck.ebm import march, motion, natural
+    from rockcheck.ebm import natural
+    from rockcheck.ebm.core import march, motion
 
     scratch = motion.workspace()
 

@@ -466,7 +466,8 @@ def random_scene(rng: np.random.Generator, side: str) -> Scene:
 @pytest.mark.parametrize("name", ["rock", "slide-rock", "lean", "ladder"])
 def test_series_begin_with_the_closed_forms(name, side, case):
     """x'', theta'', P, Q and N of the models' series are the paper's, at 200 random blocks and states, to 1e-12."""
-    from rockcheck.ebm import motion, natural
+    from rockcheck.ebm import natural
+    from rockcheck.ebm.core import motion
 
     rng = np.random.default_rng(20240229)
     a, _ = motion.workspace()

@@ -218,7 +218,7 @@ def test_floor_impact_balances_momentum(least, most):
 
     Squat blocks: where sticking asks for more friction than there is, and slipping cannot turn the block, it lands flat.
     """
-    from rockcheck.ebm import impacts
+    from rockcheck.ebm.core.laws import impacts
 
     forms = set()
     for s, c, S1, w1, v1, mu_s, mu_k in random_floor_impacts(2000, least, most):
@@ -247,7 +247,7 @@ def test_floor_impact_balances_momentum(least, most):
 @pytest.mark.parametrize("alpha", [0.1, 0.25, 0.5])
 def test_floor_impact_sticks_above_its_friction(alpha):
     """Without slip before, the impact sticks from mu = 3 t/(4 + t^2) on, t = tan(alpha)."""
-    from rockcheck.ebm import impacts
+    from rockcheck.ebm.core.laws import impacts
 
     t, s, c = math.tan(alpha), math.sin(alpha), math.cos(alpha)
     limit = 3.0 * t / (4.0 + t * t)
@@ -257,7 +257,7 @@ def test_floor_impact_sticks_above_its_friction(alpha):
 
 def test_wall_impact_balances_momentum():
     """The cascade of Fig. 3 at 4,000 random blocks and approaches: momentum, restitution, Coulomb's law, no pull of the wall."""
-    from rockcheck.ebm import impacts
+    from rockcheck.ebm.core.laws import impacts
 
     rng = np.random.default_rng(4)
     branches = set()
@@ -301,8 +301,8 @@ def test_wall_impact_balances_momentum():
 @pytest.mark.parametrize("e", [0.0, 0.5])
 def test_contact_impact_leaves_no_approach(e):
     """Unilateral impacts at 1,000 random states: no touched contact still closes, and without restitution no energy is gained."""
-    from rockcheck.ebm import contact_impacts as ci
     from rockcheck.ebm import natural
+    from rockcheck.ebm.core.laws import contact_impacts as ci
 
     rng = np.random.default_rng(5)
     for _ in range(1000):

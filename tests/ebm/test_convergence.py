@@ -69,7 +69,8 @@ def test_a_run_leaves_no_trace(pivot, pulse_scene):
 
 def test_compiled_scratch_is_scratch(pulse_scene):
     """What the loop finds in its work arrays, however wild, does not matter."""
-    from rockcheck.ebm import march, motion, natural
+    from rockcheck.ebm import natural
+    from rockcheck.ebm.core import march, motion
 
     scene = pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0))
     unit = natural.time_unit(scene)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel, batch, overturning_spectrum
-from rockcheck.ebm.march import TOO_MANY_STEPS
+from rockcheck.ebm.core.march import TOO_MANY_STEPS
 from rockcheck.ebm.spectrum import node_scene, play_nodes
 from rockcheck.scenes import Floor, InputError, Record, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK

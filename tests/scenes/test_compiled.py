@@ -155,7 +155,7 @@ def test_without_the_compiler(play):
 
 def test_everything_can_be_imported_without_the_compiler():
     """NUMBA_DISABLE_JIT=1, as for a debugger."""
-    imports = "import rockcheck, rockcheck.ebm, rockcheck.cm, rockcheck.engines, rockcheck.ebm.bouc_wen"
+    imports = "import rockcheck, rockcheck.ebm, rockcheck.cm, rockcheck.engines, rockcheck.ebm.core.bouc_wen"
     play = "scene = rockcheck.load_scene('fig4a').replace(duration=0.2); print(rockcheck.EventBasedModel().simulate(scene).outcome)"
     command = [sys.executable, "-c", f"{imports}; {play}"]
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, timeout=300, check=False)

@@ -404,7 +404,7 @@ BOMBS = {
 _PLAY_BOMBS = """
 import resource, sys, time
 from pathlib import Path
-import pandas, numba, ebm.march  # what a run needs in any case
+import pandas, numba, ebm.core.march  # what a run needs in any case
 resource.setrlimit(resource.RLIMIT_DATA, (2**30, 2**30))
 from rockcheck.validation.commands.cli import main
 from rockcheck.scenes import InputError

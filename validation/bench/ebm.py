@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.batch import Packed, pack, pack_pulses, run_batch
-from rockcheck.ebm.ground import Ground, acceleration
+from rockcheck.ebm.core.ground import Ground, acceleration
 from rockcheck.scenes import Floor, ModelFailure, Ricker, Scene, Wall, load_scene
 from rockcheck.scenes.compiled import kernel
 from rockcheck.scenes.progress import OnProgress, unheard

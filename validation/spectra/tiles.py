@@ -93,7 +93,7 @@ class Tiles:
     def _here(self, scene: Scene, amplitudes: Floats, frequencies: Floats, model: str, settings: Mapping[str, Any]) -> Outcomes:
         player = build(model, settings)
         if compiled(player):
-            return play_nodes(scene, amplitudes, frequencies, model=player, jobs=self.jobs, progress=self.count.add)
+            return play_nodes(scene, amplitudes, frequencies, model=player, jobs=self.jobs, on_progress=self.count.part())
         if self._pool is None:
             self._pool = self._open.enter_context(Pool(self.jobs or os.cpu_count() or 1))
         parts = _slices(len(amplitudes), NODES_A_CALL)

@@ -1,6 +1,6 @@
 """Newton-Euler for a block with given contacts, once more and by other means than `ebm`: what its histories are held against.
 
-Natural units: lengths in R, accelerations in g, unit mass, moment of inertia 1/3. As in `ebm.motion`, a tilted block is seen in
+Natural units: lengths in R, accelerations in g, unit mass, moment of inertia 1/3. As in `ebm.core.motion`, a tilted block is seen in
 the frame of its pivot, which is then the lower-left corner: with S = sign theta, phi = |theta|, s, c = sin, cos(alpha - phi),
 s', c' = sin, cos(alpha + phi). Four contact forces can act: P and Q of the floor on the pivot, N of the wall that the top corner
 touches, M of the wall that the lifted bottom corner touches. The gap of each contact, its row J (xi, y, phi) and the part of its

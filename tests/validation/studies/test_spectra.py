@@ -367,7 +367,7 @@ def test_the_documentation_says_what_is_found(tmp_path):
     panels = [panel for figure in spectra.FIGURES for panel in paper_panels(figure)]
     tiles = Tiles(tmp_path)
     found = claims.check_claims(play_panels(panels, request, tiles), claims.extra_runs(tiles, request))
-    page = (Path(__file__).parents[2] / "docs" / "spectra.md").read_text(encoding="utf-8").split("## What the paper says")[1]
+    page = (Path(__file__).parents[3] / "docs" / "spectra.md").read_text(encoding="utf-8").split("## What the paper says")[1]
     rows = [line.split("|")[2].strip() for line in page.split("\n## ")[0].splitlines() if line.startswith("| ")]
     assert rows == ["verdict", *(claim.verdict for claim in found)]
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.ground import GAUSSIAN, STILL, acceleration, impulse_ahead, largest_ahead
-from rockcheck.ebm.motion import FAMILY, FAR, FLAT, FLOOR, HEIGHT, STICK, THETA, TILT, TIP, VX, VY, S, W
+from rockcheck.ebm.core.ground import GAUSSIAN, STILL, acceleration, impulse_ahead, largest_ahead
+from rockcheck.ebm.core.motion import FAMILY, FAR, FLAT, FLOOR, HEIGHT, STICK, THETA, TILT, TIP, VX, VY, S, W
 from rockcheck.scenes.compiled import inner_kernel
 
 # A pulse is over when this part of the tolerance is left of it; a bound on the energy keeps this margin where impacts may add some.

@@ -42,7 +42,7 @@ FINE = '[tolerances.short.{model}.still]\ntheta_rms = {{ expected = 0.0, limit =
 
 
 def write_suite(folder: Path, models: dict[str, str], tolerances: str = "", seconds: float = 60.0) -> Path:
-    shutil.copy(Path(__file__).parent / "models" / "faulty.py", folder / "faulty.py")
+    shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", folder / "faulty.py")
     tables = "\n".join(f"[models.{label}]\n{lines}" for label, lines in models.items())
     path = folder / "mine.toml"
     path.write_text(SUITE.format(models=tables, tolerances=tolerances, seconds=seconds), encoding="utf-8")
@@ -167,7 +167,7 @@ def test_models_of_different_form_may_fall_apart_where_that_is_accepted(tmp_path
     done = run(path)
     assert [cell.outcome for cell in done.cells] == ["at rest", "overturned right"]
     assert [(check.kind, check.verdict) for _, check in done.checks()] == [("model form", "pass")] * 2
-    shutil.copy(Path(__file__).parent / "models" / "faulty.py", tmp_path / "faulty.py")
+    shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", tmp_path / "faulty.py")
     falling = re.sub(r"walls = .*", "initial_rotation = -0.3", FORM)
     path.write_text(falling.replace("[models.ebm]", '[models.ebm]\nmodel = "faulty:Still"'), encoding="utf-8")
     done = run(path)

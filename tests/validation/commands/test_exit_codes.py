@@ -55,7 +55,7 @@ def test_a_fault_that_cannot_be_written_down_is_told(monkeypatch, capsys):
 def test_the_exit_codes_are_told_by_the_help_and_by_the_documentation(capsys):
     assert main(["--help"]) == 0
     said = capsys.readouterr().out
-    page = (Path(__file__).parents[2] / "docs" / "ci.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "ci.md").read_text(encoding="utf-8")
     for code, meaning in EXIT_CODES.items():
         assert re.search(rf"^ +{code} +{re.escape(meaning)}$", said, re.MULTILINE), code
         assert f"\n| {code} | " in page, code

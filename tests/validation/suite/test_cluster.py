@@ -22,7 +22,7 @@ MODELS = "\n".join(f'[models.{name}]\nmodel = "faulty:{name}"' for name in ("Seg
 def test_a_cluster_gives_the_same_run_and_survives_failures(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", list(sys.path))  # the suite's folder joins it
     monkeypatch.delitem(sys.modules, "faulty", raising=False)
-    shutil.copy(Path(__file__).parent / "models" / "faulty.py", tmp_path / "faulty.py")
+    shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", tmp_path / "faulty.py")
     path = tmp_path / "mine.toml"
     path.write_text(
         f"""reference = "Still"

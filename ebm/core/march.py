@@ -1,4 +1,4 @@
-"""The event loop: series, first root of the guards, impact or selection, until the end. Natural units (see ebm.motion).
+"""The event loop: series, first root of the guards, impact or selection, until the end. Natural units (see ebm.core.motion).
 
 docs/theory.md, "How an event is handled", goes with this file.
 """
@@ -9,11 +9,11 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm import bouc_wen
-from rockcheck.ebm.contacts import closed_floor, stand, stop
-from rockcheck.ebm.decide import decided, quiet_from
-from rockcheck.ebm.ground import STILL, next_exceedance, next_kink
-from rockcheck.ebm.guards import (
+from rockcheck.ebm.core import bouc_wen
+from rockcheck.ebm.core.contacts import closed_floor, stand, stop
+from rockcheck.ebm.core.decide import decided, quiet_from
+from rockcheck.ebm.core.ground import STILL, next_exceedance, next_kink
+from rockcheck.ebm.core.guards import (
     G_CONE_MINUS,
     G_CONE_PLUS,
     G_FAR_GAP,
@@ -27,8 +27,9 @@ from rockcheck.ebm.guards import (
     first_event,
     rock_guards_hold,
 )
-from rockcheck.ebm.modes import MODES, SLACK, forget, leave, select, slacken
-from rockcheck.ebm.motion import (
+from rockcheck.ebm.core.laws.strike import LANDING, ON_WALL, strike
+from rockcheck.ebm.core.modes import MODES, SLACK, forget, leave, select, slacken
+from rockcheck.ebm.core.motion import (
     COS,
     FAMILY,
     FAR,
@@ -57,8 +58,8 @@ from rockcheck.ebm.motion import (
     tilt_series,
     tilt_state,
 )
-from rockcheck.ebm.rules import GRAZES, RULES
-from rockcheck.ebm.running import (
+from rockcheck.ebm.core.rules import GRAZES, RULES
+from rockcheck.ebm.core.running import (
     BEFORE,
     CHANGING,
     CORNER,
@@ -101,9 +102,8 @@ from rockcheck.ebm.running import (
     mode_code,
     note,
 )
-from rockcheck.ebm.series import FORCE, NO_ROOT, NOISE, POSITION, first_root, slope, step_size, value
-from rockcheck.ebm.settle import no_impacts, settling_speed
-from rockcheck.ebm.strike import LANDING, ON_WALL, strike
+from rockcheck.ebm.core.series import FORCE, NO_ROOT, NOISE, POSITION, first_root, slope, step_size, value
+from rockcheck.ebm.core.settle import no_impacts, settling_speed
 from rockcheck.scenes.compiled import inner_kernel, kernel, placed_kernel
 
 __all__ = ["DONE", "EVENT_NAMES", "FAILURES", "MODE_NAMES", "OVERTURNED", "TOO_MANY_EVENTS", "TOO_MANY_STEPS", "Control", "Tally", "run"]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.ebm.motion import FAMILY, FAR, FLAT, FLOOR, OFF, STICK, TIP
+from rockcheck.ebm.core.motion import FAMILY, FAR, FLAT, FLOOR, OFF, STICK, TIP
 from rockcheck.scenes.compiled import placed_kernel
 
 #: Names of the mode codes that `mode_code` gives, and of the event codes.
@@ -67,7 +67,7 @@ class Tally(NamedTuple):
     largest_gain: float
     rows: int
     t_rest: float
-    #: How often each modelling choice was made (ebm.rules).
+    #: How often each modelling choice was made (ebm.core.rules).
     rules: NDArray[np.int64]
 
 

@@ -16,7 +16,7 @@ from rockcheck.validation.commands.cli import main
 from rockcheck.validation.execute.models import build, build_own, check_allowed
 from rockcheck.validation.suite.suites import load_suite
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 SCENE = """
 name = "short"
 duration = 0.2
@@ -55,7 +55,7 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(SCENE)
     (tmp_path / "spy.py").write_text(SPY)
-    shutil.copy(Path(__file__).parent / "models" / "faulty.py", tmp_path / "faulty.py")
+    shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", tmp_path / "faulty.py")
     return tmp_path
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from rockcheck.ebm import rules
+from rockcheck.ebm.core import rules
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 spec = importlib.util.spec_from_file_location("ledger", Path(__file__).with_name("ledger.py"))
 assert spec is not None
 assert spec.loader is not None

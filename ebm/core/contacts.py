@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.motion import HEIGHT, THETA, VX, VY, W, X
+from rockcheck.ebm.core.motion import HEIGHT, THETA, VX, VY, W, X
 from rockcheck.scenes.compiled import inner_kernel
 
 #: The zero of position (R) and of velocity (sqrt(g R)): a contact nearer and slower than this is closed, a pivot that slips more

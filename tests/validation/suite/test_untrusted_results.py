@@ -50,7 +50,7 @@ ks_distance = { expected = 1.0, limit = 1.0, drift = 0.0, why = "a test" }
 def run(tmp_path, monkeypatch) -> Callable[[], Run]:
     monkeypatch.setattr(sys, "path", list(sys.path))  # the suite's folder joins it
     monkeypatch.delitem(sys.modules, "faulty", raising=False)
-    shutil.copy(Path(__file__).parent / "models" / "faulty.py", tmp_path / "faulty.py")
+    shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", tmp_path / "faulty.py")
     (tmp_path / "mine.toml").write_text(SUITE)
 
     def run() -> Run:

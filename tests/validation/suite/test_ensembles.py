@@ -52,7 +52,7 @@ overturning_accuracy = { expected = 1.0, limit = 0.0, drift = 0.0, why = "none f
 
 @pytest.fixture
 def suite_file(tmp_path, monkeypatch):
-    shutil.copy(Path(__file__).parent / "models" / "faulty.py", tmp_path / "faulty.py")
+    shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", tmp_path / "faulty.py")
     monkeypatch.setattr(sys, "path", list(sys.path))
     monkeypatch.delitem(sys.modules, "faulty", raising=False)
     path = tmp_path / "mine.toml"

@@ -1,7 +1,7 @@
 """What an impact does to a block: the floor impact, a wall impact, or all contacts that touch at one instant.
 
-The bilateral pivot follows the paper's laws (ebm.impacts), one impact at a time. With the unilateral one every contact that touches
-takes part (ebm.contact_impacts). Either way slow rebounds end by the Zeno rule (ebm.settle). Natural units.
+The bilateral pivot follows the paper's laws (`impacts`), one impact at a time. With the unilateral one every contact that touches
+takes part (`contact_impacts`). Either way slow rebounds end by the Zeno rule (ebm.core.settle). Natural units.
 """
 
 from __future__ import annotations
@@ -10,8 +10,21 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm import impacts
-from rockcheck.ebm.contact_impacts import (
+from rockcheck.ebm.core.contacts import (
+    CLOSED,
+    SLOW,
+    between_walls,
+    closed_floor,
+    floor_gap,
+    land_upright,
+    slip_velocity,
+    stand,
+    stop,
+    wall_gap,
+)
+from rockcheck.ebm.core.guards import G_FAR_GAP, G_LANDING, G_PHI, G_TIP_GAP
+from rockcheck.ebm.core.laws import impacts
+from rockcheck.ebm.core.laws.contact_impacts import (
     CONTACTS,
     FAR_BOTTOM,
     FAR_TOP,
@@ -23,13 +36,11 @@ from rockcheck.ebm.contact_impacts import (
     F,
     contact_impact,
 )
-from rockcheck.ebm.contacts import CLOSED, SLOW, between_walls, closed_floor, floor_gap, land_upright, slip_velocity, stand, stop, wall_gap
-from rockcheck.ebm.guards import G_FAR_GAP, G_LANDING, G_PHI, G_TIP_GAP
-from rockcheck.ebm.modes import tips_first
-from rockcheck.ebm.motion import FAMILY, FAR, FLAT, FLOOR, HEIGHT, OFF, PULL, STICK, THETA, TILT, TIP, VX, VY, S, W, X
-from rockcheck.ebm.rules import ENDLESS_STAGES, FLUSH_LANDING, LANDS_ALONG, LEAST_CONTRADICTION, SETTLES, WEDGED
-from rockcheck.ebm.series import NOISE, POSITION
-from rockcheck.ebm.settle import SETTLE
+from rockcheck.ebm.core.modes import tips_first
+from rockcheck.ebm.core.motion import FAMILY, FAR, FLAT, FLOOR, HEIGHT, OFF, PULL, STICK, THETA, TILT, TIP, VX, VY, S, W, X
+from rockcheck.ebm.core.rules import ENDLESS_STAGES, FLUSH_LANDING, LANDS_ALONG, LEAST_CONTRADICTION, SETTLES, WEDGED
+from rockcheck.ebm.core.series import NOISE, POSITION
+from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 #: What an impact was.

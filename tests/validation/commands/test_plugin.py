@@ -42,7 +42,7 @@ def test_unknown(rockcheck_check):
 
 
 def test_check_holds_a_cell_against_its_suite(pytester):
-    shutil.copy(Path(__file__).parent / "models" / "faulty.py", pytester.path / "faulty.py")
+    shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", pytester.path / "faulty.py")
     (pytester.path / "rockcheck.toml").write_text(SUITE, encoding="utf-8")
     pytester.makepyfile(TESTS)
     result = pytester.runpytest_subprocess("-p", "no:randomly", "-rf")
@@ -71,7 +71,7 @@ def check():
 
 def test_the_old_name_warns_and_leaves_other_plugins_theirs(pytester, monkeypatch):
     """`check` was its name; pytest-check has a fixture of that name, which is the one to have where it is installed."""
-    shutil.copy(Path(__file__).parent / "models" / "faulty.py", pytester.path / "faulty.py")
+    shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", pytester.path / "faulty.py")
     (pytester.path / "rockcheck.toml").write_text(SUITE, encoding="utf-8")
     pytester.makepyfile('def test_old(check):\n    assert check("my-scene", model="near").figures\n')
     pytester.makeini("[pytest]\nrockcheck_allow_code = faulty:Still faulty:Fails\n")

@@ -21,9 +21,9 @@ from __future__ import annotations
 
 import math
 
-from rockcheck.ebm.contacts import SLOW, closed_wall, slip_velocity, stop, upright
-from rockcheck.ebm.ground import acceleration, fill_series
-from rockcheck.ebm.guards import (
+from rockcheck.ebm.core.contacts import SLOW, closed_wall, slip_velocity, stop, upright
+from rockcheck.ebm.core.ground import acceleration, fill_series
+from rockcheck.ebm.core.guards import (
     G_CONE_MINUS,
     G_CONE_PLUS,
     G_FAR_GAP,
@@ -39,8 +39,8 @@ from rockcheck.ebm.guards import (
     first_event,
     guard,
 )
-from rockcheck.ebm.modes import SOON, slacken, tips_first
-from rockcheck.ebm.motion import (
+from rockcheck.ebm.core.modes import SOON, slacken, tips_first
+from rockcheck.ebm.core.motion import (
     COS,
     FAMILY,
     FAR,
@@ -75,12 +75,12 @@ from rockcheck.ebm.motion import (
     tilt_series,
     workspace,
 )
-from rockcheck.ebm.rules import LEAST_CONTRADICTION, PULLS
-from rockcheck.ebm.running import CORNER, GOING, HOLDS, RELEASE, SLIPS, STICKS, UPLIFT, ZETA, T, mode_code, note
-from rockcheck.ebm.series import FORCE, NO_ROOT, NOISE, POSITION, first_root, leading, step_size, value
+from rockcheck.ebm.core.rules import LEAST_CONTRADICTION, PULLS
+from rockcheck.ebm.core.running import CORNER, GOING, HOLDS, RELEASE, SLIPS, STICKS, UPLIFT, ZETA, T, mode_code, note
+from rockcheck.ebm.core.series import FORCE, NO_ROOT, NOISE, POSITION, first_root, leading, step_size, value
 from rockcheck.scenes.compiled import inner_kernel, kernel, placed_kernel
 
-# Rows of the workspace after those of ebm.motion: z, V and what the recurrences need.
+# Rows of the workspace after those of ebm.core.motion: z, V and what the recurrences need.
 Z, V, Z2, SPIN2, WEIGHT, ARM, TURN, REACH, INERTIA, LOAD, PUSH, ZA, LEVER, DEN, TORQUE = range(ROWS, ROWS + 15)
 _ROWS = ROWS + 15
 
@@ -123,7 +123,7 @@ def _fill_z(a, k, loads, yielded, yield_displacement):
 def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order, a):
     """Fills the workspace with the series of a block whose pivot, or base, carries the friction force -mu_k |P| z.
 
-    Tilted, in the pivot's frame (see ebm.motion): with Sw = +-1 where a corner rests on the tip or far wall, else 0,
+    Tilted, in the pivot's frame (see ebm.core.motion): with Sw = +-1 where a corner rests on the tip or far wall, else 0,
     C = Sw c', J = 1/3 + C^2, f = u - Sw s' w^2, g = G0 - c w^2 and k = mu_k z sgn P,
 
         P = (g J - s C f) / (J + s^2 + k s (c + C)),   Q = -k P,   J theta'' = -s P + (c + C) Q - C f,
@@ -274,7 +274,7 @@ def _begin(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a):
 
 @inner_kernel
 def _wedged_series(b, m, z, zeta, gh, gv, t, order, reach, a):
-    """The series of a block that both walls hold (see ebm.motion), and the share of its friction in what they carry."""
+    """The series of a block that both walls hold (see ebm.core.motion), and the share of its friction in what they carry."""
     order = tilt_series(b, m, z, gh, gv, t, order, 0.0, reach, a)
     lever = a[COS, 0] / (b.sin_2alpha * a[SIN, 0] + b.cos_2alpha * a[COS, 0])  # of friction over that of the walls' forces
     friction = b.mu_k * m[S] * zeta * math.copysign(1.0, a[P, 0])
@@ -437,7 +437,7 @@ def follow(b, gh, gv, r, which, before, yields, log, a):
     """What follows an event that is no impact."""
     z, m, t = r.z, r.m, r.now[T]
     kind = -1
-    # At one instant each further event doubles the slack, as in a selection (ebm.modes).
+    # At one instant each further event doubles the slack, as in a selection (ebm.core.modes).
     slacken(r.memory)
     if which == G_LOADS:
         r.now[ZETA] = 0.0

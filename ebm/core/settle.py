@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rockcheck.ebm.rules import ENDLESS_STAGES, RATTLES
-from rockcheck.ebm.series import INSTANT
+from rockcheck.ebm.core.rules import ENDLESS_STAGES, RATTLES
+from rockcheck.ebm.core.series import INSTANT
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 #: The settling speed, sqrt(g R): 1e-7 rad/s for the paper's block.

@@ -1,6 +1,6 @@
 """Impacts where the floor can only push: Newton's restitution with Coulomb friction at every contact that is touched.
 
-In the pivot's frame (see ebm.motion), natural units. Six contacts: the pivot F and the other bottom corner E on the floor, the
+In the pivot's frame (see ebm.core.motion), natural units. Six contacts: the pivot F and the other bottom corner E on the floor, the
 top and bottom corner on the tip wall, the bottom and top corner on the far wall; E and the second corner of a wall touch
 only at theta = 0.
 
@@ -24,9 +24,9 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.contacts import CLOSED
-from rockcheck.ebm.motion import CLOSED_BRANCH, FLOOR_FIRST, MOREAU
-from rockcheck.ebm.series import NOISE, POSITION
+from rockcheck.ebm.core.contacts import CLOSED
+from rockcheck.ebm.core.motion import CLOSED_BRANCH, FLOOR_FIRST, MOREAU
+from rockcheck.ebm.core.series import NOISE, POSITION
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 F, E, TIP_TOP, TIP_BOTTOM, FAR_BOTTOM, FAR_TOP = range(6)

@@ -3,7 +3,7 @@
 Contact forces that push, friction inside the cone, slip that keeps its direction, open contacts that stay open. A guard is a linear
 combination of the series of a step (positions and forces) or of their rates; GUARDS lists them, and a table in the workspace
 holds the weights that a mode gives them. The first root of a guard is an event; the signs with which they leave zero select the
-mode (see ebm.modes).
+mode (see ebm.core.modes).
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.contacts import CLOSED, closed_gap
-from rockcheck.ebm.motion import (
+from rockcheck.ebm.core.contacts import CLOSED, closed_gap
+from rockcheck.ebm.core.motion import (
     COS,
     FAMILY,
     FAR,
@@ -38,7 +38,7 @@ from rockcheck.ebm.motion import (
     Y,
     delta,
 )
-from rockcheck.ebm.series import FORCE, INSTANT, NO_ROOT, NOISE, POSITION, RATE, first_root
+from rockcheck.ebm.core.series import FORCE, INSTANT, NO_ROOT, NOISE, POSITION, RATE, first_root
 from rockcheck.scenes.compiled import inner_kernel
 
 # In the order in which those of one instant count: floor before walls, contacts before friction.

@@ -25,11 +25,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rockcheck.ebm.ground import STILL, fill_series
-from rockcheck.ebm.series import MOST_TERMS, slope, value
+from rockcheck.ebm.core.ground import STILL, fill_series
+from rockcheck.ebm.core.series import MOST_TERMS, slope, value
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
-#: The laws of impacts at several contacts (see ebm.contact_impacts).
+#: The laws of impacts at several contacts (see ebm.core.laws.contact_impacts).
 LAWS = ("moreau", "closed", "open", "floor-first")
 MOREAU, CLOSED_BRANCH, OPEN_BRANCH, FLOOR_FIRST = range(4)
 
@@ -80,7 +80,7 @@ PHI, OMEGA, SIN, COS, U, G, XI, Y, P, Q, NA, NB, GUARD, KNOWN, FORCE, FLOOR_ARM,
 ROW, COLUMN, MATRIX, INVERSE = range(18, 30, 3)
 # The last angle whose sine and cosine were taken, and these: the end of a step is the start of the next one.
 ANGLE, ACCELERATION = 30, 31
-# The guards of the mode, a row each: the weights of the series in it (see ebm.guards).
+# The guards of the mode, a row each: the weights of the series in it (see ebm.core.guards).
 TABLE = 32
 ROWS = TABLE + 14
 

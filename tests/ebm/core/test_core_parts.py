@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from rockcheck.ebm import EventBasedModel, ground, guards, modes, motion, natural, rules, series
+from rockcheck.ebm import EventBasedModel, natural
+from rockcheck.ebm.core import ground, guards, modes, motion, rules, series
 from rockcheck.scenes import Block, Floor, Record, Scene, Wall
 
 PIVOTS = ["bilateral", "unilateral"]

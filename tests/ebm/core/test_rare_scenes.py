@@ -150,7 +150,7 @@ def test_a_decided_run_has_the_peak_of_the_whole_run(amplitude, period, friction
 def test_impulse_ahead_is_the_integral(symmetric):
     from scipy.integrate import quad
 
-    from rockcheck.ebm.ground import acceleration, ground_of, impulse_ahead
+    from rockcheck.ebm.core.ground import acceleration, ground_of, impulse_ahead
 
     ground = ground_of(Ricker(amplitude=5.0, period=1.3, symmetric=symmetric), 9.81, 0.4)
     for share in (1.3, 1.6, 2.2):

@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rockcheck.ebm import EventBasedModel, rules
+from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.core import rules
 from rockcheck.scenes import Block, Floor, Record, Scene, Wall, kinematics, load_scene
 from rockcheck.scenes.files import read_toml
 from rockcheck.scenes.scene import PAPER_BLOCK
 
-CHOICES = Path(__file__).parents[1] / "data" / "modelling_choices"
+CHOICES = Path(__file__).parents[2] / "data" / "modelling_choices"
 PINNED = read_toml(CHOICES / "index.toml")["choices"]
 SQUAT = Block(half_width=0.1, half_height=0.05)
 TALL = Block(half_width=0.2, half_height=1.0)

@@ -17,10 +17,10 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.contacts import SLOW, closed_floor, closed_wall, slip_velocity, stand, stop, upright
-from rockcheck.ebm.ground import acceleration
-from rockcheck.ebm.guards import G_FAR_GAP, G_PHI, G_SLIP, GUARDS, KIND, fill_guards, guard
-from rockcheck.ebm.motion import (
+from rockcheck.ebm.core.contacts import SLOW, closed_floor, closed_wall, slip_velocity, stand, stop, upright
+from rockcheck.ebm.core.ground import acceleration
+from rockcheck.ebm.core.guards import G_FAR_GAP, G_PHI, G_SLIP, GUARDS, KIND, fill_guards, guard
+from rockcheck.ebm.core.motion import (
     FAMILY,
     FAR,
     FLAT,
@@ -43,8 +43,8 @@ from rockcheck.ebm.motion import (
     flat_series,
     tilt_series,
 )
-from rockcheck.ebm.rules import LEAST_CONTRADICTION, MODE_AGAIN, TIPS
-from rockcheck.ebm.series import INSTANT, MOST_TERMS, NOISE, contradiction, leading
+from rockcheck.ebm.core.rules import LEAST_CONTRADICTION, MODE_AGAIN, TIPS
+from rockcheck.ebm.core.series import INSTANT, MOST_TERMS, NOISE, contradiction, leading
 from rockcheck.scenes.compiled import inner_kernel
 
 #: Order of the series that a selection looks at.

@@ -8,8 +8,9 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from rockcheck.ebm import EventBasedModel, impacts, natural
-from rockcheck.ebm import contact_impacts as ci
+from rockcheck.ebm import EventBasedModel, natural
+from rockcheck.ebm.core.laws import contact_impacts as ci
+from rockcheck.ebm.core.laws import impacts
 from rockcheck.scenes import Block, Floor, Scene
 from rockcheck.scenes.scene import PAPER_BLOCK
 

@@ -1,4 +1,7 @@
-"""What the event core is made of, counted: small numbers, zeros, modelling choices, complexity. `python tests/ebm/ledger.py` prints it."""
+"""What the event core is made of, counted: small numbers, zeros, modelling choices, complexity.
+
+`python tests/ebm/core/ledger.py` prints it.
+"""
 
 from __future__ import annotations
 
@@ -7,19 +10,19 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import rockcheck.ebm
-from rockcheck.ebm import rules
+from rockcheck.ebm.core import rules
 
 FOLDER = Path(rockcheck.ebm.__file__).parent
 #: What counts as a small number, and the zeros: where they are defined, and of what.
 SMALL = 2e-3
-ZEROS = {"position": ("contacts.py", "CLOSED"), "velocity": ("contacts.py", "SLOW"), "time": ("series.py", "INSTANT")}
+ZEROS = {"position": ("core/contacts.py", "CLOSED"), "velocity": ("core/contacts.py", "SLOW"), "time": ("core/series.py", "INSTANT")}
 #: Statements and expressions at which a path divides, as ruff's C901 counts them.
 _BRANCHES = (ast.If, ast.For, ast.While, ast.ExceptHandler, ast.comprehension, ast.match_case)
 
 
 def sources() -> dict[str, ast.Module]:
-    """The modules of the package, parsed, by file name."""
-    return {path.name: ast.parse(path.read_text(encoding="utf-8")) for path in sorted(FOLDER.glob("*.py"))}
+    """The modules of the package, parsed, by path in it."""
+    return {path.relative_to(FOLDER).as_posix(): ast.parse(path.read_text(encoding="utf-8")) for path in sorted(FOLDER.rglob("*.py"))}
 
 
 def small_numbers() -> list[tuple[str, int, float]]:
@@ -43,7 +46,7 @@ def homes(rule: str) -> set[str]:
 
 
 def names_of_rules() -> dict[str, str]:
-    """The constants of ebm.rules and the names that they stand for."""
+    """The constants of ebm.core.rules and the names that they stand for."""
     constants = {key: value for key, value in vars(rules).items() if key.isupper() and isinstance(value, int) and key != "RULES"}
     return {key: rules.NAMES[value] for key, value in sorted(constants.items(), key=lambda item: item[1])}
 

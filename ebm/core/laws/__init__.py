@@ -1,0 +1,1 @@
+"""Laws of impact: the paper's cascade, and contacts that only push."""
