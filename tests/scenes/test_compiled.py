@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from rockcheck import ebm
+from rockcheck.ebm.core import march
 from rockcheck.scenes import compiled
 
 posix = pytest.mark.skipif(os.name != "posix", reason="owners and modes as POSIX has them")
@@ -67,6 +69,19 @@ def test_what_was_compiled_is_read_back(tmp_path, play):
     assert play("2 read, 0 compiled") == ""
     (tmp_path / "tiny" / "kernels.py").write_text(_TINY.replace("2.0 * x", "x + x"))
     assert play("0 read, 2 compiled") == ""
+
+
+def test_the_key_is_of_all_that_lies_below_the_package(tmp_path, monkeypatch):
+    """A function of rockcheck.ebm.core.march may call one of any module of rockcheck.ebm."""
+    assert compiled._package(march.run.py_func) == Path(ebm.__file__).parent
+    monkeypatch.setattr(compiled.config, "CACHE_DIR", str(tmp_path / "cache"))
+    below = tmp_path / "package" / "core" / "deep.py"
+    below.parent.mkdir(parents=True)
+    keys = set()
+    for text in ("x = 1", "x = 2", "x = 1"):
+        below.write_text(text)
+        keys.add(compiled._cache_folder.__wrapped__(tmp_path / "package"))
+    assert len(keys) == 2
 
 
 @pytest.mark.parametrize("damage", ["cut short", "a flipped bit", "empty", "a folder", "a pipe", "another's pickle", "a link to nowhere"])

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from multiprocessing import resource_tracker
 from typing import Any, Self
 
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes.errors import InputError, ModelFailure, printable
 
 #: One thread a process: the calls are what runs in parallel.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
@@ -66,6 +66,14 @@ class Ended:
         if isinstance(self.error, MemoryError):
             return "out of memory"
         return printable(f"{type(self.error).__name__}: {self.error}", 300)
+
+    @property
+    def unexpected(self) -> bool:
+        """Whether the call raised what nobody foresaw: a fault of rockcheck's own, where the call runs nothing else."""
+        from pebble import ProcessExpired
+
+        foreseen = (InputError, ModelFailure, OSError, TimeoutError, ProcessExpired, MemoryError)
+        return self.error is not None and not isinstance(self.error, foreseen)
 
 
 @dataclass(eq=False)

@@ -100,10 +100,9 @@ class Tiles:
         calls = (Call(play_tile, (scene, amplitudes[part], frequencies[part], model, settings), key=part) for part in parts)
         sides, failed = np.zeros(len(amplitudes), dtype=np.int8), np.zeros(len(amplitudes), dtype=bool)
         for ended in self._pool.run(deque(calls)):
-            if isinstance(ended.error, InputError | ModelFailure):
-                raise ended.error
             if ended.error is not None:
-                raise ModelFailure(f"{model}: {ended.fault}; what was finished is kept")
+                own = isinstance(ended.error, InputError | ModelFailure) or ended.unexpected
+                raise ended.error if own else ModelFailure(f"{model}: {ended.fault}; what was finished is kept")
             (sides[ended.call.key], failed[ended.call.key]), _ = ended.result
             self.count.add(len(amplitudes[ended.call.key]))
         return sides, failed
