@@ -19,7 +19,7 @@ from rockcheck.ebm.core.march import DONE, FAILURES, OVERTURNED, Control, run
 from rockcheck.ebm.core.motion import Setting, workspace
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes.compiled import kernel, threads
-from rockcheck.scenes.errors import ModelFailure
+from rockcheck.scenes.errors import InputError, ModelFailure
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.scene import Scene
 
@@ -79,6 +79,8 @@ def pack(scenes: Sequence[Scene], model: EventBasedModel) -> Packed:
     offset = 0
     horizontal: list[tuple[float, ...]] = []
     vertical: list[tuple[float, ...]] = []
+    if model.friction == "bouc-wen":
+        raise InputError("a batch has Coulomb's friction or none", "friction")
     for scene in scenes:
         model.check(scene)
         for ground, rows in zip(natural.grounds_of(scene), (horizontal, vertical), strict=True):
@@ -183,7 +185,8 @@ def run_batch(
 
 
 @kernel
-def _ground(row, samples):
+def row_ground(row, samples):
+    """The base motion of a packed row."""
     return Ground(
         kind=row.kind,
         c0=row.c0,
@@ -199,34 +202,39 @@ def _ground(row, samples):
 
 
 @kernel
+def row_setting(r):
+    """Block, floor and walls of a packed row."""
+    return Setting(
+        alpha=r.alpha,
+        sin_alpha=r.sin_alpha,
+        cos_alpha=r.cos_alpha,
+        sin_2alpha=r.sin_2alpha,
+        cos_2alpha=r.cos_2alpha,
+        mu_s=r.mu_s,
+        mu_k=r.mu_k,
+        e_floor=r.e_floor,
+        gap_left=r.gap_left,
+        gap_right=r.gap_right,
+        e_left=r.e_left,
+        e_right=r.e_right,
+        walls=r.walls,
+        no_slip=r.no_slip,
+        unilateral=r.unilateral,
+        energy_cap=r.energy_cap,
+        law=int(r.law),
+    )
+
+
+@kernel
 def _run_rows(settings, horizontal, vertical, states, durations, samples, control, side, peak, t_end, series, ending):
     a, stack = workspace()
     out, out_mode, log = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
     z = np.empty(6)
     for i in range(len(durations)):
-        r = settings[i]
-        b = Setting(
-            alpha=r.alpha,
-            sin_alpha=r.sin_alpha,
-            cos_alpha=r.cos_alpha,
-            sin_2alpha=r.sin_2alpha,
-            cos_2alpha=r.cos_2alpha,
-            mu_s=r.mu_s,
-            mu_k=r.mu_k,
-            e_floor=r.e_floor,
-            gap_left=r.gap_left,
-            gap_right=r.gap_right,
-            e_left=r.e_left,
-            e_right=r.e_right,
-            walls=r.walls,
-            no_slip=r.no_slip,
-            unilateral=r.unilateral,
-            energy_cap=r.energy_cap,
-            law=int(r.law),
-        )
+        b = row_setting(settings[i])
         z[:] = states[i]
         tally = run(
-            b, _ground(horizontal[i], samples), _ground(vertical[i], samples), z, durations[i], control, out, out_mode, log, a, stack
+            b, row_ground(horizontal[i], samples), row_ground(vertical[i], samples), z, durations[i], control, out, out_mode, log, a, stack
         )
         ending[i] = tally.ending
         if tally.ending == OVERTURNED:

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.ebm import natural
+from rockcheck.ebm.batch import pack, row_ground, row_setting
+from rockcheck.ebm.core.march import FAILURES, OVERTURNED, Control, run
+from rockcheck.ebm.core.motion import THETA, X, workspace
 from rockcheck.ebm.model import EventBasedModel
+from rockcheck.scenes import kinematics
+from rockcheck.scenes.compiled import kernel, threads
+from rockcheck.scenes.errors import ModelFailure
 from rockcheck.scenes.scene import Scene
 
 Floats = NDArray[np.float64]
+_CHUNK = 32
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,7 +28,7 @@ class Ensemble:
     """What a model makes of some scenes, one row a scene.
 
     `theta` (rad, n x rows) at times `t` (s), after a fall pi/2 to its side; empty where no rows were asked for. `side` is -1
-    overturned left, +1 right, 0 not; `peak` the largest |theta| on the grid (rad, pi/2 of a fall); `last_slip` in m; `alpha`
+    overturned left, +1 right, 0 not; `peak` the largest |theta| (rad, pi/2 of a fall); `last_slip` in m; `alpha`
     the blocks' own (rad).
     """
 
@@ -32,22 +40,53 @@ class Ensemble:
     alpha: Floats
 
 
-def play_ensemble(scenes: Sequence[Scene], model: EventBasedModel, *, rows: int = 0) -> Ensemble:
-    """Play scenes of one duration to their end. Raises what `simulate` raises."""
-    first = scenes[0]
-    step = max(first.output_step, first.duration / rows) if rows else first.output_step
-    t = first.replace(output_step=step).output_times
-    theta = np.empty((len(scenes), len(t) if rows else 0))
-    side, peak, slip = np.zeros(len(scenes), dtype=np.int8), np.empty(len(scenes)), np.empty(len(scenes))
-    for i, scene in enumerate(scenes):
-        history = model.simulate(scene.replace(output_step=step))
-        rotation = history.channels["theta"]
-        if history.outcome.startswith("overturned"):
-            side[i] = -1 if history.outcome.endswith("left") else 1
-        peak[i] = 0.5 * math.pi if side[i] else history.peak_rotation
-        slip[i] = history.channels["slip"][-1]
-        if rows:
-            theta[i, : len(rotation)] = rotation
-            theta[i, len(rotation) :] = -0.5 * math.pi * side[i]
+def play_ensemble(scenes: Sequence[Scene], model: EventBasedModel, *, rows: int = 0, jobs: int | None = None) -> Ensemble:
+    """Play scenes of one duration to their end, on `jobs` threads (default: all cores).
+
+    Raises `InputError` where the model cannot play one of them, or has Bouc-Wen friction, and `ModelFailure`.
+    """
+    packed = pack(scenes, model)
+    first, count = scenes[0], len(scenes)
+    step = max(first.output_step, first.duration / rows) if rows else first.duration
+    t = first.replace(output_step=step).output_times if rows else np.empty(0)
+    steps = np.array([step / natural.time_unit(scene) for scene in scenes])
+    theta, states = np.empty((count, len(t))), packed.states.copy()
+    peak, ending = np.empty(count), np.zeros(count, dtype=np.int64)
+    control = Control(model.tolerance, model.order, model.most_steps, model.most_events, False, 1.0)
+
+    def chunk(begin: int) -> None:
+        part = slice(begin, begin + _CHUNK)
+        grounds = packed.horizontal[part], packed.vertical[part]
+        _sample_rows(
+            packed.settings[part], *grounds, states[part], packed.durations[part], packed.samples, control, steps[part], theta[part],
+            peak[part], ending[part],
+        )  # fmt: skip
+
+    with threads(jobs or os.cpu_count() or 1) as pool:
+        list(pool.map(chunk, range(0, count, _CHUNK)))
+    failed = np.isin(ending, tuple(FAILURES))
+    if failed.any():
+        i = int(np.argmax(failed))
+        raise ModelFailure(f"{model.name}: scene {i} of the ensemble: {FAILURES[int(ending[i])]}")
+    side = np.where(ending == OVERTURNED, -np.sign(states[:, THETA]), 0.0).astype(np.int8)
+    slip = [float(kinematics.slip(scene.block, z[X] * scene.block.radius, z[THETA])) for scene, z in zip(scenes, states, strict=True)]
     alpha = np.array([scene.block.alpha for scene in scenes])
-    return Ensemble(t=t, theta=theta, side=side, peak=peak, last_slip=slip, alpha=alpha)
+    return Ensemble(t=t, theta=theta, side=side, peak=peak, last_slip=np.array(slip), alpha=alpha)
+
+
+@kernel
+def _sample_rows(settings, horizontal, vertical, states, durations, samples, control, steps, theta, peak, ending):
+    """Plays each row to its end: its rotations on the grid, its last state (in place of the first), its peak and how it ended."""
+    a, stack = workspace()
+    rows = theta.shape[1]
+    out, out_mode, log = np.empty((rows, 6)), np.empty(rows, dtype=np.int8), np.empty((0, 5))
+    z = np.empty(6)
+    for i in range(len(durations)):
+        c = Control(control.tolerance, control.order, control.most_steps, control.most_events, False, steps[i])
+        grounds = row_ground(horizontal[i], samples), row_ground(vertical[i], samples)
+        z[:] = states[i]
+        tally = run(row_setting(settings[i]), grounds[0], grounds[1], z, durations[i], c, out, out_mode, log, a, stack)
+        states[i] = z
+        peak[i], ending[i] = tally.peak, tally.ending
+        for k in range(rows):
+            theta[i, k] = out[k, THETA] if k < tally.rows else z[THETA]
