@@ -50,7 +50,8 @@ def test_a_scene_file(tmp_path):
     ("old", "new", "said"),
     [
         ("duration = 8.0", "duration = -8.0", "duration: -8.0 is not allowed: input should be greater than 0"),
-        ("duration = 8.0", "durations = 8.0", "duration: is missing"),
+        ("duration = 8.0", "", "duration: is missing"),
+        ("duration = 8.0", "durations = 8.0", "durations: unknown key; did you mean 'duration'"),
         ("duration = 8.0", "duration = 8.0\ncolour = 1", "colour: unknown key"),
         ("duration = 8.0", "duration = nan", "duration: nan is not allowed"),
         ("half_width = 0.397", "half_width = -0.397", "block.half_width: -0.397 is not allowed: input should be greater than 0"),

@@ -77,7 +77,7 @@ def simulated(type_, model: str, output: str, *words: str) -> str:
         (("[floor]", '[walls]\nside = "left"\ngap = 0.1\n[floor]'), "[[walls]], not [walls]"),
         (("half_width", "halfwidth"), "block.halfwidth: unknown key; did you mean 'half_width'"),
         (("[block]", "[blok]"), "blok: unknown key; did you mean 'block'"),
-        (("[floor]", '[excitation]\nkind = "record"\nfile = "a.csv"\nunit = "g"\n[floor]'), "excitation.unit"),
+        (("[floor]", '[excitation]\nkind = "record"\nfile = "a.csv"\nunit = "kg"\n[floor]'), "excitation.unit"),
     ],
 )
 def test_a_slip_in_a_scene_file_is_named(type_, change, said):
