@@ -19,6 +19,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from rockcheck.reports import tables, words
 from rockcheck.reports.ensembles import EnsembleView, ensemble_views, write_ensemble_figures
 from rockcheck.reports.figures import figure_stem, write_figures
+from rockcheck.reports.overview import write_overview
 from rockcheck.reports.payload import script
 from rockcheck.reports.scene_file import write_scene_file
 from rockcheck.reports.style import LOOKS, SPARE, looks
@@ -175,7 +176,8 @@ class _Pages:
         ensembles = [view for view in self.views.values() if isinstance(view, EnsembleView)]
         worst, times = tables.worst_first(self.run), tables.run_times(self.run)
         summaries = {model: FAMILIES[model].summary for model in self.run.models if model in FAMILIES}
-        shown = {"scenes": scenes, "ensembles": ensembles, "worst": worst, "times": times, "summaries": summaries}
+        shown: dict[str, Any] = {"scenes": scenes, "ensembles": ensembles, "worst": worst, "times": times, "summaries": summaries}
+        shown |= write_overview(self.run, _made(self.folder / PAGES / "figures"))
         return self.site.page("index.html", "index.html", **shown, **_common(self.run))
 
     def stamp(self, view: View) -> str:

@@ -1,6 +1,6 @@
 """What is known of the models from the suites (data/experience.json): how far to trust a figure, and for which scenes.
 
-The file is written by `rockcheck uncertainty --learn RUN ...` from finished runs (`validation.suite.experience`).
+The file is written by docs/site_tools/experience.py from finished runs (`validation.suite.experience`).
 """
 
 from __future__ import annotations

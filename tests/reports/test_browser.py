@@ -89,6 +89,23 @@ def test_every_link_leads_to_a_file(visit: Visit) -> None:
     playwright.expect(page.locator("h1")).to_contain_text("A model failed")
 
 
+def test_the_index_is_filtered_and_sorted(visit: Visit) -> None:
+    page = visit.open("index.html")
+    shown = "[...document.querySelectorAll('#matrix tbody tr:not([hidden])')].map(row => row.dataset.scene)"
+    assert page.evaluate(shown) == ["free", "beside a wall", "Free"]
+    page.locator("#pick [name=order]").select_option("worst")
+    assert page.evaluate(shown)[:2] == ["Free", "beside a wall"]
+    page.locator("#pick [name=verdict]").select_option("fail")
+    assert page.evaluate(shown) == ["beside a wall"]
+    page.locator("#pick [name=model]").select_option("cm")
+    assert page.evaluate(shown) == []
+    assert page.locator("#matrix thead th:visible").count() == 2
+    page.locator("#pick [name=verdict]").select_option("")
+    page.locator("#pick [name=name]").fill("WALL")
+    assert page.evaluate(shown) == ["beside a wall"]
+    playwright.expect(page.locator("#pick output")).to_have_text("1 of 3 scenes")
+
+
 def test_zoom_by_dragging_moves_all_plots(visit: Visit) -> None:
     page = visit.open(WALL)
     box = page.locator("#plots .u-over").nth(3)

@@ -15,6 +15,7 @@ import pytest
 from rockcheck.reports import write_site
 from rockcheck.reports.ensembles import distributions_figure, ensemble_views
 from rockcheck.reports.figures import histories_figure
+from rockcheck.reports.overview import PEAKS, accuracies, matrix
 from rockcheck.reports.payload import packed
 from rockcheck.reports.scene_file import write_scene_file
 from rockcheck.reports.site import PAGES
@@ -101,6 +102,36 @@ def test_index_lists_what_is_wrong_worst_first(site: Path) -> None:
     index = (site / "index.html").read_text(encoding="utf-8")
     assert "A model failed" in index
     assert "tolerance [old.cm.ebm: theta_rms] has no cell in the suite" in index
+
+
+def test_index_says_how_far_each_model_is(site: Path) -> None:
+    run = Run.load(site)
+    rows = {row.scene: dict(zip(run.models, row.entries, strict=True)) for row in matrix(run)}
+    assert set(rows) == set(run.scenes)
+    late = rows["beside a wall"]["mine:Model"]
+    assert late is not None
+    assert late.rms is not None
+    assert (late.rms.window, late.rms.value) == ("8s", pytest.approx(0.006))
+    assert late.used == pytest.approx(3.0)
+    assert rows["free"]["mine:Model"] is None
+    falling = rows["Free"]["ebm"]
+    assert falling is not None
+    assert falling.apart == (run.cell("Free", "ebm").outcome != run.cell("Free", "ebm-unilateral").outcome)
+    lost = next(row for row in matrix(run) if row.scene == "Free")
+    assert lost.worst == 1e9
+    assert "error" in lost.verdicts
+    index = (site / "index.html").read_text(encoding="utf-8")
+    assert '<tr data-scene="beside a wall"' in index
+
+
+def test_index_shows_peaks_against_the_reference_s(site: Path) -> None:
+    run = Run.load(site)
+    (crowd,) = (one for one in accuracies(run) if one.model == "cm")
+    assert len(crowd.pairs) > 30
+    assert crowd.here is not None
+    assert crowd.here.scatter == pytest.approx(0.14, abs=0.02)  # 0.2 sin k
+    assert f"{crowd.here.bias:.4g}" in (site / "index.html").read_text(encoding="utf-8")
+    assert (site / PAGES / "figures" / "overview-peaks.svg").stat().st_size > 1000
 
 
 def test_index_says_what_the_models_are(site: Path) -> None:
@@ -275,8 +306,8 @@ def test_numbers_for_people() -> None:
 
 
 def files_of(site: Path) -> dict[str, tuple[int, bytes]]:
-    """By name: time of writing and content of all that belongs to the scenes' pages."""
-    found = (path for path in (site / PAGES).rglob("*") if path.is_file() and path.parent.name != "assets")
+    """By name: time of writing and content of all that belongs to the scenes' pages, not to the index."""
+    found = (path for path in (site / PAGES).rglob("*") if path.is_file() and path.parent.name != "assets" and path.stem != PEAKS)
     return {path.relative_to(site / PAGES).as_posix(): (path.stat().st_mtime_ns, path.read_bytes()) for path in found}
 
 

@@ -185,13 +185,16 @@ def test_the_wait_for_compiled_code_can_be_interrupted(tmp_path):
     script.write_text(_SLOW)
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     for how in ("one", "many"):
-        running = subprocess.Popen([sys.executable, str(script), how], stdout=subprocess.PIPE, text=True, env=environment)
-        assert running.stdout is not None
-        assert running.stdout.readline() == "begins\n"
-        time.sleep(1.0)
-        running.send_signal(signal.SIGINT)
-        assert running.communicate(timeout=60)[0] == "interrupted\n"
-        assert running.returncode == 130
+        with subprocess.Popen([sys.executable, str(script), how], stdout=subprocess.PIPE, text=True, env=environment) as running:
+            try:
+                assert running.stdout is not None
+                assert running.stdout.readline() == "begins\n"
+                time.sleep(1.0)
+                running.send_signal(signal.SIGINT)
+                assert running.communicate(timeout=60)[0] == "interrupted\n"
+                assert running.returncode == 130
+            finally:
+                running.kill()
 
 
 _SLOW = """
