@@ -89,6 +89,7 @@ STUDIES = (
     ("Stress", "stress/index.html"),
     ("Conformance", "conformance/index.html"),
     ("Overturning spectra", "spectra.html"),
+    ("Incremental dynamic analysis", "ida/index.html"),
 )
 
 

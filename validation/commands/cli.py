@@ -31,7 +31,7 @@ from rockcheck.validation.commands import (
     validate,
 )
 from rockcheck.validation.commands.engines import calibrate, conformance
-from rockcheck.validation.commands.studies import benchmark, convergence, spectrum, stress
+from rockcheck.validation.commands.studies import benchmark, convergence, ida, spectrum, stress
 from rockcheck.validation.suite.results import FAULT
 
 #: The commands, in the order of the help, each with an example.
@@ -45,6 +45,7 @@ COMMANDS = {
     validate: "rockcheck validate smoke --out rockcheck-report",
     accept: 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"',
     spectrum: "rockcheck spectrum --figure 8 --size 50 --refine",
+    ida: "rockcheck ida shelf.toml records --intensity sa --period 0.5",
     benchmark: "rockcheck benchmark --quick",
     convergence: "rockcheck convergence --quick",
     conformance: "rockcheck conformance --engine mujoco --settings default",

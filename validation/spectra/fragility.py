@@ -133,7 +133,9 @@ def lognormal(intensities: Floats, median: float, dispersion: float) -> Floats:
 
 
 def fit_lognormal(intensities: Floats, overturned: NDArray[np.int64], runs: NDArray[np.int64]) -> tuple[float, float] | None:
-    """Median and dispersion of the lognormal curve of the greatest likelihood (Baker 2015); None where all or none overturn.
+    """Median and dispersion of the lognormal curve of the greatest likelihood (Baker 2015).
+
+    None where all or none overturn, or where it does not rise with the intensity.
 
     `overturned` counts the runs, of those that were decided, that overturn the block at each intensity.
     """
@@ -142,15 +144,17 @@ def fit_lognormal(intensities: Floats, overturned: NDArray[np.int64], runs: NDAr
 
     if not 0 < overturned.sum() < runs.sum():
         return None
+    logarithm = np.log(intensities)
+    centre = float(np.mean(logarithm))
 
-    def unlikelihood(place: Floats) -> float:
-        linear = (np.log(intensities) - place[0]) / np.exp(place[1])
+    def unlikelihood(line: Floats) -> float:  # convex, as a straight line in ln x; not so in median and dispersion
+        linear = line[0] + line[1] * (logarithm - centre)
         return -float(np.sum(overturned * log_ndtr(linear) + (runs - overturned) * log_ndtr(-linear)))
 
-    found = minimize(
-        unlikelihood, [float(np.mean(np.log(intensities))), -0.7], method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-9}
-    )
-    return float(np.exp(found.x[0])), float(np.exp(found.x[1]))
+    level, slope = minimize(unlikelihood, [0.0, 1.0], method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-9, "maxiter": 2000}).x
+    if slope <= 0.0:
+        return None
+    return float(np.exp(centre - level / slope)), float(1.0 / slope)
 
 
 def curves_table(found: Fragility) -> str:

@@ -482,6 +482,15 @@ def test_the_lognormal_curve_is_found_again():
     assert fragility.fit_lognormal(intensities, np.full(60, 10), np.full(60, 10)) is None
 
 
+def test_a_curve_is_found_where_few_overturn():
+    counts = np.array([0] * 23 + [1, 1, 2, 4, 2, 1, 2, 1, 2, 2, 1, 4, 3, 5, 5, 5, 4])
+    intensities = np.linspace(0.02, 2.0, 40)
+    median, dispersion = fragility.fit_lognormal(intensities, counts, np.full(40, 12))
+    assert 1.9 < median < 2.4
+    assert 0.2 < dispersion < 0.5
+    assert fragility.fit_lognormal(intensities, counts[::-1], np.full(40, 12)) is None  # it falls
+
+
 def test_the_band_holds_the_binomial_spread():
     overturned = np.zeros((100, 2, 3), dtype=bool)
     overturned[:50, :, 1] = overturned[:, :, 2] = True  # directions alike: no more is known than from 100 runs
