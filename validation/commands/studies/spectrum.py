@@ -224,7 +224,7 @@ def _claims(spectra: Sequence[Spectrum], request: SpectrumRequest, tiles: Tiles,
     from rockcheck.validation.spectra.claims import Claims, check_claims, extra_runs
 
     tiles.count = Count()
-    claims = check_claims(spectra, extra_runs(tiles, request))
+    claims = check_claims(spectra, extra_runs(spectra, tiles, request))
     grid = f"{len(request.amplitudes)} x {len(request.frequencies)}"
     write_whole(data / "claims.json", Claims(grid=grid, model=request.model, claims=claims).model_dump_json(indent=1) + "\n")
     table = Table(box=None, pad_edge=False, title="The paper's section 5", title_justify="left")
