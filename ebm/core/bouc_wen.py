@@ -77,7 +77,7 @@ from rockcheck.ebm.core.motion import (
 )
 from rockcheck.ebm.core.rules import LEAST_CONTRADICTION, PULLS
 from rockcheck.ebm.core.running import CORNER, GOING, HOLDS, RELEASE, SLIPS, STICKS, UPLIFT, ZETA, T, mode_code, note
-from rockcheck.ebm.core.series import FORCE, NO_ROOT, NOISE, POSITION, first_root, leading, step_size, value
+from rockcheck.ebm.core.series import AHEAD, FORCE, NO_ROOT, NOISE, POSITION, first_root, leading, step_size, value
 from rockcheck.scenes.compiled import inner_kernel, kernel, placed_kernel
 
 # Rows of the workspace after those of ebm.core.motion: z, V and what the recurrences need.
@@ -247,7 +247,7 @@ def _tip(b, m, z, first, zeta, yield_displacement, gh, gv, t, rules, a):
         m[:] = 0
         m[FAMILY], m[S], m[SLIP] = TILT, sense, 1 if sense * v > 0.0 else -1
         _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a)
-        if leading(a, PHI, _LOOK, NOISE[POSITION]) > 0:
+        if leading(a, PHI, _LOOK, NOISE[POSITION], AHEAD) > 0:
             return True
     return False
 
@@ -313,12 +313,12 @@ def _walls_hold(b, m, touched, a):
     """Whether the walls of the mode push and those that are touched besides are left."""
     for which in range(2):
         if m[TIP if which == 0 else FAR] != 0:
-            if leading(a, NA if which == 0 else NB, _LOOK - 2, NOISE[FORCE]) < 0:
+            if leading(a, NA if which == 0 else NB, _LOOK - 2, NOISE[FORCE], AHEAD) < 0:
                 return False
         elif touched >> which & 1:
             fill_guards(b, m, 0.0, a)
             guard(G_TIP_GAP if which == 0 else G_FAR_GAP, _LOOK, a)
-            if leading(a, GUARD, _LOOK, NOISE[POSITION]) < 0:
+            if leading(a, GUARD, _LOOK, NOISE[POSITION], AHEAD) < 0:
                 return False
     return True
 
@@ -332,12 +332,12 @@ def _aim(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a):
     """
     m[PULL] = 1
     friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
-    if leading(a, P, _LOOK - 2, NOISE[FORCE]) >= 0 and a[DEN, 0] > 0.0:
+    if leading(a, P, _LOOK - 2, NOISE[FORCE], AHEAD) >= 0 and a[DEN, 0] > 0.0:
         return True
     m[PULL] = -1
     rules[PULLS] += 1
     friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
-    return leading(a, P, _LOOK - 2, NOISE[FORCE]) <= 0
+    return leading(a, P, _LOOK - 2, NOISE[FORCE], AHEAD) <= 0
 
 
 @inner_kernel
@@ -410,7 +410,7 @@ def locate(b, m, order, h, slack, a, stack):
     if m[FLOOR] == SLIPPING and m[SLIP] * a[Z, 0] <= -NOISE[POSITION]:
         for k in range(order):
             a[GUARD, k] = -m[SLIP] * a[Z, k]
-        root = first_root(a, GUARD, order - 1, tau, NOISE[POSITION], stack)
+        root = first_root(a, GUARD, order - 1, tau, NOISE[POSITION], AHEAD, stack)
         if root != NO_ROOT:
             return root, G_LOADS
     return tau, which

@@ -203,14 +203,15 @@ def impulse_ahead(g, t):
 def _passage(g, a, b, fa, fb, level):
     """Where the acceleration passes the level between a, inside it by fa, and b, beyond it by fb; it is monotone in between.
 
-    Regula falsi (Illinois), never nearer to an end than rounding, so that the bracket closes on the root; returns its outer end.
+    Regula falsi (Illinois), never nearer to an end than rounding, and halved in between, so that the bracket closes on the root also
+    where a is on it; returns its outer end.
     """
     rising = fb > 0.0
     close = 2.0 * _EPSILON * abs(b)
-    for _ in range(200):
+    for trial in range(200):
         if b - a <= close:
             break
-        guess = a - fa * (b - a) / (fb - fa)
+        guess = a - fa * (b - a) / (fb - fa) if trial % 4 < 3 else 0.5 * (a + b)
         middle = min(max(guess, a + close), b - close)
         if not a < middle < b:
             middle = 0.5 * (a + b)
@@ -229,19 +230,25 @@ def _passage(g, a, b, fa, fb, level):
 
 
 @inner_kernel
-def next_exceedance(g, t, low, high):
-    """The first time from t on at which the acceleration is below `low` or above `high`, on that side; else NEVER."""
+def next_exceedance(g, t, low, high, noise, ahead):
+    """The time from t on at which the acceleration passes below `low` or above `high`, on that side, to be beyond by `noise`; else NEVER.
+
+    It is the passage of the limit itself, but no more than `ahead` before that of the limit and the noise: what lingers at its limit has
+    not left it.
+    """
     here = acceleration(g, t)
     while True:
-        if here < low or here > high:
+        if here < low - noise or here > high + noise:
             return t
         end = _next_extremum(g, t)
         if end == NEVER:
             return NEVER
         there = g.samples[interval(g, end)] if g.kind == SAMPLED else acceleration(g, end)  # just before it, where a record ends
-        if there < low or there > high:
-            level = low if there < low else high
-            return _passage(g, t, end, here - level, there - level, level)
+        if there < low - noise or there > high + noise:
+            level, beyond = (low, low - noise) if there < low else (high, high + noise)
+            passed = t if (here - level) * (there - level) > 0.0 else _passage(g, t, end, here - level, there - level, level)
+            left = _passage(g, passed, end, acceleration(g, passed) - beyond, there - beyond, beyond)
+            return max(passed, left - ahead)
         if end <= t:
             return NEVER
         t, here = end, acceleration(g, end)

@@ -38,7 +38,7 @@ from rockcheck.ebm.core.motion import (
     Y,
     delta,
 )
-from rockcheck.ebm.core.series import FORCE, INSTANT, NO_ROOT, NOISE, POSITION, RATE, first_root
+from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, POSITION, RATE, first_root
 from rockcheck.scenes.compiled import inner_kernel
 
 # In the order in which those of one instant count: floor before walls, contacts before friction.
@@ -212,6 +212,21 @@ def guard(which, order, a):
 
 
 @inner_kernel
+def allowed(kind, slack):
+    """The noise that a guard of this kind is allowed in a mode with this slack: a contact that is not closed any more is no noise."""
+    return min(slack * NOISE[kind], CLOSED) if kind == POSITION else slack * NOISE[kind]
+
+
+@inner_kernel
+def seen(kind, smooth):
+    """How far ahead a guard of this kind is weighed where the base motion is smooth for the time `smooth`.
+
+    Forces follow the base acceleration at once, and beyond its next kink the series knows nothing of it; positions outlast a kink.
+    """
+    return min(AHEAD, smooth) if kind == FORCE else AHEAD
+
+
+@inner_kernel
 def first_event(order, h, slack, a, stack):
     """The first time within the step at which a guard ends the mode, and which; h and -1 where none does.
 
@@ -221,7 +236,8 @@ def first_event(order, h, slack, a, stack):
     for k in range(GUARDS):
         degree = guard(k, order, a)
         if degree >= 0:
-            root = first_root(a, GUARD, degree, h, slack * NOISE[KIND[k]], stack)  # in h, not tau: the mirror image has another order
+            # In h, not tau: the mirror image has another order.
+            root = first_root(a, GUARD, degree, h, allowed(KIND[k], slack), seen(KIND[k], h), stack)
             closes = 0 <= which <= G_FAR_GAP < k
             if root != NO_ROOT and root < tau - (INSTANT if closes else 0.0):
                 tau, which = root, k

@@ -102,7 +102,7 @@ from rockcheck.ebm.core.running import (
     mode_code,
     note,
 )
-from rockcheck.ebm.core.series import FORCE, NO_ROOT, NOISE, POSITION, first_root, slope, step_size, value
+from rockcheck.ebm.core.series import AHEAD, FORCE, NO_ROOT, NOISE, POSITION, first_root, slope, step_size, value
 from rockcheck.ebm.core.settle import no_impacts, settling_speed
 from rockcheck.scenes.compiled import inner_kernel, kernel, placed_kernel
 
@@ -195,10 +195,11 @@ def _rest(b, gh, r, t_end, control, records):
     limit = b.sin_alpha / b.cos_alpha
     if not b.no_slip:
         limit = min(limit, b.mu_s)
-    limit += (r.memory[SLACK] - 1.0) * 4.0 * NOISE[FORCE]
     if math.isnan(now[T_REST]):
         now[T_REST] = now[T]
-    until = next_exceedance(gh, now[T], -np.inf if m[FAR] != 0 else -limit, np.inf if m[TIP] != 0 else limit)
+    noise = 2.0 * r.memory[SLACK] * NOISE[FORCE] / b.cos_alpha  # of an acceleration, for all guards of rest to see it
+    low, high = -np.inf if m[FAR] != 0 else -limit, np.inf if m[TIP] != 0 else limit
+    until = next_exceedance(gh, now[T], low, high, noise, 0.5 * AHEAD)
     _sample_rest(r, min(until, t_end), control, records)
     if until >= t_end:
         now[T] = t_end if not control.until_decided else now[T]
@@ -297,7 +298,7 @@ def _locate(b, m, order, pivot, h, slack, a, stack):
     """The first time within the step at which a guard ends the mode, and which; h and -1 where none does."""
     rocks = m[FAMILY] == TILT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
     if rocks and m[PULL] > 0 and rock_guards_hold(b, order, h, a):
-        tau = first_root(a, PHI, order, h, NOISE[POSITION], stack)
+        tau = first_root(a, PHI, order, h, NOISE[POSITION], AHEAD, stack)
         return (h, -1) if tau == NO_ROOT else (tau, G_PHI)
     fill_guards(b, m, pivot, a)
     return first_event(order, h, slack, a, stack)
@@ -336,7 +337,7 @@ def _advance(b, r, order, pivot, tau, a, stack):
     """Moves the state to tau after the start of the step; keeps the largest rotation on the way."""
     z, now = r.z, r.now
     if r.m[FAMILY] == TILT and a[OMEGA, 0] > 0.0 and value(a, OMEGA, order - 1, tau) < 0.0:
-        top = first_root(a, OMEGA, order - 1, tau, NOISE[POSITION], stack)
+        top = first_root(a, OMEGA, order - 1, tau, NOISE[POSITION], AHEAD, stack)
         if top > 0.0:
             now[PEAK] = max(now[PEAK], value(a, PHI, order, top))
     _state(b, r.m, order, tau, pivot, a, z)

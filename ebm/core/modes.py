@@ -18,8 +18,8 @@ import math
 import numpy as np
 
 from rockcheck.ebm.core.contacts import SLOW, closed_floor, closed_wall, slip_velocity, stand, stop, upright
-from rockcheck.ebm.core.ground import acceleration
-from rockcheck.ebm.core.guards import G_FAR_GAP, G_PHI, G_SLIP, GUARDS, KIND, fill_guards, guard
+from rockcheck.ebm.core.ground import acceleration, next_kink
+from rockcheck.ebm.core.guards import G_FAR_GAP, G_PHI, G_SLIP, GUARDS, KIND, fill_guards, guard, seen
 from rockcheck.ebm.core.motion import (
     FAMILY,
     FAR,
@@ -126,17 +126,18 @@ def wrong_by(b, m, z, gh, gv, t, a):
         order = tilt_series(b, m, z, gh, gv, t, look, 0.0, 0.0, a)
         pivot = m[S] * z[X] - a[SIN, 0]
     fill_guards(b, m, pivot, a)
+    smooth = min(next_kink(gh, t), next_kink(gv, t)) - t
     worst = 0.0
     for which in range(GUARDS):
         degree = guard(which, order, a)
         if degree < 0 or (which <= G_FAR_GAP and a[GUARD, 1] < -SLOW):
             continue  # a contact that closes is the impact's
-        noise = NOISE[KIND[which]]
-        sign = leading(a, GUARD, degree, noise)
+        noise, ahead = NOISE[KIND[which]], seen(KIND[which], smooth)
+        sign = leading(a, GUARD, degree, noise, ahead)
         if not math.isfinite(a[GUARD, 0]) or (sign <= 0 and which == G_PHI and (m[FLOOR] != OFF or sign < 0)):
             return np.inf
         if sign < 0:
-            worst = max(worst, contradiction(a, GUARD, degree, noise) / noise)
+            worst = max(worst, contradiction(a, GUARD, degree, noise, ahead) / noise)
         elif sign == 0 and which == G_SLIP:
             worst = max(worst, 1.0)
     return worst

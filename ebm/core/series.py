@@ -63,24 +63,24 @@ def step_size(a, first, second, order, tolerance, reach):
 
 
 @inner_kernel
-def leading(a, row, n, floor):
-    """The sign with which c leaves tau = 0: +1, -1, or 0 where it is zero throughout."""
-    k = _order_of_zero(a, row, n, floor)
+def leading(a, row, n, floor, ahead):
+    """The sign with which c leaves tau = 0: +1, -1, or 0 where it is zero throughout the time `ahead`, at most AHEAD."""
+    k = _order_of_zero(a, row, n, floor, ahead)
     if k > n:
         return 0
     return 1 if a[row, k] > 0.0 else -1
 
 
 @inner_kernel
-def contradiction(a, row, n, floor):
+def contradiction(a, row, n, floor, ahead):
     """The least noise, a multiple of `floor`, for which c would not leave tau = 0 downward."""
-    while leading(a, row, n, floor) < 0:
+    while leading(a, row, n, floor, ahead) < 0:
         floor *= 4.0
     return floor
 
 
 @inner_kernel
-def _order_of_zero(a, row, n, floor):
+def _order_of_zero(a, row, n, floor, ahead):
     """The index of the first coefficient of c that counts; n + 1 where there is none.
 
     Coefficients that are rounding (below `floor`, see NOISE), by themselves or with the noise before them, or turn positive within
@@ -90,7 +90,7 @@ def _order_of_zero(a, row, n, floor):
     scale = _ERROR
     for k in range(min(n, 2) + 1):  # later terms may grow without bound where friction nearly jams the pivot (Painleve)
         noise = max(noise, abs(a[row, k]) * scale)
-        scale *= AHEAD
+        scale *= ahead
     scale = 1.0
     total = 0.0
     for k in range(n + 1):
@@ -99,12 +99,12 @@ def _order_of_zero(a, row, n, floor):
             rises = k < n and a[row, k] < 0.0 and a[row, k] + (k + 1) * a[row, k + 1] * INSTANT > 0.0
             if not rises:
                 return k
-        scale *= AHEAD
+        scale *= ahead
     return n + 1
 
 
 @inner_kernel
-def first_root(a, row, n, h, floor, stack):
+def first_root(a, row, n, h, floor, ahead, stack):
     """The first tau in [0, h] at which c turns negative, or NO_ROOT.
 
     A zero at tau = 0 (within `floor`) is divided out: 0.0 comes back only where c leaves it downward. `stack` is scratch of shape
@@ -116,7 +116,7 @@ def first_root(a, row, n, h, floor, stack):
         low = (low + min(a[row, k], 0.0)) * h
     if a[row, 0] > floor and a[row, 0] + low > _ERROR * a[row, 0]:
         return NO_ROOT
-    zeros = _order_of_zero(a, row, n, floor)
+    zeros = _order_of_zero(a, row, n, floor, ahead)
     lift = 0.0
     if zeros > n:
         # Noise as far as is looked ahead; in a long step it may yet become what is not.

@@ -58,15 +58,23 @@ def tilted_forces(
     right = np.where(closed, right, 0.0)
     slipping = floor & (slip != 0)
     matrix[slipping, 1, 0] = mu * slip[slipping]
-    forces = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
+    forces = _solved(matrix, right)
     asked = slipping & ((forces[:, 0] < 0.0) | (forces[:, 2:].min(axis=1) < 0.0))
     if asked.any():
         matrix[asked, 1, 0] *= -1.0
         other = forces.copy()
-        other[asked] = np.linalg.solve(matrix[asked], right[asked][:, :, None])[:, :, 0]
+        other[asked] = _solved(matrix[asked], right[asked])
         pulls = asked & ((forces[:, 0] < 0.0) | ((other[:, 0] < 0.0) & (other[:, 2:].min(axis=1) >= 0.0)))
         forces[pulls] = other[pulls]
     return Forces(*forces.T)
+
+
+def _solved(matrix: Floats, right: Floats) -> Floats:
+    """Solves a system a row; of contacts whose rows are parallel to rounding (a corner that has hardly left its wall) the least forces."""
+    try:
+        return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
+    except np.linalg.LinAlgError:
+        return np.asarray((np.linalg.pinv(matrix) @ right[:, :, None])[:, :, 0])
 
 
 def _triple(x: Floats, y: Floats, turn: Floats) -> Floats:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 
+from rockcheck.ebm.core.series import NOISE, POSITION
 from rockcheck.scenes.compiled import inner_kernel
 
 STICK, SLIP, FLAT_END = 0, 1, 2
@@ -41,8 +42,9 @@ def floor_impact(s, c, S1, w1, v1, mu_s, mu_k):
     friction), and v2 is then the velocity with which it slides.
     """
     S2 = -S1
+    rounding = NOISE[POSITION] * (abs(w1) + abs(v1))
     w2, p, q = floor_stick(s, c, S2, w1, v1)
-    if S2 * w2 >= 0.0 and p >= 0.0 and abs(q) <= mu_s * p:
+    if S2 * w2 >= 0.0 and p >= 0.0 and abs(q) <= mu_s * p + rounding:
         return STICK, w2, 0.0, p
     stuck = w2, p
     turns = False
@@ -50,7 +52,7 @@ def floor_impact(s, c, S1, w1, v1, mu_s, mu_k):
     for d in (toward, -toward):
         w2, v2, p = floor_slip(s, c, S2, d, mu_k, w1, v1)
         turns = turns or S2 * w2 >= 0.0
-        if S2 * w2 >= 0.0 and d * v2 >= 0.0:
+        if S2 * w2 >= 0.0 and d * v2 >= -rounding:
             return SLIP, w2, v2, p
     if turns and mu_s > mu_k and S2 * stuck[0] >= 0.0:
         # Static friction above kinetic leaves a gap in which neither form is consistent: sticking is the nearer one.
@@ -85,8 +87,9 @@ def wall_impact(S, Sw, s, c, c_prime, w1, xdot1, e, mu_s, mu_k, no_slip):
     N >= 0 is the wall's impulse. (31) is the identity map while the pivot is on the floor, so it does not appear.
     """
     C = S * Sw * c_prime
+    rounding = NOISE[POSITION] * (abs(w1) + abs(xdot1))
     w2, xdot2, p, q = wall_stick(S, Sw, s, c, C, w1, xdot1, e)
-    if math.isfinite(w2) and (no_slip or abs(q) <= mu_s * abs(p)):
+    if math.isfinite(w2) and (no_slip or abs(q) <= mu_s * abs(p) + rounding):
         n = Sw * (xdot2 - xdot1 - q)
         if n >= 0.0:  # (21)
             return A_STICK, w2, xdot2, n, p, 0.0
@@ -99,7 +102,7 @@ def wall_impact(S, Sw, s, c, c_prime, w1, xdot1, e, mu_s, mu_k, no_slip):
         for sy in (1.0, -1.0):
             w2, xdot2, p, q = wall_slip(S, s, c, C, w1, xdot1, e, mu_k, Sr, sy)
             v2 = xdot2 + c * w2
-            if p * sy < 0.0 or v2 * Sr < 0.0:
+            if p * sy < -rounding or v2 * Sr < -rounding:
                 continue
             n = Sw * (xdot2 - xdot1 - q)
             if n >= 0.0:

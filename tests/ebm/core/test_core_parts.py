@@ -51,13 +51,13 @@ class Core:
     @staticmethod
     def first_root(coefficients, h: float, noise: float = series.NOISE[series.POSITION]) -> float | None:
         """First time in [0, h] at which the polynomial (constant first) turns negative."""
-        found = series.first_root(_row(coefficients), 0, len(coefficients) - 1, h, noise, np.zeros((48, series.MOST_TERMS)))
+        found = series.first_root(_row(coefficients), 0, len(coefficients) - 1, h, noise, series.AHEAD, np.zeros((48, series.MOST_TERMS)))
         return None if found == series.NO_ROOT else found
 
     @staticmethod
     def leading(coefficients, noise: float = series.NOISE[series.POSITION]) -> int:
         """Sign with which the polynomial leaves zero."""
-        return series.leading(_row(coefficients), 0, len(coefficients) - 1, noise)
+        return series.leading(_row(coefficients), 0, len(coefficients) - 1, noise, series.AHEAD)
 
     def __init__(self, scene: Scene, pivot: str, friction: str = "coulomb") -> None:
         assert scene.gravity == scene.block.radius == 1.0
