@@ -39,7 +39,7 @@ from rockcheck.ebm.core.guards import (
     first_event,
     guard,
 )
-from rockcheck.ebm.core.modes import SOON, slacken, tips_first
+from rockcheck.ebm.core.modes import SOON, hangs_flat, slacken, tips_first
 from rockcheck.ebm.core.motion import (
     COS,
     FAMILY,
@@ -75,8 +75,8 @@ from rockcheck.ebm.core.motion import (
     tilt_series,
     workspace,
 )
-from rockcheck.ebm.core.rules import LEAST_CONTRADICTION, PULLS
-from rockcheck.ebm.core.running import CORNER, GOING, HOLDS, RELEASE, SLIPS, STICKS, UPLIFT, ZETA, T, mode_code, note
+from rockcheck.ebm.core.rules import HANGS, LEAST_CONTRADICTION, PULLS
+from rockcheck.ebm.core.running import GOING, HOLDS, RELEASE, SLIPS, STICKS, UPLIFT, ZETA, T, mode_code, note
 from rockcheck.ebm.core.series import AHEAD, FORCE, NO_ROOT, NOISE, POSITION, first_root, leading, step_size, value
 from rockcheck.scenes.compiled import inner_kernel, kernel, placed_kernel
 
@@ -203,10 +203,20 @@ def _held(b, z, gh, gv, t):
     if abs(abs(u) - (least if g >= 0.0 else slope) * abs(g)) < NOISE[FORCE]:  # at its limit: where it goes decides
         g, u = 1.0 + acceleration(gv, t + SOON), acceleration(gh, t + SOON)
     left, right = closed_wall(b, z, 1, False), closed_wall(b, z, -1, False)
-    if g < 0.0:  # hanging: only a wall on which it is pressed holds it flat
+    if g < 0.0 and not left and not right:  # hanging: by both corners, as long as nothing tells to which side it tips
+        return abs(u) <= NOISE[FORCE]
+    if g < 0.0:  # a wall on which it is pressed holds it flat
         return (left and u >= -slope * g) or (right and u <= slope * g)
     limit = least if b.mu_s == LEAST_FRICTION else least * g
     return (u <= limit or left) and (u >= -limit or right)
+
+
+@inner_kernel
+def _hangs_on(m, gh, gv, t):
+    """Whether the floor begins to fall away faster than g under a block at rest, and nothing tells to which side it would tip."""
+    stands = m[FLOOR] == STICK and m[PULL] > 0 and m[TIP] == 0 and m[FAR] == 0
+    still = max(abs(acceleration(gh, t)), abs(acceleration(gh, t + SOON))) <= NOISE[FORCE]
+    return stands and still and acceleration(gv, t + SOON) < -1.0
 
 
 @inner_kernel
@@ -259,7 +269,7 @@ def _begin(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a):
     if z[THETA] == 0.0 and z[W] == 0.0:
         if v == 0.0:
             if not _held(b, z, gh, gv, t):
-                return _leave_rest(b, m, z, tips_first(b, m, z, gh, t, rules), yield_displacement, gh, gv, t, rules, a)
+                return _leave_rest(b, m, z, tips_first(b, z, gh, t), yield_displacement, gh, gv, t, rules, a)
             _rest(b, m, z, gv, t)
             return 0.0
         m[:] = 0
@@ -368,7 +378,6 @@ def begin(b, gh, gv, r, yields, a):
     z, m, t = r.z, r.m, r.now[T]
     upright(b, z)
     zeta = _initial_friction(b, m, z, gh, gv, t, a) if math.isnan(r.now[ZETA]) else r.now[ZETA]
-    m[S] = r.counts[CORNER]
     r.now[ZETA] = _begin(b, m, z, zeta, yields, gh, gv, t, r.rules, a)
     # It has yielded where the pivot slips with z = +-1.
     _holds(r, m[FLOOR] != SLIPPING or abs(r.now[ZETA]) != 1.0 or r.now[ZETA] * slip_velocity(b, z) <= SLOW)
@@ -443,16 +452,16 @@ def follow(b, gh, gv, r, which, before, yields, log, a):
         r.now[ZETA] = 0.0
     elif which == G_SLIP:
         kind = _turn(b, gh, gv, r, t)
-    elif which == G_PUSH and m[FAMILY] == FLAT:
+    elif m[FAMILY] == FLAT and (which == G_PUSH or _hangs_on(m, gh, gv, t)):
         m[PULL] = -m[PULL]
+        r.rules[HANGS] += hangs_flat(m)
     elif m[FAMILY] == TILT:  # the push of the floor or of a wall ends
         kind = -1 if which == G_PUSH else RELEASE
         _close_walls(b, m, z, r.now[ZETA], yields, gh, gv, t, r.rules, a)
     elif which >= G_UPLIFT_PLUS and m[FLOOR] == SLIPPING:
         kind = _tip_sliding(b, gh, gv, r, yields, a)
     else:  # the cone, uplift from rest, or a wall that lets go of a standing block
-        m[S] = r.counts[CORNER]
-        r.now[ZETA] = _leave_rest(b, m, z, tips_first(b, m, z, gh, t, r.rules), yields, gh, gv, t, r.rules, a)
+        r.now[ZETA] = _leave_rest(b, m, z, tips_first(b, z, gh, t), yields, gh, gv, t, r.rules, a)
         _holds(r, abs(r.now[ZETA]) != 1.0)
         kind = RELEASE if which == G_TIP_PUSH or which == G_FAR_PUSH else (UPLIFT if m[FAMILY] == TILT else SLIPS)
     if kind >= 0:

@@ -169,14 +169,16 @@ def _fill_flat(b, m, a):
         a[TABLE + G_CONE_PLUS, _CONSTANT] = a[TABLE + G_CONE_MINUS, _CONSTANT] = b.mu_s
     else:
         _fill_friction(b, m, b.mu_s, a)
-    if not b.unilateral and not on_wall:  # the paper's floor holds what no wall does
+    if not b.unilateral and not on_wall and not hangs:  # the paper's floor holds what no wall does
         _has(a, G_PUSH, -1)
     else:
         _has(a, G_PUSH, 2)
     for plus in (True, False):
         held = m[TIP if plus else FAR] != 0
         uplift = G_UPLIFT_PLUS if plus else G_UPLIFT_MINUS
-        a[TABLE + uplift, P], a[TABLE + uplift, Q] = b.sin_alpha, -b.cos_alpha if plus else b.cos_alpha
+        # What hangs by both corners tips as soon as anything tells to which side.
+        a[TABLE + uplift, P] = 0.0 if hangs and not on_wall else b.sin_alpha
+        a[TABLE + uplift, Q] = -b.cos_alpha if plus else b.cos_alpha
         _has(a, uplift, -1 if m[FLOOR] == STICK and held else 2)
         if held or hangs:
             _has(a, G_CONE_PLUS if plus else G_CONE_MINUS, -1)

@@ -62,7 +62,6 @@ from rockcheck.ebm.core.rules import GRAZES, RULES
 from rockcheck.ebm.core.running import (
     BEFORE,
     CHANGING,
-    CORNER,
     DONE,
     EVENT_NAMES,
     EVENTS,
@@ -121,7 +120,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack, yields=None)
         z,
         np.zeros(MODE_SIZE, dtype=np.int64),
         np.array([0.0, abs(z[THETA]), 0.0, np.nan, quiet_from(gh, gv, control.tolerance), np.nan]),
-        np.zeros(8, dtype=np.int64),
+        np.zeros(7, dtype=np.int64),
         np.zeros(RULES, dtype=np.int64),
         np.zeros(MODES, dtype=np.bool_),
         np.zeros(3),
@@ -206,7 +205,6 @@ def _rest(b, gh, r, t_end, control, records):
         return DONE
     now[T] = until
     leave(m, r.tried, r.memory, until)
-    m[S] = r.counts[CORNER]
     return _change(r, LEAVES_REST, 0)
 
 
@@ -371,14 +369,10 @@ def _resolve(b, gh, gv, r, which, yields, records, a):
     """An event: the impact at a gap that closes, or the change of mode at another guard."""
     z, m, t = r.z, r.m, r.now[T]
     before = mode_code(r)
-    if m[FAMILY] == TILT:
-        r.counts[CORNER] = m[S]
     leave(m, r.tried, r.memory, t)
     if which <= G_FAR_GAP:
         r.impulse[:] = 0.0
         resting = settling_speed(r.rattle, t, r.rules)
-        if m[FAMILY] == FLAT:
-            m[S] = r.counts[CORNER]
         struck, known = strike(b, m, z, which, gh, t, resting, r.impulse, r.gains, r.rules)
         kind = WALL_IMPACT if struck == ON_WALL else (LANDS if struck == LANDING else FLOOR_IMPACT)
         if r.impulse[0] + r.impulse[1] > 0.0:
@@ -389,8 +383,6 @@ def _resolve(b, gh, gv, r, which, yields, records, a):
         kind, known = _release(b, m, z, which), False
     else:
         return bouc_wen.follow(b, gh, gv, r, which, before, yields, records.log, a)
-    if m[FAMILY] == FLAT:
-        m[S] = r.counts[CORNER]
     if which <= G_FAR_GAP and b.unilateral and r.impulse[0] + r.impulse[1] == 0.0:
         kind = NO_EVENT  # a block in flight passes theta = 0
     r.counts[WALL_IMPACTS] += kind == WALL_IMPACT
@@ -408,6 +400,8 @@ def _release(b, m, z, which):
             stop(z)
         stand(b, z)
         return STICKS
+    if not b.unilateral and m[FAMILY] == FLAT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0:
+        return LEAVES_REST  # or hangs on, or lands again: the mode that follows tells
     if which == G_CONE_PLUS or which == G_CONE_MINUS:
         return SLIPS
     if which == G_UPLIFT_PLUS or which == G_UPLIFT_MINUS:

@@ -43,8 +43,8 @@ from rockcheck.ebm.core.motion import (
     flat_series,
     tilt_series,
 )
-from rockcheck.ebm.core.rules import LEAST_CONTRADICTION, MODE_AGAIN, TIPS
-from rockcheck.ebm.core.series import INSTANT, MOST_TERMS, NOISE, contradiction, leading
+from rockcheck.ebm.core.rules import HANGS, LEAST_CONTRADICTION, MODE_AGAIN
+from rockcheck.ebm.core.series import FORCE, INSTANT, MOST_TERMS, NOISE, contradiction, leading
 from rockcheck.scenes.compiled import inner_kernel
 
 #: Order of the series that a selection looks at.
@@ -144,15 +144,15 @@ def wrong_by(b, m, z, gh, gv, t, a):
 
 
 @inner_kernel
-def tips_first(b, m, z, gh, t, rules):
+def tips_first(b, z, gh, t):
     """The side to which a flat block is first asked to tip, +1 left or -1 right: the sense in which all of it is calculated.
 
     Both fit only for rounding, or where the floor falls away faster than g under a pivot that cannot let go: then the base
-    acceleration decides, now or soon, or the friction, its place between walls, the corner m[S] on which it last stood (0 where
-    there was none): a mirror image does alike.
+    acceleration decides, now or soon, or the friction. Its place and its walls tell apart only what is calculated in which order, so that a
+    mirror image comes out alike; where nothing does it is its own mirror image.
     """
     toward = acceleration(gh, t)
-    if toward == 0.0:
+    if abs(toward) <= NOISE[FORCE]:
         toward = acceleration(gh, t + SOON)
     if toward == 0.0:
         toward = -z[VX]
@@ -160,10 +160,13 @@ def tips_first(b, m, z, gh, t, rules):
         toward = z[X]
     if toward == 0.0 and b.gap_left != b.gap_right:
         toward = b.gap_left - b.gap_right
-    if toward == 0.0:
-        rules[TIPS] += 1
-        toward = float(-m[S])
     return 1 if toward >= 0.0 else -1
+
+
+@inner_kernel
+def hangs_flat(m):
+    """Whether the floor holds a flat block at rest that no wall touches, though it falls away faster than g."""
+    return m[FAMILY] == FLAT and m[FLOOR] == STICK and m[PULL] < 0 and m[TIP] == 0 and m[FAR] == 0
 
 
 @inner_kernel
@@ -181,14 +184,13 @@ def _write(number, first, m):
 @inner_kernel
 def _possible(b, m, z, v, floor, walls):
     """Whether the contacts of m are closed, and its slip is not against the motion; v is the slip rate, `walls` those touched, as bits."""
-    flat = m[FAMILY] == FLAT
+    flat, mine = m[FAMILY] == FLAT, m[TIP] + 2 * m[FAR]
     if (not b.unilateral and floor) if m[FLOOR] == OFF else not floor:
         return False
-    if m[FLOOR] != OFF and m[PULL] < 0 and (b.unilateral or (b.no_slip and not flat) or (flat and m[TIP] == 0 and m[FAR] == 0)):
+    if m[FLOOR] != OFF and m[PULL] < 0 and (b.unilateral or (b.no_slip and not flat) or (flat and not hangs_flat(m) and mine == 0)):
         return False
     if b.no_slip and m[FLOOR] == SLIPPING:
         return False
-    mine = m[TIP] + 2 * m[FAR]
     if mine & ~walls:
         return False
     if flat:
@@ -228,7 +230,7 @@ def select(b, z, gh, gv, t, m, tried, memory, rules, a):
     _clean(b, z, floor)
     flat = z[THETA] == 0.0 and z[W] == 0.0
     lean = z[THETA] if z[THETA] != 0.0 else z[W]
-    first = tips_first(b, m, z, gh, t, rules) if flat else (1 if lean > 0.0 else -1)
+    first = tips_first(b, z, gh, t) if flat else (1 if lean > 0.0 else -1)
     upright_walls = _touched(b, z, 1, True) if flat else 0
     near, away = _touched(b, z, first, False), _touched(b, z, -first, False) if flat else 0
     v = slip_velocity(b, z)
@@ -243,6 +245,7 @@ def select(b, z, gh, gv, t, m, tried, memory, rules, a):
             wrong = wrong_by(b, m, z, gh, gv, t, a)
             if wrong == 0.0 and not again:
                 memory[SLACK] = 1.0
+                rules[HANGS] += hangs_flat(m)
                 return True
             wrong = max(wrong, memory[LEAST_SLACK] if again else 0.0)
             if wrong < least:

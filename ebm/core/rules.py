@@ -5,8 +5,8 @@ Each has one home in the code, is counted in every run (`History.cost.rules`), a
 
 from __future__ import annotations
 
-#: Where neither base, friction, place nor walls tell to which side a flat block tips: the corner on which it last stood.
-TIPS = 0
+#: A flat block under a floor that falls away faster than g, and nothing to tell left from right: it hangs flat, on both corners.
+HANGS = 0
 #: A mode is taken once at an instant; one that has just ended goes on only where no other fits.
 MODE_AGAIN = 1
 #: Where no mode, or no set of contacts at an impact, fits, for rounding or beyond Painleve's limit, the one that is wrong by least.
@@ -30,7 +30,7 @@ PULLS = 10
 RULES = 11
 
 NAMES = (
-    "tips to the corner it stood on",
+    "hangs flat",
     "mode goes on",
     "least contradiction",
     "endless stages",

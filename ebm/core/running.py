@@ -98,9 +98,9 @@ class Records(NamedTuple):
 # The clock: time, largest |theta|, largest |omega| since the last event, since when it rests, from when the base is quiet; and the
 # variable z of Bouc-Wen friction.
 T, PEAK, SWING, T_REST, QUIET, ZETA = range(6)
-# The counts; the corner that the block last stood on (0: none); with Bouc-Wen friction, whether the pivot has not yielded; the event
+# The counts; with Bouc-Wen friction, whether the pivot has not yielded; the event
 # that has ended a mode, and that mode's code.
-STEPS, EVENTS, WALL_IMPACTS, ROWS, CORNER, HOLDS, KIND, BEFORE = range(8)
+STEPS, EVENTS, WALL_IMPACTS, ROWS, HOLDS, KIND, BEFORE = range(7)
 
 
 @placed_kernel

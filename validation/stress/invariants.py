@@ -288,23 +288,20 @@ def _force_conditions(
         return excess, tension
     direction = np.where(slides, np.sign(sign * slip), 0.0).astype(np.int8)[tilted]
     on = np.ones(int(tilted.sum()), dtype=bool)
-    forces = tilted_forces(
-        scene.block.alpha,
-        scene.floor.friction,
-        np.abs(theta)[tilted],
-        (sign * w)[tilted],
-        (sign * u)[tilted],
-        g[tilted],
-        (on, (tip & walls)[tilted], (far & walls)[tilted]),
-        direction,
-    )
-    size = scale[tilted]
+    touching = on, (tip & walls)[tilted], (far & walls)[tilted]
+    over, pulls = np.full(len(on), math.inf), np.full(len(on), math.inf)
+    # What happens within NEAR is one event, for the core and here: a block that spins passes through its cone in less. So a condition is
+    # broken only where it is so long before and after.
+    for moment in (0.0, -NEAR, NEAR):
+        turned = np.abs(theta)[tilted] + moment * (sign * w)[tilted]
+        forces = tilted_forces(
+            scene.block.alpha, scene.floor.friction, turned, (sign * w)[tilted], (sign * u)[tilted], g[tilted], touching, direction
+        )
+        over = np.minimum(over, (np.abs(forces.friction) - mu_s * np.abs(forces.normal)) / scale[tilted])
+        floor = -forces.normal if unilateral else -math.inf
+        pulls = np.minimum(pulls, np.maximum(np.maximum(-forces.tip, -forces.far), floor) / scale[tilted])
     if model.friction != "no-slip":
-        over = (np.abs(forces.friction) - mu_s * np.abs(forces.normal)) / size
         excess = max(excess, float(np.max(over[direction == 0], initial=0.0)))
-    pulls = np.maximum(-forces.tip, -forces.far) / size
-    if unilateral:
-        pulls = np.maximum(pulls, -forces.normal / size)
     return excess, max(tension, float(np.max(pulls, initial=0.0)))
 
 

@@ -193,7 +193,7 @@ def count_gain(before, after, gains):
 @kernel
 def _strike_all(b, m, z, gh, t, resting, impulse, gains, rules):
     """Unilateral pivot: resolves all contacts touched at this instant."""
-    sign = float(tips_first(b, m, z, gh, t, rules) if m[FAMILY] == FLAT else m[S])
+    sign = float(tips_first(b, z, gh, t) if m[FAMILY] == FLAT else m[S])
     phi = abs(z[THETA])
     flat = z[THETA] == 0.0
     touching = np.zeros(CONTACTS, dtype=np.bool_)

@@ -65,11 +65,10 @@ class Core:
         self.grounds = natural.grounds_of(scene)
         self.work = motion.workspace()[0]
 
-    def select(self, state, last: int = 0) -> Mode | None:
-        """The mode in which the state (x, y, theta and their rates) goes on; `last` is the corner on which the block stood before."""
+    def select(self, state) -> Mode | None:
+        """The mode in which the state (x, y, theta and their rates) goes on."""
         m, tried, memory = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.zeros(modes.MODES, dtype=bool), np.zeros(3)
         modes.forget(tried, memory, 0.0)
-        m[motion.S] = last
         chosen = np.zeros(rules.RULES, dtype=np.int64)
         if not modes.select(self.setting, np.array(state), *self.grounds, 0.0, m, tried, memory, chosen, self.work):
             return None
@@ -552,10 +551,10 @@ def test_flight_of_a_block_whose_floor_falls_away():
     mode = Core(at.scene, "unilateral").select(at.state)
     assert (mode.name, mode.tilted) == ("flight", False)
     held = Core(at.scene, "bilateral").select(at.state)
-    assert held.floor != "off"
-    assert held.tilted  # it hangs on a corner and turns about it
-    # Where nothing else tells left from right, the corner on which it stood does; the mirror image does alike.
-    assert {corner: Core(at.scene, "bilateral").select(at.state, corner).side for corner in (1, -1)} == {1: -1, -1: 1}
+    assert (held.name, held.tilted) == ("rest", False)  # nothing tells left from right: it hangs on both corners
+    pushed = {u: Situation(alpha, 0.5, 0.5, u, -0.2, (0.0, math.cos(alpha), 0.0, 0.0, 0.0, 0.0)) for u in (1e-6, -1e-6)}
+    hangs = {u: Core(one.scene, "bilateral").select(one.state) for u, one in pushed.items()}
+    assert {u: (mode.tilted, mode.side) for u, mode in hangs.items()} == {1e-6: (True, 1), -1e-6: (True, -1)}
     slides = {v: Core(at.scene, "bilateral").select((*at.state[:3], v, 0.0, 0.0)) for v in (0.1, -0.1)}
     assert {v: mode.side for v, mode in slides.items()} == {0.1: -1, -0.1: 1}
 
