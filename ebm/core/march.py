@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from rockcheck.ebm.core import bouc_wen
-from rockcheck.ebm.core.contacts import closed_floor, stand, stop
+from rockcheck.ebm.core.contacts import CLOSED, closed_floor, stand, stop
 from rockcheck.ebm.core.decide import decided, quiet_from
 from rockcheck.ebm.core.ground import STILL, next_exceedance, next_kink
 from rockcheck.ebm.core.guards import (
@@ -20,6 +20,7 @@ from rockcheck.ebm.core.guards import (
     G_PHI,
     G_PUSH,
     G_SLIP,
+    G_TIP_GAP,
     G_TOPPLE,
     G_UPLIFT_MINUS,
     G_UPLIFT_PLUS,
@@ -58,7 +59,7 @@ from rockcheck.ebm.core.motion import (
     tilt_series,
     tilt_state,
 )
-from rockcheck.ebm.core.rules import GRAZES, RULES
+from rockcheck.ebm.core.rules import GRAZES, LANDS_ALONG, RULES
 from rockcheck.ebm.core.running import (
     BEFORE,
     CHANGING,
@@ -264,7 +265,7 @@ def _step(b, gh, gv, r, t_end, control, yields, records, a, stack):
     now[SWING] = 0.0
     if r.counts[EVENTS] + 1 >= control.most_events:
         return TOO_MANY_EVENTS
-    if which == G_TOPPLE:
+    if which == G_TOPPLE or _lies_along_wall(m, z, which, r.rules):
         z[THETA] = math.copysign(0.5 * math.pi, z[THETA])
         now[PEAK] = 0.5 * math.pi
         note(r, records.log, LEFT if m[S] > 0 else RIGHT, mode_code(r))
@@ -390,6 +391,15 @@ def _resolve(b, gh, gv, r, which, yields, records, a):
         _note_event(r, records.log, kind, before)
         return GOING
     return _change(r, kind, before)
+
+
+@inner_kernel
+def _lies_along_wall(m, z, which, rules):
+    """Whether a block that turns over about a standing pivot meets the wall as it comes to lie: the gap goes with the rest squared."""
+    rest = math.cos(z[THETA])
+    lies = which == G_TIP_GAP and m[FAMILY] == TILT and m[FLOOR] == STICK and rest * rest < CLOSED and m[S] * z[W] > 0.0
+    rules[LANDS_ALONG] += lies
+    return lies
 
 
 @inner_kernel

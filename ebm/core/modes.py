@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.core.contacts import SLOW, closed_floor, closed_wall, slip_velocity, stand, stop, upright
+from rockcheck.ebm.core.contacts import CLOSED, SLOW, closed_floor, closed_wall, slip_velocity, stand, stop, upright
 from rockcheck.ebm.core.ground import acceleration, next_kink
 from rockcheck.ebm.core.guards import G_FAR_GAP, G_PHI, G_SLIP, GUARDS, KIND, fill_guards, guard, seen
 from rockcheck.ebm.core.motion import (
@@ -199,6 +199,8 @@ def _possible(b, m, z, v, floor, walls):
         if (held and mine != walls) or (m[FLOOR] == SLIPPING and mine != 0):
             return False
         v = z[VX]
+    elif m[FLOOR] == STICK and mine == 2 and z[THETA] * z[THETA] < CLOSED:
+        return False  # near phi = 0 the far gap goes with phi^2: it lands along that wall, and does not lean on it
     else:
         v = m[S] * (v if mine == 0 else z[W])  # along a wall the pivot slips as the block turns
     return m[FLOOR] == OFF or (v == 0.0 if m[FLOOR] == STICK else m[SLIP] * v >= 0.0)

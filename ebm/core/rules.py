@@ -23,7 +23,7 @@ WEDGED = 6
 FLUSH_LANDING = 7
 #: A hanging block that comes down with less energy than the tolerance has not touched the floor.
 GRAZES = 8
-#: A corner that meets the wall as the block lands belongs to the landing.
+#: A corner that meets the wall as the block lands, on its base or on its side, belongs to the landing.
 LANDS_ALONG = 9
 #: Bouc-Wen: beyond Painleve's limit on a wall the motion goes on with the pull.
 PULLS = 10
