@@ -28,8 +28,9 @@ from rockcheck.ebm.core.guards import (
     first_event,
     rock_guards_hold,
 )
+from rockcheck.ebm.core.guards import KIND as GUARD_KIND
 from rockcheck.ebm.core.laws.strike import LANDING, ON_WALL, strike
-from rockcheck.ebm.core.modes import MODES, SLACK, forget, leave, select, slacken
+from rockcheck.ebm.core.modes import MEMORY, MODES, SLACK, code_of, forget, leave, select, slacken
 from rockcheck.ebm.core.motion import (
     COS,
     FAMILY,
@@ -108,6 +109,9 @@ from rockcheck.scenes.compiled import inner_kernel, kernel, placed_kernel
 
 __all__ = ["DONE", "EVENT_NAMES", "FAILURES", "MODE_NAMES", "OVERTURNED", "TOO_MANY_EVENTS", "TOO_MANY_STEPS", "Control", "Tally", "run"]
 
+#: Events that are changes of mode and nothing else.
+_CHANGES = (UPLIFT, SLIPS, LIFT_OFF, RELEASE)
+
 
 @kernel
 def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack, yields=None):
@@ -124,7 +128,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack, yields=None)
         np.zeros(7, dtype=np.int64),
         np.zeros(RULES, dtype=np.int64),
         np.zeros(MODES, dtype=np.bool_),
-        np.zeros(3),
+        np.zeros(MEMORY),
         no_impacts(),
         np.zeros(2),
         np.zeros(2),
@@ -164,12 +168,14 @@ def _change(r, kind, before):
 
 @placed_kernel
 def _follow(b, gh, gv, r, yields, records, a):
-    """Selects the mode that follows, and notes the event that ended the one before."""
+    """Selects the mode that follows, and notes the event that ended the one before, unless it goes on."""
+    kind, ended = r.counts[KIND], code_of(r.m)
     if yields is not None:
         bouc_wen.begin(b, gh, gv, r, yields, a)
     elif not select(b, r.z, gh, gv, r.now[T], r.m, r.tried, r.memory, r.rules, a):
         return NOT_FINITE
-    kind = r.counts[KIND]
+    if kind in _CHANGES and yields is None and code_of(r.m) == ended:
+        return GOING
     if kind == LEAVES_REST:
         if mode_code(r) == 0:
             return GOING
@@ -205,7 +211,7 @@ def _rest(b, gh, r, t_end, control, records):
         now[T] = t_end if not control.until_decided else now[T]
         return DONE
     now[T] = until
-    leave(m, r.tried, r.memory, until)
+    leave(m, r.tried, r.memory, until, FORCE)
     return _change(r, LEAVES_REST, 0)
 
 
@@ -370,7 +376,7 @@ def _resolve(b, gh, gv, r, which, yields, records, a):
     """An event: the impact at a gap that closes, or the change of mode at another guard."""
     z, m, t = r.z, r.m, r.now[T]
     before = mode_code(r)
-    leave(m, r.tried, r.memory, t)
+    leave(m, r.tried, r.memory, t, GUARD_KIND[which])
     if which <= G_FAR_GAP:
         r.impulse[:] = 0.0
         resting = settling_speed(r.rattle, t, r.rules)

@@ -6,9 +6,9 @@ Applied to the bilateral pivot this selection is the paper's: its rules for upli
 tilted block and for the corner that stays on the wall come out as the one consistent candidate; tests hold the closed forms
 against it.
 
-Termination. At one instant a mode is selected once: one that has ended there is taken again only where no other fits, and then, as
-where none fits at all, the one that contradicts itself least goes on with a *slack*, the noise that its guards are allowed. Each
-further such selection at that instant doubles the least slack, so that it soon exceeds all forces and time goes on.
+Termination. At one instant a mode is selected once: one that was selected and has ended there is taken again only where no other
+fits, and then, as where none fits at all, the one that contradicts itself least goes on with a *slack*, the noise that its guards are
+allowed. Each further such selection at that instant doubles the least slack, so that it soon exceeds all forces and time goes on.
 """
 
 from __future__ import annotations
@@ -52,8 +52,9 @@ _LOOK = 6
 #: A base acceleration that is zero shows where it goes so soon (samples of a record may be much nearer than AHEAD).
 SOON = 1e-6
 # What a run remembers of the selections at one instant: the slack of the mode, in noises, the least slack of the next one that does not
-# fit, and when the instant began. The modes tried in it are a row of flags.
-SLACK, LEAST_SLACK, SINCE = range(3)
+# fit, when the instant began, and when the mode was selected. The modes tried in it are a row of flags.
+SLACK, LEAST_SLACK, SINCE, BEGAN = range(4)
+MEMORY = 4
 MODES = 128
 
 
@@ -98,11 +99,11 @@ def forget(tried, memory, t):
 
 
 @inner_kernel
-def leave(m, tried, memory, t):
-    """Mode m has ended at time t."""
+def leave(m, tried, memory, t, kind):
+    """A guard of this kind has ended mode m at time t; where it was a force's, and by rounding only, the same mode may go on, once."""
     if t - memory[SINCE] > INSTANT:
         forget(tried, memory, t)
-    tried[code_of(m)] = True
+    tried[code_of(m)] = kind != FORCE or t - memory[BEGAN] <= INSTANT
 
 
 @inner_kernel
@@ -228,6 +229,7 @@ def _clean(b, z, floor):
 @inner_kernel
 def select(b, z, gh, gv, t, m, tried, memory, rules, a):
     """Writes into m the mode that is consistent at state z, or contradicts itself least; False where the state is not finite."""
+    memory[BEGAN] = t
     floor = closed_floor(b, z) or not b.unilateral
     _clean(b, z, floor)
     flat = z[THETA] == 0.0 and z[W] == 0.0

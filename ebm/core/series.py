@@ -83,8 +83,8 @@ def contradiction(a, row, n, floor, ahead):
 def _order_of_zero(a, row, n, floor, ahead):
     """The index of the first coefficient of c that counts; n + 1 where there is none.
 
-    Coefficients that are rounding (below `floor`, see NOISE), by themselves or with the noise before them, or turn positive within
-    an INSTANT, are taken as zero, so that a guard that has just fired (and is zero by construction) does not fire again.
+    Coefficients that are rounding (below `floor`, see NOISE), by themselves or with the noise before them, or turn to the other sign
+    within an INSTANT, are taken as zero, so that a guard that has just fired (and is zero by construction) does not fire again.
     """
     noise = floor
     scale = _ERROR
@@ -96,8 +96,9 @@ def _order_of_zero(a, row, n, floor, ahead):
     for k in range(n + 1):
         total += a[row, k] * scale
         if abs(a[row, k]) * scale > noise and math.copysign(total, total * a[row, k]) > noise:
-            rises = k < n and a[row, k] < 0.0 and a[row, k] + (k + 1) * a[row, k + 1] * INSTANT > 0.0
-            if not rises:
+            soon = a[row, k] + (k + 1) * a[row, k + 1] * INSTANT if k < n else a[row, k]
+            turns = a[row, k] * soon < 0.0 and (k > 0 or soon > 0.0)  # what ends so soon has its root; what only begins has not begun
+            if not turns:
                 return k
         scale *= ahead
     return n + 1

@@ -117,7 +117,7 @@ def test_rows_of_a_shaken_block_at_rest(pivot):
 
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_floor_that_falls_away(pivot):
-    """A floor that falls faster than g: the block flies freely (unilateral), or hangs: by both corners, and by one as soon as it is pushed."""
+    """A floor that falls faster than g: the block flies freely (unilateral), or hangs: by both corners, and by one once it is pushed."""
     drop = Record.from_samples([-12.0, -12.0], time_step=0.1)
     falls = scene_of(excitation=Rest(), vertical=drop, duration=0.1, output_step=0.01)
     motion = EventBasedModel(pivot=pivot).simulate(falls).channels

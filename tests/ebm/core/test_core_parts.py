@@ -67,7 +67,7 @@ class Core:
 
     def select(self, state) -> Mode | None:
         """The mode in which the state (x, y, theta and their rates) goes on."""
-        m, tried, memory = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.zeros(modes.MODES, dtype=bool), np.zeros(3)
+        m, tried, memory = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.zeros(modes.MODES, dtype=bool), np.zeros(modes.MEMORY)
         modes.forget(tried, memory, 0.0)
         chosen = np.zeros(rules.RULES, dtype=np.int64)
         if not modes.select(self.setting, np.array(state), *self.grounds, 0.0, m, tried, memory, chosen, self.work):
