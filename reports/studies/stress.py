@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rockcheck.reports.studies.page import write_study
 from rockcheck.reports.style import PAGE, figure_style, save
-from rockcheck.validation.stress.invariants import EXCEPTIONS, INVARIANTS
+from rockcheck.validation.stress.invariants import INVARIANTS
 from rockcheck.validation.stress.players import PLAYERS
 from rockcheck.validation.stress.results import Stress
 from rockcheck.validation.stress.stability import AXIS_WORDS, STEPS, Stability
@@ -30,7 +30,6 @@ def write_stress(found: Stress, folder: Path) -> Path:
         "stress.html",
         maps=MAPS,
         invariants=INVARIANTS,
-        exceptions=EXCEPTIONS,
         players=PLAYERS,
     )
 

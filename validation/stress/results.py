@@ -43,8 +43,6 @@ class RunTotals:
     rules: Counter[str] = field(default_factory=Counter)
     #: Runs whose comparison had to be ended by the horizon of predictability.
     horizons: int = 0
-    #: Runs that an exception of the model excuses from an invariant, by its name.
-    exceptions: Counter[str] = field(default_factory=Counter)
     #: Runs in which an invariant that was to be looked at could not be judged, by its name.
     unjudged: Counter[str] = field(default_factory=Counter)
 
@@ -65,7 +63,6 @@ class RunTotals:
             largest_gain=max(self.largest_gain, other.largest_gain),
             rules=self.rules + other.rules,
             horizons=self.horizons + other.horizons,
-            exceptions=self.exceptions + other.exceptions,
             unjudged=self.unjudged + other.unjudged,
         )
 

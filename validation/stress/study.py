@@ -55,7 +55,6 @@ def play_some(label: str, seed: int, first: int, count: int) -> RunTotals:
     began = time.process_time()
     looked_at: Counter[str] = Counter()
     outcomes: Counter[str] = Counter()
-    exceptions: Counter[str] = Counter()
     unjudged: Counter[str] = Counter()
     rules: Counter[str] = Counter()
     worst: dict[str, tuple[float, int]] = {}
@@ -75,8 +74,6 @@ def play_some(label: str, seed: int, first: int, count: int) -> RunTotals:
         largest_gain = max(largest_gain, played.largest_gain)
         horizons += played.horizons
         rules.update(played.rules)
-        if played.exception:
-            exceptions[played.exception] += 1
         unjudged.update(played.unjudged)
     return RunTotals(
         model=label,
@@ -91,7 +88,6 @@ def play_some(label: str, seed: int, first: int, count: int) -> RunTotals:
         largest_gain=largest_gain,
         horizons=horizons,
         rules=rules,
-        exceptions=exceptions,
         unjudged=unjudged,
     )
 

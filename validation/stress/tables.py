@@ -55,13 +55,12 @@ def markdown(found: Stress) -> str:
 
 def _totals(found: Stress) -> str:
     """A row a model."""
-    columns = ("model", "runs", "failures", "events", "runs with energy gained in an impact (most)", "horizon needed", "excepted")
+    columns = ("model", "runs", "failures", "events", "runs with energy gained in an impact (most)", "horizon needed")
     rows = []
     for label, batch in found.batches.items():
         broken = len({failure.number for failure in batch.failures})
         gains = f"{batch.gaining} ({100.0 * batch.largest_gain:.2g} %)" if batch.gaining else "0"
-        excepted = ", ".join(f"{count} {name}" for name, count in batch.exceptions.items()) or "0"
-        rows.append((label, str(batch.runs), str(broken), str(batch.events), gains, str(batch.horizons), excepted))
+        rows.append((label, str(batch.runs), str(broken), str(batch.events), gains, str(batch.horizons)))
     return markdown_table(columns, rows)
 
 

@@ -95,8 +95,7 @@ def show(found: Stress, out: Console) -> None:
 
 
 def _remarks(found: Stress) -> Iterator[str]:
-    """What is known of a model: impacts that add energy, modelling choices, exceptions, and what could not be judged."""
-    from rockcheck.validation.stress.invariants import EXCEPTIONS
+    """What is known of a model: impacts that add energy, modelling choices, and what could not be judged."""
     from rockcheck.validation.stress.tables import rules_text
 
     for label, batch in found.batches.items():
@@ -104,8 +103,6 @@ def _remarks(found: Stress) -> Iterator[str]:
             yield f"{label}: an impact adds energy in {batch.gaining} runs, at most {100.0 * batch.largest_gain:.2g} %, by its law"
         if batch.rules:
             yield f"{label}: modelling choices made: {rules_text(batch)}"
-        for name, count in batch.exceptions.items():
-            yield f"{label}: {count} runs excepted, {name}: {EXCEPTIONS[name]}"
         for name, count in batch.unjudged.items():
             yield f"{label}: {name} could not be judged in {count} of {count + batch.looked_at[name]} runs"
 
