@@ -99,7 +99,7 @@ STUDIES = {
     "benchmark": (benchmark_page, "Run time against error"),
     "benchmark-without-time": (benchmark_page_without_time, "before any model had been played"),
     "convergence": (convergence_page, "What does not converge"),
-    "stress": (stress_page, "Runs: 2 of EBM, 2 of EBM, unilateral"),
+    "stress": (stress_page, "no mode is consistent"),
     "spectra": (spectra_page, "Fig. 8"),
 }
 
