@@ -200,11 +200,11 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
             last = now
 
 
-def _planar_body(scene: Scene, geoms: str) -> str:
-    """A body of unit mass that moves in the plane x, z and turns counterclockwise."""
+def _planar_body(scene: Scene, geoms: str, raised: float = 0.0) -> str:
+    """A body of unit mass that moves in the plane x, z and turns counterclockwise, its origin `raised` m above that of the floor."""
     inertia = scene.block.radius**2 / 3.0
     return f"""
-<body>
+<body pos="0 0 {raised!r}">
   <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/><joint type="hinge" axis="0 -1 0"/>
   <inertial pos="0 0 0" mass="1" diaginertia="{inertia!r} {inertia!r} {inertia!r}"/>
   {geoms}
@@ -216,9 +216,12 @@ def _model(world: str, settings: str = "") -> str:
 
 
 def _plane(name: str, scene: Scene, inset: float, attributes: str) -> str:
-    """The floor or a wall, `inset` m behind its surface."""
+    """The floor, or a wall `inset` m behind its surface.
+
+    The floor stays where it is and the block is raised instead: a plane nearer to the origin than 1e-6 m MuJoCo takes to be in it.
+    """
     if name == "floor":
-        return f'<geom name="floor" type="plane" size="0 0 1" pos="0 0 {-inset!r}" {attributes}/>'
+        return f'<geom name="floor" type="plane" size="0 0 1" {attributes}/>'
     wall = next(wall for wall in scene.walls if wall.side == name)
     inward = 1.0 if name == "left" else -1.0
     place = -inward * (scene.block.half_width + wall.gap + inset)
@@ -245,11 +248,12 @@ def _point_contact_model(scene: Scene) -> str:
         for contact in contacts
     )
     # Without warm start Newton's method needs fewer iterations, and it does not get stuck on the edge of a stiff cone.
+    # The 50 iterations of a line search that MuJoCo allows are too few there: Newton's method would stop short of its solution.
     settings = f"""
 <option integrator="Euler" cone="elliptic" impratio="1" jacobian="dense" solver="Newton" iterations="100" tolerance="1e-15"
-  ls_tolerance="1e-6"><flag island="disable" warmstart="disable"/></option>
+  ls_tolerance="1e-6" ls_iterations="200"><flag island="disable" warmstart="disable"/></option>
 <contact>{pairs}</contact>"""
-    return _model(planes + _planar_body(scene, spheres), settings)
+    return _model(planes + _planar_body(scene, spheres, CORNER_RADIUS), settings)
 
 
 def _stock_model(scene: Scene, mu: float, settings: str = "") -> str:

@@ -298,3 +298,14 @@ def test_endless_events_are_a_failure(block):
     engine = Scripted(time_step="adaptive", answers={"push": lambda pose, velocity, dt, felt, bouncing: (0.0, -1.0, 0.0)})
     with pytest.raises(ModelFailure, match="no end to the events"):
         engine.simulate(Scene(name="falling", block=block, floor=Floor(friction=0.3), duration=1.0))
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+@pytest.mark.parametrize("above", [3e-9, -3e-9])
+def test_mujocos_floor_is_where_it_is_said_to_be(friction, above):
+    block = Block(half_width=0.3, half_height=math.sqrt(1.0 - 0.09))  # R = 1 m
+    scene = Scene(name="a", block=block, floor=Floor(friction=friction), duration=0.1)
+    world = MuJoCo().rigid_world(scene)
+    _, falls, _ = world.push((0.0, block.half_height + above, 0.0), (0.0, 0.0, 0.0), 2e-5, (0.0, -9.81), False)
+    world.close()
+    assert falls == pytest.approx(-9.81 * 2e-5 if above > 0.0 else 0.0, abs=1e-9)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Floor, Scene, Wall
+from rockcheck.engines import MuJoCo
+from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.validation.discrepancy.impact_laws import flush_landing as flush_landing_of
 from rockcheck.validation.discrepancy.impact_laws import law_followed
 
 
@@ -51,3 +53,54 @@ def test_without_such_a_landing_there_is_nothing_to_tell() -> None:
     assert law_followed(free, EventBasedModel(pivot="unilateral").simulate(free)) is None
     plastic = flush_landing(0.0)
     assert law_followed(plastic, EventBasedModel(pivot="unilateral").simulate(plastic)) is None
+
+
+PIVOT_IS_LIFTED = Scene(  # by 1e-9 R, as the wall is struck just before the landing
+    name="the wall lifts the pivot",
+    block=Block(half_width=0.28532883023336414, half_height=0.9584296837210646),
+    floor=Floor(friction=0.6943690325519232),
+    walls=[Wall(side="left", gap=0.0, restitution=0.25)],
+    excitation=Ricker(amplitude=-8.048561710708649, period=0.8978701000666194),
+    duration=2.404,
+    output_step=0.002,
+)
+SLIDES = Scene(
+    name="the pivot slides",
+    block=Block(half_width=0.22150172490006162, half_height=0.9751599796270853),
+    floor=Floor(friction=0.34861762111375877),
+    walls=[Wall(side="right", gap=0.0, restitution=0.75)],
+    excitation=Ricker(amplitude=-2.4792903934729824, period=1.0072062070663723),
+    duration=2.536,
+    output_step=0.002,
+)
+
+
+@pytest.mark.parametrize("scene", [PIVOT_IS_LIFTED, SLIDES], ids=lambda scene: scene.name)
+def test_mujoco_with_steps_that_end_at_events_follows_the_closed_branch(scene: Scene) -> None:
+    found = law_followed(scene, MuJoCo(time_step="adaptive").simulate(scene))
+    assert found is not None
+    assert found.law == "closed"
+    assert found.errors["closed"] < 1e-5
+
+
+def test_where_two_laws_give_one_motion_both_are_named() -> None:
+    tall = Block(half_width=0.5, half_height=1.2)
+    scene = flush_landing(0.5).replace(block=tall, initial_rotation=-0.3 * tall.alpha)
+    found = law_followed(scene, EventBasedModel(pivot="unilateral").simulate(scene))
+    assert found is not None
+    assert found.law == "closed or open"
+    assert max(found.errors["closed"], found.errors["open"]) < 1e-3 < found.spread
+
+
+def test_a_history_that_parted_before_the_landing_tells_nothing() -> None:
+    scene = flush_landing(0.5)
+    other = scene.replace(initial_rotation=0.9 * scene.initial_rotation)
+    assert law_followed(scene, EventBasedModel(pivot="unilateral").simulate(other)) is None
+
+
+def test_a_history_that_ends_before_the_landing_tells_nothing() -> None:
+    scene = flush_landing(0.5)
+    landing = flush_landing_of(scene)
+    assert landing is not None
+    short = EventBasedModel(pivot="unilateral").simulate(scene.replace(duration=landing.t - 0.05))
+    assert landing.followed_by(short, scene) is None
