@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
+from typing import Literal
 
 import numpy as np
 
@@ -43,10 +44,15 @@ def predictability_horizon(
     return scene.duration if rows == len(undisturbed) else float(scene.output_times[max(rows - 1, 1)])
 
 
+def other_law(model: EventBasedModel) -> Literal["moreau", "floor-first"]:
+    """The law of impacts under which an event-based model's motion is to be the same, for it to be trusted."""
+    return "floor-first" if model.impacts == "moreau" else "moreau"
+
+
 def _disturbed(scene: Scene, model: EventBasedModel, perturbation: float) -> Iterator[tuple[EventBasedModel, Scene]]:
     """The other law of impacts; a base motion a little stronger or weaker; a start a little farther from or nearer to rest."""
     if model.pivot == "unilateral" and scene.walls:
-        yield model.model_copy(update={"impacts": "floor-first" if model.impacts == "moreau" else "moreau"}), scene
+        yield model.model_copy(update={"impacts": other_law(model)}), scene
     start = {name: value for name in START if (value := getattr(scene, name)) != 0.0}
     for factor in (1.0 - perturbation, 1.0 + perturbation):
         if scene.excitation.kind != "rest" or scene.vertical.kind != "rest":

@@ -13,6 +13,15 @@ from rockcheck.scenes import Scene
 
 #: The paper's colours.
 COLOURS = {"safe": "#3b6fb6", "counterclockwise": "#e8833a", "clockwise": "#f2cf4a", "overturned": "#e8833a", "undecided": "#9a9a9a"}
+#: The mark of a node whose outcome depends on the law of impacts.
+LAW_MARK: dict[str, Any] = {
+    "linestyle": "none",
+    "marker": "o",
+    "markersize": 4.0,
+    "markerfacecolor": "none",
+    "markeredgecolor": "black",
+    "markeredgewidth": 0.8,
+}
 
 
 def spectrum_figure(spectrum: Spectrum) -> Figure:
@@ -26,7 +35,7 @@ def draw(spectrum: Spectrum, axes: Any) -> None:
     """Draws a spectrum into matplotlib axes in the paper's colours.
 
     Blue is safe. Without a wall orange is overturned counterclockwise and yellow clockwise; with a wall orange is overturned.
-    Grey is undecided.
+    Grey is undecided, a black ring around a node says that its outcome depends on the law of impacts.
     """
     names = ("counterclockwise", "safe", "overturned" if spectrum.scene.walls else "clockwise", "undecided")
     shown = spectrum.outcomes.copy()
@@ -41,6 +50,9 @@ def draw(spectrum: Spectrum, axes: Any) -> None:
         shading="nearest",
         rasterized=True,
     )
+    if spectrum.depends_on_law is not None and len(spectrum.depends_on_law):
+        i, j = spectrum.depends_on_law.T
+        axes.plot(spectrum.frequency_ratios[j], spectrum.amplitude_ratios[i], **LAW_MARK)
     horizontal, vertical = axis_labels(spectrum.scene)
     axes.set_xlabel(horizontal)
     axes.set_ylabel(vertical)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rockcheck.ebm.spectrum import Spectrum
-from rockcheck.reports.show.spectrum import COLOURS, axis_labels, draw
+from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, axis_labels, draw
 from rockcheck.reports.site import PAGES, STUDIES, Site
 from rockcheck.reports.style import LOOKS, PAGE, figure_style, save
 from rockcheck.validation.discrepancy.figures import Stored
@@ -89,6 +89,7 @@ def _panel(axes: Any, spectrum: Spectrum, title: str) -> None:
 
 
 def _legend(figure: Figure, spectra: Iterable[Spectrum]) -> None:
+    from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     spectra = list(spectra)
@@ -102,8 +103,10 @@ def _legend(figure: Figure, spectra: Iterable[Spectrum]) -> None:
         labels["overturned"] = "overturned"
     if any(len(spectrum.undecided) for spectrum in spectra):
         labels["undecided"] = "undecided"
-    patches = [Patch(facecolor=COLOURS[name], label=label) for name, label in labels.items()]
-    figure.legend(handles=patches, loc="outside lower center", ncols=4, fontsize=7, handlelength=1.6)
+    handles: list[Patch | Line2D] = [Patch(facecolor=COLOURS[name], label=label) for name, label in labels.items()]
+    if any(spectrum.depends_on_law is not None and len(spectrum.depends_on_law) for spectrum in spectra):
+        handles.append(Line2D([], [], label="depends on the impact law", **LAW_MARK))
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=7, handlelength=1.6)
 
 
 def maps_figure(found: Agreement, panels: Sequence[Panel]) -> Figure:

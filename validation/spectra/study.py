@@ -9,14 +9,16 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rockcheck.ebm import Spectrum, overturning_spectrum
+from rockcheck.ebm import EventBasedModel, Spectrum, overturning_spectrum
+from rockcheck.ebm.horizon import other_law
 from rockcheck.ebm.spectrum import LEFT, RIGHT, TOLERANCE, Floats, play_nodes
 from rockcheck.scenes import Floor, InputError, Ricker, Scene, Wall
 from rockcheck.scenes.compiled import threads
@@ -89,6 +91,8 @@ class SpectrumRecord(Stored):
     safe: float
     left: float
     right: float
+    #: How many nodes have another outcome under the other law of impacts; None where that was not looked at.
+    depends_on_law: int | None = None
 
 
 class SpectraIndex(Stored):
@@ -130,19 +134,36 @@ def axis(low: float, high: float, size: int, key: str) -> Floats:
     return np.linspace(low, high, size)
 
 
-def play_panels(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles) -> list[Spectrum]:
-    """The spectra of the panels, in order; on a cluster all at once, here one after the other on all cores. Raises `InputError`."""
+def other_settings(panel: Panel, request: SpectrumRequest) -> dict[str, Any] | None:
+    """The model's settings with the other law of impacts; None where outcomes do not depend on it: beside no wall that bounces."""
+    player = build(request.model, request.settings)
+    bounces = any(wall.restitution > 0.0 for wall in panel.scene.walls)
+    if not (bounces and isinstance(player, EventBasedModel) and player.pivot == "unilateral"):
+        return None
+    return {**request.settings, "impacts": other_law(player)}
 
-    def play(panel: Panel) -> Spectrum:
+
+def play_panels(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, *, both_laws: bool = False) -> list[Spectrum]:
+    """The spectra of the panels, in order; on a cluster all at once, here one after the other on all cores. Raises `InputError`.
+
+    With `both_laws` they are played under the other law of impacts, too, where that can matter, and know the nodes at which it does.
+    """
+
+    def played(panel: Panel, settings: Mapping[str, Any]) -> Spectrum:
         spectrum = overturning_spectrum(
             panel.scene,
             request.frequencies,
             request.amplitudes,
             refine=request.refine,
-            play=lambda scene, a, f: tiles.play(scene, a, f, model=request.model, settings=request.settings),
+            play=lambda scene, a, f: tiles.play(scene, a, f, model=request.model, settings=settings),
         )
         tiles.count.add(spectrum.outcomes.size - spectrum.evaluations)  # what did not have to be run
         return spectrum
+
+    def play(panel: Panel) -> Spectrum:
+        spectrum = played(panel, request.settings)
+        settings = other_settings(panel, request) if both_laws else None
+        return spectrum if settings is None else replace(spectrum, depends_on_law=differing(spectrum, played(panel, settings)))
 
     for panel in panels:
         check = getattr(build(request.model, request.settings), "check", None)
@@ -152,6 +173,14 @@ def play_panels(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles)
         return [play(panel) for panel in panels]
     with threads(len(panels)) as pool:
         return list(pool.map(play, panels))
+
+
+def differing(spectrum: Spectrum, other: Spectrum) -> NDArray[np.int64]:
+    """The nodes (i, j), a row each, that are decided in both and differ."""
+    differ = spectrum.outcomes != other.outcomes
+    for one in (spectrum, other):
+        differ[tuple(one.undecided.T)] = False
+    return np.argwhere(differ)
 
 
 def warm_up(panel: Panel, request: SpectrumRequest) -> None:
@@ -180,6 +209,7 @@ def save(panels: Sequence[Panel], spectra: Sequence[Spectrum], request: Spectrum
             safe=spectrum.safe_area,
             left=float(np.mean(spectrum.outcomes == LEFT)),
             right=float(np.mean(spectrum.outcomes == RIGHT)),
+            depends_on_law=None if spectrum.depends_on_law is None else len(spectrum.depends_on_law),
         )
         about = record.model_dump(exclude={"frequency_ratios", "amplitude_ratios"}) | {"versions": provenance.versions()}
         write_whole(folder / f"{record.name}.npz", _npz(spectrum, json.dumps(about)))
@@ -215,6 +245,7 @@ def _plain_scene(scene: Scene) -> dict[str, Any]:
 
 def _npz(spectrum: Spectrum, about: str) -> bytes:
     content = io.BytesIO()
+    law: dict[str, Any] = {} if spectrum.depends_on_law is None else {"depends_on_law": spectrum.depends_on_law}
     np.savez_compressed(
         content,
         outcomes=spectrum.outcomes,
@@ -222,6 +253,7 @@ def _npz(spectrum: Spectrum, about: str) -> bytes:
         amplitude_ratios=spectrum.amplitude_ratios,
         undecided=spectrum.undecided,
         settings=np.array(about),
+        **law,
     )
     return content.getvalue()
 

@@ -141,7 +141,7 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path, capsys):
             assert run.poll() is None
             time.sleep(0.002)
         run.kill()
-    finished = sum(len(json.loads(tile.read_text(encoding="utf-8"))["outcomes"]) for tile in tiles.glob("*.json"))
+    finished = sum(len(json.loads(tile.read_text(encoding="utf-8"))["content"]["outcomes"]) for tile in tiles.glob("*.json"))
     assert 0 < finished < 7 * 150**2
     assert main(words) == 0
     assert f"{7 * 150**2} runs, {finished} read back" in capsys.readouterr().out
@@ -252,6 +252,57 @@ def test_ones_own_scene_and_fragility(tmp_path, capsys):
     assert "bookcase" in page
     assert "Fragility" in page
     assert "motions" in capsys.readouterr().out
+
+
+# The law of impacts
+
+#: A node of the spectrum beside a wall at 3 mm, e = 1, that falls under one law and stands under the other, between two that do not.
+OF_THE_LAW = np.array([5.0, np.linspace(0.5, 8.0, 100)[73]]), np.array([6.0, 8.0])
+
+
+@pytest.mark.parametrize("refine", [False, True])
+def test_nodes_that_depend_on_the_law_of_impacts_are_known(tmp_path, refine):
+    panel = next(panel for panel in paper_panels(6) if panel.name == "figure-6-gap-3-e-1")
+    request = SpectrumRequest(*OF_THE_LAW, model="ebm-unilateral", refine=refine)
+    with Tiles(tmp_path, jobs=1) as tiles:
+        (alone,) = play_panels([panel], request, tiles)
+        (found,) = play_panels([panel], request, tiles, both_laws=True)
+    assert alone.depends_on_law is None
+    assert found.depends_on_law.tolist() == [[0, 1]]
+    np.testing.assert_array_equal(found.outcomes, alone.outcomes)
+    spectra.save([panel], [found], request, tmp_path)
+    assert spectra.read_index(tmp_path).spectra[0].depends_on_law == 1
+    with np.load(tmp_path / "figure-6-gap-3-e-1--ebm-unilateral.npz") as data:
+        assert data["depends_on_law"].tolist() == [[0, 1]]
+
+
+@pytest.mark.parametrize(("name", "model"), [("gap-3-e-1", "ebm"), ("gap-3-e-0", "ebm-unilateral"), ("unobstructed", "ebm-unilateral")])
+def test_without_a_bouncing_wall_or_a_hop_no_second_law_is_played(tmp_path, name, model):
+    panel = next(panel for panel in paper_panels(6) if panel.name == f"figure-6-{name}")
+    with Tiles(tmp_path, jobs=1) as tiles:
+        (found,) = play_panels([panel], SpectrumRequest(*OF_THE_LAW, model=model), tiles, both_laws=True)
+        assert tiles.played == 4
+    assert found.depends_on_law is None
+
+
+def test_an_undecided_node_does_not_depend_on_the_law():
+    about = {"frequency_ratios": np.ones(1), "amplitude_ratios": np.ones(2), "evaluations": 2, "scene": None, "model": None}
+    one = Spectrum(outcomes=np.array([[0], [1]], dtype=np.int8), undecided=np.array([[0, 0]]), **about)
+    other = Spectrum(outcomes=np.array([[1], [0]], dtype=np.int8), undecided=np.empty((0, 2), dtype=np.int64), **about)
+    assert spectra.differing(one, other).tolist() == [[1, 0]]
+
+
+def test_the_command_counts_and_marks_nodes_that_depend_on_the_law(tmp_path, capsys):
+    text = SCENE.replace("half_width = 0.2, half_height = 1.0", "half_width = 0.397, half_height = 1.555").replace("0.5 }", "0.3 }", 1)
+    (tmp_path / "near.toml").write_text(text.replace("gap = 0.02", "gap = 0.003, restitution = 1.0"), encoding="utf-8")
+    (low, high), (weak, strong) = (map(str, map(float, values)) for values in OF_THE_LAW)
+    grid = ["--frequencies", low, high, "--amplitudes", weak, strong, "--size", "2", "--out", "out"]
+    assert main(["spectrum", "--scene", "near.toml", *grid]) == 0
+    assert capsys.readouterr().out.splitlines()[1].split()[-1] == "1"
+    page = (tmp_path / "out" / "spectra.html").read_text(encoding="utf-8")
+    assert "depends on the impact law" in page
+    assert main(["spectrum", "--scene", "bookcase.toml", *grid]) == 0
+    assert "impact law" not in capsys.readouterr().out
 
 
 # Claims

@@ -31,6 +31,7 @@ from rockcheck.validation.spectra.study import (
     Panel,
     SpectrumRequest,
     axis,
+    other_settings,
     paper_panels,
     play_panels,
     save,
@@ -166,8 +167,9 @@ def _spectra(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, da
     began, cpu = time.perf_counter(), time.process_time()
     nodes = len(request.frequencies) * len(request.amplitudes)
     with progress("spectra") as on_progress:
-        tiles.count = Count(on_progress, nodes * len(panels))
-        spectra = play_panels(panels, request, tiles)
+        laws = sum(other_settings(panel, request) is not None for panel in panels)
+        tiles.count = Count(on_progress, nodes * (len(panels) + laws))
+        spectra = play_panels(panels, request, tiles, both_laws=True)
     taken, cpu = time.perf_counter() - began, time.process_time() - cpu
     screen.print(_shares(panels, spectra))
     _speed(spectra, request, tiles, taken, cpu, screen)
@@ -178,13 +180,15 @@ def _spectra(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, da
 
 
 def _shares(panels: Sequence[Panel], spectra: Sequence[Spectrum]) -> Table:
+    laws = any(spectrum.depends_on_law is not None for spectrum in spectra)
     table = Table(box=None, pad_edge=False)
-    for title, justify in (("spectrum", "left"), ("safe", "right"), ("left", "right"), ("right", "right"), ("undecided", "right")):
-        table.add_column(title, justify=justify)  # type: ignore[arg-type]
+    for title in ("spectrum", "safe", "left", "right", "undecided", *(["depends on the impact law"] if laws else [])):
+        table.add_column(title, justify="left" if title == "spectrum" else "right")
     for panel, spectrum in zip(panels, spectra, strict=True):
         left, right = (float(np.mean(spectrum.outcomes == side)) for side in (LEFT, RIGHT))
         shares = (f"{100.0 * share:.2f} %" for share in (spectrum.safe_area, left, right))
-        table.add_row(panel.name, *shares, str(len(spectrum.undecided)))
+        law = "-" if spectrum.depends_on_law is None else str(len(spectrum.depends_on_law))
+        table.add_row(panel.name, *shares, str(len(spectrum.undecided)), *([law] if laws else []))
     return table
 
 
