@@ -23,6 +23,7 @@ from rockcheck.scenes.errors import from_validation, printable
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
+from rockcheck.validation.discrepancy.impact_laws import LawFollowed
 from rockcheck.validation.uncertainty.inputs import Inputs
 from rockcheck.validation.uncertainty.numerical import Numerical
 from rockcheck.validation.uncertainty.verdict import Explanation
@@ -92,6 +93,7 @@ class Cell(Stored):
     path of its CSV relative to the run's folder. `read_back` is true where nothing that the cell depends on had changed.
     `figures` are all measures, judged or not; `checks` those with a tolerance or in need of one. `numerical` is the run's
     numerical uncertainty, where the suite asks for it, and `explanations` what it says of the differences.
+    `impact_law` is the law of impacts that the history followed at the scene's first flush landing, which nothing judges.
     `traceback` is the path of a file beside them: of an exception that no model may raise, which is `unexpected` where the
     model is one of rockcheck's own.
     """
@@ -113,6 +115,7 @@ class Cell(Stored):
     checks: tuple[Check, ...] = ()
     numerical: Numerical | None = None
     explanations: tuple[Explanation, ...] = ()
+    impact_law: LawFollowed | None = None
 
     @field_validator("history")
     @classmethod

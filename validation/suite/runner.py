@@ -20,6 +20,7 @@ from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.discrepancy.compare import compare, describe, evaluate, too_short
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
+from rockcheck.validation.discrepancy.impact_laws import LawFollowed
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.execute import provenance, workers
@@ -27,6 +28,7 @@ from rockcheck.validation.execute.models import is_own, not_installed
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, Store, name_of
 from rockcheck.validation.suite.confidence import explanations, inputs_of, key_of, numerical_of
 from rockcheck.validation.suite.ensembles import Ensemble
+from rockcheck.validation.suite.impact_laws import by_either, landing_of, under_the_other_law
 from rockcheck.validation.suite.results import Cell, CostRecord, EnsembleRecord, Run
 from rockcheck.validation.suite.suites import ModelVariant, Suite
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Place, Windowed, judge
@@ -101,10 +103,14 @@ class BatchRecord(Stored):
 
 
 class ComparisonRecord(Stored):
-    """The figures of a comparison; by window, what could not be compared, and whether because one block fell."""
+    """The figures of a comparison; by window, what could not be compared, and whether because one block fell.
+
+    What could not be compared is given by measure and window where a measure has its own. `impact_law` is that of a cell's own figures.
+    """
 
     figures: tuple[Figure, ...]
     gaps: dict[str, tuple[str, bool]]
+    impact_law: LawFollowed | None = None
 
 
 def _is(kind: type[Stored], found: Mapping[str, Any] | None) -> bool:
@@ -336,6 +342,7 @@ def _cell(
     own = suite.suite_of(scene.name)
     figures: list[Figure] = []
     gaps: dict[tuple[str, str], tuple[str, bool]] = {}
+    law: dict[str, Any] | None = None
     for name in dict.fromkeys([OWN_FIGURES, own.reference, own.model_form, *(place.against for place in required)]):
         reference = planned_cells.get((scene.name, name))
         if name != OWN_FIGURES and (reference is None or reference is planned or reference not in records):
@@ -345,10 +352,12 @@ def _cell(
         found = _compared(store, scene, planned, reference, extra, horizon)
         figures += [Figure(**figure) for figure in found["figures"]]
         gaps |= {(name, window): (text, fall) for window, (text, fall) in found["gaps"].items()}
+        law = law or found.get("impact_law")
     checks = []
     for place, kind in required.items():
         figure = _figure(figures, place)
-        text, fall = gaps.get((place.against, place.what.window), ("", False))
+        of_window = gaps.get((place.against, place.what.window), ("", False))
+        text, fall = gaps.get((place.against, str(place.what)), of_window)
         gap = "" if fall and kind == "model form" else text
         if gap and kind == "measured" and not fall:
             gap += "; `offset` of the measured model shifts its times, a window such as theta_rms@8s ends sooner"
@@ -364,6 +373,7 @@ def _cell(
         figures=tuple(figures),
         checks=tuple(checks),
         numerical=numerical_of(record),
+        impact_law=None if law is None else LawFollowed.model_validate(law),
     )
 
 
@@ -429,10 +439,10 @@ def _compared(
 ) -> dict[str, Any]:
     """All figures over the whole time, and those asked for over a window; kept in the store.
 
-    Figures of the cell itself where `reference` is None. "gaps" says by window what could not be compared,
-    and whether because one block fell.
+    Figures of the cell itself where `reference` is None, with the law of impacts that it followed. "gaps" says by window what could
+    not be compared, and whether because one block fell.
     """
-    code = provenance.code_digest("rockcheck.validation.discrepancy.compare")
+    code = provenance.code_digest("rockcheck.validation.suite.impact_laws")  # with `compare`
     key = provenance.digest(json.dumps([planned.key, reference.key if reference else "", list(map(str, windowed)), horizon, code]))
     name = name_of(scene.name, planned.variant.label, reference.variant.label if reference else OWN_FIGURES, key)
     found = store.get_record(COMPARISONS, name)
@@ -452,6 +462,8 @@ def _compute(
     by_window: dict[str, list[str]] = {"": [m.name for m in (DIFFERENCES if reference else FIGURES).values() if not m.on_request]}
     for what in windowed:
         by_window.setdefault(what.window, []).append(what.measure)
+    landing = landing_of(store, scene)
+    other = under_the_other_law(scene, reference.variant) if landing and reference else None
     for window, measures in by_window.items():
         until = horizon if window == HORIZON else float(window[:-1]) if window else None
         if yardstick is None:
@@ -460,5 +472,13 @@ def _compute(
         else:
             discrepancy = compare(yardstick, candidate, until=until, scene=scene, measures=measures)
             found, gaps[window] = discrepancy.figures, (discrepancy.gap, discrepancy.fall)
+            if other and landing and (until is None or until > landing.t):
+                found, own = by_either(discrepancy, *other, candidate, scene, until, measures)
+                gaps |= {str(Windowed(measure, window)): gap for measure, gap in own.items()}
         figures += [figure.model_copy(update={"window": window}) for figure in found]
-    return {"figures": [figure.model_dump(mode="json") for figure in figures], "gaps": gaps}
+    law = landing.followed_by(candidate, scene) if landing and yardstick is None else None
+    return {
+        "figures": [figure.model_dump(mode="json") for figure in figures],
+        "gaps": gaps,
+        "impact_law": None if law is None else law.model_dump(mode="json"),
+    }

@@ -53,6 +53,7 @@ def summary(run: Run) -> dict[str, Any]:
                 "checks": len(cell.checks),
                 "verdict": cell.verdict if cell.checks or cell.status != "done" else None,
                 "converged": cell.converged,
+                "impact_law": cell.impact_law.law if cell.impact_law else None,
                 "explanations": [f"{e.quantity} against {e.against}: {e.verdict}" for e in cell.explanations],
             }
             for cell in run.cells

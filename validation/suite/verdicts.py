@@ -68,7 +68,19 @@ def markdown(run: Run) -> str:
     if reasons:
         lines += [*(f"- {_plain(reason)}" for reason in reasons), ""]
     rows = ((_plain(scene), *(_entry(run.cell(scene, model)) for model in run.models)) for scene in run.places)
-    return "\n".join([*lines, markdown_table(("scene", *map(_plain, run.models)), rows)]) + "\n"
+    return "\n".join([*lines, markdown_table(("scene", *map(_plain, run.models)), rows), *_laws(run)]) + "\n"
+
+
+def _laws(run: Run) -> Iterator[str]:
+    """Which law of impacts each model followed, where scenes have a landing that tells; it is no verdict."""
+    told = {cell.scene: cell.impact_law.t for cell in run.cells if cell.impact_law}
+    if not told:
+        return
+    models = [model for model in run.models if any(cell.model == model and cell.impact_law for cell in run.cells)]
+    yield from ("", "The law of impacts followed at the first landing flush against a bouncing wall (not judged):", "")
+    found = {(cell.scene, cell.model): cell.impact_law.law for cell in run.cells if cell.impact_law}
+    rows = ((_plain(scene), f"{t:.3f} s", *(found.get((scene, model), "") for model in models)) for scene, t in told.items())
+    yield markdown_table(("scene", "landing", *map(_plain, models)), rows)
 
 
 def _entry(cell: Cell | None) -> str:

@@ -1,0 +1,153 @@
+"""The law of impacts in a suite: named where a landing tells, never judged; outcomes and peaks by the nearer law."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import Scene
+from rockcheck.validation.discrepancy.compare import compare
+from rockcheck.validation.execute import workers
+from rockcheck.validation.execute.store import COMPARISONS, Store
+from rockcheck.validation.suite.impact_laws import by_either, landing_of, under_the_other_law
+from rockcheck.validation.suite.results import Cell, Run
+from rockcheck.validation.suite.runner import run_suite
+from rockcheck.validation.suite.suites import ModelVariant, load_suite
+from rockcheck.validation.suite.tables import summary
+from rockcheck.validation.suite.verdicts import markdown
+
+# Under "moreau" the first block stays and under "floor-first" it falls; the second stands beside no wall that bounces.
+SUITE = """
+reference = "ebm-unilateral"
+[models.ebm-unilateral]
+[models.floor-first]
+model = "ebm-unilateral"
+impacts = "floor-first"
+[models.mujoco]
+time_step = "adaptive"
+[require]
+difference = ["outcome_agrees", "peak_ratio", "theta_rms@horizon"]
+[[scene]]
+name = "of the law"
+duration = 8.0
+output_step = 0.01
+block = { half_width = 0.397, half_height = 1.555 }
+floor = { friction = 0.3 }
+walls = [{ side = "left", gap = 0.003, restitution = 1.0 }]
+excitation = { kind = "ricker", amplitude = AMPLITUDE, period = PERIOD }
+[[scene]]
+name = "plastic"
+duration = 1.0
+initial_rotation = -0.07
+block = { half_width = 0.397, half_height = 1.555 }
+floor = { friction = 0.5 }
+walls = [{ side = "left", gap = 0.0, restitution = 0.0 }]
+[tolerances."*".floor-first.ebm-unilateral]
+outcome_agrees = { expected = 1.0, limit = 0.0, drift = 0.0, why = "the nearer of two laws" }
+peak_ratio = { expected = 1.0, limit = 1e-6, drift = 1e-6, why = "the nearer of two laws" }
+"theta_rms@horizon" = { expected = 0.0, limit = 1e-3, drift = 1e-3, why = "before the laws part" }
+"""
+
+
+@pytest.fixture(scope="module")
+def suite_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The suite, with a pulse that is a node of the paper's Fig. 6 of which the law decides."""
+    block = Scene(name="a", **{"block": {"half_width": 0.397, "half_height": 1.555}, "floor": {"friction": 0.3}, "duration": 1.0})
+    ratio = np.linspace(0.5, 8.0, 100)[73]
+    period, amplitude = 2.0 * np.pi / (ratio * block.frequency_parameter), 6.0 * 9.81 * 0.397 / 1.555
+    path = tmp_path_factory.mktemp("suite") / "laws.toml"
+    path.write_text(SUITE.replace("AMPLITUDE", repr(float(amplitude))).replace("PERIOD", repr(float(period))), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def run(suite_file: Path) -> Run:
+    return run_suite(load_suite(suite_file), suite_file.parent / "out", jobs=1, play=lambda tasks, **_: enumerate(map(workers.play, tasks)))
+
+
+def cell_of(run: Run, scene: str, model: str) -> Cell:
+    found = run.cell(scene, model)
+    assert found is not None
+    return found
+
+
+def test_the_law_that_each_model_followed_is_in_its_cell(run: Run) -> None:
+    laws = {cell.model: cell.impact_law for cell in run.of_scene("of the law")}
+    assert {model: law.law for model, law in laws.items() if law} == {
+        "ebm-unilateral": "open",
+        "floor-first": "floor-first",
+        "mujoco": "closed",
+    }
+    assert len({law.t for law in laws.values() if law}) == 1
+    assert all(cell.impact_law is None for cell in run.of_scene("plastic"))
+
+
+def test_outcomes_and_peaks_are_judged_by_the_nearer_law(run: Run) -> None:
+    """The two laws end differently, and yet both are right; the histories are held against each other only up to where they part."""
+    cell = cell_of(run, "of the law", "floor-first")
+    assert cell_of(run, "of the law", "ebm-unilateral").outcome != cell.outcome
+    assert {str(check.figure.measure): check.verdict for check in cell.checks} == dict.fromkeys(
+        ("outcome_agrees", "peak_ratio", "theta_rms"), "pass"
+    )
+    notes = {check.figure.measure: check.figure.note for check in cell.checks}
+    assert notes["outcome_agrees"].endswith('impacts = "floor-first"')
+    assert notes["peak_ratio"] == 'impacts = "floor-first"'
+    assert "impacts = " not in notes["theta_rms"]
+    assert cell.impact_law is not None
+    horizon = next(check.figure.until for check in cell.checks if check.figure.measure == "theta_rms")
+    assert horizon is not None
+    assert abs(horizon - cell.impact_law.t) < 0.05
+
+
+def test_where_no_landing_tells_one_law_judges(run: Run) -> None:
+    for cell in run.of_scene("plastic"):
+        assert all("impacts = " not in figure.note for figure in cell.figures)
+
+
+def test_the_summary_names_the_laws_and_nothing_depends_on_them(run: Run, tmp_path: Path) -> None:
+    table = markdown(run).split("not judged")[1]
+    assert "of the law" in table
+    assert "open | floor-first | closed" in " ".join(table.split())
+    assert "plastic" not in table
+    laws = {(one["scene"], one["model"]): one["impact_law"] for one in summary(run)["cells"]}
+    assert laws["of the law", "mujoco"] == "closed"
+    assert laws["plastic", "mujoco"] is None
+    run.save(tmp_path)
+    assert cell_of(Run.load(tmp_path), "of the law", "mujoco").impact_law == cell_of(run, "of the law", "mujoco").impact_law
+    silent = run.model_copy(update={"cells": tuple(cell.model_copy(update={"impact_law": None}) for cell in run.cells)})
+    assert "not judged" not in markdown(silent)
+    assert silent.verdict == run.verdict
+
+
+def test_a_landing_is_kept_and_what_was_kept_is_not_trusted(suite_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, store = load_suite(suite_file).scenes["of the law"], Store(tmp_path)
+    first = landing_of(store, scene)
+    assert first is not None
+    (kept,) = (tmp_path / COMPARISONS).iterdir()
+    with monkeypatch.context() as patched:
+        patched.setattr("rockcheck.validation.suite.impact_laws.flush_landing", lambda scene: None)
+        assert landing_of(store, scene) == first
+    store.put_record(COMPARISONS, kept.stem, {"landing": {"t": 1.0}})
+    assert landing_of(store, scene) == first
+
+
+def test_only_a_reference_with_a_law_to_choose_has_another(suite_file: Path) -> None:
+    suite = load_suite(suite_file)
+    scene = suite.scenes["of the law"]
+    found = [under_the_other_law(scene, suite.models[name]) for name in ("ebm-unilateral", "floor-first", "mujoco")]
+    assert [one and one[0] for one in found] == ["floor-first", "moreau", None]
+    assert under_the_other_law(scene, ModelVariant("paper", "ebm", {})) is None
+
+
+def test_the_reference_itself_counts_where_it_is_nearer(suite_file: Path) -> None:
+    scene = load_suite(suite_file).scenes["of the law"]
+    one, other = (EventBasedModel(pivot="unilateral", impacts=law).simulate(scene) for law in ("moreau", "floor-first"))
+    figures, gaps = by_either(compare(one, one, scene=scene), "floor-first", other, one, scene, None, ["outcome_agrees", "peak_ratio"])
+    assert gaps == {}
+    assert {figure.measure: figure.value for figure in figures if figure.measure in ("outcome_agrees", "peak_ratio")} == {
+        "outcome_agrees": 1.0,
+        "peak_ratio": 1.0,
+    }
