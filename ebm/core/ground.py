@@ -203,10 +203,11 @@ def impulse_ahead(g, t):
 def _passage(g, a, b, fa, fb, level):
     """Where the acceleration passes the level between a, inside it by fa, and b, beyond it by fb; it is monotone in between.
 
-    Regula falsi (Illinois), never nearer to an end than rounding, and halved in between, so that the bracket closes on the root also
-    where a is on it; returns its outer end.
+    Regula falsi (Anderson and Bjoerck's), never nearer to an end than rounding, and halved in between, so that the bracket closes on the
+    root also where a is on it; returns its outer end.
     """
     rising = fb > 0.0
+    side = 0  # the end that the last step has moved
     close = 2.0 * _EPSILON * abs(b)
     for trial in range(200):
         if b - a <= close:
@@ -219,13 +220,13 @@ def _passage(g, a, b, fa, fb, level):
                 break
         f = acceleration(g, middle) - level
         if (f > 0.0) == rising and f != 0.0:
-            if fb * f > 0.0:
-                fa *= 0.5
-            b, fb = middle, f
+            if side > 0:
+                fa *= 1.0 - f / fb if abs(f) < abs(fb) else 0.5
+            b, fb, side = middle, f, 1
         else:
-            if fa * f > 0.0:
-                fb *= 0.5
-            a, fa = middle, f
+            if side < 0:
+                fb *= 1.0 - f / fa if abs(f) < abs(fa) else 0.5
+            a, fa, side = middle, f, -1
     return b
 
 

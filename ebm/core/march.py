@@ -103,7 +103,7 @@ from rockcheck.ebm.core.running import (
     mode_code,
     note,
 )
-from rockcheck.ebm.core.series import AHEAD, FORCE, NO_ROOT, NOISE, POSITION, first_root, slope, step_size, value
+from rockcheck.ebm.core.series import AHEAD, FORCE, NO_ROOT, NOISE, POSITION, first_root, slope, stays_below, step_size, value
 from rockcheck.ebm.core.settle import no_impacts, settling_speed
 from rockcheck.scenes.compiled import inner_kernel, kernel, placed_kernel
 
@@ -341,7 +341,8 @@ def _state(b, m, order, tau, pivot, a, z):
 def _advance(b, r, order, pivot, tau, a, stack):
     """Moves the state to tau after the start of the step; keeps the largest rotation on the way."""
     z, now = r.z, r.now
-    if r.m[FAMILY] == TILT and a[OMEGA, 0] > 0.0 and value(a, OMEGA, order - 1, tau) < 0.0:
+    turns = r.m[FAMILY] == TILT and a[OMEGA, 0] > 0.0 and value(a, OMEGA, order - 1, tau) < 0.0
+    if turns and not stays_below(a, PHI, order, tau, now[PEAK]):
         top = first_root(a, OMEGA, order - 1, tau, NOISE[POSITION], AHEAD, stack)
         if top > 0.0:
             now[PEAK] = max(now[PEAK], value(a, PHI, order, top))

@@ -48,6 +48,23 @@ def slope(a, row, n, tau):
 
 
 @inner_kernel
+def stays_below(a, row, n, tau, level):
+    """Whether c is known to stay below a positive level between 0 and tau, both ends included.
+
+    Between values at a distance d, c rises above the larger one by at most d^2/8 of its largest curvature.
+    """
+    d = 0.25 * tau
+    curvature = 0.0
+    for k in range(n - 2, -1, -1):
+        curvature = curvature * tau + (k + 2.0) * (k + 1.0) * abs(a[row, k + 2])
+    room = 0.999999 * level - 0.125 * d * d * curvature
+    highest = a[row, 0]
+    for quarter in range(1, 5):
+        highest = max(highest, value(a, row, n, quarter * d))
+    return highest < room
+
+
+@inner_kernel
 def step_size(a, first, second, order, tolerance, reach):
     """The step at which the last two terms of the series stay below the tolerance, at most `reach`.
 
@@ -113,8 +130,8 @@ def first_root(a, row, n, h, floor, ahead, stack):
     slope and end value, shows that it holds no root. Touching zero without crossing is no root.
     """
     low = 0.0
-    for k in range(n, 0, -1):
-        low = (low + min(a[row, k], 0.0)) * h
+    for k in range(n, 0, -1):  # c_k + tau (c_k+1 + ...) >= c_k + h min(0, ...)
+        low = min(low + a[row, k], 0.0) * h
     if a[row, 0] > floor and a[row, 0] + low > _ERROR * a[row, 0]:
         return NO_ROOT
     zeros = _order_of_zero(a, row, n, floor, ahead)
@@ -147,13 +164,12 @@ def _isolate(stack, n):
         width, begin = stack[top, _WIDTH], stack[top, _START]
         if stack[top, 0] <= 0.0:
             return begin
-        low = end = stack[top, 0]
-        high_slope = stack[top, 1] if n >= 1 else 0.0
-        for k in range(1, n + 1):
-            low += min(stack[top, k], 0.0)
+        low, high_slope, end = 0.0, 0.0, 0.0
+        for k in range(n, 0, -1):
+            low = min(low, 0.0) + stack[top, k]
+            high_slope = max(high_slope, 0.0) + k * stack[top, k]
             end += stack[top, k]
-            if k > 1:
-                high_slope += k * max(stack[top, k], 0.0)
+        low, end = stack[top, 0] + min(low, 0.0), stack[top, 0] + end
         rootless = low > 0.0 or (high_slope < 0.0 and end > 0.0)
         if not rootless and high_slope < 0.0:
             return begin + width * _falling_root(stack, top, n, end)

@@ -204,7 +204,7 @@ imported = time.perf_counter()
 from rockcheck.scenes import load_scene
 scene = load_scene("fig5a")
 loaded = time.perf_counter()
-ebm.EventBasedModel().simulate(scene)
+rockcheck.ebm.EventBasedModel().simulate(scene)
 print(imported - began, time.perf_counter() - loaded)
 """
 

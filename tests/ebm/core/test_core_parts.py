@@ -15,7 +15,8 @@ import pytest
 
 from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import ground, guards, modes, motion, rules, series
-from rockcheck.scenes import Block, Floor, Record, Scene, Wall
+from rockcheck.scenes import Block, Floor, Record, Ricker, Scene, Wall
+from rockcheck.scenes.scene import PAPER_BLOCK
 
 PIVOTS = ["bilateral", "unilateral"]
 #: Order of the series that guards are taken from.
@@ -568,3 +569,32 @@ def test_the_model_starts_as_the_selection_says():
         history = EventBasedModel().simulate(at.scene.replace(duration=0.02, output_step=0.01))
         assert history.channels["mode"][1] == Core(at.scene, "bilateral").select(at.state).name
         assert ground.acceleration(Core(at.scene, "bilateral").grounds[0], 0.0) == pytest.approx(a)
+
+
+def test_uplift_is_found_to_rounding_in_few_evaluations(monkeypatch):
+    limit, asked = math.tan(0.25), []
+    real = ground.acceleration
+    monkeypatch.setattr(ground, "acceleration", lambda g, t: asked.append(t) or real(g, t))
+    count = 0
+    for amplitude, period, symmetric in itertools.product(np.linspace(2.6, 30.0, 12), (0.3, 1.1, 4.0), (False, True)):
+        pulse = Ricker(amplitude=amplitude, period=period, symmetric=symmetric)
+        scene = Scene(name="pulse", block=PAPER_BLOCK, floor=Floor(friction=1.0), excitation=pulse, duration=5.0)
+        base, _ = natural.grounds_of(scene)
+        t = ground.next_exceedance(base, 0.0, -limit, limit, 0.0, 0.0)
+        assert abs(real(base, t)) >= limit * (1.0 - 1e-15)
+        assert abs(real(base, t * (1.0 - 1e-14))) < limit
+        count += 1
+    assert len(asked) < 25 * count
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_what_stays_below_a_level_is_below_it(seed):
+    r = np.random.default_rng(seed)
+    a, _ = motion.workspace()
+    n, tau = 8, r.uniform(0.1, 2.0)
+    a[0, : n + 1] = r.normal(size=n + 1) / np.cumprod(np.arange(1.0, n + 2.0))
+    highest = max(series.value(a, 0, n, t) for t in np.linspace(0.0, tau, 2001))
+    for level in highest + np.array([-0.5, -1e-3, -1e-9, 0.1, 2.0]):
+        if series.stays_below(a, 0, n, tau, level):
+            assert highest < level
+    assert series.stays_below(a, 0, n, tau, abs(highest) + 1e3)
