@@ -114,7 +114,7 @@ def _order_of_zero(a, row, n, floor, ahead):
         total += a[row, k] * scale
         if abs(a[row, k]) * scale > noise and math.copysign(total, total * a[row, k]) > noise:
             soon = a[row, k] + (k + 1) * a[row, k + 1] * INSTANT if k < n else a[row, k]
-            turns = a[row, k] * soon < 0.0 and (k > 0 or soon > 0.0)  # what ends so soon has its root; what only begins has not begun
+            turns = a[row, k] * soon < 0.0 and (k > 1 or soon > 0.0)  # a gap that a rebound opens ends in an impact, however soon
             if not turns:
                 return k
         scale *= ahead
