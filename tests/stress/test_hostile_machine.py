@@ -287,7 +287,7 @@ def test_interrupted(tmp_path):
 @pytest.mark.parametrize("later", [0.0, 0.2, 0.4, 0.6])
 def test_interrupted_while_a_worker_starts(tmp_path, later):
     """Ctrl-C reaches a worker, too, before it can say that it is not meant: still one line, and no traceback of the worker."""
-    command = [*ROCKCHECK, *SMALL_RUN, "--runs", "60000", "--out", str(tmp_path)]
+    command = [*ROCKCHECK, "stress", "runs", "--model", "ebm no-slip", "--runs", "60000", "--jobs", "1", "--out", str(tmp_path)]
     running = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, start_new_session=True)
     try:
         assert len(workers(running, settled=later)) >= 2
