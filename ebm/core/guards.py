@@ -214,12 +214,6 @@ def guard(which, order, a):
 
 
 @inner_kernel
-def allowed(kind, slack):
-    """The noise that a guard of this kind is allowed in a mode with this slack: a contact that is not closed any more is no noise."""
-    return min(slack * NOISE[kind], CLOSED) if kind == POSITION else slack * NOISE[kind]
-
-
-@inner_kernel
 def seen(kind, smooth):
     """How far ahead a guard of this kind is weighed where the base motion is smooth for the time `smooth`.
 
@@ -238,8 +232,12 @@ def first_event(order, h, slack, a, stack):
     for k in range(GUARDS):
         degree = guard(k, order, a)
         if degree >= 0:
+            noise = slack * NOISE[KIND[k]]
+            if KIND[k] == POSITION and slack > 1.0:  # a contact that is not closed any more is no noise, and takes time to become one
+                noise = NOISE[POSITION]
+                a[GUARD, 0] += CLOSED
             # In h, not tau: the mirror image has another order.
-            root = first_root(a, GUARD, degree, h, allowed(KIND[k], slack), seen(KIND[k], h), stack)
+            root = first_root(a, GUARD, degree, h, noise, seen(KIND[k], h), stack)
             closes = 0 <= which <= G_FAR_GAP < k
             if root != NO_ROOT and root < tau - (INSTANT if closes else 0.0):
                 tau, which = root, k
