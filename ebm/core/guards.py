@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.core.contacts import CLOSED, closed_gap
+from rockcheck.ebm.core.contacts import CLOSED, SLOW, closed_gap
 from rockcheck.ebm.core.motion import (
     COS,
     FAMILY,
@@ -214,6 +214,20 @@ def guard(which, order, a):
 
 
 @inner_kernel
+def _with_slack(which, slack, a):
+    """The noise of the guard in the workspace in a mode with this slack; a contact that is not closed any more is no noise.
+
+    A gap that touches without speed may close so far: that takes time, so that events at one instant end.
+    """
+    if KIND[which] != POSITION:
+        return slack * NOISE[KIND[which]]
+    if slack == 1.0 or which == G_PHI or abs(a[GUARD, 0]) > CLOSED or a[GUARD, 1] < -SLOW:
+        return min(slack * NOISE[POSITION], CLOSED)
+    a[GUARD, 0] += CLOSED
+    return NOISE[POSITION]
+
+
+@inner_kernel
 def seen(kind, smooth):
     """How far ahead a guard of this kind is weighed where the base motion is smooth for the time `smooth`.
 
@@ -232,10 +246,7 @@ def first_event(order, h, slack, a, stack):
     for k in range(GUARDS):
         degree = guard(k, order, a)
         if degree >= 0:
-            noise = slack * NOISE[KIND[k]]
-            if KIND[k] == POSITION and slack > 1.0:  # a contact that is not closed any more is no noise, and takes time to become one
-                noise = NOISE[POSITION]
-                a[GUARD, 0] += CLOSED
+            noise = _with_slack(k, slack, a)
             # In h, not tau: the mirror image has another order.
             root = first_root(a, GUARD, degree, h, noise, seen(KIND[k], h), stack)
             closes = 0 <= which <= G_FAR_GAP < k
