@@ -151,10 +151,10 @@ class EventBasedModel(Frozen):
             wall_seconds=seconds,
             cpu_seconds=cpu,
             set_up=ready - start,
-            steps=tally.steps,
-            evaluations=tally.steps,
-            energy_gains=tally.gains,
-            largest_energy_gain=tally.largest_gain,
+            steps=int(tally.steps),  # the loop, interpreted, counts in numpy's integers
+            evaluations=int(tally.steps),
+            energy_gains=int(tally.gains),
+            largest_energy_gain=float(tally.largest_gain),
             rules={name: int(count) for name, count in zip(NAMES, tally.rules, strict=True) if count},
         )
         return observe(

@@ -40,7 +40,11 @@ TARGETS = {
     "ebm/core/guards.py": ["tests/ebm/core/test_core_parts.py", "tests/ebm/test_edges.py"],
     "ebm/core/modes.py": ["tests/ebm/core/test_core_parts.py", "tests/ebm/test_edges.py"],
     "validation/suite/tolerances.py": ["tests/validation/suite/test_verdicts.py", "tests/validation/suite/test_tolerances.py"],
-    "validation/suite/verdicts.py": ["tests/validation/suite/test_verdicts.py", "tests/validation/commands/test_cli.py"],
+    "validation/suite/verdicts.py": [
+        "tests/validation/suite/test_verdicts.py",
+        "tests/validation/suite/test_impact_laws.py",
+        "tests/validation/commands/test_cli.py",
+    ],
     "validation/discrepancy/statistics.py": ["tests/validation/suite/test_verdicts.py", "tests/validation/suite/test_ensembles.py"],
     "validation/discrepancy/compare.py": ["tests/validation/discrepancy/test_measures.py", "tests/validation/discrepancy/test_measured.py"],
 }

@@ -101,6 +101,15 @@ def test_a_figure_that_is_missing_is_not_the_worst_of_those_that_are_there():
     assert "| a |  | ❌ theta_peak 9.00e-01 / 0.5 |" in text
 
 
+def test_the_table_shows_what_two_solutions_of_the_same_equations_differ_by():
+    """Neither what another model form differs by, nor a figure that is held against no other model."""
+    figure = Figure(measure="theta_rms", label="theta_rms", unit="alpha", value=0.9, against="r")
+    form = judge(figure, LINE, kind="model form", measure=DIFFERENCES["theta_rms"])
+    alone = judge(figure.model_copy(update={"measure": "x_rms", "against": ""}), LINE, kind="numerical", measure=DIFFERENCES["x_rms"])
+    text = markdown(run_of(cell("a", "m", check(0.26, "theta_peak"), form, alone), cell("a", "n", form, alone)))
+    assert "| a |  | ❌ theta_peak 2.60e-01 / 0.5 | ❌ |" in text
+
+
 def test_a_line_for_every_scene_is_completed_by_the_same_line_only():
     """Another measure's line leaves it as it is: without a limit."""
     tables = {"*": {"m": {"r": {"theta_rms": {"why": "a test"}}}}, "a": {"m": {"r": {"x_rms": {"expected": 0.1, "limit": 1.0}}}}}
@@ -112,6 +121,16 @@ def test_a_limit_of_zero_asks_for_the_figure_itself():
     exact = Tolerance(expected=1.0, limit=0.0, drift=0.0, why="the same outcome")
     assert check(1.0, "outcome_agrees", exact).verdict == "pass"
     assert check(0.0, "outcome_agrees", exact).verdict == "fail"
+
+
+def test_the_reason_gives_the_remark_where_the_figure_itself_is_asked_for():
+    """Which outcomes they were; of a figure with a limit the distance says enough."""
+    figure = Figure(measure="outcome_agrees", label="outcome", unit="1", value=0.0, against="r", note="at rest, not overturned left")
+    exact = Tolerance(expected=1.0, limit=0.0, drift=0.0, why="the same outcome")
+    wide = Tolerance(expected=1.0, limit=0.5, drift=0.0, why="half of it")
+    told, untold = (judge(figure, line, kind="numerical", measure=DIFFERENCES["outcome_agrees"]).reason for line in (exact, wide))
+    assert told == "0, not 1 (at rest, not overturned left)"
+    assert untold == "0 is more than 0.5 from 1"
 
 
 def samples(reference: list[float], candidate: list[float], fallen: tuple[int, ...] = ()) -> Samples:
