@@ -43,7 +43,7 @@ def convergence_figure(found: Convergence) -> Figure:
         figure = Figure(figsize=(PAGE, 3.4), layout="constrained")
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
         for ax, reference in zip(panels, REFERENCES, strict=True):
-            for model in SWEEPS:
+            for model in found.models():
                 colour = LOOKS[model].light
                 for case in found.cases:
                     line = [one for one in found.line(model, case.scene) if math.isfinite(one.error(reference))]

@@ -1,0 +1,83 @@
+"""Makes the tables and the figure of docs/convergence.md: `python docs/site_tools/convergence.py` (whole: some minutes of CPU a core).
+
+Every engine that is installed is in them, so that Drake is to be installed, too.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from rockcheck.reports.studies.convergence import convergence_figure
+from rockcheck.reports.style import LOOKS
+from rockcheck.scenes.writing import markdown_table
+from rockcheck.validation.bench.convergence import Convergence, run_convergence
+
+DOCS = Path(__file__).parents[1]
+UNILATERAL, PAPER = "ebm-unilateral", "ebm"
+
+
+def number(value: float) -> str:
+    """An error, or what stands for one that there is not."""
+    return f"{value:.1e}" if math.isfinite(value) else "failed"
+
+
+def levels(found: Convergence) -> str:
+    """Errors of each model at each step, and how fast they fall."""
+    rows = []
+    for level in found.levels:
+        if level.reference == UNILATERAL:
+            errors = [one.against_ebm for one in found.plays if (one.model, one.value) == (level.model, level.value) and not one.failure]
+            within = f"{level.within} of {level.runs}"
+            median = found.level(level.model, PAPER, level.value).median
+            row = (number(level.step), number(level.median), number(level.largest), within, number(median), number(min(errors)))
+            rows.append((LOOKS[level.model].label, *row))
+    head = ("model", "step, s", "against `ebm-unilateral`: median", "largest", "at most 1e-3", "against `ebm`: median", "smallest")
+    return markdown_table(head, rows)
+
+
+def orders(found: Convergence) -> str:
+    """The observed orders of the medians."""
+    head = ("observed order in the step, of the median", "against `ebm-unilateral`", "against `ebm`")
+    rows = (
+        (LOOKS[model].label, *(f"{found.order(model, reference):.2f}" for reference in (UNILATERAL, PAPER))) for model in found.models()
+    )
+    return markdown_table(head, rows)
+
+
+def scenes(found: Convergence) -> str:
+    """Errors against the unilateral model, scene by scene."""
+    rows = []
+    for case in found.cases:
+        falls = case.ends[PAPER].startswith("overturned") and not case.ends[UNILATERAL].startswith("overturned")
+        lines = (" → ".join(number(one.error(UNILATERAL)) for one in found.line(model, case.scene)) for model in found.models())
+        rows.append((case.scene, number(case.model_form) + (" †" if falls else ""), *lines))
+    return markdown_table(("scene", "`ebm` from `ebm-unilateral`", *(LOOKS[model].label for model in found.models())), rows)
+
+
+def exceptions(found: Convergence) -> str:
+    """What does not converge, of how many."""
+    lines: Iterable[str] = found.exceptions or ("none",)
+    pairs = {(one.model, one.scene) for one in found.plays}
+    return "\n".join([f"Of {len(pairs)} scenes with a model:", "", *(f"- {line}" for line in lines)])
+
+
+def main() -> None:
+    """Plays, and writes what was found."""
+    found = run_convergence(on_progress=lambda done, of, what: print(f"{done} of {of}: {what}", file=sys.stderr, flush=True))
+    page = DOCS / "convergence.md"
+    text = page.read_text(encoding="utf-8")
+    for name, made in (("levels", levels), ("orders", orders), ("scenes", scenes), ("exceptions", exceptions)):
+        table = made(found).replace("\\", "\\\\")
+        text, count = re.subn(rf"(<!-- {name} -->\n).*?(\n<!-- end -->)", rf"\g<1>\n{table}\n\2", text, flags=re.S)
+        if count != 1:
+            sys.exit(f"{page}: no place for {name}")
+    page.write_text(text, encoding="utf-8")
+    convergence_figure(found).savefig(DOCS / "images" / "convergence.png", dpi=130)
+
+
+if __name__ == "__main__":
+    main()
