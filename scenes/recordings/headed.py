@@ -53,7 +53,14 @@ def read_at2(path: Path, lines: list[str], reading: Reading) -> Recording:
     values = numbers(path, enumerate(lines[header + 1 :], header + 2))
     if len(values) != count:
         raise fault(path, f"NPTS says {count}, the file has {len(values)} samples", header + 1)
-    return Recording(samples=np.array(values) * UNITS[unit], time_step=step, unit=unit, form="PEER AT2")
+    return Recording(samples=np.array(values) * UNITS[unit], time_step=step, unit=unit, form="PEER AT2", component=_at2_component(lines))
+
+
+def _at2_component(lines: list[str]) -> str:
+    """What the second line ends in: event, date, station, component; "" where it is another line."""
+    fields = lines[1].split(",") if len(lines) > 1 else []
+    name = fields[-1].strip()[:10] if len(fields) > 2 else ""
+    return printable(name) if re.fullmatch(r"[0-9A-Za-z-]{1,6}", name) else ""
 
 
 def read_esm(path: Path, lines: list[str], reading: Reading) -> Recording:

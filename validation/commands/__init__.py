@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.console import Console
@@ -18,6 +18,9 @@ from rockcheck.scenes import History, InputError, named_scenes
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import OnProgress
 from rockcheck.scenes.writing import json_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 OUT = Path("rockcheck-report")
 
@@ -30,6 +33,8 @@ AllowCodeOption = Annotated[
     list[str] | None,
     typer.Option("--allow-code", metavar="MODULE:CLASS", help="A model of your own that may be run: its code is imported; repeatable."),
 ]
+
+PlotOption = Annotated[Path | None, typer.Option("--plot", metavar="FILE.png", help="PNG to draw.")]
 
 #: What a command says: tables and progress, one JSON value instead, or nothing but errors.
 Voice = Literal["tables", "json", "quiet"]
@@ -77,6 +82,12 @@ def tell_notes(history: History, of: str = "") -> None:
         console().print(f"note{f' on {of}' if of else ''}: {note}", style="yellow", soft_wrap=True)
 
 
+def tell_left_out(names: Sequence[str]) -> None:
+    """Names the vertical components of a set of records, which are not played as if they were horizontal."""
+    if names:
+        console().print(f"left out: {', '.join(names)} (vertical; --component plays one as horizontal)", style="yellow", soft_wrap=True)
+
+
 def answer(value: Any) -> None:
     """The command's result as JSON on stdout, where `--json` asks for it; numbers that are not finite become null."""
     if _voice.get() == "json":
@@ -105,6 +116,24 @@ def progress(title: str) -> Iterator[OnProgress]:
             bar.update(task, completed=done, total=total, description=f"{title}: {printable(what, 24)}" if what else title)
 
         yield on_progress
+
+
+def check_picture(path: Path | None) -> None:
+    """Raises `InputError` where no picture can be written into a file of that name."""
+    if path is None:
+        return
+    if path.suffix.lower() != ".png":
+        raise InputError(f"{printable(path)}: a name that ends in .png is asked for", "--plot")
+    if not path.parent.is_dir():
+        raise InputError(f"{printable(path.parent)}: no such folder", "--plot")
+
+
+def save_picture(figure: Figure, path: Path) -> None:
+    """Write a figure as PNG, and say so."""
+    from rockcheck.reports.style import save
+
+    (written,) = save(figure, path.with_suffix(""), ("png",))
+    console().print(f"picture: {written}", soft_wrap=True)
 
 
 def report_file(text: str) -> str:

@@ -7,7 +7,8 @@ from typing import Annotated
 import typer
 
 from rockcheck.validation.commands import OUT, AllowCodeOption, JobsOption, OutOption, SchedulerOption, answer, console, usable_folder
-from rockcheck.validation.commands.validate import ForceOption, SuiteArgument, play_suite, tell_faults
+from rockcheck.validation.commands.run import ForceOption, tell_faults
+from rockcheck.validation.commands.validate import SuiteArgument, play_suite
 from rockcheck.validation.suite.acceptance import accept
 from rockcheck.validation.suite.suites import load_suite
 

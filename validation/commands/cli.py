@@ -24,6 +24,7 @@ from rockcheck.validation.commands import (
     record,
     report,
     report_file,
+    run,
     scenes,
     simulate,
     speaking,
@@ -40,6 +41,7 @@ COMMANDS = {
     new: "rockcheck new bookcase.toml",
     record: "rockcheck record station.V2 --component 1 --plot station.png",
     simulate: "rockcheck simulate fig5a --model mujoco --set time_step=1e-3 -o mujoco.csv",
+    run: "rockcheck run fig5a --models ebm,cm,mujoco",
     compare: "rockcheck compare ebm.csv mujoco.csv --until 8",
     uncertainty: "rockcheck uncertainty fig5a --model mujoco --set time_step=1e-3",
     validate: "rockcheck validate smoke --out rockcheck-report",
@@ -76,19 +78,19 @@ app = typer.Typer(
 )
 
 
-def spoken(run: Callable[..., None]) -> Callable[..., None]:
+def spoken(does: Callable[..., None]) -> Callable[..., None]:
     """A command with the options that all of them have: --quiet and --json."""
 
     def command(*, quiet: bool, as_json: bool, **arguments: Any) -> None:
         with speaking("json" if as_json else "quiet" if quiet else "tables"):
-            run(**arguments)
+            does(**arguments)
 
-    signature = inspect.signature(run, eval_str=True)
+    signature = inspect.signature(does, eval_str=True)
     common = [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=option)
         for name, option in (("quiet", QuietOption), ("as_json", JsonOption))
     ]
-    command.__doc__ = run.__doc__
+    command.__doc__ = does.__doc__
     command.__signature__ = signature.replace(parameters=[*signature.parameters.values(), *common])  # type: ignore[attr-defined]
     command.__annotations__ = {parameter.name: parameter.annotation for parameter in (*signature.parameters.values(), *common)}
     return command

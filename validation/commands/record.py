@@ -12,7 +12,8 @@ from rich.table import Table
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.recordings import Reading, Recording, intensity, read_components
-from rockcheck.validation.commands import answer, console
+from rockcheck.scenes.recordings.sets import files_of
+from rockcheck.validation.commands import answer, check_picture, console, save_picture
 
 UnitOption = Annotated[str | None, typer.Option("--unit", help="Unit of the accelerations: g, m/s2, cm/s2, gal or mm/s2.")]
 TimeStepOption = Annotated[float | None, typer.Option("--time-step", help="Time step, s, where the file has no times.")]
@@ -26,7 +27,7 @@ _PARTS, _MARKS = 60, " ▁▂▃▄▅▆▇█"
 
 
 def run(
-    files: Annotated[list[Path], typer.Argument(help="Record files, or folders of them.")],
+    files: Annotated[list[str], typer.Argument(help='Record files, folders of them, or patterns such as "RSN1_H*.AT2".')],
     unit: UnitOption = None,
     time_step: TimeStepOption = None,
     column: ColumnOption = None,
@@ -39,10 +40,11 @@ def run(
 
     Reads PEER AT2, COSMOS and CSMIP V2, ESM, K-NET and KiK-net, CSV and columns of text; what a file does not say is an option.
     """
+    check_picture(plot)
     reading = reading_of(unit, time_step, column, header_lines, decimal, component)
     found: list[tuple[Path, Recording]] = []
     faults: list[InputError] = []
-    for path in _expanded(files):
+    for path in files_of(files):
         try:
             found += [(path, one) for one in read_components(path, reading)]
         except InputError as error:
@@ -67,20 +69,6 @@ def reading_of(
     for name, word in (("column", column), ("component", component)):
         given[name] = int(word) if word is not None and word.isascii() and word.isdecimal() and len(word) < 9 else word
     return Reading(**given)
-
-
-def _expanded(files: list[Path]) -> list[Path]:
-    """The files, and those in the folders among them, by name."""
-    found: list[Path] = []
-    for path in files:
-        if path.is_dir():
-            inside = sorted(file for file in path.iterdir() if file.is_file() and not file.name.startswith("."))
-            if not inside:
-                raise InputError(f"{printable(path)}: a folder without files")
-            found += inside
-        else:
-            found.append(path)
-    return found
 
 
 def _values(path: Path, record: Recording) -> dict[str, Any]:
@@ -130,12 +118,5 @@ def _picture(record: Recording) -> str:
 
 def _draw(found: list[tuple[Path, Recording]], plot: Path) -> None:
     from rockcheck.reports.show.drawing import recordings_figure
-    from rockcheck.reports.style import save
 
-    if plot.suffix.lower() != ".png":
-        raise InputError(f"{printable(plot)}: a name that ends in .png is asked for", "--plot")
-    if not plot.parent.is_dir():
-        raise InputError(f"{printable(plot.parent)}: no such folder", "--plot")
-    shown = [(f"{path.name} {record.component}".strip(), record) for path, record in found[:12]]
-    (written,) = save(recordings_figure(shown), plot.with_suffix(""), ("png",))
-    console().print(f"picture: {written}", soft_wrap=True)
+    save_picture(recordings_figure([(f"{path.name} {record.component}".strip(), record) for path, record in found[:12]]), plot)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -20,18 +19,16 @@ from rockcheck.validation.commands import (
     SchedulerOption,
     answer,
     console,
-    progress,
     suite_names,
+    tell_left_out,
     usable_folder,
 )
-from rockcheck.validation.commands.publish import keep, publish
-from rockcheck.validation.execute import remote, workers
+from rockcheck.validation.commands.publish import keep
+from rockcheck.validation.commands.run import ForceOption, chosen_models, play, play_scene, published, tell_faults
 from rockcheck.validation.suite.results import Run
-from rockcheck.validation.suite.runner import run_suite
-from rockcheck.validation.suite.suites import load_suite
+from rockcheck.validation.suite.suites import is_scene, load_suite, scene_suite
 from rockcheck.validation.suite.tables import summary, verdict_lines, verdict_table
 
-ForceOption = Annotated[bool, typer.Option("--force", help="Run every cell, also those whose results are up to date.")]
 SuiteArgument = Annotated[str | None, typer.Argument(help="A named suite or a .toml file (default: paper).", autocompletion=suite_names)]
 
 
@@ -48,18 +45,24 @@ def run(
 ) -> None:
     """Run a suite, compare, judge, write the report.
 
-    Every model on every scene; cells whose results are up to date are read back.
+    Every model on every scene; cells whose results are up to date are read back. A scene in place of a suite is played by all models,
+    as by `rockcheck run`, and nothing is judged.
 
     Exit 0: within tolerance. 1: out of tolerance. 2: bad input. 3: a model failed. 70: a fault of rockcheck itself.
     """
     if quick and suite not in (None, "smoke"):
         raise InputError(f"cannot be given together with the suite {suite!r}", "--quick")
     folder = usable_folder(out)
+    if suite is not None and is_scene(suite):
+        if strict:
+            raise InputError(f"{printable(suite)} is a scene, of which nothing is judged; a suite is asked for", "--strict")
+        console().print(f"{suite} is a scene: all models play it, nothing is judged (as `rockcheck run {suite}`)", soft_wrap=True)
+        play_scene(scene_suite(suite, chosen_models()), folder, jobs=jobs, force=force, scheduler=scheduler, report=report)
     finished = play_suite(suite or ("smoke" if quick else "paper"), folder, jobs, force, strict, scheduler, allow_code)
     kept = keep(finished, folder)
     show(finished, console())
     tell_faults(finished, folder)
-    page = _published(folder, jobs) if report else kept
+    page = published(folder, jobs) if report else kept
     console().print(f"report: {page}", soft_wrap=True)
     answer(summary(finished) | {"report": page})
     raise typer.Exit(finished.exit_code)
@@ -70,24 +73,8 @@ def play_suite(
 ) -> Run:
     """Run a suite with a progress bar on stderr."""
     loaded = load_suite(suite, allow_code=allow_code or ())
-    play = workers.local if scheduler is None else remote.OnCluster(scheduler)
-    with progress(loaded.name) as on_progress:
-        return run_suite(loaded, folder, jobs=jobs, force=force, strict=strict, play=play, on_progress=on_progress)
-
-
-def _published(folder: Path, jobs: int | None) -> Path:
-    with progress("pages") as on_progress:
-        return publish(folder, jobs=jobs, on_progress=on_progress)
-
-
-def tell_faults(finished: Run, folder: Path) -> None:
-    """A line on stderr for each exception that no model may raise: of rockcheck's own models to report, of one's own to mend."""
-    for cell in finished.cells:
-        if not cell.traceback:
-            continue
-        where, path = f"{cell.scene}, {cell.model}: {cell.reason}", folder / cell.traceback
-        said = f"a fault of rockcheck itself, {where}: please report it with {path}" if cell.unexpected else f"{where}: traceback in {path}"
-        print(printable(f"rockcheck: {said}", 1400), file=sys.stderr)
+    tell_left_out(loaded.left_out)
+    return play(loaded, folder, jobs, force, strict, scheduler)
 
 
 def show(finished: Run, out: Console) -> None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm.spectrum import SAFE, Floats
 from rockcheck.scenes import InputError, Record, Scene
+from rockcheck.scenes.recordings import Recording
 from rockcheck.scenes.writing import table_text
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.spectra.study import Panel, SpectrumRequest
@@ -49,8 +49,8 @@ class Fragility(Stored):
     cases: tuple[FragilityCurve, ...]
 
 
-def fragility(panel: Panel, request: SpectrumRequest, records: Sequence[Path], tiles: Tiles) -> Fragility:
-    """The curves of a scene for a set of records, or, without any, for pulses of the scene's kind over the frequencies asked.
+def fragility(panel: Panel, request: SpectrumRequest, records: Sequence[tuple[str, Recording]], tiles: Tiles) -> Fragility:
+    """The curves of a scene for a set of named records, or, without any, for pulses of the scene's kind over the frequencies asked.
 
     Each motion is played in both directions at every intensity: its peak acceleration over g tan(alpha), the amplitudes
     asked. Raises `InputError` for a set of fewer than `FEWEST`.
@@ -86,14 +86,14 @@ def _play_pulses(scene: Scene, request: SpectrumRequest, tiles: Tiles) -> Runs:
     return sides.reshape(a.shape), failed.reshape(a.shape)
 
 
-def _play_records(scene: Scene, request: SpectrumRequest, records: Sequence[Path], tiles: Tiles) -> Runs:
+def _play_records(scene: Scene, request: SpectrumRequest, records: Sequence[tuple[str, Recording]], tiles: Tiles) -> Runs:
     """Sides and failures (record, direction, intensity)."""
     found = []
-    for path in records:
-        record = Record.from_file(path)
+    for name, recording in records:
+        record = Record.from_samples(recording.samples, recording.time_step)
         peak = float(np.max(np.abs(record.samples)))
         if peak == 0.0:
-            raise InputError(f"{path.name}: a record without motion has no intensity", "--record")
+            raise InputError(f"{name}: a record without motion has no intensity", "--record")
         scales = request.amplitudes * scene.gravity * scene.block.half_width / scene.block.half_height / peak
         both = np.concatenate([scales, -scales])
         played = tiles.play(scene.replace(excitation=record), both, np.ones(len(both)), model=request.model, settings=request.settings)

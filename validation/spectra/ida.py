@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,9 +17,9 @@ from numpy.typing import NDArray
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.scenes import InputError, Record, Scene
-from rockcheck.scenes.errors import printable, unknown_name
+from rockcheck.scenes.errors import unknown_name
 from rockcheck.scenes.progress import OnProgress, unheard
-from rockcheck.scenes.recordings import Reading, Recording, intensity, read_components
+from rockcheck.scenes.recordings import Recording, intensity
 from rockcheck.scenes.writing import table_text
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.spectra.fragility import CONFIDENCE, FEWEST, Floats, FragilityCurve, curve_of, fit_lognormal
@@ -92,32 +91,6 @@ class Ida(Stored):
     lines: tuple[Line, ...]
     quantiles: Mapping[str, tuple[float | None, ...]]
     capacities: tuple[Capacity, ...]
-
-
-def files_of(words: Sequence[str]) -> list[Path]:
-    """The files that are meant: paths, folders (all files in them), and patterns such as "RSN1_H*.AT2" that no shell has expanded."""
-    found: list[Path] = []
-    for word in words:
-        path = Path(word)
-        if path.is_dir():
-            inside = sorted(file for file in path.iterdir() if file.is_file() and not file.name.startswith("."))
-        elif path.exists() or not any(sign in path.name for sign in "*?["):
-            inside = [path]
-        else:
-            inside = sorted(path.parent.glob(path.name))
-        if not inside:
-            raise InputError(f"{printable(path)}: no such files")
-        found += inside
-    return list(dict.fromkeys(found))
-
-
-def motions_of(paths: Sequence[Path], reading: Reading) -> list[tuple[str, Recording]]:
-    """All components of the files, each with a name: the file's, and the component's where it has several."""
-    found = []
-    for path in paths:
-        components = read_components(path, reading)
-        found += [(f"{path.name} {one.component}" if len(components) > 1 else path.name, one) for one in components]
-    return found
 
 
 def analyse(

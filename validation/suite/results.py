@@ -94,6 +94,7 @@ class Cell(Stored):
     `figures` are all measures, judged or not; `checks` those with a tolerance or in need of one. `numerical` is the run's
     numerical uncertainty, where the suite asks for it, and `explanations` what it says of the differences.
     `impact_law` is the law of impacts that the history followed at the scene's first flush landing, which nothing judges.
+    `overturned_at` is the time (s) at which the block lay, None for one that stays.
     `traceback` is the path of a file beside them: of an exception that no model may raise, which is `unexpected` where the
     model is one of rockcheck's own.
     """
@@ -109,6 +110,7 @@ class Cell(Stored):
     read_back: bool = False
     history: str | None = None
     outcome: str = ""
+    overturned_at: float | None = None
     notes: tuple[str, ...] = ()
     cost: CostRecord = CostRecord()
     figures: tuple[Figure, ...] = ()
@@ -123,6 +125,11 @@ class Cell(Stored):
         if history is not None and (PurePath(history).is_absolute() or ".." in PurePath(history).parts or not history.isprintable()):
             raise InputError(f"{printable(history)} is not allowed: a path within the run's folder is asked for")
         return history
+
+    @property
+    def fate(self) -> str:
+        """The outcome in words, with the time of overturning: "overturned left at 3.21 s"."""
+        return self.outcome if self.overturned_at is None else f"{self.outcome} at {self.overturned_at:.3g} s"
 
     @property
     def converged(self) -> bool | None:
@@ -182,6 +189,8 @@ class Run(Stored):
     hardware: dict[str, str] = Field(default_factory=dict)
     wall_seconds: float = 0.0
     strict: bool = False
+    #: False where nothing was to be judged, as by `rockcheck run`.
+    judged: bool = True
     tolerances_file: str = ""
     ensembles: tuple[EnsembleRecord, ...] = ()
     #: By scene, what the spread of its inputs makes of its figures.
@@ -189,13 +198,15 @@ class Run(Stored):
 
     @property
     def verdict(self) -> Verdict:
-        """The worst cell; "fail" at least where there are faults, and never "pass" without a single check."""
+        """The worst cell; "fail" at least where there are faults, and never "pass" without a single check that was to be made."""
         found = worst([cell.verdict for cell in self.cells] + (["fail"] if self.faults else []))
-        return found if any(cell.checks for cell in self.cells) else worst([found, "fail"])
+        return found if not self.judged or any(cell.checks for cell in self.cells) else worst([found, "fail"])
 
     @property
     def words(self) -> str:
-        """The verdict for people; "no tolerance yet" where nothing else keeps the run from passing."""
+        """The verdict for people; "no tolerance yet" where nothing else keeps the run from passing, "not judged" where nothing was."""
+        if not self.judged and self.verdict == "pass":
+            return "not judged"
         found = {cell.words for cell in self.cells}
         bad = bool(self.faults) or bool(found & {"fail", "error"})
         return "no tolerance yet" if "no tolerance yet" in found and not bad else self.verdict

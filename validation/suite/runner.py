@@ -105,12 +105,14 @@ class BatchRecord(Stored):
 class ComparisonRecord(Stored):
     """The figures of a comparison; by window, what could not be compared, and whether because one block fell.
 
-    What could not be compared is given by measure and window where a measure has its own. `impact_law` is that of a cell's own figures.
+    What could not be compared is given by measure and window where a measure has its own. `impact_law` and `overturned_at` are those of
+    a cell's own figures.
     """
 
     figures: tuple[Figure, ...]
     gaps: dict[str, tuple[str, bool]]
     impact_law: LawFollowed | None = None
+    overturned_at: float | None = None
 
 
 def _is(kind: type[Stored], found: Mapping[str, Any] | None) -> bool:
@@ -203,6 +205,7 @@ def run_suite(
         hardware=provenance.hardware(),
         wall_seconds=time.perf_counter() - began,
         strict=strict,
+        judged=suite.judged,
         tolerances_file=str(suite.tolerances_path),
     )
 
@@ -343,6 +346,7 @@ def _cell(
     figures: list[Figure] = []
     gaps: dict[tuple[str, str], tuple[str, bool]] = {}
     law: dict[str, Any] | None = None
+    overturned_at: float | None = None
     for name in dict.fromkeys([OWN_FIGURES, own.reference, own.model_form, *(place.against for place in required)]):
         reference = planned_cells.get((scene.name, name))
         if name != OWN_FIGURES and (reference is None or reference is planned or reference not in records):
@@ -353,8 +357,9 @@ def _cell(
         figures += [Figure(**figure) for figure in found["figures"]]
         gaps |= {(name, window): (text, fall) for window, (text, fall) in found["gaps"].items()}
         law = law or found.get("impact_law")
+        overturned_at = overturned_at or found.get("overturned_at")
     checks = []
-    for place, kind in required.items():
+    for place, kind in required.items() if suite.judged else ():
         figure = _figure(figures, place)
         of_window = gaps.get((place.against, place.what.window), ("", False))
         text, fall = gaps.get((place.against, str(place.what)), of_window)
@@ -368,6 +373,7 @@ def _cell(
         settings=record["settings"],
         history=f"{HISTORIES}/{planned.name}.csv",
         outcome=record["outcome"],
+        overturned_at=overturned_at,
         notes=tuple(record["notes"]),
         cost=CostRecord(**record["cost"]),
         figures=tuple(figures),
@@ -481,4 +487,5 @@ def _compute(
         "figures": [figure.model_dump(mode="json") for figure in figures],
         "gaps": gaps,
         "impact_law": None if law is None else law.model_dump(mode="json"),
+        "overturned_at": None if yardstick else candidate.overturned_at,
     }

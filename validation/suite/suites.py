@@ -31,6 +31,7 @@ A suite is a TOML file that a user can write:
         [{ name = "weak", excitation = { kind = "ricker", amplitude = 4.0, period = 1.5 } }],
     ]
 
+Scenes under recorded motions are `[[records]]` tables (validation.suite.record_sets).
 Ensembles are `[[ensemble]]` tables (validation.suite.ensembles), judged by what `require.ensemble` names. Scenes can also be written
 out as `[[scene]]` tables. Tolerances (validation.suite.tolerances) are a table `[tolerances]` in the file or a file
 `<suite>.tolerances.toml` beside it. `include = ["smoke", "walls"]` joins other suites instead.
@@ -39,7 +40,7 @@ out as `[[scene]]` tables. Tolerances (validation.suite.tolerances) are a table 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Container, Iterable, Iterator, Mapping
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
@@ -56,9 +57,14 @@ from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS
 from rockcheck.validation.execute.models import Family, build, check_allowed, family, is_own
 from rockcheck.validation.suite.ensembles import Ensemble
+from rockcheck.validation.suite.record_sets import RecordSet, under_records
 from rockcheck.validation.suite.results import Kind
-from rockcheck.validation.suite.tolerances import OWN_FIGURES, Place, Tolerances, Windowed, parse_tolerances
+from rockcheck.validation.suite.tolerances import HORIZON, OWN_FIGURES, Place, Tolerances, Windowed, parse_tolerances
 
+#: The fair reference for engines, and the model that forbids flight.
+REFERENCE, PAPER_MODEL = "ebm-unilateral", "ebm"
+#: What a simulation may take where no suite says so, s.
+UNJUDGED_SECONDS = 900.0
 DATA = Path(str(resources.files("rockcheck.validation"))) / "data"
 
 
@@ -99,6 +105,7 @@ class SuiteFile(Frozen):
     scenes: tuple[str, ...] = ()
     scene: tuple[dict[str, Any], ...] = ()
     grid: tuple[Grid, ...] = ()
+    records: tuple[RecordSet, ...] = ()
     models: dict[str, dict[str, Any]] = Field(default_factory=dict)
     require: Require = Require()
     limits: Limits = Limits()
@@ -146,6 +153,9 @@ class Suite:
     #: Whether the numerical error of each cell is asked for (two coarser runs a cell), and scenes with uncertain numbers, by name.
     uncertainty: bool = False
     uncertain: Mapping[str, UncertainScene] = field(default_factory=dict)
+    #: Vertical components of its records, which are not played, and whether anything is judged.
+    left_out: tuple[str, ...] = ()
+    judged: bool = True
 
     def suite_of(self, scene: str) -> Suite:
         """The suite that a scene or an ensemble comes from: this one, or the included one."""
@@ -230,7 +240,7 @@ def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
     tables = read_toml(path)
     if "block" in tables:
         names = f"scenes = [{printable(path.name)!r}], and tables [models.NAME]"
-        raise InputError(f"{printable(path)}: a scene, where a suite is asked for: a file with {names}")
+        raise InputError(f"{printable(path)}: a scene, where a suite is asked for: a file with {names}; `rockcheck run` plays a scene")
     try:
         return _suite(SuiteFile(**tables), path, shipped, allow_code)
     except InputError as error:
@@ -242,7 +252,7 @@ def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[st
     if given.include:
         return _joined(given, path, allow_code)
     models = {label: _variant(label, settings, path.parent, allow_code) for label, settings in given.models.items()}
-    uncertain = _scenes(given, path.parent)
+    uncertain, left_out = under_records(_scenes(given, path.parent), given.records, path.parent)
     scenes = {name: found.scene for name, found in uncertain.items()}
     ensembles = {e.name: (e, scene_from(e.scene, folder=path.parent, default_name=e.name)) for e in given.ensemble}
     _check_names(given, models, scenes, ensembles)
@@ -262,7 +272,47 @@ def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[st
         tolerances_path=tolerances_path,
         uncertainty=given.uncertainty,
         uncertain={name: one for name, one in uncertain.items() if one.spreads},
+        left_out=tuple(left_out),
     )
+
+
+def scene_suite(
+    source: str,
+    models: Mapping[str, Mapping[str, Any]],
+    *,
+    records: Sequence[RecordSet] = (),
+    allow_code: Container[str] = (),
+) -> Suite:
+    """One scene (a name or a .toml file) by some models, each with its settings, perhaps under records: nothing is judged.
+
+    Differences are from `ebm-unilateral`, or the first model where that is not among them. Models of one's own are looked for in
+    the working folder. Raises `InputError` as `load_suite`.
+    """
+    known = named_scenes()
+    path = Path(f"{source}.toml" if source in known else source)
+    reference = REFERENCE if REFERENCE in models else next(iter(models))
+    given = SuiteFile(
+        reference=reference,
+        model_form=PAPER_MODEL if PAPER_MODEL in models and reference == REFERENCE else "",
+        scenes=(source if source in known else path.name,),
+        records=tuple(records),
+        models={name: dict(settings) for name, settings in models.items()},
+        require=Require(difference=(f"theta_rms@{HORIZON}",)),
+        limits=Limits(seconds=UNJUDGED_SECONDS),
+        tolerances={},
+    )
+    suite = _suite(given, path, source in known, allow_code)
+    here = (str(Path.cwd()),)
+    variants = {name: replace(one, search_path=here) if one.search_path else one for name, one in suite.models.items()}
+    return replace(suite, models=variants, judged=False)
+
+
+def is_scene(source: str) -> bool:
+    """Whether that is the name or the file of a scene, where a suite could be meant. Raises `InputError` for a file that is no TOML."""
+    if source in named_suites():
+        return False
+    path = Path(source)
+    return source in named_scenes() or (path.suffix.lower() == ".toml" and "block" in read_toml(path))
 
 
 def _check_names(given: SuiteFile, models: Container[str], scenes: Collection[str], ensembles: Collection[str]) -> None:
@@ -327,6 +377,7 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
         tolerances={place: line for suite in included for place, line in suite.tolerances.items()},
         tolerances_path=path,
         uncertain={name: scene for suite in included for name, scene in suite.uncertain.items()},
+        left_out=tuple(name for suite in included for name in suite.left_out),
         included=tuple(included),
     )
 

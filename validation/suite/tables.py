@@ -12,7 +12,7 @@ from rich.text import Text
 from rockcheck.scenes.writing import table_text
 from rockcheck.validation.discrepancy.figures import Figure, value_words
 from rockcheck.validation.suite.results import Cell, Check, Run
-from rockcheck.validation.suite.tolerances import MEASURES
+from rockcheck.validation.suite.tolerances import HORIZON, MEASURES
 
 COLOURS = {"pass": "green", "incomplete": "yellow", "changed": "yellow", "fail": "red", "error": "red"}
 
@@ -38,6 +38,41 @@ def verdict_table(run: Run) -> Table:
     return table
 
 
+def outcome_tables(run: Run) -> Iterator[tuple[str, Table]]:
+    """Each scene with a row a model, within 80 columns: what becomes of the block, its peak rotation, and how far from the reference."""
+    for scene in run.places:
+        table = Table(box=None, pad_edge=False, expand=False)
+        for name, width in (("", 0), ("model", 16), ("outcome", 26)):
+            table.add_column(name, overflow="fold", min_width=width)
+        for name in ("peak", "apart", "took"):
+            table.add_column(name, justify="right", no_wrap=True, min_width=8)
+        for cell in run.of_scene(scene):
+            words = cell.fate if cell.status == "done" else cell.reason or "failed"
+            colour = "red" if cell.status == "failed" else "yellow" if cell.status == "absent" else ""
+            row = outcome_row(cell, run.reference)
+            peak, apart = ("" if row[name] is None else f"{row[name]:.3g}" for name in ("peak_rotation_alpha", "apart_alpha"))
+            apart = "ref." if cell.model == run.reference else apart
+            took = f"{cell.cost.wall_seconds:.1f} s" if cell.status == "done" else ""
+            table.add_row("", cell.model, Text(words, colour), peak, apart, took)
+        yield scene, table
+
+
+def outcome_row(cell: Cell, reference: str) -> dict[str, Any]:
+    """What a cell came to, in plain values; `peak_rotation_alpha` is None for a block that fell."""
+    figures = {(f.measure, f.against, f.window): f.value for f in cell.figures}
+    fell = cell.outcome.startswith("overturned")
+    return {
+        "scene": cell.scene,
+        "model": cell.model,
+        "status": cell.status,
+        "outcome": cell.outcome or None,
+        "overturned_at_s": cell.overturned_at,
+        "peak_rotation_alpha": None if fell else figures.get(("peak_rotation", "", "")),
+        "apart_alpha": figures.get(("theta_rms", reference, HORIZON)),
+        "wall_seconds": cell.cost.wall_seconds,
+    }
+
+
 def summary(run: Run) -> dict[str, Any]:
     """The verdicts in a few plain values: of the run, of each cell, and why anything is not a pass."""
     return {
@@ -50,6 +85,7 @@ def summary(run: Run) -> dict[str, Any]:
                 "scene": cell.scene,
                 "model": cell.model,
                 "outcome": cell.outcome,
+                "overturned_at_s": cell.overturned_at,
                 "checks": len(cell.checks),
                 "verdict": cell.verdict if cell.checks or cell.status != "done" else None,
                 "converged": cell.converged,
@@ -70,7 +106,7 @@ def verdict_lines(run: Run) -> Iterator[str]:
     for cell in run.cells:
         if cell.status != "absent":
             yield from cell_lines(cell)
-    if not any(cell.checks or cell.status != "done" for cell in run.cells):
+    if run.judged and not any(cell.checks or cell.status != "done" for cell in run.cells):
         yield "nothing was judged: the suite requires no measure and has no tolerance"
 
 

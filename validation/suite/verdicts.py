@@ -67,7 +67,7 @@ def markdown(run: Run) -> str:
     reasons = list(verdict_lines(run))
     if reasons:
         lines += [*(f"- {_plain(reason)}" for reason in reasons), ""]
-    rows = ((_plain(scene), *(_entry(run.cell(scene, model)) for model in run.models)) for scene in run.places)
+    rows = ((_plain(scene), *(_entry(run.cell(scene, model), run.judged) for model in run.models)) for scene in run.places)
     return "\n".join([*lines, markdown_table(("scene", *map(_plain, run.models)), rows), *_laws(run)]) + "\n"
 
 
@@ -83,10 +83,12 @@ def _laws(run: Run) -> Iterator[str]:
     yield markdown_table(("scene", "landing", *map(_plain, models)), rows)
 
 
-def _entry(cell: Cell | None) -> str:
+def _entry(cell: Cell | None, judged: bool) -> str:
     if cell is None:
         return ""
     sure = " (not converged)" if cell.converged is False else ""
+    if not judged and cell.status == "done":
+        return _plain(cell.fate)
     return f"{MARKS[cell.verdict]} {_plain(_worst(cell.checks))}{sure}".strip()
 
 

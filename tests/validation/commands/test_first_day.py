@@ -89,10 +89,14 @@ def test_a_slip_in_a_scene_file_is_named(type_, change, said):
 
 
 def test_a_scene_is_no_suite(type_):
-    _, err = type_("validate", write("rack.toml", SCENE), code=2)
+    write("rack.toml", SCENE)
+    _, err = type_("accept", "rack.toml", code=2)
     assert err == (
-        "rockcheck: rack.toml: a scene, where a suite is asked for: a file with scenes = ['rack.toml'], and tables [models.NAME]\n"
+        "rockcheck: rack.toml: a scene, where a suite is asked for: a file with scenes = ['rack.toml'], and tables [models.NAME];"
+        " `rockcheck run` plays a scene\n"
     )
+    _, err = type_("validate", "rack.toml", "--strict", code=2)
+    assert err == "rockcheck: --strict: rack.toml is a scene, of which nothing is judged; a suite is asked for\n"
 
 
 @pytest.mark.parametrize(

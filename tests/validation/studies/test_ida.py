@@ -11,6 +11,7 @@ import pytest
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Scene, Wall
 from rockcheck.scenes.recordings import Reading
+from rockcheck.scenes.recordings.sets import files_of, motions_of
 from rockcheck.validation.commands.cli import main
 from rockcheck.validation.spectra import ida
 
@@ -44,7 +45,7 @@ def records(tmp_path):
 
 
 def motions(folder):
-    return ida.motions_of(ida.files_of([str(folder)]), Reading())
+    return motions_of(files_of([folder]), Reading())[0]
 
 
 def test_a_run_is_the_record_at_that_intensity(records):
@@ -72,7 +73,7 @@ def test_every_measure_takes_out_the_record_s_own_size(records, measure):
     path = records / "twice.csv"
     rows = "\n".join(f"{recording.time_step * k:.2f},{a!r}" for k, a in enumerate(twice.samples.tolist()))
     path.write_text(f"time_s,acceleration_m_s2\n{rows}\n", encoding="utf-8")
-    pair = [(name, recording), *ida.motions_of([path], Reading())]
+    pair = [(name, recording), *motions_of([path], Reading())[0]]
     found = ida.analyse(SCENE, pair, LEVELS, measure=measure, period=0.5 if measure == "sa" else None)
     one, other = found.lines[0], found.lines[2]
     assert other.own == pytest.approx(2.0 * one.own, rel=1e-9)
@@ -102,10 +103,10 @@ def test_half_the_motions_stay_below_the_median(records):
 
 def test_files_folders_and_patterns_are_meant(records):
     names = ["H1.csv", "H2.csv", "H3.csv"]
-    assert [path.name for path in ida.files_of([str(records)])] == names
-    assert [path.name for path in ida.files_of([str(records / "H*.csv"), str(records / "H1.csv")])] == names
+    assert [path.name for path in files_of([str(records)])] == names
+    assert [path.name for path in files_of([str(records / "H*.csv"), str(records / "H1.csv")])] == names
     with pytest.raises(InputError, match="no such files"):
-        ida.files_of([str(records / "X*.csv")])
+        files_of([str(records / "X*.csv")])
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,8 @@ from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.spectrum import node_scene
 from rockcheck.scenes import InputError, Ricker
 from rockcheck.scenes.progress import Count
+from rockcheck.scenes.recordings import Reading
+from rockcheck.scenes.recordings.sets import motions_of
 from rockcheck.validation.commands.cli import main
 from rockcheck.validation.spectra import agreement, claims, fragility, refinement
 from rockcheck.validation.spectra import study as spectra
@@ -595,14 +597,18 @@ def test_records_are_scaled_to_the_intensity(tmp_path, monkeypatch):
         (tmp_path / f"{n}.csv").write_text(f"time_s,acceleration_m_s2\n{rows}\n", encoding="utf-8")
     request = SpectrumRequest(np.array([1.0, 2.0]), np.linspace(0.5, 12.0, 8))
     panel = Panel("case", "case", paper_panels(8)[0].scene)
-    found = fragility.fragility(panel, request, [tmp_path / "0.csv", tmp_path / "1.csv"], Tiles(tmp_path / "tiles"))
+
+    def motions(*names):
+        return motions_of([tmp_path / name for name in names], Reading())[0]
+
+    found = fragility.fragility(panel, request, motions("0.csv", "1.csv"), Tiles(tmp_path / "tiles"))
     (case,) = found.cases
     assert (case.motions, case.undecided) == (2, 0)
 
     # The two records differ only in their size, which the intensity takes out: both directions of each overturn together.
     assert {point[1] for point in case.points} <= {0.0, 0.5, 1.0}
     with pytest.raises(InputError, match="too few"):
-        fragility.fragility(panel, request, [tmp_path / "0.csv"], Tiles(tmp_path / "tiles"))
+        fragility.fragility(panel, request, motions("0.csv"), Tiles(tmp_path / "tiles"))
 
 
 def test_a_fragility_curve_never_counts_a_failed_run_as_safe():

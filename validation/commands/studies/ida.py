@@ -11,8 +11,9 @@ from rich.table import Table
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import InputError, load_scene
 from rockcheck.scenes.errors import unknown_name
+from rockcheck.scenes.recordings.sets import files_of, motions_of
 from rockcheck.scenes.writing import write_whole
-from rockcheck.validation.commands import OUT, JobsOption, OutOption, answer, console, progress, scene_names, usable_folder
+from rockcheck.validation.commands import OUT, JobsOption, OutOption, answer, console, progress, scene_names, tell_left_out, usable_folder
 from rockcheck.validation.commands.record import (
     ColumnOption,
     ComponentOption,
@@ -22,7 +23,7 @@ from rockcheck.validation.commands.record import (
     UnitOption,
     reading_of,
 )
-from rockcheck.validation.spectra.ida import CAPACITIES, MEASURES, analyse, files_of, lines_table, motions_of
+from rockcheck.validation.spectra.ida import CAPACITIES, MEASURES, analyse, lines_table
 
 IDA = "ida"
 MOST_LEVELS = 1000
@@ -59,7 +60,7 @@ def run(
         raise InputError(f"{span[0]:g} to {span[1]:g} is not allowed: 0 < least < largest", "--range")
     if pivot not in ("unilateral", "bilateral"):
         raise InputError(str(unknown_name("pivot", pivot, ("unilateral", "bilateral"))), "--pivot")
-    motions = motions_of(files_of(records), reading_of(unit, time_step, column, header_lines, decimal, component))
+    motions, left_out = motions_of(files_of(records), reading_of(unit, time_step, column, header_lines, decimal, component))
     folder = usable_folder(usable_folder(out) / IDA)
     with progress("ida") as on_progress:
         found = analyse(
@@ -88,6 +89,7 @@ def run(
         median, dispersion = ("-", "-") if fit.median is None else (f"{fit.median:.3g}", f"{fit.dispersion:.2g}")
         table.add_row(fit.label, median, within, dispersion)
     screen.print(f"{found.scene}, {found.label}: {len(motions)} records in both directions, {levels} intensities", soft_wrap=True)
+    tell_left_out(left_out)
     screen.print(table)
     screen.print(f"report: {page}", soft_wrap=True)
-    answer(found.model_dump(mode="json", exclude={"lines"}) | {"report": page, "table": folder / "ida.csv"})
+    answer(found.model_dump(mode="json", exclude={"lines"}) | {"report": page, "table": folder / "ida.csv", "left_out": left_out})

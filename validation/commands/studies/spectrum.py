@@ -20,8 +20,22 @@ from rockcheck.ebm.spectrum import LEFT, RIGHT
 from rockcheck.scenes import InputError, load_scene
 from rockcheck.scenes.errors import NotInstalled, unknown_name
 from rockcheck.scenes.progress import Count
+from rockcheck.scenes.recordings import Reading, Recording
+from rockcheck.scenes.recordings.sets import files_of, motions_of
 from rockcheck.scenes.writing import table_text, write_whole
-from rockcheck.validation.commands import OUT, JobsOption, OutOption, SchedulerOption, answer, console, progress, scene_names, usable_folder
+from rockcheck.validation.commands import (
+    OUT,
+    JobsOption,
+    OutOption,
+    SchedulerOption,
+    answer,
+    console,
+    progress,
+    scene_names,
+    tell_left_out,
+    usable_folder,
+)
+from rockcheck.validation.commands.run import MoreRecords, RecordOption
 from rockcheck.validation.execute.store import name_of
 from rockcheck.validation.spectra.study import (
     AMPLITUDES,
@@ -75,7 +89,8 @@ def run(
     fragility: Annotated[
         bool, typer.Option("--fragility", help="Probability of overturning against intensity, with and without the wall.")
     ] = False,
-    records: Annotated[list[Path] | None, typer.Option("--record", help="A record of the fragility's set; repeatable.")] = None,
+    records: RecordOption = None,
+    more: MoreRecords = None,
     out: OutOption = OUT,
     jobs: JobsOption = None,
     scheduler: SchedulerOption = None,
@@ -89,14 +104,17 @@ def run(
     --figure all                                    the paper's figures and claims
     --figure all --agreement 200                    against the other models
     --scene shelf.toml --amplitudes 1 6 --refine    your own block and pulse
-    --scene shelf.toml --fragility --record a.AT2 --record b.AT2
+    --scene shelf.toml --fragility --record records/RSN1_H*.AT2
     """
     panels = _panels(figure, scene)
     if pivot is None:  # beside a wall a block hops, which the bilateral pivot of the paper's figures forbids
         pivot = "unilateral" if model is None and scene is not None and panels[0].scene.walls else "bilateral"
     request = _request(size, frequencies, amplitudes, pivot, model, tolerance, refine)
-    if records and not fragility:
+    words = [*(records or []), *(more or [])]
+    if words and not fragility:
         raise InputError("needs --fragility", "--record")
+    motions, left_out = motions_of(files_of(words), Reading())
+    tell_left_out(left_out)
     folder = usable_folder(out)
     data = usable_folder(folder / SPECTRA)
     screen = console()
@@ -108,7 +126,7 @@ def run(
             client = stack.enter_context(connected(scheduler))
         tiles = stack.enter_context(Tiles(data, jobs=jobs, client=client, force=force))
         if fragility:
-            _fragility(panels, request, records or [], tiles, data, screen)
+            _fragility(panels, request, motions, tiles, data, screen)
         elif verify:
             _verify(panels, request, tiles, data, screen)
         elif agreement is not None:
@@ -290,7 +308,7 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, words: int)
 
 
 def _fragility(
-    panels: Sequence[Panel], request: SpectrumRequest, records: Sequence[Path], tiles: Tiles, data: Path, screen: Console
+    panels: Sequence[Panel], request: SpectrumRequest, records: Sequence[tuple[str, Recording]], tiles: Tiles, data: Path, screen: Console
 ) -> None:
     from rockcheck.reports.studies.spectra import fragility_figure, write
     from rockcheck.validation.spectra.fragility import PULSES, curves_table, fragility
@@ -298,7 +316,7 @@ def _fragility(
     if len(panels) != 1:
         raise InputError("needs --scene", "--fragility")
     warm_up(panels[0], request)
-    motions = 2 * len(records) if records else 2 * PULSES
+    motions = 2 * (len(records) or PULSES)
     with progress("fragility") as on_progress:
         tiles.count = Count(on_progress, motions * len(request.amplitudes) * (1 + bool(panels[0].scene.walls)))
         found = fragility(panels[0], request, records, tiles)

@@ -1,0 +1,91 @@
+"""Scenes under sets of recorded motions: a suite's tables `[[records]]`, and what `rockcheck run` plays.
+
+    [[records]]
+    files = ["records/RSN1_H*.AT2", "station.V2"]    # files, folders, patterns, beside the suite
+    scale = 1.6                                      # optional; and what a file does not say, such as unit = "cm/s2"
+    scenes = ["shelf"]                               # optional: the scenes that are meant; without it all
+
+Each horizontal component takes the place of the scene's own excitation. The scene lasts as long as its record, and at least as
+long as it says itself; its own vertical motion stays.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from rockcheck.scenes import InputError, Record
+from rockcheck.scenes.base import Finite
+from rockcheck.scenes.errors import unknown_name
+from rockcheck.scenes.recordings import Reading, Recording
+from rockcheck.scenes.recordings.recording import Word
+from rockcheck.scenes.recordings.sets import files_of, motions_of
+from rockcheck.scenes.trust.inputs import UncertainScene, uncertain_scene
+
+#: Longest name of a scene, and of the part of it that is the record's.
+_LONGEST, _LONGEST_RECORD = 100, 60
+
+
+class RecordSet(Reading):
+    """A table `[[records]]`: files, the factor of their accelerations, the scenes that they shake, and the options of a reader."""
+
+    files: Annotated[tuple[Word, ...], Field(min_length=1)]
+    scale: Finite = 1.0
+    scenes: tuple[Word, ...] = ()
+
+    @property
+    def reading(self) -> Reading:
+        """What the files do not say of themselves."""
+        return Reading(**{name: getattr(self, name) for name in Reading.model_fields})
+
+
+def under_records(
+    scenes: Mapping[str, UncertainScene], sets: Sequence[RecordSet], folder: Path
+) -> tuple[dict[str, UncertainScene], list[str]]:
+    """The scenes, those that a set names once for each of its motions; and the vertical components that are left out.
+
+    A scene is then named `<scene>, <record>`. Raises `InputError` for files that cannot be read, and scenes that there are not.
+    """
+    found: dict[str, UncertainScene] = {}
+    left_out: list[str] = []
+    shaken: set[str] = set()
+    for given in sets:
+        for name in given.scenes:
+            if name not in scenes:
+                raise InputError(str(unknown_name("scene", name, scenes)), "records.scenes")
+        motions, vertical = motions_of(files_of([folder / word for word in given.files]), given.reading)
+        left_out += vertical
+        chosen = given.scenes or tuple(scenes)
+        shaken.update(chosen)
+        for name in chosen:
+            for label, motion in zip(_labels([name for name, _ in motions]), (motion for _, motion in motions), strict=True):
+                one = _shaken(scenes[name], label, motion, given.scale)
+                if one.scene.name in found:
+                    raise InputError(f"scene {one.scene.name!r} is named twice: two records have one name", "records.files")
+                found[one.scene.name] = one
+    return {name: one for name, one in scenes.items() if name not in shaken} | found, left_out
+
+
+def _shaken(base: UncertainScene, label: str, motion: Recording, scale: float) -> UncertainScene:
+    """A scene under one motion; what is not known of its own excitation goes with that."""
+    scene = base.scene
+    record = Record.from_samples(motion.samples, motion.time_step, scale).model_copy(update={"source": label, "notes": motion.notes})
+    name = f"{scene.name[: _LONGEST - len(label) - 2]}, {label}"
+    spreads = {place: spread for place, spread in base.spreads.items() if not place.startswith("excitation.")}
+    if base.spreads and not base.independent:
+        raise InputError("correlated numbers cannot be given together with [[records]]", "correlation")
+    return uncertain_scene(scene.replace(name=name, excitation=record, duration=max(scene.duration, record.quiet_after)), spreads, {})
+
+
+def _labels(names: Sequence[str]) -> list[str]:
+    """Names of records as names of scenes may have them: without their endings, where these do not tell two apart."""
+    short = [re.sub(r"\.[A-Za-z0-9]{1,5}(?= |$)", "", name, count=1) for name in names]
+    return [_allowed(one if short.count(one) == 1 else name) for one, name in zip(short, names, strict=True)]
+
+
+def _allowed(name: str) -> str:
+    return re.sub(r"[^A-Za-z0-9 _.,+=()-]", "-", name)[-_LONGEST_RECORD:].strip() or "record"
