@@ -96,6 +96,36 @@ def hop() -> Figure:
     return figure
 
 
+def cases() -> Figure:
+    """The scenes that are not the paper's, by the reference; dashed: what the page sets beside each."""
+    rack, bookcase, statue, vial, boulder = (load_scene(name) for name in ("rack", "bookcase", "statue", "vial", "boulder"))
+    reference = EventBasedModel(pivot="unilateral")
+    shown = (
+        (rack, EventBasedModel().simulate(rack), "may not hop"),
+        (bookcase, reference.simulate(bookcase.replace(walls=())), "no wall"),
+        (statue, None, ""),
+        (vial, reference.simulate(vial.replace(excitation=Ricker(amplitude=5.0, period=0.1))), "pulse of 0.1 s"),
+        (boulder, reference.simulate(boulder.replace(excitation=boulder.excitation.scaled(1.2))), "x 3"),
+    )
+    figure = Figure(figsize=(PAGE, 7.5), layout="constrained")
+    for (place, ax), (one, other, beside) in zip(figure.subplots(len(shown), 2, width_ratios=(1, 2.6)), shown, strict=True):
+        draw_block(place, one)
+        place.set_xlabel("")
+        place.set_title(f"{one.name}, R = {one.block.radius:.2g} m", loc="left")
+        slides = one in (rack, statue)
+        for history, style in ((reference.simulate(one), "-"), (other, "--")):
+            if history is not None:
+                values = 1e3 * history.channels["slip"] if slides else history.channels["theta"] / one.block.alpha
+                ax.plot(history.channels["t"], values, style, color="#0072b2" if style == "-" else "#d55e00", linewidth=0.8)
+        ax.set(ylabel="slip, mm" if slides else "θ / α", xlim=(0.0, min(one.duration, 32.0)))
+        if not slides:
+            ax.set_ylim(-1.3, 1.3)
+        if beside:
+            ax.set_title(f"dashed: {beside}", loc="right", fontsize=7)
+    ax.set_xlabel("t, s")
+    return figure
+
+
 def spectra() -> Figure:
     """Overturning spectra without and with a wall (blue: safe)."""
     figure = Figure(figsize=(PAGE, 2.9), layout="constrained")
@@ -121,7 +151,7 @@ def chaos() -> Figure:
     return figure
 
 
-PICTURES: Iterable[Callable[[], Figure]] = (front, scene, history, hop, spectra, chaos)
+PICTURES: Iterable[Callable[[], Figure]] = (front, scene, history, hop, cases, spectra, chaos)
 
 
 def make(folder: Path) -> list[Path]:
