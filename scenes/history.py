@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import io
 import json
 import math
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from rockcheck.scenes.base import Shown
 from rockcheck.scenes.errors import InputError, printable
-from rockcheck.scenes.reading import MOST_LINE, MOST_TABLE_BYTES, open_regular, read_table
+from rockcheck.scenes.reading import read_table
 from rockcheck.scenes.trust.experience import Expected, expected, known
 from rockcheck.scenes.writing import json_text, write_together
 
@@ -32,6 +31,9 @@ LYING = math.pi / 2 - 0.05
 #: Endings of files that a history can be written to, and the columns that hold words.
 FORMATS = ("", ".csv", ".json", ".mat")
 WORDS = ("kind", "mode_before", "mode_after")
+#: The column of a CSV that says what the table does not, as JSON in its first row, so that any reader takes the file as a
+#: plain table; "-" in the others, since pandas warns of a column that holds words here and nothing there.
+ABOUT = "rockcheck_history"
 #: The modes of motion that a `mode` column may hold.
 MODES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight", "overturned")
 
@@ -148,7 +150,7 @@ class History(Shown):
 
         | ending | what is written |
         |---|---|
-        | .csv | the table; a first line (#) with outcome, model and settings; the events in `<stem>.events.csv` beside it |
+        | .csv | the table, with outcome, model, block and settings in the first row of its last column; `<stem>.events.csv` beside it |
         | .json | {"outcome", "model", "settings", ..., "channels": {name: [...]}, "events": {column: [...]}} |
         | .mat | the same as a MATLAB file: structures `about`, `channels` and `events` |
 
@@ -172,10 +174,8 @@ class History(Shown):
             events = {name: [getattr(event, name) for event in self.event_list] for name in EVENT_COLUMNS}
             write_together({path: (_json if path.suffix.lower() == ".json" else _mat)(about, self.channels, events)})
             return
-        text = io.StringIO()
-        text.write(f"# rockcheck history {json.dumps(about, sort_keys=True, default=str)}\n")
-        self.frame.to_csv(text, index=False, lineterminator="\n")
-        contents: dict[Path, str | bytes] = {path: text.getvalue()}
+        said = [json.dumps(about, sort_keys=True, default=str), *["-"] * len(self.frame)][: len(self.frame)]
+        contents: dict[Path, str | bytes] = {path: self.frame.assign(**{ABOUT: said}).to_csv(index=False, lineterminator="\n")}
         if path.is_file() or not path.exists():  # beside /dev/stdout there is nothing to be written
             contents = {_events_path(path): self.events.to_csv(index=False, lineterminator="\n"), **contents}
         write_together(contents)
@@ -196,7 +196,7 @@ class History(Shown):
         events = read_table(events_path) if events_path.exists() else pd.DataFrame()
         if len(frame) and not isinstance(frame.index, pd.RangeIndex):  # pandas would take the first column for names of rows
             raise InputError(f"{shown}: rows have more values than the heading has columns")
-        about = _header(path, shown)
+        about = _about(frame, shown)
         channels = _checked_channels(frame, shown)
         try:
             event_list = tuple(
@@ -224,7 +224,8 @@ class History(Shown):
 def check_format(path: Path) -> None:
     """Raises `InputError` where no history can be written into a file of that name."""
     if path.suffix.lower() not in FORMATS:
-        raise InputError(f"{printable(path)}: a history is written as .csv, .json or .mat, not as {printable(path.suffix)}")
+        hint = "; pandas makes Parquet of the .csv: read_csv(...).to_parquet(...)" if path.suffix.lower() in (".parquet", ".pq") else ""
+        raise InputError(f"{printable(path)}: a history is written as .csv, .json or .mat, not as {printable(path.suffix)}{hint}")
 
 
 def _json(about: Mapping[str, Any], channels: Mapping[str, NDArray[Any]], events: Mapping[str, list[Any]]) -> str:
@@ -261,21 +262,17 @@ def _text(value: object) -> str:
     return value if isinstance(value, str) else ""
 
 
-def _header(path: Path, shown: str) -> dict[str, Any]:
-    """What `save` says of a history in the file's first line; empty for a file of another program."""
-    with open_regular(path, MOST_TABLE_BYTES) as stream:
-        line = stream.readline(MOST_LINE).removeprefix(codecs.BOM_UTF8)
-    mark = b"# rockcheck history "
-    if not line.startswith(mark):
+def _about(frame: pd.DataFrame, shown: str) -> dict[str, Any]:
+    """What `save` says of a history in the table's first row; empty for a file of another program."""
+    if ABOUT not in frame.columns or not len(frame):
         return {}
     try:
-        about = json.loads(line.removeprefix(mark).decode("utf-8"))
-    except (ValueError, RecursionError):
-        raise InputError(f"{shown}, line 1: not a header written by rockcheck") from None
-    if not isinstance(about, dict) or not isinstance(about.get("cost", {}), dict) or not isinstance(about.get("settings", {}), dict):
-        raise InputError(f"{shown}, line 1: not a header written by rockcheck")
-    if not isinstance(about.get("notes", []), list):
-        raise InputError(f"{shown}, line 1: not a header written by rockcheck")
+        about = json.loads(frame[ABOUT].iloc[0])
+    except (TypeError, ValueError, RecursionError):
+        about = None
+    parts = {"cost": dict, "settings": dict, "notes": list}
+    if not isinstance(about, dict) or not all(isinstance(about.get(name, kind()), kind) for name, kind in parts.items()):
+        raise InputError(f"{shown}: column {ABOUT!r}: not written by rockcheck")
     return about
 
 
@@ -291,7 +288,7 @@ def _size(about: Mapping[str, Any], key: str, shown: str) -> float | None:
 def _uncertainty(about: Mapping[str, Any], shown: str) -> dict[str, float]:
     found = about.get("uncertainty", {})
     if not isinstance(found, dict) or not all(isinstance(u, int | float) and 0.0 <= u < math.inf for u in found.values()):
-        raise InputError(f"{shown}: not a header written by rockcheck", "uncertainty")
+        raise InputError(f"{shown}: column {ABOUT!r}: not written by rockcheck", "uncertainty")
     return {printable(name): float(u) for name, u in found.items()}
 
 

@@ -6,9 +6,11 @@ import json
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from rockcheck.scenes import Block, Cost, Event, Floor, History, InputError, Rest, Scene
+from rockcheck.scenes.history import COLUMNS
 from rockcheck.scenes.observation import observe
 
 SCENE = Scene(
@@ -82,8 +84,13 @@ def test_a_plain_table_is_a_measured_history(tmp_path):
     assert History.load(path).outcome == "overturned right"
 
 
-HEAD = "# rockcheck history "
 ROWS = "t,theta\n0,0\n1,0.1\n"
+
+
+def rows_about(text: str) -> str:
+    """The same rows with a column in which the first says this of the history."""
+    quoted = text.replace('"', '""')
+    return f't,theta,rockcheck_history\n0,0,"{quoted}"\n1,0.1,\n'
 
 
 @pytest.mark.parametrize(
@@ -100,16 +107,16 @@ ROWS = "t,theta\n0,0\n1,0.1\n"
         ("t,theta\n0,0\n0,1\n", "column 't' does not increase"),
         ("t,theta\n1,0\n0,1\n", "column 't' does not increase"),
         ("t,theta\n0,0\n1,0,5,6\n", "not a CSV table"),
-        (HEAD + "{broken\n" + ROWS, "line 1: not a header written by rockcheck"),
-        (HEAD + "[1, 2]\n" + ROWS, "line 1: not a header written by rockcheck"),
-        (HEAD + "[" * 100000 + "\n" + ROWS, "line 1: not a header written by rockcheck"),
-        (HEAD + '{"cost": 3}\n' + ROWS, "line 1: not a header written by rockcheck"),
-        (HEAD + '{"settings": []}\n' + ROWS, "line 1: not a header written by rockcheck"),
-        (HEAD + '{"notes": "x"}\n' + ROWS, "line 1: not a header written by rockcheck"),
-        (HEAD + '{"half_width": -1}\n' + ROWS, "half_width: -1 is not allowed"),
-        (HEAD + '{"half_width": "1"}\n' + ROWS, "half_width: 1 is not allowed"),
-        (HEAD + '{"half_height": true}\n' + ROWS, "half_height: True is not allowed"),
-        (HEAD + '{"half_height": Infinity}\n' + ROWS, "half_height: inf is not allowed"),
+        (rows_about("{broken"), "column 'rockcheck_history': not written by rockcheck"),
+        (rows_about("[1, 2]"), "column 'rockcheck_history': not written by rockcheck"),
+        (rows_about("[" * 100000), "column 'rockcheck_history': not written by rockcheck"),
+        (rows_about('{"cost": 3}'), "column 'rockcheck_history': not written by rockcheck"),
+        (rows_about('{"settings": []}'), "column 'rockcheck_history': not written by rockcheck"),
+        (rows_about('{"notes": "x"}'), "column 'rockcheck_history': not written by rockcheck"),
+        (rows_about('{"half_width": -1}'), "half_width: -1 is not allowed"),
+        (rows_about('{"half_width": "1"}'), "half_width: 1 is not allowed"),
+        (rows_about('{"half_height": true}'), "half_height: True is not allowed"),
+        (rows_about('{"half_height": Infinity}'), "half_height: inf is not allowed"),
     ],
 )
 def test_hostile_tables(text, said, tmp_path):
@@ -120,6 +127,20 @@ def test_hostile_tables(text, said, tmp_path):
     assert "hostile.csv" in str(fault.value)
     assert said in str(fault.value)
     assert "\n" not in str(fault.value)
+
+
+@pytest.mark.filterwarnings("error")
+def test_pandas_reads_the_table_without_an_option(tmp_path):
+    """Also a long one, whose columns pandas looks at in pieces."""
+    scene = SCENE.replace(duration=30.0, output_step=0.001)
+    history = observe(scene, "model", states(0.1 * np.sin(scene.output_times)))
+    history.save(tmp_path / "run.csv")
+    frame = pd.read_csv(tmp_path / "run.csv")
+    pd.testing.assert_frame_equal(frame[list(COLUMNS)], history.frame, check_exact=False, rtol=1e-14)
+    assert list(frame.columns) == [*COLUMNS, "rockcheck_history"]
+    assert json.loads(frame["rockcheck_history"][0])["outcome"] == history.outcome
+    assert set(frame["rockcheck_history"][1:]) == {"-"}
+    assert list(pd.read_csv(tmp_path / "run.events.csv").columns) == list(history.events.columns)
 
 
 def test_hostile_events(tmp_path):
@@ -143,7 +164,7 @@ def test_files_that_cannot_be_read(tmp_path):
 
 def test_unknown_outcome_in_a_header_is_not_believed(tmp_path):
     path = tmp_path / "run.csv"
-    path.write_text(HEAD + json.dumps({"outcome": "<script>"}) + "\n" + ROWS)
+    path.write_text(rows_about(json.dumps({"outcome": "<script>"})))
     assert History.load(path).outcome == "moving"
 
 

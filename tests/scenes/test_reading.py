@@ -133,9 +133,11 @@ def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
     assert load_scene(tmp_path / "a.toml").name == "a"
     (tmp_path / "a.csv").write_text("time_s,acceleration_m_s2\n0.0,0.1\n0.5,0.2\n", encoding="utf-8-sig")
     assert read_record(tmp_path / "a.csv").time_step == 0.5
-    for remark in ("", '# rockcheck history {"name": "kept", "outcome": "at rest"}\n'):
+    for remark in ("", '"{""name"": ""kept"", ""outcome"": ""at rest""}"'):
         path = tmp_path / "h.csv"
-        path.write_text(remark + "t,theta\n0,0.5\n1,0.25\n", encoding="utf-8-sig")
+        path.write_text(
+            f"t,theta,rockcheck_history\n0,0.5,{remark}\n1,0.25,\n" if remark else "t,theta\n0,0.5\n1,0.25\n", encoding="utf-8-sig"
+        )
         history = History.load(path)
         assert history.channels["theta"].tolist() == [0.5, 0.25]
         assert history.outcome == ("at rest" if remark else "moving")

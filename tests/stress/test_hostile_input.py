@@ -538,7 +538,8 @@ def test_a_path_does_not_steer_the_terminal(tmp_path, monkeypatch, capsys):
     """Found by fuzzing: what a file is called was written to the terminal as it is; so was the name in a history's header."""
     monkeypatch.chdir(tmp_path)
     assert main(["simulate", "fig4a", "--model", "ebm", "-o", "a\x1b]0;x\x07\udcff.csv"]) == 0
-    (tmp_path / "h.csv").write_text('# rockcheck history {"name": "\\u001b[2J", "model": "\\u001b[2J"}\n' + HISTORY)
+    said = '"{""name"": ""\\u001b[2J"", ""model"": ""\\u001b[2J""}"'
+    (tmp_path / "h.csv").write_text(f"t,theta,rockcheck_history\n0.0,0.1,{said}\n0.5,0.2,\n")
     assert main(["compare", "h.csv", "h.csv"]) in (0, 1)
     heard = capsys.readouterr()
     assert "history: a?]0;x??.csv" in heard.out

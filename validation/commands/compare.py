@@ -9,7 +9,7 @@ import typer
 from rich.table import Table
 
 from rockcheck.scenes import load_scene
-from rockcheck.validation.commands import answer, console, scene_names, tell_notes
+from rockcheck.validation.commands import PlotOption, answer, check_picture, console, save_picture, scene_names, tell_notes
 from rockcheck.validation.discrepancy.compare import Discrepancy, compare
 from rockcheck.validation.discrepancy.figures import value_words
 from rockcheck.validation.discrepancy.measured import read_measured
@@ -24,11 +24,14 @@ def run(
     align: Annotated[bool, typer.Option("--align", help="Shift the candidate in time to where the rotations agree best.")] = False,
     until: Annotated[float | None, typer.Option("--until", help="End of the window, s (default: the whole common time).")] = None,
     scene: Annotated[str | None, typer.Option("--scene", help="Scene of both: its block and gravity.", autocompletion=scene_names)] = None,
+    plot: PlotOption = None,
 ) -> None:
     """Compare two histories, measure by measure.
 
     Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg, time_ms, x_mm, ...).
+    --plot draws both rotations and their difference.
     """
+    check_picture(plot)
     what = load_scene(scene) if scene else None
     given, other = read_measured(reference), read_measured(candidate, offset=offset)
     shift = time_shift(given, other) if align else 0.0
@@ -49,6 +52,8 @@ def run(
         out.print(f"not the whole time: {found.gap}")
     for role, history in (("the reference", given), ("the candidate", other)):
         tell_notes(history, role)
+    if plot is not None:
+        save_picture(found.plot(), plot)
     answer(
         {
             "reference": found.reference,

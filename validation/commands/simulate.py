@@ -16,11 +16,14 @@ from rockcheck.scenes.history import check_format
 from rockcheck.scenes.progress import listening
 from rockcheck.validation.commands import (
     AllowCodeOption,
+    PlotOption,
     answer,
+    check_picture,
     console,
     model_names,
     progress,
     report_file,
+    save_picture,
     scene_names,
     tell_notes,
 )
@@ -39,11 +42,12 @@ def run(
         Path | None, typer.Option("-o", "--output", help="File to write: .csv, .json or .mat (default: SCENE--MODEL.csv).")
     ] = None,
     settings: Annotated[list[str] | None, typer.Option("--set", help="A setting of the model, such as time_step=1e-4; repeatable.")] = None,
+    plot: PlotOption = None,
     allow_code: AllowCodeOption = None,
 ) -> None:
     """Simulate one scene with one model.
 
-    Writes the history as CSV, its events to a second file beside it; or both to one .json or .mat.
+    Writes the history as CSV, its events to a second file beside it; or both to one .json or .mat. --plot draws rotation, slip and impacts.
     """
     check_allowed(model, allow_code or ())
     given = dict(setting_of(text) for text in settings or [])
@@ -53,6 +57,7 @@ def run(
     if not path.parent.is_dir():
         raise InputError(f"{printable(path.parent)}: no such folder", "--output")
     check_format(path)
+    check_picture(plot)
     compiles = ", a first run compiles" if family(model).compiled else ""
     with progress(f"{what.name}, {model}{compiles}") as on_progress, listening(on_progress):
         history = player.simulate(what) if player else _played_apart(what, model, given)
@@ -66,6 +71,8 @@ def run(
     console().print(f"{what.name}, {model}: {history.fate}{reached}, {took}")
     tell_notes(history)
     console().print(f"history: {path}", soft_wrap=True)
+    if plot is not None:
+        save_picture(history.plot(), plot)
     answer(
         {
             "scene": what.name,

@@ -117,7 +117,10 @@ def test_without_a_model_the_reference_plays(type_):
 
 def test_what_is_no_format_of_a_history_is_refused_before_the_run(type_):
     _, err = type_("simulate", "fig5a", "-o", "x.parquet", code=2)
-    assert err == "rockcheck: x.parquet: a history is written as .csv, .json or .mat, not as .parquet\n"
+    assert err == (
+        "rockcheck: x.parquet: a history is written as .csv, .json or .mat, not as .parquet;"
+        " pandas makes Parquet of the .csv: read_csv(...).to_parquet(...)\n"
+    )
     assert not Path("x.parquet").exists()
 
 
@@ -158,6 +161,24 @@ def test_compare_says_first_what_matters(type_):
     assert "note on the candidate: made to fall" in out
     out, _ = type_("compare", "a.csv", "a.csv")
     assert out.startswith("same outcome, at rest; rotations 0 alpha apart (RMS)\n")
+
+
+def test_simulate_and_compare_draw(type_):
+    out = simulated(type_, "Falls", "a.csv", "--plot", "a.png")
+    assert "picture: a.png" in out
+    simulated(type_, "Still", "b.csv")
+    out, _ = type_("compare", "a.csv", "b.csv", "--plot", "c.png")
+    assert out.startswith("outcomes differ, ")
+    for name in ("a.png", "c.png"):
+        assert Path(name).read_bytes().startswith(b"\x89PNG")
+        assert Path(name).stat().st_size > 5000
+
+
+@pytest.mark.parametrize(("name", "said"), [("a.pdf", "a.pdf: a name that ends in .png is asked for"), ("no/a.png", "no: no such folder")])
+def test_a_picture_that_cannot_be_written_is_refused_before_the_run(type_, name, said):
+    _, err = type_("simulate", write("rack.toml", SCENE), "--model", "faulty:Still", *CODE, "--plot", name, code=2)
+    assert err == f"rockcheck: --plot: {said}\n"
+    assert not Path("rack--faulty_Still.csv").exists()
 
 
 def test_a_figure_without_tolerance_has_not_failed(type_):
