@@ -94,7 +94,7 @@ def _entry(run: Run, scene: str, model: str) -> Entry | None:
         rms=rms,
         ratio=next((f.value for f in figures if f.measure == "peak_ratio" and f.against == run.reference and not f.window), None),
         u_num=cell.numerical.u_num("theta_rms") if cell.numerical and rms and not rms.window else None,
-        outcome=cell.outcome,
+        outcome=cell.fate,
         apart=len(set(outcomes)) > 1,
     )
 

@@ -90,6 +90,7 @@ STUDIES = (
     ("Conformance", "conformance/index.html"),
     ("Overturning spectra", "spectra.html"),
     ("Incremental dynamic analysis", "ida/index.html"),
+    ("Trend", "trend/index.html"),
 )
 
 

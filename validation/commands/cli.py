@@ -20,6 +20,7 @@ from rockcheck.scenes.errors import printable
 from rockcheck.validation.commands import (
     accept,
     compare,
+    diff,
     new,
     record,
     report,
@@ -46,6 +47,7 @@ COMMANDS = {
     uncertainty: "rockcheck uncertainty fig5a --model mujoco --set time_step=1e-3",
     validate: "rockcheck validate smoke --out rockcheck-report",
     accept: 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"',
+    diff: "rockcheck diff last-week rockcheck-report",
     spectrum: "rockcheck spectrum --figure 8 --size 50 --refine",
     ida: "rockcheck ida shelf.toml records --intensity sa --period 0.5",
     benchmark: "rockcheck benchmark --quick",

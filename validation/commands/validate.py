@@ -25,10 +25,13 @@ from rockcheck.validation.commands import (
 )
 from rockcheck.validation.commands.publish import keep
 from rockcheck.validation.commands.run import ForceOption, chosen_models, play, play_scene, published, tell_faults
+from rockcheck.validation.suite.changes import Moment, moment_of, remember, trends
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.suites import is_scene, load_suite, scene_suite
 from rockcheck.validation.suite.tables import summary, verdict_lines, verdict_table
 
+#: The folder of the trend's page, and so many figures that moved are told.
+TREND, MOST_MOVED = "trend", 10
 SuiteArgument = Annotated[str | None, typer.Argument(help="A named suite or a .toml file (default: paper).", autocompletion=suite_names)]
 
 
@@ -41,6 +44,9 @@ def run(
     strict: Annotated[bool, typer.Option("--strict", help="Figures that changed beyond their drift band fail.")] = False,
     scheduler: SchedulerOption = None,
     allow_code: AllowCodeOption = None,
+    history: Annotated[
+        Path | None, typer.Option("--history", metavar="FILE", help="Append this run to FILE (a JSON line a run), and show the trend.")
+    ] = None,
     report: Annotated[bool, typer.Option("--report/--no-report", help="Render the pages; without them only run.json and tables.")] = True,
 ) -> None:
     """Run a suite, compare, judge, write the report.
@@ -62,6 +68,13 @@ def run(
     kept = keep(finished, folder)
     show(finished, console())
     tell_faults(finished, folder)
+    moments = [] if history is None else remember(history, moment_of(finished, Path(finished.tolerances_file).parent))
+    if history is not None:
+        tell_trend(moments, history)
+    if history is not None and report:
+        from rockcheck.reports.studies.trend import write_trend
+
+        console().print(f"trend: {write_trend(moments, usable_folder(folder / TREND))}", soft_wrap=True)
     page = published(folder, jobs) if report else kept
     console().print(f"report: {page}", soft_wrap=True)
     answer(summary(finished) | {"report": page})
@@ -75,6 +88,16 @@ def play_suite(
     loaded = load_suite(suite, allow_code=allow_code or ())
     tell_left_out(loaded.left_out)
     return play(loaded, folder, jobs, force, strict, scheduler)
+
+
+def tell_trend(moments: Sequence[Moment], path: Path) -> None:
+    """How many runs a history has, and the figures that moved since the one before."""
+    moved = [trend for trend in trends(moments) if trend.moved]
+    since = f", {len(moved)} figures moved since {moments[-2].commit or moments[-2].created}" if len(moments) > 1 else ""
+    console().print(f"{path}: {len(moments)} runs{since}", soft_wrap=True)
+    for trend in moved[:MOST_MOVED]:
+        was, now = ("-" if value is None else f"{value:.6g}" for value in trend.values[-2:])
+        console().print(f"  {trend.name}: {was} -> {now}", soft_wrap=True)
 
 
 def show(finished: Run, out: Console) -> None:

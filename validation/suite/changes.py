@@ -1,0 +1,202 @@
+"""What changed: between two finished runs of a suite (`rockcheck diff`), and over many (`rockcheck validate --history FILE`).
+
+A history of runs is a file of JSON lines, one a run: `Moment`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Literal, TypeVar
+
+from pydantic import Field, ValidationError
+
+from rockcheck.scenes import InputError
+from rockcheck.scenes.errors import from_validation, printable
+from rockcheck.scenes.reading import read_text
+from rockcheck.validation.discrepancy.figures import Figure, Stored
+from rockcheck.validation.suite.results import Cell, Run
+from rockcheck.validation.suite.tables import title
+from rockcheck.validation.suite.tolerances import MEASURES
+
+T = TypeVar("T")
+#: A figure has moved where it differs by more than this share, and by more than its measure's resolution.
+ROUNDING = 1e-9
+#: Where a continuous integration says which commit it runs.
+COMMITS = ("GITHUB_SHA", "CI_COMMIT_SHA", "BUILD_SOURCEVERSION", "CIRCLE_SHA1")
+
+
+class Change(Stored):
+    """One thing that differs: a cell that is in one run only, an outcome, a figure, or the verdict on a check, a cell or the run.
+
+    `name` is the figure or check as tolerances name it; `before` and `after` are None where there is nothing.
+    """
+
+    scene: str = ""
+    model: str = ""
+    what: Literal["cell", "outcome", "figure", "verdict"]
+    name: str = ""
+    before: str | float | None = None
+    after: str | float | None = None
+
+    @property
+    def size(self) -> float:
+        """How far a figure moved, relative to the larger of the two; infinite for all else."""
+        if not isinstance(self.before, float) or not isinstance(self.after, float):
+            return math.inf
+        return abs(self.after - self.before) / max(abs(self.before), abs(self.after))
+
+
+def changes(before: Run, after: Run) -> list[Change]:
+    """All that differs, verdicts first, then figures, the one that moved most first. Raises `InputError` for runs of two suites."""
+    if before.suite != after.suite:
+        raise InputError(f"the runs are of two suites, {printable(before.suite)} and {printable(after.suite)}")
+    found = [Change(what="verdict", before=before.words, after=after.words)] if before.words != after.words else []
+    old, new = ({(cell.scene, cell.model): cell for cell in run.cells} for run in (before, after))
+    for place in dict.fromkeys((*old, *new)):
+        if place in old and place in new:
+            found += _of_cell(old[place], new[place])
+        else:
+            was, now = ("there", None) if place in old else (None, "there")
+            found.append(Change(scene=place[0], model=place[1], what="cell", before=was, after=now))
+    order = ("verdict", "cell", "outcome", "figure")
+    return sorted(found, key=lambda change: (order.index(change.what), -change.size))
+
+
+def judged_otherwise(found: Sequence[Change]) -> bool:
+    """Whether a verdict changed, or a cell is in one of the runs only."""
+    return any(change.what in ("verdict", "cell") for change in found)
+
+
+def _of_cell(old: Cell, new: Cell) -> Iterator[Change]:
+    place = {"scene": old.scene, "model": old.model}
+    if old.words != new.words:
+        yield Change(**place, what="verdict", before=old.words, after=new.words)
+    if old.fate != new.fate:
+        yield Change(**place, what="outcome", before=old.fate, after=new.fate)
+    checks = [{title(check): check.words for check in cell.checks} for cell in (old, new)]
+    for name, was, now in _pairs(*checks):
+        if was != now:
+            yield Change(**place, what="verdict", name=name, before=was, after=now)
+    figures = [{_key(figure): figure for figure in cell.figures} for cell in (old, new)]
+    for name, one, other in _pairs(*figures):
+        if one and other and _moved(one, other):
+            yield Change(**place, what="figure", name=name, before=one.value, after=other.value)
+
+
+def _pairs(old: Mapping[str, T], new: Mapping[str, T]) -> Iterator[tuple[str, T | None, T | None]]:
+    yield from ((name, old.get(name), new.get(name)) for name in dict.fromkeys((*old, *new)))
+
+
+def _key(figure: Figure) -> str:
+    against = f" against {figure.against}" if figure.against else ""
+    return f"{figure.measure}{'@' if figure.window else ''}{figure.window}{against}"
+
+
+def _moved(one: Figure, other: Figure) -> bool:
+    if one.value is None or other.value is None:
+        return one.value is not other.value
+    measure = MEASURES.get(one.measure)
+    least = measure.resolution if measure else 0.0
+    return abs(other.value - one.value) > max(least, ROUNDING * max(abs(one.value), abs(other.value)))
+
+
+class Moment(Stored):
+    """One run in a history: when, of which commit and version, its verdict, and every judged figure by "scene, model: check"."""
+
+    created: str
+    commit: str = ""
+    rockcheck: str = ""
+    suite: str
+    verdict: str
+    wall_seconds: float = 0.0
+    figures: dict[str, float | None] = Field(default_factory=dict)
+    not_passed: tuple[str, ...] = ()
+
+
+def moment_of(run: Run, folder: Path) -> Moment:
+    """What a history keeps of a run, whose suite lies in `folder`."""
+    names = [(f"{cell.scene}, {cell.model}: {title(check)}", check) for cell, check in run.checks()]
+    return Moment(
+        created=run.created,
+        commit=commit_of(folder),
+        rockcheck=run.versions.get("rockcheck", ""),
+        suite=run.suite,
+        verdict=run.words,
+        wall_seconds=run.wall_seconds,
+        figures={name: check.figure.value for name, check in names},
+        not_passed=tuple(name for name, check in names if check.verdict != "pass"),
+    )
+
+
+def commit_of(folder: Path) -> str:
+    """The commit that is checked out, with "-dirty" where files have changed since; "" outside of a repository."""
+    git = shutil.which("git")
+    if git:
+        words = [git, "-C", str(folder), "describe", "--always", "--dirty", "--abbrev=12", "--exclude", "*"]
+        found = subprocess.run(words, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
+        if found.returncode == 0:
+            return printable(found.stdout.strip())
+    return printable(next((os.environ[name][:12] for name in COMMITS if os.environ.get(name)), ""))
+
+
+def remember(path: Path, moment: Moment) -> list[Moment]:
+    """Append a line to the history; returns all its moments of the same suite, the oldest first. Raises `InputError`."""
+    known = read_history(path) if path.exists() else []
+    try:
+        with path.open("a", encoding="utf-8") as stream:
+            stream.write(moment.model_dump_json() + "\n")
+    except OSError as error:
+        raise InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
+    return [one for one in (*known, moment) if one.suite == moment.suite]
+
+
+def read_history(path: Path) -> list[Moment]:
+    """The moments of a history. Raises `InputError`, naming the line, where one is none."""
+    found = []
+    for n, line in enumerate(read_text(path).splitlines(), 1):
+        if not line.strip():
+            continue
+        try:
+            found.append(Moment.model_validate(json.loads(line)))
+        except ValidationError as error:
+            raise InputError(f"{printable(path)}, line {n}: not a run of a history: {from_validation(error)}") from None
+        except (ValueError, RecursionError):
+            raise InputError(f"{printable(path)}, line {n}: not a run of a history") from None
+    return found
+
+
+class Trend(Stored):
+    """One figure over the runs of a history: its values, None where it was not there."""
+
+    name: str
+    values: tuple[float | None, ...]
+
+    @property
+    def spread(self) -> float:
+        """Largest less smallest value, relative to the largest size; 0 where fewer than two are known."""
+        known = [value for value in self.values if value is not None]
+        most = max(map(abs, known), default=0.0)
+        return (max(known) - min(known)) / most if most > 0.0 else 0.0
+
+    @property
+    def moved(self) -> bool:
+        """Whether the last value differs from the one before."""
+        if len(self.values) < 2:
+            return False
+        was, now = self.values[-2:]
+        if was is None or now is None:
+            return was is not now
+        return abs(now - was) > ROUNDING * max(abs(was), abs(now))
+
+
+def trends(moments: Sequence[Moment]) -> list[Trend]:
+    """Every figure of the last run over all runs, the one that varied most first."""
+    last = moments[-1].figures if moments else {}
+    found = [Trend(name=name, values=tuple(moment.figures.get(name) for moment in moments)) for name in last]
+    return sorted(found, key=lambda trend: -trend.spread)
