@@ -229,6 +229,14 @@ def test_what_is_noise_at_first_may_grow(noise):
     found = Core.first_root(c, 10.0, noise)
     assert found is not None
     assert 0.9 < found < 1.2
+    # Met where it has fallen by the noise: noise tau^4 / 16 is that at tau = 2.
+    assert Core.first_root([0.0, 0.0, 0.0, 0.0, -noise / 16.0], 10.0, noise) == pytest.approx(2.0, rel=1e-9)
+
+
+def test_terms_beyond_the_third_drown_no_earlier_one():
+    """Where friction nearly jams the pivot they grow without bound: the noise that they bring is not that of a slope."""
+    assert Core.leading([0.0, -1e-7, 0.0, 1e12]) == -1
+    assert Core.leading([0.0, -1e-7, 1e12]) == 1, "the third one does"
 
 
 # --- guards and selection
@@ -598,3 +606,14 @@ def test_what_stays_below_a_level_is_below_it(seed):
         if series.stays_below(a, 0, n, tau, level):
             assert highest < level
     assert series.stays_below(a, 0, n, tau, abs(highest) + 1e3)
+
+
+@pytest.mark.parametrize("degree", [2, 3, 6])
+def test_the_bound_of_what_stays_below_is_as_it_says(degree):
+    """Of t - t^degree, whose curvature is largest at the end: d^2/8 of it above the largest of five values, and no more."""
+    a, _ = motion.workspace()
+    a[0, 1], a[0, degree] = 1.0, -1.0
+    highest = max(series.value(a, 0, degree, t) for t in (0.0, 0.25, 0.5, 0.75, 1.0))
+    rise = 0.25**2 / 8.0 * degree * (degree - 1.0)
+    assert series.stays_below(a, 0, degree, 1.0, (highest + rise) * 1.00001)
+    assert not series.stays_below(a, 0, degree, 1.0, (highest + rise) * 0.99999)
