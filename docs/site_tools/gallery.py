@@ -51,9 +51,14 @@ def models(scene: Scene) -> list[History]:
     return [player.simulate(scene) for player in players]
 
 
+def front_scene() -> Scene:
+    """A pulse after which the block falls, if it may not hop."""
+    return bookcase(floor=Floor(friction=0.5), excitation=Ricker(amplitude=5.0, period=0.9), duration=6.0)
+
+
 def front() -> Figure:
     """The project in one picture: block and wall, the rotation by each model, and its distance from the unilateral one so far."""
-    shaken = bookcase(floor=Floor(friction=0.5), excitation=Ricker(amplitude=5.0, period=0.9), duration=6.0)
+    shaken = front_scene()
     found = models(shaken)
     reference, alpha = found[1], shaken.block.alpha
     figure = Figure(figsize=(PAGE, 3.3), layout="constrained")

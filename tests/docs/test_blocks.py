@@ -3,6 +3,8 @@
 - python: executed; the blocks of a page share their names, as in a notebook.
 - a block with `title="file"`: written to that file, and loaded as what it is.
 - bash, and indented commands: run; one that fails, fails the page. `make` targets are looked up instead of run.
+- an HTML comment that begins with `check`: executed after the blocks before it, and not shown to a reader. It computes figures that the
+  page states: `said("within 0.008")` holds the page to its words, an assertion holds the words to what comes out.
 
 Pages of studies hold commands of many minutes; these are run with `@pytest.mark.slow`, the longest in their `--quick` form.
 """
@@ -24,6 +26,7 @@ from markdown_it import MarkdownIt
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+CHECK = "<!-- check\n"
 LANGUAGES = {"python", "bash", "toml", "csv", "yaml", "text"}
 #: Commands that take minutes, and the form of them that takes less, where there is one.
 LONG = {"benchmark": "--quick", "convergence": "--quick", "spectrum": "", "validate": "", "stress": "--quick"}
@@ -50,6 +53,8 @@ def blocks_of(page: Path) -> Iterator[Block]:
             yield Block(language, title[1] if title else "", token.content, line)
         elif token.type == "code_block":
             yield Block("bash", "", token.content, line)
+        elif token.type == "html_block" and token.content.startswith(CHECK):
+            yield Block("python", "", token.content.removeprefix(CHECK).strip().removesuffix("-->"), line)
 
 
 def commands_of(text: str) -> list[str]:
@@ -62,6 +67,12 @@ def is_long(command: str) -> bool:
     """Whether a command takes minutes: a study, or a named suite; a page's own suites and scenes are short."""
     words = shlex.split(command)
     return words[0] == "rockcheck" and words[1] in LONG and not any(word.endswith(".toml") for word in words)
+
+
+def said(phrase: str, page: Path) -> None:
+    """Fails where a page does not have this phrase, however its lines are broken."""
+    text = re.sub(r"<!--.*?-->", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    assert " ".join(phrase.split()) in " ".join(text.split()), f"{page.name} does not say: {phrase}"
 
 
 def run_python(block: Block, page: Path, names: dict[str, object]) -> None:
@@ -112,7 +123,8 @@ def test_blocks_run(page, tmp_path, monkeypatch):
         return
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
-    names: dict[str, object] = {"__name__": "__main__"}
+    monkeypatch.syspath_prepend(ROOT / "docs" / "site_tools")
+    names: dict[str, object] = {"__name__": "__main__", "DOCS": ROOT / "docs", "said": lambda phrase, where=page: said(phrase, where)}
     for block in blocks:
         if block.file:
             show_file(block, tmp_path)
