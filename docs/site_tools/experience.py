@@ -1,7 +1,7 @@
 """What the suites have found about each model: `python docs/site_tools/experience.py RUN ...` from the folders of finished runs.
 
 Writes bias and scatter of the figures and the domain of the scenes to scenes/data/experience.json, which `History.expected` and the
-report read, and the table of docs/uncertainty.md.
+report read, and the tables of docs/theory.md.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rockcheck.validation.suite.results import Run
 
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "scenes" / "data" / "experience.json"
-PAGE = ROOT / "docs" / "uncertainty.md"
+PAGE = ROOT / "docs" / "theory.md"
 BEGIN, END = "<!-- experience: begin -->\n", "<!-- experience: end -->\n"
 
 
