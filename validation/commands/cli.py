@@ -69,7 +69,7 @@ EXIT_CODES = {
     INTERRUPTED: "interrupted by Ctrl-C",
 }
 
-QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Nothing but errors; the exit code tells.")]
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only; the exit code is the answer.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="The result as JSON on stdout, instead of tables.")]
 
 app = typer.Typer(

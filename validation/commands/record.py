@@ -18,9 +18,9 @@ from rockcheck.validation.commands import answer, check_picture, console, save_p
 UnitOption = Annotated[str | None, typer.Option("--unit", help="Unit of the accelerations: g, m/s2, cm/s2, gal or mm/s2.")]
 TimeStepOption = Annotated[float | None, typer.Option("--time-step", help="Time step, s, where the file has no times.")]
 ColumnOption = Annotated[str | None, typer.Option("--column", help="Column of the accelerations: its number from 1, or its name.")]
-HeaderLinesOption = Annotated[int | None, typer.Option("--header-lines", help="So many first lines are no data.")]
-DecimalOption = Annotated[str | None, typer.Option("--decimal", help="What stands before the decimals: . or ,")]
-ComponentOption = Annotated[str | None, typer.Option("--component", help="Of a file with several: its number from 1, or its name.")]
+HeaderLinesOption = Annotated[int | None, typer.Option("--header-lines", help="Number of lines to skip at the top.")]
+DecimalOption = Annotated[str | None, typer.Option("--decimal", help="The decimal sign: . or ,")]
+ComponentOption = Annotated[str | None, typer.Option("--component", help="Which of several components: its number from 1, or its name.")]
 
 #: Parts of the line that pictures a motion, and its marks from the smallest acceleration to the largest.
 _PARTS, _MARKS = 60, " ▁▂▃▄▅▆▇█"

@@ -20,14 +20,14 @@ NOT_CONVERGED = 1
 def run(
     scene: Annotated[str, typer.Argument(help="A named scene or a .toml file.", autocompletion=scene_names)],
     model: Annotated[
-        str, typer.Option("--model", help=f"Whose numerical error: one of {', '.join(FAMILIES)}.", autocompletion=model_names)
+        str, typer.Option("--model", help=f"Model to look at: one of {', '.join(FAMILIES)}.", autocompletion=model_names)
     ] = "ebm-unilateral",
     settings: Annotated[list[str] | None, typer.Option("--set", help="A setting of the model, such as time_step=1e-4; repeatable.")] = None,
     samples: Annotated[
         int, typer.Option("--samples", min=2, help="Draws of the scene's uncertain numbers (a power of two is taken).")
     ] = SAMPLES,
 ) -> None:
-    """How sure the figures of a scene are.
+    """Give the uncertainty of a scene's figures.
 
     The numerical error comes from runs at two coarser steps (or a finer tolerance). Numbers that the scene file gives as
     { value = 0.3, sd = 0.03 } are drawn, played by the event-based model, and ranked by what matters most.

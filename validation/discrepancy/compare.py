@@ -23,8 +23,8 @@ class Discrepancy(Shown):
     """The figures of one comparison.
 
     `start` and `end` (s) bound the time that was compared. `gap` says which part of the asked time could not be
-    compared, empty where all was; a comparison with a gap never passes a tolerance. `fall` says that one block's fall is
-    why: then the two models answer differently, which a difference in form may do.
+    compared, empty where all was; a comparison with a gap never passes a tolerance. `fall` says that the gap is there
+    because one of the two blocks fell: the models give different answers, which a difference of model form may explain.
     """
 
     reference: str

@@ -115,7 +115,7 @@ def check_allowed(name: str, allow_code: Container[str]) -> None:
     if module in sys.stdlib_module_names:
         raise InputError(f"{printable(name)!r} is no model: {module} is part of Python's standard library")
     if name not in allow_code:
-        raise InputError(f"{printable(name)!r} is code, which is run only where the command line says so: --allow-code {printable(name)}")
+        raise InputError(f"{printable(name)!r} is code of your own; it runs only if you allow it: --allow-code {printable(name)}")
 
 
 def home(name: str) -> str:

@@ -120,7 +120,7 @@ class Tiles:
         try:
             return future.result()
         except KilledWorker as error:
-            raise ModelFailure(f"the cluster's workers die of a tile: {error}") from None
+            raise ModelFailure(f"a worker of the cluster died on every attempt at a tile: {error}") from None
 
     def _keep(self, key: str, found: Outcomes) -> Outcomes:
         text = "".join(UNDECIDED if fault else CODES[int(side)] for side, fault in zip(*found, strict=True))

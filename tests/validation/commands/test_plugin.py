@@ -47,7 +47,7 @@ def test_check_holds_a_cell_against_its_suite(pytester):
     pytester.makepyfile(TESTS)
     result = pytester.runpytest_subprocess("-p", "no:randomly", "-rf")
     result.assert_outcomes(failed=5)
-    result.stdout.fnmatch_lines(["*models.still: 'faulty:Still' is code, which is run only where*"])
+    result.stdout.fnmatch_lines(["*models.still: 'faulty:Still' is code of your own; it runs only if*"])
     pytester.makeini("[pytest]\nrockcheck_allow_code = faulty:Still\n")
     result = pytester.runpytest_subprocess("-p", "no:randomly", "-rf", "--rockcheck-allow-code", "faulty:Fails")
     result.assert_outcomes(passed=1, failed=4)

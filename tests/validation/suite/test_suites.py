@@ -71,7 +71,7 @@ def test_variants_of_a_model_have_labels_of_their_own(tmp_path):
         (MODELS + "tollerance = 1e-9\n" + SHELF, "ebm.tollerance: unknown key"),
         (MODELS + 'pivot = "unilateral"\n' + SHELF, "ebm.pivot: is fixed by the name"),
         (MODELS + "[models.mujcoo]\n" + SHELF, "did you mean 'mujoco'"),
-        (MODELS + '[models.own]\nmodel = "nowhere:Model"\n' + SHELF, "models.own: 'nowhere:Model' is code, which is run only where"),
+        (MODELS + '[models.own]\nmodel = "nowhere:Model"\n' + SHELF, "models.own: 'nowhere:Model' is code of your own; it runs only if"),
         (MODELS + "[require]\ndifference = ['theta_rsm']\n" + SHELF, "did you mean 'theta_rms'"),
         (MODELS + "[require]\ndifference = ['peak_rotation']\n" + SHELF, "require.difference"),
         (MODELS + SHELF.replace("0.1", "-0.1"), "block.half_width: -0.1 is not allowed"),

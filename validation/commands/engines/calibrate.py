@@ -17,7 +17,7 @@ def run(
     engine: Annotated[str, typer.Option("--engine", help="The engine.", autocompletion=model_names)],
     restitution: Annotated[float, typer.Option("--restitution", help="Wanted, from 0 to 1.")],
     friction: Annotated[float, typer.Option("--friction", help="Wanted coefficient.")] = 0.3,
-    penetration: Annotated[float | None, typer.Option("--penetration", help="Largest that is allowed, m.")] = None,
+    penetration: Annotated[float | None, typer.Option("--penetration", help="Largest penetration allowed, m.")] = None,
     step: Annotated[float, typer.Option("--step", help="Time step, s.")] = 1e-3,
 ) -> None:
     """Find an engine's own parameters for a restitution.

@@ -37,7 +37,7 @@ def run(
     ] = None,
     export: Annotated[Path | None, typer.Option("--export", help="Write the scenes for another engine into a folder, and stop.")] = None,
     compare: Annotated[
-        tuple[Path, Path] | None, typer.Option("--compare", help="What changed between two files of cards, and stop.")
+        tuple[Path, Path] | None, typer.Option("--compare", help="Show what changed between two files of cards, and stop.")
     ] = None,
     allow_code: AllowCodeOption = None,
     out: OutOption = OUT / "conformance",

@@ -26,7 +26,7 @@ def run(
     out: OutOption = OUT / "benchmark",
     quick: Annotated[bool, typer.Option("--quick", help="Fewer scenes and settings, at most 2 minutes.")] = False,
     jobs: JobsOption = None,
-    minutes: Annotated[float | None, typer.Option("--minutes", min=0.1, help="Leave out what has not begun then (25; quick 2).")] = None,
+    minutes: Annotated[float | None, typer.Option("--minutes", min=0.1, help="Start nothing later than this (25; --quick 2).")] = None,
 ) -> None:
     """Run time against error, for every model.
 

@@ -39,9 +39,7 @@ def run(
     capacity: Annotated[
         list[float] | None, typer.Option("--capacity", help="Peak rotation (alpha) of a fragility curve; repeatable.", min=1e-6, max=1.0)
     ] = None,
-    pivot: Annotated[
-        str, typer.Option("--pivot", help="unilateral, or the paper's bilateral, from which a block cannot hop.")
-    ] = "unilateral",
+    pivot: Annotated[str, typer.Option("--pivot", help="unilateral, or bilateral as in the paper: the block cannot hop.")] = "unilateral",
     unit: UnitOption = None,
     time_step: TimeStepOption = None,
     column: ColumnOption = None,

@@ -82,7 +82,7 @@ def run(
         typer.Option("--pivot", help="bilateral (default) or unilateral: the block may hop (default of a --scene with a wall)."),
     ] = None,
     model: Annotated[str | None, typer.Option("--model", help="Another model: cm, mujoco, pybullet (slow: mind --size).")] = None,
-    tolerance: Annotated[float | None, typer.Option("--tolerance", help="Of the event-based model.")] = None,
+    tolerance: Annotated[float | None, typer.Option("--tolerance", help="Tolerance of the event-based model.")] = None,
     refine: Annotated[bool, typer.Option("--refine", help="Run only what lies near a boundary.")] = False,
     verify: Annotated[bool, typer.Option("--verify", help="Refine, run the full grid too, and count the nodes that differ.")] = False,
     agreement: Annotated[int | None, typer.Option("--agreement", help="Nodes a spectrum at which the other models are compared.")] = None,
@@ -94,7 +94,7 @@ def run(
     out: OutOption = OUT,
     jobs: JobsOption = None,
     scheduler: SchedulerOption = None,
-    force: Annotated[bool, typer.Option("--force", help="Run everything, also what is up to date.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Run everything again, also what is up to date.")] = False,
 ) -> None:
     """Overturning spectra: the paper's, or your own.
 
