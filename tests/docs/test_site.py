@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 import pytest
 from playwright import sync_api as playwright
@@ -57,6 +58,47 @@ def test_pages_open_from_the_file_system_and_ask_for_nothing(site, page, name):
     assert page.locator("h1").count() == 1
     broken = page.evaluate("[...document.images].filter(i => !i.complete || !i.naturalWidth).map(i => i.src)")
     assert broken == []
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("name", SOURCES)
+def test_pages_fit_a_phone(site, page, name):
+    """Tables, code and equations scroll by themselves; the page does not."""
+    page.set_viewport_size({"width": 390, "height": 800})
+    page.goto((site / f"{name}.html").as_uri())
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+@pytest.mark.browser
+def test_pictures_are_no_white_slabs_on_a_dark_page(site, page):
+    page.emulate_media(color_scheme="dark")
+    page.goto((site / "gallery.html").as_uri())
+    filters = page.evaluate("[...document.querySelectorAll('article img')].map(image => getComputedStyle(image).filter)")
+    assert filters
+    assert all(one.startswith("invert") for one in filters)
+
+
+@pytest.mark.browser
+def test_no_number_breaks_at_its_hyphen(site, page):
+    """In the narrowest column, too; and what only the tests need is not published."""
+    page.set_viewport_size({"width": 320, "height": 800})
+    page.goto((site / "choosing.html").as_uri())
+    held = page.evaluate("[...document.querySelectorAll('article .unbroken')].map(one => [one.textContent, one.getClientRects().length])")
+    assert {"1e-12", "ebm-unilateral"} <= {text for text, _ in held}
+    assert {lines for _, lines in held} == {1}
+    assert "<!-- check" not in page.content()
+
+
+@pytest.mark.browser
+def test_the_sample_report_is_one_click_away(site, page):
+    page.goto((site / "index.html").as_uri())
+    page.get_by_role("link", name="See a sample report").click()
+    assert page.url == (site / "sample" / "index.html").as_uri()
+    assert "smoke" in page.inner_text("body")
+    links = page.evaluate("[...document.links].map(a => a.href).filter(h => h.startsWith('file:')).map(h => h.split(/[?#]/)[0])")
+    missing = [link for link in links if not Path(unquote(urlsplit(link).path)).exists()]
+    assert len(links) > 5
+    assert missing == []
 
 
 @pytest.mark.browser
