@@ -1,4 +1,4 @@
-"""The one exception that means "what you gave is not usable", told in one line."""
+"""The exceptions, each with a message of one line: what a user gave cannot be used, or a model could not finish."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from rockcheck.validation.discrepancy.measures import IMPACTS
 from rockcheck.validation.execute.models import build, not_installed
 from rockcheck.validation.execute.pool import Call, Pool
 
-#: Errors for which each model's cost is told, alpha.
+#: Errors at which each model's cost is given, alpha.
 LEVEL = 1e-3
 #: The cost at which engines are compared in their league, CPU s a simulated second.
 EQUAL_COST = 0.02

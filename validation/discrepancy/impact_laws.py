@@ -17,7 +17,7 @@ from rockcheck.validation.discrepancy.figures import Stored
 Law = Literal["closed", "open", "floor-first"]
 #: How long (s) a history is looked at before and after such a landing.
 WINDOW = 0.1
-#: Rotations (alpha) nearer than this are one motion, and laws whose motions stay nearer than TELLS cannot be told apart.
+#: Rotations (alpha) nearer than this are one motion; laws whose motions stay nearer than TELLS are not distinguished.
 SAME, TELLS = 1e-6, 1e-3
 #: A history follows a law if it is nearer to it than this part of the distance to the next one.
 NEAR = 0.25

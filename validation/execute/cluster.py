@@ -1,4 +1,4 @@
-"""Tiles on other machines: a Dask cluster, met by its address, or made of local workers."""
+"""Tiles on other machines: a Dask cluster at an address, or one made of local workers."""
 
 from __future__ import annotations
 

@@ -31,8 +31,8 @@ from rockcheck.validation.execute.store import TILES, Store
 TILE = 10_000
 #: Nodes of a tile of a model that is simulated one by one, and how many of them a process takes at once.
 SLOW_TILE, NODES_A_CALL = 100, 5
-#: How long (s) a run goes on after the base's motion where its outcome is open then, and the share of the energy of tipping
-#: over below which it is not: a hundredth is left to the model's own error.
+#: Time (s) that a run goes on after the base's motion while its outcome is open; and the share of the energy of tipping over
+#: below which the outcome is decided: a hundredth is left to the model's own error.
 SETTLE, ENOUGH = 6.0, 0.99
 #: Outcomes in text.
 CODES, UNDECIDED = {LEFT: "L", SAFE: ".", RIGHT: "R"}, "?"

@@ -19,7 +19,7 @@ GRAVITIES = (9.81, 10.0, 1.0)
 FRICTIONS = (0.0, 0.1, 0.2, 0.25, 0.3, 0.5, 0.6, 0.75, 1.0, 1.2)
 RESTITUTIONS = (0.0, 0.0, 0.25, 0.5, 0.75, 1.0, 0.9999999)
 STEPS = (0.01, 0.02, 0.1, 0.25)
-#: Powers of ten of starts that are noise, small, and large; the share of runs that last long, and how long (s).
+#: Starts as powers of ten: noise, small, large. Share of long runs, and their length, s.
 SIZES = (-300, -20, -13, -12, -11, -10, -9, -8, -6, -3, -1, 0, 1, 3)
 LONG, LASTS = 0.02, 1e4
 

@@ -16,7 +16,7 @@ Kind = Literal["bilateral", "unilateral", "bouc-wen", "no-slip"]
 #: Ranges: slenderness (rad), half diagonal (m), friction, amplitude over uplift's, period over the block's, step of records (s).
 ALPHA, RADIUS, FRICTION = (0.02, 1.2), (1e-3, 1e3), (0.0, 1.333)
 AMPLITUDE, PERIOD, RECORD_STEP = (0.1, 100.0), (0.05, 50.0), (1e-4, 0.1)
-#: Longest run, sqrt(R/g), and most samples of a record: what a hundred thousand runs can afford.
+#: Longest run, sqrt(R/g), and most samples of a record, so that a hundred thousand runs stay affordable.
 LONGEST, MOST_SAMPLES = 15.0, 300
 #: Rows of a history.
 ROWS = 100

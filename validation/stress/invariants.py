@@ -51,16 +51,15 @@ INVARIANTS = {
         Invariant("source", "energy beyond that of the start and the work of the base, of all work done", 0.05),
     )
 }
-#: The horizon of predictability of a run here: a relative disturbance of the scene's data by DISTURBANCE turns the block by SEEN rad
-#: (half the bound of what is asked before it: of two that grow alike either may be first), or answers at tolerances finer than EXACT,
-#: a hundred times apart, differ by a tenth of that, or friction near Painleve's limit has let a difference of EXACT grow to SEEN
-#: (`_amplified`).
+#: The horizon of predictability of a run is the first of three times: a relative disturbance of the scene's data by DISTURBANCE turns
+#: the block by SEEN rad (half the bound of the invariants that end there); answers at tolerances finer than EXACT, a hundred times
+#: apart, differ by a tenth of SEEN; friction near Painleve's limit lets a difference of EXACT grow to SEEN (`_amplified`).
 DISTURBANCE, SEEN, DISTURBED, EXACT = 1e-7, 5e-7, 6, 1e-10
 #: Rows of an audited history: this fraction of the shortest time in the scene, and at most this many.
 FINE, MOST_ROWS = 64, 4000
-#: A contact counts as closed, a slip as seen, beyond these; conditions are not asked for within this time of an event or a jump.
+#: Thresholds of a closed contact and of slip; no condition is checked within this time of an event or a jump.
 CLOSED, SLIPS, NEAR = 1e-8, 1e-9, 1e-9
-#: An integral is believed where a rule of order 6 gives the same to this, relatively: that of order 10 is then off by far less.
+#: An integral is used where rules of order 6 and 10 agree to this, relatively: the error of order 10 is then far smaller.
 RESOLVED = 1e-10
 #: Kinds of motion by the contacts they have.
 ON_FLOOR = ("rest", "slide", "rock", "slide-rock", "lean", "ladder")
@@ -79,14 +78,14 @@ class CheckedRun:
     failure: str = ""
     outcome: str = ""
     events: int = 0
-    #: Impacts that added energy where the impact law is known to (see `rules`), and the most that one added.
+    #: Impacts that added energy where the impact law is known to do so (see `rules`), and the most that one added.
     gains: int = 0
     largest_gain: float = 0.0
     #: How often each modelling choice was made.
     rules: Mapping[str, int] = field(default_factory=dict)
-    #: Whether the horizon of predictability had to be found.
+    #: Whether the horizon of predictability had to be computed.
     horizons: int = 0
-    #: Invariants that were to be looked at, but could not be judged.
+    #: Invariants that could not be judged.
     unjudged: tuple[str, ...] = ()
 
     @property
@@ -109,7 +108,7 @@ def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: boo
         return CheckedRun(figures=figures, outcome=history.outcome)
     figures["outcome"] = float(_contradicts(played, history))
     figures |= conditions(model, played, history)
-    if audit:  # at the finer tolerance, so that its error is not taken for one of the balance
+    if audit:  # at the finer tolerance, whose error does not disturb the balance
         with suppress(ModelFailure):
             energy = _energy(finer(model), played)
             figures |= {"energy": energy} if energy is not None else {}
@@ -198,7 +197,7 @@ def conditions(model: EventBasedModel, scene: Scene, history: History) -> dict[s
     t, theta, mode = channels["t"], channels["theta"], channels["mode"]
     height = kinematics.pivot_height(block, channels["y"], theta) / radius
     gaps = _gaps(scene, channels["x"], theta)
-    # What x is off by its own rounding is not depth.
+    # The rounding of x is not depth.
     rounding = 4e-16 * np.abs(channels["x"]) / radius
     depth = [float(np.max(-height)), *(float(np.max(-gap - rounding)) for gap in gaps.values())]
     on_floor, stands = np.isin(mode, ON_FLOOR), np.isin(mode, STANDS)
@@ -459,7 +458,7 @@ class _Horizon:
             self.found = 1
             self._row = len(history.channels["t"])
             exact = self.model.model_copy(update={"tolerance": EXACT})  # the horizon is the scene's, however coarse the model is
-            for by in (10.0, 100.0):  # rounding is a disturbance, too: an answer that finer tolerances do not agree on is none
+            for by in (10.0, 100.0):  # rounding is a disturbance, too: finer tolerances must agree on the answer
                 with suppress(ModelFailure):
                     a, b = (finer(exact, times).simulate(self.scene) for times in (by, 100.0 * by))
                     self._row = min(self._row, _agree(a, b, 0.1 * SEEN))

@@ -84,7 +84,7 @@ def _triple(x: Floats, y: Floats, turn: Floats) -> Floats:
 #: Weights of the closed Newton-Cotes rule with nine nodes: exact up to degree 9.
 NEWTON_COTES = np.array([989.0, 5888.0, -928.0, 10496.0, -4540.0, 10496.0, -928.0, 5888.0, 989.0]) * 4.0 / 14175.0
 GROUP = len(NEWTON_COTES) - 1
-#: The same interval by Boole's rule twice, exact up to degree 5: what the two differ by says how far the first is to be trusted.
+#: The same interval by Boole's rule twice, exact up to degree 5. The difference of the two rules estimates the error.
 BOOLE = np.array([7.0, 32.0, 12.0, 32.0, 14.0, 32.0, 12.0, 32.0, 7.0]) * 2.0 / 45.0
 
 

@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 #: Caps of an event-based run: a block that bounces between two near walls with e = 1 needs the most, 27 steps an impact with Bouc-Wen.
 MOST_STEPS, MOST_EVENTS = 2_000_000, 400_000
-#: Every so many runs one is audited, that is, sampled so finely that its energy can be integrated.
+#: One in so many runs is audited: sampled so finely that its energy can be integrated.
 AUDIT = 10
 
 

@@ -30,20 +30,20 @@ class RunTotals:
     model: str
     runs: int = 0
     cpu_seconds: float = 0.0
-    #: How many runs looked at an invariant; its worst figure, and in which run.
+    #: Number of runs that checked an invariant; its worst figure, and the run of that figure.
     looked_at: Counter[str] = field(default_factory=Counter)
     worst: dict[str, tuple[float, int]] = field(default_factory=dict)
     failures: tuple[Failure, ...] = ()
     outcomes: Counter[str] = field(default_factory=Counter)
     events: int = 0
-    #: Runs in which an impact added energy as its law is known to, and the most that one added.
+    #: Runs in which an impact added energy, as its law is known to do, and the most that one added.
     gaining: int = 0
     largest_gain: float = 0.0
     #: How often each modelling choice of the model was made, by its name.
     rules: Counter[str] = field(default_factory=Counter)
-    #: Runs whose comparison had to be ended by the horizon of predictability.
+    #: Runs whose comparison ended at the horizon of predictability.
     horizons: int = 0
-    #: Runs in which an invariant that was to be looked at could not be judged, by its name.
+    #: Runs in which an invariant could not be judged, by its name.
     unjudged: Counter[str] = field(default_factory=Counter)
 
     def __add__(self, other: RunTotals) -> RunTotals:

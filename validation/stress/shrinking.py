@@ -70,7 +70,7 @@ def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
             for samples in _shorter(excitation.unscaled):
                 yield {key: excitation.model_copy(update={"unscaled": samples})}
     radius = scene.block.radius
-    if not 0.5 < radius < 2.0:  # rounding does not lead back here
+    if not 0.5 < radius < 2.0:  # rounding would change it again
         yield {"block": Block(half_width=scene.block.half_width / radius, half_height=scene.block.half_height / radius)}
     if scene.gravity != 9.81:
         yield {"gravity": 9.81}

@@ -24,7 +24,7 @@ from rockcheck.validation.stress.players import energy_without_source
 Axis = Literal["size", "friction", "restitution", "shaking"]
 
 SLOPE = math.tan(0.25)
-#: Values along each axis, and the others at the paper's block beside a wall: R in m, friction, restitution of the wall, a_p/(g tan alpha).
+#: Values along each axis; all else is the paper's block beside a wall: R in m, friction, restitution of the wall, a_p/(g tan alpha).
 AXES: dict[Axis, tuple[float, ...]] = {
     "size": (1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1000.0),
     "friction": (0.0, 0.1, 0.3, 0.6, 0.9, 1.2),
@@ -154,7 +154,7 @@ def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
     if not all(np.all(np.isfinite(column)) for column in channels.values() if column.dtype.kind == "f"):
         return "blows up"
     deepest = max(float(np.max(-gap)) for gap in _gaps(scene, channels)) / radius
-    # A step's own way is no fault.
+    # The distance of one step is no fault.
     if deepest > DEEPEST + 2.0 * step * float(np.max(np.hypot(channels["x_dot"], channels["y_dot"]))) * unit / radius:
         return "sinks"
     return "gains energy" if energy_without_source(scene, history) > MOST_ENERGY else ""
@@ -178,7 +178,7 @@ def largest_stable(label: str, axis: Axis, value: float, steps: Sequence[float] 
     return Stable(label, axis, value, best)
 
 
-#: What pushes or shakes (at 1 Hz) a block that should nevertheless stand: how hard, of what would move it.
+#: Push or shaking (at 1 Hz) under which a block should still stand, as a share of what would move it.
 CASES = {"left alone": 0.0, "pushed": 0.5, "shaken": 0.8}
 
 
@@ -196,7 +196,7 @@ def stand_still(label: str, case: str, duration: float, step: float = REST_STEP)
     )
     line = SETUPS[label]
     settings = dict(line.settings)
-    if line.family != "cm":  # whose own step it is that makes an hour cheap
+    if line.family != "cm":  # the CM's own step makes an hour cheap
         settings |= {line.knob: step}
     try:
         history = build(line.family, settings).simulate(scene)

@@ -25,10 +25,10 @@ from rockcheck.validation.stress.shrinking import shrink, write_scene
 from rockcheck.validation.stress.tables import save
 
 What = Literal["all", "runs", "maps"]
-#: Runs that one task of a worker holds, and how long (s) one of them may take on the average: event-based runs, others.
+#: Runs in one task of a worker, and the time (s) that one of them may take on average: event-based runs, others.
 CHUNK, APPROXIMATE_CHUNK = 250, 20
 SECONDS_A_RUN, SECONDS_AN_APPROXIMATE_RUN = 0.2, 2.0
-#: How long (s) a task may take in addition.
+#: Time (s) that a task may take in addition.
 PATIENCE = 20.0
 #: Memory that a worker may take, MB.
 MEMORY = 2048.0
@@ -45,7 +45,7 @@ def _checked(label: str, scene: Scene, seed: int, number: int, only: str = "") -
     """What a run shows; a fault of the program itself is a failure like any other."""
     try:
         return PLAYERS[label].check(scene, seed, number, only)
-    except Exception as error:  # whatever it is: the other runs go on, and this one is told with its words
+    except Exception as error:  # the other runs go on, and this one is reported with its message
         return CheckedRun(figures={"ends": math.inf}, failure=printable(f"{type(error).__name__}: {error}", 300))
 
 

@@ -13,7 +13,7 @@ from rockcheck.validation.stress.invariants import INVARIANTS
 from rockcheck.validation.stress.results import Failure, RunTotals, Stress
 from rockcheck.validation.stress.stability import AXIS_WORDS, Stability, Stable, Still
 
-#: What of a block that should stand still is told.
+#: What is listed of a block that should stand still.
 MOVES = ("creep", "sinking", "rotation", "uplift", "jitter")
 #: Columns of `summary_rows`.
 SUMMARY = ("model", "invariant", "runs", "not judged", "failures", "worst", "in run", "bound")

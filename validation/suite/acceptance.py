@@ -16,7 +16,7 @@ from rockcheck.validation.suite.results import Check, Run
 from rockcheck.validation.suite.suites import Suite
 from rockcheck.validation.suite.tolerances import OWN_FIGURES, Tolerance, Windowed, judge
 
-#: New lines: the limit and the drift band as shares of a difference from perfection, and of a figure of the cell itself.
+#: Of a new line: limit and drift band, as shares of a difference from the perfect value, and of a cell's own figure.
 ROOM, DRIFT = 2.0, 0.2
 OWN_ROOM, OWN_DRIFT = 0.02, 0.002
 #: The least limit and drift band of new lines: multiples of the measure's resolution, and a share of the limit.

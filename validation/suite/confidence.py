@@ -37,7 +37,7 @@ def inputs_of(store: Store, given: UncertainScene) -> Inputs:
     code = provenance.code_digest("rockcheck.validation.uncertainty.inputs")
     key = provenance.cell_key(given.scene, "ebm-unilateral", {"spreads": spreads, "correlation": given.correlation.tolist(), "code": code})
     name = name_of(given.scene.name, "inputs", key)
-    with suppress(TypeError, ValueError):  # what is kept is not trusted to have the fields that it must have
+    with suppress(TypeError, ValueError):  # a kept result may lack the fields that it should have
         return Inputs(**(store.get_record(COMPARISONS, name) or {}))
     found = propagate(given).inputs
     store.put_record(COMPARISONS, name, found.model_dump(mode="json"))

@@ -20,9 +20,9 @@ from rockcheck.scenes import Scene
 from rockcheck.scenes.trust.experience import Experience, Range, Trust
 from rockcheck.validation.suite.results import Run
 
-#: Figures that have a bias, and the size (alpha) below which a ratio says nothing.
+#: Figures that have a bias, and the size (alpha) below which a ratio means nothing.
 QUANTITIES = {"peak_rotation": 1e-3}
-#: Fewer pairs say nothing of a scatter.
+#: Fewest pairs from which a scatter is computed.
 FEWEST = 5
 
 

@@ -137,7 +137,7 @@ def _spread(lines: Mapping[_Path, Any], cells: Iterable[tuple[str, str]]) -> Ite
         completes = any(path[0] != EVERY and path[1:] == tuple(rest) for path in lines)
         if completes and isinstance(line, Mapping) and "limit" not in line:
             continue
-        # Where nothing is played it stays what it is, and is told as a tolerance without a cell.
+        # Where no cell is run it stays as it is, and is reported as a tolerance without a cell.
         yield from (((scene, *rest), line) for scene in scenes or [EVERY] if (scene, *rest) not in lines or scene == EVERY)
 
 
