@@ -69,6 +69,10 @@ def test_each_branch_of_the_wall_cascade(parting):
         if branch == impacts.E_SLIP:
             assert n == 0.0
             assert xdot2 == pytest.approx(C * w2, abs=1e-10)  # (32): the corner stays on the wall
+            # The friction is that of the slip which (30) would have, were it not for its pull of the wall.
+            slips = ((sr, sy, impacts.wall_slip(1.0, s, c, C, w1, xdot1, e, mu, sr, sy)) for sr in (1, -1) for sy in (1, -1))
+            sense = next(sr * sy for sr, sy, (w, x, push, _) in slips if push * sy >= -1e-12 and (x + c * w) * sr >= -1e-12)
+            assert q == pytest.approx(-mu * sense * p, abs=1e-10)
     least = {impacts.A_STICK: 20, impacts.B_STICK: 20, impacts.E_SLIP if parting else impacts.D_SLIP: 500}
     least |= {impacts.C_STICK: 10} if parting else {}
     assert seen.keys() == least.keys()
