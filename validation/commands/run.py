@@ -78,7 +78,7 @@ def run(
     allow_code: AllowCodeOption = None,
     report: Annotated[bool, typer.Option("--report/--no-report", help="Render the pages; without them only run.json and tables.")] = True,
 ) -> None:
-    """Play one scene by all models, and show them beside each other.
+    """Play one scene by all models, beside each other.
 
     With records: once for each, in place of the scene's own excitation. A table and a report; nothing is judged, and no suite is needed.
     """

@@ -482,9 +482,11 @@ def _unmatched(pair: Pair, matched: MatchedImpacts) -> list[tuple[History, Seque
 
 
 @figure("peak rotation", "angle")
-def peak_rotation(motion: WindowedHistory) -> float:
-    """max |theta|, in alpha."""
-    return float(np.max(np.abs(motion.channel("theta")))) / motion.block.alpha
+def peak_rotation(motion: WindowedHistory) -> Value:
+    """max |theta|, in alpha; of a block that has overturned it is no peak, and a note says so."""
+    at = motion.history.overturned_at
+    fell = "" if at is None or at > motion.until else f"the block overturned at {at:.3g} s"
+    return float(np.max(np.abs(motion.channel("theta")))) / motion.block.alpha, fell
 
 
 @figure("last rotation", "angle")

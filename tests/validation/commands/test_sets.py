@@ -111,7 +111,10 @@ def test_what_falls_is_told_with_its_time_and_without_a_peak(capsys):
     assert max(map(len, out.splitlines())) <= 130
     page = Path("rockcheck-report/index.html").read_text(encoding="utf-8")
     assert "Nothing is judged." in page
-    assert "Within tolerance" not in page
+    (scene,) = Path("rockcheck-report/pages").glob("*.html")
+    for text in (page, scene.read_text(encoding="utf-8")):
+        assert "ithin tolerance" not in text.replace('<option value="pass">within tolerance</option>', "")
+        assert "overturned left at 1.57 s" in text
     assert "overturned left at 1.57 s" in Path("rockcheck-report/summary.md").read_text(encoding="utf-8")
 
 

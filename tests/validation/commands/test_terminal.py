@@ -145,7 +145,7 @@ def test_json_is_all_that_is_on_stdout(capsys):
     run = result("validate", "suite.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1", code=1)
     assert run["verdict"] == "fail"
     assert run["reasons"] == ["nothing was judged: the suite requires no measure and has no tolerance"]
-    nothing = {"checks": 0, "verdict": None, "converged": None, "impact_law": None, "explanations": []}
+    nothing = {"overturned_at_s": None, "checks": 0, "verdict": None, "converged": None, "impact_law": None, "explanations": []}
     assert run["cells"] == [{"scene": "short", "model": "still", "outcome": "at rest", **nothing}]
     assert result("accept", "suite.toml", "--allow-code", "faulty:Still", "--jobs", "1")["refused"] == []
 
