@@ -14,7 +14,7 @@ from pathlib import Path
 from rockcheck.reports.studies.convergence import convergence_figure
 from rockcheck.reports.style import LOOKS
 from rockcheck.scenes.writing import markdown_table
-from rockcheck.validation.bench.convergence import Convergence, run_convergence
+from rockcheck.validation.bench.convergence import Convergence, Level, run_convergence
 
 DOCS = Path(__file__).parents[1]
 UNILATERAL, PAPER = "ebm-unilateral", "ebm"
@@ -23,6 +23,23 @@ UNILATERAL, PAPER = "ebm-unilateral", "ebm"
 def number(value: float) -> str:
     """An error, or what stands for one that there is not."""
     return f"{value:.1e}" if math.isfinite(value) else "failed"
+
+
+def figures(found: Convergence) -> str:
+    """The study in two sentences; of the models that play all scenes."""
+    whole = [model for model in found.models() if len({one.scene for one in found.plays if one.model == model}) == len(found.cases)]
+    finest = [min((level for level in found.levels if (level.model, level.reference) == (model, UNILATERAL)), key=_step) for model in whole]
+    names = [LOOKS[model].label for model in whole]
+    forms = sorted(case.model_form for case in found.cases)
+    return (
+        f"At the finest steps the median error against `ebm-unilateral` is at most {number(max(level.median for level in finest))} alpha"
+        f" with {', '.join(names[:-1])} and {names[-1]}. The model form is {number(found.model_form)} alpha in the\n"
+        f"median of the scenes ({number(forms[0])} to {number(forms[-1])}).\n"
+    )
+
+
+def _step(level: Level) -> float:
+    return level.step
 
 
 def levels(found: Convergence) -> str:
@@ -70,7 +87,7 @@ def main() -> None:
     found = run_convergence(on_progress=lambda done, of, what: print(f"{done} of {of}: {what}", file=sys.stderr, flush=True))
     page = DOCS / "convergence.md"
     text = page.read_text(encoding="utf-8")
-    for name, made in (("levels", levels), ("orders", orders), ("scenes", scenes), ("exceptions", exceptions)):
+    for name, made in (("figures", figures), ("levels", levels), ("orders", orders), ("scenes", scenes), ("exceptions", exceptions)):
         table = made(found).replace("\\", "\\\\")
         text, count = re.subn(rf"(<!-- {name} -->\n).*?(\n<!-- end -->)", rf"\g<1>\n{table}\n\2", text, flags=re.S)
         if count != 1:
