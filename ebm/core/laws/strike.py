@@ -92,8 +92,11 @@ def touch(b, m, z, which):
     elif which == G_TIP_GAP and m[FAMILY] == TILT and m[FLOOR] == STICK:
         sign = float(m[S])
         pivot = sign * z[X] - math.sin(b.alpha - phi)
-        phi += wall_gap(b, z, m[S]) / (math.cos(b.alpha - phi) + math.cos(b.alpha + phi))
-        z[X], z[HEIGHT], z[THETA] = sign * (pivot + math.sin(b.alpha - phi)), math.cos(b.alpha - phi), sign * phi
+        turned = phi + wall_gap(b, z, m[S]) / (math.cos(b.alpha - phi) + math.cos(b.alpha + phi))
+        if turned > 0.0:
+            z[X], z[HEIGHT], z[THETA] = sign * (pivot + math.sin(b.alpha - turned)), math.cos(b.alpha - turned), sign * turned
+        else:  # past upright it would stand on its other corner, without an impact
+            z[X] -= sign * wall_gap(b, z, m[S])
     elif which == G_TIP_GAP or which == G_FAR_GAP:
         side = 1 if (which == G_TIP_GAP) == (m[FAMILY] == FLAT or m[S] > 0) else -1
         z[X] -= side * wall_gap(b, z, side)
