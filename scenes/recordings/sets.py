@@ -10,7 +10,7 @@ from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.recordings import Reading, Recording, read_components
 
 #: How files and networks name the vertical component; K-NET's third and sixth channels (KiK-net) are vertical, too.
-_VERTICAL = re.compile(r"(?:.*[-_. ])?(?:up|dwn|down|u-?d|ver|vert|vertical|[HBES][NLGH]Z)", re.IGNORECASE)
+_VERTICAL = re.compile(r"(?:.*[-_. ])?(?:up|dn|dwn|down|u-?d|ver|vrt|vert|vertical|[HBES][NLGH]Z)", re.IGNORECASE)
 _KIKNET = ("3", "6")
 
 
@@ -59,9 +59,23 @@ def motions_of(paths: Sequence[Path], reading: Reading) -> tuple[list[tuple[str,
     return motions, left_out
 
 
+def verticals_of(paths: Sequence[Path], reading: Reading) -> dict[str, Recording]:
+    """By the name of each horizontal motion (see `motions_of`), the vertical component of the same file.
+
+    Raises `InputError` for a file that has not exactly one.
+    """
+    found: dict[str, Recording] = {}
+    for path in paths:
+        up = [one for one in read_components(path, reading) if is_vertical(path, one)]
+        if len(up) != 1:
+            raise InputError(f"{printable(path)}: {len(up)} vertical components; one beside the horizontal ones is asked for", "vertical")
+        found |= {name: up[0] for name, _ in motions_of([path], reading)[0]}
+    return found
+
+
 def is_vertical(path: Path, recording: Recording) -> bool:
     """Whether the component is the vertical one, or, of a table, which has none, the file."""
     if recording.form.startswith("K-NET") and recording.component in _KIKNET:
         return True
-    named = path.stem if recording.form in ("CSV", "table") else recording.component or path.stem
-    return bool(_VERTICAL.fullmatch(named))
+    channel = "" if recording.form in ("CSV", "table") else recording.component
+    return channel in ("V", "Z") or bool(_VERTICAL.fullmatch(channel or path.stem))

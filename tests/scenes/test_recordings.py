@@ -16,6 +16,7 @@ from rockcheck.scenes import InputError, Record, load_scene
 from rockcheck.scenes.observation import scene_notes
 from rockcheck.scenes.recordings import Reading, intensity, read_components, read_record
 from rockcheck.scenes.recordings.recording import Recording
+from rockcheck.scenes.recordings.sets import is_vertical
 from rockcheck.validation.commands.cli import main
 
 G = 9.80665
@@ -385,3 +386,28 @@ def test_one_bad_file_does_not_hide_the_others(tmp_path, capsys):
     captured = capsys.readouterr()
     assert json.loads(captured.out)["samples"] == 401
     assert "b.txt, line 1: 3 columns" in captured.err
+
+
+@pytest.mark.parametrize(
+    ("name", "form", "component", "vertical"),
+    [
+        ("RSN6_IMPVALL.I_I-ELC-UP.AT2", "PEER AT2", "UP", True),
+        ("RSN6_IMPVALL.I_I-ELC180.AT2", "PEER AT2", "180", False),
+        ("RSN1_DWN.AT2", "PEER AT2", "", True),
+        ("RSN1.AT2", "PEER AT2", "V", True),
+        ("IV.T1213..HNZ.D.ASC", "ESM ASCII", "HNZ", True),
+        ("IV.T1213..HNE.D.ASC", "ESM ASCII", "HNE", False),
+        ("MYG0041103111446.UD", "K-NET ASCII", "U-D", True),
+        ("MYGH041103111446.UD2", "K-NET ASCII", "6", True),
+        ("MYGH041103111446.EW2", "K-NET ASCII", "5", False),
+        ("station.V2", "V2", "up", True),
+        ("station.V2", "V2", "Down", True),
+        ("station.V2", "V2", "90 deg", False),
+        ("table-up.csv", "CSV", "acceleration_g", True),
+        ("cup.csv", "CSV", "acceleration_g", False),
+        ("setup.txt", "table", "column 2", False),
+    ],
+)
+def test_which_component_is_vertical(name, form, component, vertical):
+    recording = Recording(samples=np.zeros(3), time_step=0.01, unit="g", form=form, component=component)
+    assert is_vertical(Path(name), recording) == vertical

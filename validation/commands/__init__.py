@@ -82,10 +82,11 @@ def tell_notes(history: History, of: str = "") -> None:
         console().print(f"note{f' on {of}' if of else ''}: {note}", style="yellow", soft_wrap=True)
 
 
-def tell_left_out(names: Sequence[str]) -> None:
-    """Names the vertical components of a set of records, which are not played as if they were horizontal."""
+def tell_left_out(names: Sequence[str], hint: str = "") -> None:
+    """Names the vertical components of a set of records, which are not played as if they were horizontal; `hint`: what plays them."""
     if names:
-        console().print(f"left out: {', '.join(names)} (vertical; --component plays one as horizontal)", style="yellow", soft_wrap=True)
+        said = f"vertical; {hint}" if hint else "vertical"
+        console().print(f"left out: {', '.join(names)} ({said})", style="yellow", soft_wrap=True)
 
 
 def answer(value: Any) -> None:

@@ -65,6 +65,7 @@ def run(
         list[str] | None, typer.Option("--set", help="A setting of a model, such as mujoco.time_step=1e-3; repeatable.")
     ] = None,
     scale: Annotated[float, typer.Option("--scale", help="Factor of the records' accelerations.")] = 1.0,
+    vertical: Annotated[bool, typer.Option("--vertical", help="With the vertical component of each file.")] = False,
     unit: UnitOption = None,
     time_step: TimeStepOption = None,
     column: ColumnOption = None,
@@ -85,10 +86,10 @@ def run(
     words = [*(records or []), *(more or [])]
     reading = reading_of(unit, time_step, column, header_lines, decimal, component)
     given = {name: value for name, value in reading if value is not None}
-    if not words and (given or scale != 1.0):
+    if not words and (given or vertical or scale != 1.0):
         raise InputError("is missing: a unit, a scale or another option of records is given", "--record")
     files = tuple(str(Path(word).absolute()) for word in words)
-    sets = [RecordSet(files=files, scale=scale, **given)] if files else []
+    sets = [RecordSet(files=files, scale=scale, vertical=vertical, **given)] if files else []
     suite = scene_suite(scene, chosen_models(models, settings or ()), records=sets, allow_code=allow_code or ())
     play_scene(suite, usable_folder(out), jobs=jobs, force=force, scheduler=scheduler, report=report)
 
@@ -118,7 +119,7 @@ def play_scene(suite: Suite, folder: Path, *, jobs: int | None, force: bool, sch
     finished = play(suite, folder, jobs, force, False, scheduler)
     kept = keep(finished, folder)
     screen = console()
-    tell_left_out(suite.left_out)
+    tell_left_out(suite.left_out, "--vertical plays such a component together with the others of its file")
     for name, table in outcome_tables(finished):
         screen.print(name, style="bold", soft_wrap=True)
         screen.print(table)

@@ -3,10 +3,11 @@
     [[records]]
     files = ["records/RSN1_H*.AT2", "station.V2"]    # files, folders, patterns, beside the suite
     scale = 1.6                                      # optional; and what a file does not say, such as unit = "cm/s2"
+    vertical = true                                  # optional: with the vertical component of the same file
     scenes = ["shelf"]                               # optional: the scenes that are meant; without it all
 
 Each horizontal component takes the place of the scene's own excitation. The scene lasts as long as its record, and at least as
-long as it says itself; its own vertical motion stays.
+long as it says itself; its own vertical motion stays, unless `vertical` puts another in its place.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -23,7 +24,7 @@ from rockcheck.scenes.base import Finite
 from rockcheck.scenes.errors import unknown_name
 from rockcheck.scenes.recordings import Reading, Recording
 from rockcheck.scenes.recordings.recording import Word
-from rockcheck.scenes.recordings.sets import files_of, motions_of
+from rockcheck.scenes.recordings.sets import files_of, motions_of, verticals_of
 from rockcheck.scenes.trust.inputs import UncertainScene, uncertain_scene
 
 #: Longest name of a scene, and of the part of it that is the record's.
@@ -31,10 +32,14 @@ _LONGEST, _LONGEST_RECORD = 100, 60
 
 
 class RecordSet(Reading):
-    """A table `[[records]]`: files, the factor of their accelerations, the scenes that they shake, and the options of a reader."""
+    """A table `[[records]]`: files, the factor of their accelerations, the scenes that they shake, and the options of a reader.
+
+    With `vertical` the base also moves up and down, as the same file says.
+    """
 
     files: Annotated[tuple[Word, ...], Field(min_length=1)]
     scale: Finite = 1.0
+    vertical: bool = False
     scenes: tuple[Word, ...] = ()
 
     @property
@@ -57,28 +62,39 @@ def under_records(
         for name in given.scenes:
             if name not in scenes:
                 raise InputError(str(unknown_name("scene", name, scenes)), "records.scenes")
-        motions, vertical = motions_of(files_of([folder / word for word in given.files]), given.reading)
-        left_out += vertical
+        files = files_of([folder / word for word in given.files])
+        motions, vertical = motions_of(files, given.reading)
+        upward = verticals_of(files, given.reading) if given.vertical else {}
+        left_out += [] if given.vertical else vertical
         chosen = given.scenes or tuple(scenes)
         shaken.update(chosen)
         for name in chosen:
-            for label, motion in zip(_labels([name for name, _ in motions]), (motion for _, motion in motions), strict=True):
-                one = _shaken(scenes[name], label, motion, given.scale)
+            for label, (motion, recording) in zip(_labels([motion for motion, _ in motions]), motions, strict=True):
+                one = _shaken(scenes[name], label, (recording, upward.get(motion)), given.scale)
                 if one.scene.name in found:
                     raise InputError(f"scene {one.scene.name!r} is named twice: two records have one name", "records.files")
                 found[one.scene.name] = one
     return {name: one for name, one in scenes.items() if name not in shaken} | found, left_out
 
 
-def _shaken(base: UncertainScene, label: str, motion: Recording, scale: float) -> UncertainScene:
-    """A scene under one motion; what is not known of its own excitation goes with that."""
+def _shaken(base: UncertainScene, label: str, motion: tuple[Recording, Recording | None], scale: float) -> UncertainScene:
+    """A scene under one motion, horizontal and perhaps vertical; what is not known of the excitation that it replaces goes with that."""
     scene = base.scene
-    record = Record.from_samples(motion.samples, motion.time_step, scale).model_copy(update={"source": label, "notes": motion.notes})
-    name = f"{scene.name[: _LONGEST - len(label) - 2]}, {label}"
-    spreads = {place: spread for place, spread in base.spreads.items() if not place.startswith("excitation.")}
+    horizontal, vertical = motion
+    change: dict[str, Any] = {"excitation": _record(horizontal, label, scale)}
+    if vertical is not None:
+        change["vertical"] = _record(vertical, f"{label}, vertical", scale)
     if base.spreads and not base.independent:
         raise InputError("correlated numbers cannot be given together with [[records]]", "correlation")
-    return uncertain_scene(scene.replace(name=name, excitation=record, duration=max(scene.duration, record.quiet_after)), spreads, {})
+    spreads = {place: spread for place, spread in base.spreads.items() if place.partition(".")[0] not in change}
+    name = f"{scene.name[: _LONGEST - len(label) - 2]}, {label}"
+    duration = max(scene.duration, change["excitation"].quiet_after)
+    return uncertain_scene(scene.replace(name=name, duration=duration, **change), spreads, {})
+
+
+def _record(motion: Recording, label: str, scale: float) -> Record:
+    record = Record.from_samples(motion.samples, motion.time_step, scale)
+    return record.model_copy(update={"source": label, "notes": motion.notes})
 
 
 def _labels(names: Sequence[str]) -> list[str]:

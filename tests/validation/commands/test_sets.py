@@ -92,6 +92,25 @@ def test_a_chosen_component_is_played_though_it_is_vertical(told):
     assert [c["scene"] for c in told("run", "rack.toml", "up.csv", "--column", "acceleration_g", *STILL)["cells"]] == ["rack, up"]
 
 
+def test_the_vertical_component_of_a_file_goes_with_its_others(told, capsys):
+    """Two channels in one file (CSMIP): the base moves to the side and upward at once."""
+    text = ""
+    for name, gain in (("90 Deg", 0.1), ("Up", 0.05)):
+        values = "".join(f"{981 * a:10.4f}" + "\n" * (n % 8 == 7) for n, a in enumerate(motion(gain)))
+        text += (
+            f"Corrected data\nChan  1: {name}\n  101 points of accel data equally spaced at   .020 sec, in cm/sec2. (8f10.4)\n{values}\n"
+        )
+    Path("two.v2").write_text(text, encoding="utf-8")
+    words = ("run", "rack.toml", "two.v2", "--scale", "2", *STILL)
+    assert told(*words)["left_out"] == ["two.v2 Up"]
+    assert told(*words, "--vertical")["left_out"] == []
+    scene = Run.load("rockcheck-report").load_scene("rack, two 90 Deg")
+    assert scene.excitation.peak == pytest.approx(2 * 0.1 * 981 / 980.665, rel=1e-3)
+    assert scene.vertical.peak == pytest.approx(2 * 0.05 * 981 / 980.665, rel=1e-3)
+    assert main(["run", "rack.toml", "records/RSN1_H1.AT2", "--vertical", *STILL]) == 2
+    assert "RSN1_H1.AT2: 0 vertical components; one beside the horizontal ones is asked for" in capsys.readouterr().err
+
+
 def test_all_models_are_those_that_are_installed(told):
     found = told("run", "rack.toml", "--models", "all", "--set", "mujoco.time_step=1e-3", "--no-report", "--json")
     models = [cell["model"] for cell in found["cells"]]
