@@ -16,6 +16,8 @@ from rockcheck.validation.discrepancy import Discrepancy
 from rockcheck.validation.discrepancy.measures import Pair
 
 INK, SHADE, ACCENT = "#1b1b1b", "#d5d5d5", "#0072b2"
+#: Where the axis of rotation ends for a block that falls, alpha.
+FALLEN = 1.3
 #: Where a kind of event is drawn, from the top, and how.
 TRACKS = {"wall impact": "v", "floor impact": "^", "slip": "_", "landing": "x", "lift-off": "+"}
 
@@ -73,7 +75,7 @@ def history_figure(history: History) -> Figure:
     rotation, slip, tracks = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 1))
     time = history.channels["t"]
     rotation_lines(rotation, [history], [INK])
-    rotation.set_title(f"{history.name}, {history.model}: {history.outcome}")
+    rotation.set_title(f"{history.name}, {history.model}: {history.fate}")
     if "slip" in history.channels:
         slip.plot(time, 1e3 * history.channels["slip"], color=INK, linewidth=0.9)
     slip.set_ylabel("slip of the\npivot, mm")
@@ -89,6 +91,9 @@ def rotation_lines(axes: Any, histories: list[History], colours: list[str]) -> N
     for history, colour in zip(histories, colours, strict=True):
         unit = (history.alpha if known else None) or 1.0
         axes.plot(history.channels["t"], history.channels["theta"] / unit, color=colour, linewidth=0.9, label=history.model)
+    if known and any(history.overturned_at is not None for history in histories):  # beyond the balance point it only falls
+        low, high = axes.get_ylim()
+        axes.set_ylim(max(low, -FALLEN), min(high, FALLEN))
     axes.set_ylabel("θ / α" if known else "θ, rad")
     axes.grid(color=SHADE, linewidth=0.5)
 

@@ -102,6 +102,16 @@ def test_one_model_twice_has_two_colours(history):
     assert lines[0].get_color() != lines[1].get_color()
 
 
+def test_of_a_fallen_block_the_way_to_the_balance_point_is_drawn_and_the_time():
+    t = np.linspace(0.0, 1.6, 161)
+    sizes = {"half_width": 0.4, "half_height": 1.6}
+    fallen = History(name="a", model="m", channels={"t": t, "theta": t}, event_list=(), outcome="overturned left", **sizes)
+    axes = fallen.plot().axes[0]
+    assert axes.get_title() == "a, m: overturned left at 1.53 s"
+    assert axes.get_ylim()[1] == pytest.approx(1.3)
+    assert compare(fallen, fallen).plot().axes[0].get_ylim()[1] == pytest.approx(1.3)
+
+
 def test_text_is_escaped():
     made = History(
         name=NASTY, model=NASTY, channels={"t": np.arange(3.0), "theta": np.zeros(3)}, event_list=(), outcome=NASTY, notes=(NASTY,)
