@@ -57,7 +57,7 @@ class Engine(Frozen):
             return "adaptive"
         if isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < math.inf:
             return float(value)
-        raise InputError(f'{printable(value)} is not allowed: a step above 0 s, or "adaptive", is asked for')
+        raise InputError(f'{printable(value)} is not allowed: give a step above 0 s, or "adaptive"')
 
     @model_validator(mode="after")
     def _possible(self) -> Self:

@@ -154,7 +154,7 @@ class Record(Motion):
             data = dict(data)
             path = data.pop("file")
             if not isinstance(path, str | Path):
-                raise InputError(f"{path!r} is not allowed: the path of a record file is asked for", "file")
+                raise InputError(f"{path!r} is not allowed: give the path of a record file", "file")
             reading = Reading(**{name: data.pop(name) for name in Reading.model_fields if name in data})
             data |= _told(read_record(Path(path), reading), Path(path))
         return data

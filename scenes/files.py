@@ -63,7 +63,7 @@ def scene_from(data: dict[str, Any], *, folder: Path, default_name: str) -> Scen
     """A scene from the tables of a scene file; record files are looked up in `folder`, then among the package's records."""
     data = {"name": default_name, **data}
     if isinstance(data.get("walls"), dict):
-        raise InputError("a list of tables is asked for: write [[walls]], not [walls]", "walls")
+        raise InputError("must be a list of tables: write [[walls]], not [walls]", "walls")
     for key in ("excitation", "vertical"):
         table = data.get(key)
         if isinstance(table, dict) and isinstance(table.get("file"), str):

@@ -281,7 +281,7 @@ def _size(about: Mapping[str, Any], key: str, shown: str) -> float | None:
     if value is None:
         return None
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
-        raise InputError(f"{printable(value)} is not allowed: a positive length in m is asked for", f"{shown}: {key}")
+        raise InputError(f"{printable(value)} is not allowed: give a positive length in m", f"{shown}: {key}")
     return float(value)
 
 

@@ -81,7 +81,7 @@ def read_esm(path: Path, lines: list[str], reading: Reading) -> Recording:
 
     kind = header.get("DATA_TYPE", (0, "ACCELERATION"))
     if kind[1].upper() != "ACCELERATION":
-        raise fault(path, f"DATA_TYPE {printable(kind[1], 30)!r}; a record of ACCELERATION is asked for", kind[0])
+        raise fault(path, f"DATA_TYPE {printable(kind[1], 30)!r}; only ACCELERATION can be read", kind[0])
     place, count_word = stated("NDATA")
     if not re.fullmatch(r"[0-9]++", count_word):
         raise fault(path, f"NDATA {printable(count_word, 30)!r} is not a count", place)

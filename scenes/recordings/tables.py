@@ -188,7 +188,7 @@ def _unclear(cells: _Cells) -> InputError:
     shown = printable(", ".join(cells.names))
     return fault(
         cells.path,
-        f"columns {shown!r}; time_s and exactly one of {', '.join(NAMED)} are asked for, or the column: {option('column', 2)}",
+        f"columns {shown!r}; name them time_s and exactly one of {', '.join(NAMED)}, or give the column: {option('column', 2)}",
         line,
     )
 

@@ -91,7 +91,7 @@ def read_volume(path: Path, lines: list[str], reading: Reading) -> list[Recordin
         elif named := _CHANNEL.search(line):
             channel.name = named[2]
     if not found:
-        raise fault(path, "a V2 file without a block of accelerations; corrected accelerations are asked for")
+        raise fault(path, "a V2 file without a block of accelerations; only corrected accelerations can be read")
     return found
 
 

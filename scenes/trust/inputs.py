@@ -53,9 +53,9 @@ class Spread(Frozen):
             if self.distribution == "lognormal" and self.value <= 0.0:
                 raise InputError(f"{self.value:g} is not allowed: a lognormal number is positive", "value")
         elif self.low is None or self.high is None:
-            raise InputError("is missing: value and sd, or low and high, are asked for", "high" if self.low is not None else "low")
+            raise InputError("is missing: give value and sd, or low and high", "high" if self.low is not None else "low")
         elif not self.low < self.high:
-            raise InputError(f"{self.high:g} is not allowed: more than low, {self.low:g}, is asked for", "high")
+            raise InputError(f"{self.high:g} is not allowed: must be more than low, {self.low:g}", "high")
         return self
 
     @property
@@ -137,12 +137,12 @@ def uncertain_scene(scene: Scene, spreads: Mapping[str, Spread], correlations: M
         pair = [part.strip() for part in key.split(",")]
         where = f"{CORRELATION}.{key}"
         if len(pair) != 2 or pair[0] == pair[1]:
-            raise InputError("two uncertain numbers are asked for, as in 'floor.friction, walls.left.gap'", where)
+            raise InputError("give two uncertain numbers, as in 'floor.friction, walls.left.gap'", where)
         for name in pair:
             if name not in names:
                 raise InputError(f"{name!r} is not an uncertain number of the scene{suggestion(name, names)}", where)
         if isinstance(value, bool) or not isinstance(value, int | float) or not -1.0 < value < 1.0:
-            raise InputError(f"{value!r} is not allowed: a number between -1 and 1 is asked for", where)
+            raise InputError(f"{value!r} is not allowed: give a number between -1 and 1", where)
         i, j = (names.index(name) for name in pair)
         matrix[i, j] = matrix[j, i] = float(value)
     if names and np.linalg.eigvalsh(matrix)[0] <= 0.0:

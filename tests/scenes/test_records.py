@@ -120,7 +120,7 @@ HEAD = "time_s,acceleration_g\n"
     [
         ("", "empty"),
         ("# only a remark\n", "empty"),
-        ("x,acceleration_g\n0,0\n1,0\n", "line 1: columns 'x, acceleration_g'; time_s and exactly one of"),
+        ("x,acceleration_g\n0,0\n1,0\n", "line 1: columns 'x, acceleration_g'; name them time_s and exactly one of"),
         ("time_s,acceleration\n0,0\n1,0\n", "the unit of acceleration is not stated; give it: --unit g (in a scene file: unit"),
         ("# r\ntime_s,acceleration_g,acceleration_m_s2\n0,0,0\n1,0,0\n", "line 2: columns"),
         (HEAD + "0,0\n", "1 sample(s); at least 2"),

@@ -124,7 +124,7 @@ def check_picture(path: Path | None) -> None:
     if path is None:
         return
     if path.suffix.lower() != ".png":
-        raise InputError(f"{printable(path)}: a name that ends in .png is asked for", "--plot")
+        raise InputError(f"{printable(path)}: give a name that ends in .png", "--plot")
     if not path.parent.is_dir():
         raise InputError(f"{printable(path.parent)}: no such folder", "--plot")
 

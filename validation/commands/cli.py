@@ -106,7 +106,7 @@ class _EachOnce(typer.core.TyperCommand):
         for option in order:
             single = isinstance(option, typer.core.TyperOption) and not (option.multiple or option.is_flag or option.count)
             if single and sum(one is option for one in order) > 1:
-                raise InputError("is given twice: one value is asked for", option.opts[-1])
+                raise InputError("is given twice: give one value", option.opts[-1])
         return super().parse_args(ctx, args)
 
 

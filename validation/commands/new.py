@@ -20,7 +20,7 @@ def run(path: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to 
     It is ready to run, and has a remark on every setting. A file that is there already is left as it is.
     """
     if path.suffix.lower() != ".toml":
-        raise InputError(f"{printable(path)}: the name of a .toml file is asked for")
+        raise InputError(f"{printable(path)}: give the name of a .toml file")
     text = (resources.files("rockcheck.validation") / "data" / "new_scene.toml").read_text(encoding="utf-8")
     try:
         write_new(path, text)

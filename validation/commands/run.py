@@ -108,7 +108,7 @@ def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, d
     for text in settings:
         model, dot, rest = text.partition(".")
         if not dot or model not in found:
-            raise InputError(f"{printable(text)!r}: MODEL.key=value is asked for, of {', '.join(found)}", "--set")
+            raise InputError(f"{printable(text)!r}: write MODEL.key=value, with MODEL one of {', '.join(found)}", "--set")
         key, value = setting_of(rest)
         found[model][key] = value
     return found

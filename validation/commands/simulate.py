@@ -107,7 +107,7 @@ def setting_of(text: str) -> tuple[str, Any]:
     """key=value, the value as in TOML; a bare word is a string."""
     key, equals, value = text.partition("=")
     if not equals or not key.isidentifier():
-        raise InputError(f"{printable(text)!r}: key=value is asked for", "--set")
+        raise InputError(f"{printable(text)!r}: write key=value", "--set")
     try:
         return key, tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:

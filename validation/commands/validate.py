@@ -61,7 +61,7 @@ def run(
     folder = usable_folder(out)
     if suite is not None and is_scene(suite):
         if strict:
-            raise InputError(f"{printable(suite)} is a scene, of which nothing is judged; a suite is asked for", "--strict")
+            raise InputError(f"{printable(suite)} is a scene, and nothing of it is judged: give a suite", "--strict")
         console().print(f"{suite} is a scene: all models play it, nothing is judged (as `rockcheck run {suite}`)", soft_wrap=True)
         play_scene(scene_suite(suite, chosen_models()), folder, jobs=jobs, force=force, scheduler=scheduler, report=report)
     finished = play_suite(suite or ("smoke" if quick else "paper"), folder, jobs, force, strict, scheduler, allow_code)

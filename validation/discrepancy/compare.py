@@ -73,7 +73,7 @@ def compare(
     `InputError` if the histories have no time in common.
     """
     if until is not None and not until > 0.0:
-        raise InputError(f"{until:g} is not allowed: a positive time in s is asked for", "until")
+        raise InputError(f"{until:g} is not allowed: give a positive time in s", "until")
     pair = Pair(reference, candidate, scene, math.inf if until is None else until)
     if len(pair.time) == 0:
         raise InputError(f"{reference.model} and {candidate.model} have no time in common")

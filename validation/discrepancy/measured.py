@@ -120,5 +120,5 @@ def _meaning(column: str, shown: str) -> tuple[str, float]:
     for name in sorted(UNITS, key=len, reverse=True):
         if plain.startswith(f"{name}_"):
             units = ", ".join(UNITS[name])
-            raise InputError(f"{shown}: column {printable(column)!r}: a unit of {name} is asked for: {units}")
+            raise InputError(f"{shown}: column {printable(column)!r}: give a unit of {name}: {units}")
     return column, 1.0

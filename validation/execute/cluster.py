@@ -23,7 +23,7 @@ def connected(address: str) -> Iterator[Any]:
     if address.startswith("local:"):
         count = address.removeprefix("local:")
         if not count.isdecimal() or not 1 <= int(count) <= 256:
-            raise InputError(f"{printable(address)!r} is not allowed: local:N with 1 to 256 workers is asked for", "--scheduler")
+            raise InputError(f"{printable(address)!r} is not allowed: give local:N with 1 to 256 workers", "--scheduler")
         with (
             LocalCluster(n_workers=int(count), threads_per_worker=1, dashboard_address=None) as cluster,
             Client(cluster) as client,

@@ -148,7 +148,7 @@ def build_own(name: str, settings: Mapping[str, Any] | None = None) -> Model:
     check_allowed(name, (name,))
     kind = _class_of(name)
     if not isinstance(kind, type) or not callable(getattr(kind, "simulate", None)):
-        raise InputError(f"{printable(name)!r} is no model: a class with a method `simulate` is asked for")
+        raise InputError(f"{printable(name)!r} is no model: it must be a class with a method `simulate`")
     if kind.__module__.partition(".")[0] in sys.stdlib_module_names:
         raise InputError(f"{printable(name)!r} is no model: it is part of Python's standard library")
     return _built(name, kind, settings)

@@ -128,7 +128,7 @@ def _paper_panel(figure: int, friction: float, wall: Wall | None) -> Panel:
 def axis(low: float, high: float, size: int, key: str) -> Floats:
     """`size` equally spaced ratios from `low` to `high`; raises `InputError` where they are not finite, positive and in order."""
     if not (np.isfinite(low) and np.isfinite(high) and low > 0.0):
-        raise InputError(f"{low:g} to {high:g} is not allowed: positive finite numbers are asked for", key)
+        raise InputError(f"{low:g} to {high:g} is not allowed: give positive finite numbers", key)
     if low >= high:
         raise InputError(f"{low:g} to {high:g} is not allowed: the lower end comes first", key)
     return np.linspace(low, high, size)

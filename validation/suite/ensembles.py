@@ -41,7 +41,7 @@ class Distribution(Frozen):
     @model_validator(mode="after")
     def _one(self) -> Distribution:
         if (self.uniform is None) == (self.lognormal is None):
-            raise InputError("exactly one of uniform, lognormal is asked for")
+            raise InputError("give exactly one of uniform, lognormal")
         return self
 
     def draw(self, chance: np.random.Generator) -> float:

@@ -123,7 +123,7 @@ class Cell(Stored):
     @classmethod
     def _inside(cls, history: str | None) -> str | None:
         if history is not None and (PurePath(history).is_absolute() or ".." in PurePath(history).parts or not history.isprintable()):
-            raise InputError(f"{printable(history)} is not allowed: a path within the run's folder is asked for")
+            raise InputError(f"{printable(history)} is not allowed: it must be a path within the run's folder")
         return history
 
     @property

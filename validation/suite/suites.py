@@ -240,7 +240,7 @@ def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
     tables = read_toml(path)
     if "block" in tables:
         names = f"scenes = [{printable(path.name)!r}], and tables [models.NAME]"
-        raise InputError(f"{printable(path)}: a scene, where a suite is asked for: a file with {names}; `rockcheck run` plays a scene")
+        raise InputError(f"{printable(path)}: is a scene, not a suite; `rockcheck run` plays a scene, and a suite is a file with {names}")
     try:
         return _suite(SuiteFile(**tables), path, shipped, allow_code)
     except InputError as error:

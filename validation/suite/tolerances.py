@@ -57,7 +57,7 @@ class Windowed:
         if name not in MEASURES:
             raise unknown_name("measure", name, MEASURES)
         if at and window != HORIZON and not re.fullmatch(r"\d+(\.\d+)?s", window):
-            raise InputError(f"window {printable(window)!r} of {name}: seconds such as 8s, or {HORIZON}, are asked for")
+            raise InputError(f"window {printable(window)!r} of {name}: give seconds such as 8s, or {HORIZON}")
         return cls(name, window)
 
     @property
@@ -111,7 +111,7 @@ def parse_tolerances(tables: Mapping[str, Any], cells: Iterable[tuple[str, str]]
         try:
             place = Place(scene, model, against, Windowed.parse(key))
             if not isinstance(line, Mapping):
-                raise InputError("a table { expected, limit, drift, why } is asked for")
+                raise InputError("must be a table { expected, limit, drift, why }")
             tolerance = Tolerance(**line)
             measure = place.what.definition
             if (measure.name in FIGURES) != (against == OWN_FIGURES):
@@ -149,7 +149,7 @@ def _lines(tables: Mapping[str, Any], depth: int, above: tuple[str, ...] = ()) -
         elif isinstance(inner, Mapping):
             yield from _lines(inner, depth, path)
         else:
-            raise InputError(f"{printable('.'.join(path))}: tables [scene.model.reference] are asked for")
+            raise InputError(f"{printable('.'.join(path))}: must be tables [scene.model.reference]")
 
 
 def judge(figure: Figure, tolerance: Tolerance | None, *, kind: Kind, measure: Measure, gap: str = "") -> Check:

@@ -92,11 +92,11 @@ def test_a_scene_is_no_suite(type_):
     write("rack.toml", SCENE)
     _, err = type_("accept", "rack.toml", code=2)
     assert err == (
-        "rockcheck: rack.toml: a scene, where a suite is asked for: a file with scenes = ['rack.toml'], and tables [models.NAME];"
-        " `rockcheck run` plays a scene\n"
+        "rockcheck: rack.toml: is a scene, not a suite; `rockcheck run` plays a scene,"
+        " and a suite is a file with scenes = ['rack.toml'], and tables [models.NAME]\n"
     )
     _, err = type_("validate", "rack.toml", "--strict", code=2)
-    assert err == "rockcheck: --strict: rack.toml is a scene, of which nothing is judged; a suite is asked for\n"
+    assert err == "rockcheck: --strict: rack.toml is a scene, and nothing of it is judged: give a suite\n"
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,7 @@ def test_a_scene_is_no_suite(type_):
 )
 def test_an_option_given_twice_is_refused(type_, words):
     _, err = type_(*words, code=2)
-    assert err == f"rockcheck: {words[3] if words[0] == 'compare' else words[2]}: is given twice: one value is asked for\n"
+    assert err == f"rockcheck: {words[3] if words[0] == 'compare' else words[2]}: is given twice: give one value\n"
 
 
 def test_without_a_model_the_reference_plays(type_):
@@ -174,7 +174,7 @@ def test_simulate_and_compare_draw(type_):
         assert Path(name).stat().st_size > 5000
 
 
-@pytest.mark.parametrize(("name", "said"), [("a.pdf", "a.pdf: a name that ends in .png is asked for"), ("no/a.png", "no: no such folder")])
+@pytest.mark.parametrize(("name", "said"), [("a.pdf", "a.pdf: give a name that ends in .png"), ("no/a.png", "no: no such folder")])
 def test_a_picture_that_cannot_be_written_is_refused_before_the_run(type_, name, said):
     _, err = type_("simulate", write("rack.toml", SCENE), "--model", "faulty:Still", *CODE, "--plot", name, code=2)
     assert err == f"rockcheck: --plot: {said}\n"

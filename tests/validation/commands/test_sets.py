@@ -183,7 +183,7 @@ def test_a_suite_has_tables_of_records():
         (("run", "rack.toml", "--models", "measured"), "--models: 'measured' is not allowed"),
         (
             ("run", "rack.toml", "--models", "ebm", "--set", "cm.tolerance=1"),
-            "--set: 'cm.tolerance=1': MODEL.key=value is asked for, of ebm",
+            "--set: 'cm.tolerance=1': write MODEL.key=value, with MODEL one of ebm",
         ),
         (("run", "rack.toml", "--models", "ebm", "--set", "ebm.tol=1"), "ebm.tol: unknown key"),
         (("run", "rack.toml", "--unit", "g"), "--record: is missing"),

@@ -61,7 +61,7 @@ def test_units_of_columns(tmp_path):
 @pytest.mark.parametrize(
     ("head", "fault"),
     [
-        ("t_s,theta_gon,x", "'theta_gon': a unit of theta is asked for: rad, mrad, deg"),
+        ("t_s,theta_gon,x", "'theta_gon': give a unit of theta: rad, mrad, deg"),
         ("t_s,theta_deg,theta_rad", "gives theta a second time"),
         ("time,t_s,theta", "gives t a second time"),
         ("t_s,x_mm,y_mm", "no column 'theta'"),

@@ -176,11 +176,11 @@ def test_correlated_numbers(uncertain):
         ("sd = 0.05", "sd = -0.05", "floor.friction.sd: -0.05 is not allowed"),
         ("value = 0.5, sd", "valu = 0.5, sd", "floor.friction.valu: unknown key; did you mean 'value'?"),
         ("value = 0.5, sd", "sd", "floor.friction.value: is missing beside sd"),
-        ("low = 0.05, high", "low = 0.07, high", "walls.left.gap.high: 0.06 is not allowed: more than low, 0.07"),
+        ("low = 0.05, high", "low = 0.07, high", "walls.left.gap.high: 0.06 is not allowed: must be more than low, 0.07"),
         ('"lognormal"', '"gamma"', "excitation.amplitude.distribution"),
         ("value = 6.0", "value = -6.0", "a lognormal number is positive"),
         ("period = 1.0", 'period = 1.0\n[correlation]\n"floor.frction, walls.left.gap" = 0.1', "did you mean 'floor.friction'?"),
-        ("period = 1.0", 'period = 1.0\n[correlation]\n"floor.friction, walls.left.gap" = 1.5', "a number between -1 and 1"),
+        ("period = 1.0", 'period = 1.0\n[correlation]\n"floor.friction, walls.left.gap" = 1.5', "give a number between -1 and 1"),
     ],
 )
 def test_faults_of_the_file_are_one_line(uncertain, old, new, said):

@@ -57,7 +57,7 @@ def test_the_command(capsys):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--engine", "ebm", "--restitution", "0.5"], "--engine: 'ebm' is not allowed: one of mujoco"),
+        (["--engine", "ebm", "--restitution", "0.5"], "--engine: 'ebm' is not allowed: give one of mujoco"),
         (["--engine", "mujoco", "--restitution", "2"], "--restitution: 2 is not allowed"),
         (["--engine", "mujoco", "--restitution", "nan"], "--restitution: nan is not allowed"),
         (["--engine", "mujoco", "--restitution", "0.5", "--step", "0"], "--step: 0 is not allowed"),

@@ -204,7 +204,7 @@ def test_another_program_takes_part_by_files(histories, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--engine", "ebm"], "--engine: 'ebm' is not allowed: one of mujoco"),
+        (["--engine", "ebm"], "--engine: 'ebm' is not allowed: give one of mujoco"),
         (["--step", "2"], "--step: 2 is not allowed"),
         (["--histories", "nowhere"], "engine.toml: cannot be read"),
         (["--compare", "nowhere", "nowhere"], "nowhere: cannot be read"),

@@ -29,12 +29,12 @@ def run(
     from rockcheck.validation.execute.models import not_installed
 
     if engine not in KNOBS:
-        raise InputError(f"{printable(engine)!r} is not allowed: one of {', '.join(KNOBS)} is asked for", "--engine")
+        raise InputError(f"{printable(engine)!r} is not allowed: give one of {', '.join(KNOBS)}", "--engine")
     if reason := not_installed(engine):
         raise InputError(reason, f"--engine {engine}")
     for name, value, most in (("restitution", restitution, 1.0), ("friction", friction, 1.3), ("step", step, 0.01)):
         if not (0.0 if name == "restitution" else 1e-6) <= value <= most:
-            raise InputError(f"{value:g} is not allowed: up to {most:g} is asked for", f"--{name}")
+            raise InputError(f"{value:g} is not allowed: give at most {most:g}", f"--{name}")
     limit = {} if penetration is None else {"penetration": penetration}
     found = calibrate(engine, restitution=restitution, friction=friction, step=step, **limit)
     table = Table(box=None, pad_edge=False, show_header=False)

@@ -85,7 +85,7 @@ def _asked(names: list[str] | None, settings: str | None, step: float, elsewhere
     from rockcheck.validation.execute.models import build, check_allowed, engine_names, is_own, not_installed
 
     if not 0.0 < step <= 0.1:
-        raise InputError(f"{step:g} is not allowed: a step above 0 and up to 0.1 s is asked for", "--step")
+        raise InputError(f"{step:g} is not allowed: give a step above 0 and up to 0.1 s", "--step")
     names = names or ([] if elsewhere else engines_here())
     kinds = ["best", "default"] if settings == "both" else [settings or "best"]
     found = []
@@ -93,9 +93,7 @@ def _asked(names: list[str] | None, settings: str | None, step: float, elsewhere
         if is_own(name):
             check_allowed(name, allow_code)
         elif name not in engine_names():
-            raise InputError(
-                f"{printable(name)!r} is not allowed: one of {', '.join(engine_names())}, or module:Class is asked for", "--engine"
-            )
+            raise InputError(f"{printable(name)!r} is not allowed: give one of {', '.join(engine_names())}, or module:Class", "--engine")
         mine = [""] if is_own(name) and settings is None else kinds
         found += [Asked(name, kind, step) for kind in mine]
         if reason := not_installed(name):  # told before others have run

@@ -162,7 +162,7 @@ def _request(
     refine: bool,
 ) -> SpectrumRequest:
     if not 2 <= size <= MOST_SIZE:
-        raise InputError(f"{size} is not allowed: 2 to {MOST_SIZE} nodes an axis are asked for", "--size")
+        raise InputError(f"{size} is not allowed: give 2 to {MOST_SIZE} nodes an axis", "--size")
     if pivot not in ("bilateral", "unilateral"):
         raise InputError(str(unknown_name("pivot", pivot, ("bilateral", "unilateral"))), "--pivot")
     if model is not None and pivot != "bilateral":
@@ -280,7 +280,7 @@ def _agreement(panels: Sequence[Panel], request: SpectrumRequest, count: int, ti
         if missing := not_installed(model):
             raise NotInstalled(missing, model)
     if not 2 <= count <= len(request.frequencies) * len(request.amplitudes):
-        raise InputError(f"{count} is not allowed: 2 up to the spectrum's nodes are asked for", "--agreement")
+        raise InputError(f"{count} is not allowed: give 2 up to the number of the spectrum's nodes", "--agreement")
     spectra = play_panels(panels, request, tiles)
     on_maps = MAP_SIZE**2 * len(mapped(panels)) * (1 + len(CANDIDATES))
     with progress("agreement") as on_progress:
