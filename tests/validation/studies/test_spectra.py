@@ -31,6 +31,7 @@ from rockcheck.validation.spectra import tiles as tiling
 from rockcheck.validation.spectra.study import Panel, SpectrumRequest, axis, paper_panels, play_panels
 from rockcheck.validation.spectra.tiles import Tiles, tile_key
 
+EL_CENTRO = Path(__file__).parents[3] / "scenes" / "data" / "records" / "elcentro_1940_ns.csv"
 SCENE = """duration = 1.0
 block = { half_width = 0.2, half_height = 1.0 }
 floor = { friction = 0.5 }
@@ -210,7 +211,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same(tmp_path, monkeypatch):
         (["--record", "x.AT2"], "--record: needs --fragility"),
         (["--fragility"], "--fragility: needs --scene"),
         (["--fragility", "--scene", "bookcase.toml", "--record", "gone.AT2", "--record", "gone.AT2"], "gone.AT2"),
-        (["--fragility", "--scene", "bookcase.toml", "--record", "gone.AT2"], "--record: 1 is too few"),
+        (["--fragility", "--scene", "bookcase.toml", "--record", str(EL_CENTRO)], "--record: 1 is too few"),
         (["--agreement", "0"], "--agreement: 0 is not allowed"),
         (["--scheduler", "local:0"], "--scheduler"),
     ],
