@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rockcheck.reports.show.words import SUPERSCRIPTS
 from rockcheck.reports.style import PAGE, figure_style, looks, save
 from rockcheck.reports.view import PAPER_CHANNELS, Band, Channel, SceneView
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
@@ -16,6 +17,7 @@ from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
 #: How an event is drawn on a model's track: kind, marker, size.
@@ -24,7 +26,6 @@ TRACKED = (("floor impact", "|", 5.0), ("wall impact", "D", 2.6))
 FINE = 1e-3
 LEGEND_COLUMNS = 6
 TOLERANCE = "#009168"
-SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def histories_figure(view: SceneView, against: str | None = None, channels: Sequence[Channel] = PAPER_CHANNELS) -> Figure:
@@ -82,7 +83,7 @@ def thumbnail(view: SceneView) -> Figure:
         ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         for model, look in looks(view.run.models).items():
             if model in view.values:
-                ax.plot(view.t, view.values[model]["theta"], color=look.light, linewidth=0.7)
+                ax.plot(view.t, view.drawn[model]["theta"], color=look.light, linewidth=0.7)
         ax.axhline(0.0, color="#bbbbbb", linewidth=0.4, zorder=0)
         ax.margins(x=0.0, y=0.08)
         ax.set_axis_off()
@@ -110,7 +111,7 @@ def fineness(view: SceneView, channel: Channel, bands: Sequence[Band]) -> float:
     The tightest tolerance that is not below a thousandth of the channel's largest value, else that thousandth: finer
     scales would show nothing but decades.
     """
-    largest = max((_largest(columns[channel.name]) for columns in view.values.values()), default=0.0)
+    largest = max((_largest(columns[channel.name]) for columns in view.drawn.values()), default=0.0)
     least = float(f"{FINE * largest:.1g}") or 1e-12
     return min((band.limit for band in bands if band.channel == channel.name and band.limit >= least), default=least)
 
@@ -131,21 +132,40 @@ def _values(ax: Axes, view: SceneView, channel: Channel) -> None:
         if model not in view.values:
             continue
         first = model == next(iter(view.references), None)
-        values = view.values[model][channel.name]
-        ax.plot(view.t, values, **look.line | ({"linewidth": 1.6, "zorder": 1.9} if first else {"zorder": 2.0 + 0.01 * order}))
+        values = view.drawn[model][channel.name]
+        if model in view.measured:
+            rows = view.measured[model]
+            ax.plot(view.t[rows], values[rows], ".", color=look.light, markersize=2.0, label=look.label, zorder=3.0)
+        else:
+            ax.plot(view.t, values, **look.line | ({"linewidth": 1.6, "zorder": 1.9} if first else {"zorder": 2.0 + 0.01 * order}))
         if channel.name == "theta":
-            times = np.array([e.t for e in view.histories[model].event_list if e.kind == "wall impact"])
+            _mark_fall(ax, view, model, look.light)
+            until = view.falls.get(model, math.inf)
+            times = np.array([e.t for e in view.histories[model].event_list if e.kind == "wall impact" and e.t <= until])
             if len(times):
                 at = np.interp(times, view.t, np.nan_to_num(values))
                 ax.plot(times, at, marker="D", markersize=2.4, markerfacecolor="white", markeredgecolor=look.light, linestyle="")
     ax.set_ylabel(channel.symbol)
 
 
+def _mark_fall(ax: Axes, view: SceneView, model: str, colour: str) -> None:
+    """A cross where the block falls: nothing is drawn beyond."""
+    if model in view.falls:
+        row = int(np.searchsorted(view.t, view.falls[model]))
+        ax.plot(view.t[row], view.drawn[model]["theta"][row], marker="x", markersize=4.5, markeredgewidth=1.2, color=colour, zorder=4.0)
+
+
 def _differences(ax: Axes, view: SceneView, channel: Channel, against: str) -> None:
     bands = [band for band in view.bands(against) if band.channel == channel.name]
-    for limit, until in sorted({(band.limit, band.until) for band in bands}, reverse=True):
-        ax.fill_between([0.0, until], -limit, limit, color=TOLERANCE, alpha=0.13, linewidth=0)
     known = looks(view.run.models)
+    for limit, until in sorted({(band.limit, band.until) for band in bands if band.kind == "peak"}, reverse=True):
+        ax.fill_between([0.0, until], -limit, limit, color=TOLERANCE, alpha=0.13, linewidth=0)
+    for limit, until in sorted({(band.limit, band.until) for band in bands if band.kind == "rms"}):
+        ax.plot([until, until], [0.0, limit], color=TOLERANCE, linewidth=0.8, zorder=3.0)
+        ax.plot(until, limit, marker="_", color=TOLERANCE, markersize=7.0, markeredgewidth=1.4, zorder=3.0)
+    for band in {band.model: band for band in sorted(bands, key=lambda band: band.until) if band.kind == "rms"}.values():
+        running = view.running_rms(band)
+        ax.plot(view.t[: len(running)], running, color=known[band.model].light, linewidth=1.5, alpha=0.8)
     fine = largest = fineness(view, channel, bands)
     for model, difference in view.differences(channel.name, against).items():
         largest = max(largest, _largest(difference))
@@ -166,7 +186,7 @@ def _decades(fine: float, largest: float) -> dict[float, str]:
     low = max(math.ceil(math.log10(fine)), top - 2)
     ticks = {0.0: "0"}
     for power in {low, top} if low < top else {top}:
-        words = f"10{str(power).translate(SUPERSCRIPT)}"
+        words = f"10{str(power).translate(SUPERSCRIPTS)}"
         ticks |= {10.0**power: words, -(10.0**power): f"−{words}"}
     return ticks
 
@@ -189,14 +209,19 @@ def _short(label: str, most: int = 17) -> str:
     return label if len(label) <= most else label[: most - 1] + "…"
 
 
-def _shades(view: SceneView, against: str | None, channels: Sequence[Channel]) -> list[Patch]:
-    """Legend entries for the shaded areas that the figure has."""
+def _shades(view: SceneView, against: str | None, channels: Sequence[Channel]) -> list[Patch | Line2D]:
+    """Legend entries for what the figure has besides the models."""
+    from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     names = [channel.name for channel in channels]
-    found = []
-    if against and any(band.channel in names for band in view.bands(against)):
+    found: list[Patch | Line2D] = []
+    kinds = {band.kind for band in view.bands(against) if band.channel in names} if against else set()
+    if "peak" in kinds:
         found.append(Patch(color=TOLERANCE, alpha=0.25, label="tolerance"))
+    if "rms" in kinds:
+        found.append(Line2D([], [], color="#555555", linewidth=1.8, label="RMS so far"))
+        found.append(Line2D([], [], color=TOLERANCE, marker="_", markersize=7.0, markeredgewidth=1.4, linestyle="", label="its limit"))
     if view.horizon is not None and view.horizon < view.t[-1]:
         found.append(Patch(color="#000000", alpha=0.08, label="beyond the horizon"))
     return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ from rockcheck.reports.tables import overrun
 from rockcheck.scenes.trust.experience import Trust, known
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.suite.experience import FEWEST, bias_and_scatter, pairs_of
-from rockcheck.validation.suite.results import Cell, Run
+from rockcheck.validation.suite.results import Cell, Check, Run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,13 +30,14 @@ PEAKS = "overview-peaks"
 class Entry:
     """One model in one scene: the RMS difference of the rotation and the ratio of the peaks, both against the run's reference.
 
-    `rms` is the judged figure of the shortest window, else the one of the whole time. `u_num` is the model's numerical uncertainty of
-    it (alpha), which is known of the whole time only; else None. `apart`: of it and the reference one falls and the other does not,
+    `rms` is the judged figure of the shortest window, else the one of the whole time, which is `whole`. `u_num` is the model's
+    numerical uncertainty of `whole` (alpha), where it is known. `apart`: of it and the reference one falls and the other does not,
     or to another side.
     """
 
     cell: Cell
     rms: Figure | None
+    whole: Figure | None
     ratio: float | None
     u_num: float | None
     outcome: str
@@ -46,6 +47,11 @@ class Entry:
     def used(self) -> float:
         """The largest share of a limit that the cell uses; infinite where it has no history."""
         return math.inf if self.cell.status != "done" else max(map(overrun, self.cell.checks), default=0.0)
+
+    @property
+    def nearest(self) -> Check | None:
+        """The check that uses most of its limit."""
+        return max(self.cell.checks, key=overrun, default=None)
 
 
 @dataclass(frozen=True)
@@ -79,29 +85,27 @@ class Accuracy:
 
 def matrix(run: Run) -> list[Row]:
     """A row a scene, an entry a model of the run."""
-    return [Row(scene, tuple(_entry(run, scene, model) for model in run.models)) for scene in run.scenes]
+    return [Row(scene, tuple(entry(run, scene, model) for model in run.models)) for scene in run.scenes]
 
 
-def _entry(run: Run, scene: str, model: str) -> Entry | None:
+def entry(run: Run, scene: str, model: str) -> Entry | None:
+    """How far a model lies from the run's reference in a scene; None where it does not play it."""
     cell, reference = run.cell(scene, model), run.cell(scene, run.reference)
     if cell is None:
         return None
     figures = [check.figure for check in cell.checks] + list(cell.figures)
-    rms = _shortest(figures, run.reference)
+    found = [f for f in figures if f.measure == "theta_rms" and f.against == run.reference and f.value is not None]
+    whole = next((f for f in found if not f.window), None)
     outcomes = [_fall(one.outcome) for one in (cell, reference) if one is not None and one.status == "done"]
     return Entry(
         cell=cell,
-        rms=rms,
+        rms=min(found, key=lambda figure: figure.until or math.inf, default=None),
+        whole=whole,
         ratio=next((f.value for f in figures if f.measure == "peak_ratio" and f.against == run.reference and not f.window), None),
-        u_num=cell.numerical.u_num("theta_rms") if cell.numerical and rms and not rms.window else None,
+        u_num=cell.numerical.u_num("theta_rms") if cell.numerical and whole else None,
         outcome=cell.fate,
         apart=len(set(outcomes)) > 1,
     )
-
-
-def _shortest(figures: Iterable[Figure], against: str) -> Figure | None:
-    found = [f for f in figures if f.measure == "theta_rms" and f.against == against and f.value is not None]
-    return min(found, key=lambda figure: figure.until or math.inf, default=None)
 
 
 def _fall(outcome: str) -> str:

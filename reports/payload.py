@@ -44,7 +44,8 @@ def payload(view: SceneView) -> dict[str, Any]:
         "channels": [
             {"name": c.name, "label": c.label, "unit": "" if c.unit == "1" else c.unit, "fine": fineness(view, c, bands)} for c in CHANNELS
         ],
-        "bands": [vars(band) for band in bands],
+        "window": view.active,
+        "bands": [vars(band) | ({"running": packed(view.running_rms(band))} if band.kind == "rms" else {}) for band in bands],
         "models": [
             {
                 "name": model,
@@ -55,6 +56,8 @@ def payload(view: SceneView) -> dict[str, Any]:
                 "events": [[float(f"{e.t:.6f}"), e.kind, float(f"{e.impulse:.3g}")] for e in view.histories[model].event_list],
                 "modes": _spells(view, model),
                 "agreement": view.agreement.get(model),
+                "fell": view.falls.get(model),
+                "samples": view.measured.get(model),
             }
             for model, look in known.items()
             if model in view.histories

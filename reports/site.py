@@ -19,7 +19,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from rockcheck.reports import tables, words
 from rockcheck.reports.ensembles import EnsembleView, ensemble_views, write_ensemble_figures
 from rockcheck.reports.figures import figure_stem, write_figures
-from rockcheck.reports.overview import write_overview
+from rockcheck.reports.overview import entry, write_overview
 from rockcheck.reports.payload import script
 from rockcheck.reports.scene_file import write_scene_file
 from rockcheck.reports.style import LOOKS, SPARE, looks
@@ -258,7 +258,7 @@ def _environment() -> Environment:
     environment = Environment(
         loader=FileSystemLoader(DATA / "templates"), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    for filter in (words.number, words.unit, words.duration, words.moment, words.ratio, words.window, words.dash_array):
+    for filter in (words.number, words.unit, words.duration, words.moment, words.ratio, words.window, words.dash_array, words.readable):
         environment.filters[filter.__name__] = filter
     for function in (
         words.share,
@@ -269,6 +269,7 @@ def _environment() -> Environment:
         tables.scene_facts,
         tables.summary,
         figure_stem,
+        entry,
     ):
         environment.globals[function.__name__] = function
     environment.globals |= {"VERDICTS": VERDICTS, "finite": math.isfinite}

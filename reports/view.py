@@ -19,6 +19,13 @@ from rockcheck.validation.suite.results import Cell, Run
 from rockcheck.validation.uncertainty.inputs import Inputs
 
 Array = NDArray[np.float64]
+#: A block that falls is drawn up to this rotation (alpha): from 1 on nothing brings it back.
+FALL = 1.5
+#: Something happens while a model turns or slides by this share of the most that any does; room beside it, and how much of the whole
+#: time it may take before the whole is shown.
+STILL, ROOM, NEARLY_ALL = 0.01, 0.05, 0.85
+#: Settings that only a measured history has (`validation.discrepancy.measured`).
+MEASURED = {"file", "offset"}
 
 
 @dataclass(frozen=True)
@@ -63,6 +70,15 @@ class Band:
     kind: str
     limit: float
     until: float
+
+
+@dataclass(frozen=True)
+class Hop:
+    """How the block leaves the floor: its lowest corner's greatest height (m), by which model, and its longest flight (s)."""
+
+    height: float
+    model: str
+    longest: float
 
 
 @dataclass(frozen=True)
@@ -152,6 +168,63 @@ class SceneView:
         inside = (self.t >= times[0] - 1e-9) & (self.t <= times[-1] + 1e-9)
         return np.where(inside, np.interp(self.t, times, values), math.nan)
 
+    @cached_property
+    def falls(self) -> dict[str, float]:
+        """By model: when the rotation passes `FALL`, s; only those that fall."""
+        beyond = {model: np.flatnonzero(np.abs(columns["theta"]) > FALL) for model, columns in self.values.items()}
+        return {model: float(self.t[rows[0]]) for model, rows in beyond.items() if len(rows)}
+
+    @property
+    def measured(self) -> dict[str, list[int]]:
+        """By model that was measured: the rows of `t` that lie next to one of its samples."""
+        found = {}
+        for model, history in self.histories.items():
+            if set(history.settings) >= MEASURED:
+                near = np.searchsorted(self.t, np.asarray(history.channels["t"], dtype=float) - 0.5 * float(self.t[1] - self.t[0]))
+                found[model] = np.unique(near[near < len(self.t)]).tolist()
+        return found
+
+    @cached_property
+    def drawn(self) -> dict[str, dict[str, Array]]:
+        """The `values` up to the fall, NaN from there on."""
+        standing = {model: self.t <= self.falls.get(model, math.inf) for model in self.values}
+        return {m: {name: np.where(standing[m], v, math.nan) for name, v in columns.items()} for m, columns in self.values.items()}
+
+    @cached_property
+    def active(self) -> tuple[float, float]:
+        """The window of time, s, in which something happens: a model turns or slides. The whole time where that is nearly all."""
+        moving = np.zeros(len(self.t), dtype=bool)
+        for name in ("theta", "slip_rate"):
+            sizes = [np.nan_to_num(np.abs(columns[name])) for columns in self.drawn.values()]
+            least = STILL * max((float(size.max()) for size in sizes), default=0.0)
+            for size in sizes:
+                moving |= size > max(least, 1e-9)
+        rows, whole = np.flatnonzero(moving), (float(self.t[0]), float(self.t[-1]))
+        if not len(rows):
+            return whole
+        first, last = float(self.t[rows[0]]), float(self.t[rows[-1]])
+        room = ROOM * (last - first) + 10.0 * float(self.t[1] - self.t[0])
+        first, last = max(whole[0], first - room), min(whole[1], last + room)
+        return (first, last) if last - first < NEARLY_ALL * (whole[1] - whole[0]) else whole
+
+    @property
+    def hop(self) -> Hop | None:
+        """The highest hop of the model that may hop and is trusted most; None where none does, or no model here may."""
+        order = (*self.unilateral, *(cell.model for cell in self.cells if cell.model not in self.bilateral))
+        for cell in sorted(self.cells, key=lambda cell: order.index(cell.model) if cell.model in order else len(order)):
+            height = next((f.value for f in cell.figures if f.measure == "highest_hop" and not f.window), None)
+            if cell.model in order and height is not None:
+                return Hop(height, cell.model, self._longest_flight(cell.model)) if height > 0.0 else None
+        return None
+
+    def _longest_flight(self, model: str) -> float:
+        channels = self.histories[model].channels if model in self.histories else {}
+        if "mode" not in channels:
+            return 0.0
+        t, flying = np.asarray(channels["t"], dtype=float), np.asarray(channels["mode"]).astype(str) == "flight"
+        ends = np.flatnonzero(np.diff(np.r_[False, flying, False].astype(int)))
+        return max((float(t[min(end, len(t) - 1)] - t[start]) for start, end in zip(ends[::2], ends[1::2], strict=True)), default=0.0)
+
     @property
     def references(self) -> tuple[str, ...]:
         """Models that others are held against here and that have a history; the run's own reference first."""
@@ -164,9 +237,19 @@ class SceneView:
         return (self.references if self.model_form_matters else self.references[:1]) or (None,)
 
     def differences(self, channel: str, against: str) -> dict[str, Array]:
-        """Candidate minus reference by model, in the channel's unit."""
-        reference = self.values[against][channel]
-        return {model: columns[channel] - reference for model, columns in self.values.items() if model != against}
+        """Candidate minus reference by model up to the first fall of the two, in the channel's unit."""
+        reference = self.drawn[against][channel]
+        return {model: columns[channel] - reference for model, columns in self.drawn.items() if model != against}
+
+    def running_rms(self, band: Band) -> Array:
+        """The RMS difference from 0 up to each time, to `band.until`: what its limit holds for at the end. NaN where it is not known."""
+        both = [self.values.get(model, {}).get(band.channel) for model in (band.model, band.against)]
+        t = self.t[self.t <= band.until + 1e-9]
+        if both[0] is None or both[1] is None or len(t) < 2:
+            return np.full(len(t), math.nan)
+        square = (both[0][: len(t)] - both[1][: len(t)]) ** 2
+        steps = 0.5 * np.diff(t) * (square[1:] + square[:-1])
+        return np.sqrt(np.r_[square[0], np.cumsum(steps) / (t[1:] - t[0])])
 
     def bands(self, against: str | None = None) -> tuple[Band, ...]:
         """The tolerances that can be drawn over time; of one reference, or of all."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from datetime import datetime
 
-from rockcheck.reports.show.words import number
+from rockcheck.reports.show.words import SUPERSCRIPTS, number
 from rockcheck.reports.style import Look
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord
 from rockcheck.validation.suite.results import Check
@@ -16,6 +17,16 @@ from rockcheck.validation.suite.tables import used
 def known(value: float, digits: int = 2) -> str:
     """`number` where there is one, else a dash."""
     return number(value, digits) if math.isfinite(value) else "–"
+
+
+_POWER = re.compile(r"(?<![\w.])([+-]?\d+(?:\.\d+)?)e([+-]?\d+)(?![\w.]\w)")
+_MINUS = re.compile(r"(?<![\w.)\]-])-(?=\.?\d)")
+
+
+def readable(text: str) -> str:
+    """A sentence whose numbers do not break at a hyphen: -1.2e-3 as −1.2·10⁻³."""
+    shown = _POWER.sub(lambda found: f"{found[1]}·10{str(int(found[2])).translate(SUPERSCRIPTS)}", text)
+    return _MINUS.sub("−", shown)
 
 
 def unit(name: str) -> str:

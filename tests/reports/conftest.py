@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -206,6 +206,12 @@ def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
     make_run(folder)
     return folder
+
+
+@pytest.fixture
+def run_of() -> Callable[[Path, float], Run]:
+    """`run_of(folder, duration)` writes a finished run of scenes so long (s)."""
+    return make_run
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,6 +12,10 @@ from urllib.parse import unquote, urlsplit
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright import sync_api as playwright
+
+from rockcheck.reports import write_site
+from rockcheck.scenes import History
+from rockcheck.validation.suite.results import Run
 
 pytestmark = pytest.mark.browser
 
@@ -232,7 +237,9 @@ def test_print_shows_the_figures_and_no_controls(visit: Visit) -> None:
     page = visit.open(WALL)
     page.emulate_media(media="print")
     assert not page.locator("#explore").is_visible()
-    assert page.locator(".paper img").first.is_visible()
+    playwright.expect(page.locator("#paper")).to_have_attribute("open", "")
+    page.locator("#paper figcaption").first.scroll_into_view_if_needed()  # an image is loaded when it comes near
+    playwright.expect(page.locator(".paper img").first).to_be_visible()
 
 
 def test_without_scripts_the_figures_remain(visits: Visits) -> None:
@@ -240,3 +247,77 @@ def test_without_scripts_the_figures_remain(visits: Visits) -> None:
     assert "need JavaScript" in page.locator("noscript").inner_text()
     assert not page.locator("#live").is_visible()
     assert page.locator(".paper img").first.is_visible()
+
+
+def test_a_page_opens_on_the_time_in_which_something_happens(visit: Visit) -> None:
+    page = visit.open("pages/Free-2.html")
+    shown, drawn = window(page), page.evaluate("rockcheckPage.drawn.slice(1).map(u => [u.scales.x.min, u.scales.x.max])")
+    assert page.evaluate("rockcheck.window") == pytest.approx(shown)
+    assert shown[1] < 6.0 < 12.0  # the block lies then
+    assert all(ends == pytest.approx(shown) for ends in drawn)
+    page.get_by_role("button", name="Whole").click()
+    assert window(page) == pytest.approx([0.0, 12.0])
+
+
+def test_a_fall_is_marked_and_ends_the_scale(visit: Visit) -> None:
+    page = visit.open("pages/Free-2.html")
+    scale = page.evaluate("[rockcheckPage.drawn[2].scales.y.min, rockcheckPage.drawn[2].scales.y.max]")
+    assert max(map(abs, scale)) < 1.8
+    assert "✕ fell" in page.locator("#plots").inner_text()
+    assert page.locator("#result").get_by_text("fell").count() == 2
+
+
+def test_the_running_rms_is_drawn_below_its_limit(visit: Visit) -> None:
+    page = visit.open(WALL)
+    assert "RMS so far" in page.locator("#plots").inner_text()
+    running = page.evaluate("rockcheckPage.drawn[3].data[9].filter(v => v !== null)")  # 6 models: the third's running RMS
+    judged = "b => b.model === 'cm' && b.channel === 'theta' && b.against === 'ebm-unilateral'"
+    band = page.evaluate(f"rockcheck.bands.find({judged})")
+    assert len(running) == len(band["running"])
+    assert running[-1] == pytest.approx(band["running"][-1])
+    page.get_by_role("checkbox", name="CM").uncheck()
+    assert page.evaluate("rockcheckPage.drawn[3].series[9].show") is False
+
+
+def test_the_explanation_and_the_figures_are_folded(visit: Visit) -> None:
+    page = visit.open(WALL)
+    assert page.locator("#form").get_attribute("open") is None
+    assert page.locator("#form summary").bounding_box()["height"] < 60.0  # two lines
+    assert not page.locator(".paper img").first.is_visible()
+    page.locator("#paper summary").click()
+    assert page.locator(".paper img").first.is_visible()
+    assert page.locator("#result tbody tr").count() == 5
+
+
+def test_by_night_no_figure_is_white(visits: Visits) -> None:
+    for address in ("index.html", WALL):
+        page = visits(color_scheme="dark").open(address)
+        page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
+        assert set(page.eval_on_selector_all("main img", "all => all.map(one => getComputedStyle(one).filter)")) <= {
+            "invert(0.91) hue-rotate(180deg)"
+        }
+
+
+def test_a_measured_history_is_dots(visitor: Callable[..., playwright.Page], tmp_path: Path, finished: Run) -> None:
+    history = History.load(tmp_path / (finished.cell("free", "cm").history or ""))
+    every = slice(None, None, 10)
+    table = dataclasses.replace(
+        history,
+        model="table",
+        settings={"file": "run7.csv", "offset": 0.0},
+        channels={name: history.channels[name][every] for name in ("t", "theta")},
+        event_list=(),
+    )
+    table.save(tmp_path / "histories" / "table.csv")
+    cell = finished.cell("free", "cm")
+    assert cell is not None
+    cells = (cell.model_copy(update={"model": "table", "history": "histories/table.csv"}), *finished.cells)
+    finished.model_copy(update={"models": ("table", *finished.models), "cells": cells}).save(tmp_path)
+    write_site(tmp_path)
+    page = visitor(tmp_path, viewport={"width": 1280, "height": 900})  # in the end it must have complained of nothing
+    page.goto((tmp_path / "pages" / "free.html").as_uri())
+    assert page.evaluate("rockcheckPage.drawn[2].data[1].filter(v => v !== null).length") == len(table.channels["t"])
+    assert page.evaluate("rockcheckPage.drawn[2].series[1].points.show(rockcheckPage.drawn[2], 1)")
+    page.evaluate("rockcheckPage.store.change({time: 3})")
+    assert not page.locator('#block [data-model="table"]').is_visible()
+    assert "null" not in (page.locator("#close").get_attribute("viewBox") or "null")

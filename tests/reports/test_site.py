@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -21,10 +22,12 @@ from rockcheck.reports.scene_file import write_scene_file
 from rockcheck.reports.site import PAGES
 from rockcheck.reports.style import LOOKS, SPARE, looks, save
 from rockcheck.reports.tables import overrun, run_times, worst_first
-from rockcheck.reports.view import scene_views, slugs_of
-from rockcheck.reports.words import number, ratio
-from rockcheck.scenes import Block, Floor, InputError, Record, Scene, Sine, Wall, load_scene
+from rockcheck.reports.view import FALL, scene_views, slugs_of
+from rockcheck.reports.words import number, ratio, readable
+from rockcheck.scenes import Block, Floor, History, InputError, Record, Scene, Sine, Wall, load_scene
+from rockcheck.validation.commands.cli import main
 from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.discrepancy.measures import Pair, theta_rms
 from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.suite.results import Check, Run
 
@@ -184,6 +187,64 @@ def test_a_large_run_shows_every_nth_row(run_folder: Path) -> None:
     [fine, *_] = scene_views(run, run_folder)
     assert (fine.stride, coarse.stride) == (1, 5)
     assert coarse.values["cm"]["theta"] == pytest.approx(fine.values["cm"]["theta"][::5], abs=0.0)
+
+
+def test_the_running_rms_ends_at_the_measure(run_folder: Path) -> None:
+    view = next(view for view in scene_views(Run.load(run_folder), run_folder) if view.name == "beside a wall")
+    bands = [band for band in view.bands("ebm-unilateral") if band.model == "mujoco"]
+    assert [(band.kind, band.until) for band in bands] == [("rms", 8.0)]
+    running, t = view.running_rms(bands[0]), view.t[view.t <= 8.0 + 1e-9]
+    apart = view.differences("theta", "ebm-unilateral")["mujoco"][: len(t)]
+    pair = Pair(view.histories["ebm-unilateral"], view.histories["mujoco"], view.scene, until=8.0)
+    assert running[-1] == pytest.approx(theta_rms(pair), rel=1e-12)
+    assert running[400] == pytest.approx(np.sqrt(np.trapezoid(apart[:401] ** 2, t[:401]) / t[400]), rel=1e-12)
+
+
+def test_a_fall_is_drawn_up_to_one_and_a_half_alpha(run_folder: Path) -> None:
+    view = next(view for view in scene_views(Run.load(run_folder), run_folder) if view.name == "Free")
+    whole, drawn = view.values["ebm"]["theta"], view.drawn["ebm"]["theta"]
+    row = int(np.flatnonzero(np.abs(whole) > FALL)[0])
+    assert view.falls["ebm"] == view.t[row]
+    assert np.nanmax(np.abs(drawn)) == whole[row] == pytest.approx(FALL, abs=0.02)
+    assert np.isnan(drawn[row + 1 :]).all()
+    assert np.nanmax(np.abs(whole)) > 2.0
+    theta = histories_figure(view).axes[1]
+    assert max(abs(end) for end in theta.get_ylim()) < 1.7
+    assert [line.get_marker() for line in theta.get_lines()].count("x") == len(view.falls) == 2
+
+
+def test_plots_open_where_something_happens(tmp_path: Path, run_of: Callable[[Path, float], Run]) -> None:
+    run = run_of(tmp_path, 60.0)
+    view = next(view for view in scene_views(run, tmp_path) if view.name == "free")
+    start, end = view.active
+    assert start == 0.0
+    assert 25.0 < end < 35.0  # the motion decays as exp(-0.15 t), to a hundredth after 31 s
+    short = next(view for view in scene_views(run_of(tmp_path, 12.0), tmp_path) if view.name == "free")
+    assert short.active == (0.0, 12.0)
+
+
+def test_the_hop_is_the_trusted_model_s(site: Path) -> None:
+    run = Run.load(site)
+    views = {view.name: view for view in scene_views(run, site)}
+    hop = views["beside a wall"].hop
+    assert hop is not None
+    assert (hop.height, hop.model) == (0.004, "ebm-unilateral")
+    text = re.sub(r"\s+", " ", (site / PAGES / "beside-a-wall.html").read_text(encoding="utf-8"))
+    assert "here 4 mm high" in text
+
+
+def test_the_command_of_the_page_runs_as_it_stands(site: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    text = (site / PAGES / "beside-a-wall.html").read_text(encoding="utf-8")
+    found = re.search(r"<code>rockcheck (simulate [^<]+)</code>", text)
+    assert found is not None
+    monkeypatch.chdir(site)
+    assert main([*found[1].split(), "-o", str(tmp_path / "again.csv")]) == 0
+    assert History.load(tmp_path / "again.csv").model == "ebm-unilateral"
+
+
+def test_numbers_in_sentences_do_not_break() -> None:
+    said = readable("-1.2e-3 is more than 1e+05; x-2 of run-7 on 2026-01-02 (-0.5)")
+    assert said == "−1.2·10⁻³ is more than 1·10⁵; x-2 of run-7 on 2026-01-02 (−0.5)"
 
 
 def test_missing_and_foreign_histories_are_told(tmp_path: Path, run_folder: Path) -> None:

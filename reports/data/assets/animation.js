@@ -36,12 +36,14 @@ const Animation = (() => {
     };
     const update = () => {
       data.models.forEach((model, k) => {
-        const body = bodies[k], [x, y, theta, ended] = pose(model, store.time);
-        body.style.display = store.on.has(model.name) && x !== null && y !== null ? "" : "none";
+        const body = bodies[k], [x, y, theta, ended] = pose(model, store.time), placed = x !== null && y !== null;
+        body.style.display = store.on.has(model.name) && placed ? "" : "none";
+        if (!placed) return;  // a measured history may not say where the block is
         body.style.opacity = ended ? 0.4 : 1;
         body.setAttribute("transform", `translate(${x} ${y}) rotate(${theta * 180 / Math.PI})`);
       });
       const leader = data.models.find(model => model.name === store.lead) ?? data.models[0], [x, y, theta] = pose(leader, store.time);
+      if (x === null || y === null) return;
       const pivot = theta < 0 ? half : -half;
       const corner = [x + pivot * Math.cos(theta) + height * Math.sin(theta), y + pivot * Math.sin(theta) - height * Math.cos(theta)];
       close.setAttribute("viewBox", `${corner[0] - side / 2} ${-0.62 * side} ${side} ${side}`);

@@ -40,6 +40,7 @@ const Plots = (() => {
     width,
     spanGaps: false,
     points: { show: false },
+    ...(model.samples ? { paths: () => null, points: { show: true, size: 4, width: 1, fill: () => lookOf(model) } } : {}),
   });
 
   const axes = (host, values, extra = {}) => {
@@ -87,7 +88,7 @@ const Plots = (() => {
           dblclick: () => () => store.change({ window: [0, store.data.duration] }),
         },
       },
-      scales: { x: { time: false, range: (u, min, max) => [min, max] }, y: scale },
+      scales: { x: { time: false, range: (u, min, max) => [min, max], ...(overview ? {} : { min: store.window[0], max: store.window[1] }) }, y: scale },
       axes: [x, y],
       series: [{}, ...series],
       hooks: {
@@ -153,8 +154,9 @@ const Plots = (() => {
     follow(u, host, height);
     mark();
     store.listen(changed => {
-      if (changed.models && !overview) store.data.models.forEach((model, k) => {
-        if (u.series[k + 1] && u.series[k + 1].show !== store.on.has(model.name)) u.setSeries(k + 1, { show: store.on.has(model.name) });
+      if (changed.models && !overview) u.series.forEach((one, n) => {
+        const model = n > 0 && store.data.models[(n - 1) % store.data.models.length];
+        if (model && one.show !== store.on.has(model.name)) u.setSeries(n, { show: store.on.has(model.name) });
       });
       if (changed.window) {
         if (overview) u.redraw(false, false);
@@ -197,12 +199,13 @@ const Plots = (() => {
   }
 
   function values(parent, store, channel, first) {
-    const [box] = host(parent, axisLabel(channel), false, `${channel.label} of ${store.data.models.length} models over time; the numbers are in the tables of this page`);
+    const falls = channel.name === "theta" && store.data.models.some(model => model.fell !== null);
+    const [box] = host(parent, axisLabel(channel) + (falls ? "; ✕ fell: nothing is drawn beyond 1.5" : ""), false, `${channel.label} of ${store.data.models.length} models over time; the numbers are in the tables of this page`);
     return overTime(box, store, {
       height: first ? 190 : 140,
-      data: [store.t, ...store.data.models.map(model => model.columns[channel.name])],
+      data: [store.t, ...store.data.models.map(model => model.drawn[channel.name])],
       series: store.data.models.map(model => seriesOf(store, model, model.name === store.against ? 2.6 : 1.4)),
-      draw: channel.name === "theta" ? { above: u => wallHits(u, store) } : {},
+      draw: channel.name === "theta" ? { above: u => { wallHits(u, store); falls && crosses(u, store); } } : {},
     });
   }
 
@@ -217,10 +220,26 @@ const Plots = (() => {
       if (!store.on.has(model.name)) continue;
       ctx.strokeStyle = lookOf(model);
       for (const [t, kind] of model.events) {
-        if (kind !== "wall impact" || t < from || t > to) continue;
+        if (kind !== "wall impact" || t < from || t > to || t > (model.fell ?? Infinity)) continue;
         const value = store.at(model, "theta", t);
         if (value !== null) diamond(ctx, u.valToPos(t, "x", true), u.valToPos(value, "y", true), r);
       }
+    }
+    ctx.restore();
+  }
+
+  // Where a block falls.
+  function crosses(u, store) {
+    const [from, to] = store.window, { ctx } = u, r = 5 * devicePixelRatio;
+    ctx.save();
+    ctx.setLineDash([]);
+    ctx.lineWidth = 2 * devicePixelRatio;
+    for (const model of store.data.models) {
+      if (model.fell === null || model.fell < from || model.fell > to || !store.on.has(model.name)) continue;
+      const x = u.valToPos(model.fell, "x", true), y = u.valToPos(store.at(model, "theta", model.fell), "y", true);
+      ctx.strokeStyle = lookOf(model);
+      segment(ctx, x - r, y - r, x + r, y + r);
+      segment(ctx, x - r, y + r, x + r, y - r);
     }
     ctx.restore();
   }
@@ -255,29 +274,38 @@ const Plots = (() => {
     const title = () => {
       const limits = new Map();  // what is asked, and of which models
       for (const model of store.data.models) {
-        const own = bands().filter(b => b.model === model.name).map(b => `${words(b.limit)} (${b.kind === "rms" ? "RMS" : "peak"}, first ${words(b.until)} s)`);
+        const own = bands().filter(b => b.model === model.name).map(b => b.kind === "rms" ? `RMS ${words(b.limit)} at ${words(b.until)} s` : `${words(b.limit)} up to ${words(b.until)} s`);
         if (own.length) limits.set(own.join(", "), [...(limits.get(own.join(", ")) ?? []), model.label]);
       }
       const told = [...limits].map(([asked, labels]) => `${labels.join(", ")} at most ${asked}`);
-      return `difference from ${label()}` + (told.length ? `; shaded: tolerance, ${told.join("; ")}` : "; no tolerance is set on it");
+      const drawn = [bands().some(b => b.running) ? "thick: its RMS so far, which ends below the bar ┬" : "", bands().some(b => b.kind === "peak") ? "shaded: its limit" : ""].filter(Boolean);
+      return `difference from ${label()}` + (told.length ? `; ${drawn.join("; ")}. ${told.join("; ")}` : "; no tolerance is set on it");
     };
+    // Of each model the running RMS that is judged last: it passes the ends of the earlier windows on its way.
+    const running = () => store.data.models.map(model => {
+      const judged = bands().filter(b => b.running && b.model === model.name);
+      return judged.reduce((longest, b) => !longest || b.until > longest.until ? b : longest, null)?.running ?? [];
+    });
     const [box, heading] = host(parent, title(), true, `Difference of ${channel.label} from the reference over time`);
     const columns = () => {
-      const reference = store.data.models.find(model => model.name === store.against)?.columns[channel.name];
-      return [store.t, ...store.data.models.map(model => reference && model.name !== store.against
-        ? model.columns[channel.name].map((v, k) => v === null || reference[k] === null ? null : v - reference[k])
-        : new Array(store.t.length).fill(null))];
+      const reference = store.data.models.find(model => model.name === store.against)?.upright[channel.name];
+      const apart = store.data.models.map(model => reference && model.name !== store.against
+        ? model.drawn[channel.name].map((v, k) => v === null || reference[k] === null ? null : v - reference[k])
+        : new Array(store.t.length).fill(null));
+      return [store.t, ...apart, ...running().map(column => store.t.map((_, k) => column[k] ?? null))];
     };
     const u = overTime(box, store, {
       height: 96, data: columns(),
-      series: store.data.models.map(model => seriesOf(store, model, 1.2)),
+      series: [...store.data.models.map(model => seriesOf(store, model, 1)), ...store.data.models.map(model => ({ ...seriesOf(store, { ...model, samples: null }, 2.6), dash: [] }))],
       scale: { distr: 4, asinh: channel.fine, range: (u, min, max) => {
         const largest = 1.4 * Math.max(channel.fine, Math.abs(min ?? 0), Math.abs(max ?? 0));
         return [-largest, largest];
       } },
       axis: { splits: (u, axis, min, max) => decades(channel.fine, max), filter: (u, splits) => splits, values: (u, splits) => labels(splits, channel.fine, u.scales.y.max, 35) },
       draw: { below: u => {
-        for (const { limit, until } of uniqueBands(bands())) shade(u, 0, until, colour("--tolerance"), -limit, limit);
+        for (const { limit, until } of uniqueBands(bands().filter(b => b.kind === "peak"))) shade(u, 0, until, colour("--tolerance"), -limit, limit);
+      }, above: u => {
+        for (const { limit, until } of uniqueBands(bands().filter(b => b.running))) bar(u, until, limit);
       } },
     });
     store.listen(changed => {
@@ -288,6 +316,26 @@ const Plots = (() => {
       if (changed.against || changed.models) heading.textContent = title();
     });
     return u;
+  }
+
+  // The limit that a running RMS has to be below at a time.
+  function bar(u, until, limit) {
+    const x = u.valToPos(until, "x", true), top = u.valToPos(limit, "y", true), r = 7 * devicePixelRatio, { ctx } = u;
+    if (x < u.bbox.left || top < u.bbox.top) return;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
+    ctx.clip();
+    ctx.strokeStyle = colour("--pass");
+    ctx.lineWidth = devicePixelRatio;
+    ctx.setLineDash([2 * devicePixelRatio, 5 * devicePixelRatio]);
+    segment(ctx, u.bbox.left, top, x, top);
+    ctx.setLineDash([]);
+    ctx.lineWidth = 2 * devicePixelRatio;
+    segment(ctx, x - r, top, x + r, top);
+    ctx.lineWidth = devicePixelRatio;
+    segment(ctx, x, top, x, u.valToPos(0, "y", true));
+    ctx.restore();
   }
 
   const uniqueBands = bands => [...new Map(bands.map(b => [`${b.limit} ${b.until}`, b])).values()];
@@ -360,14 +408,14 @@ const Plots = (() => {
       const [from, to] = store.rows(store.window);
       let least = Infinity, most = -Infinity;
       for (const model of models) if (store.on.has(model.name)) for (let k = from; k <= to; k++) {
-        const v = model.columns[name][k];
+        const v = model.upright[name][k];
         if (v !== null) { least = Math.min(least, v); most = Math.max(most, v); }
       }
       const pad = 0.06 * (most - least) || 0.01;
       return least <= most ? [least - pad, most + pad] : [-1, 1];
     };
     const paths = k => u => {
-      const [from, to] = store.rows(store.window), model = models[k], { theta, theta_dot: rate } = model.columns, { ctx } = u;
+      const [from, to] = store.rows(store.window), model = models[k], { theta, theta_dot: rate } = model.drawn, { ctx } = u;
       ctx.save();
       ctx.beginPath();
       ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
@@ -380,7 +428,9 @@ const Plots = (() => {
       for (let n = from; n <= to; n++) {
         if (theta[n] === null || rate[n] === null) { pen = false; continue; }
         const x = u.valToPos(theta[n], "x", true), y = u.valToPos(rate[n], "y", true);
-        if (pen) ctx.lineTo(x, y); else ctx.moveTo(x, y);
+        if (model.samples) ctx.rect(x, y, devicePixelRatio, devicePixelRatio);
+        else if (pen) ctx.lineTo(x, y);
+        else ctx.moveTo(x, y);
         pen = true;
       }
       ctx.stroke();
@@ -398,14 +448,14 @@ const Plots = (() => {
       hooks: { draw: [u => {
         for (const model of models) {
           const theta = store.at(model, "theta", store.time), rate = store.at(model, "theta_dot", store.time);
-          if (!store.on.has(model.name) || theta === null || rate === null) continue;
+          if (!store.on.has(model.name) || theta === null || rate === null || store.time > (model.fell ?? Infinity)) continue;
           u.ctx.fillStyle = lookOf(model);
           u.ctx.beginPath();
           u.ctx.arc(u.valToPos(theta, "x", true), u.valToPos(rate, "y", true), 3.5 * devicePixelRatio, 0, 2 * Math.PI);
           u.ctx.fill();
         }
       }] },
-    }, [null, ...models.map(model => [model.columns.theta, model.columns.theta_dot])], box);
+    }, [null, ...models.map(model => [model.drawn.theta, model.drawn.theta_dot])], box);
     follow(u, box, height);
     const again = () => u.setData(u.data, true);
     store.listen(changed => {

@@ -16,7 +16,14 @@
     model.columns = Object.fromEntries(Object.entries(model.values).map(([name, text]) => [name, floats(text)]));
     model.values = null;
     model.end = data.step * Math.max(0, model.columns.theta.findLastIndex(v => v !== null));
+    // What is drawn: up to the fall; of a measured history only its samples.
+    const last = model.fell === null ? data.rows : Math.round(model.fell / data.step), samples = model.samples && new Set(model.samples);
+    const kept = wanted => Object.fromEntries(Object.entries(model.columns).map(([name, column]) => [name, column.map((v, k) => wanted(k) ? v : null)]));
+    model.upright = model.fell === null ? model.columns : kept(k => k <= last);
+    model.drawn = samples ? kept(k => k <= last && samples.has(k)) : model.upright;
   }
+  for (const band of data.bands) if (band.running) band.running = floats(band.running);
+  const placed = model => model.columns.x.some(v => v !== null);
 
   const listeners = [];
   const least = 4 * data.step;
@@ -24,11 +31,11 @@
     data,
     t: Array.from({ length: data.rows }, (_, k) => k * data.step),
     ground: floats(data.ground),
-    time: 0,
-    window: [0, data.duration],
+    time: data.window[0],
+    window: [...data.window],
     on: new Set(data.models.map(model => model.name)),
     against: data.references[0] ?? null,
-    lead: data.references[0] ?? data.models[0].name,
+    lead: (data.models.find(model => model.name === data.references[0] && placed(model)) ?? data.models.find(placed) ?? data.models[0]).name,
     playing: false,
     listen: listener => listeners.push(listener),
     // Applies a change of time, window, models or against, kept within what there is, and tells everybody.
@@ -67,6 +74,8 @@
   };
 
   find("live").hidden = false;
+  find("paper").open = false;  // without scripts, and on paper, its figures are all that there is
+  matchMedia("print").addEventListener("change", print => { find("paper").open = print.matches; });
   const close = 0.12;
   find("close-scale").textContent = `${100 * close} cm wide`;
   Animation.build(find("block"), find("close"), store, close);
