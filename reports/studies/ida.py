@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rockcheck.reports.site import Site
+from rockcheck.reports.studies.curves import COLOURS as COLOURS_OF
+from rockcheck.reports.studies.curves import GREY, Chart, Curve, fragility_chart, write_charts
 from rockcheck.reports.style import PAGE, figure_style, save
 from rockcheck.validation.spectra.fragility import Floats
 from rockcheck.validation.spectra.ida import Ida
@@ -71,11 +73,28 @@ def _axis(found: Ida) -> str:
     return found.label if found.unit == "1" else f"{found.label} ({found.unit})"
 
 
+def _lines_chart(found: Ida) -> Chart:
+    """The lines of all motions, and their quantiles."""
+    curves = [
+        Curve(f"{line.record}{'' if line.direction > 0 else ', reversed'}", _cut(line.peaks), GREY, width=0.7) for line in found.lines
+    ]
+    quantiles = zip(found.quantiles.items(), (1, 0, 1), strict=False)
+    curves += [Curve(f"{100.0 * float(share):g} %", _cut(peaks), COLOURS_OF[colour], width=2.2) for (share, peaks), colour in quantiles]
+    return Chart("lines", _axis(found), "peak |θ|/α", found.intensities, tuple(curves), most=FALLEN, single=True)
+
+
+def _cut(peaks: tuple[float | None, ...]) -> tuple[float | None, ...]:
+    return tuple(None if peak is None or peak > FALLEN else float(f"{peak:.5g}") for peak in peaks)
+
+
 def write_ida(found: Ida, folder: Path) -> Path:
     """Writes the figure and `index.html` into the folder of the analysis; returns the page."""
     save(ida_figure(found), folder / "figure")
     above = (("Report", "../index.html"),) if (folder.parent / "index.html").exists() else ()
     site = Site(folder, f"rockcheck: incremental dynamic analysis of {found.scene}", above)
     site.assets()
+    write_charts(
+        [_lines_chart(found), fragility_chart("fragility", _axis(found), [one.curve for one in found.capacities])], folder / "ida.curves.js"
+    )
     records = list(dict.fromkeys((line.record, line.own) for line in found.lines))
     return site.page("index.html", "ida.html", found=found, records=records, created=datetime.now(UTC).isoformat(timespec="seconds"))

@@ -12,8 +12,14 @@ import numpy as np
 from rockcheck.ebm.spectrum import Spectrum
 from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, axis_labels, draw
 from rockcheck.reports.site import PAGES, STUDIES, Site
+from rockcheck.reports.studies.curves import fragility_chart, write_charts
+from rockcheck.reports.studies.nodes import write_nodes
 from rockcheck.reports.style import LOOKS, PAGE, figure_style, save
 from rockcheck.validation.discrepancy.figures import Stored
+from rockcheck.validation.spectra.findings import Finding, findings
+from rockcheck.validation.spectra.fragility import Fragility
+from rockcheck.validation.spectra.histories import KEPT_AN_AXIS, glimpses_path
+from rockcheck.validation.spectra.study import SpectrumRecord, paper_panels, read_spectrum
 from rockcheck.validation.suite.results import RUN_FILE
 
 if TYPE_CHECKING:
@@ -29,8 +35,11 @@ TITLES = {
     9: "Wall on the right, μ = 0.6",
 }
 PAGE_NAME = "spectra.html"
-#: The name of the files of the figure of all models' maps.
-MAPS = "models"
+#: The names of the files of the figures of all models' maps, and of what the paper does not say.
+MAPS, FINDINGS = "models", "findings"
+#: In its maps: overturned, safe, gained, lost.
+FOUND = ["#e9e9e9", "#a9c1df", "#009168", "#c4342d"]
+PAPER_SCENE = paper_panels(6)[0].scene
 
 
 def paper_figure(panels: Sequence[Panel], spectra: Sequence[Spectrum], *, of: str = "") -> Figure:
@@ -167,6 +176,30 @@ def areas_figure(spectra: Sequence[Spectrum]) -> Figure:
     return figure
 
 
+def findings_figure(found: Sequence[Finding]) -> Figure:
+    """What the paper does not say: a map a finding, with the nodes that it rests on."""
+    from matplotlib.colors import ListedColormap
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
+
+    with figure_style():
+        figure = Figure(figsize=(PAGE, 3.0), layout="constrained")
+        for axes, one in zip(figure.subplots(1, len(found), sharey=True), found, strict=True):
+            shown = np.where(one.safe, 1, 0)
+            shown[one.gained], shown[one.lost] = 2, 3
+            axes.pcolormesh(
+                one.frequencies, one.amplitudes, shown, cmap=ListedColormap(FOUND), vmin=0, vmax=3, shading="nearest", rasterized=True
+            )
+            axes.set_title(one.case, fontsize=7.0)
+            axes.set_xlabel(axis_labels(PAPER_SCENE)[0])
+            axes.grid(False)
+            marked = [(1, "safe"), (2, one.gained_means), *([(3, one.lost_means)] if one.lost_means else [])]
+            handles = [Patch(facecolor=FOUND[code], label=label) for code, label in marked]
+            axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.2), fontsize=6.5, handlelength=1.2)
+        figure.axes[0].set_ylabel(axis_labels(PAPER_SCENE)[1])
+    return figure
+
+
 def fragility_figure(fragility: Mapping[str, Any]) -> Figure:
     """Probability of overturning against intensity: the share of the motions with its confidence band, and the lognormal fit, dotted."""
     from matplotlib.figure import Figure
@@ -201,18 +234,31 @@ def write_page(folder: Path) -> Path:
     index = read_index(data)
     found = {name: _read(data / f"{name}.json") for name in ("claims", "fragility")}
     figures = sorted({(record.figure, record.model) for record in index.spectra if record.figure}, key=lambda key: (key[0] or 0, key[1]))
-    shown = [
+    shown: list[dict[str, Any]] = [
         {
             "stem": f"{SPECTRA}/{figure_stem(number, model)}",
+            "file": figure_stem(number, model),
             "number": number,
             "model": model,
             "title": TITLES[number or 6],
-            "records": [record for record in index.spectra if (record.figure, record.model) == (number, model)],
+            "records": sorted((one for one in index.spectra if (one.figure, one.model) == (number, model)), key=_place),
         }
         for number, model in figures
         if (data / f"{figure_stem(number, model)}.svg").exists()
     ]
-    site = Site(folder, "rockcheck: overturning spectra", _links(folder))
+    own: list[dict[str, Any]] = [{"record": record} for record in index.spectra if record.figure is None]
+    for figure in shown:
+        figure["nodes"] = write_nodes(data, figure["file"], figure["records"])
+    for one in own:
+        one["nodes"] = write_nodes(data, one["record"].name, [one["record"]])
+    scripts = [f"{figure['file']}.nodes.js" for figure in shown if figure["nodes"]]
+    scripts += [f"{one['record'].name}.nodes.js" for one in own if one["nodes"]]
+    if found["fragility"]:
+        curves = Fragility.model_validate(found["fragility"])
+        write_charts([fragility_chart("fragility", curves.intensity, curves.cases)], data / "fragility.curves.js")
+        scripts.append("fragility.curves.js")
+    heading = "Overturning spectra" if shown or own or not found["fragility"] else "Fragility: the probability of overturning"
+    site = Site(folder, f"rockcheck: {heading[0].lower()}{heading[1:]}", _links(folder))
     site.assets()
     addresses = [PAGE_NAME] if (folder / RUN_FILE).exists() else ["index.html", PAGE_NAME]  # a folder has a page to open
     pages = [
@@ -220,9 +266,13 @@ def write_page(folder: Path) -> Path:
             address,
             "spectra.html",
             figures=shown,
-            own=[record for record in index.spectra if record.figure is None],
+            own=own,
+            heading=heading,
+            scripts=scripts,
+            played=KEPT_AN_AXIS**2 if any(glimpses_path(data, record.name).exists() for record in index.spectra) else 0,
             **found,
             **_studies(data, bool(figures)),
+            findings=_findings(data, index.spectra),
             areas=(data / "safe-areas.svg").exists(),
             fragility_drawn=(data / "fragility.svg").exists(),
             versions=provenance.versions(),
@@ -232,11 +282,30 @@ def write_page(folder: Path) -> Path:
     return pages[-1]
 
 
+def _place(record: SpectrumRecord) -> tuple[tuple[float, float], ...]:
+    """Where a spectrum stands in its figure: without a wall first, then by gap and restitution."""
+    return tuple((wall["gap"], wall["restitution"]) for wall in record.scene.get("walls", ()))
+
+
+def _findings(data: Path, records: Sequence[SpectrumRecord]) -> tuple[Finding, ...]:
+    """What the 28 spectra of the folder show, and its figure; empty where they are not all there, on one grid."""
+    mine = {record.name: record for record in records if record.model == "ebm"}
+    panels = [panel for number in TITLES for panel in paper_panels(number)]
+    if not all(panel.name in mine and (data / f"{panel.name}.npz").exists() for panel in panels):
+        return ()
+    spectra = [read_spectrum(data, mine[panel.name], panel.scene) for panel in panels]
+    if len({spectrum.outcomes.shape for spectrum in spectra}) > 1:
+        return ()
+    found = findings(spectra)
+    write(findings_figure(found), data / FINDINGS)
+    return found
+
+
 def _studies(data: Path, papers: bool) -> dict[str, Any]:
     """Agreement and refinement for the page: those in the folder, or with the `papers` figures those that came with the package."""
     from rockcheck.validation.spectra import agreement as agreements
     from rockcheck.validation.spectra import refinement
-    from rockcheck.validation.spectra.study import KEPT, paper_panels
+    from rockcheck.validation.spectra.study import KEPT
 
     context: dict[str, Any] = {"maps": (data / f"{MAPS}.svg").exists()}
     context |= {"agreement_columns": agreements.COLUMNS, "refinement_columns": refinement.COLUMNS}

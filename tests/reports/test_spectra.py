@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from rockcheck.reports.show.spectrum import COLOURS, draw
 from rockcheck.reports.studies.spectra import paper_figure, write_page
 from rockcheck.reports.style import save
 from rockcheck.validation.spectra.agreement import Agreement
+from rockcheck.validation.spectra.claims import Claim, Claims
+from rockcheck.validation.spectra.findings import findings, kept_spectra
 from rockcheck.validation.spectra.refinement import Refined, Refinement
 from rockcheck.validation.spectra.study import KEPT, SPECTRA, SpectrumRequest, paper_panels
 from rockcheck.validation.spectra.study import save as save_spectra
@@ -94,3 +97,39 @@ def test_the_documentation_shows_the_kept_studies():
     assert len(refinement.spectra) == len({share.spectrum for share in agreement.shares}) == 28
     assert refinement.runs < refinement.nodes / 8
     assert all(share.nodes == 100 for share in agreement.shares)
+
+
+def test_the_documentation_tells_the_findings_of_the_kept_spectra():
+    text = (Path(__file__).parents[2] / "docs" / "spectra.md").read_text(encoding="utf-8")
+    shown = [line.strip("| \n").split(" | ") for line in text.partition("<!-- findings -->")[2].partition("<!-- end -->")[0].splitlines()]
+    found = findings(kept_spectra())
+    assert [row for row in shown if len(row) == 3][1:] == [[one.sentence, f"{one.case} (Fig. {one.figure})", one.words] for one in found]
+
+
+def test_the_page_tells_the_findings_and_the_tally(tmp_path):
+    data = tmp_path / SPECTRA
+    data.mkdir()
+    spectra = kept_spectra()
+    panels = [panel for number in (6, 7, 8, 9) for panel in paper_panels(number)]
+    one = spectra[0]
+    request = SpectrumRequest(one.frequency_ratios, one.amplitude_ratios)
+    coarse = [  # four nodes an axis: the histories that are kept beside them take their time
+        dataclasses.replace(
+            s,
+            outcomes=s.outcomes[::33, ::33],
+            frequency_ratios=s.frequency_ratios[::33],
+            amplitude_ratios=s.amplitude_ratios[::33],
+            undecided=s.undecided[:0],
+        )
+        for s in spectra
+    ]
+    save_spectra(panels, coarse, request, data)
+    claims = [
+        Claim(name=verdict, sentence=verdict, verdict=verdict, finding="", criterion="", figures=(6,), rows=())
+        for verdict in ("holds", "holds", "holds in part")
+    ]
+    (data / "claims.json").write_text(Claims(grid="4 x 4", model="ebm", claims=tuple(claims)).model_dump_json(), encoding="utf-8")
+    text = re.sub(r"\s+", " ", write_page(tmp_path).read_text(encoding="utf-8"))
+    assert "Of 3 sentences of the paper 2 hold, 1 hold in part, 0 do not." in text
+    assert all(one.words in text for one in findings(coarse))
+    assert (data / "findings.svg").exists()

@@ -27,6 +27,7 @@ from rockcheck.scenes.writing import table_text, write_whole
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build
+from rockcheck.validation.spectra.histories import glimpses, glimpses_path, save_glimpses
 from rockcheck.validation.spectra.tiles import Tiles, compiled
 
 FIGURES: dict[int, tuple[Literal["left", "right"], float]] = {6: ("left", 0.3), 7: ("left", 0.6), 8: ("right", 0.3), 9: ("right", 0.6)}
@@ -191,8 +192,12 @@ def warm_up(panel: Panel, request: SpectrumRequest) -> None:
 
 
 def save(panels: Sequence[Panel], spectra: Sequence[Spectrum], request: SpectrumRequest, folder: Path) -> None:
-    """Write each spectrum's outcomes with its settings as NPZ and CSV, and note it in the folder's `spectra.json`."""
+    """Write each spectrum's outcomes with its settings as NPZ and CSV, and note it in the folder's `spectra.json`.
+
+    Beside them go histories of some nodes (`spectra.histories`), where the model is quick enough.
+    """
     records = []
+    model = build(request.model, request.settings)
     for panel, spectrum in zip(panels, spectra, strict=True):
         record = SpectrumRecord(
             name=stem(panel.name, request.model),
@@ -214,6 +219,8 @@ def save(panels: Sequence[Panel], spectra: Sequence[Spectrum], request: Spectrum
         about = record.model_dump(exclude={"frequency_ratios", "amplitude_ratios"}) | {"versions": provenance.versions()}
         write_whole(folder / f"{record.name}.npz", _npz(spectrum, json.dumps(about)))
         write_whole(folder / f"{record.name}.csv", _csv(spectrum, json.dumps(about)))
+        if compiled(model):
+            save_glimpses(glimpses(spectrum, model), glimpses_path(folder, record.name))
         records.append(record)
     index = read_index(folder)
     new = {record.name: record for record in records}
@@ -233,6 +240,20 @@ def read_index(folder: Path) -> SpectraIndex:
         return SpectraIndex.model_validate_json((folder / "spectra.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return SpectraIndex()
+
+
+def read_spectrum(folder: Path, record: SpectrumRecord, scene: Scene) -> Spectrum:
+    """A spectrum of a folder as it was saved, of this scene."""
+    with np.load(folder / f"{record.name}.npz") as data:
+        return Spectrum(
+            outcomes=data["outcomes"],
+            frequency_ratios=data["frequency_ratios"],
+            amplitude_ratios=data["amplitude_ratios"],
+            evaluations=record.evaluations,
+            undecided=data["undecided"],
+            scene=scene,
+            model=None,
+        )
 
 
 def _plain_scene(scene: Scene) -> dict[str, Any]:

@@ -1,0 +1,182 @@
+"""The pages of spectra, fragility and incremental dynamic analysis in a real browser: hover, click, keys, accessibility."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright import sync_api as playwright
+
+from rockcheck.ebm import Spectrum
+from rockcheck.reports.show.spectrum import COLOURS
+from rockcheck.reports.studies.ida import write_ida
+from rockcheck.reports.studies.spectra import paper_figure, write_page
+from rockcheck.reports.style import save
+from rockcheck.validation.spectra.fragility import Fragility, curve_of
+from rockcheck.validation.spectra.ida import Capacity, Ida, Line
+from rockcheck.validation.spectra.study import SPECTRA, SpectrumRequest, paper_panels
+from rockcheck.validation.spectra.study import save as save_spectra
+
+pytestmark = pytest.mark.browser
+SIZE = 20
+FREQUENCIES, AMPLITUDES = np.linspace(0.5, 8.0, SIZE), np.linspace(1.0, 12.0, SIZE)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Fig. 8 made up: safe up to the sixth amplitude, overturned right from there on; its histories are the model's own."""
+    path = tmp_path_factory.mktemp("spectra")
+    (path / SPECTRA).mkdir()
+    outcomes = np.zeros((SIZE, SIZE), dtype=np.int8)
+    outcomes[6:] = 1
+    panels = paper_panels(8)
+    grid = {"outcomes": outcomes, "frequency_ratios": FREQUENCIES, "amplitude_ratios": AMPLITUDES, "undecided": np.array([[0, 0]])}
+    spectra = [Spectrum(**grid, evaluations=SIZE**2, scene=panel.scene, model=None) for panel in panels]
+    save_spectra(panels, spectra, SpectrumRequest(FREQUENCIES, AMPLITUDES), path / SPECTRA)
+    save(paper_figure(panels, spectra), path / SPECTRA / "figure-8")
+    write_page(path)
+    return path
+
+
+@pytest.fixture
+def page(visitor: Callable[..., playwright.Page], folder: Path) -> playwright.Page:
+    page = visitor(folder, viewport={"width": 1280, "height": 900})
+    page.goto((folder / "spectra.html").as_uri())
+    return page
+
+
+def place(page: playwright.Page, panel: int, row: int, column: int) -> tuple[float, float]:
+    """Where a node is on the screen."""
+    canvas = page.locator(".panel canvas").nth(panel)
+    canvas.scroll_into_view_if_needed()
+    box = canvas.bounding_box()
+    assert box is not None
+    wide, high = box["width"] - 48.0, box["height"] - 30.0
+    return box["x"] + 42.0 + (column + 0.5) / SIZE * wide, box["y"] + 4.0 + (1.0 - (row + 0.5) / SIZE) * high
+
+
+def test_the_panels_stand_as_in_the_paper_and_are_painted(page: playwright.Page) -> None:
+    assert page.locator(".panel h3").all_inner_texts() == [panel.title for panel in paper_panels(8)]
+    colours = """([panel, nodes]) => {
+        const c = document.querySelectorAll('.panel canvas')[panel], w = c.clientWidth - 48, h = c.clientHeight - 30, r = devicePixelRatio;
+        const all = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+        return nodes.map(([i, j]) => {
+            const [x, y] = [42 + (j + .5) / 20 * w, 4 + h - (i + .5) / 20 * h].map(pixels => Math.round(r * pixels));
+            return '#' + [0, 1, 2].map(k => all[4 * (y * c.width + x) + k].toString(16).padStart(2, '0')).join('');
+        });
+    }"""
+    free = page.evaluate(colours, [0, [[3, 9], [9, 9], [0, 0]]])
+    assert free == [COLOURS["safe"], COLOURS["clockwise"], COLOURS["undecided"]]
+    assert page.evaluate(colours, [1, [[3, 9], [9, 9]]]) == [COLOURS["safe"], COLOURS["overturned"]]
+
+
+def test_pointing_at_a_node_names_it_in_every_panel(page: playwright.Page) -> None:
+    page.mouse.move(*place(page, 3, 10, 7))
+    said = page.locator("output.node").inner_text()
+    assert said.startswith(f"ωₚ/p {FREQUENCIES[7]:.3g}, aₚ / (g tan α) {AMPLITUDES[10]:.3g}: a pulse of ")
+    assert page.locator(".panel .said").all_inner_texts() == ["overturned clockwise", *["overturned"] * 6]
+    page.mouse.move(*place(page, 3, 2, 7))
+    assert page.locator(".panel .said").all_inner_texts() == ["safe"] * 7
+
+
+def test_a_click_plays_the_kept_history_that_ends_the_same_way(page: playwright.Page) -> None:
+    page.mouse.click(*place(page, 0, 7, 7))
+    playwright.expect(page.locator(".player figcaption")).to_contain_text("overturned clockwise")
+    chosen = page.evaluate("rockcheckFigures['figure-8'].store.chosen.node")
+    assert chosen[0] >= 6
+    assert abs(chosen[0] - 7) <= 1
+    assert abs(chosen[1] - 7) <= 1
+    start = page.evaluate("rockcheckPlayer.store.time")
+    for _ in range(100):
+        if page.evaluate("rockcheckPlayer.store.time") > start + 0.2:
+            break
+        page.wait_for_timeout(50)
+    assert page.evaluate("rockcheckPlayer.store.time") > start + 0.2
+    page.get_by_role("button", name="Pause").click()
+    page.mouse.click(*place(page, 4, 1, 1))
+    playwright.expect(page.locator(".player figcaption")).to_contain_text("Gap 53 mm, e = 1")
+    assert page.locator(".player").count() == 1
+    assert page.locator(".player svg .solid").count() >= 2  # the floor and the wall
+
+
+def test_keys_do_what_the_mouse_does(page: playwright.Page) -> None:
+    page.locator(".panel canvas").nth(1).focus()
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("ArrowRight")
+    assert page.evaluate("rockcheckFigures['figure-8'].store.node") == [11, 11]
+    page.keyboard.press("Enter")
+    playwright.expect(page.locator(".player")).to_be_visible()
+
+
+def fragility_page(folder: Path) -> Path:
+    (folder / SPECTRA).mkdir()
+    level = np.linspace(0.5, 5.0, 10)
+    fell = np.random.default_rng(1).random((20, 2, 1)) < np.linspace(0.0, 1.0, 10)
+    cases = tuple(curve_of(label, fell, np.zeros_like(fell), level) for label in ("with the wall", "without a wall"))
+    found = Fragility(title="shelf, 20 records", about="made up", intensity="peak acceleration / (g tan α)", cases=cases)
+    (folder / SPECTRA / "fragility.json").write_text(found.model_dump_json(), encoding="utf-8")
+    (folder / SPECTRA / "fragility.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"/>', encoding="utf-8")
+    return write_page(folder)
+
+
+def ida_page(folder: Path) -> Path:
+    level = np.linspace(0.1, 1.0, 10)
+    fell = np.random.default_rng(1).random((4, 2, 1)) < np.linspace(0.0, 1.0, 10)
+    curve = curve_of("peak above α, or overturned", fell, np.zeros_like(fell), level)
+    lines = tuple(
+        Line(record=f"r{k}", direction=1, own=0.3, peaks=tuple(None if 0.2 * (k + 1) * x > 0.7 else 0.2 * (k + 1) * x for x in level))
+        for k in range(4)
+    )
+    quantiles = {"0.16": lines[0].peaks, "0.5": lines[1].peaks, "0.84": lines[3].peaks}
+    found = Ida(
+        scene="shelf", model="ebm", measure="pga", label="PGA", unit="g", intensities=tuple(level), lines=lines, quantiles=quantiles,
+        capacities=(Capacity(limit=1.0, curve=curve, low=0.4, high=0.6),),
+    )  # fmt: skip
+    return write_ida(found, folder)
+
+
+def test_fragility_has_its_own_page_and_is_read_under_the_pointer(visitor: Callable[..., playwright.Page], tmp_path: Path) -> None:
+    page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
+    page.goto(fragility_page(tmp_path).as_uri())
+    assert page.title() == "Fragility: the probability of overturning · rockcheck: fragility: the probability of overturning"
+    assert page.locator("h1").inner_text() == "Fragility: the probability of overturning"
+    assert page.locator(".key span").all_inner_texts() == ["with the wall", "without a wall"]
+    assert "median, peak acceleration / (g tan α)" in page.locator("table thead").inner_text()
+    page.locator("[data-curves] .u-over").hover()
+    said = page.locator("[data-curves] output").inner_text()
+    assert said.startswith("peak acceleration / (g tan α) ")
+    assert "with the wall 0." in said
+
+
+def test_the_lines_of_an_ida_are_named_under_the_pointer(visitor: Callable[..., playwright.Page], tmp_path: Path) -> None:
+    page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
+    page.goto(ida_page(tmp_path).as_uri())
+    page.locator('[data-curves="lines"] .u-over').hover(position={"x": 500, "y": 200})
+    said = page.locator('[data-curves="lines"] output').inner_text()
+    assert said.startswith("PGA (g) ")
+    assert any(f"r{k} 0." in said for k in range(4))
+    assert "50 % " in said
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("what", ["spectra", "fragility", "ida"])
+def test_accessible(visitor: Callable[..., playwright.Page], folder: Path, tmp_path: Path, what: str, scheme: str) -> None:
+    address = folder / "spectra.html" if what == "spectra" else {"fragility": fragility_page, "ida": ida_page}[what](tmp_path)
+    page = visitor(address.parent, color_scheme=scheme, bypass_csp=True, viewport={"width": 1280, "height": 900})
+    page.goto(address.as_uri())
+    if what == "spectra":
+        page.evaluate("(f => f.choose(f.panels[2], [8, 8]))(rockcheckFigures['figure-8'])")
+        playwright.expect(page.locator(".player")).to_be_visible()
+    page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
+    found = Axe().run(page, options={"preload": False}).response["violations"]
+    serious = [f"{v['id']}: {n['html'][:120]}" for v in found if v["impact"] in ("serious", "critical") for n in v["nodes"][:3]]
+    assert serious == []
+
+
+def test_a_phone_needs_no_sideways_scrolling(visitor: Callable[..., playwright.Page], folder: Path) -> None:
+    page = visitor(folder, viewport={"width": 390, "height": 800})
+    page.goto((folder / "spectra.html").as_uri())
+    assert page.evaluate("document.documentElement.scrollWidth") == 390

@@ -1,0 +1,105 @@
+"""Histories of some nodes of a spectrum, thinned until they are just good enough to be looked at.
+
+A page plays them: the event-based model's own motion, not an imitation of it. `<name>.histories.npz` beside a spectrum holds them.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.ebm import EventBasedModel, Spectrum
+from rockcheck.ebm.spectrum import node_scene
+from rockcheck.scenes import ModelFailure
+from rockcheck.scenes.writing import write_whole
+
+#: Nodes an axis whose histories are kept, both ends of the axis among them.
+KEPT_AN_AXIS = 16
+#: A history is played with so many rows, and thinned until straight lines between the rows that stay are within this much of
+#: it: of alpha in rotation, of the half width in position.
+ROWS, COARSE = 400, 0.01
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Glimpse:
+    """The history of node (`row`, `column`): an array of rows t (s), theta (rad), x, y (m), and its outcome."""
+
+    row: int
+    column: int
+    outcome: str
+    motion: Floats
+
+
+def glimpses(spectrum: Spectrum, model: EventBasedModel) -> list[Glimpse]:
+    """Histories of `KEPT_AN_AXIS` nodes an axis, where the model could play them."""
+    found = []
+    for i in _spread(len(spectrum.amplitude_ratios)):
+        for j in _spread(len(spectrum.frequency_ratios)):
+            scene = node_scene(spectrum.scene, float(spectrum.amplitude_ratios[i]), float(spectrum.frequency_ratios[j]))
+            try:
+                history = model.simulate(scene.replace(output_step=scene.duration / ROWS))
+            except ModelFailure:
+                continue
+            motion = np.column_stack([np.asarray(history.channels[name], dtype=float) for name in ("t", "theta", "x", "y")])
+            scale = np.array([scene.block.alpha, scene.block.half_width, scene.block.half_width])
+            found.append(Glimpse(int(i), int(j), history.outcome, motion[_enough(motion[:, 0], motion[:, 1:] / scale)]))
+    return found
+
+
+def _spread(size: int) -> NDArray[np.int64]:
+    return np.unique(np.round(np.linspace(0, size - 1, min(size, KEPT_AN_AXIS))).astype(np.int64))
+
+
+def _enough(t: Floats, values: Floats) -> list[int]:
+    """The rows that stay: halving from both ends, at the row that is farthest from the straight line."""
+    kept, open_ = {0, len(t) - 1}, [(0, len(t) - 1)]
+    while open_:
+        first, last = open_.pop()
+        if last - first < 2:
+            continue
+        share = ((t[first : last + 1] - t[first]) / (t[last] - t[first]))[:, None]
+        line = (1.0 - share) * values[first] + share * values[last]
+        apart = np.abs(values[first : last + 1] - line).max(axis=1)
+        worst = int(np.argmax(apart))
+        if apart[worst] > COARSE:
+            kept.add(first + worst)
+            open_ += [(first, first + worst), (first + worst, last)]
+    return sorted(kept)
+
+
+def save_glimpses(found: Sequence[Glimpse], path: Path) -> None:
+    """Write histories as one NPZ: all rows below each other, and where each begins."""
+    content = io.BytesIO()
+    lengths = [len(one.motion) for one in found]
+    np.savez_compressed(
+        content,
+        nodes=np.array([(one.row, one.column) for one in found], dtype=np.int64).reshape(-1, 2),
+        outcomes=np.array([one.outcome for one in found]),
+        ends=np.cumsum(lengths, dtype=np.int64),
+        rows=np.concatenate([one.motion for one in found]).astype(np.float32) if found else np.zeros((0, 4), dtype=np.float32),
+    )
+    write_whole(path, content.getvalue())
+
+
+def read_glimpses(path: Path) -> list[Glimpse]:
+    """What `save_glimpses` wrote; empty where there is no such file."""
+    if not path.is_file():
+        return []
+    with np.load(path) as data:
+        parts = np.split(data["rows"].astype(float), data["ends"][:-1]) if len(data["ends"]) else []
+        return [
+            Glimpse(int(i), int(j), str(outcome), part)
+            for (i, j), outcome, part in zip(data["nodes"], data["outcomes"], parts, strict=True)
+        ]
+
+
+def glimpses_path(folder: Path, name: str) -> Path:
+    """Where the histories of a spectrum of that name lie."""
+    return folder / f"{name}.histories.npz"
