@@ -74,6 +74,17 @@ class Row:
 
 
 @dataclass(frozen=True)
+class Glance:
+    """What most readers ask: the entry farthest from the reference, the scenes whose outcome depends on the model, and what is no
+    longer as it was accepted (checks that changed or are out, the farthest first; `judged` were looked at)."""
+
+    farthest: Entry | None
+    apart: tuple[Row, ...]
+    changed: tuple[tuple[Cell, Check], ...]
+    judged: int
+
+
+@dataclass(frozen=True)
 class Accuracy:
     """A model over all scenes: (reference's, model's) peaks (alpha), bias and scatter in this run, and over all suites."""
 
@@ -86,6 +97,19 @@ class Accuracy:
 def matrix(run: Run) -> list[Row]:
     """A row a scene, an entry a model of the run."""
     return [Row(scene, tuple(entry(run, scene, model) for model in run.models)) for scene in run.scenes]
+
+
+def glance(run: Run) -> Glance:
+    """The answers that the index gives first."""
+    rows = matrix(run)
+    entries = [one for row in rows for one in row.entries if one and one.cell.model != run.reference and one.rms]
+    accepted = [(cell, check) for cell, check in run.checks() if check.expected is not None]
+    return Glance(
+        farthest=max(entries, key=lambda one: (one.rms.value if one.rms else None) or 0.0, default=None),
+        apart=tuple(row for row in rows if any(one and one.apart for one in row.entries)),
+        changed=tuple(sorted((pair for pair in accepted if pair[1].verdict != "pass"), key=lambda pair: -overrun(pair[1]))),
+        judged=len(accepted),
+    )
 
 
 def entry(run: Run, scene: str, model: str) -> Entry | None:
@@ -175,4 +199,4 @@ def write_overview(run: Run, folder: Path) -> Mapping[str, object]:
         save(peaks_figure(run, found), folder / PEAKS, ["svg"])
     else:
         (folder / f"{PEAKS}.svg").unlink(missing_ok=True)
-    return {"matrix": matrix(run), "accuracies": found}
+    return {"matrix": matrix(run), "accuracies": found, "glance": glance(run)}

@@ -16,7 +16,7 @@ import pytest
 from rockcheck.reports import write_site
 from rockcheck.reports.ensembles import distributions_figure, ensemble_views
 from rockcheck.reports.figures import histories_figure
-from rockcheck.reports.overview import PEAKS, accuracies, matrix
+from rockcheck.reports.overview import PEAKS, accuracies, glance, matrix
 from rockcheck.reports.payload import packed
 from rockcheck.reports.scene_file import write_scene_file
 from rockcheck.reports.site import PAGES
@@ -125,6 +125,24 @@ def test_index_says_how_far_each_model_is(site: Path) -> None:
     assert "error" in lost.verdicts
     index = (site / "index.html").read_text(encoding="utf-8")
     assert '<tr data-scene="beside a wall"' in index
+
+
+def test_index_answers_three_questions_first(site: Path) -> None:
+    run = Run.load(site)
+    found = glance(run)
+    assert found.farthest is not None
+    assert (found.farthest.cell.scene, found.farthest.cell.model) == ("beside a wall", "mine:Model")
+    assert [row.scene for row in found.apart] == [row.scene for row in matrix(run) if any(one and one.apart for one in row.entries)]
+    accepted = [check for _, check in run.checks() if check.expected is not None]
+    assert found.judged == len(accepted)
+    assert len(found.changed) == sum(check.verdict != "pass" for check in accepted) > 0
+    shares = [overrun(check) for _, check in found.changed]
+    assert shares == sorted(shares, reverse=True)
+    index = (site / "index.html").read_text(encoding="utf-8")
+    told = " ".join(" ".join(Addresses(index.partition('<dl class="glance"')[2].partition("</dl>")[0]).words).split())
+    assert "mine:Model in beside a wall : 0.006 α RMS (first 8 s), convergence not looked at" in told
+    assert f"{len(found.changed)} of {found.judged} figures" in told
+    assert index.index('<dl class="glance"') < index.index('id="worst"') < index.index('id="matrix"')
 
 
 def test_index_shows_peaks_against_the_reference_s(site: Path) -> None:
