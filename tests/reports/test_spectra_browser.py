@@ -84,7 +84,7 @@ def test_pointing_at_a_node_names_it_in_every_panel(page: playwright.Page) -> No
 
 def test_a_click_plays_the_kept_history_that_ends_the_same_way(page: playwright.Page) -> None:
     page.mouse.click(*place(page, 0, 7, 7))
-    playwright.expect(page.locator(".player figcaption")).to_contain_text("overturned clockwise")
+    playwright.expect(page.locator(".played figcaption")).to_contain_text("overturned clockwise")
     chosen = page.evaluate("rockcheckFigures['figure-8'].store.chosen.node")
     assert chosen[0] >= 6
     assert abs(chosen[0] - 7) <= 1
@@ -97,9 +97,9 @@ def test_a_click_plays_the_kept_history_that_ends_the_same_way(page: playwright.
     assert page.evaluate("rockcheckPlayer.store.time") > start + 0.2
     page.get_by_role("button", name="Pause").click()
     page.mouse.click(*place(page, 4, 1, 1))
-    playwright.expect(page.locator(".player figcaption")).to_contain_text("Gap 53 mm, e = 1")
-    assert page.locator(".player").count() == 1
-    assert page.locator(".player svg .solid").count() >= 2  # the floor and the wall
+    playwright.expect(page.locator(".played figcaption")).to_contain_text("Gap 53 mm, e = 1")
+    assert page.locator(".played").count() == 1
+    assert page.locator(".played svg .solid").count() >= 2  # the floor and the wall
 
 
 def test_keys_do_what_the_mouse_does(page: playwright.Page) -> None:
@@ -108,7 +108,7 @@ def test_keys_do_what_the_mouse_does(page: playwright.Page) -> None:
     page.keyboard.press("ArrowRight")
     assert page.evaluate("rockcheckFigures['figure-8'].store.node") == [11, 11]
     page.keyboard.press("Enter")
-    playwright.expect(page.locator(".player")).to_be_visible()
+    playwright.expect(page.locator(".played")).to_be_visible()
 
 
 def fragility_page(folder: Path) -> Path:
@@ -169,7 +169,7 @@ def test_accessible(visitor: Callable[..., playwright.Page], folder: Path, tmp_p
     page.goto(address.as_uri())
     if what == "spectra":
         page.evaluate("(f => f.choose(f.panels[2], [8, 8]))(rockcheckFigures['figure-8'])")
-        playwright.expect(page.locator(".player")).to_be_visible()
+        playwright.expect(page.locator(".played")).to_be_visible()
     page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
     found = Axe().run(page, options={"preload": False}).response["violations"]
     serious = [f"{v['id']}: {n['html'][:120]}" for v in found if v["impact"] in ("serious", "critical") for n in v["nodes"][:3]]

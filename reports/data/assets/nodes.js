@@ -166,7 +166,7 @@
   }
 
   function play(host, kept, index, caption) {
-    host.querySelector(".player")?.remove();
+    host.querySelector(".played")?.remove();
     const all = kept.unpacked ??= floats(kept.rows), first = index ? kept.ends[index - 1] : 0, last = kept.ends[index] - 1;
     const column = n => Array.from({ length: last - first + 1 }, (_, k) => all[4 * (first + k) + n]);
     const t = column(0), channels = { theta: column(1).map(value => value / kept.alpha), x: column(2), y: column(3) };
@@ -189,7 +189,7 @@
         return channels[channel][k] + share * (channels[channel][k + 1] - channels[channel][k]);
       },
     };
-    const player = make("figure", { class: "player" }, host);
+    const player = make("figure", { class: "played" }, host);
     const views = make("div", { class: "views" }, player);
     const svg = () => { const one = document.createElementNS("http://www.w3.org/2000/svg", "svg"); views.append(one); return one; };
     const view = svg(), close = svg();
