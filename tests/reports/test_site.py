@@ -173,6 +173,9 @@ def test_a_run_without_tolerances_says_how_to_get_them(tmp_path: Path, finished:
     assert "No tolerance yet" in index
     assert f"{sum(len(cell.checks) for cell in cells)} figures have no tolerance yet" in index
     assert "rockcheck accept" in index
+    assert "out of tolerance</span>" not in index, "what waits for a tolerance has not failed"
+    assert index.count("no tolerance yet</span>") >= len(cells) - 1
+    assert 'data-verdict="no-tolerance"' in index
 
 
 def test_data_are_the_histories(site: Path) -> None:
