@@ -268,6 +268,7 @@ def _environment() -> Environment:
         tables.measure_table,
         tables.scene_facts,
         tables.summary,
+        tables.events_of,
         figure_stem,
         entry,
     ):

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import geometric_mean
 
 from rockcheck.reports.show import words as display
 from rockcheck.reports.view import SceneView
 from rockcheck.reports.words import number
+from rockcheck.scenes.history import events_path
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.suite.results import Cell, Check, Run
 
@@ -106,3 +108,8 @@ def summary(view: SceneView) -> str:
         reached = f"peak {number(history.peak_rotation / view.scene.block.alpha)} α, " if history.overturned_at is None else ""
         said.append(f"{model}: {reached}{impacts} impacts, {history.fate}")
     return "; ".join(said) + "."
+
+
+def events_of(history: str) -> str:
+    """The address of the events beside a history's."""
+    return events_path(Path(history)).as_posix()

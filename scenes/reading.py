@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import gzip
 import os
 import re
 import stat
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, cast
 
 from rockcheck.scenes.errors import InputError, printable
 
@@ -59,13 +63,28 @@ def read_text(path: Path, most: int = MOST_BYTES, *, latin: bool = False) -> str
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
+#: How a file begins that gzip has compressed.
+_GZIP = b"\x1f\x8b"
 #: The marks of UTF-16, and bytes that no text holds.
 _NOT_UTF8 = re.compile(rb"\xff\xfe|\xfe\xff")
 _CONTROLS = re.compile(rb"[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")
 
 
+@contextmanager
+def open_table(path: Path) -> Iterator[IO[bytes]]:
+    """A table's content, open for reading; one that gzip has compressed is decompressed as it is read. Raises `InputError`."""
+    with open_regular(path, MOST_TABLE_BYTES) as stream:
+        packed = stream.read(len(_GZIP)) == _GZIP
+        stream.seek(0)
+        if not packed:
+            yield stream
+            return
+        with gzip.GzipFile(fileobj=stream) as unpacked:
+            yield cast(IO[bytes], unpacked)
+
+
 def read_table(path: Path, **options: Any) -> pd.DataFrame:
-    """A CSV file by pandas, whose `options` these are; lines that start with # are remarks.
+    """A CSV file by pandas, plain or compressed by gzip; `options` are those of pandas. Lines that start with # are remarks.
 
     Raises `InputError` where it is no such file, or a line of it is too long for a table of histories.
     """
@@ -73,10 +92,12 @@ def read_table(path: Path, **options: Any) -> pd.DataFrame:
 
     shown = printable(path)
     try:
-        with open_regular(path, MOST_TABLE_BYTES) as stream:
+        with open_table(path) as stream:
             _check_lines(stream, shown)
             stream.seek(0)
             return pd.read_csv(stream, comment="#", **options)
+    except (gzip.BadGzipFile, EOFError, zlib.error):
+        raise InputError(f"{shown}: a compressed file that is damaged") from None
     except OSError as error:
         raise InputError(f"{shown}: cannot be read: {error.strerror}") from None
     except InputError:
@@ -86,10 +107,13 @@ def read_table(path: Path, **options: Any) -> pd.DataFrame:
 
 
 def _check_lines(stream: IO[bytes], shown: str) -> None:
-    """Every row stands on one line, of a bounded number of columns."""
-    number = 0
+    """Every row stands on one line, of a bounded number of columns; all of them are no more than a table may hold."""
+    number = size = 0
     while line := stream.readline(MOST_LINE + 1):
         number += 1
+        size += len(line)
+        if size > MOST_TABLE_BYTES:  # a small compressed file may hold very much
+            raise InputError(f"{shown}: larger than {MOST_TABLE_BYTES} bytes")
         if len(line) > MOST_LINE:
             raise InputError(f"{shown}: not a CSV table: line {number}: longer than {MOST_LINE} bytes")
         if line.startswith(b"#"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import math
 
@@ -9,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rockcheck.scenes import Block, Cost, Event, Floor, History, InputError, Rest, Scene
+from rockcheck.scenes import Block, Cost, Event, Floor, History, InputError, Rest, Scene, reading
 from rockcheck.scenes.history import COLUMNS
 from rockcheck.scenes.observation import observe
 
@@ -62,6 +63,50 @@ def test_save_and_load_round_trip(history, tmp_path):
     for name, values in history.channels.items():
         np.testing.assert_array_equal(again.channels[name], values)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run.csv", "run.events.csv"]
+
+
+def test_a_compressed_history_is_the_same_and_opens_in_pandas(history, tmp_path):
+    """Half the size; the same history gives the same bytes, whenever it is written."""
+    path = tmp_path / "run.csv.gz"
+    history.save(path)
+    written = path.read_bytes()
+    history.save(tmp_path / "run.csv")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["run.csv", "run.csv.gz", "run.events.csv", "run.events.csv.gz"]
+    assert gzip.decompress(written) == (tmp_path / "run.csv").read_bytes()
+    again = History.load(path)
+    assert list(again.event_list) == list(history.event_list)
+    assert again.settings == history.settings
+    np.testing.assert_array_equal(again.channels["theta"], history.channels["theta"])
+    np.testing.assert_array_equal(pd.read_csv(path)["theta"], history.channels["theta"])
+    again.save(path)
+    assert path.read_bytes() == written
+
+
+@pytest.mark.parametrize("damage", ["cut", "flipped", "no end"])
+def test_a_damaged_compressed_history(history, tmp_path, damage):
+    path = tmp_path / "run.csv.gz"
+    history.save(path)
+    content = bytearray(path.read_bytes())
+    if damage == "flipped":
+        content[len(content) // 2] ^= 0xFF
+    path.write_bytes(content[:5] if damage == "cut" else content[:-8] if damage == "no end" else content)
+    with pytest.raises(InputError, match=r"^[^\n]*run\.csv\.gz: (a compressed file that is damaged|not a CSV table)"):
+        History.load(path)
+
+
+def test_a_compressed_table_is_bounded(tmp_path, monkeypatch):
+    """A small file may hold very much: it is refused before it is taken into memory."""
+    monkeypatch.setattr(reading, "MOST_TABLE_BYTES", 100_000)
+    path = tmp_path / "bomb.csv.gz"
+    path.write_bytes(gzip.compress(b"t,theta\n" + b"0,0\n" * 1_000_000))
+    assert path.stat().st_size < 100_000
+    with pytest.raises(InputError, match=r"bomb\.csv\.gz: larger than 100000 bytes"):
+        History.load(path)
+
+
+def test_another_compressed_file_is_refused(history, tmp_path):
+    with pytest.raises(InputError, match=r"written as \.csv, \.csv\.gz, \.json or \.mat"):
+        history.save(tmp_path / "run.json.gz")
 
 
 def test_tables(history):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import gzip
 import io
 import json
 import math
@@ -27,7 +28,7 @@ from rockcheck.scenes.recordings import read_components
 from rockcheck.validation.commands.cli import main
 from rockcheck.validation.discrepancy.measured import read_measured
 from rockcheck.validation.execute.models import build
-from rockcheck.validation.execute.store import COMPARISONS, Store, _sealed, name_of
+from rockcheck.validation.execute.store import COMPARISONS, SUFFIXES, TABLE, Store, _sealed, name_of
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.suites import load_suite
 
@@ -260,7 +261,7 @@ def feed_history(content: bytes, folder: Path) -> None:
 
 
 @functools.cache
-def stored_texts() -> dict[str, str]:
+def stored_files() -> dict[str, bytes]:
     """A small finished run as its files: run.json, a history, its events and its record."""
     from rockcheck.ebm import EventBasedModel
 
@@ -268,14 +269,14 @@ def stored_texts() -> dict[str, str]:
     history = EventBasedModel().simulate(scene)
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        history.save(folder / "h.csv")
-        files = {".csv": (folder / "h.csv").read_text(), ".events.csv": (folder / "h.events.csv").read_text()}
+        history.save(folder / "h.csv.gz")
+        files = {suffix: (folder / f"h{suffix}").read_bytes() for suffix in SUFFIXES}
         Store(folder).put("short--ebm--0", files, {"outcome": history.outcome, "cost": {}, "notes": [], "settings": {}})
-        record = (folder / "histories" / "short--ebm--0.json").read_text()
+        record = (folder / "histories" / "short--ebm--0.json").read_bytes()
     scenes = {"short": scene.replace(excitation={"kind": "rest"}).model_dump(mode="json")}
-    cell = {"scene": "short", "model": "ebm", "status": "done", "history": "histories/short--ebm--0.csv", "outcome": history.outcome}
+    cell = {"scene": "short", "model": "ebm", "status": "done", "history": "histories/short--ebm--0.csv.gz", "outcome": history.outcome}
     run = Run(suite="s", created="2026-01-01T00:00:00", reference="ebm", scenes=scenes, models=("ebm",), cells=(cell,))
-    return {"run.json": run.model_dump_json(), "record": record, **files}
+    return {"run.json": run.model_dump_json().encode(), "record": record, **files}
 
 
 def feed_stored_run(content: bytes, folder: Path) -> None:
@@ -286,8 +287,8 @@ def feed_stored_run(content: bytes, folder: Path) -> None:
 def feed_stored_record(content: bytes, folder: Path) -> None:
     """A damaged record is as good as none."""
     store = Store(folder)
-    for suffix in (".csv", ".events.csv"):
-        (folder / "histories" / f"a{suffix}").write_text(stored_texts()[suffix])
+    for suffix in SUFFIXES:
+        (folder / "histories" / f"a{suffix}").write_bytes(stored_files()[suffix])
     (folder / "histories" / "a.json").write_bytes(content)
     (folder / "comparisons" / "a.json").write_bytes(content)
     assert isinstance(store.get("a"), dict | None)
@@ -329,8 +330,8 @@ READERS: dict[str, tuple[Callable[[bytes, Path], None], Callable[[], str]]] = {
     "scene_toml": (feed_scene, lambda: SCENE),
     "suite_toml": (feed_suite, lambda: SUITE),
     "history_csv": (feed_history, lambda: HISTORY),
-    "stored_run": (feed_stored_run, lambda: stored_texts()["run.json"]),
-    "stored_record": (feed_stored_record, lambda: stored_texts()["record"]),
+    "stored_run": (feed_stored_run, lambda: stored_files()["run.json"].decode()),
+    "stored_record": (feed_stored_record, lambda: stored_files()["record"].decode()),
     "command_line": (feed_command_line, lambda: BETWEEN.join(("simulate", "a.toml", "--model", "ebm", "-o", "out.csv"))),
 }
 
@@ -370,7 +371,7 @@ def test_any_input(tmp_path, reader):
 
 @pytest.fixture(scope="module")
 def stored() -> dict[str, str]:
-    return stored_texts()
+    return stored_files()
 
 
 #: Small files, or small numbers in them, that ask for a great deal.
@@ -456,7 +457,7 @@ def test_names_are_told_from_paths_and_from_markup(tmp_path, name):
 def test_a_stored_path_does_not_leave_the_run(tmp_path, stored, capsys):
     """A run's file whose history lies elsewhere is refused, before any page is written."""
     data = json.loads(stored["run.json"])
-    (tmp_path / "secret.csv").write_text(stored[".csv"])
+    (tmp_path / "secret.csv").write_bytes(gzip.decompress(stored[TABLE]))
     run = tmp_path / "run"
     run.mkdir()
     for path in ("../secret.csv", str(tmp_path / "secret.csv"), "histories/../../secret.csv"):
@@ -476,7 +477,7 @@ def test_markup_in_a_stored_run_is_text_on_the_page(tmp_path, stored):
     data["scenes"]["short"]["description"] = evil
     (tmp_path / "run.json").write_text(json.dumps(data))
     store = Store(tmp_path)
-    store.put("short--ebm--0", {suffix: stored[suffix] for suffix in (".csv", ".events.csv")}, {})
+    store.put("short--ebm--0", {suffix: stored[suffix] for suffix in SUFFIXES}, {})
     assert main(["report", str(tmp_path)]) == 0
     pages = [*tmp_path.glob("**/*.html"), *tmp_path.glob("**/data/*.js")]
     assert pages
@@ -490,7 +491,7 @@ def test_markup_in_a_stored_run_is_text_on_the_page(tmp_path, stored):
 def test_a_record_names_no_file_but_its_own(tmp_path, stored):
     """Found by fuzzing: a record that names a file with a name too long, or elsewhere, is as good as none."""
     store = Store(tmp_path)
-    store.put("a", {suffix: stored[suffix] for suffix in (".csv", ".events.csv")}, {})
+    store.put("a", {suffix: stored[suffix] for suffix in SUFFIXES}, {})
     assert store.get("a") == {}
     record = tmp_path / "histories" / "a.json"
     files = json.loads(record.read_text())["content"]["files"]

@@ -149,7 +149,7 @@ def test_folder_that_cannot_be_written(tmp_path, capsys, command):
 def test_clock_that_jumps(tmp_path, monkeypatch):
     """Years forward or back: what a run has used is kept, and read back."""
     store = Store(tmp_path)
-    files = {".csv": "t,theta\n0,0\n", ".events.csv": ""}
+    files = {".csv.gz": b"t,theta\n0,0\n", ".events.csv.gz": b""}
     now = time.time()
     for jump in (0.0, 10.0 * 365 * 86400.0, -10.0 * 365 * 86400.0):
         monkeypatch.setattr(stores.time, "time", lambda jump=jump: now + jump)
@@ -163,8 +163,8 @@ def test_clock_that_jumps(tmp_path, monkeypatch):
 def test_two_versions_share_a_store(tmp_path):
     """Each reads what it wrote; a record of another layout is as good as none, and a newer run.json is told."""
     old, new = Store(tmp_path), Store(tmp_path)
-    old.put("s--ebm--1111", {".csv": "old"}, {"outcome": "at rest"})
-    new.put("s--ebm--2222", {".csv": "new"}, {"outcome": "moving", "something": {"new": [1]}})
+    old.put("s--ebm--1111", {".csv.gz": b"old"}, {"outcome": "at rest"})
+    new.put("s--ebm--2222", {".csv.gz": b"new"}, {"outcome": "moving", "something": {"new": [1]}})
     assert old.get("s--ebm--1111") == {"outcome": "at rest"}
     assert new.get("s--ebm--1111") == {"outcome": "at rest"}
     assert old.history("s--ebm--1111").read_text() == "old"

@@ -2,7 +2,7 @@
 
 | folder | a result |
 |---|---|
-| `histories/` | `.csv` and `.events.csv` (`scenes.History.save`); `.json`, the record with their hashes, is written last |
+| `histories/` | `.csv.gz` and `.events.csv.gz` (`scenes.History.save`); `.json`, the record with their hashes, is written last |
 | `comparisons/` | `.json`: figures of a cell, peaks of an ensemble's batch, a horizon of predictability |
 | `tiles/` | `.json`: outcomes at some nodes of a spectrum |
 
@@ -31,7 +31,8 @@ HISTORIES = "histories"
 COMPARISONS = "comparisons"
 TILES = "tiles"
 #: What a history's files are called after its name.
-SUFFIXES = {".csv", ".events.csv"}
+TABLE = ".csv.gz"
+SUFFIXES = {TABLE, f".events{TABLE}"}
 #: A result that no run has used for so long is removed, s.
 KEEP = 14 * 86400.0
 
@@ -54,13 +55,13 @@ class Store:
 
     def history(self, name: str) -> Path:
         """Path of a history's CSV."""
-        return self.folder / HISTORIES / f"{name}.csv"
+        return self.folder / HISTORIES / f"{name}{TABLE}"
 
-    def put(self, name: str, files: Mapping[str, str], record: Mapping[str, Any]) -> None:
-        """Keep a history: its files by suffix (".csv", ".events.csv") and its record."""
-        for suffix, text in files.items():
-            write_whole(self.folder / HISTORIES / f"{name}{suffix}", text)
-        hashes = {suffix: _hash(text.encode()) for suffix, text in files.items()}
+    def put(self, name: str, files: Mapping[str, bytes], record: Mapping[str, Any]) -> None:
+        """Keep a history: its files by suffix (".csv.gz", ".events.csv.gz") and its record."""
+        for suffix, content in files.items():
+            write_whole(self.folder / HISTORIES / f"{name}{suffix}", content)
+        hashes = {suffix: _hash(content) for suffix, content in files.items()}
         write_whole(self.folder / HISTORIES / f"{name}.json", _sealed(name, {**record, "files": hashes}))
 
     def get(self, name: str) -> dict[str, Any] | None:
@@ -68,7 +69,7 @@ class Store:
         base = self.folder / HISTORIES
         record = _read(base / f"{name}.json")
         files = record.pop("files", None) if record else None
-        if record is None or not isinstance(files, dict) or ".csv" not in files or not files.keys() <= SUFFIXES:
+        if record is None or not isinstance(files, dict) or TABLE not in files or not files.keys() <= SUFFIXES:
             return None
         for suffix, expected in files.items():
             path = base / f"{name}{suffix}"
@@ -93,7 +94,7 @@ class Store:
         """Remove results that no run has used for two weeks, and the leavings of killed runs after a day."""
         now = time.time() if now is None else now
         for path in [*(path for kind in self.kinds for path in (self.folder / kind).iterdir()), *self.folder.glob(".*.part")]:
-            record = path if path.suffix in (".json", ".part") else path.with_name(re.sub(r"(\.events)?\.csv$", ".json", path.name))
+            record = path if path.suffix in (".json", ".part") else path.with_name(re.sub(r"(\.events)?\.csv(\.gz)?$", ".json", path.name))
             used = record if record.exists() else path
             try:
                 if now - used.stat().st_mtime > (86400.0 if path.suffix == ".part" else KEEP):

@@ -19,6 +19,7 @@ from rockcheck.scenes import History, InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.execute.models import build_own, family
 from rockcheck.validation.execute.pool import Call, Pool
+from rockcheck.validation.execute.store import TABLE
 from rockcheck.validation.uncertainty.numerical import failed, numerical_uncertainty
 
 
@@ -57,7 +58,7 @@ class TaskResult:
     `bad_input` says that the model refused what it was given. `traceback` is that of an exception which no model may raise.
     """
 
-    files: dict[str, str] = field(default_factory=dict, repr=False)
+    files: dict[str, bytes] = field(default_factory=dict, repr=False)
     record: dict[str, Any] = field(default_factory=dict)
     failure: str = ""
     bad_input: bool = False
@@ -74,8 +75,8 @@ def play(task: Task | BatchTask) -> TaskResult:
     if history is None:
         return failed
     with tempfile.TemporaryDirectory() as folder:
-        history.save(Path(folder) / "history.csv")
-        files = {path.name.removeprefix("history"): path.read_text(encoding="utf-8") for path in Path(folder).iterdir()}
+        history.save(Path(folder) / f"history{TABLE}")
+        files = {path.name.removeprefix("history"): path.read_bytes() for path in Path(folder).iterdir()}
     cost = {key: value for key, value in vars(history.cost).items() if value is not None}
     record = {
         "outcome": history.outcome,

@@ -3,8 +3,8 @@
 A run's folder holds
 
     run.json                       one `Run` (this module); run.schema.json beside it describes it
-    histories/<scene>--<model>--<key>.csv          one history a cell, `scenes.History.save` (path in `Cell.history`)
-    histories/<scene>--<model>--<key>.events.csv   its events
+    histories/<scene>--<model>--<key>.csv.gz          one history a cell, `scenes.History.save` (path in `Cell.history`)
+    histories/<scene>--<model>--<key>.events.csv.gz   its events
 
 Nothing here knows how a cell is simulated, compared or shown.
 """

@@ -25,7 +25,7 @@ from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.execute import provenance, workers
 from rockcheck.validation.execute.models import is_own, not_installed
-from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, Store, name_of
+from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store, name_of
 from rockcheck.validation.suite.confidence import explanations, inputs_of, key_of, numerical_of
 from rockcheck.validation.suite.ensembles import Ensemble
 from rockcheck.validation.suite.impact_laws import by_either, landing_of, under_the_other_law
@@ -371,7 +371,7 @@ def _cell(
         **about,
         status="done",
         settings=record["settings"],
-        history=f"{HISTORIES}/{planned.name}.csv",
+        history=f"{HISTORIES}/{planned.name}{TABLE}",
         outcome=record["outcome"],
         overturned_at=overturned_at,
         notes=tuple(record["notes"]),

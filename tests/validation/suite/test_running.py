@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import re
 import shutil
@@ -123,17 +124,23 @@ def _reread(run, path):
     return run(path)
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".events.csv", ".json"])
+@pytest.mark.parametrize("suffix", [".csv.gz", ".events.csv.gz", ".json"])
 @pytest.mark.parametrize("damage", ["gone", "cut short", "empty"])
 def test_a_damaged_result_is_not_read(tmp_path, run, suffix, damage):
     path = write_suite(tmp_path, {})
     run(path)
     (target,) = (file for file in (tmp_path / "out" / "histories").iterdir() if file.name.partition(".")[2] == suffix[1:])
-    content = target.read_text()
-    target.unlink() if damage == "gone" else target.write_text(content[: len(content) // 2] if damage == "cut short" else "")
+    content = target.read_bytes()
+    shown = _lines(content)
+    target.unlink() if damage == "gone" else target.write_bytes(content[: len(content) // 2] if damage == "cut short" else b"")
     assert run(path).up_to_date == 0
-    assert target.read_text().splitlines()[1:] == content.splitlines()[1:]
+    assert _lines(target.read_bytes())[1:] == shown[1:]
     assert run(path).up_to_date == 1
+
+
+def _lines(content):
+    """The lines of a stored file; the first holds what the run took."""
+    return (gzip.decompress(content) if content.startswith(b"\x1f\x8b") else content).splitlines()
 
 
 def test_a_failed_reference_fails_what_needs_it(tmp_path, run):
