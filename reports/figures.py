@@ -91,9 +91,9 @@ def thumbnail(view: SceneView) -> Figure:
 
 
 def write_figures(view: SceneView, folder: Path) -> list[Path]:
-    """Write the figures of a scene into `folder`: one for each of its `figure_references`, and a thumbnail."""
+    """Write the figures of a scene into `folder`: a thumbnail, and where the run asks for them those for a paper, one a reference."""
     written = save(thumbnail(view), folder / f"{view.slug}-small", ["svg"])
-    for against in view.figure_references:
+    for against in view.figure_references if view.printed else ():
         written += save(histories_figure(view, against), folder / figure_stem(view, against))
     return written
 

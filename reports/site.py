@@ -17,13 +17,15 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from rockcheck.reports import tables, words
-from rockcheck.reports.ensembles import EnsembleView, ensemble_views, write_ensemble_figures
-from rockcheck.reports.figures import figure_stem, write_figures
+from rockcheck.reports.ensembles import EnsembleView, distributions_figure, ensemble_views, write_ensemble_figures
+from rockcheck.reports.figures import figure_stem, histories_figure, write_figures
 from rockcheck.reports.overview import entry, write_overview
 from rockcheck.reports.payload import script
 from rockcheck.reports.scene_file import write_scene_file
-from rockcheck.reports.style import LOOKS, SPARE, looks
+from rockcheck.reports.style import FORMATS, LOOKS, SPARE, looks, save
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
+from rockcheck.scenes import InputError
+from rockcheck.scenes.errors import printable, unknown_name
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.execute import provenance
@@ -95,6 +97,31 @@ STUDIES = (
 
 
 View = SceneView | EnsembleView
+
+
+def write_figure(folder: Path, name: str, path: Path, against: str | None = None) -> Path:
+    """Draw a finished run's scene or ensemble into the file `path`, whose ending is one of `style.FORMATS`; returns it.
+
+    `against`: the model whose differences a scene's figure shows, by default its first reference. Raises `InputError` for what
+    the run does not have.
+    """
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in FORMATS:
+        allowed = ", ".join(f".{one}" for one in FORMATS)
+        raise InputError(f"{printable(path)}: a figure is written as {allowed}, not as {printable(path.suffix)!r}")
+    pages = _Pages(folder)
+    view = pages.views.get(name)
+    if view is None:
+        raise unknown_name("scene of the run", name, pages.views)
+    if isinstance(view, EnsembleView):
+        if against is not None:
+            raise InputError("an ensemble's figure shows differences from its reference", "--against")
+        return save(distributions_figure(view), path.with_suffix(""), [kind])[0]
+    if against is not None and against not in view.histories:
+        raise unknown_name("model with a history of this scene", against, view.histories)
+    if not view.histories:
+        raise InputError(f"{printable(name)}: no model has a history of it: {'; '.join(view.missing.values())}")
+    return save(histories_figure(view, against), path.with_suffix(""), [kind])[0]
 
 
 def write_site(folder: Path, *, jobs: int = 1, afresh: bool = True, on_progress: OnProgress = unheard) -> Path:
@@ -186,7 +213,9 @@ class _Pages:
         """Hash of all that a page shows and of the code that draws it; not when the run was, nor what was read back."""
         run = self.run
         shown = {
-            "what": view.record.model_dump(mode="json") if isinstance(view, EnsembleView) else [run.scenes[view.name], view.stride],
+            "what": view.record.model_dump(mode="json")
+            if isinstance(view, EnsembleView)
+            else [run.scenes[view.name], view.stride, view.printed],
             "cells": [cell.model_dump(mode="json", exclude={"read_back"}) for cell in view.cells],
             "run": run.model_dump(mode="json", include={"suite", "reference", "model_form", "models", "measures", "versions", "hardware"}),
             "links": self.site.links,

@@ -6,11 +6,15 @@ white would fall below a contrast of 3:1. A dash pattern says the same once more
 
 from __future__ import annotations
 
+import hashlib
 import io
+import json
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -141,11 +145,14 @@ def power_of_ten(value: float) -> str:
     return f"{value:g}" if -1 <= exponent <= 3 else "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
-def save(figure: Figure, stem: Path, formats: Iterable[str] = FORMATS) -> list[Path]:
-    """Write a figure as `<stem>.svg`, `.png` and `.pdf`; the same figure gives the same bytes, for no date is written."""
+def save(figure: Figure, stem: Path, formats: Iterable[str] = FORMATS, *, stamp: str = "") -> list[Path]:
+    """Write a figure as `<stem>.svg`, `.png` and `.pdf`; the same figure gives the same bytes, for no date is written.
+
+    `stamp` says what an SVG shows, see `stamp_of`.
+    """
     stem.parent.mkdir(parents=True, exist_ok=True)
     undated: dict[str, dict[str, Any]] = {
-        "svg": {"Date": None, "Creator": "rockcheck"},
+        "svg": {"Date": None, "Creator": "rockcheck"} | ({"Identifier": stamp} if stamp else {}),
         "pdf": {"CreationDate": None, "Creator": "rockcheck"},
         "png": {"Software": "rockcheck"},
     }
@@ -157,3 +164,43 @@ def save(figure: Figure, stem: Path, formats: Iterable[str] = FORMATS) -> list[P
             figure.savefig(content, format=kind, metadata=undated[kind])
             written.append(write_whole(path, content.getvalue()))
     return written
+
+
+def keep_drawn(stem: Path, shown: object, draw: Callable[[], Figure], formats: Sequence[str] = ("svg",)) -> None:
+    """`<stem>.svg` and the other `formats`, drawn only where there is none yet that shows the same.
+
+    `shown` is all that the figure shows, as JSON can hold it; the code that draws is taken into account. A file of another format
+    goes where it would show something else.
+    """
+    stamp, paths = stamp_of(shown), {kind: stem.with_name(f"{stem.name}.{kind}") for kind in FORMATS}
+    current = stamp_in(paths["svg"]) == stamp
+    missing = [kind for kind in formats if not (current and paths[kind].is_file())]
+    if not current:
+        for path in paths.values():
+            path.unlink(missing_ok=True)
+    if missing:
+        save(draw(), stem, missing, stamp=stamp)
+
+
+def stamp_of(shown: object) -> str:
+    """Two short hashes: of what a figure shows, and of what draws it."""
+    return f"{_short_hash(json.dumps(shown, sort_keys=True).encode())} {_drawn_by()}"
+
+
+@cache
+def _drawn_by() -> str:
+    sources = sorted(Path(__file__).parent.rglob("*.py"))
+    return _short_hash(version("matplotlib").encode() + b"".join(source.read_bytes() for source in sources))
+
+
+def _short_hash(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:16]
+
+
+def stamp_in(path: Path) -> str:
+    """The stamp that an SVG names near its beginning, empty where there is none."""
+    if not path.is_file():
+        return ""
+    with path.open(encoding="utf-8", errors="replace") as stream:
+        _, mark, rest = stream.read(4000).partition("<dc:identifier>")
+    return rest.partition("<")[0] if mark else ""

@@ -101,6 +101,11 @@ class SceneView:
         return self._read[0]
 
     @property
+    def printed(self) -> bool:
+        """Whether the run asks for the scene's figures for a paper."""
+        return self.name in self.run.printed
+
+    @property
     def missing(self) -> dict[str, str]:
         """By model: why there is no history."""
         return self._read[1]

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from collections.abc import Sequence
+
+#: When the program started, of `time.perf_counter`.
+BEGAN = time.perf_counter()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -12,7 +16,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from rockcheck.validation.commands.cli import INTERRUPTED
     from rockcheck.validation.commands.cli import main as run
 
-    code = run(arguments)
+    code = run(arguments, began=BEGAN)
     if code == INTERRUPTED:  # compiled code may still run in threads, which Python would wait for
         os._exit(code)
     return code

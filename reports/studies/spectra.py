@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +16,8 @@ from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, axis_labels, draw
 from rockcheck.reports.site import PAGES, STUDIES, Site
 from rockcheck.reports.studies.curves import fragility_chart, write_charts
 from rockcheck.reports.studies.nodes import write_nodes
-from rockcheck.reports.style import LOOKS, PAGE, figure_style, save
+from rockcheck.reports.style import FORMATS, LOOKS, PAGE, figure_style, keep_drawn
+from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.spectra.findings import Finding, findings
 from rockcheck.validation.spectra.fragility import Fragility
@@ -35,8 +38,8 @@ TITLES = {
     9: "Wall on the right, μ = 0.6",
 }
 PAGE_NAME = "spectra.html"
-#: The names of the files of the figures of all models' maps, and of what the paper does not say.
-MAPS, FINDINGS = "models", "findings"
+#: The names of the files of the figures of all models' maps, of all safe areas, and of what the paper does not say.
+MAPS, AREAS, FINDINGS = "models", "safe-areas", "findings"
 #: In its maps: overturned, safe, gained, lost.
 FOUND = ["#e9e9e9", "#a9c1df", "#009168", "#c4342d"]
 PAPER_SCENE = paper_panels(6)[0].scene
@@ -221,6 +224,61 @@ def fragility_figure(fragility: Mapping[str, Any]) -> Figure:
     return figure
 
 
+def _shown(panels: Sequence[Panel], spectra: Sequence[Spectrum]) -> list[object]:
+    """All that a figure shows of spectra, as JSON can hold it."""
+    return [
+        [
+            panel.name,
+            panel.title,
+            spectrum.scene.model_dump(mode="json"),
+            *(None if array is None else sha256(array.tobytes()).hexdigest() for array in _arrays(spectrum)),
+        ]
+        for panel, spectrum in zip(panels, spectra, strict=True)
+    ]
+
+
+def _arrays(spectrum: Spectrum) -> tuple[np.ndarray | None, ...]:
+    return (spectrum.outcomes, spectrum.frequency_ratios, spectrum.amplitude_ratios, spectrum.undecided, spectrum.depends_on_law)
+
+
+def draw_figures(panels: Sequence[Panel], spectra: Sequence[Spectrum], model: str, folder: Path, formats: Sequence[str] = ("svg",)) -> None:
+    """Draw the paper's figures, or the user's own spectra, into `folder`, where they would show something else."""
+    from rockcheck.validation.spectra.study import stem
+
+    for number in dict.fromkeys(panel.figure for panel in panels):
+        mine = [(panel, spectrum) for panel, spectrum in zip(panels, spectra, strict=True) if panel.figure == number]
+        if number is None:
+            for panel, spectrum in mine:
+                place = folder / stem(panel.name, model)
+                keep_drawn(place, _shown([panel], [spectrum]), partial(own_figure, panel, spectrum), formats)
+        else:
+            own, found = [panel for panel, _ in mine], [spectrum for _, spectrum in mine]
+            of = "" if model == "ebm" else model
+            shown = [of, _shown(own, found)]
+            keep_drawn(folder / figure_stem(number, model), shown, partial(paper_figure, own, found, of=of), formats)
+
+
+def draw_areas(panels: Sequence[Panel], spectra: Sequence[Spectrum], folder: Path, formats: Sequence[str] = ("svg",)) -> None:
+    """Draw the safe areas of the paper's spectra into `folder`, where they would show something else."""
+    areas = [[panel.name, spectrum.safe_area] for panel, spectrum in zip(panels, spectra, strict=True)]
+    keep_drawn(folder / AREAS, areas, partial(areas_figure, spectra), formats)
+
+
+def draw_fragility(fragility: Mapping[str, Any], folder: Path, formats: Sequence[str] = ("svg",)) -> None:
+    """Draw the curves of fragility into `folder`, where they would show something else."""
+    keep_drawn(folder / "fragility", fragility, partial(fragility_figure, fragility), formats)
+
+
+def draw_maps(found: Agreement, panels: Sequence[Panel], folder: Path, formats: Sequence[str] = ("svg",)) -> None:
+    """Draw the maps of all models into `folder`, where they would show something else."""
+    keep_drawn(folder / MAPS, maps_shown(found, panels), partial(maps_figure, found, panels), formats)
+
+
+def maps_shown(found: Agreement, panels: Sequence[Panel]) -> list[object]:
+    """All that the figure of maps shows, as JSON can hold it."""
+    return [found.model_dump(mode="json", include={"maps", "map_frequencies", "map_amplitudes"}), [panel.name for panel in panels]]
+
+
 def write_page(folder: Path) -> Path:
     """Write `spectra.html` into the report's folder from what its `spectra/` holds; returns the page.
 
@@ -236,6 +294,7 @@ def write_page(folder: Path) -> Path:
     figures = sorted({(record.figure, record.model) for record in index.spectra if record.figure}, key=lambda key: (key[0] or 0, key[1]))
     shown: list[dict[str, Any]] = [
         {
+            "name": figure_stem(number, model),
             "stem": f"{SPECTRA}/{figure_stem(number, model)}",
             "file": figure_stem(number, model),
             "number": number,
@@ -261,6 +320,7 @@ def write_page(folder: Path) -> Path:
     site = Site(folder, f"rockcheck: {heading[0].lower()}{heading[1:]}", _links(folder))
     site.assets()
     addresses = [PAGE_NAME] if (folder / RUN_FILE).exists() else ["index.html", PAGE_NAME]  # a folder has a page to open
+    studies = _studies(data, bool(figures))
     pages = [
         site.page(
             address,
@@ -271,11 +331,12 @@ def write_page(folder: Path) -> Path:
             scripts=scripts,
             played=KEPT_AN_AXIS**2 if any(glimpses_path(data, record.name).exists() for record in index.spectra) else 0,
             **found,
-            **_studies(data, bool(figures)),
+            **studies,
             findings=_findings(data, index.spectra),
             areas=(data / "safe-areas.svg").exists(),
             fragility_drawn=(data / "fragility.svg").exists(),
             versions=provenance.versions(),
+            formats=partial(_formats, data),
         )
         for address in addresses
     ]
@@ -297,7 +358,10 @@ def _findings(data: Path, records: Sequence[SpectrumRecord]) -> tuple[Finding, .
     if len({spectrum.outcomes.shape for spectrum in spectra}) > 1:
         return ()
     found = findings(spectra)
-    write(findings_figure(found), data / FINDINGS)
+    shown = [
+        [one.name, one.words, one.case, *(sha256(mask.tobytes()).hexdigest() for mask in (one.gained, one.lost, one.safe))] for one in found
+    ]
+    keep_drawn(data / FINDINGS, shown, partial(findings_figure, found))
     return found
 
 
@@ -313,9 +377,10 @@ def _studies(data: Path, papers: bool) -> dict[str, Any]:
         found = _stored(data, name, kind)
         context[f"{name}_kept"] = found is None
         context[name] = found or (_stored(KEPT, name, kind) if papers else None)
-    agreement = context["agreement"]
-    if agreement and context["agreement_kept"]:
-        write(maps_figure(agreement, agreements.mapped([panel for number in TITLES for panel in paper_panels(number)])), data / MAPS)
+    if context["agreement"] and context["agreement_kept"]:  # its figure came with it
+        for other in ("png", "pdf"):
+            (data / f"{MAPS}.{other}").unlink(missing_ok=True)
+        write_whole(data / f"{MAPS}.svg", (KEPT / f"{MAPS}.svg").read_bytes())
         context["maps"] = True
     return context
 
@@ -327,14 +392,14 @@ def _stored(folder: Path, name: str, kind: type[Stored]) -> Any:
         return None
 
 
+def _formats(data: Path, name: str) -> list[str]:
+    """The formats in which a figure is there."""
+    return [kind for kind in FORMATS if (data / f"{name}.{kind}").exists()]
+
+
 def figure_stem(number: int | None, model: str) -> str:
     """The name of a figure's files."""
     return f"figure-{number}" if model == "ebm" else f"figure-{number}--{model}"
-
-
-def write(figure: Figure, stem: Path) -> list[Path]:
-    """Write a figure as SVG, PNG and PDF."""
-    return save(figure, stem)
 
 
 def _links(folder: Path) -> tuple[tuple[str, str], ...]:

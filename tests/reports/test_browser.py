@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
+from xml.etree import ElementTree
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
@@ -240,6 +241,28 @@ def test_print_shows_the_figures_and_no_controls(visit: Visit) -> None:
     playwright.expect(page.locator("#paper")).to_have_attribute("open", "")
     page.locator("#paper figcaption").first.scroll_into_view_if_needed()  # an image is loaded when it comes near
     playwright.expect(page.locator(".paper img").first).to_be_visible()
+
+
+@pytest.mark.parametrize(("kind", "begins"), [("svg", b"<svg"), ("png", b"\x89PNG")])
+def test_the_plots_can_be_taken_as_a_picture(visit: Visit, tmp_path, kind: str, begins: bytes) -> None:
+    """What is shown: the window of time, the models that are on; drawn by itself, with nothing of the page around it."""
+    page = visit.open(WALL)
+    page.evaluate("rockcheckPage.store.change({ window: [1, 5] })")
+    page.get_by_label("CM", exact=True).uncheck()
+    with page.expect_download() as waiting:
+        page.locator(f"#as-{kind}").click()
+    assert waiting.value.suggested_filename == f"beside-a-wall.{kind}"
+    content = Path(waiting.value.path()).read_bytes()
+    assert content.startswith(begins)
+    if kind == "png":
+        assert len(content) > 20_000
+        return
+    root = ElementTree.fromstring(content)
+    said = [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert (said.count("MuJoCo"), said.count("CM")) == (2, 1)  # in the key, and as a row of the events
+    paths = [path.get("d") for path in root.iter("{http://www.w3.org/2000/svg}path")]
+    assert max(d.count("L") for d in paths) > 500
+    assert "NaN" not in content.decode()
 
 
 def test_without_scripts_the_figures_remain(visits: Visits) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +12,14 @@ from matplotlib.colors import to_rgba
 
 from rockcheck.ebm import Spectrum
 from rockcheck.reports.show.spectrum import COLOURS, draw
-from rockcheck.reports.studies.spectra import paper_figure, write_page
-from rockcheck.reports.style import save
-from rockcheck.validation.spectra.agreement import Agreement
+from rockcheck.reports.studies import spectra as pages
+from rockcheck.reports.studies.spectra import draw_figures, maps_shown, paper_figure, write_page
+from rockcheck.reports.style import save, stamp_in, stamp_of
+from rockcheck.validation.spectra.agreement import Agreement, mapped
 from rockcheck.validation.spectra.claims import Claim, Claims
 from rockcheck.validation.spectra.findings import findings, kept_spectra
 from rockcheck.validation.spectra.refinement import Refined, Refinement
-from rockcheck.validation.spectra.study import KEPT, SPECTRA, SpectrumRequest, paper_panels
+from rockcheck.validation.spectra.study import FIGURES, KEPT, SPECTRA, SpectrumRequest, paper_panels
 from rockcheck.validation.spectra.study import save as save_spectra
 
 SIZE = 12
@@ -73,6 +75,37 @@ def test_the_page_shows_what_the_folder_holds(tmp_path):
     assert (folder / "models.svg").exists()
     for link in re.findall(r'(?:href|src)="([^"#:]+)"', text):
         assert (tmp_path / link).exists(), link
+
+
+def test_what_is_drawn_already_is_not_drawn_again(tmp_path, monkeypatch):
+    """Drawn anew only where it would show something else, in the formats that are asked for; no file shows what is not so any more."""
+    panels = paper_panels(7)
+    spectra = [made(panel) for panel in panels]
+    drawn = []
+    monkeypatch.setattr(pages, "paper_figure", lambda *given, **of: drawn.append(of) or paper_figure(*given, **of))
+    draw_figures(panels, spectra, "ebm", tmp_path)
+    first = (tmp_path / "figure-7.svg").read_bytes()
+    draw_figures(panels, spectra, "ebm", tmp_path)
+    assert len(drawn) == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["figure-7.svg"]
+    for _ in range(2):
+        draw_figures(panels, spectra, "ebm", tmp_path, ("svg", "png", "pdf"))
+    assert len(drawn) == 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["figure-7.pdf", "figure-7.png", "figure-7.svg"]
+    assert (tmp_path / "figure-7.svg").read_bytes() == first
+    changed = spectra[0].outcomes.copy()
+    changed[0, 0] = 1
+    draw_figures(panels, [replace(spectra[0], outcomes=changed), *spectra[1:]], "ebm", tmp_path)
+    assert len(drawn) == 3
+    assert [path.name for path in tmp_path.iterdir()] == ["figure-7.svg"]
+    assert (tmp_path / "figure-7.svg").read_bytes() != first
+
+
+def test_the_shipped_figure_shows_the_shipped_study():
+    """`rockcheck spectrum --figure all --agreement 200` writes both; they are kept together."""
+    found = Agreement.model_validate_json((KEPT / "agreement.json").read_text(encoding="utf-8"))
+    panels = mapped([panel for figure in FIGURES for panel in paper_panels(figure)])
+    assert stamp_in(KEPT / "models.svg").split()[0] == stamp_of(maps_shown(found, panels)).split()[0]
 
 
 def test_studies_of_the_folder_come_first(tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -49,6 +50,36 @@ def speaking(voice: Voice) -> Iterator[None]:
         yield
     finally:
         _voice.reset(token)
+
+
+#: When the command began, of `time.perf_counter`; None: nobody has said.
+_began: ContextVar[float | None] = ContextVar("began", default=None)
+
+
+@contextmanager
+def begun(when: float) -> Iterator[None]:
+    """Within this block `total_told` counts from then."""
+    token = _began.set(when)
+    try:
+        yield
+    finally:
+        _began.reset(token)
+
+
+@contextmanager
+def total_told() -> Iterator[None]:
+    """A last line says how long the command took in all, whatever its verdict: its user waits for more than the simulations."""
+    began = _began.get() or time.perf_counter()
+    try:
+        yield
+    except typer.Exit:
+        _tell_total(began)
+        raise
+    _tell_total(began)
+
+
+def _tell_total(began: float) -> None:
+    console().print(f"total: {time.perf_counter() - began:.1f} s")
 
 
 class _Screen(Console):

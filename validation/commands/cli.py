@@ -6,6 +6,7 @@ import contextlib
 import inspect
 import os
 import sys
+import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
@@ -19,8 +20,10 @@ from rockcheck.scenes import InputError, ModelFailure
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.commands import (
     accept,
+    begun,
     compare,
     diff,
+    figure,
     new,
     record,
     report,
@@ -29,6 +32,7 @@ from rockcheck.validation.commands import (
     scenes,
     simulate,
     speaking,
+    total_told,
     uncertainty,
     validate,
 )
@@ -56,7 +60,11 @@ COMMANDS = {
     calibrate: "rockcheck calibrate --engine mujoco --restitution 0.5 --step 1e-3",
     stress: "rockcheck stress --quick",
     report: "rockcheck report rockcheck-report",
+    figure: "rockcheck figure rockcheck-report fig4a -o fig4a.pdf",
 }
+
+#: Commands that answer at once: nobody asks how long they took.
+AT_ONCE = (scenes, new, record, compare, diff)
 
 #: Exit code of a run that Ctrl-C ended.
 INTERRUPTED = 130
@@ -80,11 +88,11 @@ app = typer.Typer(
 )
 
 
-def spoken(does: Callable[..., None]) -> Callable[..., None]:
-    """A command with the options that all of them have: --quiet and --json."""
+def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
+    """A command with the options that all of them have, --quiet and --json; one that is `timed` says how long it took."""
 
     def command(*, quiet: bool, as_json: bool, **arguments: Any) -> None:
-        with speaking("json" if as_json else "quiet" if quiet else "tables"):
+        with speaking("json" if as_json else "quiet" if quiet else "tables"), total_told() if timed else contextlib.nullcontext():
             does(**arguments)
 
     signature = inspect.signature(does, eval_str=True)
@@ -124,12 +132,13 @@ def common(
 
 
 for module, example in COMMANDS.items():
-    app.command(name=module.__name__.rpartition(".")[2], cls=_EachOnce, epilog=f"Example: {example}")(spoken(module.run))
+    spoken_run = spoken(module.run, timed=module not in AT_ONCE)
+    app.command(name=module.__name__.rpartition(".")[2], cls=_EachOnce, epilog=f"Example: {example}")(spoken_run)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code, one of `EXIT_CODES`."""
-    with _readers_may_go():
+def main(arguments: Sequence[str] | None = None, *, began: float | None = None) -> int:
+    """Run the command line; returns the exit code, one of `EXIT_CODES`. The program `began` then (of `time.perf_counter`; None: now)."""
+    with _readers_may_go(), begun(time.perf_counter() if began is None else began):
         try:
             code = app(args=list(sys.argv[1:] if arguments is None else arguments), prog_name="rockcheck", standalone_mode=False)
         except (typer.TyperException, InputError) as error:

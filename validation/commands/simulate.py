@@ -29,7 +29,7 @@ from rockcheck.validation.commands import (
 )
 from rockcheck.validation.execute import workers
 from rockcheck.validation.execute.models import FAMILIES, build, check_allowed, family, is_own
-from rockcheck.validation.execute.store import name_of
+from rockcheck.validation.execute.store import TABLE, name_of
 
 #: The model that plays where none is named: the fair reference for engines.
 REFERENCE = "ebm-unilateral"
@@ -39,7 +39,7 @@ def run(
     scene: Annotated[str, typer.Argument(help="A named scene or a .toml file.", autocompletion=scene_names)],
     model: Annotated[str, typer.Option("--model", help=f"One of {', '.join(FAMILIES)}.", autocompletion=model_names)] = REFERENCE,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="File to write: .csv, .json or .mat (default: SCENE--MODEL.csv).")
+        Path | None, typer.Option("-o", "--output", help="File to write: .csv, .csv.gz, .json or .mat (default: SCENE--MODEL.csv).")
     ] = None,
     settings: Annotated[list[str] | None, typer.Option("--set", help="A setting of the model, such as time_step=1e-4; repeatable.")] = None,
     plot: PlotOption = None,
@@ -98,9 +98,9 @@ def _played_apart(scene: Scene, model: str, settings: dict[str, Any]) -> History
         where = f"; its traceback: {report_file(result.traceback)}" if result.traceback else ""
         raise ModelFailure(f"{result.failure}{where}")
     with tempfile.TemporaryDirectory() as folder:
-        for suffix, text in result.files.items():
-            (Path(folder) / f"history{suffix}").write_text(text, encoding="utf-8")
-        return History.load(Path(folder) / "history.csv")
+        for suffix, content in result.files.items():
+            (Path(folder) / f"history{suffix}").write_bytes(content)
+        return History.load(Path(folder) / f"history{TABLE}")
 
 
 def setting_of(text: str) -> tuple[str, Any]:

@@ -9,6 +9,7 @@ import json
 import os
 import platform
 from collections.abc import Container, Iterable, Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
 from importlib.machinery import PathFinder
@@ -57,7 +58,7 @@ def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
 
     Of the syntax trees without docstrings: comments, layout and documentation do not count.
     """
-    return digest("".join(f"{name}\n{_essence(path)}\n" for name, path in sorted(reachable(module, search_path).items())))
+    return digest("".join(f"{name}\n{_source_of(path).essence}\n" for name, path in sorted(reachable(module, search_path).items())))
 
 
 def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]:
@@ -105,10 +106,10 @@ def _source(name: str, search_path: tuple[str, ...]) -> Path | None:
 
 def _imports(path: Path, package: str, packages: Container[str], search_path: tuple[str, ...]) -> Iterable[str]:
     """Names of the modules that a file of `package` imports; of a package only where something that is no module is taken from it."""
-    for node in ast.walk(syntax(path)):
+    for node in _source_of(path).imports:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             base = node.module or ""
             if node.level:
                 base = ".".join(filter(None, [*package.split(".")[: len(package.split(".")) - node.level + 1], base]))
@@ -117,19 +118,23 @@ def _imports(path: Path, package: str, packages: Container[str], search_path: tu
                 yield inner if base.split(".")[0] in packages and _source(inner, search_path) else base
 
 
-@cache
-def syntax(path: Path) -> ast.Module:
-    """The syntax tree of a source file."""
-    return ast.parse(path.read_text(encoding="utf-8"))
+@dataclass(frozen=True)
+class _Source:
+    """What a source file imports, and its syntax tree without docstrings, as text."""
+
+    imports: tuple[ast.Import | ast.ImportFrom, ...]
+    essence: str
 
 
 @cache
-def _essence(path: Path) -> str:
-    tree = ast.parse(path.read_text(encoding="utf-8"))  # a tree of its own, since it is changed
+def _source_of(path: Path) -> _Source:
+    tree, imports = ast.parse(path.read_text(encoding="utf-8")), []
     for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and ast.get_docstring(node, clean=False):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            imports.append(node)
+        elif isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and ast.get_docstring(node, clean=False):
             node.body = node.body[1:] or [ast.Pass()]
-    return ast.dump(tree)
+    return _Source(tuple(imports), ast.dump(tree))
 
 
 @cache

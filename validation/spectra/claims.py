@@ -6,17 +6,19 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, node_scene
+from rockcheck.scenes import Scene
 from rockcheck.validation.discrepancy.figures import Stored
-from rockcheck.validation.execute.models import build
+from rockcheck.validation.execute import provenance
+from rockcheck.validation.execute.models import Model, build
 from rockcheck.validation.spectra.study import AMPLITUDES, FIGURES, GAPS, RESTITUTIONS, SpectrumRequest, paper_panels
-from rockcheck.validation.spectra.tiles import Tiles
+from rockcheck.validation.spectra.tiles import Tiles, tile_key
 
 ClaimVerdict = Literal["holds", "holds in part", "does not hold"]
 #: A change of the safe area of less than this share of the nodes is no change: a band one node wide along the boundary.
@@ -125,19 +127,31 @@ def extra_runs(spectra: Sequence[Spectrum], tiles: Tiles, request: SpectrumReque
             key = (panel.wall.gap, panel.wall.restitution) if panel.wall else None
             least[key] = float(amplitudes[np.argmax(sides != SAFE)]) if (sides != SAFE).any() else math.inf
     free = [spectrum for spectrum in spectra if not spectrum.scene.walls]
-    return ExtraRuns(least, {one.scene.floor.friction: _with_one_impact(one, request) for one in free})
+    return ExtraRuns(least, {one.scene.floor.friction: _with_one_impact(one, tiles, request) for one in free})
 
 
-def _with_one_impact(spectrum: Spectrum, request: SpectrumRequest) -> NDArray[np.bool_]:
+def _with_one_impact(spectrum: Spectrum, tiles: Tiles, request: SpectrumRequest) -> NDArray[np.bool_]:
     """The nodes at omega_p/p from `ONE_IMPACT` to one more that overturn clockwise after exactly one floor impact."""
-    model = build(request.model, request.settings)
-    found = np.zeros(spectrum.outcomes.shape, dtype=bool)
     near = (spectrum.frequency_ratios >= ONE_IMPACT[0]) & (spectrum.frequency_ratios <= ONE_IMPACT[1] + 1.0)
-    for i, j in np.argwhere((spectrum.outcomes == RIGHT) & near):
-        scene = node_scene(spectrum.scene, float(spectrum.amplitude_ratios[i]), float(spectrum.frequency_ratios[j]))
-        history = model.simulate(scene.replace(output_step=scene.duration))
-        found[i, j] = sum(event.kind == "floor impact" for event in history.event_list) == 1
+    nodes = np.argwhere((spectrum.outcomes == RIGHT) & near)
+    amplitudes, frequencies = spectrum.amplitude_ratios[nodes[:, 0]], spectrum.frequency_ratios[nodes[:, 1]]
+
+    def find() -> dict[str, Any]:
+        model = build(request.model, request.settings)
+        return {"one": [_impacts(model, spectrum.scene, a, f) == 1 for a, f in zip(amplitudes, frequencies, strict=True)]}
+
+    key = tile_key(spectrum.scene, amplitudes, frequencies, request.model, request.settings)
+    one = tiles.remembered(f"{key}--one-impact-{provenance.code_digest(__name__)}", find)["one"]
+    found = np.zeros(spectrum.outcomes.shape, dtype=bool)
+    found[tuple(nodes[np.array(one, dtype=bool)].T)] = True
     return found
+
+
+def _impacts(model: Model, scene: Scene, amplitude: float, frequency: float) -> int:
+    """Floor impacts until the outcome at a node is decided."""
+    node = node_scene(scene, float(amplitude), float(frequency))
+    history = model.simulate(node.replace(output_step=node.duration))
+    return sum(event.kind == "floor impact" for event in history.event_list)
 
 
 def _pairs(paper: Paper, pairs: Sequence[tuple[str, Spectrum, Spectrum]]) -> tuple[Row, ...]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel, Spectrum, overturning_spectrum
 from rockcheck.ebm.horizon import other_law
-from rockcheck.ebm.spectrum import LEFT, RIGHT, TOLERANCE, Floats, play_nodes
+from rockcheck.ebm.spectrum import LEFT, RIGHT, TOLERANCE, Floats
 from rockcheck.scenes import Floor, InputError, Ricker, Scene, Wall
 from rockcheck.scenes.compiled import threads
 from rockcheck.scenes.scene import PAPER_BLOCK
@@ -182,13 +182,6 @@ def differing(spectrum: Spectrum, other: Spectrum) -> NDArray[np.int64]:
     for one in (spectrum, other):
         differ[tuple(one.undecided.T)] = False
     return np.argwhere(differ)
-
-
-def warm_up(panel: Panel, request: SpectrumRequest) -> None:
-    """Load or compile the event-based model's code, by one node of the panel."""
-    player = build(request.model, request.settings)
-    if compiled(player):
-        play_nodes(panel.scene, request.amplitudes[:1], request.frequencies[-1:], model=player)
 
 
 def save(panels: Sequence[Panel], spectra: Sequence[Spectrum], request: SpectrumRequest, folder: Path) -> None:

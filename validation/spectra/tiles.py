@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,7 +19,7 @@ from typing import Any, Self, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm import EventBasedModel, spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, Floats, node_scene, play_nodes
 from rockcheck.scenes import InputError, ModelFailure, Scene, kinematics
 from rockcheck.scenes.progress import Count
@@ -58,6 +59,9 @@ class Tiles:
     #: Nodes run, and nodes read back.
     played: int = 0
     read_back: int = 0
+    #: Wall time and this process's CPU time in which compiled models ran nodes here, s; to load or compile their code is not in them.
+    seconds: float = 0.0
+    cpu: float = 0.0
     _lock: Lock = field(default_factory=Lock, init=False, repr=False)
     _open: ExitStack = field(default_factory=ExitStack, init=False, repr=False)
     _pool: Pool | None = field(default=None, init=False, repr=False)
@@ -90,10 +94,24 @@ class Tiles:
             self.count.add(len(found[0]))
         return sides, failed
 
+    def remembered(self, key: str, find: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """What was kept under that key, found and kept where there is nothing; `key` covers all that it depends on."""
+        kept = None if self.force else self._store.get_record(TILES, key)
+        if kept is None:
+            kept = find()
+            self._store.put_record(TILES, key, kept)
+        return kept
+
     def _here(self, scene: Scene, amplitudes: Floats, frequencies: Floats, model: str, settings: Mapping[str, Any]) -> Outcomes:
         player = build(model, settings)
         if compiled(player):
-            return play_nodes(scene, amplitudes, frequencies, model=player, jobs=self.jobs, on_progress=self.count.part())
+            if not self.seconds:
+                spectrum.play_nodes(scene, amplitudes[:1], frequencies[-1:], model=player, jobs=1)  # loads or compiles
+            began, cpu = time.perf_counter(), time.process_time()
+            found = play_nodes(scene, amplitudes, frequencies, model=player, jobs=self.jobs, on_progress=self.count.part())
+            self.seconds += time.perf_counter() - began
+            self.cpu += time.process_time() - cpu
+            return found
         if self._pool is None:
             self._pool = self._open.enter_context(Pool(self.jobs or os.cpu_count() or 1))
         parts = _slices(len(amplitudes), NODES_A_CALL)

@@ -195,6 +195,8 @@ class Run(Stored):
     ensembles: tuple[EnsembleRecord, ...] = ()
     #: By scene, what the spread of its inputs makes of its figures.
     inputs: dict[str, Inputs] = Field(default_factory=dict)
+    #: Scenes whose figure for a paper is drawn.
+    printed: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> Verdict:

@@ -199,6 +199,7 @@ def run_suite(
         cells=tuple(cells),
         ensembles=tuple(ensembles),
         inputs=inputs,
+        printed=tuple(name for name in suite.scenes if suite.suite_of(name).print_figures),
         faults=_without_cell(suite, {(cell.scene, cell.model) for cell in cells}),
         measures=tuple(MeasureRecord(name=m.name, label=m.label, unit=m.unit, formula=m.formula) for m in MEASURES.values()),
         versions=provenance.versions(),

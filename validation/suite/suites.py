@@ -5,6 +5,7 @@ A suite is a TOML file that a user can write:
     description = "my shelf on my record"
     reference = "ebm-unilateral"                 # judges numerical differences
     model_form = "ebm"                           # optional: shown beside it, with a band of its own
+    print_figures = true                         # each scene's figure for a paper (SVG, PNG, PDF); without it `rockcheck figure` draws one
     scenes = ["fig4a", "shelf.toml"]             # names, or scene files beside this one
 
     [models.ebm-unilateral]
@@ -112,6 +113,7 @@ class SuiteFile(Frozen):
     ensemble: tuple[Ensemble, ...] = ()
     tolerances: dict[str, Any] | None = None
     uncertainty: bool = False
+    print_figures: bool = False
 
 
 @dataclass(frozen=True)
@@ -156,6 +158,8 @@ class Suite:
     #: Vertical components of its records, which are not played, and whether anything is judged.
     left_out: tuple[str, ...] = ()
     judged: bool = True
+    #: Whether each scene's figure for a paper is drawn.
+    print_figures: bool = False
 
     def suite_of(self, scene: str) -> Suite:
         """The suite that a scene or an ensemble comes from: this one, or the included one."""
@@ -271,6 +275,7 @@ def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[st
         tolerances=_tolerances(tolerances_path, tables, scenes, models),
         tolerances_path=tolerances_path,
         uncertainty=given.uncertainty,
+        print_figures=given.print_figures,
         uncertain={name: one for name, one in uncertain.items() if one.spreads},
         left_out=tuple(left_out),
     )

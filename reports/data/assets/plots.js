@@ -466,5 +466,5 @@ const Plots = (() => {
     return u;
   }
 
-  return { ground, values, differences, tracks, portrait, words, forgetColours };
+  return { ground, values, differences, tracks, portrait, words, lookOf, forgetColours };
 })();

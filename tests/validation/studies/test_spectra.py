@@ -225,7 +225,7 @@ def test_bad_input_is_one_line_and_exit_2(words, said, capsys):
 
 
 def test_the_command_writes_figures_data_and_page(tmp_path, capsys):
-    assert main(["spectrum", "--figure", "8", "--size", "9", "--out", "out"]) == 0
+    assert main(["spectrum", "--figure", "8", "--size", "9", "--print", "--out", "out"]) == 0
     folder = tmp_path / "out" / "spectra"
     assert {f"figure-8.{kind}" for kind in ("svg", "png", "pdf")} <= {path.name for path in folder.iterdir()}
     with np.load(folder / "figure-8-gap-3-e-0.npz") as data:
@@ -240,7 +240,7 @@ def test_the_command_writes_figures_data_and_page(tmp_path, capsys):
     assert "567 runs, 0 read back" in out
     assert "right-hand-side evaluation" in out
     assert "Fig. 8" in (tmp_path / "out" / "spectra.html").read_text(encoding="utf-8")
-    assert main(["spectrum", "--figure", "8", "--size", "9", "--out", "out"]) == 0
+    assert main(["spectrum", "--figure", "8", "--size", "9", "--print", "--out", "out"]) == 0
     assert "567 read back" in capsys.readouterr().out
 
 
@@ -390,7 +390,7 @@ def test_impacts_before_the_fall_are_counted(tmp_path):
     panel = next(p for p in paper_panels(6) if p.wall is None)
     request = SpectrumRequest(np.array([2.5]), np.linspace(1.0, 12.0, 23))
     spectrum = play_panels([panel], request, Tiles(tmp_path))[0]
-    counted = claims._with_one_impact(spectrum, request)
+    counted = claims._with_one_impact(spectrum, Tiles(tmp_path), request)
     assert 0 < counted.sum() <= np.sum(spectrum.outcomes == 1)
     for i, _ in np.argwhere(counted):
         history = EventBasedModel().simulate(node_scene(panel.scene, float(request.amplitudes[i]), 2.5))

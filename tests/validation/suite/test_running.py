@@ -119,8 +119,7 @@ def _reread(run, path):
     """Run as a new process would, which has not read the code before."""
     sys.modules.pop("faulty", None)
     provenance.code_digest.cache_clear()
-    provenance.syntax.cache_clear()
-    provenance._essence.cache_clear()
+    provenance._source_of.cache_clear()
     return run(path)
 
 

@@ -7,6 +7,7 @@ import math
 import os
 import time
 from collections.abc import Sequence
+from concurrent.futures import Future
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,6 +19,7 @@ from rich.table import Table
 from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT
 from rockcheck.scenes import InputError, load_scene
+from rockcheck.scenes.compiled import threads
 from rockcheck.scenes.errors import NotInstalled, unknown_name
 from rockcheck.scenes.progress import Count
 from rockcheck.scenes.recordings import Reading, Recording
@@ -49,8 +51,6 @@ from rockcheck.validation.spectra.study import (
     paper_panels,
     play_panels,
     save,
-    stem,
-    warm_up,
 )
 from rockcheck.validation.spectra.tiles import Tiles
 
@@ -91,6 +91,7 @@ def run(
     ] = False,
     records: RecordOption = None,
     more: MoreRecords = None,
+    printed: Annotated[bool, typer.Option("--print", help="Write the figures as PDF and PNG, too.")] = False,
     out: OutOption = OUT,
     jobs: JobsOption = None,
     scheduler: SchedulerOption = None,
@@ -117,6 +118,7 @@ def run(
     tell_left_out(left_out)
     folder = usable_folder(out)
     data = usable_folder(folder / SPECTRA)
+    formats = ("svg", "png", "pdf") if printed else ("svg",)
     screen = console()
     with contextlib.ExitStack() as stack:
         client = None
@@ -126,13 +128,13 @@ def run(
             client = stack.enter_context(connected(scheduler))
         tiles = stack.enter_context(Tiles(data, jobs=jobs, client=client, force=force))
         if fragility:
-            _fragility(panels, request, motions, tiles, data, screen)
+            _fragility(panels, request, motions, tiles, data, formats, screen)
         elif verify:
             _verify(panels, request, tiles, data, screen)
         elif agreement is not None:
-            _agreement(panels, request, agreement, tiles, data, screen)
+            _agreement(panels, request, agreement, tiles, data, formats, screen)
         else:
-            _spectra(panels, request, tiles, data, screen)
+            _spectra(panels, request, tiles, data, formats, screen)
     from rockcheck.reports.studies.spectra import write_page
 
     page = write_page(folder)
@@ -179,22 +181,51 @@ def _request(
     )
 
 
-def _spectra(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, data: Path, screen: Console) -> None:
-    if tiles.client is None:
-        warm_up(panels[0], request)  # so that no run's time holds the compiler's
-    began, cpu = time.perf_counter(), time.process_time()
+def _spectra(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, data: Path, formats: Sequence[str], screen: Console) -> None:
+    """Plays the spectra, and draws each figure while the next one is played."""
+    papers = {panel.figure for panel in panels} == set(FIGURES) and request.model == "ebm"
     nodes = len(request.frequencies) * len(request.amplitudes)
-    with progress("spectra") as on_progress:
-        laws = sum(other_settings(panel, request) is not None for panel in panels)
-        tiles.count = Count(on_progress, nodes * (len(panels) + laws))
-        spectra = play_panels(panels, request, tiles, both_laws=True)
-    taken, cpu = time.perf_counter() - began, time.process_time() - cpu
-    screen.print(_shares(panels, spectra))
-    _speed(spectra, request, tiles, taken, cpu, screen)
-    save(panels, spectra, request, data)
-    _draw(panels, spectra, request, data)
-    if {panel.figure for panel in panels} == set(FIGURES) and request.model == "ebm":
-        _claims(spectra, request, tiles, data, screen)
+    groups = [[panel for panel in panels if panel.figure == number] for number in dict.fromkeys(panel.figure for panel in panels)]
+    if tiles.client is not None:  # a cluster gets all at once
+        groups = [list(panels)]
+    spectra: list[Spectrum] = []
+    aside = 0.0  # s of CPU that figures took meanwhile
+    drawn: list[Future[float]] = []
+    with threads(1) as drawing:
+        with progress("spectra") as on_progress:
+            laws = sum(other_settings(panel, request) is not None for panel in panels)
+            tiles.count = Count(on_progress, nodes * (len(panels) + laws))
+            for group in groups:
+                found = play_panels(group, request, tiles, both_laws=True)
+                spectra += found
+                aside = sum(one.result() for one in drawn if one.done())
+                drawn.append(drawing.submit(_draw, group, found, request.model, data, formats))
+        if papers:
+            drawn.append(drawing.submit(_draw_areas, panels, spectra, data, formats))
+        screen.print(_shares(panels, spectra))
+        _speed(spectra, request, tiles, tiles.cpu - aside, screen)
+        save(panels, spectra, request, data)
+        if papers:
+            _claims(spectra, request, tiles, data, screen)
+        for one in drawn:
+            one.result()
+
+
+# matplotlib takes a second to import: the thread that draws does it. Returned is its CPU time, s.
+def _draw(panels: Sequence[Panel], spectra: Sequence[Spectrum], model: str, data: Path, formats: Sequence[str]) -> float:
+    began = time.thread_time()
+    from rockcheck.reports.studies.spectra import draw_figures
+
+    draw_figures(panels, spectra, model, data, formats)
+    return time.thread_time() - began
+
+
+def _draw_areas(panels: Sequence[Panel], spectra: Sequence[Spectrum], data: Path, formats: Sequence[str]) -> float:
+    began = time.thread_time()
+    from rockcheck.reports.studies.spectra import draw_areas
+
+    draw_areas(panels, spectra, data, formats)
+    return time.thread_time() - began
 
 
 def _shares(panels: Sequence[Panel], spectra: Sequence[Spectrum]) -> Table:
@@ -210,36 +241,21 @@ def _shares(panels: Sequence[Panel], spectra: Sequence[Spectrum]) -> Table:
     return table
 
 
-def _speed(spectra: Sequence[Spectrum], request: SpectrumRequest, tiles: Tiles, taken: float, cpu: float, screen: Console) -> None:
+def _speed(spectra: Sequence[Spectrum], request: SpectrumRequest, tiles: Tiles, cpu: float, screen: Console) -> None:
     nodes, evaluations = sum(s.outcomes.size for s in spectra), sum(s.evaluations for s in spectra)
     share = f" ({nodes / evaluations:.1f} times fewer than nodes)" if request.refine else ""
     what = "spectrum" if len(spectra) == 1 else "spectra"
-    screen.print(f"{len(spectra)} {what}, {nodes} nodes, {evaluations} runs{share}, {tiles.read_back} read back; {taken:.1f} s")
-    if tiles.played and tiles.client is None and request.model in ("ebm", "ebm-unilateral"):
+    screen.print(f"{len(spectra)} {what}, {nodes} nodes, {evaluations} runs{share}, {tiles.read_back} read back")
+    if tiles.seconds:
         from rockcheck.validation.bench.ebm import right_hand_side_seconds
 
-        one = right_hand_side_seconds()
-        each = cpu / tiles.played
+        one, each = right_hand_side_seconds(), cpu / tiles.played
         screen.print(
-            f"{tiles.played / taken:,.0f} trajectories/s on {tiles.jobs or os.cpu_count()} threads; {cpu:.1f} s of CPU,"
-            f" {1e6 * each:.1f} us a trajectory, {each / one:,.0f} times one right-hand-side evaluation ({1e9 * one:.1f} ns)",
+            f"{tiles.played / tiles.seconds:,.0f} trajectories/s on {tiles.jobs or os.cpu_count()} threads, {tiles.seconds:.1f} s;"
+            f" {cpu:.1f} s of CPU, {1e6 * each:.1f} us a trajectory,"
+            f" {each / one:,.0f} times one right-hand-side evaluation ({1e9 * one:.1f} ns)",
             soft_wrap=True,
         )
-
-
-def _draw(panels: Sequence[Panel], spectra: Sequence[Spectrum], request: SpectrumRequest, data: Path) -> None:
-    from rockcheck.reports.studies.spectra import areas_figure, figure_stem, own_figure, paper_figure, write
-
-    for number in dict.fromkeys(panel.figure for panel in panels):
-        mine = [(panel, spectrum) for panel, spectrum in zip(panels, spectra, strict=True) if panel.figure == number]
-        if number is None:
-            for panel, spectrum in mine:
-                write(own_figure(panel, spectrum), data / stem(panel.name, request.model))
-        else:
-            drawn = paper_figure([p for p, _ in mine], [s for _, s in mine], of="" if request.model == "ebm" else request.model)
-            write(drawn, data / figure_stem(number, request.model))
-    if {panel.figure for panel in panels} == set(FIGURES) and request.model == "ebm":
-        write(areas_figure(spectra), data / "safe-areas")
 
 
 def _claims(spectra: Sequence[Spectrum], request: SpectrumRequest, tiles: Tiles, data: Path, screen: Console) -> None:
@@ -261,7 +277,6 @@ def _verify(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, dat
     from rockcheck.validation.spectra.refinement import COLUMNS, verify
 
     nodes = len(request.frequencies) * len(request.amplitudes)
-    warm_up(panels[0], request)
     with progress("refined and full") as on_progress:
         tiles.count = Count(on_progress, 2 * nodes * len(panels))
         found = verify(panels, request, tiles)
@@ -269,8 +284,10 @@ def _verify(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, dat
     screen.print(_table(COLUMNS, found.rows, words=1))
 
 
-def _agreement(panels: Sequence[Panel], request: SpectrumRequest, count: int, tiles: Tiles, data: Path, screen: Console) -> None:
-    from rockcheck.reports.studies.spectra import MAPS, maps_figure, write
+def _agreement(
+    panels: Sequence[Panel], request: SpectrumRequest, count: int, tiles: Tiles, data: Path, formats: Sequence[str], screen: Console
+) -> None:
+    from rockcheck.reports.studies.spectra import draw_maps
     from rockcheck.validation.execute.models import not_installed
     from rockcheck.validation.spectra.agreement import CANDIDATES, COLUMNS, MAP_SIZE, agree, mapped
 
@@ -287,7 +304,7 @@ def _agreement(panels: Sequence[Panel], request: SpectrumRequest, count: int, ti
         tiles.count = Count(on_progress, count * len(CANDIDATES) * len(panels) + on_maps)
         found = agree(panels, spectra, request, count, tiles)
     _write_table("agreement", found, COLUMNS, data)
-    write(maps_figure(found, mapped(panels)), data / MAPS)
+    draw_maps(found, mapped(panels), data, formats)
     screen.print(_table(COLUMNS[1:], [row[1:] for row in found.rows[: len(CANDIDATES)]], words=1))
 
 
@@ -308,21 +325,26 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, words: int)
 
 
 def _fragility(
-    panels: Sequence[Panel], request: SpectrumRequest, records: Sequence[tuple[str, Recording]], tiles: Tiles, data: Path, screen: Console
+    panels: Sequence[Panel],
+    request: SpectrumRequest,
+    records: Sequence[tuple[str, Recording]],
+    tiles: Tiles,
+    data: Path,
+    formats: Sequence[str],
+    screen: Console,
 ) -> None:
-    from rockcheck.reports.studies.spectra import fragility_figure, write
+    from rockcheck.reports.studies.spectra import draw_fragility
     from rockcheck.validation.spectra.fragility import PULSES, curves_table, fragility
 
     if len(panels) != 1:
         raise InputError("needs --scene", "--fragility")
-    warm_up(panels[0], request)
     motions = 2 * (len(records) or PULSES)
     with progress("fragility") as on_progress:
         tiles.count = Count(on_progress, motions * len(request.amplitudes) * (1 + bool(panels[0].scene.walls)))
         found = fragility(panels[0], request, records, tiles)
     write_whole(data / "fragility.json", found.model_dump_json(indent=1) + "\n")
     write_whole(data / "fragility.csv", curves_table(found))
-    write(fragility_figure(found.model_dump()), data / "fragility")
+    draw_fragility(found.model_dump(mode="json"), data, formats)
     for case in found.cases:
         fit = "no curve fits" if case.median is None else f"median {case.median:.3g}, dispersion {case.dispersion:.3g}"
         screen.print(f"{case.label}: {case.motions} motions, {fit}")
