@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from functools import partial
 from importlib.util import find_spec
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import field_validator, model_validator
@@ -26,13 +26,16 @@ from rockcheck.scenes.errors import NotInstalled, printable
 from rockcheck.scenes.observation import observe
 
 MOST_STEPS = 5_000_000
+#: The step of an engine as it comes, where none is given, s.
+STOCK_STEP = 1e-4
 
 
 class Engine(Frozen):
     """A physics engine as a model of the block.
 
     `time_step` in s, or "adaptive": then steps end at the events and are at most `largest_step` s long, and those at
-    impacts and just after events `short_steps` times their usual length; neither has a meaning otherwise. `settings`
+    impacts and just after events `short_steps` times their usual length; neither has a meaning otherwise. Where none is given it is
+    the class's own, or `STOCK_STEP` with settings that cannot step adaptively. `settings`
     "best" is the set-up that converges to rigid contact with Coulomb friction and Newton's restitution; "default" is the
     engine as it comes, a box on a floor with the engine's own contact parameters, which cannot step adaptively.
     """
@@ -46,9 +49,16 @@ class Engine(Frozen):
     #: The settings in which contacts have Newton's coefficient of restitution.
     bounces_with: ClassVar[tuple[str, ...]] = ("best", "default")
     time_step: float | Literal["adaptive"] = 1e-4
-    largest_step: Positive = 1e-3
+    largest_step: Positive = 5e-4
     short_steps: Positive = 1.0
     settings: Literal["best", "default"] = "best"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _stock_step(cls, given: Any) -> Any:
+        if isinstance(given, dict) and given.get("settings") == "default":
+            return {"time_step": STOCK_STEP, **given}
+        return given
 
     @field_validator("time_step", mode="plain")
     @classmethod

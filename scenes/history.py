@@ -265,8 +265,8 @@ def events_path(path: Path) -> Path:
 
 
 def _packed(text: str) -> bytes:
-    """The same text gives the same bytes. More effort than the least makes histories smaller by a fourteenth, in five times the time."""
-    return gzip.compress(text.encode(), compresslevel=1, mtime=0)
+    """The same text gives the same bytes. More effort makes histories 2 % smaller in twice the time, less 5 % larger in half of it."""
+    return gzip.compress(text.encode(), compresslevel=4, mtime=0)
 
 
 def _text(value: object) -> str:

@@ -10,10 +10,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rockcheck.ebm import EventBasedModel
 from rockcheck.engines import MuJoCo, PyBullet
 from rockcheck.engines.engine import Engine
 from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Ricker, Scene, Sine, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
 
 
 def run(code: str) -> subprocess.CompletedProcess[str]:
@@ -76,6 +78,42 @@ def test_wrong_settings(varying_engine, settings, words):
 
 
 @pytest.mark.parametrize("settings", [{"time_step": 1e-9}, {"time_step": "adaptive", "largest_step": 1e-9}])
+@pytest.mark.parametrize("engine", [MuJoCo, PyBullet], ids=["mujoco", "pybullet"])
+def test_steps_are_adaptive_unless_something_else_is_asked_for(engine):
+    """An engine as it comes cannot step so: it has a fixed step, also by default."""
+    if not engine.installed():
+        pytest.skip("not installed")
+    assert (engine().time_step, engine().largest_step) == ("adaptive", 5e-4)
+    assert engine(settings="default").time_step == 1e-4
+    assert engine(settings="default", time_step=1e-3).time_step == 1e-3
+    assert engine(time_step=1e-3).coarser(2.0).time_step == 2e-3
+    with pytest.raises(InputError, match='"adaptive" is not allowed with settings = "default"'):
+        engine(settings="default", time_step="adaptive")
+
+
+@pytest.mark.parametrize("engine", [MuJoCo, PyBullet], ids=["mujoco", "pybullet"])
+def test_a_default_run_of_the_readmes_scene_is_converged(engine):
+    """A wall that the block strikes at 5.95 alpha and comes back from: at fixed steps of 1e-4 s it is not."""
+    if not engine.installed():
+        pytest.skip("not installed")
+    scene = Scene(
+        name="bookcase",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=0.3),
+        walls=(Wall(side="left", gap=0.053),),
+        excitation=Ricker(amplitude=4.0, period=1.5),
+        duration=6.0,
+    )
+    model = engine()
+    history = model.simulate(scene)
+    reference = EventBasedModel(pivot="unilateral").simulate(scene)
+    error = np.sqrt(np.mean((history.channels["theta"] - reference.channels["theta"]) ** 2)) / scene.block.alpha
+    found = numerical_uncertainty(model, scene, history)
+    assert found is not None
+    assert found.converged
+    assert error < found.u_num("theta_rms") < 1e-3
+
+
 def test_too_many_steps_are_refused_at_once(varying_engine, settings, free_rocking):
     with pytest.raises(InputError, match="5000000 steps"):
         varying_engine(**settings).simulate(free_rocking(0.5))

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import lru_cache
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -161,6 +162,8 @@ def run_suite(
     waiting = [item for item in items if item not in records and item not in failures]
     on_progress(len(records), len(items), f"{len(records)} up to date")
     limits = [suite.suite_of(item.place).limits for item in waiting]
+    by_place = {(planned.scene.name, planned.variant.label): planned for planned in planned_cells}
+    by_scene = {scene: list(of) for scene, of in groupby(planned_cells, key=lambda planned: planned.scene.name)}
     for index, result in play(
         [_task(item, suite) for item in waiting],
         jobs=jobs or os.cpu_count() or 1,
@@ -181,7 +184,10 @@ def run_suite(
             else:
                 store.put_record(COMPARISONS, item.name, result.record)
         on_progress(len(records) + len(failures), len(items), f"{item.place}, {item.variant.label}")
-    by_place = {(planned.scene.name, planned.variant.label): planned for planned in planned_cells}
+        of_scene = by_scene.get(item.place, [])
+        if all(planned in records or planned in failures for planned in of_scene):  # compared while others play, and kept
+            for planned in of_scene:
+                _cell(suite, planned, by_place, records, failures, store, False)
     inputs = {name: inputs_of(store, given) for name, given in suite.uncertain.items()}
     cells = [_cell(suite, planned, by_place, records, failures, store, planned in read_back) for planned in planned_cells]
     ensembles, ensemble_cells = _ensembles(suite, batches, records, failures, read_back)
@@ -459,11 +465,21 @@ def _compared(
     return found
 
 
+def _loaded(store: Store, planned: PlannedCell) -> History:
+    path = store.history(planned.name)
+    return _load(path, path.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=16)  # a scene's histories are held against each other
+def _load(path: Path, written: int) -> History:
+    return History.load(path)
+
+
 def _compute(
     store: Store, scene: Scene, planned: PlannedCell, reference: PlannedCell | None, windowed: Sequence[Windowed], horizon: float | None
 ) -> dict[str, Any]:
-    candidate = History.load(store.history(planned.name))
-    yardstick = History.load(store.history(reference.name)) if reference else None
+    candidate = _loaded(store, planned)
+    yardstick = _loaded(store, reference) if reference else None
     figures: list[Figure] = []
     gaps: dict[str, tuple[str, bool]] = {}
     by_window: dict[str, list[str]] = {"": [m.name for m in (DIFFERENCES if reference else FIGURES).values() if not m.on_request]}

@@ -109,7 +109,7 @@ def test_a_deliberate_fault_fails_the_smoke_suite(project, fault, file, old, new
 CHANGES = [
     ("an engine's module", "engines/pybullet_engine.py", r"\Z", "\nUNUSED = 1\n", 20),
     ("a remark", "engines/pybullet_engine.py", r"\Z", "\n# unused\n", 25),
-    ("an engine's setting", "validation/data/suites/smoke.toml", r"(\[models\.mujoco\]\ntime_step = )2e-4", r"\g<1>1.9e-4", 20),
+    ("an engine's setting", "validation/data/suites/smoke.toml", r"(\[models\.mujoco\]\n)", r"\g<1>largest_step = 4.9e-4\n", 20),
     ("the continuous model's", "cm/contact.py", r"\Z", "\nUNUSED = 1\n", 20),
     ("a measure", "validation/discrepancy/measures.py", r"\Z", "\nUNUSED = 1\n", 25),
     ("a page", "reports/site.py", r"\Z", "\nUNUSED = 1\n", 25),
