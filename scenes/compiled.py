@@ -34,6 +34,7 @@ from numba.core.event import Event, Listener, register
 from numba.extending import register_jitable
 
 from rockcheck.scenes.errors import InputError
+from rockcheck.scenes.progress import announce, announced
 from rockcheck.scenes.reading import MOST_BYTES, open_regular
 from rockcheck.scenes.writing import write_whole
 
@@ -41,30 +42,55 @@ config: Any = numba_config
 Result = TypeVar("Result")
 
 _KEPT = 7 * 86400.0  # s
+#: A compilation that takes longer is announced, s.
+_SILENT = 2.0
+#: What the code of a package is for, in an announcement.
+_PURPOSES = {"rockcheck.ebm": "the event-based models", "rockcheck.cm": "the continuous model"}
 
 
-class _NoCollection(Listener):
-    """Collects no garbage while numba compiles: to search all that a compiler keeps for cycles takes a tenth of its time."""
+class _Compiling(Listener):
+    """While numba compiles no garbage is collected: to search all that a compiler keeps for cycles takes a tenth of its time.
+
+    What takes long is announced, once a package and process: whoever waits should know for what.
+    """
 
     def __init__(self) -> None:
         self.depth = 0
         self.wanted = False
+        self.told: set[str] = set()
+        self.timer: threading.Timer | None = None
 
     def on_start(self, event: Event) -> None:
         """A compilation begins, perhaps inside another one; numba's lock admits one thread."""
         if self.depth == 0:
             self.wanted = gc.isenabled()
             gc.disable()
+            if announced():
+                function = getattr((event.data or {}).get("dispatcher"), "py_func", None)
+                self.timer = threading.Timer(_SILENT, self._tell, [getattr(function, "__module__", "")])
+                self.timer.daemon = True
+                self.timer.start()
         self.depth += 1
 
     def on_end(self, event: Event) -> None:
         """A compilation ends."""
         self.depth -= 1
-        if self.depth == 0 and self.wanted:
-            gc.enable()
+        if self.depth == 0:
+            if self.timer is not None:
+                self.timer.cancel()
+                self.timer = None
+            if self.wanted:
+                gc.enable()
+
+    def _tell(self, module: str) -> None:
+        package = ".".join(module.split(".")[:2])
+        if package not in self.told:
+            self.told.add(package)
+            what = _PURPOSES.get(package, package)
+            announce(f"compiling {what} for this machine, once a version: about a minute (`rockcheck warm` does it ahead)")
 
 
-register("numba:compile", _NoCollection())
+register("numba:compile", _Compiling())
 
 
 def _package(function: Callable[..., Any]) -> Path:

@@ -6,7 +6,7 @@ hears it; without a listener that costs nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -41,6 +41,37 @@ def listening(on_progress: OnProgress) -> Iterator[None]:
         yield
     finally:
         _listener.reset(token)
+
+
+_announcer: Callable[[str], None] | None = None
+
+
+def announce(words: str) -> None:
+    """Says in one line what a user waits for, in whatever thread, where somebody is `announcing`; else nothing."""
+    if _announcer is not None:
+        _announcer(words)
+
+
+def announced() -> bool:
+    """Whether somebody is `announcing`."""
+    return _announcer is not None
+
+
+def announce_by(say: Callable[[str], None] | None) -> None:
+    """From now on `say` gets what is to be announced in this process; None: nobody."""
+    global _announcer
+    _announcer = say
+
+
+@contextmanager
+def announcing(say: Callable[[str], None] | None) -> Iterator[None]:
+    """Within this block `say` gets what is to be announced in this process; None: nobody."""
+    before = _announcer
+    announce_by(say)
+    try:
+        yield
+    finally:
+        announce_by(before)
 
 
 @dataclass

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import gc
+import json
 import os
 import pickle
 import signal
 import subprocess
 import sys
 import time
+from collections import deque
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from rockcheck import ebm
 from rockcheck.ebm.core import march
 from rockcheck.scenes import compiled
+from rockcheck.scenes.progress import announce, announcing
+from rockcheck.validation.commands.cli import main
+from rockcheck.validation.execute.pool import Call, Pool
+from rockcheck.validation.execute.warming import PARTS
 
 posix = pytest.mark.skipif(os.name != "posix", reason="owners and modes as POSIX has them")
 
@@ -226,3 +234,59 @@ def test_an_interruptible_call_is_the_call_itself():
     assert compiled.interruptible(lambda: 3) == 3
     with pytest.raises(ZeroDivisionError):
         compiled.interruptible(lambda: 1 // 0)
+
+
+def compilation(compiling, module):
+    """A compilation of a function of that module, as numba tells of it, that takes a tenth of a second."""
+    event = SimpleNamespace(data={"dispatcher": SimpleNamespace(py_func=SimpleNamespace(__module__=module))})
+    compiling.on_start(event)
+    compiling.on_start(event)  # of a function that it calls
+    time.sleep(0.1)
+    compiling.on_end(event)
+    compiling.on_end(event)
+
+
+def test_a_long_compilation_is_announced_once_a_package(monkeypatch):
+    """Whoever waits knows for what; of one that is quick nothing is said, nor where nobody asked."""
+    heard, compiling = [], compiled._Compiling()
+    monkeypatch.setattr(compiled, "_SILENT", 60.0)
+    with announcing(heard.append):
+        compilation(compiling, "rockcheck.ebm.core.march")
+        assert heard == []
+        monkeypatch.setattr(compiled, "_SILENT", 0.0)
+        for module in ("rockcheck.ebm.core.march", "rockcheck.ebm.batch", "rockcheck.cm.kernels"):
+            compilation(compiling, module)
+    compilation(compiling, "rockcheck.elsewhere")
+    assert [words.split(" for this machine")[0] for words in heard] == [
+        "compiling the event-based models",
+        "compiling the continuous model",
+    ]
+    assert gc.isenabled()
+
+
+def test_a_worker_announces_on_the_runs_own_stderr(capfd):
+    """Its output goes nowhere otherwise; and it says nothing where the run does not want to hear of it."""
+    calls = [Call(announce, ("compiling",)), Call(print, ("noise",))]
+    with announcing(lambda words: None), Pool(1) as pool:
+        assert [ended.error for ended in pool.run(deque(calls))] == [None, None]
+    assert capfd.readouterr() == ("", "rockcheck: compiling\n")
+    with Pool(1) as pool:
+        assert [ended.error for ended in pool.run(deque(calls))] == [None, None]
+    assert capfd.readouterr() == ("", "")
+
+
+def test_what_is_compiled_ahead_is_not_compiled_again(capsys):
+    """`rockcheck warm` covers what commands need; a second time all of it is there."""
+    assert main(["warm"]) == 0
+    assert "the continuous model" in capsys.readouterr().out
+    assert main(["warm", "--json", "--jobs", "1"]) == 0
+    said = capsys.readouterr()
+    assert list(json.loads(said.out)["seconds"]) == list(PARTS)
+    assert said.err == ""
+    code = (
+        "from rockcheck.validation.execute.warming import PARTS;"
+        "[run() for runs in PARTS.values() for run in runs];"
+        "from rockcheck.ebm.core import march; print(sum(march.run.stats.cache_misses.values()), len(march.run.signatures) <= 2)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True)
+    assert done.stdout == "0 True\n"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -17,7 +18,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from rockcheck.scenes import History, InputError, named_scenes
 from rockcheck.scenes.errors import printable
-from rockcheck.scenes.progress import OnProgress
+from rockcheck.scenes.progress import OnProgress, announcing
 from rockcheck.scenes.writing import json_text
 
 if TYPE_CHECKING:
@@ -46,8 +47,10 @@ _voice: ContextVar[Voice] = ContextVar("voice", default="tables")
 def speaking(voice: Voice) -> Iterator[None]:
     """Within this block commands speak like that."""
     token = _voice.set(voice)
+    say = (lambda words: print(f"rockcheck: {words}", file=sys.stderr)) if voice == "tables" else None
     try:
-        yield
+        with announcing(say):
+            yield
     finally:
         _voice.reset(token)
 

@@ -35,6 +35,7 @@ from rockcheck.validation.commands import (
     total_told,
     uncertainty,
     validate,
+    warm,
 )
 from rockcheck.validation.commands.engines import calibrate, conformance
 from rockcheck.validation.commands.studies import benchmark, convergence, ida, spectrum, stress
@@ -61,6 +62,7 @@ COMMANDS = {
     stress: "rockcheck stress --quick",
     report: "rockcheck report rockcheck-report",
     figure: "rockcheck figure rockcheck-report fig4a -o fig4a.pdf",
+    warm: "rockcheck warm",
 }
 
 #: Commands that answer at once: nobody asks how long they took.

@@ -14,12 +14,13 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing import resource_tracker
 from typing import Any, Self
 
 from rockcheck.scenes.errors import InputError, ModelFailure, printable
+from rockcheck.scenes.progress import announce_by, announced
 
 #: One thread a process: the calls are what runs in parallel.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
@@ -98,7 +99,7 @@ class Pool:
             max_workers=self.jobs,
             context=multiprocessing.get_context("spawn"),
             initializer=prepare,
-            initargs=(self.memory_mb,),
+            initargs=(self.memory_mb, announced()),
         )
         try:
             with _interrupts_held():
@@ -183,11 +184,17 @@ def _interrupts_held() -> Iterator[None]:
             signal.raise_signal(signal.SIGINT)
 
 
-def prepare(memory_mb: float | None) -> None:
-    """Make this process die with the run, and fail where it takes more memory than it may (where the system can say so)."""
+def prepare(memory_mb: float | None, announces: bool = False) -> None:
+    """Make this process die with the run, and fail where it takes more memory than it may (where the system can say so).
+
+    Its output goes nowhere but for what it `announces`, such as a long compilation, which goes to the run's standard error.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run itself ends its processes
     if (run := multiprocessing.parent_process()) is not None:
         threading.Thread(target=_follow, args=(run,), daemon=True).start()
+    if announces:
+        terminal = os.dup(2)
+        announce_by(lambda words: _write(terminal, f"rockcheck: {words}\n"))
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):  # the terminal is the run's; engines greet on it from C
         os.dup2(nowhere, stream)
@@ -200,6 +207,11 @@ def prepare(memory_mb: float | None) -> None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     except (ImportError, ValueError, OSError):
         pass
+
+
+def _write(stream: int, text: str) -> None:
+    with suppress(OSError):  # nobody reads any more
+        os.write(stream, text.encode())
 
 
 def _follow(run: Any) -> None:

@@ -1,0 +1,80 @@
+"""Fills the cache of compiled code ahead, in processes side by side: a user then waits for no compiler."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+
+from rockcheck.scenes import Scene, load_scene
+from rockcheck.scenes.progress import OnProgress, unheard
+from rockcheck.validation.execute.pool import Call, Pool
+
+
+def _scene() -> Scene:
+    return load_scene("fig5a").replace(duration=0.1)
+
+
+def _histories() -> None:
+    from rockcheck.ebm import EventBasedModel
+
+    EventBasedModel().simulate(_scene())
+
+
+def _bouc_wen() -> None:
+    from rockcheck.ebm import EventBasedModel
+
+    EventBasedModel(friction="bouc-wen").simulate(_scene())
+
+
+def _batches() -> None:
+    from rockcheck.ebm import EventBasedModel
+    from rockcheck.ebm.batch import pack, run_batch
+
+    model = EventBasedModel()
+    run_batch(pack([_scene()], model), model, jobs=1)
+
+
+def _samples() -> None:
+    from rockcheck.ebm import EventBasedModel
+    from rockcheck.ebm.ensemble import play_ensemble
+
+    play_ensemble([_scene()], EventBasedModel())
+
+
+def _continuous() -> None:
+    from rockcheck.cm import ContinuousModel
+
+    ContinuousModel().simulate(_scene())
+
+
+#: What is compiled, the longest first. Batches share the loop of histories, so they come after it and in one process with it.
+PARTS: Mapping[str, tuple[Callable[[], None], ...]] = {
+    "the event-based model with Bouc-Wen friction": (_bouc_wen,),
+    "the event-based models: histories, batches, ensembles": (_histories, _batches, _samples),
+    "the continuous model": (_continuous,),
+}
+
+
+def warm(jobs: int, *, on_progress: OnProgress = unheard) -> dict[str, float]:
+    """Compile what is not in the cache, in up to `jobs` processes; returns the time of each part of `PARTS`, s.
+
+    Raises what a part raises.
+    """
+    taken: dict[str, float] = {}
+    on_progress(0, len(PARTS), "")
+    with Pool(max(1, min(jobs, len(PARTS)))) as pool:
+        for ended in pool.run(deque(Call(compile_part, (name,), key=name) for name in PARTS)):
+            if ended.error is not None:
+                raise ended.error
+            taken[ended.call.key] = ended.result
+            on_progress(len(taken), len(PARTS), ended.call.key)
+    return {name: taken[name] for name in PARTS}
+
+
+def compile_part(name: str) -> float:
+    """Compile one part of `PARTS`, or find it in the cache; returns how long that took, s."""
+    began = time.perf_counter()
+    for run in PARTS[name]:
+        run()
+    return time.perf_counter() - began
