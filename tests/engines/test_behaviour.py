@@ -78,23 +78,23 @@ def test_wrong_settings(varying_engine, settings, words):
 
 
 @pytest.mark.parametrize("settings", [{"time_step": 1e-9}, {"time_step": "adaptive", "largest_step": 1e-9}])
-@pytest.mark.parametrize("engine", [MuJoCo, PyBullet], ids=["mujoco", "pybullet"])
-def test_steps_are_adaptive_unless_something_else_is_asked_for(engine):
+@pytest.mark.parametrize("kind", [MuJoCo, PyBullet], ids=["mujoco", "pybullet"])
+def test_steps_are_adaptive_unless_something_else_is_asked_for(kind):
     """An engine as it comes cannot step so: it has a fixed step, also by default."""
-    if not engine.installed():
+    if not kind.installed():
         pytest.skip("not installed")
-    assert (engine().time_step, engine().largest_step) == ("adaptive", 5e-4)
-    assert engine(settings="default").time_step == 1e-4
-    assert engine(settings="default", time_step=1e-3).time_step == 1e-3
-    assert engine(time_step=1e-3).coarser(2.0).time_step == 2e-3
+    assert (kind().time_step, kind().largest_step) == ("adaptive", 5e-4)
+    assert kind(settings="default").time_step == 1e-4
+    assert kind(settings="default", time_step=1e-3).time_step == 1e-3
+    assert kind(time_step=1e-3).coarser(2.0).time_step == 2e-3
     with pytest.raises(InputError, match='"adaptive" is not allowed with settings = "default"'):
-        engine(settings="default", time_step="adaptive")
+        kind(settings="default", time_step="adaptive")
 
 
-@pytest.mark.parametrize("engine", [MuJoCo, PyBullet], ids=["mujoco", "pybullet"])
-def test_a_default_run_of_the_readmes_scene_is_converged(engine):
+@pytest.mark.parametrize("kind", [MuJoCo, PyBullet], ids=["mujoco", "pybullet"])
+def test_a_default_run_of_the_readmes_scene_is_converged(kind):
     """A wall that the block strikes at 5.95 alpha and comes back from: at fixed steps of 1e-4 s it is not."""
-    if not engine.installed():
+    if not kind.installed():
         pytest.skip("not installed")
     scene = Scene(
         name="bookcase",
@@ -104,7 +104,7 @@ def test_a_default_run_of_the_readmes_scene_is_converged(engine):
         excitation=Ricker(amplitude=4.0, period=1.5),
         duration=6.0,
     )
-    model = engine()
+    model = kind()
     history = model.simulate(scene)
     reference = EventBasedModel(pivot="unilateral").simulate(scene)
     error = np.sqrt(np.mean((history.channels["theta"] - reference.channels["theta"]) ** 2)) / scene.block.alpha
