@@ -186,9 +186,9 @@ def run_batch(
 
 @kernel
 def row_ground(row, samples):
-    """The base motion of a packed row."""
+    """The base motion of a packed row, of the types that a single history has: the loop is then compiled once for both."""
     return Ground(
-        kind=row.kind,
+        kind=int(row.kind),
         c0=row.c0,
         c1=row.c1,
         c2=row.c2,
@@ -203,7 +203,7 @@ def row_ground(row, samples):
 
 @kernel
 def row_setting(r):
-    """Block, floor and walls of a packed row."""
+    """Block, floor and walls of a packed row, of the types that a single history has."""
     return Setting(
         alpha=r.alpha,
         sin_alpha=r.sin_alpha,
@@ -217,10 +217,10 @@ def row_setting(r):
         gap_right=r.gap_right,
         e_left=r.e_left,
         e_right=r.e_right,
-        walls=r.walls,
-        no_slip=r.no_slip,
-        unilateral=r.unilateral,
-        energy_cap=r.energy_cap,
+        walls=r.walls != 0.0,
+        no_slip=r.no_slip != 0.0,
+        unilateral=r.unilateral != 0.0,
+        energy_cap=r.energy_cap != 0.0,
         law=int(r.law),
     )
 
