@@ -91,6 +91,28 @@ def landing(alpha: float, phi: float, mu: float, e: float, v, cap: bool) -> tupl
     return after, float(tally[1])
 
 
+def test_the_floor_takes_friction_within_its_cone():
+    """A corner that lands and slips is held by mu times what holds it up, against the slip; one that sticks by no more than that."""
+    rng = np.random.default_rng(22)
+    sticks = slips = 0
+    for _ in range(500):
+        alpha, mu, e = rng.uniform(0.1, 1.2), rng.uniform(0.05, 1.2), float(rng.choice([0.0, 0.5]))
+        phi, v = alpha * rng.uniform(0.05, 0.9), rng.normal(0.0, 0.5, 3)
+        rows = ci.contact_rows(alpha, phi)
+        if rows[ci.F] @ v > -1e-3:
+            continue
+        after = landing(alpha, phi, mu, e, v, cap=False)[0]
+        along, up = (after - v)[:2]  # of a unit mass
+        slip = rows[-1] @ after
+        if abs(slip) < 1e-9:
+            assert abs(along) <= mu * up + 1e-12
+            sticks += 1
+        else:
+            assert along == pytest.approx(-math.copysign(mu * up, slip), abs=1e-12)
+            slips += 1
+    assert min(sticks, slips) > 50
+
+
 def test_the_energy_cap_takes_the_largest_restitution_that_adds_none():
     """Where Newton's restitution adds no energy the cap changes nothing; where it does, a little more restitution would add some."""
     rng = np.random.default_rng(21)
