@@ -9,6 +9,7 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,12 +75,22 @@ def _enough(t: Floats, values: Floats) -> list[int]:
     return sorted(kept)
 
 
-def save_glimpses(found: Sequence[Glimpse], path: Path) -> None:
-    """Write histories as one NPZ: all rows below each other, and where each begins."""
+def kept(path: Path, key: str) -> bool:
+    """Whether the histories of that key are there already."""
+    try:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as content:
+            return bool(content["key"] == key)
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+        return False
+
+
+def save_glimpses(found: Sequence[Glimpse], path: Path, key: str = "") -> None:
+    """Write histories as one NPZ: all rows below each other, and where each begins. `key` covers all that they depend on."""
     content = io.BytesIO()
     lengths = [len(one.motion) for one in found]
     np.savez_compressed(
         content,
+        key=np.array(key),
         nodes=np.array([(one.row, one.column) for one in found], dtype=np.int64).reshape(-1, 2),
         outcomes=np.array([one.outcome for one in found]),
         ends=np.cumsum(lengths, dtype=np.int64),

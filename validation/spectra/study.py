@@ -27,8 +27,8 @@ from rockcheck.scenes.writing import table_text, write_whole
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build
-from rockcheck.validation.spectra.histories import glimpses, glimpses_path, save_glimpses
-from rockcheck.validation.spectra.tiles import Tiles, compiled
+from rockcheck.validation.spectra.histories import glimpses, glimpses_path, kept, save_glimpses
+from rockcheck.validation.spectra.tiles import Tiles, compiled, tile_key
 
 FIGURES: dict[int, tuple[Literal["left", "right"], float]] = {6: ("left", 0.3), 7: ("left", 0.6), 8: ("right", 0.3), 9: ("right", 0.6)}
 GAPS, RESTITUTIONS = (0.003, 0.053, 0.103), (0.0, 1.0)
@@ -213,13 +213,21 @@ def save(panels: Sequence[Panel], spectra: Sequence[Spectrum], request: Spectrum
         write_whole(folder / f"{record.name}.npz", _npz(spectrum, json.dumps(about)))
         write_whole(folder / f"{record.name}.csv", _csv(spectrum, json.dumps(about)))
         if compiled(model):
-            save_glimpses(glimpses(spectrum, model), glimpses_path(folder, record.name))
+            path, key = glimpses_path(folder, record.name), _glimpses_key(spectrum, request)
+            if not kept(path, key):
+                save_glimpses(glimpses(spectrum, model), path, key)
         records.append(record)
     index = read_index(folder)
     new = {record.name: record for record in records}
     merged = [*(old for old in index.spectra if old.name not in new), *records]
     whole = SpectraIndex(spectra=tuple(sorted(merged, key=lambda record: record.name)))
     write_whole(folder / "spectra.json", whole.model_dump_json(indent=1) + "\n")
+
+
+def _glimpses_key(spectrum: Spectrum, request: SpectrumRequest) -> str:
+    """Hash of all that the histories of some nodes depend on."""
+    nodes = tile_key(spectrum.scene, spectrum.amplitude_ratios, spectrum.frequency_ratios, request.model, request.settings)
+    return provenance.digest(nodes + provenance.code_digest("rockcheck.validation.spectra.histories"))
 
 
 def stem(name: str, model: str) -> str:

@@ -10,7 +10,7 @@ import pytest
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.spectrum import TOLERANCE, node_scene, play_nodes
 from rockcheck.validation.spectra.findings import findings, kept_spectra
-from rockcheck.validation.spectra.histories import COARSE, KEPT_AN_AXIS, glimpses, read_glimpses, save_glimpses
+from rockcheck.validation.spectra.histories import COARSE, KEPT_AN_AXIS, Glimpse, glimpses, kept, read_glimpses, save_glimpses
 
 MODEL = EventBasedModel(tolerance=TOLERANCE)
 
@@ -74,3 +74,15 @@ def test_histories_are_the_model_s_own_and_good_enough_to_be_looked_at(tmp_path)
     assert read_glimpses(tmp_path / "none.npz") == []
     sides = {"overturned left": -1, "overturned right": 1}
     assert np.mean([sides.get(one.outcome, 0) == spectrum.outcomes[one.row, one.column] for one in found]) == pytest.approx(1.0, abs=0.01)
+
+
+def test_histories_of_another_run_are_not_taken_for_this_ones(tmp_path):
+    path = tmp_path / "x.npz"
+    assert not kept(path, "a")
+    save_glimpses([Glimpse(0, 0, "at rest", np.zeros((2, 4)))], path, "a")
+    assert kept(path, "a")
+    assert not kept(path, "b")
+    whole = path.read_bytes()
+    for damaged in (whole[:50], b"", b"no archive"):
+        path.write_bytes(damaged)
+        assert not kept(path, "a")
