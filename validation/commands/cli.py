@@ -23,10 +23,8 @@ from rockcheck.validation.commands import (
     begun,
     compare,
     diff,
-    figure,
     new,
     record,
-    report,
     report_file,
     run,
     scenes,
@@ -38,6 +36,7 @@ from rockcheck.validation.commands import (
     warm,
 )
 from rockcheck.validation.commands.engines import calibrate, conformance
+from rockcheck.validation.commands.pages import figure, report
 from rockcheck.validation.commands.studies import benchmark, convergence, ida, spectrum, stress
 from rockcheck.validation.suite.results import FAULT
 

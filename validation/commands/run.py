@@ -26,7 +26,7 @@ from rockcheck.validation.commands import (
     tell_missing,
     usable_folder,
 )
-from rockcheck.validation.commands.publish import keep, publish
+from rockcheck.validation.commands.pages.publish import keep, publish
 from rockcheck.validation.commands.record import (
     ColumnOption,
     ComponentOption,

@@ -23,7 +23,7 @@ from rockcheck.validation.commands import (
     tell_left_out,
     usable_folder,
 )
-from rockcheck.validation.commands.publish import keep
+from rockcheck.validation.commands.pages.publish import keep
 from rockcheck.validation.commands.run import ForceOption, chosen_models, play, play_scene, published, tell_faults
 from rockcheck.validation.suite.changes import Moment, moment_of, remember, trends
 from rockcheck.validation.suite.results import Run

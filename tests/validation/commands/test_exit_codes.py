@@ -13,8 +13,9 @@ import pytest
 from filelock import FileLock
 
 from rockcheck.scenes import ModelFailure
-from rockcheck.validation.commands import cli, publish
+from rockcheck.validation.commands import cli
 from rockcheck.validation.commands.cli import EXIT_CODES, main
+from rockcheck.validation.commands.pages import publish
 from rockcheck.validation.execute.pool import Ended, Pool
 from rockcheck.validation.spectra.study import paper_panels
 from rockcheck.validation.spectra.tiles import Tiles

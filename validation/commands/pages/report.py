@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rockcheck.validation.commands import answer, console, progress
-from rockcheck.validation.commands.publish import publish
+from rockcheck.validation.commands.pages.publish import publish
 from rockcheck.validation.suite.results import Run
 
 

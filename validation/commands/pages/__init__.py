@@ -1,0 +1,1 @@
+"""Commands that show a finished run, and what they share."""
