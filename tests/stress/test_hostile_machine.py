@@ -52,17 +52,24 @@ def leavings(folder: Path) -> list[Path]:
     return list(folder.rglob("*.part"))
 
 
+def limited(size: int, *words: str) -> subprocess.CompletedProcess[str]:
+    """rockcheck where no file can be larger than `size` bytes; without coverage.py, whose own file would be too large."""
+    command = [sys.executable, "-c", _LIMITED, str(size), *words]
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("COVERAGE_PROCESS")}
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=environment)
+
+
 @posix
 def test_disk_full(tmp_path):
     """A history that does not fit: one line that names the file, exit 2, and the old history with its events as they were."""
     out, events = tmp_path / "out.csv", tmp_path / "out.events.csv"
-    command = [sys.executable, "-c", _LIMITED, "4096", "simulate", "fig4a", "--model", "ebm", "-o", str(out)]
+    words = ("simulate", "fig4a", "--model", "ebm", "-o", str(out))
     for old in (False, True):
         if old:
             assert main(["simulate", "fig5a", "--model", "ebm", "-o", str(out), "--quiet"]) == 0
         before = {path: path.read_bytes() for path in tmp_path.iterdir()}
         assert set(before) == ({out, events} if old else set())
-        done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+        done = limited(4096, *words)
         assert done.returncode == 2
         assert f"{out}: cannot be written: File too large" in one_line(done.stderr)
         assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
@@ -73,8 +80,7 @@ def test_disk_full(tmp_path):
 def test_disk_full_whatever_is_written(tmp_path, size):
     """A scene file, figures and pages: nothing that is there is cut, and the line names the file that could not be written."""
     for words in (["new", str(tmp_path / "a.toml")], ["validate", "smoke", "--out", str(tmp_path / "run")]):
-        command = [sys.executable, "-c", _LIMITED, str(size), *words]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+        done = limited(size, *words)
         if words[0] == "validate" or size == 100:
             assert done.returncode == 2
             assert str(tmp_path) in one_line(done.stderr)
@@ -102,8 +108,7 @@ def test_what_is_no_file_is_written_as_it_is(tmp_path):
 @posix
 def test_disk_full_while_a_study_is_written(tmp_path):
     """Tables that were written stay whole; the file that does not fit leaves nothing; the next run writes all."""
-    command = [sys.executable, "-c", _LIMITED, "3000", *SMALL_RUN, "--out", str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    done = limited(3000, *SMALL_RUN, "--out", str(tmp_path))
     assert done.returncode == 2
     one_line(done.stderr)
     assert not leavings(tmp_path)
