@@ -14,6 +14,7 @@ from rockcheck.scenes import Floor, History, Record, Rest, Ricker, Scene, Sine, 
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.commands.cli import main
 from rockcheck.validation.stress import invariants, players, study
+from rockcheck.validation.stress.exact import exact_scene
 from rockcheck.validation.stress.generator import ALPHA, FRICTION, RADIUS, random_scene
 from rockcheck.validation.stress.invariants import INVARIANTS, CheckedRun, audited, check_run, energy_error, similar
 from rockcheck.validation.stress.mechanics import BOOLE, integrals, tilted_forces
@@ -364,3 +365,19 @@ def test_quick_run():
     found = run_stress("runs", quick=True, seed=11)
     assert found.complete
     assert found.broken == []
+
+
+def test_exact_scenes_are_the_same_for_a_seed_and_hold_what_they_are_for():
+    """Numbers of few digits, starts that are noise, walls on both sides, a vertical base that may take all weight, long rest."""
+    scenes = [exact_scene(5, number, "unilateral") for number in range(400)]
+    assert scenes == [exact_scene(5, number, "unilateral") for number in range(400)]
+    assert scenes[:50] != [exact_scene(6, number, "unilateral") for number in range(50)]
+    assert all(len(repr(scene.block.half_width)) < 8 and len(repr(scene.gravity)) < 8 for scene in scenes)
+    assert any(0.0 < abs(scene.initial_rotation) < 1e-12 for scene in scenes)
+    assert any(0.0 < abs(scene.initial_angular_velocity) < 1e-12 for scene in scenes)
+    assert any(len(scene.walls) == 2 and scene.walls[0].gap == scene.walls[1].gap for scene in scenes)
+    assert any(scene.vertical.kind == "record" and min(scene.vertical.samples) == -scene.gravity for scene in scenes)
+    assert any(scene.duration == 1e4 for scene in scenes)
+    yielding = [exact_scene(5, number, "bouc-wen") for number in range(100)]
+    assert all(scene.floor.static_friction is None for scene in yielding)
+    assert [scene.block for scene in yielding] == [scene.block for scene in scenes[:100]]
