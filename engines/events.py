@@ -16,7 +16,7 @@ FloatArray = NDArray[np.float64]
 HOLD = 2e-3  # s: shorter openings of a contact are the engine's chatter, and an impulse is summed over this time
 REST = 20e-3  # s: a shorter rest is the dead centre of a last tiny rocking
 CLOSED = 1e-6  # block radii; wider at fixed steps, where a resting block falls freely for a step now and then
-NOISE = 1e-3  # of the thresholds
+GAP_NOISE, SLIP_NOISE = 1e-4, 1e-3  # of the thresholds: what a gap and a slip of a contact that holds may show
 SLIPPING = 1e-3  # m/s
 TURNING = 1e-3  # rad/s
 
@@ -39,14 +39,14 @@ def events_of(scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: 
             found += [(t[end], "release", end, 0.0) for end in _falls(flags) if t[end] - t[_run_start(flags, end)] > HOLD]
     floor = [flags for contact, flags in zip(contacts, closed, strict=True) if contact.surface == "floor"]
     flat, flight = floor[0] & floor[1], ~(floor[0] | floor[1])
-    noise = NOISE * motion.near
+    noise = GAP_NOISE * motion.near
     lowest, highest = np.sort([motion.gap(contact) for contact in contacts[:2]], axis=0)
     found += [(t[_start(highest, i, noise)], "uplift", i, 0.0) for i in _falls(_held(flat, t, REST, value=True)) if not flight[i]]
     found += [(t[_start(lowest, i, noise)], "lift-off", i, 0.0) for i in _rises(flight)]
     found += [(t[i], "landing", i, 0.0) for i in _falls(flight)]
     slip_speed = np.abs(motion.slip_rate)
     slipping = _held(_held(~flight & (slip_speed > SLIPPING), t), t, value=True)
-    found += [(t[_start(slip_speed, i, NOISE * SLIPPING)], "slip", i, 0.0) for i in _rises(slipping)]
+    found += [(t[_start(slip_speed, i, SLIP_NOISE * SLIPPING)], "slip", i, 0.0) for i in _rises(slipping)]
     found += [(t[i], "stick", i, 0.0) for i in _falls(slipping) if not flight[i]]
     resting = _held(flat & ~slipping & (np.abs(states[:, 5]) < TURNING), t, REST, value=True)
     found += [(t[i], "settled", i, 0.0) for i in _rises(resting)]

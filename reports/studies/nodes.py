@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, node_scene
 from rockcheck.reports.payload import packed
 from rockcheck.reports.show.spectrum import axis_labels
-from rockcheck.scenes import Ricker, Scene, Sine
+from rockcheck.scenes import InputError, Ricker, Scene, Sine
+from rockcheck.scenes.reading import read_arrays
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.spectra.histories import Glimpse, glimpses_path, read_glimpses
 from rockcheck.validation.spectra.study import SpectrumRecord
@@ -60,9 +61,9 @@ def write_nodes(folder: Path, stem: str, records: Sequence[SpectrumRecord]) -> b
 def _outcomes(path: Path) -> NDArray[np.str_] | None:
     """A letter a node, amplitude by frequency; None where there is no such file."""
     try:
-        with np.load(path) as data:
-            sides, undecided = data["outcomes"], data["undecided"]
-    except (OSError, ValueError, KeyError):
+        data = read_arrays(path)
+        sides, undecided = data["outcomes"], data["undecided"]
+    except (InputError, KeyError):
         return None
     letters = np.full(sides.shape, CODES[SAFE])
     for side, letter in CODES.items():

@@ -77,7 +77,6 @@ def test_wrong_settings(varying_engine, settings, words):
         varying_engine(**settings)
 
 
-@pytest.mark.parametrize("settings", [{"time_step": 1e-9}, {"time_step": "adaptive", "largest_step": 1e-9}])
 @pytest.mark.parametrize("kind", [MuJoCo, PyBullet], ids=["mujoco", "pybullet"])
 def test_steps_are_adaptive_unless_something_else_is_asked_for(kind):
     """An engine as it comes cannot step so: it has a fixed step, also by default."""
@@ -114,6 +113,7 @@ def test_a_default_run_of_the_readmes_scene_is_converged(kind):
     assert error < found.u_num("theta_rms") < 1e-3
 
 
+@pytest.mark.parametrize("settings", [{"time_step": 1e-9}, {"time_step": "adaptive", "largest_step": 1e-9}])
 def test_too_many_steps_are_refused_at_once(varying_engine, settings, free_rocking):
     with pytest.raises(InputError, match="5000000 steps"):
         varying_engine(**settings).simulate(free_rocking(0.5))

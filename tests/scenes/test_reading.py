@@ -7,10 +7,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rockcheck.scenes import History, InputError, load_scene
 from rockcheck.scenes.files import read_toml
+from rockcheck.scenes.reading import read_arrays
 from rockcheck.scenes.recordings import read_record
 from rockcheck.validation.discrepancy.measured import read_measured
 from rockcheck.validation.suite.results import Run
@@ -162,3 +164,20 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path, monkeypatch):
         stream.truncate(10_000_001)
     with pytest.raises(InputError, match="larger than 10000000 bytes"):
         read_toml(path)
+
+
+def test_arrays_are_read_whole_without_objects_and_bounded(tmp_path):
+    """What lies beside a spectrum may be anybody's: objects, which would be unpickled, half a file and a bomb are one line each."""
+    path = tmp_path / "a.npz"
+    np.savez_compressed(path, x=np.arange(3.0), y=np.zeros(100_000))
+    assert read_arrays(path)["x"].tolist() == [0.0, 1.0, 2.0]
+    with pytest.raises(InputError, match="arrays are larger than 10000 bytes"):
+        read_arrays(path, most=10_000)
+    path.write_bytes(path.read_bytes()[:-60])
+    with pytest.raises(InputError, match="not a whole file of arrays"):
+        read_arrays(path)
+    np.savez(path, x=np.array([{"a": 1}], dtype=object))
+    with pytest.raises(InputError, match="not a whole file of arrays"):
+        read_arrays(path)
+    with pytest.raises(InputError, match="cannot be read"):
+        read_arrays(tmp_path / "none.npz")

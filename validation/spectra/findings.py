@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import SAFE
+from rockcheck.scenes.reading import read_arrays
 from rockcheck.validation.spectra.claims import Paper, Row, percent
 from rockcheck.validation.spectra.study import FIGURES, GAPS, KEPT, RESTITUTIONS, paper_panels
 
@@ -44,20 +45,20 @@ class Finding:
 
 def kept_spectra() -> list[Spectrum]:
     """The paper's 28 spectra as they come with the package (`rockcheck spectrum --figure all` plays them anew)."""
-    with np.load(KEPT_GRIDS) as data:
-        return [
-            Spectrum(
-                outcomes=data[panel.name],
-                frequency_ratios=data["frequency_ratios"],
-                amplitude_ratios=data["amplitude_ratios"],
-                evaluations=data[panel.name].size,
-                undecided=data[f"{panel.name}.undecided"],
-                scene=panel.scene,
-                model=None,
-            )
-            for number in FIGURES
-            for panel in paper_panels(number)
-        ]
+    data = read_arrays(KEPT_GRIDS)
+    return [
+        Spectrum(
+            outcomes=data[panel.name],
+            frequency_ratios=data["frequency_ratios"],
+            amplitude_ratios=data["amplitude_ratios"],
+            evaluations=data[panel.name].size,
+            undecided=data[f"{panel.name}.undecided"],
+            scene=panel.scene,
+            model=None,
+        )
+        for number in FIGURES
+        for panel in paper_panels(number)
+    ]
 
 
 def findings(spectra: Sequence[Spectrum]) -> tuple[Finding, ...]:

@@ -9,14 +9,14 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.spectrum import node_scene
-from rockcheck.scenes import ModelFailure
+from rockcheck.scenes import InputError, ModelFailure
+from rockcheck.scenes.reading import read_arrays
 from rockcheck.scenes.writing import write_whole
 
 #: Nodes an axis whose histories are kept, both ends of the axis among them.
@@ -78,9 +78,8 @@ def _enough(t: Floats, values: Floats) -> list[int]:
 def kept(path: Path, key: str) -> bool:
     """Whether the histories of that key are there already."""
     try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as content:
-            return bool(content["key"] == key)
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+        return bool(read_arrays(path)["key"] == key)
+    except (InputError, KeyError):
         return False
 
 
@@ -103,12 +102,11 @@ def read_glimpses(path: Path) -> list[Glimpse]:
     """What `save_glimpses` wrote; empty where there is no such file."""
     if not path.is_file():
         return []
-    with np.load(path) as data:
-        parts = np.split(data["rows"].astype(float), data["ends"][:-1]) if len(data["ends"]) else []
-        return [
-            Glimpse(int(i), int(j), str(outcome), part)
-            for (i, j), outcome, part in zip(data["nodes"], data["outcomes"], parts, strict=True)
-        ]
+    data = read_arrays(path)
+    parts = np.split(data["rows"].astype(float), data["ends"][:-1]) if len(data["ends"]) else []
+    return [
+        Glimpse(int(i), int(j), str(outcome), part) for (i, j), outcome, part in zip(data["nodes"], data["outcomes"], parts, strict=True)
+    ]
 
 
 def glimpses_path(folder: Path, name: str) -> Path:

@@ -22,6 +22,7 @@ from rockcheck.ebm.horizon import other_law
 from rockcheck.ebm.spectrum import LEFT, RIGHT, TOLERANCE, Floats
 from rockcheck.scenes import Floor, InputError, Ricker, Scene, Wall
 from rockcheck.scenes.compiled import threads
+from rockcheck.scenes.reading import read_arrays
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.scenes.writing import table_text, write_whole
 from rockcheck.validation.discrepancy.figures import Stored
@@ -245,16 +246,16 @@ def read_index(folder: Path) -> SpectraIndex:
 
 def read_spectrum(folder: Path, record: SpectrumRecord, scene: Scene) -> Spectrum:
     """A spectrum of a folder as it was saved, of this scene."""
-    with np.load(folder / f"{record.name}.npz") as data:
-        return Spectrum(
-            outcomes=data["outcomes"],
-            frequency_ratios=data["frequency_ratios"],
-            amplitude_ratios=data["amplitude_ratios"],
-            evaluations=record.evaluations,
-            undecided=data["undecided"],
-            scene=scene,
-            model=None,
-        )
+    data = read_arrays(folder / f"{record.name}.npz")
+    return Spectrum(
+        outcomes=data["outcomes"],
+        frequency_ratios=data["frequency_ratios"],
+        amplitude_ratios=data["amplitude_ratios"],
+        evaluations=record.evaluations,
+        undecided=data["undecided"],
+        scene=scene,
+        model=None,
+    )
 
 
 def _plain_scene(scene: Scene) -> dict[str, Any]:

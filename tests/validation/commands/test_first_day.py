@@ -118,7 +118,7 @@ def test_without_a_model_the_reference_plays(type_):
 def test_what_is_no_format_of_a_history_is_refused_before_the_run(type_):
     _, err = type_("simulate", "fig5a", "-o", "x.parquet", code=2)
     assert err == (
-        "rockcheck: x.parquet: a history is written as .csv, .json or .mat, not as .parquet;"
+        "rockcheck: x.parquet: a history is written as .csv, .csv.gz, .json or .mat, not as .parquet;"
         " pandas makes Parquet of the .csv: read_csv(...).to_parquet(...)\n"
     )
     assert not Path("x.parquet").exists()

@@ -57,7 +57,7 @@ def test_from_a_v2_record_to_a_report_and_a_curve_in_four_commands(type_):
 
     told = type_("run rack.toml --record station.V2 --models ebm,ebm-unilateral,cm,mujoco --set mujoco.time_step=1e-3")
     assert "left out: station.V2 up (vertical" in told
-    assert told.endswith("report: rockcheck-report/index.html\n")
+    assert "report: rockcheck-report/index.html\n" in told
     run = Run.load("rockcheck-report")
     assert run.places == ("rack, station 360 deg", "rack, station 90 deg")
     assert [cell.status for cell in run.cells] == ["done"] * 8
@@ -66,7 +66,7 @@ def test_from_a_v2_record_to_a_report_and_a_curve_in_four_commands(type_):
         assert (Path("rockcheck-report") / "pages" / f"{place.replace(', ', '-').replace(' ', '-')}.html").exists()
 
     told = type_("ida rack.toml station.V2 --levels 8")
-    assert told.endswith("report: rockcheck-report/ida/index.html\n")
+    assert "report: rockcheck-report/ida/index.html\n" in told
     rows = list(csv.DictReader(Path("rockcheck-report/ida/ida.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) == 2 * 2 * 8  # components, directions, intensities
     assert {row["record"] for row in rows} == {"station.V2 360 deg", "station.V2 90 deg"}

@@ -204,7 +204,8 @@ def test_no_code_is_made_of_what_is_read():
             if isinstance(called, ast.Name):
                 assert called.id not in ("eval", "exec", "compile", "__import__", "input"), (name, called.id)
             said = ast.unparse(called) if isinstance(called, ast.Attribute) else ""
-            assert said not in ("os.system", "os.popen", "np.load", "numpy.load", "pd.read_pickle", "yaml.load", "pd.eval"), (name, said)
+            assert said not in ("os.system", "os.popen", "pd.read_pickle", "yaml.load", "pd.eval"), (name, said)
+            assert said not in ("np.load", "numpy.load") or name == "scenes/reading.py", name
             assert not any(k.arg in ("shell", "allow_pickle") for k in getattr(node, "keywords", ()) if isinstance(node, ast.Call)), name
             if said in ("importlib.import_module", "runpy.run_path", "runpy.run_module"):
                 imports.add(name)

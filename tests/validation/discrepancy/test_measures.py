@@ -169,6 +169,9 @@ def test_a_measured_history_may_lack_columns(made):
     assert math.isnan(found["x_rms"])
     assert "no column x" in found.figure("x_rms").note
     assert set(found.table.columns) == {"measure", "value", "unit", "note"}
+    by_name = found.table.set_index("measure")["value"]
+    assert by_name["theta_rms"] == 0.0
+    assert math.isnan(by_name["x_rms"])
     in_radians = compare(bare, bare)
     assert in_radians.figure("theta_rms").unit == "rad"
 
@@ -178,6 +181,19 @@ def test_nothing_in_common_is_bad_input(made):
         compare(made(WAVE, T), made(WAVE, T + 100.0))
     with pytest.raises(InputError, match="until"):
         compare(made(WAVE, T), made(WAVE, T), until=-1.0)
+    with pytest.raises(InputError, match="until"):
+        compare(made(WAVE, T), made(WAVE, T), until=0.0)
+    assert compare(made(WAVE, T), made(WAVE, T), until=0.5)["theta_rms"] == 0.0
+
+
+@pytest.mark.parametrize("late", [False, True], ids=["ends early", "starts late"])
+def test_what_is_less_than_a_step_and_a_half_short_is_whole(made, late):
+    """Of histories of eleven rows a second apart: 1.4 s are rounding of their grids, 1.6 s are not."""
+    t = np.arange(11.0)
+    for missing, whole in ((1.4, True), (1.6, False)):
+        other = np.concatenate([[missing], t[2:]]) if late else np.concatenate([t[:-2], [10.0 - missing]])
+        other = np.linspace(other[0], other[-1], 11)
+        assert (compare(made(np.zeros(11), t), made(np.zeros(11), other)).gap == "") is whole
 
 
 def test_every_measure_says_what_it_is():
