@@ -67,11 +67,13 @@ EQUIVALENT = {
         "_has(a, which, -1",
         "TIP if which == G_TIP_GAP else FAR  ->  TIP if not which == G_TIP_GAP else FAR",
     ): "on one wall the other's gap cannot close, and its own is zero throughout",
+    ("ebm/core/modes.py", "m[PULL] < 0 and (b.unilateral", "m[PULL] < 0  ->  m[PULL] <= 0"): "a floor pushes or pulls: it is never 0",
+    ("ebm/core/modes.py", "upright_walls =", "0  ->  1"): "only a flat block asks for it",
     ("ebm/core/guards.py", "a[PHI, 0] > 0.5", "a[PHI, 0] > 0.5  ->  a[PHI, 0] >= 0.5"): "a bound that saves the guards, met or not",
     (
         "ebm/core/guards.py",
         "root < tau",
-        "root < tau - earlier  ->  root <= tau - earlier",
+        "root < tau - (INSTANT if closes else 0.0)  ->  root <= tau - (INSTANT if closes else 0.0)",
     ): "equal to the last bit",
 }
 

@@ -568,6 +568,42 @@ def test_flight_of_a_block_whose_floor_falls_away():
     assert {v: mode.side for v, mode in slides.items()} == {0.1: -1, -0.1: 1}
 
 
+def test_a_block_that_hangs_flat_is_counted_once():
+    """The choice that nothing tells left from right is in the tally of a run that made it; a wall that holds the block tells."""
+    alpha = 0.3
+    at = Situation(alpha, 0.5, 0.5, 0.0, -0.2, (0.0, math.cos(alpha), 0.0, 0.0, 0.0, 0.0))
+    history = EventBasedModel().simulate(at.scene.replace(duration=0.02, output_step=0.01))
+    assert history.cost.rules == {"hangs flat": 1}
+    m = np.zeros(motion.MODE_SIZE, dtype=np.int64)
+    m[motion.FAMILY], m[motion.FLOOR], m[motion.PULL] = motion.FLAT, motion.STICK, -1
+    assert modes.hangs_flat(m)
+    for place in (motion.TIP, motion.FAR):
+        held = m.copy()
+        held[place] = 1
+        assert not modes.hangs_flat(held)
+
+
+def test_what_was_tried_at_an_instant():
+    """A new instant knows of nothing and has no slack; a mode that a force ended may go on there, once; one that a gap ended may not."""
+    m, memory = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.full(modes.MEMORY, 7.0)
+    m[motion.FAMILY], m[motion.S] = motion.TILT, 1
+    tried = np.ones(modes.MODES, dtype=bool)
+    modes.forget(tried, memory, 3.0)
+    assert not tried.any()
+    assert memory[modes.SLACK] == 1.0
+    modes.slacken(memory)
+    assert memory[modes.SLACK] == 1.0, "the least slack is one noise"
+    modes.slacken(memory)
+    assert memory[modes.SLACK] == 2.0
+    for kind, began, may in ((series.FORCE, 2.0, True), (series.FORCE, 3.0, False), (series.POSITION, 2.0, False)):
+        modes.forget(tried, memory, 3.0)
+        memory[modes.BEGAN] = began
+        modes.leave(m, tried, memory, 3.0, kind)
+        assert tried[modes.code_of(m)] != may
+    modes.leave(m, tried, memory, 4.0, series.RATE)
+    assert tried.sum() == 1, "what was tried at an earlier instant is forgotten"
+
+
 def test_the_model_starts_as_the_selection_says():
     """The adapter looks at the core that the model runs: the same mode in the first row of a history."""
     rng = np.random.default_rng(48)
