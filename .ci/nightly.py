@@ -130,17 +130,20 @@ def main() -> int:
     seed = int(os.environ.get("NIGHTLY_SEED") or today.toordinal())
     folder = Path(os.environ.get("NIGHTLY_OUT") or tempfile.mkdtemp(prefix="rockcheck-nightly-"))
     folder.mkdir(parents=True, exist_ok=True)
-    done = [play(part, folder) for part in parts(quick, seed, folder)]
     kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
-    kept["short" if quick else "whole"] = {
-        "date": today.isoformat(),
-        "commit": commit(),
-        "seed": seed,
-        "python": platform.python_version(),
-        "machine": f"{platform.system()}, {platform.machine()}, {os.cpu_count()} cores",
-        "parts": [asdict(one) for one in done],
-    }
-    KEPT.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    done: list[Done] = []
+    for part in parts(quick, seed, folder):
+        done.append(play(part, folder))
+        kept["short" if quick else "whole"] = {
+            "date": today.isoformat(),
+            "commit": commit(),
+            "seed": seed,
+            "python": platform.python_version(),
+            "machine": f"{platform.system()}, {platform.machine()}, {os.cpu_count()} cores",
+            "parts": [asdict(one) for one in done],
+        }
+        # After each part: a night that is cut short keeps what it has found.
+        KEPT.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     print(f"nightly: {KEPT.relative_to(ROOT)} has the results; what was said is in {folder}")
     return int(any(one.result == "failed" for one in done))
 
