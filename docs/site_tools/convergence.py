@@ -82,18 +82,24 @@ def exceptions(found: Convergence) -> str:
     return "\n".join([f"Of {len(pairs)} scenes with a model:", "", *(f"- {line}" for line in lines)])
 
 
+#: What is written between which marks of the page.
+MADE = {"figures": figures, "levels": levels, "orders": orders, "scenes": scenes, "exceptions": exceptions}
+
+
 def main() -> None:
-    """Plays, and writes what was found."""
-    found = run_convergence(on_progress=lambda done, of, what: print(f"{done} of {of}: {what}", file=sys.stderr, flush=True))
+    """Plays, and writes what was found; that there is a place for all of it is seen before."""
     page = DOCS / "convergence.md"
+    places = {name: re.compile(rf"(<!-- {name} -->\n).*?(\n<!-- end -->)", flags=re.S) for name in MADE}
     text = page.read_text(encoding="utf-8")
-    for name, made in (("figures", figures), ("levels", levels), ("orders", orders), ("scenes", scenes), ("exceptions", exceptions)):
-        table = made(found).replace("\\", "\\\\")
-        text, count = re.subn(rf"(<!-- {name} -->\n).*?(\n<!-- end -->)", rf"\g<1>\n{table}\n\2", text, flags=re.S)
-        if count != 1:
+    for name, place in places.items():
+        if len(place.findall(text)) != 1:
             sys.exit(f"{page}: no place for {name}")
-    page.write_text(text, encoding="utf-8")
+    found = run_convergence(on_progress=lambda done, of, what: print(f"{done} of {of}: {what}", file=sys.stderr, flush=True))
     convergence_figure(found).savefig(DOCS / "images" / "convergence.png", dpi=130)
+    for name, place in places.items():
+        table = MADE[name](found).replace("\\", "\\\\")
+        text = place.sub(rf"\g<1>\n{table}\n\2", text)
+    page.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
