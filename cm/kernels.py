@@ -1,7 +1,7 @@
 """The compiled time loop of the Continuous Model. Imported only by a run: it needs numba.
 
 Three surfaces (left wall, right wall, floor) face two corners of the block each. A contact is known by the unit normal n of
-its surface (into the free space) and by the offset r of its corner from the centroid: its gap is n.(centroid + r) + distance,
+its surface (into the free space) and by the offset r of its corner from the mass's centre c: its gap is n.(c + r) + distance,
 its lever the third entry of J = (n_x, n_y, r x n), its rate J.(vx, vy, w), its mobility K = J M^-1 J^T. All per unit mass.
 
 **The integrator.** Position Verlet (half a step of motion, a kick at the middle, half a step of motion) with implicit dampers
@@ -41,6 +41,8 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 #: Velocity of the block: vx, vy, w.
 Velocity = tuple[float, float, float]
+#: Offsets (x, y) of the corners from the mass's centre: bottom left, bottom right, top left, top right.
+Corners = tuple[float, float, float, float, float, float, float, float]
 
 effective_mass = kernel(contact.effective_mass)
 felt_share = kernel(contact.felt_share)
@@ -74,8 +76,10 @@ DONE, OVERTURNED, BLOWN_UP = 0, 1, 2
 class Parameters(NamedTuple):
     """Constants of a run; SI units, per unit mass. Tuples hold one value a surface."""
 
-    half_width: float
-    half_height: float
+    #: Of the corners from the mass's centre, where the block stands: left, right, bottom and top.
+    reach: tuple[float, float, float, float]
+    #: Of the moment of inertia about the mass's centre, 1/m^2.
+    inverse_inertia: float
     gravity: float
     stiffness: float
     friction_damping: float
@@ -99,27 +103,25 @@ def sampled(samples: Floats, rate: float, t: float) -> float:
 
 
 @kernel
-def facing(surface: int, lx: float, ly: float, rx: float, ry: float) -> tuple[float, float, float, float, float, float]:
-    """Normal of a surface and offsets of the two corners that face it, from those of the bottom left and right corner."""
+def facing(surface: int, corners: Corners) -> tuple[float, float, float, float, float, float]:
+    """Normal of a surface and offsets of the two corners that face it."""
     if surface == FLOOR:
-        return 0.0, 1.0, lx, ly, rx, ry
-    if surface == LEFT_WALL:  # the top corners lie opposite to the bottom ones
-        return 1.0, 0.0, lx, ly, -rx, -ry
-    return -1.0, 0.0, rx, ry, -lx, -ly
+        return 0.0, 1.0, corners[0], corners[1], corners[2], corners[3]
+    if surface == LEFT_WALL:
+        return 1.0, 0.0, corners[0], corners[1], corners[4], corners[5]
+    return -1.0, 0.0, corners[2], corners[3], corners[6], corners[7]
 
 
 @kernel
 def kicked(v: Velocity, inverse: float, nx: float, ny: float, lever: float, impulse: float) -> Velocity:
-    """Velocity after an impulse along n with that lever; `inverse` is 1/I = 3/R^2."""
+    """Velocity after an impulse along n with that lever; `inverse` is 1/I."""
     return v[0] + nx * impulse, v[1] + ny * impulse, v[2] + inverse * lever * impulse
 
 
 @kernel
-def with_forces(
-    memory: Floats, friction: Floats, inverse: float, surface: int, corners: tuple[float, float, float, float], v: Velocity, step: float
-) -> Velocity:
+def with_forces(memory: Floats, friction: Floats, inverse: float, surface: int, corners: Corners, v: Velocity, step: float) -> Velocity:
     """Velocity after the remembered forces of a surface have acted for `step`."""
-    nx, ny, ax, ay, bx, by = facing(surface, corners[0], corners[1], corners[2], corners[3])
+    nx, ny, ax, ay, bx, by = facing(surface, corners)
     v = kicked(v, inverse, nx, ny, ax * ny - ay * nx, step * memory[2 * surface, FORCE])
     v = kicked(v, inverse, nx, ny, bx * ny - by * nx, step * memory[2 * surface + 1, FORCE])
     if surface == FLOOR:
@@ -196,7 +198,7 @@ def is_closed(memory: Floats, contact: int, gap: float, rate: float, ahead: floa
 @kernel
 def press(
     memory: Floats, friction: Floats, parameters: Parameters, inverse: float, surface: int, x: float, y: float,
-    corners: tuple[float, float, float, float], v: Velocity, v0: Velocity, step: float, ahead: float, t: float,
+    corners: Corners, v: Velocity, v0: Velocity, step: float, ahead: float, t: float,
 ) -> tuple[Velocity, float, float]:  # fmt: skip
     """The forces of one surface over a step, from the velocity `v` that the block would have without them and `v0` before it.
 
@@ -205,7 +207,7 @@ def press(
     step that a contact which closes asks for, else infinity.
     """
     k = parameters.stiffness
-    nx, ny, ax, ay, bx, by = facing(surface, corners[0], corners[1], corners[2], corners[3])
+    nx, ny, ax, ay, bx, by = facing(surface, corners)
     away = nx * x + ny * y + parameters.distance[surface]
     gap1, gap2 = away + nx * ax + ny * ay, away + nx * bx + ny * by
     one, two = 2 * surface, 2 * surface + 1
@@ -291,7 +293,7 @@ def flush(memory: Floats, until: float, events: Floats, n_events: int) -> int:
 @kernel
 def kick(
     memory: Floats, friction: Floats, parameters: Parameters, inverse: float, surfaces: Integers, x: float, y: float,
-    corners: tuple[float, float, float, float], v: Velocity, v0: Velocity, step: float, settled: bool, t: float,
+    corners: Corners, v: Velocity, v0: Velocity, step: float, settled: bool, t: float,
 ) -> tuple[Velocity, float, float, int]:  # fmt: skip
     """The forces of all surfaces over a step, from the velocity `v` that the block would have without them and `v0` before it.
 
@@ -327,7 +329,7 @@ def kick(
 @kernel
 def stretch(
     memory: Floats, friction: Floats, parameters: Parameters,
-    corners: tuple[float, float, float, float], v: Velocity, v0: Velocity, step: float,
+    corners: Corners, v: Velocity, v0: Velocity, step: float,
 ) -> None:  # fmt: skip
     """The friction spring follows the lower corner over a step; one that slips keeps the length of its largest force."""
     friction[SLIPPED] = friction[SLIPS]
@@ -366,8 +368,8 @@ def advance(
     gets rows (onset time, contact, impulse). Returns how it ended, the rows and events written, the steps taken, the sweeps
     over the surfaces that they took, and the time reached.
     """
-    b, h = parameters.half_width, parameters.half_height
-    inverse = 3.0 / (b * b + h * h)
+    left, right, bottom, top = parameters.reach
+    inverse = parameters.inverse_inertia
     contact_time = 1.0 / math.sqrt(parameters.stiffness)
     x, y, theta, vx, vy, w, calm, fine, closing, allowed, gross = state
     v = vx, vy, w
@@ -390,7 +392,10 @@ def advance(
             y += half * v[1]
             theta += half * v[2]
             s, c = math.sin(theta), math.cos(theta)
-            corners = -b * c + h * s, -b * s - h * c, b * c + h * s, b * s - h * c
+            corners = (
+                -left * c + bottom * s, -left * s - bottom * c, right * c + bottom * s, right * s - bottom * c,
+                -left * c - top * s, -left * s + top * c, right * c - top * s, right * s + top * c,
+            )  # fmt: skip
             v0 = v
             u, vg = sampled(horizontal, horizontal_rate, middle), sampled(vertical, vertical_rate, middle)
             v = v[0] - step * u, v[1] - step * (parameters.gravity + vg), v[2]
@@ -416,7 +421,7 @@ def advance(
             if abs(theta) >= 0.5 * math.pi:
                 state[:6] = x, y, theta, v[0], v[1], v[2]
                 return OVERTURNED, row, n_events, steps, sweeps, t
-        energy = 0.5 * (v[0] ** 2 + v[1] ** 2 + v[2] ** 2 / inverse) + parameters.gravity * (y - h)
+        energy = 0.5 * (v[0] ** 2 + v[1] ** 2 + v[2] ** 2 / inverse) + parameters.gravity * (y - bottom)
         if not (energy <= allowed + ENERGY * gross and energy < 1e300):
             return BLOWN_UP, row, n_events, steps, sweeps, t
         output[row, :] = x, y, theta, v[0], v[1], v[2]

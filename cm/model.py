@@ -115,7 +115,7 @@ class ContinuousModel(Frozen):
         state, memory = self._initial(scene, parameters)
         friction = np.zeros(4)
         output = np.empty((len(times), 6))
-        output[0] = scene.initial_state
+        output[0] = kinematics.of_mass(scene.block, scene.initial_state)
         rows_a_slab = max(1, math.ceil(SLAB / scene.output_step))
         events = np.empty((len(memory) * (math.ceil(rows_a_slab * scene.output_step / kernels.STRIKE) + 2), 3))
 
@@ -162,7 +162,7 @@ class ContinuousModel(Frozen):
             "time_step": dt,
             "damping_rule": self.damping_rule,
         }
-        return observe(scene, self.name, output[:row], events=happened, cost=cost, settings=settings)
+        return observe(scene, self.name, kinematics.of_box(scene.block, output[:row]), events=happened, cost=cost, settings=settings)
 
     def _parameters(self, scene: Scene) -> kernels.Parameters:
         from rockcheck.cm import kernels
@@ -170,11 +170,12 @@ class ContinuousModel(Frozen):
         ratio = contact.damping_ratio if self.damping_rule == "calibrated" else contact.damping_ratio_of_paper
         k = self.stiffness_in(scene)
         left, right = scene.wall("left"), scene.wall("right")
+        b, h, (dx, dz) = scene.block.half_width, scene.block.half_height, scene.block.offset
         restitution = (left.restitution if left else 0.0, right.restitution if right else 0.0, scene.floor.restitution)
         distance = [math.inf if wall is None else scene.block.half_width + wall.gap for wall in (left, right)]
         return kernels.Parameters(
-            half_width=scene.block.half_width,
-            half_height=scene.block.half_height,
+            reach=(b + dx, b - dx, h + dz, h - dz),
+            inverse_inertia=3.0 / (b * b + h * h) if scene.block.homogeneous else 1.0 / scene.block.gyration_squared,
             gravity=scene.gravity,
             stiffness=k,
             friction_damping=FRICTION_DAMPING * math.sqrt(k),
@@ -191,7 +192,7 @@ class ContinuousModel(Frozen):
         """State and contact memory at t = 0. A block on the floor starts sunk in by its weight, so that it does not bounce."""
         from rockcheck.cm import kernels
 
-        x, y, tilt, *speeds = scene.initial_state
+        x, y, tilt, *rates = scene.initial_state
         k = parameters.stiffness
         memory = np.zeros((2 * len(kernels.SURFACES), len(kernels.COLUMNS)))
         memory[:, kernels.STRUCK] = math.inf
@@ -206,9 +207,15 @@ class ContinuousModel(Frozen):
             standing = [2 * kernels.FLOOR] * (tilt >= 0.0) + [2 * kernels.FLOOR + 1] * (tilt <= 0.0)
             memory[standing, kernels.CLOSED] = 1.0
             sunk = scene.gravity / (k * len(standing))
-        energy = kinematics.energy(scene.block, scene.gravity, y, *speeds)
+        energy = kinematics.energy(scene.block, scene.gravity, y, tilt, *rates)
         gross = energy + 0.01 * scene.gravity * scene.block.half_width
-        return np.array((x, y - sunk, tilt, *speeds, 0.0, math.inf, 0.0, energy, gross)), memory
+        placed = np.array(kinematics.of_mass(scene.block, scene.initial_state))
+        if sunk > 0.0 and tilt == 0.0 and scene.block.offset[0] != 0.0:  # the corner nearer to the mass's centre carries more
+            left, right = scene.block.pivot("left").arm, scene.block.pivot("right").arm
+            placed[2] += 2.0 * sunk * (right - left) / (left + right) ** 2
+            sunk *= 2.0 * (left * left + right * right) / (left + right) ** 2
+        placed[1] -= sunk
+        return np.array((*placed, 0.0, math.inf, 0.0, energy, gross)), memory
 
 
 def _samples(excitation: Rest | Ricker | Sine | Record, duration: float) -> tuple[NDArray[np.float64], float]:

@@ -16,7 +16,7 @@ from rockcheck.scenes.base import Shown
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.excitations import Record
 from rockcheck.scenes.progress import Count, OnProgress, unheard
-from rockcheck.scenes.scene import Block, Scene
+from rockcheck.scenes.scene import Scene
 
 Floats = NDArray[np.float64]
 MOST_NODES = 50_000_000
@@ -165,7 +165,7 @@ def _batch_of(
     if scene.excitation.kind == "record":
         packed = batch.pack([node_scene(scene, a, f) for a, f in zip(amplitude_ratios, frequency_ratios, strict=True)], model)
     else:
-        p, tan_alpha = scene.frequency_parameter, scene.block.half_width / scene.block.half_height
+        p, tan_alpha = scene.frequency_parameter, scene.block.slope
         periods = 2.0 * math.pi / (frequency_ratios * p)
         packed = batch.pack_pulses(scene, model, amplitude_ratios * scene.gravity * tan_alpha, periods)
     found = batch.run_batch(packed, model, jobs=jobs, on_progress=on_progress, strict=False)
@@ -175,13 +175,12 @@ def _batch_of(
 def node_scene(scene: Scene, amplitude_ratio: float, frequency_ratio: float, settle: float = 6.0) -> Scene:
     """The scene of one node of a spectrum, for any model to play; it lasts until `settle` s after the motion of the base."""
     if isinstance(scene.excitation, Record):
-        block = scene.block
         return scene.replace(
             excitation=scene.excitation.scaled(float(amplitude_ratio)),
-            block=Block(half_width=block.half_width * float(frequency_ratio), half_height=block.half_height * float(frequency_ratio)),
+            block=scene.block.scaled(float(frequency_ratio)),
             duration=max(scene.excitation.quiet_after, scene.vertical.quiet_after) + settle,
         )
-    tan_alpha = scene.block.half_width / scene.block.half_height
+    tan_alpha = scene.block.slope
     amplitude = float(amplitude_ratio) * scene.gravity * tan_alpha
     period = 2.0 * math.pi / (float(frequency_ratio) * scene.frequency_parameter)
     pulse = type(scene.excitation)(**scene.excitation.model_dump() | {"amplitude": amplitude, "period": period})

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rockcheck.engines.base_motion import BaseMotion
 from rockcheck.engines.contacts import Contact, contacts_of
-from rockcheck.scenes import ModelFailure, Scene
+from rockcheck.scenes import ModelFailure, Scene, kinematics
 from rockcheck.scenes.progress import tell
 
 FloatArray = NDArray[np.float64]
@@ -109,7 +109,9 @@ def march_adaptively(
     most_steps = 100_000 + 20 * int(end / longest)
 
     t, before, next_start = 0.0, base.velocity(0.0), 0
-    pose, velocity = scene.initial_state[:3], scene.initial_state[3:]
+    x, y, theta, *rates = map(float, kinematics.of_mass(scene.block, scene.initial_state))
+    pose, velocity = (x, y, theta), (rates[0], rates[1], rates[2])
+    standing = scene.block.weaker_pivot.height
     past: _Past | None = None
     times, states, felt = [t], [(*pose, *velocity)], []
     while t < end - 1e-12 and abs(pose[2]) < math.pi / 2:
@@ -123,7 +125,7 @@ def march_adaptively(
         pose, velocity, acceleration = _drift_kick_drift(pose, velocity, past, plan, feels, push)
         pose = _put_back(pose, velocity, plan, limits)
         if past is None and plan.touching[0] and _settles(sides[0], pose, velocity, acceleration, limits):
-            pose, velocity = (pose[0], scene.block.half_height, 0.0), (velocity[0], 0.0, 0.0)
+            pose, velocity = (pose[0], standing, 0.0), (velocity[0], 0.0, 0.0)
         past = None if plan.impact or plan.stops else _Past(acceleration, dt, plan.touching)
         before = after
         times.append(t)

@@ -66,7 +66,8 @@ def _starts_of_motion(scene: Scene, times: FloatArray) -> list[float]:
     pushing = np.abs(scene.excitation.acceleration(times))
     holding = scene.gravity + scene.vertical.acceleration(times)
     found = []
-    for limit in (scene.floor.friction, scene.block.half_width / scene.block.half_height):
+    left, right = scene.block.pivot("left"), scene.block.pivot("right")
+    for limit in dict.fromkeys((scene.floor.friction, left.arm / left.height, right.arm / right.height)):
         excess = pushing - limit * holding
         change = np.flatnonzero((excess[1:] > 0.0) != (excess[:-1] > 0.0))
         part = excess[change] / (excess[change] - excess[change + 1])

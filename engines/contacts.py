@@ -18,13 +18,13 @@ class Contact:
     """One corner of the block and one surface that it can touch."""
 
     surface: Literal["floor", "left", "right"]
-    corner: tuple[float, float]  # from the centroid, in the block's own frame, m
+    corner: tuple[float, float]  # from the mass's centre, in the block's own frame, m
     normal: tuple[float, float]  # out of the surface
-    distance: float  # from the surface to the point of the floor below the upright centroid, m
+    distance: float  # from the surface to the point of the floor below the centre of the box as it stands, m
     restitution: float
 
     def arm(self, cos: Any, sin: Any) -> Arm:
-        """From the centroid to the corner of the block turned by theta, given its cosine and sine: right, up, m."""
+        """From the mass's centre to the corner of the block turned by theta, given its cosine and sine: right, up, m."""
         bx, bz = self.corner
         return bx * cos - bz * sin, bx * sin + bz * cos
 
@@ -48,15 +48,17 @@ class Contact:
 def contacts_of(scene: Scene) -> tuple[Contact, ...]:
     """The contacts a scene can use: its lower corners on the floor and, where there is a wall, the corners of that side."""
     b, h = scene.block.half_width, scene.block.half_height
+    dx, dz = scene.block.offset
     found = [
-        Contact(surface="floor", corner=(bx, -h), normal=(0.0, 1.0), distance=0.0, restitution=scene.floor.restitution) for bx in (-b, b)
+        Contact(surface="floor", corner=(bx - dx, -h - dz), normal=(0.0, 1.0), distance=0.0, restitution=scene.floor.restitution)
+        for bx in (-b, b)
     ]
     for wall in scene.walls:
         inward = 1.0 if wall.side == "left" else -1.0
         found += [
             Contact(
                 surface=wall.side,
-                corner=(-inward * b, bz),
+                corner=(-inward * b - dx, bz - dz),
                 normal=(inward, 0.0),
                 distance=b + wall.gap,
                 restitution=wall.restitution,

@@ -52,19 +52,23 @@ class _DartWorld(World):
         self.block = dartpy.dynamics.Skeleton("block")
         joint, body = self.block.createPlanarJointAndBodyNodePair()
         joint.setArbitraryPlane([1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
-        inertia = (scale * scene.block.radius) ** 2 / 3.0
+        inertia = scale**2 * scene.block.gyration_squared
         body.setInertia(dartpy.dynamics.Inertia(1.0, np.zeros(3), inertia * np.eye(3)))
         # Restitutions of two bodies multiply, of frictions the smaller counts: the block's leave those of floor and walls.
-        self.contact = self._box(body, (2.0 * b, 2.0 * b, 2.0 * h), scene.floor.friction, 1.0)
+        self.contact = self._box(body, (2.0 * b, 2.0 * b, 2.0 * h), scene.floor.friction, 1.0, scale * np.array(scene.block.offset))
         self.world.addSkeleton(self.block)
         self._slab("floor", (0.0, 1.0), 0.0, scene.floor.friction, scene.floor.restitution, scale)
         for wall in scene.walls:
             inward = 1.0 if wall.side == "left" else -1.0
             self._slab(wall.side, (inward, 0.0), scene.block.half_width + wall.gap, 0.0, wall.restitution, scale)
 
-    def _box(self, body: Any, size: tuple[float, float, float], friction: float, restitution: float) -> Any:
-        """A box as a body's shape; returns what holds its friction and restitution."""
+    def _box(
+        self, body: Any, size: tuple[float, float, float], friction: float, restitution: float, offset: FloatArray | None = None
+    ) -> Any:
+        """A box as a body's shape, by `offset` behind the mass's centre; returns what holds its friction and restitution."""
         node = body.createShapeNode(self.dart.dynamics.BoxShape(size))
+        if offset is not None and offset.any():
+            node.setRelativeTranslation([-offset[0], 0.0, -offset[1]])
         node.createCollisionAspect()
         contact = node.createDynamicsAspect()
         contact.setFrictionCoeff(friction)

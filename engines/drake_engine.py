@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rockcheck.engines.contacts import contacts_of
 from rockcheck.engines.engine import Engine
 from rockcheck.engines.world import State, World
-from rockcheck.scenes import Floor, ModelFailure, Scene
+from rockcheck.scenes import Floor, ModelFailure, Scene, kinematics
 from rockcheck.scenes.errors import printable
 
 FloatArray = NDArray[np.float64]
@@ -57,7 +57,7 @@ class _DrakeWorld(World):
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.dt = scene, 0.0
-        self.start: FloatArray | State = scene.initial_state
+        self.start: FloatArray | State = tuple(kinematics.of_mass(scene.block, np.array(scene.initial_state)).tolist())
 
     def place(self, state: FloatArray | State) -> None:
         """Put the block where `state` says."""
@@ -92,7 +92,7 @@ class _DrakeWorld(World):
         builder = DiagramBuilder()
         self.plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=dt)
         self.plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
-        inertia = self.scene.block.radius**2 / 3.0
+        inertia = self.scene.block.gyration_squared
         body = self.plant.AddRigidBody("block", SpatialInertia(1.0, np.zeros(3), UnitInertia(inertia, inertia, inertia)))
         # The joint's plane is its frame's x and y: to the right and up.
         upright = RigidTransform(RotationMatrix([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]))
@@ -118,7 +118,8 @@ class _DrakeWorld(World):
         b, h, mu = self.scene.block.half_width, self.scene.block.half_height, self.scene.floor.friction
         rough, smooth = CoulombFriction(mu, mu), CoulombFriction(0.0, 0.0)
         add, world = self.plant.RegisterCollisionGeometry, self.plant.world_body()
-        add(body, RigidTransform(), Box(2.0 * b, 2.0 * b, 2.0 * h), "box", rough)
+        dx, dz = self.scene.block.offset
+        add(body, RigidTransform([-dx, 0.0, -dz]), Box(2.0 * b, 2.0 * b, 2.0 * h), "box", rough)
         logging.getLogger("drake").setLevel(logging.ERROR)  # it would warn that half-spaces do not meet deformable bodies
         add(world, HalfSpace.MakePose([0.0, 0.0, 1.0], np.zeros(3)), HalfSpace(), "floor", rough)
         for wall in self.scene.walls:

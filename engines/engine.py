@@ -20,7 +20,7 @@ from rockcheck.engines.contacts import contacts_of
 from rockcheck.engines.events import events_of
 from rockcheck.engines.marching import Marched, at_output_times, in_units_of, march_fixed
 from rockcheck.engines.world import World
-from rockcheck.scenes import Cost, Floor, History, InputError, Scene
+from rockcheck.scenes import Cost, Floor, History, InputError, Scene, kinematics
 from rockcheck.scenes.base import Frozen, Positive
 from rockcheck.scenes.errors import NotInstalled, printable
 from rockcheck.scenes.observation import observe
@@ -156,7 +156,7 @@ class Engine(Frozen):
         return observe(
             scene,
             self.name,
-            at_output_times(scene, times, states),
+            kinematics.of_box(scene.block, at_output_times(scene, times, states)),
             events=events_of(scene, contacts_of(scene), times, states, unit * felt),
             cost=cost,
             settings=self.model_dump(),

@@ -22,7 +22,7 @@ TURNING = 1e-3  # rad/s
 
 
 def events_of(scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: FloatArray, felt: FloatArray) -> list[Event]:
-    """Events in order of time; `t` (n) and `states` (n, 6) at step ends, `felt` (n-1 or more, 2) accelerations in the steps.
+    """Events in order of time; `t` (n) and `states` (n, 6) of the mass's centre at step ends, `felt` (n-1 or more, 2) accelerations.
 
     "floor impact" and "wall impact": the onset of a contact that had been open for more than 2 ms, with its normal
     impulse in the first 2 ms; "uplift": one lower corner opens after both were closed for more than 20 ms; "lift-off",
@@ -71,7 +71,9 @@ class _Motion:
     def __init__(self, scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: FloatArray, felt: FloatArray) -> None:
         self.scene, self.contacts, self.t, self.states, self.felt = scene, contacts, t, states, felt
         self.near = CLOSED * scene.block.radius + 2.0 * scene.gravity * float(np.min(np.diff(t), initial=1e-3)) ** 2
-        self.slip_rate = kinematics.slip_rate(scene.block, states[:, 2], states[:, 3], states[:, 5])
+        #: The same of the box's centre.
+        self.box = kinematics.of_box(scene.block, states)
+        self.slip_rate = kinematics.slip_rate(scene.block, states[:, 2], self.box[:, 3], states[:, 5])
 
     def gap(self, contact: Contact, rows: slice = slice(None)) -> FloatArray:
         """Gaps of a contact at step ends, m."""
@@ -103,7 +105,7 @@ class _Motion:
         from scipy.optimize import nnls
 
         first, last = max(index - 1, 0), self.later(index)
-        inertia = self.scene.block.radius**2 / 3.0
+        inertia = self.scene.block.gyration_squared
         gained = self.states[last, 3:] - self.states[first, 3:]
         gained[:2] -= np.diff(self.t[first : last + 1]) @ self.felt[first:last]
         theta = self.states[index, 2]
@@ -123,7 +125,7 @@ class _Motion:
 
     def modes(self, indices: Sequence[int]) -> list[str]:
         """Modes of motion at some step ends."""
-        chosen = self.states[list(indices)]
+        chosen = self.box[list(indices)]
         channels = {name: chosen[:, column] for column, name in enumerate(STATE)}
         return [str(mode) for mode in modes_of(self.scene, channels | {"slip_rate": self.slip_rate[list(indices)]})]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.engines.world import World
-from rockcheck.scenes import Block, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall
+from rockcheck.scenes import Block, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
 from rockcheck.scenes.progress import tell
 
 FloatArray = NDArray[np.float64]
@@ -24,7 +24,7 @@ def in_units_of(length: float, scene: Scene) -> Scene:
         return excitation.scaled(1.0 / length)
 
     return scene.replace(
-        block=Block(half_width=scene.block.half_width / length, half_height=scene.block.half_height / length),
+        block=_rescaled(scene.block, length),
         walls=tuple(Wall(side=wall.side, gap=wall.gap / length, restitution=wall.restitution) for wall in scene.walls),
         excitation=rescaled(scene.excitation),
         vertical=rescaled(scene.vertical),
@@ -34,13 +34,24 @@ def in_units_of(length: float, scene: Scene) -> Scene:
     )
 
 
+def _rescaled(block: Block, length: float) -> Block:
+    """The block of 1 kg with all lengths in units of `length` m."""
+    offset, inertia = block.centre_of_mass, block.moment_of_inertia
+    return Block(
+        half_width=block.half_width / length,
+        half_height=block.half_height / length,
+        centre_of_mass=None if offset is None else (offset[0] / length, offset[1] / length),
+        moment_of_inertia=None if inertia is None else block.gyration_squared / length**2,
+    )
+
+
 def march_fixed(world: World, scene: Scene, times: FloatArray, felt: FloatArray) -> Marched:
-    """Times, states at all step ends and felt accelerations, up to the first state with |theta| >= pi/2.
+    """Times, states of the mass's centre at all step ends and felt accelerations, up to the first state with |theta| >= pi/2.
 
     Raises `ModelFailure` if the motion blows up or the block falls through the floor.
     """
     dt = float(times[1]) if len(times) > 1 else 0.0
-    pieces = [np.array(scene.initial_state)[None, :]]
+    pieces = [kinematics.of_mass(scene.block, np.array(scene.initial_state))[None, :]]
     world.place(pieces[0][0])
     for first in range(0, len(felt), STEPS_AT_ONCE):
         tell(first, len(felt))

@@ -203,7 +203,7 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
 
 def _planar_body(scene: Scene, geoms: str, raised: float = 0.0) -> str:
     """A body of unit mass that moves in the plane x, z and turns counterclockwise, its origin `raised` m above that of the floor."""
-    inertia = scene.block.radius**2 / 3.0
+    inertia = scene.block.gyration_squared
     return f"""
 <body pos="0 0 {raised!r}">
   <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/><joint type="hinge" axis="0 -1 0"/>
@@ -262,6 +262,7 @@ def _stock_model(scene: Scene, mu: float, settings: str = "") -> str:
     block = scene.block
     planes = _plane("floor", scene, 0.0, f'condim="3" friction="{mu!r} 0 0"')
     planes += "".join(_plane(wall.side, scene, 0.0, 'condim="1"') for wall in scene.walls)
-    size = f"{block.half_width!r} {block.half_width!r} {block.half_height!r}"
-    box = f'<geom type="box" size="{size}" condim="1" friction="0 0 0"/>'
+    (dx, dz), size = block.offset, f"{block.half_width!r} {block.half_width!r} {block.half_height!r}"
+    place = "" if block.centre_of_mass is None else f'pos="{-dx!r} 0 {-dz!r}" '
+    box = f'<geom type="box" {place}size="{size}" condim="1" friction="0 0 0"/>'
     return _model(planes + _planar_body(scene, box), settings)

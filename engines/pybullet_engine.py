@@ -80,9 +80,14 @@ class _PyBulletWorld(World):
     def make_block(self, scene: Scene) -> int:
         """A box. Friction and restitution of two bodies multiply: the block's are 1, so that those of floor and walls count."""
         half = [scene.block.half_width, scene.block.half_width, scene.block.half_height]
-        shape = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=half, **self.options)
+        dx, dz = scene.block.offset
+        placed = {} if scene.block.homogeneous else {"collisionFramePosition": [-dx, 0.0, -dz]}
+        shape = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=half, **placed, **self.options)
         body: int = self.bullet.createMultiBody(1.0, shape, basePosition=_aloft(scene), **self.options)
         self.bullet.changeDynamics(body, -1, lateralFriction=1.0, restitution=1.0, **self.options)
+        if not scene.block.homogeneous:  # of a plain box Bullet finds the inertia itself
+            inertia = scene.block.gyration_squared
+            self.bullet.changeDynamics(body, -1, mass=1.0, localInertiaDiagonal=[inertia] * 3, **self.options)
         return body
 
     def _make_slab(self, normal_x: float, normal_z: float, distance: float, friction: float, restitution: float) -> None:
@@ -149,7 +154,7 @@ class _RigidPyBulletWorld(_PyBulletWorld):
             **self.options,
         )
         body: int = self.bullet.createMultiBody(1.0, shape, basePosition=_aloft(scene), useMaximalCoordinates=1, **self.options)
-        inertia = scene.block.radius**2 / 3.0
+        inertia = scene.block.gyration_squared
         self.bullet.changeDynamics(
             body,
             -1,

@@ -45,9 +45,10 @@ class _PymunkWorld(World):
 
         b, h, slab = scene.block.half_width, scene.block.half_height, self.slab
         self.space = pymunk.Space()
-        self.body = pymunk.Body(1.0, scene.block.radius**2 / 3.0)
+        self.body = pymunk.Body(1.0, scene.block.gyration_squared)
         # Friction and elasticity of two shapes multiply: the block's are 1, so that those of floor and walls count.
-        self.box = pymunk.Poly(self.body, [(-b, -h), (b, -h), (b, h), (-b, h)])
+        dx, dz = scene.block.offset
+        self.box = pymunk.Poly(self.body, [(x - dx, z - dz) for x, z in ((-b, -h), (b, -h), (b, h), (-b, h))])
         self.box.friction = self.box.elasticity = 1.0
         self.space.add(self.body, self.box)
         surfaces = [((-REACH, -slab), (REACH, -slab), scene.floor.friction, scene.floor.restitution)]

@@ -16,7 +16,8 @@ State = tuple[float, float, float, float, float, float]
 class World(ABC):
     """One scene as an engine holds it: a block of unit mass that is free to move in its plane.
 
-    A state is x, y, theta of the centroid and their rates; theta is counterclockwise positive.
+    A state is x, y, theta of the mass's centre and their rates, x = 0 where the centre of the box stands first; theta is
+    counterclockwise positive.
     """
 
     @abstractmethod

@@ -153,7 +153,7 @@ class SceneView:
         block = self.scene.block
         column = {name: self._on_axis(history, name) for name in ("x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate")}
         x, y, theta = column["x"], column["y"], column["theta"]
-        motion = (column[name] for name in ("y", "x_dot", "y_dot", "theta_dot"))
+        motion = (column[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
         found = {
             "theta": theta / block.alpha,
             "theta_dot": column["theta_dot"],
@@ -311,8 +311,8 @@ class SceneView:
         tall = [0.0, 2.0 * block.half_height]
         for columns in self.values.values():
             theta, x, y = columns["theta"] * block.alpha, columns["x"], columns["y"]
-            across = block.radius * np.sin(np.abs(theta) + block.alpha)
-            up = block.radius * np.cos(block.alpha - np.abs(theta))
+            across = block.half_diagonal * np.sin(np.abs(theta) + block.box_angle)
+            up = block.half_diagonal * np.cos(block.box_angle - np.abs(theta))
             with np.errstate(invalid="ignore"):
                 wide += [_least(x - across), -_least(-x - across)]
                 tall += [_least(y - up), -_least(-y - up)]

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.scenes.base import Shown
+from rockcheck.scenes.block import Block
 from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.reading import read_table
 from rockcheck.scenes.trust.experience import Expected, expected, known
@@ -35,6 +36,8 @@ WORDS = ("kind", "mode_before", "mode_after")
 #: The column of a CSV that says what the table does not, as JSON in its first row, so that any reader takes the file as a
 #: plain table; "-" in the others, since pandas warns of a column that holds words here and nothing there.
 ABOUT = "rockcheck_history"
+#: What it says of a block that is not homogeneous.
+_MASS = ("centre_of_mass", "moment_of_inertia")
 #: The modes of motion that a `mode` column may hold.
 MODES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight", "overturned")
 
@@ -73,8 +76,9 @@ class History(Shown):
     """The motion of a block as one model sees it. SI units, signs as in the scene.
 
     `channels` holds one 1-D array a name, all of one length: t, x, y, theta, x_dot, y_dot, theta_dot, slip, slip_rate, mode.
-    x and y are the centroid's, relative to the base; `slip` is how far the pivot corner stands from its first place along
-    the floor, `slip_rate` that corner's horizontal velocity. A history that ends in overturning stops there.
+    x and y are those of the box's centre, relative to the base (of a homogeneous block its centroid); `slip` is how far the
+    pivot corner stands from its first place along the floor, `slip_rate` that corner's horizontal velocity. A history that ends
+    in overturning stops there.
     """
 
     name: str
@@ -86,9 +90,12 @@ class History(Shown):
     settings: Mapping[str, Any] = field(default_factory=dict)
     #: Things a reader should know, one line each (for example that the record is shorter than the scene).
     notes: tuple[str, ...] = ()
-    #: Of the block, m and rad; None for a history read from a file that does not say.
+    #: Of the block, m; None for a history read from a file that does not say.
     half_width: float | None = None
     half_height: float | None = None
+    #: Of a block that is not homogeneous: place of its mass's centre (m), moment of inertia per unit mass (m^2); see `Block`.
+    centre_of_mass: tuple[float, float] | None = None
+    moment_of_inertia: float | None = None
     #: Of figures that are not exact by their source, such as a mean of tests: the 95 % interval's half width by measure, SI.
     uncertainty: Mapping[str, float] = field(default_factory=dict)
 
@@ -110,9 +117,19 @@ class History(Shown):
     @property
     def alpha(self) -> float | None:
         """The block's slenderness angle in rad, where the block is known."""
+        return None if self.block is None else self.block.alpha
+
+    @cached_property
+    def block(self) -> Block | None:
+        """The block, without its mass, where it is known."""
         if self.half_width is None or self.half_height is None:
             return None
-        return math.atan2(self.half_width, self.half_height)
+        return Block(
+            half_width=self.half_width,
+            half_height=self.half_height,
+            centre_of_mass=self.centre_of_mass,
+            moment_of_inertia=self.moment_of_inertia,
+        )
 
     @property
     def peak_rotation(self) -> float:
@@ -167,6 +184,7 @@ class History(Shown):
             "outcome": self.outcome,
             "half_width": self.half_width,
             "half_height": self.half_height,
+            **{name: getattr(self, name) for name in _MASS if getattr(self, name) is not None},
             "settings": dict(self.settings),
             "notes": list(self.notes),
             "uncertainty": dict(self.uncertainty),
@@ -220,6 +238,7 @@ class History(Shown):
             notes=tuple(printable(note, 1000) for note in about.get("notes", ())),
             half_width=_size(about, "half_width", shown),
             half_height=_size(about, "half_height", shown),
+            **_mass(about, shown),
             uncertainty=_uncertainty(about, shown),
         )
 
@@ -294,6 +313,26 @@ def _size(about: Mapping[str, Any], key: str, shown: str) -> float | None:
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
         raise InputError(f"{printable(value)} is not allowed: give a positive length in m", f"{shown}: {key}")
     return float(value)
+
+
+def block_fields(block: Block) -> dict[str, Any]:
+    """What a history keeps of its block, as keywords of `History`."""
+    inertia = None if block.moment_of_inertia is None else block.gyration_squared
+    sizes = {"half_width": block.half_width, "half_height": block.half_height}
+    return sizes | {"centre_of_mass": block.centre_of_mass, "moment_of_inertia": inertia}
+
+
+def _mass(about: Mapping[str, Any], shown: str) -> dict[str, Any]:
+    """Where the mass of a block that is not homogeneous lies, checked against its sizes."""
+    given = {name: about[name] for name in _MASS if about.get(name) is not None}
+    if not given:
+        return {}
+    try:
+        sizes: dict[str, Any] = {name: about.get(name) for name in ("half_width", "half_height")}
+        found = block_fields(Block(**sizes, **given))
+    except InputError as error:
+        raise InputError(f"{shown}: column {ABOUT!r}: {error}") from None
+    return {name: found[name] for name in _MASS}
 
 
 def _uncertainty(about: Mapping[str, Any], shown: str) -> dict[str, float]:

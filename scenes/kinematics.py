@@ -1,4 +1,8 @@
-"""Geometry and energy of the block's state, the same for every model. Arrays or scalars, SI units, per unit mass."""
+"""Geometry and energy of the block's state, the same for every model. Arrays or scalars, SI units, per unit mass.
+
+x and y are those of the *box's* centre: where the corners are does not depend on where the mass is. Models that need the mass's centre
+change over with `of_mass` and `of_box`; of a homogeneous block both are one.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.scenes.scene import Block, Scene
+from rockcheck.scenes.block import Block
+from rockcheck.scenes.scene import Scene
 
 
 def slip(block: Block, x: Any, theta: Any) -> Any:
@@ -14,17 +19,17 @@ def slip(block: Block, x: Any, theta: Any) -> Any:
 
     A function of the state: x - S (R sin(alpha - |theta|) - B), continuous through theta = 0.
     """
-    return x - np.sign(theta) * (block.radius * np.sin(block.alpha - np.abs(theta)) - block.half_width)
+    return x - np.sign(theta) * (block.half_diagonal * np.sin(block.box_angle - np.abs(theta)) - block.half_width)
 
 
 def slip_rate(block: Block, theta: Any, x_dot: Any, theta_dot: Any) -> Any:
     """Horizontal velocity V = dx/dt + R cos(alpha - |theta|) dtheta/dt of the pivot corner, m/s."""
-    return x_dot + block.radius * np.cos(block.alpha - np.abs(theta)) * theta_dot
+    return x_dot + block.half_diagonal * np.cos(block.box_angle - np.abs(theta)) * theta_dot
 
 
 def pivot_height(block: Block, y: Any, theta: Any) -> Any:
     """Height of the lowest corner above the floor, m: positive is a hop, negative a penetration."""
-    return y - block.radius * np.cos(block.alpha - np.abs(theta))
+    return y - block.half_diagonal * np.cos(block.box_angle - np.abs(theta))
 
 
 def wall_gap(scene: Scene, side: str, x: Any, theta: Any) -> Any:
@@ -32,10 +37,31 @@ def wall_gap(scene: Scene, side: str, x: Any, theta: Any) -> Any:
     outward = 1.0 if side == "left" else -1.0
     wall = next(w for w in scene.walls if w.side == side)
     block = scene.block
-    return outward * x + block.half_width + wall.gap - block.radius * np.sin(block.alpha + np.abs(theta))
+    return outward * x + block.half_width + wall.gap - block.half_diagonal * np.sin(block.box_angle + np.abs(theta))
 
 
-def energy(block: Block, gravity: float, y: Any, x_dot: Any, y_dot: Any, theta_dot: Any) -> Any:
+def of_mass(block: Block, states: Any) -> Any:
+    """States (..., 6: x, y, theta and rates) of the mass's centre, from those of the box's centre."""
+    return states if block.centre_of_mass is None else _moved(block, states, 1.0)
+
+
+def of_box(block: Block, states: Any) -> Any:
+    """States (..., 6: x, y, theta and rates) of the box's centre, from those of the mass's centre."""
+    return states if block.centre_of_mass is None else _moved(block, states, -1.0)
+
+
+def _moved(block: Block, states: Any, sense: float) -> Any:
+    """The states of a point that the block carries: by `sense` times the offset of the mass's centre further."""
+    x, y, theta, x_dot, y_dot, w = np.moveaxis(np.asarray(states, dtype=float), -1, 0)
+    (dx, dz), s, c = block.offset, np.sin(theta), np.cos(theta)
+    right, up = sense * (dx * c - dz * s), sense * (dx * s + dz * c)
+    return np.stack([x + right, y + up, theta, x_dot - w * up, y_dot + w * right, w], axis=-1)
+
+
+def energy(block: Block, gravity: float, y: Any, theta: Any, x_dot: Any, y_dot: Any, theta_dot: Any) -> Any:
     """Kinetic plus potential energy per unit mass in the base's frame, zero for the block standing still, J/kg."""
-    inertia = block.radius**2 / 3.0
-    return 0.5 * (x_dot**2 + y_dot**2 + inertia * theta_dot**2) + gravity * (y - block.half_height)
+    if block.centre_of_mass is not None:
+        state = np.stack(np.broadcast_arrays(0.0, y, theta, x_dot, y_dot, theta_dot), axis=-1)
+        _, y, _, x_dot, y_dot, _ = np.moveaxis(of_mass(block, state), -1, 0)
+    height = block.weaker_pivot.height
+    return 0.5 * (x_dot**2 + y_dot**2 + block.gyration_squared * theta_dot**2) + gravity * (y - height)

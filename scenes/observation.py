@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.scenes import kinematics
-from rockcheck.scenes.history import Cost, Event, History, outcome_of
+from rockcheck.scenes.history import Cost, Event, History, block_fields, outcome_of
 from rockcheck.scenes.scene import Scene
 
 STATE = ("x", "y", "theta", "x_dot", "y_dot", "theta_dot")
@@ -54,8 +54,7 @@ def observe(
         cost=cost or Cost(),
         settings=dict(settings or {}),
         notes=(*scene_notes(scene), *notes),
-        half_width=scene.block.half_width,
-        half_height=scene.block.half_height,
+        **block_fields(scene.block),
     )
 
 

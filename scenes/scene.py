@@ -10,47 +10,15 @@ from numpy.typing import NDArray
 from pydantic import Field, StringConstraints, field_validator, model_validator
 
 from rockcheck.scenes.base import Finite, Frozen, NonNegative, Positive, Restitution, Shown
+from rockcheck.scenes.block import PAPER_BLOCK, Block
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.excitations import Excitation, Rest
 
+__all__ = ["PAPER_BLOCK", "Block", "Floor", "Scene", "Wall"]
+
 MOST_SAMPLES = 5_000_000
-#: At mu = 4/3 the pivot of a slender block can jam while it slips (Painleve); physics beyond it is not unique.
+#: At mu = 4/3 the pivot of a homogeneous block can jam while it slips (Painleve); physics beyond it is not unique.
 PAINLEVE_FRICTION = 4.0 / 3.0
-
-
-class Block(Frozen):
-    """A homogeneous rectangular block 2B x 2H; lengths in m.
-
-    `mass` (kg) is optional: motion does not depend on it, forces and impulses are given per unit mass.
-    """
-
-    half_width: Positive
-    half_height: Positive
-    mass: Positive | None = None
-
-    @property
-    def alpha(self) -> float:
-        """Slenderness angle atan(B/H), rad."""
-        return math.atan2(self.half_width, self.half_height)
-
-    @property
-    def radius(self) -> float:
-        """Half diagonal R = sqrt(B^2 + H^2), m."""
-        return math.hypot(self.half_width, self.half_height)
-
-    @property
-    def frequency_parameter(self) -> float:
-        """p = sqrt(3 g / (4 R)), rad/s, on Earth: g = 9.81 m/s^2. `Scene.frequency_parameter` has the scene's own gravity."""
-        return frequency_parameter(self.radius, 9.81)
-
-
-def frequency_parameter(radius: float, gravity: float) -> float:
-    """p = sqrt(3 g / (4 R)), rad/s, of a block of half diagonal R (m) under gravity g (m/s^2)."""
-    return math.sqrt(0.75 * gravity / radius)
-
-
-#: The block of the paper: R = 1.605 m, alpha = 0.25 rad, p = 2.14 rad/s.
-PAPER_BLOCK = Block(half_width=0.397, half_height=1.555)
 
 
 class Floor(Frozen):
@@ -92,7 +60,7 @@ class Wall(Frozen):
 class Scene(Shown, Frozen):
     """All that a model needs to know; SI units, angles in rad, counterclockwise positive.
 
-    The block stands with its centroid above x = 0 unless it starts tilted: `initial_rotation` tilts it about the corner
+    The box stands with its centre above x = 0 unless it starts tilted: `initial_rotation` tilts it about the corner
     it would rock on, which keeps its place. `initial_angular_velocity` (rad/s) and `initial_velocity` (m/s, the slip rate
     of that corner) complete its state, see `initial_state`; `initial_height` (m) lifts it off the floor. `duration`
     counts from the excitation's start. `gravity` in m/s^2.
@@ -122,11 +90,17 @@ class Scene(Shown, Frozen):
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
+        if self.floor.mu_s >= self.block.least_painleve_friction:
+            raise InputError(
+                f"{self.floor.mu_s:g} is not allowed: must be below {self.block.least_painleve_friction:.4g}, where a slipping pivot of"
+                " this block may jam (Painleve)",
+                "floor.friction" if self.floor.static_friction is None else "floor.static_friction",
+            )
         if self.duration / self.output_step > MOST_SAMPLES:
             raise InputError(f"{self.output_step:g} s gives more than {MOST_SAMPLES} samples in {self.duration:g} s", "output_step")
         for wall in self.walls:
             reach = self._reach(wall.side)
-            if reach > self.block.half_width + wall.gap + 1e-12 * self.block.radius:
+            if reach > self.block.half_width + wall.gap + 1e-12 * self.block.half_diagonal:
                 raise InputError(
                     f"{self.initial_rotation:g} is not allowed: the block would start {reach - self.block.half_width - wall.gap:.3g} m"
                     f" inside the {wall.side} wall",
@@ -135,8 +109,8 @@ class Scene(Shown, Frozen):
         return self
 
     def _reach(self, side: str) -> float:
-        """How far the initial block reaches to one side, m from the place of its upright centroid."""
-        tilt, radius, alpha = self.initial_rotation, self.block.radius, self.block.alpha
+        """How far the initial block reaches to one side, m from the place of its upright centre."""
+        tilt, radius, alpha = self.initial_rotation, self.block.half_diagonal, self.block.box_angle
         outward = 1.0 if side == "left" else -1.0
         centroid = math.copysign(1.0, tilt) * (radius * math.sin(alpha - abs(tilt)) - self.block.half_width)
         return radius * math.sin(alpha + abs(tilt)) - outward * centroid
@@ -147,8 +121,8 @@ class Scene(Shown, Frozen):
 
     @property
     def frequency_parameter(self) -> float:
-        """p = sqrt(3 g / (4 R)) in rad/s with this scene's gravity."""
-        return frequency_parameter(self.block.radius, self.gravity)
+        """p = sqrt(3 g / (4 R)) in rad/s with this scene's gravity; of the weaker pivot."""
+        return self.block.weaker_pivot.frequency_parameter(self.gravity)
 
     @property
     def output_times(self) -> NDArray[np.float64]:
@@ -158,18 +132,20 @@ class Scene(Shown, Frozen):
 
     @property
     def initial_state(self) -> tuple[float, float, float, float, float, float]:
-        """x, y, theta, dx/dt, dy/dt, dtheta/dt at t = 0 (SI, relative to the base), turning about the lower corner."""
+        """x, y, theta of the box's centre and their rates at t = 0 (SI, relative to the base), turning about the lower corner."""
         tilt, spin, block = self.initial_rotation, self.initial_angular_velocity, self.block
+        radius, alpha = block.half_diagonal, block.box_angle
         pivot = math.copysign(1.0, tilt if tilt != 0.0 else spin)
-        s, c = math.sin(block.alpha - abs(tilt)), math.cos(block.alpha - abs(tilt))
-        x = pivot * (block.radius * s - block.half_width) if tilt != 0.0 else 0.0
-        y = self.initial_height + (block.radius * c if tilt != 0.0 else block.half_height)
-        return x, y, tilt, self.initial_velocity - block.radius * c * spin, pivot * block.radius * s * spin, spin
+        s, c = math.sin(alpha - abs(tilt)), math.cos(alpha - abs(tilt))
+        x = pivot * (radius * s - block.half_width) if tilt != 0.0 else 0.0
+        y = self.initial_height + (radius * c if tilt != 0.0 else block.half_height)
+        return x, y, tilt, self.initial_velocity - radius * c * spin, pivot * radius * s * spin, spin
 
     def mirrored(self) -> Scene:
         """The same scene with left and right exchanged."""
         swap: dict[str, Literal["left", "right"]] = {"left": "right", "right": "left"}
         return self.replace(
+            block=self.block.mirrored(),
             walls=tuple(Wall(side=swap[w.side], gap=w.gap, restitution=w.restitution) for w in self.walls),
             excitation=self.excitation.scaled(-1.0),
             initial_rotation=-self.initial_rotation,

@@ -58,9 +58,11 @@ def draw_block(axes: Any, scene: Scene) -> None:
     turn = np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (block.half_width, block.half_height)
     axes.add_patch(Polygon(corners @ turn.T + (x, y), facecolor=SHADE, edgecolor=INK))
-    reach = 1.4 * block.radius
+    if block.centre_of_mass is not None:
+        axes.plot(*(np.array(block.offset) @ turn.T + (x, y)), marker="+", color=INK)
+    reach = 1.4 * block.half_diagonal
     axes.axhline(0.0, color=INK, linewidth=2)
-    thick = 0.12 * block.radius
+    thick = 0.12 * block.half_diagonal
     for wall in scene.walls:
         place = block.half_width + wall.gap
         left = -place - thick if wall.side == "left" else place

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from html import escape
 
 import numpy as np
 
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, Spectrum
-from rockcheck.scenes import History, Record, Rest, Ricker, Scene, Sine
+from rockcheck.scenes import Block, History, Record, Rest, Ricker, Scene, Sine
 from rockcheck.validation.discrepancy import Discrepancy
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -62,6 +63,7 @@ def scene_facts(scene: Scene) -> list[tuple[str, str]]:
     walls = ", ".join(f"{wall.side}, gap {number(1e3 * wall.gap)} mm, restitution {number(wall.restitution)}" for wall in scene.walls)
     facts = [
         ("block", f"{number(2 * block.half_width, 4)} m × {number(2 * block.half_height, 4)} m, α = {number(block.alpha)} rad"),
+        *mass_facts(block),
         ("p", f"{number(scene.frequency_parameter)} rad/s"),
         ("floor", floor),
         ("wall" if len(scene.walls) < 2 else "walls", walls or "none"),
@@ -73,6 +75,19 @@ def scene_facts(scene: Scene) -> list[tuple[str, str]]:
     if scene.initial_rotation:
         facts.append(("starts at", f"θ = {number(scene.initial_rotation / block.alpha)} α"))
     return facts
+
+
+def mass_facts(block: Block) -> list[tuple[str, str]]:
+    """Where the mass of a block is that is not homogeneous, and the slenderness of both pivots."""
+    if block.homogeneous:
+        return []
+    (x, z), left, right = block.offset, block.pivot("left"), block.pivot("right")
+    place = f"{number(abs(x))} m to the {'right' if x >= 0.0 else 'left'}, {number(abs(z))} m {'up' if z >= 0.0 else 'down'}"
+    gyration = f"radius of gyration {number(math.sqrt(block.gyration_squared))} m"
+    return [
+        ("mass's centre", f"{place} of the box's; {gyration}"),
+        ("pivots", f"left α = {number(left.alpha)} rad, right α = {number(right.alpha)} rad"),
+    ]
 
 
 def history_facts(history: History) -> list[tuple[str, str]]:

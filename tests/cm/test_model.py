@@ -123,7 +123,7 @@ def test_frictionless_block_is_left_behind_by_its_base():
 def test_floor_impact_has_housners_ratio_and_does_not_slip(mu):
     history = ContinuousModel().simulate(scene(floor=Floor(friction=mu), initial_rotation=0.5 * PAPER_BLOCK.alpha))
     c = history.channels
-    e = energy(PAPER_BLOCK, G, c["y"], c["x_dot"], c["y_dot"], c["theta_dot"])
+    e = energy(PAPER_BLOCK, G, c["y"], c["theta"], c["x_dot"], c["y_dot"], c["theta_dot"])
     ratio = 1.0 - 1.5 * math.sin(PAPER_BLOCK.alpha) ** 2
     impacts = strikes(history, "floor impact")
     assert len(impacts) == 2
@@ -167,7 +167,7 @@ def test_energy_never_rises_without_excitation():
         )
     )
     c = history.channels
-    e = energy(PAPER_BLOCK, G, c["y"], c["x_dot"], c["y_dot"], c["theta_dot"])
+    e = energy(PAPER_BLOCK, G, c["y"], c["theta"], c["x_dot"], c["y_dot"], c["theta_dot"])
     assert len(strikes(history, "wall impact")) >= 3
     assert np.max(e[1:] - np.minimum.accumulate(e)[:-1]) < 1e-5 * e[0]
 

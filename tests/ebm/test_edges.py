@@ -76,7 +76,7 @@ def test_impact_on_floor_and_wall_at_once(pivot, e):
     assert_contacts_hold(scene, history)
     motion = history.channels
     assert np.max(motion["theta"]) < 1e-9
-    energy = kinematics.energy(PAPER_BLOCK, G, *(motion[name] for name in ("y", "x_dot", "y_dot", "theta_dot")))
+    energy = kinematics.energy(PAPER_BLOCK, G, *(motion[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")))
     assert np.max(np.diff(energy)) < 1e-8
     if e == 0.0:
         assert history.outcome == "at rest"

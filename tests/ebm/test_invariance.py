@@ -200,7 +200,7 @@ def test_needles_and_slabs_from_a_millimetre_to_a_kilometre(pivot, radius, alpha
     )
     history = EventBasedModel(pivot=pivot).simulate(scene)
     motion = history.channels
-    energy = kinematics.energy(block, 9.81, *(motion[name] for name in ("y", "x_dot", "y_dot", "theta_dot")))
+    energy = kinematics.energy(block, 9.81, *(motion[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")))
     assert np.all(np.diff(energy) <= 1e-9 * 9.81 * radius)
     assert np.max(np.abs(motion["theta"])) == pytest.approx(0.5 * alpha, rel=1e-12)
     assert history.outcome == "at rest" or alpha < 0.1

@@ -65,6 +65,19 @@ def test_save_and_load_round_trip(history, tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run.csv", "run.events.csv"]
 
 
+def test_a_loaded_blocks_history_keeps_where_its_mass_is(tmp_path):
+    """The block comes back, its moment of inertia per unit mass; a history of a homogeneous one says nothing of it."""
+    block = Block(half_width=0.4, half_height=1.6, mass=20.0, centre_of_mass=(0.1, -0.3), moment_of_inertia=12.0)
+    path = tmp_path / "run.csv"
+    observe(SCENE.replace(block=block), "model", states(np.zeros(11)), outcome="at rest").save(path)
+    again = History.load(path)
+    assert again.block == Block(half_width=0.4, half_height=1.6, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.6)
+    assert again.alpha == block.alpha == math.atan2(0.4 - 0.1, 1.6 - 0.3)
+    observe(SCENE, "model", states(np.zeros(11)), outcome="at rest").save(path)
+    assert "centre_of_mass" not in path.read_text(encoding="utf-8")
+    assert History.load(path).block == SCENE.block
+
+
 def test_a_compressed_history_is_the_same_and_opens_in_pandas(history, tmp_path):
     """Half the size; the same history gives the same bytes, whenever it is written."""
     path = tmp_path / "run.csv.gz"
@@ -159,6 +172,7 @@ def rows_about(text: str) -> str:
         (rows_about('{"settings": []}'), "column 'rockcheck_history': not written by rockcheck"),
         (rows_about('{"notes": "x"}'), "column 'rockcheck_history': not written by rockcheck"),
         (rows_about('{"half_width": -1}'), "half_width: -1 is not allowed"),
+        (rows_about('{"half_width": 1, "half_height": 2, "centre_of_mass": [3, 0]}'), "centre_of_mass: (3, 0) is not allowed"),
         (rows_about('{"half_width": "1"}'), "half_width: 1 is not allowed"),
         (rows_about('{"half_height": true}'), "half_height: True is not allowed"),
         (rows_about('{"half_height": Infinity}'), "half_height: inf is not allowed"),

@@ -20,6 +20,9 @@ GOOD = {
 }
 
 
+BOX = {"half_width": 0.4, "half_height": 1.0}
+
+
 def scene(**change: object) -> Scene:
     return Scene(**(GOOD | change))
 
@@ -67,6 +70,17 @@ def test_restitution_is_between_0_and_1(value):
         ({"block": {"half_width": 0.4}}, "block.half_height", "is missing"),
         ({"block": {"half_width": 0.4, "half_height": 1.0, "depth": 1.0}}, "block.depth", "unknown key"),
         ({"block": {"half_width": 0.4, "half_height": 1.0, "mass": 0.0}}, "block.mass", "0.0 is not allowed"),
+        ({"block": BOX | {"center_of_mass": [0.1, 0.1]}}, "block.center_of_mass", "did you mean 'centre_of_mass'?"),
+        ({"block": BOX | {"centre_of_mass": [0.4, 0.1]}}, "block.centre_of_mass", "(0.4, 0.1) is not allowed: must lie inside the box"),
+        ({"block": BOX | {"centre_of_mass": [0.1, -1.0]}}, "block.centre_of_mass", "z between -1 and 1 m"),
+        ({"block": BOX | {"centre_of_mass": [0.1, math.nan]}}, "block.centre_of_mass.1", "nan is not allowed"),
+        ({"block": BOX | {"centre_of_mass": [0.1]}}, "block.centre_of_mass.1", "is missing"),
+        ({"block": BOX | {"moment_of_inertia": 0.0}}, "block.moment_of_inertia", "0.0 is not allowed"),
+        ({"block": BOX | {"moment_of_inertia": 100.0}}, "block.moment_of_inertia", "taken as that of 1 kg"),
+        ({"block": BOX | {"moment_of_inertia": 117.0, "mass": 100.0}}, "block.moment_of_inertia", "at most 116 kg m^2"),
+        # The homogeneous box's own moment of inertia is too much for a centre so near to a corner.
+        ({"block": BOX | {"centre_of_mass": [0.3, 0.9]}}, "block.moment_of_inertia", "0.386667 is not allowed"),
+        ({"block": BOX | {"moment_of_inertia": 0.02}}, "floor.friction", "must be below 0.2649"),
         ({"floors": {}}, "floors", "unknown key"),
         ({"floor": {"friction": 4.0 / 3.0}}, "floor.friction", "below 4/3"),
         ({"floor": {"friction": 0.3, "static_friction": 1.5}}, "floor.static_friction", "below 4/3"),
@@ -111,6 +125,50 @@ def test_a_tilt_may_touch_a_wall_but_not_enter_it():
     assert kinematics.wall_gap(touching, "left", x, theta) == pytest.approx(0.0, abs=1e-15)
     assert fault_of(initial_rotation=tilt, walls=[Wall(side="left", gap=reach - 1e-6)]).key == "initial_rotation"
     assert scene(initial_rotation=-tilt, walls=[Wall(side="left", gap=reach)])
+
+
+LOADED = Block(**BOX, mass=50.0, centre_of_mass=(0.1, -0.2), moment_of_inertia=15.0)
+
+
+def test_a_homogeneous_block_is_written_as_ever():
+    """Its tables, and so its hash, do not know of centre and moment of inertia; those of a loaded one do, and are read again."""
+    assert scene().model_dump(mode="json")["block"] == {"half_width": 0.397, "half_height": 1.555, "mass": None}
+    assert Block(**BOX, centre_of_mass=(0.0, 0.0)) == Block(**BOX)
+    tables = LOADED.model_dump(mode="json")
+    assert tables == BOX | {"mass": 50.0, "centre_of_mass": [0.1, -0.2], "moment_of_inertia": 15.0}
+    assert Block(**tables) == LOADED
+
+
+def test_a_loaded_block_scaled_and_mirrored():
+    """Twice the size: the same slendernesses, R twice as long, p smaller by sqrt 2; mirrored: the pivots change places."""
+    twice = LOADED.scaled(2.0)
+    mirrored = scene(block=LOADED, initial_rotation=-0.02).mirrored()
+    for side, other in (("left", "right"), ("right", "left")):
+        one = LOADED.pivot(side)
+        assert twice.pivot(side).alpha == one.alpha
+        assert twice.pivot(side).radius == 2.0 * one.radius
+        assert twice.pivot(side).frequency_parameter(9.81) == pytest.approx(one.frequency_parameter(9.81) / math.sqrt(2.0), rel=1e-15)
+        assert mirrored.block.pivot(other) == one
+    assert mirrored.mirrored() == scene(block=LOADED, initial_rotation=-0.02)
+    assert (LOADED.slope, LOADED.alpha) == (pytest.approx(0.3 / 0.8), LOADED.pivot("right").alpha)
+
+
+def test_the_centres_of_mass_and_box():
+    """Where the mass's centre is and how fast, by finite differences of a turned offset; and back to rounding. Energy is the mass's."""
+    rng = np.random.default_rng(1)
+    states, small = rng.normal(size=(20, 6)), 1e-6
+    placed = kinematics.of_mass(LOADED, states)
+    np.testing.assert_allclose(kinematics.of_box(LOADED, placed), states, atol=1e-15)
+    for row, (x, y, theta, *_) in zip(placed, states, strict=True):
+        turned = np.exp(1j * theta) * (0.1 - 0.2j)
+        assert row[:2] == pytest.approx([x + turned.real, y + turned.imag], abs=1e-15)
+    later = states.copy()
+    later[:, :3] += small * states[:, 3:]
+    np.testing.assert_allclose((kinematics.of_mass(LOADED, later)[:, :2] - placed[:, :2]) / small, placed[:, 3:5], atol=1e-5)
+    energy = kinematics.energy(LOADED, 9.81, *states[:, 1:].T)
+    own = 0.5 * (placed[:, 3] ** 2 + placed[:, 4] ** 2 + 0.3 * placed[:, 5] ** 2) + 9.81 * (placed[:, 1] - 0.8)
+    np.testing.assert_allclose(energy, own, atol=1e-13)
+    assert kinematics.of_mass(PAPER_BLOCK, states) is states
 
 
 def test_frozen():

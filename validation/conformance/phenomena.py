@@ -271,7 +271,7 @@ def energy_gained(found: Histories) -> float:
     t, x, y, theta = (_column(history, name) for name in ("t", "x", "y", "theta"))
     rates = [np.diff(channel) / np.diff(t) for channel in (x, y, theta)]
     middle = 0.5 * (y[1:] + y[:-1])
-    total = energy(TUMBLE.block, G, middle, *rates)
+    total = energy(TUMBLE.block, G, middle, 0.5 * (theta[1:] + theta[:-1]), *rates)
     return float(np.max(total - np.minimum.accumulate(total)) / total[0])
 
 

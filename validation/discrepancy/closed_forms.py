@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from rockcheck.scenes import Scene
+from rockcheck.scenes.block import Pivot
 from rockcheck.validation.discrepancy.measures import FIGURES, Definition, Unavailable, WindowedHistory, register
 
 
@@ -58,14 +59,14 @@ def bounce_height_error(motion: WindowedHistory) -> float:
 def quarter_period_error(motion: WindowedHistory) -> float:
     """Time of the first floor impact, less Housner's quarter period: a block released at theta_0 that does not slip, s.
 
-    T/4 = int_0^theta_0 d theta / sqrt(2 p^2 [cos(alpha - theta_0) - cos(alpha - theta)]), without his small angles.
+    T/4 = int_0^theta_0 d theta / sqrt(2 p^2 [cos(alpha - theta_0) - cos(alpha - theta)]), without his small angles, with p and alpha of
+    the pivot on the side to which it is tilted.
     """
     from scipy.integrate import quad
 
     scene = _scene(motion)
-    tilt, alpha = abs(scene.initial_rotation), scene.block.alpha
-    _released(motion)
-    p = scene.frequency_parameter
+    pivot = _released(motion)[0]
+    tilt, alpha, p = abs(scene.initial_rotation), pivot.alpha, pivot.frequency_parameter(scene.gravity)
 
     def pace(root: float) -> float:  # theta = theta_0 - root^2 takes the singularity at the start away
         theta = tilt - root**2
@@ -82,18 +83,23 @@ def quarter_period_error(motion: WindowedHistory) -> float:
 def impact_ratio_error(motion: WindowedHistory) -> float:
     """Ratio of angular velocities over the first floor impact, less Housner's 1 - 1.5 sin^2 alpha, for a block released at rest.
 
-    From the turning points before and after it, between which energy is kept: sqrt of the ratio of cos(alpha - |theta|) - cos alpha.
+    From the turning points before and after it, between which energy is kept: dtheta/dt at the impact is
+    p sqrt(2 [cos(alpha - |theta|) - cos alpha]) with p and alpha of the pivot. A block that is not homogeneous keeps its angular momentum
+    about the new pivot: 1 - a (a + a')/(I/m + R^2), where a is the new pivot's distance from the mass's centre along the floor and
+    a' the old one's.
     """
     scene = _scene(motion)
-    _released(motion)
+    old, new = _released(motion)
     impacts = [event.t for event in motion.events("floor impact")]
     _need(len(impacts) >= 2, "two floor impacts")
     t, theta = motion.channel("t"), motion.channel("theta")
     swing = np.abs(theta[(t > impacts[0]) & (t < impacts[1])])
     _need(len(swing) > 0, "rows between the first two floor impacts")
-    alpha = scene.block.alpha
-    before, after = (math.cos(alpha - tilt) - math.cos(alpha) for tilt in (abs(scene.initial_rotation), float(np.max(swing))))
-    return math.sqrt(after / before) - (1.0 - 1.5 * math.sin(alpha) ** 2)
+    before, after = (
+        pivot.frequency_parameter(scene.gravity) * math.sqrt(math.cos(pivot.alpha - tilt) - math.cos(pivot.alpha))
+        for pivot, tilt in ((old, abs(scene.initial_rotation)), (new, float(np.max(swing))))
+    )
+    return after / before - (1.0 - new.share * new.arm * (new.arm + old.arm) / new.radius**2)
 
 
 def _scene(motion: WindowedHistory) -> Scene:
@@ -102,10 +108,14 @@ def _scene(motion: WindowedHistory) -> Scene:
     return motion.scene
 
 
-def _released(motion: WindowedHistory) -> None:
+def _released(motion: WindowedHistory) -> tuple[Pivot, Pivot]:
+    """The pivot on which a block released from a tilt rocks first, and the other one."""
     scene = _scene(motion)
+    left, right = scene.block.pivot("left"), scene.block.pivot("right")
+    old, new = (left, right) if scene.initial_rotation > 0.0 else (right, left)
     moving = scene.initial_velocity != 0.0 or scene.initial_angular_velocity != 0.0 or scene.initial_height != 0.0
-    _need(0.0 < abs(scene.initial_rotation) < scene.block.alpha and not moving and not scene.walls, "a block released at rest from a tilt")
+    _need(0.0 < abs(scene.initial_rotation) < old.alpha and not moving and not scene.walls, "a block released at rest from a tilt")
+    return old, new
 
 
 def _need(holds: bool, what: str) -> None:

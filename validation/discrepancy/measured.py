@@ -18,7 +18,7 @@ import numpy as np
 from rockcheck.scenes import History, InputError, Scene
 from rockcheck.scenes.base import Finite, Frozen
 from rockcheck.scenes.errors import printable
-from rockcheck.scenes.history import outcome_of
+from rockcheck.scenes.history import block_fields, outcome_of
 from rockcheck.scenes.reading import read_table
 from rockcheck.validation.discrepancy.repeats import mean_history, shifted, time_shift
 
@@ -61,8 +61,7 @@ class Measured(Frozen):
             history,
             name=scene.name,
             channels={key: column[inside] for key, column in history.channels.items()},
-            half_width=scene.block.half_width,
-            half_height=scene.block.half_height,
+            **block_fields(scene.block),
             settings={"file": ", ".join(Path(path).name for path in paths), "offset": self.offset},
         )
 

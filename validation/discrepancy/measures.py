@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.scenes import Block, Event, History, Scene, kinematics
-from rockcheck.scenes.scene import frequency_parameter
 
 Array = NDArray[np.float64]
 Value = float | tuple[float, str]
@@ -106,9 +105,9 @@ class WindowedHistory:
         """The block, from the scene or from the history."""
         if self.scene is not None:
             return self.scene.block
-        if self.history.half_width is None or self.history.half_height is None:
+        if self.history.block is None:
             raise Unavailable("the block's size is not known")
-        return Block(half_width=self.history.half_width, half_height=self.history.half_height)
+        return self.history.block
 
     @property
     def gravity(self) -> float:
@@ -129,7 +128,7 @@ class WindowedHistory:
     @property
     def energy(self) -> Array:
         """Kinetic plus potential energy per unit mass, J/kg (`scenes.kinematics.energy`)."""
-        motion = (self.channel(name) for name in ("y", "x_dot", "y_dot", "theta_dot"))
+        motion = (self.channel(name) for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
         return np.asarray(kinematics.energy(self.block, self.gravity, *motion))
 
     def events(self, *kinds: str) -> list[Event]:
@@ -197,7 +196,7 @@ class Pair:
     @cached_property
     def energies(self) -> tuple[Array, Array]:
         """Energy per unit mass of both, J/kg."""
-        columns = [self.channels(name) for name in ("y", "x_dot", "y_dot", "theta_dot")]
+        columns = [self.channels(name) for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")]
         known = WindowedHistory(self.reference if self.reference.alpha is not None else self.candidate, self.scene)
         first, second = (np.asarray(kinematics.energy(known.block, known.gravity, *(c[k] for c in columns))) for k in (0, 1))
         return first, second
@@ -368,7 +367,7 @@ def theta_hausdorff(pair: Pair) -> float:
     if pair.alpha is None:
         raise Unavailable("the block's size is not known")
     known = WindowedHistory(pair.reference if pair.reference.alpha is not None else pair.candidate, pair.scene)
-    p = frequency_parameter(known.block.radius, known.gravity)
+    p = known.block.weaker_pivot.frequency_parameter(known.gravity)
     first, second = (np.column_stack([p * pair.time, column]) for column in pair.theta)
     if not (np.all(np.isfinite(first)) and np.all(np.isfinite(second))):
         return math.nan

@@ -94,7 +94,8 @@ def _play_records(scene: Scene, request: SpectrumRequest, records: Sequence[tupl
         peak = float(np.max(np.abs(record.samples)))
         if peak == 0.0:
             raise InputError(f"{name}: a record without motion has no intensity", "--record")
-        scales = request.amplitudes * scene.gravity * scene.block.half_width / scene.block.half_height / peak
+        pivot = scene.block.weaker_pivot
+        scales = request.amplitudes * scene.gravity * pivot.arm / pivot.height / peak
         both = np.concatenate([scales, -scales])
         played = tiles.play(scene.replace(excitation=record), both, np.ones(len(both)), model=request.model, settings=request.settings)
         found.append([runs.reshape(2, len(scales)) for runs in played])

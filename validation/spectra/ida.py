@@ -43,7 +43,8 @@ class Measure:
 
 def _per_slope(scene: Scene) -> float:
     """1/(g tan alpha), s^2/m."""
-    return scene.block.half_height / (scene.gravity * scene.block.half_width)
+    pivot = scene.block.weaker_pivot
+    return pivot.height / (scene.gravity * pivot.arm)
 
 
 MEASURES: Mapping[str, Measure] = {

@@ -186,8 +186,8 @@ def _side(player: Model, scene: Scene, amplitude: float, frequency: float) -> in
         node = node_scene(scene, amplitude, frequency, settle).replace(output_step=0.02)  # few rows: only the outcome is asked
         history = player.simulate(node)
         theta, y, *rates = (history.channels[name][-1] for name in ("theta", "y", "x_dot", "y_dot", "theta_dot"))
-        needed = node.gravity * (node.block.radius - node.block.half_height)
-        weak = kinematics.energy(node.block, node.gravity, y, *rates) < ENOUGH * needed
+        needed = node.gravity * (node.block.radius - node.block.weaker_pivot.height)
+        weak = kinematics.energy(node.block, node.gravity, y, theta, *rates) < ENOUGH * needed
         if history.outcome.startswith("overturned") or (weak and abs(theta) < node.block.alpha):
             break
     return side_of(history.outcome)

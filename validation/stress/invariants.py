@@ -302,7 +302,8 @@ def energy_error(model: EventBasedModel, scene: Scene, history: History) -> floa
         return None
     unit = math.sqrt(radius / gravity)
     t = channels["t"]
-    energy = kinematics.energy(scene.block, gravity, *(channels[c] for c in ("y", "x_dot", "y_dot", "theta_dot"))) / (gravity * radius)
+    motion = (channels[c] for c in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
+    energy = kinematics.energy(scene.block, gravity, *motion) / (gravity * radius)
     u = scene.excitation.acceleration(t) / gravity
     vg = scene.vertical.acceleration(t) / gravity
     speed = radius / unit

@@ -169,7 +169,7 @@ def energy_without_source(scene: Scene, history: History) -> float:
     block stands, and where nothing but the base changes its velocity.
     """
     channels, block, gravity = history.channels, scene.block, scene.gravity
-    energy = kinematics.energy(block, gravity, *(channels[name] for name in ("y", "x_dot", "y_dot", "theta_dot")))
+    energy = kinematics.energy(block, gravity, *(channels[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")))
     work, moved = np.zeros(len(energy)), np.zeros(len(energy))
     for excitation, name in ((scene.excitation, "x_dot"), (scene.vertical, "y_dot")):
         velocity = channels[name]
