@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from rockcheck.ebm import natural
 from rockcheck.ebm.core.ground import Ground
 from rockcheck.ebm.core.march import DONE, FAILURES, OVERTURNED, Control, run
-from rockcheck.ebm.core.motion import Setting, workspace
+from rockcheck.ebm.core.motion import Setting, Side, workspace
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes.compiled import kernel, threads
 from rockcheck.scenes.errors import InputError, ModelFailure
@@ -26,7 +27,8 @@ from rockcheck.scenes.scene import Scene
 Floats = NDArray[np.float64]
 _CHUNK = 256
 #: Rows of settings and grounds, by the names of their fields.
-SETTING = np.dtype([(name, np.bool_ if kind == "bool" else np.float64) for name, kind in Setting.__annotations__.items()])
+SIDE = np.dtype([(name, np.float64) for name in Side._fields])
+SETTING = np.dtype([(name, SIDE if kind is Side else np.float64) for name, kind in get_type_hints(Setting).items()])
 GROUND = np.dtype(
     [(name, np.int64 if kind == "int" else np.float64) for name, kind in Ground.__annotations__.items() if name != "samples"]
     + [("first", np.int64), ("count", np.int64)]
@@ -202,14 +204,30 @@ def row_ground(row, samples):
 
 
 @kernel
+def row_side(r):
+    """One side of the block of a packed row."""
+    return Side(
+        alpha=r.alpha,
+        radius=r.radius,
+        arm=r.arm,
+        top_alpha=r.top_alpha,
+        top_radius=r.top_radius,
+        tip_sin=r.tip_sin,
+        tip_cos=r.tip_cos,
+        far_sin=r.far_sin,
+        far_cos=r.far_cos,
+        share=r.share,
+    )
+
+
+@kernel
 def row_setting(r):
     """Block, floor and walls of a packed row, of the types that a single history has."""
     return Setting(
-        alpha=r.alpha,
-        sin_alpha=r.sin_alpha,
-        cos_alpha=r.cos_alpha,
-        sin_2alpha=r.sin_2alpha,
-        cos_2alpha=r.cos_2alpha,
+        left=row_side(r.left),
+        right=row_side(r.right),
+        height=r.height,
+        spin=r.spin,
         mu_s=r.mu_s,
         mu_k=r.mu_k,
         e_floor=r.e_floor,

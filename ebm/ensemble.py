@@ -69,7 +69,8 @@ def play_ensemble(scenes: Sequence[Scene], model: EventBasedModel, *, rows: int 
         i = int(np.argmax(failed))
         raise ModelFailure(f"{model.name}: scene {i} of the ensemble: {FAILURES[int(ending[i])]}")
     side = np.where(ending == OVERTURNED, -np.sign(states[:, THETA]), 0.0).astype(np.int8)
-    slip = [float(kinematics.slip(scene.block, z[X] * scene.block.radius, z[THETA])) for scene, z in zip(scenes, states, strict=True)]
+    placed = [natural.to_si(scene, z[None, :])[0] for scene, z in zip(scenes, states, strict=True)]
+    slip = [float(kinematics.slip(scene.block, z[X], z[THETA])) for scene, z in zip(scenes, placed, strict=True)]
     alpha = np.array([scene.block.alpha for scene in scenes])
     return Ensemble(t=t, theta=theta, side=side, peak=peak, last_slip=np.array(slip), alpha=alpha)
 

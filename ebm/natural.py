@@ -1,17 +1,22 @@
-"""Between a scene (SI) and the natural units of the compiled code: lengths in R, accelerations in g, times in sqrt(R/g)."""
+"""Between a scene (SI) and the natural units of the compiled code: lengths in R, accelerations in g, times in sqrt(R/g).
+
+Of a block that is not homogeneous R is that of its weaker pivot, and the compiled code follows its mass's centre, not the box's.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm.core.ground import GAUSSIAN, Ground, ground_of
-from rockcheck.ebm.core.motion import LAWS, LEAST_FRICTION, Setting
-from rockcheck.scenes.scene import Scene
+from rockcheck.ebm.core.motion import LAWS, LEAST_FRICTION, Setting, Side
+from rockcheck.scenes import kinematics
+from rockcheck.scenes.scene import Block, Scene
 
-__all__ = ["GAUSSIAN", "grounds_of", "setting_of", "state_of", "time_unit", "to_si"]
+__all__ = ["GAUSSIAN", "grounds_of", "setting_of", "side_of", "state_of", "time_unit", "to_si"]
 
 
 def time_unit(scene: Scene) -> float:
@@ -21,14 +26,13 @@ def time_unit(scene: Scene) -> float:
 
 def setting_of(scene: Scene, *, unilateral: bool, no_slip: bool, energy_cap: bool, impacts: str = "moreau") -> Setting:
     """Block, floor and walls of a scene in natural units."""
-    alpha, radius = scene.block.alpha, scene.block.radius
+    radius = scene.block.radius
     left, right = scene.wall("left"), scene.wall("right")
     return Setting(
-        alpha=alpha,
-        sin_alpha=math.sin(alpha),
-        cos_alpha=math.cos(alpha),
-        sin_2alpha=math.sin(2.0 * alpha),
-        cos_2alpha=math.cos(2.0 * alpha),
+        left=side_of(scene.block, "left"),
+        right=side_of(scene.block, "right"),
+        height=math.cos(scene.block.alpha),
+        spin=3.0 if scene.block.homogeneous else radius**2 / scene.block.gyration_squared,
         mu_s=max(scene.floor.mu_s, LEAST_FRICTION),
         mu_k=scene.floor.friction,
         e_floor=scene.floor.restitution,
@@ -44,6 +48,28 @@ def setting_of(scene: Scene, *, unilateral: bool, no_slip: bool, energy_cap: boo
     )
 
 
+def side_of(block: Block, side: Literal["left", "right"]) -> Side:
+    """One side of a block, lengths in R of its weaker pivot."""
+    alpha = block.alpha
+    if block.homogeneous:
+        arm, sine, cosine = math.sin(alpha), math.sin(2.0 * alpha), math.cos(2.0 * alpha)
+        return Side(alpha, 1.0, arm, alpha, 1.0, sine, cosine, sine, cosine, 0.75)
+    pivot, other, unit = block.pivot(side), block.pivot("right" if side == "left" else "left"), block.radius
+    top, square = 2.0 * block.half_height - pivot.height, pivot.radius**2
+    return Side(
+        alpha=pivot.alpha,
+        radius=pivot.radius / unit,
+        arm=pivot.radius * math.sin(pivot.alpha) / unit,
+        top_alpha=math.atan2(pivot.arm, top),
+        top_radius=math.hypot(pivot.arm, top) / unit,
+        tip_sin=pivot.arm * (pivot.height + top) / square,
+        tip_cos=(pivot.height * top - pivot.arm**2) / square,
+        far_sin=pivot.height * (pivot.arm + other.arm) / square,
+        far_cos=(pivot.height**2 - pivot.arm * other.arm) / square,
+        share=pivot.share * (unit / pivot.radius) ** 2,
+    )
+
+
 def grounds_of(scene: Scene) -> tuple[Ground, Ground]:
     """Horizontal and vertical ground motion in natural units."""
     unit = time_unit(scene)
@@ -52,17 +78,24 @@ def grounds_of(scene: Scene) -> tuple[Ground, Ground]:
 
 def state_of(scene: Scene) -> NDArray[np.float64]:
     """The initial state in natural units, on its contacts to the rounding of the compiled code."""
-    radius, unit, alpha = scene.block.radius, time_unit(scene), scene.block.alpha
-    x, y, theta, vx, vy, w = scene.initial_state
+    block, radius, unit = scene.block, scene.block.radius, time_unit(scene)
+    x, y, theta, vx, vy, w = kinematics.of_mass(block, scene.initial_state)
+    x -= block.offset[0]
+    lean = theta if theta != 0.0 else w
+    pivot = block.weaker_pivot if lean == 0.0 else block.pivot("left" if lean > 0.0 else "right")
+    alpha, own = pivot.alpha, pivot.radius / radius
     state = np.array([x / radius, y / radius, theta, vx * unit / radius, vy * unit / radius, w * unit])
     if scene.initial_height == 0.0:
-        state[1] = math.cos(alpha - abs(theta))
+        state[1] = own * math.cos(alpha - abs(theta))
     if scene.initial_velocity == 0.0:
-        state[3] = -math.cos(alpha - abs(theta)) * state[5]
+        state[3] = -own * math.cos(alpha - abs(theta)) * state[5]
     return state
 
 
 def to_si(scene: Scene, states: NDArray[np.float64]) -> NDArray[np.float64]:
-    """States (n x 6: x, y, theta and rates) from natural units to SI."""
+    """States (n x 6: x, y, theta and rates) of the mass's centre in natural units as those of the box's centre in SI."""
     radius, unit = scene.block.radius, time_unit(scene)
-    return states * np.array([radius, radius, 1.0, radius / unit, radius / unit, 1.0 / unit])
+    found = states * np.array([radius, radius, 1.0, radius / unit, radius / unit, 1.0 / unit])
+    if scene.block.centre_of_mass is not None:
+        found[:, 0] += scene.block.offset[0]
+    return np.asarray(kinematics.of_box(scene.block, found))

@@ -71,6 +71,7 @@ from rockcheck.ebm.core.motion import (
     W,
     X,
     flat_series,
+    side_of,
     sine_cosine,
     tilt_series,
     workspace,
@@ -124,7 +125,7 @@ def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order
     """Fills the workspace with the series of a block whose pivot, or base, carries the friction force -mu_k |P| z.
 
     Tilted, in the pivot's frame (see ebm.core.motion): with Sw = +-1 where a corner rests on the tip or far wall, else 0,
-    C = Sw c', J = 1/3 + C^2, f = u - Sw s' w^2, g = G0 - c w^2 and k = mu_k z sgn P,
+    C = Sw c', J = I + C^2, f = u - Sw s' w^2, g = G0 - c w^2 and k = mu_k z sgn P,
 
         P = (g J - s C f) / (J + s^2 + k s (c + C)),   Q = -k P,   J theta'' = -s P + (c + C) Q - C f,
 
@@ -151,7 +152,10 @@ def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order
     wall = float(m[TIP] - m[FAR])
     push = NA if m[TIP] != 0 else NB
     a[PHI, 0], a[OMEGA, 0] = sign * z[THETA], sign * z[W]
-    a[SIN, 0], a[COS, 0] = sine_cosine(b.alpha - a[PHI, 0], a)
+    side = side_of(b, m[S])
+    along, across = (side.tip_sin, side.tip_cos) if m[TIP] != 0 else (side.far_sin, side.far_cos)
+    sine, cosine = sine_cosine(side.alpha - a[PHI, 0], a)
+    a[SIN, 0], a[COS, 0] = side.radius * sine, side.radius * cosine
     for k in range(order):
         a[PHI, k + 1] = a[OMEGA, k] / (k + 1)
         a[SIN, k + 1] = -_product(a, OMEGA, COS, k) / (k + 1)
@@ -161,13 +165,13 @@ def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order
             break
         a[SPIN2, k] = _product(a, OMEGA, OMEGA, k)
         a[WEIGHT, k] = a[G, k] - _product(a, COS, SPIN2, k)  # g
-        a[TURN, k] = wall * (b.sin_2alpha * a[SIN, k] + b.cos_2alpha * a[COS, k])  # C
+        a[TURN, k] = wall * (along * a[SIN, k] + across * a[COS, k])  # C
         a[ARM, k] = a[COS, k] + a[TURN, k]
-        a[INERTIA, k] = 1.0 / 3.0 if k == 0 else 0.0
+        a[INERTIA, k] = 1.0 / b.spin if k == 0 else 0.0
         a[LOAD, k] = 0.0  # f
-        normal = a[WEIGHT, k] / 3.0
+        normal = a[WEIGHT, k] / b.spin
         if wall != 0.0:
-            a[REACH, k] = b.sin_2alpha * a[COS, k] - b.cos_2alpha * a[SIN, k]  # s'
+            a[REACH, k] = along * a[COS, k] - across * a[SIN, k]  # s'
             a[INERTIA, k] += _product(a, TURN, TURN, k)
             a[LOAD, k] = a[U, k] - wall * _product(a, REACH, SPIN2, k)
             a[PUSH, k] = _product(a, TURN, LOAD, k)  # C f
@@ -198,17 +202,18 @@ def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order
 @inner_kernel
 def _held(b, z, gh, gv, t):
     """Whether a flat block without speed stays at rest: the base neither lifts nor slides it, or presses it on a wall."""
-    slope, g, u = b.sin_alpha / b.cos_alpha, 1.0 + acceleration(gv, t), acceleration(gh, t)
-    least = min(slope, b.mu_s)
-    if abs(abs(u) - (least if g >= 0.0 else slope) * abs(g)) < NOISE[FORCE]:  # at its limit: where it goes decides
+    g, u = 1.0 + acceleration(gv, t), acceleration(gh, t)
+    to_left, to_right = b.left.arm / b.height, b.right.arm / b.height
+    slope = to_left if (u > 0.0) == (g >= 0.0) else to_right
+    if abs(abs(u) - (min(slope, b.mu_s) if g >= 0.0 else slope) * abs(g)) < NOISE[FORCE]:  # at its limit: where it goes decides
         g, u = 1.0 + acceleration(gv, t + SOON), acceleration(gh, t + SOON)
     left, right = closed_wall(b, z, 1, False), closed_wall(b, z, -1, False)
     if g < 0.0 and not left and not right:  # hanging: by both corners, as long as nothing tells to which side it tips
         return abs(u) <= NOISE[FORCE]
     if g < 0.0:  # a wall on which it is pressed holds it flat
-        return (left and u >= -slope * g) or (right and u <= slope * g)
-    limit = least if b.mu_s == LEAST_FRICTION else least * g
-    return (u <= limit or left) and (u >= -limit or right)
+        return (left and u >= -to_right * g) or (right and u <= to_left * g)
+    share = 1.0 if b.mu_s == LEAST_FRICTION else g
+    return (u <= min(to_left, b.mu_s) * share or left) and (u >= -min(to_right, b.mu_s) * share or right)
 
 
 @inner_kernel
@@ -233,15 +238,16 @@ def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, rules, a):
     u, g = acceleration(gh, t), 1.0 + acceleration(gv, t)
     soon = 1.0 + acceleration(gv, t + SOON) <= 0.0  # friction falls with P: nothing tips until the floor pulls
     hangs = g <= 0.0 if abs(g) > NOISE[FORCE] else soon
-    tips = b.mu_k * b.cos_alpha > b.sin_alpha or hangs
+    arm = side_of(b, sense).arm
+    tips = b.mu_k * b.height > arm or hangs
     if tips:
         zeta = min(max(-u / max(b.mu_k * abs(g), SLOW), -1.0), 1.0)
-        if u != 0.0 and abs(abs(u) - g * min(b.sin_alpha / b.cos_alpha, b.mu_k)) < NOISE[FORCE]:
+        if u != 0.0 and abs(abs(u) - g * min(arm / b.height, b.mu_k)) < NOISE[FORCE]:
             # Just where it tips or slips: near g = 0 the quotient says no more, and its rounding would be a moment.
-            zeta = -math.copysign(min(b.sin_alpha / (b.cos_alpha * b.mu_k), 1.0) if b.mu_k > 0.0 else 1.0, u)
+            zeta = -math.copysign(min(arm / (b.height * b.mu_k), 1.0) if b.mu_k > 0.0 else 1.0, u)
         if _tip(b, m, z, sense, zeta, yield_displacement, gh, gv, t, rules, a):
             return zeta
-    if hangs or soon or closed_wall(b, z, sense, False) or (tips and abs(u) < g * max((1.0 + _YIELDS) * b.sin_alpha / b.cos_alpha, b.mu_k)):
+    if hangs or soon or closed_wall(b, z, sense, False) or (tips and abs(u) < g * max((1.0 + _YIELDS) * arm / b.height, b.mu_k)):
         _rest(b, m, z, gv, t)
         return 0.0
     m[:] = 0
@@ -286,12 +292,14 @@ def _begin(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a):
 def _wedged_series(b, m, z, zeta, gh, gv, t, order, reach, a):
     """The series of a block that both walls hold (see ebm.core.motion), and the share of its friction in what they carry."""
     order = tilt_series(b, m, z, gh, gv, t, order, 0.0, reach, a)
-    lever = a[COS, 0] / (b.sin_2alpha * a[SIN, 0] + b.cos_2alpha * a[COS, 0])  # of friction over that of the walls' forces
+    side = side_of(b, m[S])
+    tip, far = side.tip_sin * a[SIN, 0] + side.tip_cos * a[COS, 0], side.far_sin * a[SIN, 0] + side.far_cos * a[COS, 0]
+    mean = 0.5 * (tip + far)  # of the levers of the walls' forces
     friction = b.mu_k * m[S] * zeta * math.copysign(1.0, a[P, 0])
     for k in range(order + 1):
         a[Q, k] = -friction * a[P, k]
-        a[NA, k] += 0.5 * (lever - 1.0) * a[Q, k]
-        a[NB, k] += 0.5 * (lever + 1.0) * a[Q, k]
+        a[NA, k] += 0.5 * (a[COS, 0] / mean - far / mean) * a[Q, k]
+        a[NB, k] += 0.5 * (a[COS, 0] / mean + tip / mean) * a[Q, k]
     return order
 
 

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.core.motion import HEIGHT, THETA, VX, VY, W, X
+from rockcheck.ebm.core.motion import HEIGHT, THETA, VX, VY, W, X, side_of
 from rockcheck.scenes.compiled import inner_kernel
 
 #: The zero of position (R) and of velocity (sqrt(g R)): a contact nearer and slower than this is closed, a pivot that slips more
@@ -19,15 +19,23 @@ SLOW = 1e-9
 
 
 @inner_kernel
+def lower(b, z):
+    """The side of the lower corner, the pivot: that to which the block tips, or, upright, begins to tip."""
+    return side_of(b, z[THETA] if z[THETA] != 0.0 else z[W])
+
+
+@inner_kernel
 def slip_velocity(b, z):
     """V of the lower corner."""
-    return z[VX] + math.cos(b.alpha - abs(z[THETA])) * z[W]
+    side = lower(b, z)
+    return z[VX] + side.radius * math.cos(side.alpha - abs(z[THETA])) * z[W]
 
 
 @inner_kernel
 def stand(b, z):
     """Stops the pivot: the velocity is that of a rotation about it."""
-    z[VX] = -math.cos(b.alpha - abs(z[THETA])) * z[W]
+    side = lower(b, z)
+    z[VX] = -side.radius * math.cos(side.alpha - abs(z[THETA])) * z[W]
 
 
 @inner_kernel
@@ -39,20 +47,22 @@ def stop(z):
 @inner_kernel
 def wall_gap(b, z, side):
     """The clear gap between the wall on `side` (+1 left, -1 right) and the corner that faces it; infinite without a wall."""
-    gap = b.gap_left if side > 0 else b.gap_right
-    return side * z[X] + b.sin_alpha + gap - math.sin(b.alpha + abs(z[THETA]))
+    gap, faces = b.gap_left if side > 0 else b.gap_right, side_of(b, side)
+    radius, alpha = (faces.top_radius, faces.top_alpha) if side * z[THETA] > 0.0 else (faces.radius, faces.alpha)
+    return side * z[X] + faces.arm + gap - radius * math.sin(alpha + abs(z[THETA]))
 
 
 @inner_kernel
-def closed_wall(b, z, side, lower):
+def closed_wall(b, z, side, bottom):
     """Whether the corner facing the wall on `side` rests on it.
 
-    A tilted block has one such corner; `lower` picks, at theta = 0, the corner that keeps touching while it tilts away.
+    A tilted block has one such corner; `bottom` picks, at theta = 0, the corner that keeps touching while it tilts away.
     """
-    phi = side * z[THETA]  # positive: tips toward that wall, top corner
-    arm = math.cos(b.alpha + abs(phi))
-    if phi < 0.0 or (phi == 0.0 and lower):
-        arm = -arm
+    phi, faces = side * z[THETA], side_of(b, side)  # positive: tips toward that wall, top corner
+    if phi < 0.0 or (phi == 0.0 and bottom):
+        arm = -faces.radius * math.cos(faces.alpha + abs(phi))
+    else:
+        arm = faces.top_radius * math.cos(faces.top_alpha + abs(phi))
     rate = side * (z[VX] - arm * z[W])
     return abs(wall_gap(b, z, side)) < CLOSED and abs(rate) < SLOW
 
@@ -60,14 +70,15 @@ def closed_wall(b, z, side, lower):
 @inner_kernel
 def floor_gap(b, z):
     """Height of the lower corner over the floor."""
-    return z[HEIGHT] - math.cos(b.alpha - abs(z[THETA]))
+    side = lower(b, z)
+    return z[HEIGHT] - side.radius * math.cos(side.alpha - abs(z[THETA]))
 
 
 @inner_kernel
 def closed_floor(b, z):
     """Whether the lower corner rests on the floor."""
-    turns = z[W] if z[THETA] > 0.0 or (z[THETA] == 0.0 and z[W] > 0.0) else -z[W]
-    rate = z[VY] - math.sin(b.alpha - abs(z[THETA])) * turns
+    turns, side = z[W] if z[THETA] > 0.0 or (z[THETA] == 0.0 and z[W] > 0.0) else -z[W], lower(b, z)
+    rate = z[VY] - side.radius * math.sin(side.alpha - abs(z[THETA])) * turns
     return abs(floor_gap(b, z)) < CLOSED and abs(rate) < SLOW
 
 
@@ -86,8 +97,8 @@ def closed_gap(gap, rate):
 def upright(b, z):
     """Sets a tilt and a rotation that are rounding to zero, and a slip with them."""
     if (z[THETA] != 0.0 or z[W] != 0.0) and abs(z[THETA]) < CLOSED and abs(z[W]) < SLOW:
-        v = slip_velocity(b, z)
-        z[HEIGHT] += b.cos_alpha - math.cos(b.alpha - abs(z[THETA]))
+        v, side = slip_velocity(b, z), lower(b, z)
+        z[HEIGHT] += b.height - side.radius * math.cos(side.alpha - abs(z[THETA]))
         z[THETA] = z[W] = 0.0
         z[VX] = v if abs(v) > SLOW else 0.0
 
@@ -95,9 +106,10 @@ def upright(b, z):
 @inner_kernel
 def land_upright(b, z, sign, on_floor):
     """Sets theta from nearly to exactly zero, the pivot keeping its place; a side that then touches a wall touches it exactly."""
-    z[X] += sign * (b.sin_alpha - math.sin(b.alpha - sign * z[THETA]))
+    side = side_of(b, sign)
+    z[X] += sign * (side.arm - side.radius * math.sin(side.alpha - sign * z[THETA]))
     if on_floor:
-        z[HEIGHT] = b.cos_alpha
+        z[HEIGHT] = b.height
     z[THETA] = 0.0
     left, right = abs(wall_gap(b, z, 1)), abs(wall_gap(b, z, -1))
     if left < CLOSED and left < right:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from rockcheck.ebm.core.ground import GAUSSIAN, STILL, acceleration, impulse_ahead, largest_ahead
-from rockcheck.ebm.core.motion import FAMILY, FAR, FLAT, FLOOR, HEIGHT, STICK, THETA, TILT, TIP, VX, VY, S, W
+from rockcheck.ebm.core.motion import FAMILY, FAR, FLAT, FLOOR, HEIGHT, STICK, THETA, TILT, TIP, VX, VY, S, W, side_of
 from rockcheck.scenes.compiled import inner_kernel
 
 # A pulse is over when this part of the tolerance is left of it; a bound on the energy keeps this margin where impacts may add some.
@@ -29,7 +29,7 @@ def decided(b, m, z, gh, gv, t, quiet, peak):
     still = gv.kind == STILL
     ahead = 0.0 if t >= quiet else (impulse_ahead(gh, t) if still else math.inf)
     verdict = _by_energy(b, m, z, ahead, peak)
-    if verdict <= 0.0 and ahead > 0.0 and still and abs(z[THETA]) > b.alpha:
+    if verdict <= 0.0 and ahead > 0.0 and still and abs(z[THETA]) > side_of(b, z[THETA]).alpha:
         verdict = _falls(b, m, z, gh, t)
     return verdict
 
@@ -40,26 +40,35 @@ def _by_energy(b, m, z, ahead, peak):
 
     `ahead` bounds the integral of |u| to come, I. The energy E of block and floor, counted from standing, grows by no other
     work: dE/dt <= |u| sqrt(2 E), so that sqrt(2 E) grows by at most I. A block that can never reach the energy of standing on
-    its corner cannot overturn: it is safe once that energy cannot lift it above the peak it has had. After the excitation a
-    block that only rocks conserves its energy up to its next impact, so that its peak is known at once.
+    its lower corner cannot overturn: it is safe once that energy cannot lift it, on either corner, above the peak it has had. After
+    the excitation a block that only rocks conserves its energy up to its next impact, so that its peak is known at once, unless with as
+    much it would turn farther on its other corner.
     """
     phi = abs(z[THETA])
     if ahead > 0.0 and (b.walls or phi >= peak):
         return -1.0
-    energy = 0.5 * (z[VX] * z[VX] + z[VY] * z[VY] + z[W] * z[W] / 3.0) + z[HEIGHT] - b.cos_alpha
-    corner = 1.0 - b.cos_alpha
+    energy = 0.5 * (z[VX] * z[VX] + z[VY] * z[VY] + z[W] * z[W] / b.spin) + z[HEIGHT] - b.height
+    side, other = side_of(b, m[S]), side_of(b, -m[S])
+    corner = min(side.radius, other.radius) - b.height
     most = 0.5 * (math.sqrt(2.0 * max(energy, 0.0)) + ahead) ** 2
     margin = _MARGIN if b.walls else 1.0
     rocks = m[FAMILY] == TILT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0 and not b.walls and ahead == 0.0
     rocks = rocks and (b.no_slip or _sticks_for_good(b, energy))
-    if most < corner and phi < b.alpha:
-        highest = b.alpha - math.acos(min(b.cos_alpha + most, 1.0))
-        if rocks:
+    if most < corner and phi < side.alpha:
+        highest = _highest(b, side, most)
+        beyond = _highest(b, other, most)
+        if rocks and beyond <= max(peak, highest):
             return max(peak, highest if m[S] * z[W] > 0.0 else phi)
-        return max(peak, _TINIEST) if highest <= peak and most < margin * corner else -1.0
-    if rocks and m[S] * z[W] >= 0.0 and (phi > b.alpha or energy > corner):
+        return max(peak, _TINIEST) if max(highest, beyond) <= peak and most < margin * corner else -1.0
+    if rocks and m[S] * z[W] >= 0.0 and (phi > side.alpha or energy > side.radius - b.height):
         return 0.5 * math.pi
     return -1.0
+
+
+@inner_kernel
+def _highest(b, side, energy):
+    """The rotation on this side to which so much energy lifts the block."""
+    return side.alpha - math.acos(min((b.height + energy) / side.radius, 1.0))
 
 
 @inner_kernel
@@ -71,7 +80,7 @@ def _falls(b, m, z, gh, t):
     """
     if m[FAMILY] == FLAT or m[S] * z[W] < 0.0 or (b.gap_left if m[S] > 0 else b.gap_right) < np.inf:
         return -1.0
-    steepness = math.tan(abs(z[THETA]) - b.alpha)
+    steepness = math.tan(abs(z[THETA]) - side_of(b, m[S]).alpha)
     if (not b.no_slip and steepness <= b.mu_s) or steepness <= abs(acceleration(gh, t)) or steepness <= largest_ahead(gh, t):
         return -1.0
     return 0.5 * math.pi
@@ -79,15 +88,21 @@ def _falls(b, m, z, gh, t):
 
 @inner_kernel
 def _sticks_for_good(b, energy):
-    """Whether a pivot cannot slip in free rocking of this energy (up to its balance point), impacts included.
+    """Whether neither pivot can slip in free rocking of this energy (up to its balance point), impacts included."""
+    return _pivot_sticks(b, b.left, energy) and _pivot_sticks(b, b.right, energy)
 
-    |Q| <= max(3/4 s c, s w^2) and P >= 1 - 3/4 s^2 - w^2, with w^2 <= 3/2 energy; the landing sticks if
-    mu >= 3 t/(4 + t^2), t = tan alpha.
+
+@inner_kernel
+def _pivot_sticks(b, side, energy):
+    """Whether this pivot sticks while the block rocks about it, and as it lands on it.
+
+    With k = 1/(I + R^2): |Q| <= max(k s c, s w^2) and P >= 1 - k s^2 - R w^2, with w^2 <= 2 k energy; the landing sticks if
+    mu >= k s c/(1 - k s^2), for a homogeneous block 3 t/(4 + t^2), t = tan alpha.
     """
-    s, c = b.sin_alpha, b.cos_alpha
-    square = 1.5 * energy
-    push = 1.0 - 0.75 * s * s - square
+    s, c = side.arm, b.height
+    square = 2.0 * side.share * energy
+    push = 1.0 - side.share * s * s - side.radius * square
     # s c rises with s only up to 45 degrees.
-    pull = 0.75 * (s * c if b.alpha < 0.25 * math.pi else 0.5)
-    t = s / c
-    return push > 0.0 and b.mu_s * push >= max(pull, s * square) and b.mu_s >= 3.0 * t / (4.0 + t * t)
+    pull = side.share * (s * c if side.alpha < 0.25 * math.pi else 0.5 * side.radius * side.radius)
+    lands = side.share * s * c / (1.0 - side.share * s * s)
+    return push > 0.0 and b.mu_s * push >= max(pull, s * square) and b.mu_s >= lands

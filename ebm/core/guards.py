@@ -35,8 +35,10 @@ from rockcheck.ebm.core.motion import (
     XI,
     P,
     Q,
+    S,
     Y,
     delta,
+    side_of,
 )
 from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, POSITION, RATE, first_root
 from rockcheck.scenes.compiled import inner_kernel
@@ -133,11 +135,12 @@ def _fill_gap(b, m, tip, pivot, a):
         return
     sense = 1.0 if tip else -1.0
     rock = m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
-    if rock and not tip and distance - pivot - 2.0 * b.sin_alpha > -CLOSED:
+    if rock and not tip and distance - pivot - (b.left.arm + b.right.arm) > -CLOSED:
         # About a fixed pivot the far gap shrinks with phi, down to this value as the block lands: it cannot close before.
         return
-    row = TABLE + which
-    a[row, COS], a[row, SIN], a[row, _CONSTANT] = -b.sin_2alpha, b.cos_2alpha, distance
+    row, side = TABLE + which, side_of(b, m[S])
+    along, across = (side.tip_sin, side.tip_cos) if tip else (side.far_sin, side.far_cos)
+    a[row, COS], a[row, SIN], a[row, _CONSTANT] = -along, across, distance
     if rock:  # xi is s and a constant
         a[row, SIN] += sense
         a[row, _CONSTANT] += sense * pivot
@@ -160,7 +163,7 @@ def _fill_flat(b, m, a):
         a[TABLE + G_TIP_PUSH, NA if m[FLOOR] == OFF else Q] = 1.0 if m[FLOOR] == OFF else m[TIP] - m[FAR]
         _has(a, G_TIP_PUSH, 2)
     if m[FLOOR] == OFF:
-        a[TABLE + G_LANDING, Y], a[TABLE + G_LANDING, _CONSTANT] = 1.0, -b.cos_alpha
+        a[TABLE + G_LANDING, Y], a[TABLE + G_LANDING, _CONSTANT] = 1.0, -b.height
         _has(a, G_LANDING, 0)
         return
     a[TABLE + G_SLIP, XI] = m[SLIP]
@@ -177,8 +180,8 @@ def _fill_flat(b, m, a):
         held = m[TIP if plus else FAR] != 0
         uplift = G_UPLIFT_PLUS if plus else G_UPLIFT_MINUS
         # What hangs by both corners tips as soon as anything tells to which side.
-        a[TABLE + uplift, P] = 0.0 if hangs and not on_wall else b.sin_alpha
-        a[TABLE + uplift, Q] = -b.cos_alpha if plus else b.cos_alpha
+        a[TABLE + uplift, P] = 0.0 if hangs and not on_wall else (b.left.arm if plus else b.right.arm)
+        a[TABLE + uplift, Q] = -b.height if plus else b.height
         _has(a, uplift, -1 if m[FLOOR] == STICK and held else 2)
         if held or hangs:
             _has(a, G_CONE_PLUS if plus else G_CONE_MINUS, -1)

@@ -198,13 +198,13 @@ def _note_event(r, log, kind, before):
 def _rest(b, gh, r, t_end, control, records):
     """Rest on a base that only moves sideways: straight to the next uplift or slip."""
     m, now = r.m, r.now
-    limit = b.sin_alpha / b.cos_alpha
+    to_left, to_right = b.left.arm / b.height, b.right.arm / b.height
     if not b.no_slip:
-        limit = min(limit, b.mu_s)
+        to_left, to_right = min(to_left, b.mu_s), min(to_right, b.mu_s)
     if math.isnan(now[T_REST]):
         now[T_REST] = now[T]
-    noise = 2.0 * r.memory[SLACK] * NOISE[FORCE] / b.cos_alpha  # of an acceleration, for all guards of rest to see it
-    low, high = -np.inf if m[FAR] != 0 else -limit, np.inf if m[TIP] != 0 else limit
+    noise = 2.0 * r.memory[SLACK] * NOISE[FORCE] / b.height  # of an acceleration, for all guards of rest to see it
+    low, high = -np.inf if m[FAR] != 0 else -to_right, np.inf if m[TIP] != 0 else to_left
     until = next_exceedance(gh, now[T], low, high, noise, 0.5 * AHEAD)
     _sample_rest(r, min(until, t_end), control, records)
     if until >= t_end:

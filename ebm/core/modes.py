@@ -161,6 +161,8 @@ def tips_first(b, z, gh, t):
         toward = z[X]
     if toward == 0.0 and b.gap_left != b.gap_right:
         toward = b.gap_left - b.gap_right
+    if toward == 0.0:
+        toward = b.right.arm - b.left.arm
     return 1 if toward >= 0.0 else -1
 
 

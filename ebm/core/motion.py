@@ -1,11 +1,14 @@
 """Motion of the block for a given set of contacts, as Taylor series: one formulation for every mode.
 
-Natural units: lengths in R, accelerations in g, hence time in sqrt(R/g), unit mass, moment of inertia 1/3.
+Natural units: lengths in R, accelerations in g, hence time in sqrt(R/g), unit mass; the moment of inertia of a homogeneous block is
+then 1/3. x, y are those of the mass's centre, x = 0 where the block stands first.
 
 A mode says which contacts carry force. While the block is *tilted* everything is written in the frame of its pivot: with
 S the sign of theta, phi = S theta >= 0, xi = S x, u = S u_g, so that the pivot is always the lower-left corner and the
 block always tips to the left; the mirror image of a motion then passes through exactly the same arithmetic. With
-s = sin(alpha - phi), c = cos(alpha - phi), s' = sin(alpha + phi), c' = cos(alpha + phi) the contacts are
+s = R sin(alpha - phi), c = R cos(alpha - phi) of the pivot, s' = R' sin(alpha' + phi), c' = R' cos(alpha' + phi) of the corner on
+a wall, R and alpha being a corner's distance from the mass's centre and its angle from the upright (for a homogeneous block 1 and
+its slenderness, whichever the corner), the contacts are
 
     pivot on the floor, normal     gap  y - c                 force P along (0, 1, -s)
     pivot on the floor, tangent    slip xi - s                force Q along (1, 0, c)
@@ -34,14 +37,36 @@ LAWS = ("moreau", "closed", "open", "floor-first")
 MOREAU, CLOSED_BRANCH, OPEN_BRANCH, FLOOR_FIRST = range(4)
 
 
+class Side(NamedTuple):
+    """One side of the block as it stands: its lower corner, which is the pivot where the block tips to that side, and its top corner.
+
+    alpha and radius are a corner's angle from the upright and its distance, seen from the mass's centre. The arms of corners on a
+    wall, s' and c', are linear in those of the pivot, s' = S c - C s and c' = S s + C c, with (S, C) = (tip_sin, tip_cos) for the
+    top corner of this side and (far_sin, far_cos) for the lower corner of the other one.
+    """
+
+    alpha: float
+    radius: float
+    #: Horizontal distance of the corners from the mass's centre.
+    arm: float
+    top_alpha: float
+    top_radius: float
+    tip_sin: float
+    tip_cos: float
+    far_sin: float
+    far_cos: float
+    #: 1/(I + R^2): 3/4 for a homogeneous block.
+    share: float
+
+
 class Setting(NamedTuple):
     """Block, floor and walls in natural units; a gap is infinite where there is no wall."""
 
-    alpha: float
-    sin_alpha: float
-    cos_alpha: float
-    sin_2alpha: float
-    cos_2alpha: float
+    left: Side
+    right: Side
+    #: Height of the mass's centre where the block stands, and 1/I.
+    height: float
+    spin: float
     mu_s: float
     mu_k: float
     e_floor: float
@@ -107,10 +132,16 @@ def sine_cosine(angle, a):
 
 
 @inner_kernel
+def side_of(b, sense):
+    """The side to which a block tips whose rotation has this sign."""
+    return b.left if sense > 0 else b.right
+
+
+@inner_kernel
 def delta(b, m, tip):
-    """Distance from the initial centroid to the wall on the tip side (or the far side), R."""
+    """Distance from the mass's initial centre to the wall on the tip side (or the far side), R."""
     left = (m[S] > 0) == tip
-    return b.sin_alpha + (b.gap_left if left else b.gap_right)
+    return b.left.arm + b.gap_left if left else b.right.arm + b.gap_right
 
 
 @inner_kernel
@@ -127,21 +158,23 @@ def tilt_series(b, m, z, gh, gv, t, order, enough, reach, a):
         a[G, 0] += 1.0
     a[PHI, 0] = sign * z[THETA]
     a[OMEGA, 0] = sign * z[W]
-    a[SIN, 0], a[COS, 0] = sine_cosine(b.alpha - a[PHI, 0], a)
+    side = side_of(b, m[S])
+    sine, cosine = sine_cosine(side.alpha - a[PHI, 0], a)
+    a[SIN, 0], a[COS, 0] = side.radius * sine, side.radius * cosine
     if m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0:
-        return _rock_series(gv.kind == STILL, order, enough, reach, b.unilateral or not b.no_slip, a)
+        return _rock_series(side.share, gv.kind == STILL, order, enough, reach, b.unilateral or not b.no_slip, a)
     a[XI, 0] = sign * z[X]
     a[XI, 1] = sign * z[VX]
     a[Y, 0] = z[HEIGHT]
     a[Y, 1] = z[VY]
     if m[FLOOR] == STICK and m[TIP] != m[FAR]:
-        return _lean_series(b, m[TIP] != 0, order, a)
-    return _contact_series(b, m, order, enough, reach, a)
+        return _lean_series(b, side, m[TIP] != 0, order, a)
+    return _contact_series(b, side, m, order, enough, reach, a)
 
 
 @inner_kernel
-def _rock_series(still_vertical, order, enough, reach, need_forces, a):
-    """ROCK, (3): theta'' = (3/4)(u c - S s G0), the pivot sticking; xi and y are s and c up to a constant."""
+def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
+    """ROCK, (3): theta'' = (u c - S s G0)/(I + R^2), the pivot sticking; xi and y are s and c up to a constant."""
     scale = 1.0
     small = 0
     for k in range(order):
@@ -163,7 +196,7 @@ def _rock_series(still_vertical, order, enough, reach, need_forces, a):
         a[PHI, k + 1] = a[OMEGA, k] * r
         a[SIN, k + 1] = -ds * r
         a[COS, k + 1] = dc * r
-        a[OMEGA, k + 1] = 0.75 * (push - weight) * r
+        a[OMEGA, k + 1] = share * (push - weight) * r
         scale *= reach
         # A uniform rotation has no rates left, but its sine and cosine have.
         size = abs(a[OMEGA, k + 1]) + abs(a[SIN, k + 1]) + abs(a[COS, k + 1])
@@ -182,14 +215,14 @@ def _rock_series(still_vertical, order, enough, reach, need_forces, a):
 
 
 @inner_kernel
-def _lean_series(b, tip, order, a):
+def _lean_series(b, side, tip, order, a):
     """LEAN: nothing moves, and the wall takes the moment about the pivot.
 
     Written out, for the arm of a far wall can be so short that the general solution has no digits left.
     """
     s, c = a[SIN, 0], a[COS, 0]
     wall = 1.0 if tip else -1.0
-    arm = c + b.sin_2alpha * s + b.cos_2alpha * c if tip else 2.0 * b.sin_alpha * np.sin(a[PHI, 0])  # c - c'
+    arm = c + side.tip_sin * s + side.tip_cos * c if tip else (b.left.arm + b.right.arm) * np.sin(a[PHI, 0])  # c - c'
     push = NA if tip else NB
     for k in range(order + 1):
         a[P, k] = a[Q, k] = a[NA, k] = a[NB, k] = 0.0
@@ -204,10 +237,10 @@ def _lean_series(b, tip, order, a):
 
 
 @inner_kernel
-def _contact_rows(b, kappa, floor, stick, tip, far, a):
+def _contact_rows(b, side, kappa, floor, stick, tip, far, a):
     """Constraint rows, force columns (xi, y, moment) and the inverse of their matrix at the start; returns their number."""
     s, c = a[SIN, 0], a[COS, 0]
-    cp = b.sin_2alpha * s + b.cos_2alpha * c
+    tip_arm, far_arm = side.tip_sin * s + side.tip_cos * c, side.far_sin * s + side.far_cos * c
     n = 0
     for which in range(4):
         if not (floor, stick, tip, far)[which]:
@@ -220,23 +253,24 @@ def _contact_rows(b, kappa, floor, stick, tip, far, a):
         else:
             along = 1.0 if which < 3 else -1.0
             a[ROW + n, 0] = a[COLUMN + n, 0] = along
-            a[ROW + n, 2] = a[COLUMN + n, 2] = c if which == 1 else -cp
+            a[ROW + n, 2] = a[COLUMN + n, 2] = c if which == 1 else (-tip_arm if which == 2 else -far_arm)
         n += 1
     for i in range(n):
         for j in range(n):
-            a[MATRIX + i, j] = a[ROW + i, 0] * a[COLUMN + j, 0] + a[ROW + i, 1] * a[COLUMN + j, 1] + 3.0 * a[ROW + i, 2] * a[COLUMN + j, 2]
+            a[MATRIX + i, j] = a[ROW + i, 0] * a[COLUMN + j, 0] + a[ROW + i, 1] * a[COLUMN + j, 1]
+            a[MATRIX + i, j] += b.spin * a[ROW + i, 2] * a[COLUMN + j, 2]
     inverse_of(a, MATRIX, INVERSE, n)
     return n
 
 
 @inner_kernel
-def _contact_series(b, m, order, enough, reach, a):
+def _contact_series(b, side, m, order, enough, reach, a):
     """Newton-Euler with the mode's constraints, solved term by term: the matrix of the unknown forces is the same each time."""
     floor, tip, far = m[FLOOR] != OFF, m[TIP] != 0, m[FAR] != 0
     static = tip and far
     stick = m[FLOOR] == STICK and not static  # wedged between two walls the block needs no friction
     kappa = b.mu_k * m[SLIP] * m[PULL] if m[FLOOR] == SLIPPING else 0.0  # Q = -kappa P
-    n = _contact_rows(b, kappa, floor, stick, tip, far, a)
+    n = _contact_rows(b, side, kappa, floor, stick, tip, far, a)
     s0, c0 = a[SIN, 0], a[COS, 0]
     scale = 1.0
     small = 0
@@ -252,8 +286,8 @@ def _contact_series(b, m, order, enough, reach, a):
             ds -= a[OMEGA, j] * a[COS, k + 1 - j]
             dc += a[OMEGA, j] * a[SIN, k + 1 - j]
         a[ACCELERATION, 0], a[ACCELERATION, 1] = -a[U, k], -a[G, k]
-        a[ACCELERATION, 2] = 3.0 * _moment_of_lower_orders(b, kappa, floor, stick, tip or far, k, a)
-        _forces(b, n, kappa, floor, stick, tip, far, ds * (i - 1.0), dc * (i - 1.0), k, a)
+        a[ACCELERATION, 2] = b.spin * _moment_of_lower_orders(side, kappa, floor, stick, tip, far, k, a)
+        _forces(b, side, n, kappa, floor, stick, tip, far, ds * (i - 1.0), dc * (i - 1.0), k, a)
         if static:
             a[ACCELERATION, 0] = a[ACCELERATION, 2] = 0.0
             a[ACCELERATION, 1] = 0.0 if floor else a[ACCELERATION, 1]
@@ -277,8 +311,8 @@ def _contact_series(b, m, order, enough, reach, a):
 
 
 @inner_kernel
-def _moment_of_lower_orders(b, kappa, floor, stick, wall, k, a):
-    """Coefficient k of the moment about the centroid that the forces' coefficients below k give, by their arms' later terms."""
+def _moment_of_lower_orders(side, kappa, floor, stick, tip, far, k, a):
+    """Coefficient k of the moment that the forces' coefficients below k give, by their arms' later terms; none where both walls hold it."""
     moment = 0.0
     if floor:
         a[FLOOR_ARM, k] = a[SIN, k] + kappa * a[COS, k]
@@ -287,27 +321,33 @@ def _moment_of_lower_orders(b, kappa, floor, stick, wall, k, a):
     if stick:
         for j in range(1, k + 1):
             moment += a[COS, j] * a[Q, k - j]
-    if wall:
-        a[WALL_ARM, k] = b.sin_2alpha * a[SIN, k] + b.cos_2alpha * a[COS, k]
+    if tip or far:
+        along, across = (side.tip_sin, side.tip_cos) if tip else (side.far_sin, side.far_cos)
+        a[WALL_ARM, k] = along * a[SIN, k] + across * a[COS, k]
         for j in range(1, k + 1):
             moment -= a[WALL_ARM, j] * a[WALL_PUSH, k - j]
     return moment
 
 
 @inner_kernel
-def _forces(b, n, kappa, floor, stick, tip, far, ks, kc, k, a):
+def _forces(b, side, n, kappa, floor, stick, tip, far, ks, kc, k, a):
     """Coefficient k of the n contact forces, so that the constraints hold; adds what they do to ACCELERATION (xi, y, phi).
 
     `ks`, `kc` are the accelerations of sine and cosine but for phi's own.
     """
-    kp = b.sin_2alpha * kc - b.cos_2alpha * ks  # of s' = sin(alpha + phi)
+    tip_reach, far_reach = side.tip_sin * kc - side.tip_cos * ks, side.far_sin * kc - side.far_cos * ks  # of s'
     s, c = a[SIN, 0], a[COS, 0]
-    cp = b.sin_2alpha * s + b.cos_2alpha * c
+    tip_arm, far_arm = side.tip_sin * s + side.tip_cos * c, side.far_sin * s + side.far_cos * c
     ax, ay, aphi = a[ACCELERATION, 0], a[ACCELERATION, 1], a[ACCELERATION, 2]
     r = 0
     for which in range(4):
         if (floor, stick, tip, far)[which]:
-            a[KNOWN, r] = (kc - ay + s * aphi, ks - ax - c * aphi, kp - ax + cp * aphi, kp + ax + cp * aphi)[which]
+            a[KNOWN, r] = (
+                kc - ay + s * aphi,
+                ks - ax - c * aphi,
+                tip_reach - ax + tip_arm * aphi,
+                far_reach + ax + far_arm * aphi,
+            )[which]
             r += 1
     for r in range(n):
         force = 0.0
@@ -316,7 +356,7 @@ def _forces(b, n, kappa, floor, stick, tip, far, ks, kc, k, a):
         a[FORCE, r] = force
         ax += a[COLUMN + r, 0] * force
         ay += a[COLUMN + r, 1] * force
-        aphi += 3.0 * a[COLUMN + r, 2] * force
+        aphi += b.spin * a[COLUMN + r, 2] * force
     a[ACCELERATION, 0], a[ACCELERATION, 1], a[ACCELERATION, 2] = ax, ay, aphi
     r = 0
     for which in range(4):
@@ -391,12 +431,16 @@ def tilt_state(b, m, order, tau, pivot, a, z):
     w = value(a, OMEGA, order - 1, tau)
     if (m[FLOOR] == STICK and (m[TIP] != 0 or m[FAR] != 0)) or (m[TIP] != 0 and m[FAR] != 0):
         phi, w = a[PHI, 0], 0.0
-    s, c = sine_cosine(b.alpha - phi, a)
+    side = side_of(b, m[S])
+    sine, cosine = sine_cosine(side.alpha - phi, a)
+    s, c = side.radius * sine, side.radius * cosine
     if m[FLOOR] == STICK:
         xi, v = pivot + s, -c * w
     elif m[TIP] != 0 or m[FAR] != 0:
         wall = 1.0 if m[TIP] != 0 else -1.0
-        reach, reach_rate = np.sin(b.alpha + phi), np.cos(b.alpha + phi)
+        other = side_of(b, -m[S])
+        radius, angle = (side.top_radius, side.top_alpha + phi) if m[TIP] != 0 else (other.radius, other.alpha + phi)
+        reach, reach_rate = radius * np.sin(angle), radius * np.cos(angle)
         xi, v = wall * (reach - delta(b, m, m[TIP] != 0)), wall * reach_rate * w
     else:
         xi, v = value(a, XI, order, tau), slope(a, XI, order, tau)
@@ -420,6 +464,6 @@ def flat_state(b, m, order, tau, a, z):
         z[HEIGHT] = value(a, Y, order, tau)
         z[VY] = slope(a, Y, order, tau)
     else:
-        z[HEIGHT] = b.cos_alpha
+        z[HEIGHT] = b.height
         z[VY] = 0.0
     z[THETA] = z[W] = 0.0

@@ -70,7 +70,7 @@ def test_housners_ratio(pivot, block):
     scene = scene_of(block, 1.0, 4.0, initial_rotation=0.6 * block.alpha)
     history = EventBasedModel(tolerance=1e-14, pivot=pivot).simulate(scene)
     motion = history.channels
-    energy = kinematics.energy(block, GRAVITY, *(motion[name] for name in ("y", "x_dot", "y_dot", "theta_dot")))
+    energy = kinematics.energy(block, GRAVITY, *(motion[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")))
     impacts = [e.t for e in history.event_list if e.kind == "floor impact"][:4]
     for k, t in enumerate(impacts[:-1]):
         before = energy[motion["t"] < t][-1]
@@ -85,7 +85,7 @@ def test_energy_is_conserved_between_impacts(pivot, block):
     scene = scene_of(block, 1.0, 10.0, initial_rotation=0.95 * block.alpha)
     history = EventBasedModel(tolerance=1e-14, pivot=pivot).simulate(scene)
     motion = history.channels
-    energy = kinematics.energy(block, GRAVITY, *(motion[name] for name in ("y", "x_dot", "y_dot", "theta_dot")))
+    energy = kinematics.energy(block, GRAVITY, *(motion[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")))
     edges = [0.0, *(e.t for e in history.event_list if e.kind == "floor impact"), 10.0]
     compared = 0
     for a, b in pairwise(edges):
@@ -201,39 +201,58 @@ def test_shentons_map(friction, pivot):
 # --- impacts (physics in units of R, g and the block's mass)
 
 
-def random_floor_impacts(count: int, least: float, most: float):
-    """sin alpha, cos alpha, S1, w1, v1, mu_s, mu_k of blocks with alpha between `least` and `most`."""
+def setting_with(block: Block, **floor: float):
+    """A block as the compiled code has it, free to hop."""
+    from rockcheck.ebm import natural
+
+    scene = Scene(name="block", block=block, floor=Floor(**{"friction": 0.5} | floor), duration=1.0)
+    return natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
+
+
+def loaded(rng: np.random.Generator, block: Block) -> Block:
+    """The box with its mass somewhere in its middle half, and some moment of inertia."""
+    place = (rng.uniform(-0.5, 0.5) * block.half_width, rng.uniform(-0.5, 0.5) * block.half_height)
+    return Block(**block.model_dump() | {"centre_of_mass": place, "moment_of_inertia": rng.uniform(0.2, 0.6) * block.half_diagonal**2})
+
+
+def random_floor_impacts(count: int, least: float, most: float, lopsided: bool):
+    """A block of box angle between `least` and `most` (a `Setting`), S1, w1, v1, mu_s, mu_k."""
     rng = np.random.default_rng(3)
     for _ in range(count):
         alpha, w1 = rng.uniform(least, most), -rng.uniform(0.01, 1.0)
+        block = Block(half_width=math.sin(alpha), half_height=math.cos(alpha))
+        block = loaded(rng, block) if lopsided else block
+        b = setting_with(block)
         S1 = int(rng.choice([-1, 1]))
-        mu_k = rng.uniform(0.0, 1.3)
+        mu_k = rng.uniform(0.0, 0.95 * block.least_painleve_friction if lopsided else 1.3)
         mu_s = mu_k + rng.uniform(0.0, 0.3) * rng.integers(0, 2)
-        yield math.sin(alpha), math.cos(alpha), S1, S1 * w1, rng.choice([0.0, rng.normal(0.0, 0.3)]), mu_s, mu_k
+        yield b, S1, S1 * w1, rng.choice([0.0, rng.normal(0.0, 0.3)]), mu_s, mu_k
 
 
+@pytest.mark.parametrize("lopsided", [False, True], ids=["homogeneous", "loaded"])
 @pytest.mark.parametrize(("least", "most"), [(0.02, 0.6), (0.6, 1.2)], ids=["slender", "squat"])
-def test_floor_impact_balances_momentum(least, most):
-    """Vertical, horizontal and angular momentum about the centroid, Coulomb's law, and a block that turns onto its new pivot.
+def test_floor_impact_balances_momentum(least, most, lopsided):
+    """Vertical, horizontal and angular momentum about the mass's centre, Coulomb's law, and a block that turns onto its new pivot.
 
     Squat blocks: where sticking asks for more friction than there is, and slipping cannot turn the block, it lands flat.
     """
     from rockcheck.ebm.core.laws import impacts
 
     forms = set()
-    for s, c, S1, w1, v1, mu_s, mu_k in random_floor_impacts(2000, least, most):
-        form, w2, v2, p = impacts.floor_impact(s, c, S1, w1, v1, mu_s, mu_k)
-        S2 = -S1
+    for b, S1, w1, v1, mu_s, mu_k in random_floor_impacts(2000, least, most, lopsided):
+        form, w2, v2, p = impacts.floor_impact(b, S1, w1, v1, mu_s, mu_k)
+        S2, c = -S1, b.height
+        s1, s2 = (b.left.arm, b.right.arm) if S1 > 0 else (b.right.arm, b.left.arm)
         forms.add(form)
         if form == impacts.FLAT_END:
             xdot1 = v1 - c * w1
             assert w2 == 0.0
             assert abs(v2) == pytest.approx(max(0.0, abs(xdot1) - mu_k * p) if abs(xdot1) > mu_s * p else 0.0, abs=1e-14)
-            assert p == pytest.approx(s * abs(w1), abs=1e-15)
+            assert p == pytest.approx(s1 * abs(w1), abs=1e-15)
             continue
         q = (v2 - c * w2) - (v1 - c * w1)
-        assert p == pytest.approx(S2 * s * w2 - S1 * s * w1, abs=1e-14)
-        assert (w2 - w1) / 3.0 == pytest.approx(-S2 * s * p + c * q, abs=1e-14)
+        assert p == pytest.approx(S2 * s2 * w2 - S1 * s1 * w1, abs=1e-14)
+        assert (w2 - w1) / b.spin == pytest.approx(-S2 * s2 * p + c * q, abs=1e-14)
         assert S2 * w2 >= 0.0
         if form == impacts.STICK:
             assert v2 == 0.0
@@ -249,13 +268,14 @@ def test_floor_impact_sticks_above_its_friction(alpha):
     """Without slip before, the impact sticks from mu = 3 t/(4 + t^2) on, t = tan(alpha)."""
     from rockcheck.ebm.core.laws import impacts
 
-    t, s, c = math.tan(alpha), math.sin(alpha), math.cos(alpha)
+    t, b = math.tan(alpha), setting_with(block_of(alpha))
     limit = 3.0 * t / (4.0 + t * t)
-    assert impacts.floor_impact(s, c, 1, -0.5, 0.0, limit + 1e-12, limit + 1e-12)[0] == impacts.STICK
-    assert impacts.floor_impact(s, c, 1, -0.5, 0.0, limit - 1e-12, limit - 1e-12)[0] == impacts.SLIP
+    assert impacts.floor_impact(b, 1, -0.5, 0.0, limit + 1e-12, limit + 1e-12)[0] == impacts.STICK
+    assert impacts.floor_impact(b, 1, -0.5, 0.0, limit - 1e-12, limit - 1e-12)[0] == impacts.SLIP
 
 
-def test_wall_impact_balances_momentum():
+@pytest.mark.parametrize("lopsided", [False, True], ids=["homogeneous", "loaded"])
+def test_wall_impact_balances_momentum(lopsided):
     """The cascade of Fig. 3 at 4,000 random blocks and approaches: momentum, restitution, Coulomb's law, no pull of the wall."""
     from rockcheck.ebm.core.laws import impacts
 
@@ -264,7 +284,10 @@ def test_wall_impact_balances_momentum():
     for _ in range(4000):
         alpha = rng.uniform(0.05, 0.9)
         phi = alpha * rng.uniform(0.01, 1.0)
-        s, c, cp = math.sin(alpha - phi), math.cos(alpha - phi), math.cos(alpha + phi)
+        s, c, cp, spin = math.sin(alpha - phi), math.cos(alpha - phi), math.cos(alpha + phi), 3.0
+        if lopsided:
+            s, c, cp, spin = s * rng.uniform(0.5, 1.0), c * rng.uniform(0.5, 1.0), cp * rng.uniform(0.5, 1.5), rng.uniform(2.0, 5.0)
+        share = 1.0 / (1.0 / spin + s * s + c * c)
         S, Sw = (float(rng.choice([-1, 1])) for _ in range(2))
         C = S * Sw * cp
         w1, xdot1 = rng.normal(0.0, 1.0, 2)
@@ -273,7 +296,7 @@ def test_wall_impact_balances_momentum():
         if Sw * (xdot1 - C * w1) >= 0.0:
             w1, xdot1 = -w1, -xdot1
         e, mu_k = rng.choice([0.0, 1.0, rng.uniform()]), rng.uniform(0.0, 1.2)
-        branch, w2, xdot2, n, p, v2 = impacts.wall_impact(S, Sw, s, c, cp, w1, xdot1, e, mu_k, mu_k, False)
+        branch, w2, xdot2, n, p, v2 = impacts.wall_impact(S, Sw, s, c, cp, share, spin, w1, xdot1, e, mu_k, mu_k, False)
         branches.add(branch)
         assert n >= 0.0
         approach, parting = xdot1 - C * w1, xdot2 - C * w2
@@ -285,7 +308,7 @@ def test_wall_impact_balances_momentum():
         assert v2 == pytest.approx(xdot2 + c * w2, abs=1e-13)
         q = xdot2 - xdot1 - Sw * n
         if branch != impacts.E_SLIP:  # whose moment is not balanced: the paper's rule
-            assert (w2 - w1) / 3.0 == pytest.approx(-S * s * p + c * q - C * Sw * n, abs=1e-12)
+            assert (w2 - w1) / spin == pytest.approx(-S * s * p + c * q - C * Sw * n, abs=1e-12)
         if branch in (impacts.A_STICK, impacts.D_SLIP):
             assert parting == pytest.approx(-e * approach, abs=1e-12)
         if branch == impacts.A_STICK:
@@ -298,18 +321,18 @@ def test_wall_impact_balances_momentum():
     assert impacts.NO_BRANCH not in branches
 
 
+@pytest.mark.parametrize("lopsided", [False, True], ids=["homogeneous", "loaded"])
 @pytest.mark.parametrize("e", [0.0, 0.5])
-def test_contact_impact_leaves_no_approach(e):
+def test_contact_impact_leaves_no_approach(e, lopsided):
     """Unilateral impacts at 1,000 random states: no touched contact still closes, and without restitution no energy is gained."""
-    from rockcheck.ebm import natural
     from rockcheck.ebm.core.laws import contact_impacts as ci
 
     rng = np.random.default_rng(5)
     for _ in range(1000):
         alpha = rng.uniform(0.05, 0.9)
-        floor = Floor(friction=rng.uniform(0.0, 1.2), restitution=e)
-        b = natural.setting_of(scene_of(block_of(alpha), 0.0, 1.0).replace(floor=floor), unilateral=True, no_slip=False, energy_cap=False)
-        flat = bool(rng.integers(0, 2))
+        block = loaded(rng, block_of(alpha)) if lopsided else block_of(alpha)
+        b = setting_with(block, friction=rng.uniform(0.0, min(1.2, 0.95 * block.least_painleve_friction)), restitution=e)
+        flat, sense = bool(rng.integers(0, 2)), 1.0 if not lopsided or rng.integers(0, 2) else -1.0
         phi = 0.0 if flat else alpha * rng.uniform(0.01, 0.9)
         touching = np.zeros(ci.CONTACTS, dtype=bool)
         touching[ci.F] = True
@@ -317,13 +340,13 @@ def test_contact_impact_leaves_no_approach(e):
         touching[ci.TIP_TOP] = rng.integers(0, 2)
         touching[ci.TIP_BOTTOM] = flat and touching[ci.TIP_TOP]
         v = rng.normal(0.0, 0.3, 3)
-        before = ci.kinetic_energy(v)
+        before = ci.kinetic_energy(b.spin, v)
         impulse, tally = np.zeros(2), np.zeros(2)
-        assert ci.contact_impact(b, phi, touching, e, e, 1e-9, v, impulse, tally)
-        speeds = ci.contact_rows(alpha, phi)[:6] @ v
+        assert ci.contact_impact(b, sense, phi, touching, e, e, 1e-9, v, impulse, tally)
+        speeds = ci.contact_rows(b, sense, phi)[:6] @ v
         assert np.all(speeds[touching] >= -1e-8)
         assert np.all(impulse >= 0.0)
         if e == 0.0:
-            assert ci.kinetic_energy(v) <= before * (1.0 + 1e-12)
-        if ci.kinetic_energy(v) > before * (1.0 + 1e-9):
+            assert ci.kinetic_energy(b.spin, v) <= before * (1.0 + 1e-12)
+        if ci.kinetic_energy(b.spin, v) > before * (1.0 + 1e-9):
             assert tally[0] > 0  # whatever gains energy is counted

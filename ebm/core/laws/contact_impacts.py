@@ -25,7 +25,7 @@ import math
 import numpy as np
 
 from rockcheck.ebm.core.contacts import CLOSED
-from rockcheck.ebm.core.motion import CLOSED_BRANCH, FLOOR_FIRST, MOREAU
+from rockcheck.ebm.core.motion import CLOSED_BRANCH, FLOOR_FIRST, MOREAU, side_of
 from rockcheck.ebm.core.series import NOISE, POSITION
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
@@ -46,17 +46,17 @@ _HALVINGS = 45
 
 
 @kernel
-def contact_rows(alpha, phi):
-    """Rows (xi, y, phi) of the six normal contacts and, last, of the floor's tangent."""
-    s, c = math.sin(alpha - phi), math.cos(alpha - phi)
-    sp, cp = math.sin(alpha + phi), math.cos(alpha + phi)
+def contact_rows(b, sense, phi):
+    """Rows (xi, y, phi) of the six normal contacts and, last, of the floor's tangent, for a block that tips by phi to `sense`."""
+    pivot, other = side_of(b, sense), side_of(b, -sense)
+    s, c = pivot.radius * math.sin(pivot.alpha - phi), pivot.radius * math.cos(pivot.alpha - phi)
     rows = np.zeros((7, 3))
     rows[F, 1], rows[F, 2] = 1.0, -s
-    rows[E, 1], rows[E, 2] = 1.0, sp
-    rows[TIP_TOP, 0], rows[TIP_TOP, 2] = 1.0, -cp
+    rows[E, 1], rows[E, 2] = 1.0, other.radius * math.sin(other.alpha + phi)
+    rows[TIP_TOP, 0], rows[TIP_TOP, 2] = 1.0, -pivot.top_radius * math.cos(pivot.top_alpha + phi)
     rows[TIP_BOTTOM, 0], rows[TIP_BOTTOM, 2] = 1.0, c
-    rows[FAR_BOTTOM, 0], rows[FAR_BOTTOM, 2] = -1.0, -cp
-    rows[FAR_TOP, 0], rows[FAR_TOP, 2] = -1.0, c
+    rows[FAR_BOTTOM, 0], rows[FAR_BOTTOM, 2] = -1.0, -other.radius * math.cos(other.alpha + phi)
+    rows[FAR_TOP, 0], rows[FAR_TOP, 2] = -1.0, other.top_radius * math.cos(other.top_alpha - phi)
     rows[_TANGENT, 0], rows[_TANGENT, 2] = 1.0, c
     return rows
 
@@ -67,15 +67,15 @@ def _dot(row, v):
 
 
 @inner_kernel
-def _mass_dot(row, column):
-    """Row times inverse mass times column: unit mass, moment of inertia 1/3."""
-    return row[0] * column[0] + row[1] * column[1] + 3.0 * row[2] * column[2]
+def _mass_dot(spin, row, column):
+    """Row times inverse mass times column: unit mass, moment of inertia 1/spin."""
+    return row[0] * column[0] + row[1] * column[1] + spin * row[2] * column[2]
 
 
 @inner_kernel
-def kinetic_energy(v):
-    """Kinetic energy of velocities (xi, y, phi), per unit mass."""
-    return 0.5 * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] / 3.0)
+def kinetic_energy(spin, v):
+    """Kinetic energy of velocities (xi, y, phi), per unit mass; `spin` is one over the moment of inertia."""
+    return 0.5 * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] / spin)
 
 
 @inner_kernel
@@ -125,7 +125,7 @@ def _push(rows, index, kappa, k):
 
 
 @inner_kernel
-def _try_set(rows, number, friction, target, mu_k, v, system, trial, lam):
+def _try_set(rows, spin, number, friction, target, mu_k, v, system, trial, lam):
     """The impulses of the contacts in the set, and the velocities after them; False where there are none."""
     count = _SETS[number, 0]
     n = count + (1 if friction == _STICK else 0)
@@ -138,7 +138,7 @@ def _try_set(rows, number, friction, target, mu_k, v, system, trial, lam):
         for j in range(n):
             column = _SETS[number, 1 + j] if j < count else _TANGENT
             system[i, j] = rows[row, 0] * _push(rows, column, kappa, 0) + rows[row, 1] * _push(rows, column, kappa, 1)
-            system[i, j] += 3.0 * rows[row, 2] * _push(rows, column, kappa, 2)
+            system[i, j] += spin * rows[row, 2] * _push(rows, column, kappa, 2)
     if not solve(system, n):
         return False
     for k in range(3):
@@ -147,7 +147,7 @@ def _try_set(rows, number, friction, target, mu_k, v, system, trial, lam):
         lam[j] = system[j, n]
         index = _SETS[number, 1 + j] if j < count else _TANGENT
         for k in range(3):
-            trial[k] += (3.0 if k == 2 else 1.0) * _push(rows, index, kappa, k) * lam[j]
+            trial[k] += (spin if k == 2 else 1.0) * _push(rows, index, kappa, k) * lam[j]
     return True
 
 
@@ -173,7 +173,7 @@ def _violation(rows, number, friction, taking, target, mu_s, trial, lam):
 
 
 @kernel
-def _strike(rows, taking, target, mu_s, mu_k, v, after, impulse, system):
+def _strike(rows, spin, taking, target, mu_s, mu_k, v, after, impulse, system):
     """One stage over the contacts in `taking`: writes the velocities after it and the impulses; False where only the least wrong fits.
 
     Every set of contacts is tried with every friction. Of those that obey the law the one that leaves the least energy is taken; where
@@ -189,12 +189,12 @@ def _strike(rows, taking, target, mu_s, mu_k, v, after, impulse, system):
         if _SETS[number, 4] & ~bits:
             continue
         for friction in range(4):
-            if not _fits(number, friction, mu_s == 0.0) or not _try_set(rows, number, friction, target, mu_k, v, system, trial, lam):
+            if not _fits(number, friction, mu_s == 0.0) or not _try_set(rows, spin, number, friction, target, mu_k, v, system, trial, lam):
                 continue
             scale = _size(v) + _size(trial) + _size(lam)
             wrong = _violation(rows, number, friction, taking, target, mu_s, trial, lam)
             wrong = 0.0 if wrong <= _ROUNDING * scale else wrong
-            energy = kinetic_energy(trial)
+            energy = kinetic_energy(spin, trial)
             if not wrong < least and not (wrong == least and energy < lowest - _ROUNDING * scale * scale):
                 continue
             least, lowest = wrong, energy
@@ -241,14 +241,15 @@ def _floor_first(touching, approach, stage, rounding, ahead, taking):
 
 
 @kernel
-def contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, tally):
+def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, tally):
     """All stages at one instant; v (xi, y, phi rates) becomes the velocities after them. Returns FITS, LEAST_WRONG or ENDLESS.
 
-    `touching[6]` says which gaps are closed, `resting` is the approach speed below which a contact closes for good.
+    The block tips by phi to `sense`. `touching[6]` says which gaps are closed, `resting` is the approach speed below which a
+    contact closes for good.
     `impulse[2]` gathers the normal impulses of floor and walls; `tally[0]` counts stages that added energy and `tally[1]` keeps the
     largest relative gain.
     """
-    rows = contact_rows(b.alpha, phi)
+    rows = contact_rows(b, sense, phi)
     taking = np.zeros(CONTACTS, dtype=np.bool_)
     restitution, target, part, approach, ahead = np.zeros(CONTACTS), np.zeros(7), np.zeros(CONTACTS), np.zeros(CONTACTS), np.zeros(CONTACTS)
     after = np.zeros(3)
@@ -263,7 +264,7 @@ def contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, tally):
             closes = closes or approach[j] < -rounding
             restitution[j] = 0.0 if plastic else (b.e_floor if j <= E else (e_tip if j <= TIP_BOTTOM else e_far))
         if not closes:
-            _close(rows, touching, resting, v, system)
+            _close(rows, b.spin, touching, resting, v, system)
             return found
         if b.law == FLOOR_FIRST and not plastic:
             _floor_first(touching, approach, stage, rounding, ahead, taking)
@@ -271,12 +272,12 @@ def contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, tally):
             _moreau(MOREAU if plastic else b.law, touching, approach, restitution, rounding, taking)
         for j in range(CONTACTS):
             target[j] = -restitution[j] * approach[j] if taking[j] and approach[j] < -resting else 0.0
-        before = kinetic_energy(v)
-        if not _strike(rows, taking, target, b.mu_s, b.mu_k, v, after, part, system):
+        before = kinetic_energy(b.spin, v)
+        if not _strike(rows, b.spin, taking, target, b.mu_s, b.mu_k, v, after, part, system):
             found = LEAST_WRONG
-        if b.energy_cap and not plastic and kinetic_energy(after) > before:
+        if b.energy_cap and not plastic and kinetic_energy(b.spin, after) > before:
             _strike_without_gain(b, rows, taking, target, v, after, part, system, before)
-        gain = kinetic_energy(after) - before
+        gain = kinetic_energy(b.spin, after) - before
         if gain > 2.0 * _ROUNDING * before:
             tally[0] += 1.0
             tally[1] = max(tally[1], gain / before)
@@ -296,15 +297,15 @@ def _strike_without_gain(b, rows, taking, target, v, after, part, system, before
         scale = low if trial == _HALVINGS else 0.5 * (low + high)
         for j in range(CONTACTS):
             target[j] = scale * full[j]
-        _strike(rows, taking, target, b.mu_s, b.mu_k, v, after, part, system)
-        if kinetic_energy(after) > before:
+        _strike(rows, b.spin, taking, target, b.mu_s, b.mu_k, v, after, part, system)
+        if kinetic_energy(b.spin, after) > before:
             high = scale
         else:
             low = scale
 
 
 @kernel
-def _close(rows, touching, resting, v, system):
+def _close(rows, spin, touching, resting, v, system):
     """Contacts that part more slowly than `resting` are closed: the velocity is projected onto them, mass-orthogonally."""
     members = np.zeros(3, dtype=np.int64)
     count = 0
@@ -315,11 +316,11 @@ def _close(rows, touching, resting, v, system):
     while count > 0:
         for i in range(count):
             for j in range(count):
-                system[i, j] = _mass_dot(rows[members[i]], rows[members[j]])
+                system[i, j] = _mass_dot(spin, rows[members[i]], rows[members[j]])
             system[i, count] = -_dot(rows[members[i]], v)
         if solve(system, count):
             for i in range(count):
                 for k in range(3):
-                    v[k] += (3.0 if k == 2 else 1.0) * rows[members[i], k] * system[i, count]
+                    v[k] += (spin if k == 2 else 1.0) * rows[members[i], k] * system[i, count]
             return
         count -= 1

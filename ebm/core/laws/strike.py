@@ -17,6 +17,7 @@ from rockcheck.ebm.core.contacts import (
     closed_floor,
     floor_gap,
     land_upright,
+    lower,
     slip_velocity,
     stand,
     stop,
@@ -37,7 +38,7 @@ from rockcheck.ebm.core.laws.contact_impacts import (
     contact_impact,
 )
 from rockcheck.ebm.core.modes import tips_first
-from rockcheck.ebm.core.motion import FAMILY, FAR, FLAT, FLOOR, HEIGHT, OFF, PULL, STICK, THETA, TILT, TIP, VX, VY, S, W, X
+from rockcheck.ebm.core.motion import FAMILY, FAR, FLAT, FLOOR, HEIGHT, OFF, PULL, STICK, THETA, TILT, TIP, VX, VY, S, W, X, side_of
 from rockcheck.ebm.core.rules import ENDLESS_STAGES, FLUSH_LANDING, LANDS_ALONG, LEAST_CONTRADICTION, SETTLES, WEDGED
 from rockcheck.ebm.core.series import NOISE, POSITION
 from rockcheck.ebm.core.settle import SETTLE
@@ -88,13 +89,16 @@ def touch(b, m, z, which):
     """
     phi = abs(z[THETA])
     if which == G_LANDING:
-        z[HEIGHT] = math.cos(b.alpha - phi)
+        side = lower(b, z)
+        z[HEIGHT] = side.radius * math.cos(side.alpha - phi)
     elif which == G_TIP_GAP and m[FAMILY] == TILT and m[FLOOR] == STICK:
-        sign = float(m[S])
-        pivot = sign * z[X] - math.sin(b.alpha - phi)
-        turned = phi + wall_gap(b, z, m[S]) / (math.cos(b.alpha - phi) + math.cos(b.alpha + phi))
+        sign, side = float(m[S]), side_of(b, m[S])
+        pivot = sign * z[X] - side.radius * math.sin(side.alpha - phi)
+        arms = side.radius * math.cos(side.alpha - phi) + side.top_radius * math.cos(side.top_alpha + phi)
+        turned = phi + wall_gap(b, z, m[S]) / arms
         if turned > 0.0:
-            z[X], z[HEIGHT], z[THETA] = sign * (pivot + math.sin(b.alpha - turned)), math.cos(b.alpha - turned), sign * turned
+            z[X], z[THETA] = sign * (pivot + side.radius * math.sin(side.alpha - turned)), sign * turned
+            z[HEIGHT] = side.radius * math.cos(side.alpha - turned)
         else:  # past upright it would stand on its other corner, without an impact
             z[X] -= sign * wall_gap(b, z, m[S])
     elif which == G_TIP_GAP or which == G_FAR_GAP:
@@ -117,8 +121,8 @@ def _settle_flat(b, z, resting, rules):
 def _floor_impact(b, m, z, resting, impulse, rules):
     """Bilateral pivot: the block lands at theta = 0. Returns whether it is already known to rock on in m."""
     w1, v1 = z[W], slip_velocity(b, z)
-    s, c = b.sin_alpha, b.cos_alpha
-    S1 = m[S]
+    S1, c = m[S], b.height
+    s1, s2 = side_of(b, S1).arm, side_of(b, -S1).arm
     if m[TIP] != 0 or m[FAR] != 0:  # from LADDER: every contact plastic, flush rest
         impulse[0] = abs(z[VY])
         stop(z)
@@ -127,14 +131,14 @@ def _floor_impact(b, m, z, resting, impulse, rules):
         # Flush with the wall toward which it would rock: the closed branch of "moreau" (the paper is silent).
         rules[FLUSH_LANDING] += 1
         e = b.e_right if S1 > 0 else b.e_left
-        impulse[0] = (1.0 + e) * s * abs(w1)
+        impulse[0] = (1.0 + e) * s1 * abs(w1)
         z[W] = -e * w1 if e * abs(w1) > resting else 0.0
         z[VX] = (-e * v1 if S1 * v1 > 0.0 else v1) - c * z[W]
-        z[VY] = S1 * s * z[W]
+        z[VY] = S1 * s1 * z[W]
         return False
-    form, w2, v2, p = impacts.floor_impact(s, c, S1, w1, v1, b.mu_s if not b.no_slip else np.inf, b.mu_k)
+    form, w2, v2, p = impacts.floor_impact(b, S1, w1, v1, b.mu_s if not b.no_slip else np.inf, b.mu_k)
     impulse[0] = p
-    z[W], z[VX], z[VY] = w2, v2 - c * w2, -S1 * s * w2
+    z[W], z[VX], z[VY] = w2, v2 - c * w2, -S1 * s2 * w2
     if form == impacts.STICK and abs(w2) > SETTLE:
         rocks(m, -S1)
         return True
@@ -162,12 +166,14 @@ def _wall_impact(b, m, z, tip, resting, impulse, gains, rules):
 def _corner_impact(b, m, z, sw, e, resting, impulse, gains):
     """The paper's cascade for the corner at the tip wall (sw = 1) or the far wall (-1), in the pivot's frame."""
     phi, sign = abs(z[THETA]), float(m[S])
-    s, c, cp = math.sin(b.alpha - phi), math.cos(b.alpha - phi), math.cos(b.alpha + phi)
+    side, other = side_of(b, m[S]), side_of(b, -m[S])
+    s, c = side.radius * math.sin(side.alpha - phi), side.radius * math.cos(side.alpha - phi)
+    cp = side.top_radius * math.cos(side.top_alpha + phi) if sw > 0.0 else other.radius * math.cos(other.alpha + phi)
     w1, xdot1 = sign * z[W], sign * z[VX]
-    before = xdot1 * xdot1 + (s * w1) ** 2 + w1 * w1 / 3.0
-    branch, w2, xdot2, n, p, v2 = impacts.wall_impact(1.0, sw, s, c, cp, w1, xdot1, e, b.mu_s, b.mu_k, b.no_slip)
+    before = xdot1 * xdot1 + (s * w1) ** 2 + w1 * w1 / b.spin
+    branch, w2, xdot2, n, p, v2 = impacts.wall_impact(1.0, sw, s, c, cp, side.share, b.spin, w1, xdot1, e, b.mu_s, b.mu_k, b.no_slip)
     impulse[0], impulse[1] = abs(p), n
-    count_gain(before, xdot2 * xdot2 + (s * w2) ** 2 + w2 * w2 / 3.0, gains)
+    count_gain(before, xdot2 * xdot2 + (s * w2) ** 2 + w2 * w2 / b.spin, gains)
     C = sw * cp
     stays = e == 0.0 and branch != impacts.B_STICK and branch != impacts.E_SLIP
     stays = stays or sw * (xdot2 - C * w2) < resting
@@ -213,7 +219,7 @@ def _strike_all(b, m, z, gh, t, resting, impulse, gains, rules):
     if touching[TIP_TOP] and touching[FAR_BOTTOM]:
         rules[WEDGED] += 1
         e_tip = e_far = 0.0
-    found = contact_impact(b, phi, touching, e_tip, e_far, resting, v, impulse, gains)
+    found = contact_impact(b, sign, phi, touching, e_tip, e_far, resting, v, impulse, gains)
     if found != FITS:
         rules[LEAST_CONTRADICTION if found == LEAST_WRONG else ENDLESS_STAGES] += 1
     z[VX], z[VY], z[W] = sign * v[0], v[1], sign * v[2]

@@ -39,7 +39,7 @@ def test_each_branch_of_the_wall_cascade(parting):
     for alpha, phi, sw, w1, xdot1, e, mu, no_slip in random_strikes(4000, parting):
         s, c, cp = math.sin(alpha - phi), math.cos(alpha - phi), math.cos(alpha + phi)
         C = sw * cp
-        branch, w2, xdot2, n, p, v2 = impacts.wall_impact(1.0, sw, s, c, cp, w1, xdot1, e, mu, mu, no_slip)
+        branch, w2, xdot2, n, p, v2 = impacts.wall_impact(1.0, sw, s, c, cp, 0.75, 3.0, w1, xdot1, e, mu, mu, no_slip)
         seen[branch] += 1
         assert n >= 0.0
         # (27): without an impulse of the wall, the pivot held: angular momentum about it stays what it is.
@@ -70,7 +70,7 @@ def test_each_branch_of_the_wall_cascade(parting):
             assert n == 0.0
             assert xdot2 == pytest.approx(C * w2, abs=1e-10)  # (32): the corner stays on the wall
             # The friction is that of the slip which (30) would have, were it not for its pull of the wall.
-            slips = ((sr, sy, impacts.wall_slip(1.0, s, c, C, w1, xdot1, e, mu, sr, sy)) for sr in (1, -1) for sy in (1, -1))
+            slips = ((sr, sy, impacts.wall_slip(1.0, s, c, C, 3.0, w1, xdot1, e, mu, sr, sy)) for sr in (1, -1) for sy in (1, -1))
             sense = next(sr * sy for sr, sy, (w, x, push, _) in slips if push * sy >= -1e-12 and (x + c * w) * sr >= -1e-12)
             assert q == pytest.approx(-mu * sense * p, abs=1e-10)
     least = {impacts.A_STICK: 20, impacts.B_STICK: 20, impacts.E_SLIP if parting else impacts.D_SLIP: 500}
@@ -79,15 +79,19 @@ def test_each_branch_of_the_wall_cascade(parting):
     assert all(seen[branch] > count for branch, count in least.items()), seen
 
 
-def landing(alpha: float, phi: float, mu: float, e: float, v, cap: bool) -> tuple[np.ndarray, float]:
-    """Velocities after a tilted block lands on its corner with restitution e, and the largest relative gain of energy."""
+def setting_of(alpha: float, mu: float, e: float, cap: bool = False):
+    """A block of R = 1 m as the compiled code has it."""
     block = Block(half_width=math.sin(alpha), half_height=math.cos(alpha))
     scene = Scene(name="cap", block=block, floor=Floor(friction=mu, restitution=e), duration=1.0)
-    setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=cap)
+    return natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=cap)
+
+
+def landing(alpha: float, phi: float, mu: float, e: float, v, cap: bool) -> tuple[np.ndarray, float]:
+    """Velocities after a tilted block lands on its corner with restitution e, and the largest relative gain of energy."""
     touching = np.zeros(ci.CONTACTS, dtype=bool)
     touching[ci.F] = True
     after, impulse, tally = np.array(v), np.zeros(2), np.zeros(2)
-    assert ci.contact_impact(setting, phi, touching, 0.0, 0.0, 1e-9, after, impulse, tally)
+    assert ci.contact_impact(setting_of(alpha, mu, e, cap), 1.0, phi, touching, 0.0, 0.0, 1e-9, after, impulse, tally)
     return after, float(tally[1])
 
 
@@ -98,7 +102,7 @@ def test_the_floor_takes_friction_within_its_cone():
     for _ in range(500):
         alpha, mu, e = rng.uniform(0.1, 1.2), rng.uniform(0.05, 1.2), float(rng.choice([0.0, 0.5]))
         phi, v = alpha * rng.uniform(0.05, 0.9), rng.normal(0.0, 0.5, 3)
-        rows = ci.contact_rows(alpha, phi)
+        rows = ci.contact_rows(setting_of(alpha, mu, e), 1.0, phi)
         if rows[ci.F] @ v > -1e-3:
             continue
         after = landing(alpha, phi, mu, e, v, cap=False)[0]
@@ -121,7 +125,7 @@ def test_the_energy_cap_takes_the_largest_restitution_that_adds_none():
         alpha, mu, e = rng.uniform(0.3, 1.2), rng.uniform(0.2, 1.33), rng.uniform(0.5, 0.99)
         phi = alpha * rng.uniform(0.05, 0.9)
         v = rng.normal(0.0, 0.5, 3)
-        row = ci.contact_rows(alpha, phi)[ci.F]
+        row = ci.contact_rows(setting_of(alpha, mu, e), 1.0, phi)[ci.F]
         if row @ v > -1e-3:
             continue
         plain, gain = landing(alpha, phi, mu, e, v, cap=False)
