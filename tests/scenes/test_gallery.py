@@ -12,7 +12,7 @@ from rockcheck.scenes import History, Scene, load_scene, named_scenes
 from rockcheck.scenes.excitations import Ricker
 from rockcheck.validation.commands.cli import main
 
-CASES = ("rack", "bookcase", "statue", "vial", "boulder")
+CASES = ("rack", "loaded", "bookcase", "statue", "vial", "boulder")
 
 
 def played(scene: Scene, pivot: str = "unilateral") -> History:
@@ -45,6 +45,17 @@ def test_the_rack_walks_to_its_wall_where_it_may_hop():
     assert free.channels["slip"][-1] == pytest.approx(-0.05, abs=1e-4)  # the whole gap
     assert abs(held.channels["slip"][-1]) < 0.02
     assert hits(free) > 3 * hits(held) > 0
+
+
+def test_the_loaded_rack_falls_to_its_heavy_side_only():
+    """The pulse turned round does not overturn it, and the homogeneous rack stands either way."""
+    scene = load_scene("loaded")
+    turned = scene.replace(excitation=scene.excitation.scaled(-1.0))
+    assert [played(one).outcome for one in (scene, turned)] == ["overturned right", "at rest"]
+    plain = load_scene("rack").block
+    assert (plain.half_width, plain.half_height) == (scene.block.half_width, scene.block.half_height)
+    assert not any(played(one.replace(block=plain)).outcome.startswith("overturned") for one in (scene, turned))
+    assert [round(scene.block.pivot(side).alpha, 2) for side in ("left", "right")] == [0.47, 0.28]
 
 
 def test_the_wall_throws_the_bookcase_which_would_stand_without():
