@@ -14,6 +14,8 @@ from collections import deque
 from pathlib import Path
 from types import SimpleNamespace
 
+import numba
+import numpy as np
 import pytest
 
 from rockcheck import ebm
@@ -65,6 +67,30 @@ def play(tmp_path):
         return done.stderr
 
     return play
+
+
+@pytest.mark.skipif(compiled.config.DISABLE_JIT, reason="interpreted")
+def test_an_inner_kernel_is_linked_and_no_machine_code_is_made_of_it_alone(monkeypatch):
+    emitted = []
+    finish = compiled.JITCodeLibrary._finalize_specific
+    monkeypatch.setattr(compiled.JITCodeLibrary, "_finalize_specific", lambda self: (emitted.append(type(self)), finish(self)))
+
+    @compiled.inner_kernel
+    def lowest(x, y):
+        return x if x < y else y
+
+    @compiled.inner_kernel
+    def middle(x, y, z):
+        return max(lowest(x, y), min(max(x, y), z))
+
+    @numba.njit
+    def median(rows):
+        return [middle(row[0], row[1], row[2]) + lowest(0.0, 1.0) for row in rows]
+
+    assert median(np.array([[1.0, 3.0, 2.0], [5.0, 4.0, 9.0]])) == [2.0, 5.0]
+    assert emitted
+    assert compiled._Linked not in emitted
+    assert lowest(1, 2) == 1  # for Python it stays the function that it is
 
 
 def files(tmp_path: Path) -> list[Path]:
