@@ -76,7 +76,8 @@ class Row:
 @dataclass(frozen=True)
 class Glance:
     """What most readers ask: the entry farthest from the reference, the scenes whose outcome depends on the model, and what is no
-    longer as it was accepted (checks that changed or are out, the farthest first; `judged` were looked at)."""
+    longer as it was accepted (the farthest first; `judged` were looked at). A figure that is out of a limit but as it was accepted
+    has not changed."""
 
     farthest: Entry | None
     apart: tuple[Row, ...]
@@ -107,9 +108,17 @@ def glance(run: Run) -> Glance:
     return Glance(
         farthest=max(entries, key=lambda one: (one.rms.value if one.rms else None) or 0.0, default=None),
         apart=tuple(row for row in rows if any(one and one.apart for one in row.entries)),
-        changed=tuple(sorted((pair for pair in accepted if pair[1].verdict != "pass"), key=lambda pair: -overrun(pair[1]))),
+        changed=tuple(sorted((pair for pair in accepted if _moved(pair[1])), key=lambda pair: -overrun(pair[1]))),
         judged=len(accepted),
     )
+
+
+def _moved(check: Check) -> bool:
+    """Whether a figure left its drift band; without one, its limit."""
+    value, expected = check.figure.value, check.expected
+    if check.drift is None or value is None or expected is None:
+        return check.verdict != "pass"
+    return abs(value - expected) > check.drift
 
 
 def entry(run: Run, scene: str, model: str) -> Entry | None:
@@ -163,7 +172,7 @@ def peaks_figure(run: Run, found: Sequence[Accuracy]) -> Drawing:
         height = 0.7 + 1.85 * rows
         figure = Figure(figsize=(PAGE, height))
         panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-        figure.subplots_adjust(0.085, 0.42 / height, 0.99, 1.0 - 0.3 / height, wspace=0.12, hspace=0.3)
+        figure.subplots_adjust(0.085, 0.42 / height, 0.98, 1.0 - 0.3 / height, wspace=0.22, hspace=0.3)
         for ax, one in zip(panels, found, strict=False):
             _points(ax, one, styles[one.model].light, (low, high))
             ax.set_title(styles[one.model].label)
@@ -183,7 +192,7 @@ def _points(ax: Axes, one: Accuracy, color: str, ends: tuple[float, float]) -> N
         ax.plot(line, trust.bias * line, color=color, linewidth=0.7, zorder=2)
         for side in (-2.0, 2.0):
             ax.plot(line, trust.bias * math.exp(side * trust.scatter) * line, color=color, linewidth=0.6, linestyle="--", zorder=2)
-    ax.plot(x, y, ".", color=color, markersize=3.0, markeredgewidth=0, alpha=0.8)
+    ax.plot(x, y, ".", color=color, markersize=5.0, markeredgewidth=0, alpha=0.7, zorder=3)
     ax.set_xscale("log")
     ax.set_yscale("log")
     log_scales(ax, decades=4)

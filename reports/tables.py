@@ -16,9 +16,12 @@ from rockcheck.validation.suite.results import Cell, Check, Run
 
 
 def worst_first(run: Run) -> list[tuple[Cell, Check | None]]:
-    """What is not within tolerance: cells without a history, then checks by how far they are out, then those that changed."""
+    """What is not within tolerance: cells without a history, then checks by how far they are out, then those that changed.
+
+    A figure that has no tolerance yet is not out of one; the page counts these.
+    """
     failed: list[tuple[Cell, Check | None]] = [(cell, None) for cell in run.cells if cell.status != "done"]
-    checks = [(cell, check) for cell, check in run.checks() if check.verdict != "pass"]
+    checks = [(cell, check) for cell, check in run.checks() if check.words not in ("pass", "no tolerance yet")]
     return failed + sorted(checks, key=lambda pair: (pair[1].verdict != "fail", -overrun(pair[1])))
 
 

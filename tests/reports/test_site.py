@@ -145,6 +145,16 @@ def test_index_answers_three_questions_first(site: Path) -> None:
     assert index.index('<dl class="glance"') < index.index('id="worst"') < index.index('id="matrix"')
 
 
+def test_a_figure_that_is_as_it_was_accepted_has_not_changed_though_its_limit_is_tighter(finished: Run) -> None:
+    def tighter(check: Check) -> Check:
+        return check.model_copy(update={"expected": check.figure.value, "limit": 1e-12, "drift": 1e-6, "verdict": "fail"})
+
+    cells = tuple(cell.model_copy(update={"checks": tuple(map(tighter, cell.checks))}) for cell in finished.cells)
+    found = glance(finished.model_copy(update={"cells": cells}))
+    assert found.judged > 0
+    assert found.changed == ()
+
+
 def test_index_shows_peaks_against_the_reference_s(site: Path) -> None:
     run = Run.load(site)
     (crowd,) = (one for one in accuracies(run) if one.model == "cm")
@@ -176,6 +186,8 @@ def test_a_run_without_tolerances_says_how_to_get_them(tmp_path: Path, finished:
     assert "out of tolerance</span>" not in index, "what waits for a tolerance has not failed"
     assert index.count("no tolerance yet</span>") >= len(cells) - 1
     assert 'data-verdict="no-tolerance"' in index
+    assert 'class="banner changed"' in index, "it has a state of its own, and is not red"
+    assert "Not within tolerance" not in index, "what waits is counted, not listed"
 
 
 def test_data_are_the_histories(site: Path) -> None:

@@ -74,8 +74,11 @@
   };
 
   find("live").hidden = false;
-  find("paper").open = false;  // without scripts, and on paper, its figures are all that there is
-  matchMedia("print").addEventListener("change", print => { find("paper").open = print.matches; });
+  const paper = find("paper");  // figures for print, where the suite asks for them
+  if (paper) {
+    paper.open = false;  // without scripts, and on paper, they are all that there is
+    matchMedia("print").addEventListener("change", print => { paper.open = print.matches; });
+  }
   const close = 0.12;
   find("close-scale").textContent = `${100 * close} cm wide`;
   Animation.build(find("block"), find("close"), store, close);
