@@ -21,7 +21,7 @@ test-all: $(VENV)/.ready ## also the slow ones
 	$(BIN)/python -m pytest -q
 
 nightly: $(VENV)/.ready ## what is too long for each change; NIGHTLY_QUICK=1 for a short form; the results go to docs/nightly.json
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[audit,fuzz,drake]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[audit,fuzz,drake,parquet]'
 	$(BIN)/python .ci/nightly.py
 
 # The core is compiled, and its lines are then not seen: the second run interprets it, on fewer tests.

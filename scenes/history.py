@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +32,7 @@ OUTCOMES = ("at rest", "moving", "overturned left", "overturned right")
 #: |theta| of a block that has fallen, rad.
 LYING = math.pi / 2 - 0.05
 #: Endings of files that a history can be written to, and the columns that hold words.
-FORMATS = ("", ".csv", ".gz", ".json", ".mat")
+FORMATS = ("", ".csv", ".gz", ".json", ".mat", ".parquet")
 WORDS = ("kind", "mode_before", "mode_after")
 #: The column of a CSV that says what the table does not, as JSON in its first row, so that any reader takes the file as a
 #: plain table; "-" in the others, since pandas warns of a column that holds words here and nothing there.
@@ -172,6 +173,7 @@ class History(Shown):
         | .csv.gz | the same two files compressed; `pandas.read_csv` opens them as they are |
         | .json | {"outcome", "model", "settings", ..., "channels": {name: [...]}, "events": {column: [...]}} |
         | .mat | the same as a MATLAB file: structures `about`, `channels` and `events` |
+        | .parquet | the table, the rest in the frame's `attrs`; `<stem>.events.parquet` beside it; needs the package pyarrow |
 
         All is written whole, or nothing is touched. `load` reads the CSV, compressed or not. Raises `InputError` for another
         ending, and `OSError` that names the file which cannot be written.
@@ -193,6 +195,10 @@ class History(Shown):
         if path.suffix.lower() in (".json", ".mat"):
             events = {name: [getattr(event, name) for event in self.event_list] for name in EVENT_COLUMNS}
             write_together({path: (_json if path.suffix.lower() == ".json" else _mat)(about, self.channels, events)})
+            return
+        if path.suffix.lower() == ".parquet":
+            attrs = {ABOUT: json.loads(json.dumps(about, default=str))}
+            write_together({events_path(path): _parquet(self.events, {}), path: _parquet(self.frame, attrs)})
             return
         said = [json.dumps(about, sort_keys=True, default=str), *["-"] * len(self.frame)][: len(self.frame)]
         contents = {path: self.frame.assign(**{ABOUT: said}).to_csv(index=False, lineterminator="\n")}
@@ -245,10 +251,20 @@ class History(Shown):
 
 def check_format(path: Path) -> None:
     """Raises `InputError` where no history can be written into a file of that name."""
-    packed = path.name.lower().endswith(".gz")
-    if path.suffix.lower() not in FORMATS or (packed and not path.name.lower().endswith(".csv.gz")):
-        hint = "; pandas makes Parquet of the .csv: read_csv(...).to_parquet(...)" if path.suffix.lower() in (".parquet", ".pq") else ""
-        raise InputError(f"{printable(path)}: a history is written as .csv, .csv.gz, .json or .mat, not as {printable(path.suffix)}{hint}")
+    kind = path.suffix.lower()
+    if kind not in FORMATS or (kind == ".gz" and not path.name.lower().endswith(".csv.gz")):
+        allowed = ".csv, .csv.gz, .json, .mat or .parquet"
+        raise InputError(f"{printable(path)}: a history is written as {allowed}, not as {printable(path.suffix)}")
+    if kind == ".parquet" and not find_spec("pyarrow"):
+        raise InputError(f"{printable(path)}: Parquet needs the package pyarrow: pip install pyarrow")
+
+
+def _parquet(table: pd.DataFrame, about: Mapping[str, Any]) -> bytes:
+    content = io.BytesIO()
+    table = table.copy()
+    table.attrs = dict(about)
+    table.to_parquet(content, engine="pyarrow", index=False)
+    return content.getvalue()
 
 
 def _json(about: Mapping[str, Any], channels: Mapping[str, NDArray[Any]], events: Mapping[str, list[Any]]) -> str:
@@ -278,7 +294,9 @@ def outcome_of(channels: Mapping[str, NDArray[Any]], *, still: float = 1e-4) -> 
 
 
 def events_path(path: Path) -> Path:
-    """The file of the events beside a history's CSV, compressed where that is."""
+    """The file of the events beside a history's CSV, compressed where that is, or beside its Parquet."""
+    if path.suffix.lower() == ".parquet":
+        return path.with_name(f"{path.stem}.events.parquet")
     packed = path.suffix if path.name.lower().endswith(".csv.gz") else ""
     return path.with_name(f"{Path(path.name.removesuffix(packed)).stem}.events.csv{packed}")
 

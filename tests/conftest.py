@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 MAY_BE_SKIPPED: dict[str, bool] = {
     "needs pybullet": sys.version_info >= (3, 12),  # which has wheels for 3.11 only
     "needs Linux": sys.platform != "linux",
+    "needs pyarrow": True,  # an extra of 50 MB, which `make nightly` installs
     "needs POSIX": sys.platform == "win32",
 }
 CHROMIUM = Path("/usr/bin/chromium")

@@ -93,7 +93,9 @@ def test_every_import_is_a_declared_dependency(top):
     everywhere = [one for one in PROJECT["project"]["dependencies"] if ";" not in one]  # not of some versions of Python only
     declared = names_of(everywhere) | {"llvmlite"}  # which is numba's
     extras = {
-        name for extra in ("iso", "cluster", "pybullet", "engines") for name in names_of(PROJECT["project"]["optional-dependencies"][extra])
+        name
+        for extra in ("iso", "cluster", "parquet", "pybullet", "engines")
+        for name in names_of(PROJECT["project"]["optional-dependencies"][extra])
     }
     for path, tree in sources(top).items():
         of_pytest = {"pytest"} if path.name == "plugin.py" else set()  # which pytest loads

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from rockcheck.scenes import History
+from rockcheck.scenes import History, history
 from rockcheck.validation.commands.cli import main
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
@@ -116,12 +118,28 @@ def test_without_a_model_the_reference_plays(type_):
 
 
 def test_what_is_no_format_of_a_history_is_refused_before_the_run(type_):
+    _, err = type_("simulate", "fig5a", "-o", "x.xlsx", code=2)
+    assert err == "rockcheck: x.xlsx: a history is written as .csv, .csv.gz, .json, .mat or .parquet, not as .xlsx\n"
+    assert not Path("x.xlsx").exists()
+
+
+def test_parquet_without_its_package_is_refused_before_the_run(type_, monkeypatch):
+    monkeypatch.setattr(history, "find_spec", lambda name: None)
     _, err = type_("simulate", "fig5a", "-o", "x.parquet", code=2)
-    assert err == (
-        "rockcheck: x.parquet: a history is written as .csv, .csv.gz, .json or .mat, not as .parquet;"
-        " pandas makes Parquet of the .csv: read_csv(...).to_parquet(...)\n"
-    )
+    assert err == "rockcheck: x.parquet: Parquet needs the package pyarrow: pip install pyarrow\n"
     assert not Path("x.parquet").exists()
+
+
+@pytest.mark.skipif(find_spec("pyarrow") is None, reason="needs pyarrow")
+def test_a_history_as_parquet_is_that_of_the_csv(type_):
+    for name in ("a.csv", "a.parquet"):
+        simulated(type_, "Falls", name)
+    table, plain = History.load("a.csv"), pd.read_parquet("a.parquet")
+    assert list(plain.columns) == list(table.frame.columns)
+    for name in plain.columns:
+        np.testing.assert_array_equal(plain[name], table.channels[name])
+    assert plain.attrs["rockcheck_history"]["outcome"] == table.outcome
+    assert list(pd.read_parquet("a.events.parquet")["kind"]) == [event.kind for event in table.event_list]
 
 
 def test_a_history_as_json_and_mat_is_that_of_the_csv(type_):
