@@ -12,6 +12,8 @@ from rockcheck.scenes.recordings import Reading, Recording, read_components
 #: How files and networks name the vertical component; K-NET's third and sixth channels (KiK-net) are vertical, too.
 _VERTICAL = re.compile(r"(?:.*[-_. ])?(?:up|dn|dwn|down|u-?d|ver|vrt|vert|vertical|[HBES][NLGH]Z)", re.IGNORECASE)
 _KIKNET = ("3", "6")
+#: The part of a file's name that says so, with its sign before it.
+_UPWARD = re.compile(r"(?:^|[-_. ])(?:up|dn|dwn|down|u-?d|vertical|vert|vrt|ver|[HBES][NLGH]Z|[VZ])(?=\d?(?:[-_. ]|$))", re.IGNORECASE)
 
 
 def files_of(words: Sequence[str | Path]) -> list[Path]:
@@ -60,17 +62,47 @@ def motions_of(paths: Sequence[Path], reading: Reading) -> tuple[list[tuple[str,
 
 
 def verticals_of(paths: Sequence[Path], reading: Reading) -> dict[str, Recording]:
-    """By the name of each horizontal motion (see `motions_of`), the vertical component of the same file.
+    """By the name of each horizontal motion (see `motions_of`), its vertical component.
 
-    Raises `InputError` for a file that has not exactly one.
+    It is the one in the same file, else that of the file in the same folder whose name differs only in the component, as ELC-UP.AT2
+    does from ELC180.AT2. Raises `InputError` where there is not exactly one, and for a vertical component that belongs to no motion.
     """
-    found: dict[str, Recording] = {}
+    horizontal: dict[Path, list[str]] = {}
+    upward: dict[Path, list[Recording]] = {}
     for path in paths:
-        up = [one for one in read_components(path, reading) if is_vertical(path, one)]
-        if len(up) != 1:
-            raise InputError(f"{printable(path)}: {len(up)} vertical components; one beside the horizontal ones is asked for", "vertical")
-        found |= {name: up[0] for name, _ in motions_of([path], reading)[0]}
+        components = read_components(path, reading)
+        up = [one for one in components if is_vertical(path, one)]
+        if up:
+            upward[path] = up
+        if len(up) < len(components) or reading.component is not None or reading.column is not None:
+            horizontal[path] = [name for name, _ in motions_of([path], reading)[0]]
+    alone = {path: up for path, up in upward.items() if path not in horizontal}
+    found: dict[str, Recording] = {}
+    used: set[Path] = set()
+    for path, names in horizontal.items():
+        source = path if path in upward else _vertical_file(path, alone)
+        up = upward[source] if source else []
+        if source is None or len(up) != 1:
+            where = "in it or in a file of the set that is named alike"
+            raise InputError(f"{printable(path)}: {len(up)} vertical components {where}; one is asked for", "vertical")
+        used.add(source)
+        found |= dict.fromkeys(names, up[0])
+    if unused := [path for path in alone if path not in used]:
+        raise InputError(f"{printable(unused[0])}: a vertical component, and no horizontal one is named alike", "vertical")
     return found
+
+
+def _vertical_file(path: Path, alone: Iterable[Path]) -> Path | None:
+    """The file with the vertical component of `path`: the one whose name agrees in most letters around the component."""
+    fits: dict[int, list[Path]] = {}
+    for other in alone:
+        for said in _UPWARD.finditer(other.name):
+            before, after = other.name[: said.start()].lower(), other.name[said.end() :].lower()
+            name = path.name.lower()
+            if other.parent == path.parent and name.startswith(before) and name.endswith(after):
+                fits.setdefault(len(before) + len(after), []).append(other)
+    best = fits[max(fits)] if fits else []
+    return best[0] if len(set(best)) == 1 else None
 
 
 def is_vertical(path: Path, recording: Recording) -> bool:

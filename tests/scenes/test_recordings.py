@@ -16,7 +16,7 @@ from rockcheck.scenes import InputError, Record, load_scene
 from rockcheck.scenes.observation import scene_notes
 from rockcheck.scenes.recordings import Reading, intensity, read_components, read_record
 from rockcheck.scenes.recordings.recording import Recording
-from rockcheck.scenes.recordings.sets import is_vertical
+from rockcheck.scenes.recordings.sets import _vertical_file, is_vertical
 from rockcheck.validation.commands.cli import main
 
 G = 9.80665
@@ -411,3 +411,21 @@ def test_one_bad_file_does_not_hide_the_others(tmp_path, capsys):
 def test_which_component_is_vertical(name, form, component, vertical):
     recording = Recording(samples=np.zeros(3), time_step=0.01, unit="g", form=form, component=component)
     assert is_vertical(Path(name), recording) == vertical
+
+
+@pytest.mark.parametrize(
+    ("name", "others", "vertical"),
+    [
+        ("RSN6_IMPVALL.I_I-ELC180.AT2", ("RSN6_IMPVALL.I_I-ELC-UP.AT2", "RSN8_NCALIF-UP.AT2"), 0),
+        ("RSN6_IMPVALL.I_I-ELC180.AT2", ("RSN8_NCALIF-UP.AT2",), None),
+        ("IV.T1213..HNE.D.ASC", ("IV.T1214..HNZ.D.ASC", "IV.T1213..HNZ.D.ASC"), 1),
+        ("MYG0041103111446.EW", ("MYG0041103111446.UD", "MYG0051103111446.UD"), 0),
+        ("MYGH041103111446.NS2", ("MYGH041103111446.UD1", "MYGH041103111446.UD2"), 1),
+        ("ns.csv", ("up.csv",), 0),
+        ("ns.csv", ("up.csv", "down.csv"), None),
+        ("ns.csv", ("elsewhere/up.csv",), None),
+    ],
+)
+def test_which_file_has_the_vertical_component(name, others, vertical):
+    paths = [Path(other) for other in others]
+    assert _vertical_file(Path(name), paths) == (None if vertical is None else paths[vertical])

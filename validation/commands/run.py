@@ -65,7 +65,9 @@ def run(
         list[str] | None, typer.Option("--set", help="A setting of a model, such as mujoco.time_step=1e-3; repeatable.")
     ] = None,
     scale: Annotated[float, typer.Option("--scale", help="Factor of the records' accelerations.")] = 1.0,
-    vertical: Annotated[bool, typer.Option("--vertical", help="With the vertical component of each file.")] = False,
+    vertical: Annotated[
+        bool, typer.Option("--vertical", help="With the vertical component: of the same file, or of a file of the set that is named alike.")
+    ] = False,
     unit: UnitOption = None,
     time_step: TimeStepOption = None,
     column: ColumnOption = None,
@@ -91,13 +93,15 @@ def run(
     files = tuple(str(Path(word).absolute()) for word in words)
     sets = [RecordSet(files=files, scale=scale, vertical=vertical, **given)] if files else []
     suite = scene_suite(scene, chosen_models(models, settings or ()), records=sets, allow_code=allow_code or ())
-    play_scene(suite, usable_folder(out), jobs=jobs, force=force, scheduler=scheduler, report=report)
+    folder = usable_folder(out)
+    if models == ALL:
+        tell_missing()
+    play_scene(suite, folder, jobs=jobs, force=force, scheduler=scheduler, report=report)
 
 
 def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
     """The models by name, each with its settings; of all, those that are installed. Raises `InputError` for an unknown one."""
     if names == ALL:
-        tell_missing()
         found: dict[str, dict[str, Any]] = {name: {} for name in FAMILIES if name != "measured" and not not_installed(name)}
     else:
         found = {name.strip(): {} for name in names.split(",") if name.strip()}
@@ -119,7 +123,7 @@ def play_scene(suite: Suite, folder: Path, *, jobs: int | None, force: bool, sch
     finished = play(suite, folder, jobs, force, False, scheduler)
     kept = keep(finished, folder)
     screen = console()
-    tell_left_out(suite.left_out, "--vertical plays such a component together with the others of its file")
+    tell_left_out(suite.left_out, "--vertical plays such a component together with the horizontal ones")
     for name, table in outcome_tables(finished):
         screen.print(name, style="bold", soft_wrap=True)
         screen.print(table)

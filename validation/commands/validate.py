@@ -21,6 +21,7 @@ from rockcheck.validation.commands import (
     console,
     suite_names,
     tell_left_out,
+    tell_missing,
     usable_folder,
 )
 from rockcheck.validation.commands.pages.publish import keep
@@ -63,7 +64,9 @@ def run(
         if strict:
             raise InputError(f"{printable(suite)} is a scene, and nothing of it is judged: give a suite", "--strict")
         console().print(f"{suite} is a scene: all models play it, nothing is judged (as `rockcheck run {suite}`)", soft_wrap=True)
-        play_scene(scene_suite(suite, chosen_models()), folder, jobs=jobs, force=force, scheduler=scheduler, report=report)
+        alone = scene_suite(suite, chosen_models())
+        tell_missing()
+        play_scene(alone, folder, jobs=jobs, force=force, scheduler=scheduler, report=report)
     finished = play_suite(suite or ("smoke" if quick else "paper"), folder, jobs, force, strict, scheduler, allow_code)
     kept = keep(finished, folder)
     show(finished, console())

@@ -3,7 +3,7 @@
     [[records]]
     files = ["records/RSN1_H*.AT2", "station.V2"]    # files, folders, patterns, beside the suite
     scale = 1.6                                      # optional; and what a file does not say, such as unit = "cm/s2"
-    vertical = true                                  # optional: with the vertical component of the same file
+    vertical = true                                  # optional: with the vertical component, of the same file or of one named alike
     scenes = ["shelf"]                               # optional: the scenes that are meant; without it all
 
 Each horizontal component takes the place of the scene's own excitation. The scene lasts as long as its record, and at least as
@@ -34,7 +34,7 @@ _LONGEST, _LONGEST_RECORD = 100, 60
 class RecordSet(Reading):
     """A table `[[records]]`: files, the factor of their accelerations, the scenes that they shake, and the options of a reader.
 
-    With `vertical` the base also moves up and down, as the same file says.
+    With `vertical` the base also moves up and down, as the same file says, or one of the set that is named alike.
     """
 
     files: Annotated[tuple[Word, ...], Field(min_length=1)]

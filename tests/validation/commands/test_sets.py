@@ -108,7 +108,34 @@ def test_the_vertical_component_of_a_file_goes_with_its_others(told, capsys):
     assert scene.excitation.peak == pytest.approx(2 * 0.1 * 981 / 980.665, rel=1e-3)
     assert scene.vertical.peak == pytest.approx(2 * 0.05 * 981 / 980.665, rel=1e-3)
     assert main(["run", "rack.toml", "records/RSN1_H1.AT2", "--vertical", *STILL]) == 2
-    assert "RSN1_H1.AT2: 0 vertical components; one beside the horizontal ones is asked for" in capsys.readouterr().err
+    assert "RSN1_H1.AT2: 0 vertical components in it or in a file of the set that is named alike" in capsys.readouterr().err
+
+
+def test_the_vertical_component_may_be_a_file_of_its_own(told, capsys):
+    at2("records/RSN2_H1.AT2", 0.15, "180")
+    at2("records/RSN2_V.AT2", 0.05, "UP")
+    found = told("run", "rack.toml", "records", "--vertical", *STILL)
+    assert [cell["scene"] for cell in found["cells"]] == ["rack, RSN1_H1", "rack, RSN1_H2", "rack, RSN2_H1"]
+    assert found["left_out"] == []
+    peaks = [Run.load("rockcheck-report").load_scene(cell["scene"]).vertical.peak for cell in found["cells"]]
+    assert peaks == pytest.approx([0.3, 0.3, 0.05], rel=1e-2)
+    Path("records/RSN2_H1.AT2").unlink()
+    assert main(["run", "rack.toml", "records", "--vertical", *STILL]) == 2
+    assert "RSN2_V.AT2: a vertical component, and no horizontal one is named alike" in capsys.readouterr().err
+
+
+def test_a_scene_that_there_is_not_is_the_only_line(capsys, monkeypatch):
+    monkeypatch.setattr("rockcheck.validation.execute.models.not_installed", lambda name: "not installed" if name == "drake" else "")
+    assert main(["run", "nothere"]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+
+
+def test_records_of_an_analysis_may_be_an_option_as_elsewhere(told):
+    found = told("ida", "rack.toml", "--record", "records/RSN1_H*.AT2", "--levels", "2", "--jobs", "1", "--json")
+    assert found["left_out"] == []
+    assert len(Path(found["table"]).read_text(encoding="utf-8").splitlines()) == 1 + 2 * 2 * 2  # records, directions, intensities
 
 
 def test_all_models_are_those_that_are_installed(told):

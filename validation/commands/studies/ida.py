@@ -23,6 +23,7 @@ from rockcheck.validation.commands.record import (
     UnitOption,
     reading_of,
 )
+from rockcheck.validation.commands.run import MoreRecords, RecordOption
 from rockcheck.validation.spectra.ida import CAPACITIES, MEASURES, analyse, lines_table
 
 IDA = "ida"
@@ -31,7 +32,8 @@ MOST_LEVELS = 1000
 
 def run(
     scene: Annotated[str, typer.Argument(help="Block, floor and walls: a named scene or a .toml file.", autocompletion=scene_names)],
-    records: Annotated[list[str], typer.Argument(help='Record files, folders of them, or patterns such as "RSN1_H*.AT2".')],
+    more: MoreRecords = None,
+    records: RecordOption = None,
     intensity: Annotated[str, typer.Option("--intensity", help=f"The measure of intensity: {', '.join(MEASURES)}.")] = "pga",
     period: Annotated[float | None, typer.Option("--period", help="T1 of --intensity sa, s.", min=1e-3)] = None,
     span: Annotated[tuple[float, float], typer.Option("--range", help="Least and largest intensity.")] = (0.05, 2.0),
@@ -58,7 +60,10 @@ def run(
         raise InputError(f"{span[0]:g} to {span[1]:g} is not allowed: 0 < least < largest", "--range")
     if pivot not in ("unilateral", "bilateral"):
         raise InputError(str(unknown_name("pivot", pivot, ("unilateral", "bilateral"))), "--pivot")
-    motions, left_out = motions_of(files_of(records), reading_of(unit, time_step, column, header_lines, decimal, component))
+    words = [*(records or []), *(more or [])]
+    if not words:
+        raise InputError("no records are given: name files, a folder of them, or a pattern", "--record")
+    motions, left_out = motions_of(files_of(words), reading_of(unit, time_step, column, header_lines, decimal, component))
     folder = usable_folder(usable_folder(out) / IDA)
     with progress("ida") as on_progress:
         found = analyse(
