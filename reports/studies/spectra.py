@@ -14,9 +14,11 @@ import numpy as np
 from rockcheck.ebm.spectrum import Spectrum
 from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, axis_labels, draw
 from rockcheck.reports.site import PAGES, STUDIES, Site
-from rockcheck.reports.studies.curves import fragility_chart, write_charts
+from rockcheck.reports.studies.curves import PGA, fragility_chart, write_charts
 from rockcheck.reports.studies.nodes import write_nodes
 from rockcheck.reports.style import FORMATS, LOOKS, PAGE, figure_style, keep_drawn
+from rockcheck.scenes import Scene
+from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.spectra.findings import Finding, findings
@@ -83,9 +85,21 @@ def own_figure(panel: Panel, spectrum: Spectrum) -> Figure:
 
     with figure_style():
         figure = Figure(figsize=(PAGE / 1.6, 3.6), layout="constrained")
-        _panel(figure.subplots(), spectrum, panel.title)
+        axes = figure.subplots()
+        _panel(axes, spectrum, panel.title)
+        _units(axes, spectrum.scene)
         _legend(figure, [spectrum])
     return figure
+
+
+def _units(axes: Any, scene: Scene) -> None:
+    """The pulses of the axes in Hz and g, too."""
+    if scene.excitation.kind == "record":
+        return
+    hertz = scene.frequency_parameter / (2.0 * np.pi)
+    pga_g = scene.gravity * scene.block.half_width / scene.block.half_height / GRAVITY_OF_RECORDS
+    axes.secondary_xaxis("top", functions=(lambda x: x * hertz, lambda x: x / hertz)).set_xlabel("frequency of the pulse, Hz")
+    axes.secondary_yaxis("right", functions=(lambda y: y * pga_g, lambda y: y / pga_g)).set_ylabel(PGA)
 
 
 def _panel(axes: Any, spectrum: Spectrum, title: str) -> None:
@@ -217,6 +231,8 @@ def fragility_figure(fragility: Mapping[str, Any]) -> Figure:
             axes.plot(points[:, 0], points[:, 1], color=colour, linestyle=(0, dash) if dash else "-", label=case["label"])
             axes.plot(points[:, 0], points[:, 4], color=colour, linestyle=(0, (0.7, 1.7)), linewidth=0.8)
         axes.set_xlabel(fragility["intensity"])
+        if pga_g := fragility.get("pga_g"):
+            axes.secondary_xaxis("top", functions=(lambda x: x * pga_g, lambda x: x / pga_g)).set_xlabel(PGA)
         axes.set_ylabel("probability of overturning")
         axes.set_ylim(-0.02, 1.02)
         axes.legend(loc="lower right")
@@ -314,7 +330,7 @@ def write_page(folder: Path) -> Path:
     scripts += [f"{one['record'].name}.nodes.js" for one in own if one["nodes"]]
     if found["fragility"]:
         curves = Fragility.model_validate(found["fragility"])
-        write_charts([fragility_chart("fragility", curves.intensity, curves.cases)], data / "fragility.curves.js")
+        write_charts([fragility_chart("fragility", curves.intensity, curves.cases, curves.pga_g)], data / "fragility.curves.js")
         scripts.append("fragility.curves.js")
     heading = "Overturning spectra" if shown or own or not found["fragility"] else "Fragility: the probability of overturning"
     site = Site(folder, f"rockcheck: {heading[0].lower()}{heading[1:]}", _links(folder))

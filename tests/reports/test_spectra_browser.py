@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,11 +14,11 @@ from playwright import sync_api as playwright
 from rockcheck.ebm import Spectrum
 from rockcheck.reports.show.spectrum import COLOURS
 from rockcheck.reports.studies.ida import write_ida
-from rockcheck.reports.studies.spectra import paper_figure, write_page
+from rockcheck.reports.studies.spectra import own_figure, paper_figure, write_page
 from rockcheck.reports.style import save
 from rockcheck.validation.spectra.fragility import Fragility, curve_of
 from rockcheck.validation.spectra.ida import Capacity, Ida, Line
-from rockcheck.validation.spectra.study import SPECTRA, SpectrumRequest, paper_panels
+from rockcheck.validation.spectra.study import SPECTRA, Panel, SpectrumRequest, paper_panels
 from rockcheck.validation.spectra.study import save as save_spectra
 
 pytestmark = pytest.mark.browser
@@ -82,6 +83,24 @@ def test_pointing_at_a_node_names_it_in_every_panel(page: playwright.Page) -> No
     assert page.locator(".panel .said").all_inner_texts() == ["safe"] * 7
 
 
+def test_ones_own_block_is_told_in_hertz_and_g(visitor: Callable[..., playwright.Page], tmp_path: Path) -> None:
+    (tmp_path / SPECTRA).mkdir()
+    panel = Panel("shelf", "shelf", paper_panels(8)[1].scene)
+    grid = {"outcomes": np.zeros((SIZE, SIZE), dtype=np.int8), "undecided": np.zeros((0, 2), dtype=np.int64)}
+    grid |= {"frequency_ratios": FREQUENCIES, "amplitude_ratios": AMPLITUDES}
+    spectrum = Spectrum(**grid, evaluations=SIZE**2, scene=panel.scene, model=None)
+    save_spectra([panel], [spectrum], SpectrumRequest(FREQUENCIES, AMPLITUDES), tmp_path / SPECTRA)
+    save(own_figure(panel, spectrum), tmp_path / SPECTRA / "shelf")
+    page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
+    page.goto(write_page(tmp_path).as_uri())
+    page.evaluate("Object.values(rockcheckFigures)[0].point([4, 7])")
+    said = page.locator("output.node").inner_text()
+    g, hertz = map(float, re.search(r"a pulse of ([\d.]+) g .*, ([\d.]+) Hz", said).groups())
+    scene, block = panel.scene, panel.scene.block
+    assert g == pytest.approx(AMPLITUDES[4] * scene.gravity / 9.80665 * block.half_width / block.half_height, rel=0.01)
+    assert hertz == pytest.approx(FREQUENCIES[7] * scene.frequency_parameter / (2.0 * np.pi), rel=0.01)
+
+
 def test_a_click_plays_the_kept_history_that_ends_the_same_way(page: playwright.Page) -> None:
     page.mouse.click(*place(page, 0, 7, 7))
     playwright.expect(page.locator(".played figcaption")).to_contain_text("overturned clockwise")
@@ -116,7 +135,7 @@ def fragility_page(folder: Path) -> Path:
     level = np.linspace(0.5, 5.0, 10)
     fell = np.random.default_rng(1).random((20, 2, 1)) < np.linspace(0.0, 1.0, 10)
     cases = tuple(curve_of(label, fell, np.zeros_like(fell), level) for label in ("with the wall", "without a wall"))
-    found = Fragility(title="shelf, 20 records", about="made up", intensity="peak acceleration / (g tan α)", cases=cases)
+    found = Fragility(title="shelf, 20 records", about="made up", intensity="peak acceleration / (g tan α)", pga_g=0.2, cases=cases)
     (folder / SPECTRA / "fragility.json").write_text(found.model_dump_json(), encoding="utf-8")
     (folder / SPECTRA / "fragility.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"/>', encoding="utf-8")
     return write_page(folder)
@@ -147,8 +166,12 @@ def test_fragility_has_its_own_page_and_is_read_under_the_pointer(visitor: Calla
     assert "median, peak acceleration / (g tan α)" in page.locator("table thead").inner_text()
     page.locator("[data-curves] .u-over").hover()
     said = page.locator("[data-curves] output").inner_text()
-    assert said.startswith("peak acceleration / (g tan α) ")
-    assert "with the wall 0." in said
+    across, in_g = re.fullmatch(r"peak acceleration / \(g tan α\) ([\d.]+) \(([\d.]+) g\): with the wall 0\..*", said, re.DOTALL).groups()
+    assert float(in_g) == pytest.approx(0.2 * float(across), rel=0.01)
+    assert "median, peak acceleration in g" in page.locator("table thead").inner_text()
+    first = page.locator("table tbody tr").first.locator("td")
+    assert float(first.nth(1).inner_text()) == pytest.approx(0.2 * float(first.nth(0).inner_text()), rel=0.01)
+    assert page.evaluate("rockcheckCharts.fragility.axes.map(axis => [axis.scale, axis.label])")[2] == ["x", "peak acceleration, g"]
 
 
 def test_the_lines_of_an_ida_are_named_under_the_pointer(visitor: Callable[..., playwright.Page], tmp_path: Path) -> None:

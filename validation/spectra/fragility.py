@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rockcheck.ebm.spectrum import SAFE, Floats
 from rockcheck.scenes import InputError, Record, Scene
 from rockcheck.scenes.recordings import Recording
+from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
 from rockcheck.scenes.writing import table_text
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.spectra.study import Panel, SpectrumRequest
@@ -40,12 +41,13 @@ class FragilityCurve(Stored):
 
 
 class Fragility(Stored):
-    """`fragility.json`."""
+    """`fragility.json`; `pga_g` is the peak acceleration (g) of a motion of intensity 1, None in files of older versions."""
 
     format: int = 1
     title: str
     about: str
     intensity: str
+    pga_g: float | None = None
     cases: tuple[FragilityCurve, ...]
 
 
@@ -70,7 +72,13 @@ def fragility(panel: Panel, request: SpectrumRequest, records: Sequence[tuple[st
     )
     if undecided := sum(case.undecided for case in cases):
         about += f" {undecided} runs failed: they count neither as overturned nor as safe."
-    return Fragility(title=f"{panel.title}, {motions}", about=about, intensity="peak acceleration / (g tan α)", cases=tuple(cases))
+    return Fragility(
+        title=f"{panel.title}, {motions}",
+        about=about,
+        intensity="peak acceleration / (g tan α)",
+        pga_g=scene.gravity * scene.block.half_width / scene.block.half_height / GRAVITY_OF_RECORDS,
+        cases=tuple(cases),
+    )
 
 
 Runs = tuple[NDArray[np.int8], NDArray[np.bool_]]

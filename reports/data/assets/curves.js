@@ -32,16 +32,28 @@ document.addEventListener("DOMContentLoaded", () => {
     const told = (index, near) => {
       if (index === null || index === undefined) return;
       const shown = chart.single ? chart.curves.filter(curve => curve.width >= 1 || curve === near) : chart.curves;
-      output.textContent = `${chart.across} ${words(chart.intensities[index])}: ` + shown.map(curve => `${curve.label} ${chart.single && curve.values[index] === null ? "fell" : words(curve.values[index])}`
+      const other = chart.per_unit ? ` (${words(chart.intensities[index] * chart.per_unit)} ${chart.other_unit})` : "";
+      output.textContent = `${chart.across} ${words(chart.intensities[index])}${other}: ` + shown.map(curve => `${curve.label} ${chart.single && curve.values[index] === null ? "fell" : words(curve.values[index])}`
         + (curve.high.length ? ` (${words(curve.low[index])} to ${words(curve.high[index])})` : "")).join("; ");
     };
     const axis = { stroke: soft, grid: { stroke: grid, width: 1 }, ticks: { show: false }, font: "11px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif", labelSize: 18 };
     const size = () => ({ width: Math.max(240, host.clientWidth), height: 320 });
+    // The same axis in another unit, above the chart: round values of that unit.
+    const above = {
+      ...axis, scale: "x", side: 0, grid: { show: false }, label: chart.other_label, size: 30,
+      splits: (u, k, low, high, step) => {
+        const power = 10 ** Math.floor(Math.log10(step * chart.per_unit)), round = [1, 2, 5, 10].map(n => n * power).find(n => n >= 0.999 * step * chart.per_unit);
+        const found = [];
+        for (let n = Math.ceil(low * chart.per_unit / round); n * round <= high * chart.per_unit * (1 + 1e-9); n++) found.push(n * round / chart.per_unit);
+        return found;
+      },
+      values: (u, splits) => splits.map(value => words(value * chart.per_unit)),
+    };
     const u = new uPlot({
       ...size(), legend: { show: false }, padding: [8, 12, 0, 0], bands, series,
       cursor: { drag: { x: false, y: false }, points: { show: !chart.single }, y: false },
       scales: { x: { time: false }, y: { range: [0, chart.most] } },
-      axes: [{ ...axis, label: chart.across, size: 30 }, { ...axis, label: chart.along, size: 48 }],
+      axes: [{ ...axis, label: chart.across, size: 30 }, { ...axis, label: chart.along, size: 48 }, ...(chart.per_unit ? [above] : [])],
       hooks: { setCursor: [u => {
         const index = u.cursor.idx, y = u.cursor.top === null ? 0 : u.posToVal(u.cursor.top, "y");
         if (index === null || u.cursor.top < 0) return;

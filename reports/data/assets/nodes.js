@@ -39,6 +39,10 @@
   function figure(host, data) {
     const { frequencies: xs, amplitudes: ys } = data, size = [xs.length, ys.length];
     const store = { node: null, chosen: null };
+    // One's own block: its pulses in Hz and g beside the ratios.
+    const units = data.pulse && data.panels.length === 1;
+    const rim = units ? { ...RIM, top: 34, right: 46 } : RIM, G = 9.80665;
+    const pulseWords = (i, j) => `${words(data.pulse.amplitude[i] / G)} g (${words(data.pulse.amplitude[i])} m/s²), ${words(1 / data.pulse.period[j])} Hz (period ${words(data.pulse.period[j])} s)`;
     const grid = make("div", { class: data.panels.length > 1 ? "panels" : "panels one" }, host);
     const output = make("output", { class: "node" }, host, "Point at a node to name it; click to play it. With a panel in focus: arrows move, enter plays.");
     const panels = data.panels.map(panel => {
@@ -48,7 +52,7 @@
       return { ...panel, title, canvas, said, all: letters(panel.outcomes), image: null };
     });
 
-    const place = canvas => ({ w: canvas.clientWidth - RIM.left - RIM.right, h: canvas.clientHeight - RIM.top - RIM.bottom });
+    const place = canvas => ({ w: canvas.clientWidth - rim.left - rim.right, h: canvas.clientHeight - rim.top - rim.bottom });
     const at = (panel, [i, j]) => panel.all[i * size[0] + j];
 
     function picture(panel) {
@@ -70,24 +74,40 @@
       ctx.scale(ratio, ratio);
       ctx.imageSmoothingEnabled = false;
       panel.image ??= picture(panel);
-      ctx.drawImage(panel.image, RIM.left, RIM.top, w, h);
-      const x = j => RIM.left + (j + 0.5) / size[0] * w, y = i => RIM.top + h - (i + 0.5) / size[1] * h;
+      ctx.drawImage(panel.image, rim.left, rim.top, w, h);
+      const x = j => rim.left + (j + 0.5) / size[0] * w, y = i => rim.top + h - (i + 0.5) / size[1] * h;
       const along = (values, value) => (value - values[0]) / (values[values.length - 1] - values[0]) * (values.length - 1);
       ctx.fillStyle = colour("--soft");
       ctx.font = "10px system-ui, sans-serif";
       ctx.textAlign = "center";
       ctx.textBaseline = "top";
-      for (const value of ticks([xs[0], xs[xs.length - 1]], Math.max(2, w / 28))) ctx.fillText(words(value), x(along(xs, value)), RIM.top + h + 3);
-      ctx.fillText(data.axes[0], RIM.left + w / 2, RIM.top + h + 14);
+      for (const value of ticks([xs[0], xs[xs.length - 1]], Math.max(2, w / 28))) ctx.fillText(words(value), x(along(xs, value)), rim.top + h + 3);
+      ctx.fillText(data.axes[0], rim.left + w / 2, rim.top + h + 14);
       ctx.textAlign = "right";
       ctx.textBaseline = "middle";
-      for (const value of ticks([ys[0], ys[ys.length - 1]], Math.max(2, h / 26))) ctx.fillText(words(value), RIM.left - 3, y(along(ys, value)));
+      for (const value of ticks([ys[0], ys[ys.length - 1]], Math.max(2, h / 26))) ctx.fillText(words(value), rim.left - 3, y(along(ys, value)));
       ctx.save();
-      ctx.translate(8, RIM.top + h / 2);
+      ctx.translate(8, rim.top + h / 2);
       ctx.rotate(-Math.PI / 2);
       ctx.textAlign = "center";
       ctx.fillText(data.axes[1], 0, 0);
       ctx.restore();
+      if (units) {
+        const hertz = data.pulse.period.map(period => 1 / period), gs = data.pulse.amplitude.map(amplitude => amplitude / G);
+        ctx.textAlign = "center";
+        ctx.textBaseline = "bottom";
+        for (const value of ticks([hertz[0], hertz[hertz.length - 1]], Math.max(2, w / 40))) ctx.fillText(words(value), x(along(hertz, value)), rim.top - 3);
+        ctx.fillText("frequency of the pulse, Hz", rim.left + w / 2, rim.top - 16);
+        ctx.textAlign = "left";
+        ctx.textBaseline = "middle";
+        for (const value of ticks([gs[0], gs[gs.length - 1]], Math.max(2, h / 26))) ctx.fillText(words(value), rim.left + w + 3, y(along(gs, value)));
+        ctx.save();
+        ctx.translate(rim.left + w + 38, rim.top + h / 2);
+        ctx.rotate(-Math.PI / 2);
+        ctx.textAlign = "center";
+        ctx.fillText("peak acceleration, g", 0, 0);
+        ctx.restore();
+      }
       ctx.lineWidth = 1;
       for (const [node, ring] of [[store.node, false], [store.chosen?.panel === panel ? store.chosen.node : null, true]]) {
         if (!node) continue;
@@ -95,8 +115,8 @@
         if (ring) { ctx.lineWidth = 2; ctx.beginPath(); ctx.arc(x(node[1]), y(node[0]), 5, 0, 7); ctx.stroke(); }
         else {
           ctx.beginPath();
-          ctx.moveTo(x(node[1]), RIM.top); ctx.lineTo(x(node[1]), RIM.top + h);
-          ctx.moveTo(RIM.left, y(node[0])); ctx.lineTo(RIM.left + w, y(node[0]));
+          ctx.moveTo(x(node[1]), rim.top); ctx.lineTo(x(node[1]), rim.top + h);
+          ctx.moveTo(rim.left, y(node[0])); ctx.lineTo(rim.left + w, y(node[0]));
           ctx.stroke();
         }
       }
@@ -107,13 +127,13 @@
       store.node = node;
       const [i, j] = node, pulse = data.pulse;
       output.textContent = `${data.axes[0].replaceAll(" ", "")} ${words(xs[j])}, ${data.axes[1]} ${words(ys[i])}` +
-        (pulse ? `: a pulse of ${words(pulse.amplitude[i])} m/s², period ${words(pulse.period[j])} s` : "");
+        (pulse ? `: a pulse of ${pulseWords(i, j)}` : "");
       for (const panel of panels) panel.said.textContent = spell(at(panel, node), panel);
       drawAll();
     }
     const nodeAt = (canvas, event) => {
       const { w, h } = place(canvas), box = canvas.getBoundingClientRect();
-      const j = Math.floor((event.clientX - box.left - RIM.left) / w * size[0]), i = size[1] - 1 - Math.floor((event.clientY - box.top - RIM.top) / h * size[1]);
+      const j = Math.floor((event.clientX - box.left - rim.left) / w * size[0]), i = size[1] - 1 - Math.floor((event.clientY - box.top - rim.top) / h * size[1]);
       return [Math.min(Math.max(i, 0), size[1] - 1), Math.min(Math.max(j, 0), size[0] - 1)];
     };
 
@@ -132,7 +152,7 @@
         const [i, j] = kept, index = panels.indexOf(panel), pulse = data.pulse;
         const exact = i === node[0] && j === node[1];
         play(host, all[index], panel.nodes.indexOf(kept), `${panel.title.textContent}, ${data.axes[0].replaceAll(" ", "")} ${words(xs[j])}, ${data.axes[1]} ${words(ys[i])}` +
-          (pulse ? ` (${words(pulse.amplitude[i])} m/s², ${words(pulse.period[j])} s)` : "") + `: ${spell(at(panel, kept), panel)}` +
+          (pulse ? `, ${pulseWords(i, j)}` : "") + `: ${spell(at(panel, kept), panel)}` +
           (exact ? "" : ". The node next to yours whose history is kept."));
       });
     }

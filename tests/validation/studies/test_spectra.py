@@ -638,6 +638,8 @@ def test_records_are_scaled_to_the_intensity(tmp_path, monkeypatch):
     found = fragility.fragility(panel, request, motions("0.csv", "1.csv"), Tiles(tmp_path / "tiles"))
     (case,) = found.cases
     assert (case.motions, case.undecided) == (2, 0)
+    block = panel.scene.block
+    assert found.pga_g == pytest.approx(block.half_width / block.half_height * 9.81 / 9.80665)
 
     # The two records differ only in their size, which the intensity takes out: both directions of each overturn together.
     assert {point[1] for point in case.points} <= {0.0, 0.5, 1.0}
