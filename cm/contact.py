@@ -24,8 +24,8 @@ def felt_share(x: float) -> float:
 def normal_forces(f1: float, f2: float, d1: float, d2: float, k11: float, k12: float, k21: float, k22: float) -> tuple[float, float]:
     """Forces of two Kelvin-Voigt contacts that can only push, each of which feels both forces within the step.
 
-    f is the force k depth - c rate as it would be without them, d what a unit of velocity gained within the step takes off it,
-    and K how much velocity (over the step's length) a unit of force j gives to corner i: F_i + d_i (K F)_i = f_i, but F_i >= 0.
+    f is the force k depth - c rate without them. d is the loss of force for a unit of velocity gained within the step. K is the
+    velocity (over the step's length) that a unit of force j gives to corner i. So F_i + d_i (K F)_i = f_i, but F_i >= 0.
     An open contact has f = d = 0.
     """
     a11, a12, a21, a22 = 1.0 + d1 * k11, d1 * k12, d2 * k21, 1.0 + d2 * k22
@@ -55,13 +55,13 @@ def friction_force(
 
 
 def effective_mass(k_n: float, k_t: float, k_c: float, normal: float, tangential: float, friction: float, restitution: float) -> float:
-    """Share of the block's mass that a corner brings to an impact with friction, arriving at `normal` < 0, `tangential`.
+    """Share of the block's mass that a corner brings to an impact with friction. It arrives at `normal` (< 0) and `tangential` speed.
 
     A unit impulse along the normal changes the corner's velocity by k_n = 1 + 3 r_t^2/R^2 along the normal and by k_c =
     -3 r_n r_t/R^2 along the surface, a tangential one by k_c and k_t = 1 + 3 r_n^2/R^2 (r_n, r_t: offset of the corner from the
     centroid). Friction that holds the corner makes it heavier, 1/m = k_n - k_c^2/k_t; friction mu N that it slips against gives
-    1/m = k_n + mu k_c, signed as it acts. Which of them holds is asked of the rigid impact; that slip stops or turns within
-    the impact is left out.
+    1/m = k_n + mu k_c, signed as it acts. The rigid impact decides which of the two holds. Slip that stops or
+    reverses within the impact is left out.
     """
     held = k_n - k_c * k_c / k_t
     push = (-(1.0 + restitution) * normal + k_c * tangential / k_t) / held

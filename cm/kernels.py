@@ -67,7 +67,7 @@ SWEPT, MOST_SWEEPS = 1e-5, 50
 #: No step is cut for a contact that would close by less than this share of the depth under the block's weight; a contact that
 #: closes more slowly than this share of g/sqrt(k/m) is no impact.
 SHALLOW, GENTLE = 0.1, 0.01
-#: A run that gains this share of the work done on it out of nothing has blown up.
+#: A run whose energy exceeds the work done on it by this share has blown up.
 ENERGY = 0.02
 #: How a stretch of motion ended.
 DONE, OVERTURNED, BLOWN_UP = 0, 1, 2
@@ -164,7 +164,7 @@ def closes(
 def response(
     k: float, damping: float, mobility: float, gap: float, before: float, rate: float, step: float, ahead: float
 ) -> tuple[float, float]:
-    """Force that a closed contact would have if its own forces did not move it, and what a unit of velocity takes off it."""
+    """Force of a closed contact as if its own forces did not move it, and how much a unit of velocity lowers it."""
     share = felt_share(damping * mobility * step)
     return -k * (gap + ahead * rate) - damping * (before + share * (rate - before)), step * (share * damping + k * ahead)
 

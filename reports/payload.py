@@ -1,4 +1,4 @@
-"""What the script of a scene's page needs, as a script file: a page opened from the file system cannot fetch data.
+"""The data of a scene's page, as a script file: a page opened from the file system cannot fetch data.
 
 Values are float32 (rounded to 6e-8 of their size), little-endian, in base64.
 """
@@ -72,7 +72,7 @@ def script(view: SceneView) -> str:
 
 
 def _spells(view: SceneView, model: str) -> list[list[Any]]:
-    """The modes of motion as [start in s, mode], one entry a spell."""
+    """The modes of motion as [start in s, mode], one entry for each change."""
     channels = view.histories[model].channels
     if "mode" not in channels:
         return []

@@ -169,8 +169,8 @@ def save(figure: Figure, stem: Path, formats: Iterable[str] = FORMATS, *, stamp:
 def keep_drawn(stem: Path, shown: object, draw: Callable[[], Figure], formats: Sequence[str] = ("svg",)) -> None:
     """`<stem>.svg` and the other `formats`, drawn only where there is none yet that shows the same.
 
-    `shown` is all that the figure shows, as JSON can hold it; the code that draws is taken into account. A file of another format
-    goes where it would show something else.
+    `shown` is all that the figure shows, as JSON. The code that draws counts, too. A file of another format is removed if it would
+    show something else.
     """
     stamp, paths = stamp_of(shown), {kind: stem.with_name(f"{stem.name}.{kind}") for kind in FORMATS}
     current = stamp_in(paths["svg"]) == stamp

@@ -19,10 +19,10 @@ from rockcheck.validation.suite.results import Cell, Run
 from rockcheck.validation.uncertainty.inputs import Inputs
 
 Array = NDArray[np.float64]
-#: A block that falls is drawn up to this rotation (alpha): from 1 on nothing brings it back.
+#: A block that falls is drawn up to this rotation (alpha). Beyond 1 a block in free rocking does not come back.
 FALL = 1.5
-#: Something happens while a model turns or slides by this share of the most that any does; room beside it, and how much of the whole
-#: time it may take before the whole is shown.
+#: The opening window: a model turns or slides by at least this share of the largest motion; the margin beside it; and the share of
+#: the whole time from which on the whole is shown.
 STILL, ROOM, NEARLY_ALL = 0.01, 0.05, 0.85
 #: Settings that only a measured history has (`validation.discrepancy.measured`).
 MEASURED = {"file", "offset"}
@@ -214,7 +214,7 @@ class SceneView:
 
     @property
     def hop(self) -> Hop | None:
-        """The highest hop of the model that may hop and is trusted most; None where none does, or no model here may."""
+        """The highest hop, by the most trusted model that may hop. None where no model may hop, or none does."""
         order = (*self.unilateral, *(cell.model for cell in self.cells if cell.model not in self.bilateral))
         for cell in sorted(self.cells, key=lambda cell: order.index(cell.model) if cell.model in order else len(order)):
             height = next((f.value for f in cell.figures if f.measure == "highest_hop" and not f.window), None)

@@ -40,7 +40,7 @@ def duration(seconds: float) -> str:
 
 
 def moment(created: str) -> str:
-    """A time of creation, as ISO 8601 has it, to the minute; what is not one, in a run that somebody sent, as it is."""
+    """An ISO 8601 time to the minute. Any other text, as a run from elsewhere may hold, is returned unchanged."""
     try:
         return f"{datetime.fromisoformat(created):%Y-%m-%d %H:%M %Z}"
     except ValueError:

@@ -19,7 +19,7 @@ from rockcheck.scenes.errors import from_validation
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Sizes of numbers in SI units that still have a square, a cube and an inverse.
+#: Allowed sizes of numbers in SI units: their squares, cubes and inverses are still finite.
 LEAST, MOST = 1e-30, 1e30
 
 
@@ -59,7 +59,7 @@ class Shown:
     """Something that a notebook can show, and that has a figure."""
 
     def plot(self) -> Figure:
-        """It as a matplotlib figure."""
+        """This object as a matplotlib figure."""
         return _view_of(type(self)).figure(self)
 
     def _repr_html_(self) -> str:

@@ -1,9 +1,9 @@
 """Compiled functions whose cache can be trusted.
 
-numba's own cache looks at a function's own file only: after a change in a function that it calls, the old machine code would
-be used silently. Here the cache folder is named after the content of all source files of the function's package, such as
-rockcheck.ebm with all below it. And it would run whatever lies in its cache; here only what this user wrote is read, and only where
-it is whole.
+numba's own cache looks at a function's own file only. After a change in a function that it calls, it would silently use the old
+machine code. Here the cache folder is named after the content of all source files of the function's package, such as
+rockcheck.ebm with all below it. numba also runs whatever lies in its cache. Here a file is read only if this user wrote it and
+it is complete.
 """
 
 from __future__ import annotations
@@ -51,9 +51,9 @@ _PURPOSES = {"rockcheck.ebm": "the event-based models", "rockcheck.cm": "the con
 
 
 class _Compiling(Listener):
-    """While numba compiles no garbage is collected: to search all that a compiler keeps for cycles takes a tenth of its time.
+    """Switches garbage collection off while numba compiles: searching the compiler's objects for cycles takes a tenth of its time.
 
-    What takes long is announced, once a package and process: whoever waits should know for what.
+    A long compilation is announced once a package and process, so that a user knows what the wait is for.
     """
 
     def __init__(self) -> None:
@@ -191,7 +191,7 @@ class _InnerCompiler(Compiler):
 class _Cache(FunctionCache):
     """The compiled variants of one function, a file each that begins with the hash of the rest.
 
-    A file that is damaged is as good as none: it is removed, and the function compiled again. numba itself would unpickle it.
+    A damaged file is removed and the function compiled again. numba itself would unpickle it.
     """
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
@@ -268,10 +268,10 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def interruptible(call: Callable[[], Result]) -> Result:
-    """What `call` of a kernel gives, so that Ctrl-C ends the wait for it at once.
+    """The result of `call`, which runs a kernel. Ctrl-C ends the wait at once.
 
-    Python hears of a signal only between two of its own steps, and a kernel may run for minutes. So in the main thread, which is
-    the one that is interrupted, it runs in another; one that nobody waits for any more ends with the process.
+    Python handles a signal only between two of its own steps, and a kernel may run for minutes. The main thread is the one that is
+    interrupted; it runs the kernel in a second thread. After Ctrl-C that thread goes on unobserved and ends with the process.
     """
     if threading.current_thread() is not threading.main_thread():
         return call()
@@ -291,7 +291,7 @@ def interruptible(call: Callable[[], Result]) -> Result:
 
 @contextlib.contextmanager
 def threads(count: int) -> Iterator[ThreadPoolExecutor]:
-    """Threads for kernels. Left by an exception (Ctrl-C is one), nobody waits for what they are at."""
+    """Threads for kernels. When an exception (Ctrl-C is one) leaves the block, kernels that still run are not waited for."""
     pool = ThreadPoolExecutor(count)
     try:
         yield pool
@@ -308,8 +308,8 @@ _INNER = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True, "pipe
 def inner_kernel(function: Callable[..., Any]) -> Any:
     """A part of kernels that neither makes nor returns an array, but works on those that it is given.
 
-    It is compiled into the kernels that call it, without the counting of references, atomic operations that cost as much as a
-    short loop, and without an entrance for Python, where it stays the function that it is. numba refuses to compile one that
+    It is compiled into the kernels that call it. It has no reference counting, whose atomic operations cost as much as a short
+    loop, and no entry point for Python, which calls the plain function instead. numba refuses to compile one that
     makes an array; one that returns an array would free it too early.
     """
     return register_jitable(**_INNER)(function)

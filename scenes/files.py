@@ -78,8 +78,8 @@ def _record_path(name: str, folder: Path) -> Path:
 
 #: Largest TOML file, bytes.
 MOST_BYTES = 10_000_000
-#: A key of so many parts that the parser's memory, which goes with their square, would be at stake. Every character is looked
-#: at a bounded number of times: a match begins only where a part does, and no part is tried in another way.
+#: A key with too many parts: the parser's memory grows with the square of their number. The search takes linear time, since a
+#: match begins only at a part, and no part can match in two ways.
 _PART = r"""(?:"[^"\n]*+"|'[^'\n]*+'|[^\s.,=\[\]"']++)"""
 _DEEP_KEY = re.compile(rf"(?<![^\s.,=\[\]]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{49}}")
 

@@ -97,7 +97,7 @@ class History(Shown):
     #: Of a block that is not homogeneous: place of its mass's centre (m), moment of inertia per unit mass (m^2); see `Block`.
     centre_of_mass: tuple[float, float] | None = None
     moment_of_inertia: float | None = None
-    #: Of figures that are not exact by their source, such as a mean of tests: the 95 % interval's half width by measure, SI.
+    #: Half width of the 95 % interval by measure (SI), of figures that are uncertain at their source, such as a mean of tests.
     uncertainty: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
@@ -302,7 +302,7 @@ def events_path(path: Path) -> Path:
 
 
 def _packed(text: str) -> bytes:
-    """The same text gives the same bytes. More effort makes histories 2 % smaller in twice the time, less 5 % larger in half of it."""
+    """Compressed; the same text gives the same bytes. A higher level saves 2 % in twice the time, a lower one costs 5 % and takes half."""
     return gzip.compress(text.encode(), compresslevel=4, mtime=0)
 
 

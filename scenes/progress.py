@@ -1,7 +1,7 @@
 """How far a run has come: one protocol for models, spectra, studies, suites and pages.
 
-Whoever works calls `on_progress(done, total, what)`. A model has no argument for it: it calls `tell`, and whoever is `listening`
-hears it; without a listener that costs nothing.
+Long work calls `on_progress(done, total, what)`. A model has no argument for it. It calls `tell`, which reaches the block that is
+`listening` in the same thread; without one the call costs nothing.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ class OnProgress(Protocol):
 
 
 def unheard(done: float, total: float, what: str = "") -> None:
-    """An `OnProgress` for nobody."""
+    """An `OnProgress` that does nothing."""
 
 
 _listener: ContextVar[OnProgress] = ContextVar("listener", default=unheard)
 
 
 def tell(done: float, total: float, what: str = "") -> None:
-    """Tells whoever listens in this thread."""
+    """Passes the progress on to the listener of this thread, if there is one."""
     _listener.get()(done, total, what)
 
 
@@ -47,13 +47,13 @@ _announcer: Callable[[str], None] | None = None
 
 
 def announce(words: str) -> None:
-    """Says in one line what a user waits for, in whatever thread, where somebody is `announcing`; else nothing."""
+    """Says in one line what a user waits for, from any thread. It is silent where no block is `announcing`."""
     if _announcer is not None:
         _announcer(words)
 
 
 def announced() -> bool:
-    """Whether somebody is `announcing`."""
+    """Whether a block is `announcing`."""
     return _announcer is not None
 
 
@@ -76,7 +76,7 @@ def announcing(say: Callable[[str], None] | None) -> Iterator[None]:
 
 @dataclass
 class Count:
-    """Adds up parts that are done here and there, in any thread, and tells `on_progress` the sum."""
+    """Adds up the parts that several threads finish, and tells `on_progress` the sum."""
 
     on_progress: OnProgress = unheard
     total: float = 0.0
@@ -90,7 +90,7 @@ class Count:
             self.on_progress(self.done, self.total)
 
     def part(self) -> OnProgress:
-        """An `OnProgress` for somebody whose work is a part of all."""
+        """An `OnProgress` for one part of the whole work."""
         before = 0.0
 
         def told(done: float, total: float, what: str = "") -> None:

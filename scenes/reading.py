@@ -48,7 +48,8 @@ def open_regular(path: Path, most: int) -> IO[bytes]:
 def read_text(path: Path, most: int = MOST_BYTES, *, latin: bool = False) -> str:
     """The text of a file without a byte-order mark. Raises `InputError` where it is no file, too large or not UTF-8.
 
-    With `latin` a file that is not UTF-8 is read as UTF-16, where it has such a mark, else as Latin-1, where it has no controls.
+    With `latin` a file that is not UTF-8 is read as UTF-16 if it has that byte-order mark, else as Latin-1 if it has no control
+    characters.
     """
     with open_regular(path, most) as stream:
         try:

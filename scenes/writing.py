@@ -1,4 +1,4 @@
-"""Writing: no half of a file, tables as CSV, values as JSON."""
+"""Writing: files that are complete or untouched, tables as CSV, values as JSON."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def write_new(path: Path, content: str) -> Path:
 
 
 def _named(error: OSError, path: Path) -> OSError:
-    """The same fault, which names the file that was to be written."""
+    """The same error with the name of the file that was to be written."""
     return OSError(error.errno, error.strerror or str(error), str(path))
 
 

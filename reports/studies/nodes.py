@@ -73,7 +73,7 @@ def _outcomes(path: Path) -> NDArray[np.str_] | None:
 
 
 def _runs(letters: NDArray[np.str_]) -> str:
-    """The letters row by row, each run of equal ones as its length and its letter."""
+    """The letters row by row, run-length encoded: each run as its length and its letter."""
     return "".join(f"{len(list(same))}{letter}" for letter, same in itertools.groupby(letters.ravel()))
 
 

@@ -1,6 +1,6 @@
 """Calls in processes of their own, with limits of time and memory: for cells, spectra, studies and pages alike.
 
-A process that crashes, hangs or runs out of memory costs the call that it was at, and nothing else.
+A process that crashes, hangs or runs out of memory loses its current call, and nothing else.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Ended:
 
     @property
     def unexpected(self) -> bool:
-        """Whether the call raised what nobody foresaw: a fault of rockcheck's own, where the call runs nothing else."""
+        """Whether the call raised an unexpected exception: a fault of rockcheck's own, unless the call ran a user's code."""
         from pebble import ProcessExpired
 
         foreseen = (InputError, ModelFailure, OSError, TimeoutError, ProcessExpired, MemoryError)
@@ -81,7 +81,7 @@ class Ended:
 class Pool:
     """`jobs` processes with one thread and at most `memory_mb` each (None: as much as there is).
 
-    A context: left by an exception (Ctrl-C is one), it ends whatever they do.
+    A context: when an exception (Ctrl-C is one) leaves it, it ends the processes.
     """
 
     jobs: int
@@ -140,7 +140,7 @@ class Pool:
                 future.cancel()
 
     def _begin(self, waiting: deque[Call], running: dict[Future[Any], tuple[Call, float]]) -> None:
-        """Begins calls for all processes that have none; one that waits for a compiler is passed over."""
+        """Gives calls to all idle processes. A call that waits for another one to compile is passed over."""
         compiling = {call.compiles for call, _ in running.values()} - self._compiled
         held: list[Call] = []
         while waiting and len(running) < self.jobs:

@@ -1,4 +1,4 @@
-"""Histories of some nodes of a spectrum, thinned until they are just good enough to be looked at.
+"""Histories of some nodes of a spectrum, with as few rows as a drawing needs.
 
 A page plays them: the event-based model's own motion, not an imitation of it. `<name>.histories.npz` beside a spectrum holds them.
 """
@@ -59,7 +59,7 @@ def _spread(size: int) -> NDArray[np.int64]:
 
 
 def _enough(t: Floats, values: Floats) -> list[int]:
-    """The rows that stay: halving from both ends, at the row that is farthest from the straight line."""
+    """The rows to keep: from the first and last row on, each part is split at the row farthest from its straight line."""
     kept, open_ = {0, len(t) - 1}, [(0, len(t) - 1)]
     while open_:
         first, last = open_.pop()

@@ -21,7 +21,7 @@ QUANTITIES = {"theta_rms": "alpha", "peak_rotation": "alpha", "last_slip": "m"}
 
 
 def key_of(uncertainty: bool) -> dict[str, str]:
-    """What a cell's key depends on besides, where its numerical uncertainty is asked for."""
+    """What a cell's key also depends on if its numerical uncertainty is asked for."""
     return {"uncertainty": provenance.code_digest("rockcheck.validation.uncertainty.numerical")} if uncertainty else {}
 
 
@@ -54,7 +54,7 @@ def explanations(
 ) -> Iterator[Explanation]:
     """The verdict on each quantity against each reference, by name: its own figures and its record (`records`).
 
-    `own` is the candidate's record. Nothing comes of a model without a known numerical error, nor of a block that falls.
+    `own` is the candidate's record. There is no verdict for a model whose numerical error is unknown, nor for a block that falls.
     """
     numerical = numerical_of(own)
     if numerical is None:

@@ -57,8 +57,8 @@ def by_either(
 ) -> tuple[tuple[Figure, ...], dict[str, tuple[str, bool]]]:
     """The figures of a comparison, those of BY_EITHER against the nearer of its reference and the one under the other `law`.
 
-    A figure whose nearer law is the other one says so; the second answer tells, by measure, what could not be compared under it and
-    whether because one block fell.
+    A figure says so if its nearer law is the other one. The second value says, by measure, what could not be compared under that
+    law, and whether the reason is that one block fell.
     """
     wanted = [measure for measure in measures if measure in BY_EITHER]
     other = compare(reference, candidate, until=until, scene=scene, measures=wanted)

@@ -200,7 +200,7 @@ class Run(Stored):
 
     @property
     def verdict(self) -> Verdict:
-        """The worst cell; "fail" at least where there are faults, and never "pass" without a single check that was to be made."""
+        """The worst cell's verdict. At least "fail" where there are faults, or where checks were asked for and none was made."""
         found = worst([cell.verdict for cell in self.cells] + (["fail"] if self.faults else []))
         return found if not self.judged or any(cell.checks for cell in self.cells) else worst([found, "fail"])
 

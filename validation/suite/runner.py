@@ -218,7 +218,8 @@ def run_suite(
 
 
 def _fault(item: Planned, traceback: str, folder: Path) -> dict[str, Any]:
-    """Keep the traceback of an exception that no model may raise; what a cell says of it. One of the user's own model is that model's."""
+    """Keeps the traceback of an exception that no model may raise; returns what the cell says of it. In a user's own model it is that
+    model's fault, not rockcheck's."""
     (folder / FAULTS).mkdir(exist_ok=True)
     path = write_whole(folder / FAULTS / f"{item.name}.txt", traceback)
     return {"traceback": f"{FAULTS}/{path.name}", "unexpected": not is_own(item.variant.family_name)}
@@ -229,7 +230,7 @@ def _key(scene: Scene, variant: ModelVariant) -> str:
 
 
 def _batches(ensemble: Ensemble, base: Scene, variant: ModelVariant) -> Iterator[PlannedBatch]:
-    """An ensemble cut into batches; a batch's key covers how its scenes are drawn, so that they need not be drawn to look it up."""
+    """An ensemble in batches. A batch's key covers how its scenes are drawn, so it can be looked up without drawing them."""
     drawing = {
         "ensemble": ensemble.model_dump(mode="json", exclude={"count", "batch", "description"}),
         "code": provenance.code_digest("rockcheck.validation.suite.ensembles"),

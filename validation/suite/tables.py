@@ -143,7 +143,7 @@ def used(check: Check) -> float:
 
 
 def percent(check: Check) -> str:
-    """`used` in words; a question's answer has no share."""
+    """`used` in words; a yes-or-no measure has no share."""
     if asks(check):
         return value_words(check.figure.value, yes_no=True)
     if check.words == "no tolerance yet":
@@ -152,12 +152,12 @@ def percent(check: Check) -> str:
 
 
 def nearest(cell: Cell) -> Check | None:
-    """The check that failed, else the one nearest to its limit; what can only be met or not, a limit of 0 among it, is near to none."""
+    """The check that failed, else the one nearest to its limit. A yes-or-no measure, or a limit of 0, is never near its limit."""
     return max((check for check in cell.checks if check.verdict == "fail" or graded(check)), key=used, default=None)
 
 
 def asks(check: Check) -> bool:
-    """Whether the measure asks a question, to be answered by yes or no."""
+    """Whether the measure is a yes-or-no one."""
     measure = MEASURES.get(check.figure.measure)
     return measure is not None and measure.yes_no
 

@@ -21,13 +21,13 @@ from rockcheck.validation.suite.tables import checks_csv, figures_csv
 from rockcheck.validation.suite.verdicts import junit, markdown
 
 LOCK, HOLDER = ".lock", ".lock.holder"
-#: How long a run waits in silence for another one that writes the same folder, and how long at all, s.
+#: How long a run waits for another one that writes the same folder: before it says so, and in all, s.
 SILENT, PATIENCE = 2.0, 600.0
 
 
 @contextmanager
 def _turn(folder: Path) -> Iterator[None]:
-    """Within this block no other run writes into `folder`. Who waits says for whom, and gives up after `PATIENCE` s."""
+    """Within this block no other run writes into `folder`. A run that waits says for which one, and gives up after `PATIENCE` s."""
     lock = FileLock(folder / LOCK)
     try:
         lock.acquire(timeout=SILENT)
