@@ -12,7 +12,7 @@ from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.scene import Scene
 
-#: What is disturbed, relatively, and the separation in alpha up to which histories still say the same.
+#: The relative disturbance, and the separation (alpha) up to which two histories still count as the same.
 PERTURBATION, ALLOWED = 1e-6, 1e-3
 START = ("initial_rotation", "initial_angular_velocity", "initial_velocity", "initial_height")
 
@@ -27,8 +27,8 @@ def predictability_horizon(
     which all rotations stay within `allowed` (alpha) of the undisturbed ones; the scene's duration where they always do.
 
     With 1e-6 and 1e-3 it is the time in which the motion amplifies an error a thousandfold. Beyond it an error of 1e-4 alpha,
-    which is a good engine's, is as large as a tenth of the motion: how far two histories are apart then tells of the scene, no
-    more of the models. It is the ratio that matters: with 1e-7 and 1e-4 the horizon of El Centro is the same. Deterministic.
+    as a good engine has, has grown to a tenth of the motion. How far two histories are apart then depends on the scene, not on
+    the models. It is the ratio that matters: with 1e-7 and 1e-4 the horizon of El Centro is the same. Deterministic.
     The model's tolerance has to be well below the perturbation. Raises what `simulate` raises.
 
     A scene with a wall is played once more under the other law of impacts: where several contacts are struck at once, as when a

@@ -63,7 +63,7 @@ class EventBasedModel(Frozen):
         return min(HIGHEST_ORDER, math.ceil(-0.5 * math.log(self.tolerance)) + 4)
 
     def finer(self) -> Self:
-        """The same model at a hundredth of its tolerance, as far as double precision goes."""
+        """The same model at a hundredth of its tolerance, or at the finest tolerance that double precision allows."""
         return self.model_copy(update={"tolerance": max(self.tolerance / 100.0, 1e-15)})
 
     def check(self, scene: Scene) -> None:
@@ -189,7 +189,7 @@ def _events(log: np.ndarray, unit: float, radius: float) -> list[Event]:
 
 
 def vars_of(history: History) -> dict[str, Any]:
-    """The fields of a history, without what it has cached."""
+    """The fields of a history, without its cached values."""
     return {name: getattr(history, name) for name in History.__dataclass_fields__}
 
 

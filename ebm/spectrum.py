@@ -20,7 +20,7 @@ from rockcheck.scenes.scene import Scene
 
 Floats = NDArray[np.float64]
 MOST_NODES = 50_000_000
-#: Of the model that plays a spectrum unless another is given: well below what moves a boundary by a node.
+#: Tolerance of the model that plays a spectrum by default: far too small to move a boundary by a node.
 TOLERANCE = 1e-8
 #: Of a refined spectrum: distance of the nodes that are run first, the fewest cells an axis that they may leave, and how far (in
 #: nodes) around a boundary nothing is inferred: hairs thinner than the nodes' distance break into dots, which are found so.
@@ -28,7 +28,7 @@ COARSEST, FEWEST_CELLS, FOLLOWED = 8, 12, 3
 #: The outcome codes of a spectrum.
 LEFT, SAFE, RIGHT = -1, 0, 1
 _UNKNOWN = 9
-#: Of nodes: their sides, and whether the run failed.
+#: Results of nodes: their sides, and whether the run failed.
 Nodes = tuple[NDArray[np.int8], NDArray[np.bool_]]
 #: Plays nodes of a spectrum: scene, amplitude ratios and frequency ratios (1-D, of one length) to sides and failures, see `play_nodes`.
 Player = Callable[[Scene, Floats, Floats], Nodes]

@@ -86,9 +86,9 @@ Z, V, Z2, SPIN2, WEIGHT, ARM, TURN, REACH, INERTIA, LOAD, PUSH, ZA, LEVER, DEN, 
 _ROWS = ROWS + 15
 
 _LOOK = 6
-# z nears 1 for ever. So near to it what hangs on the difference (a block that tips just as it slips) is noise: it has yielded.
+# z tends to 1 and never reaches it. Within this distance the difference is noise (a block may tip just as it slips): it has yielded.
 _YIELDS = 1e-6
-# Nearer to it than the tolerance, a multiple, and than rounding it has yielded, too.
+# It has also yielded within this multiple of the tolerance, and within rounding.
 _NEARLY = 10.0
 
 
@@ -243,7 +243,7 @@ def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, rules, a):
     if tips:
         zeta = min(max(-u / max(b.mu_k * abs(g), SLOW), -1.0), 1.0)
         if u != 0.0 and abs(abs(u) - g * min(arm / b.height, b.mu_k)) < NOISE[FORCE]:
-            # Just where it tips or slips: near g = 0 the quotient says no more, and its rounding would be a moment.
+            # Just where it tips or slips. Near g = 0 the quotient is no better known, and its rounding would act as a moment.
             zeta = -math.copysign(min(arm / (b.height * b.mu_k), 1.0) if b.mu_k > 0.0 else 1.0, u)
         if _tip(b, m, z, sense, zeta, yield_displacement, gh, gv, t, rules, a):
             return zeta
@@ -305,7 +305,7 @@ def _wedged_series(b, m, z, zeta, gh, gv, t, order, reach, a):
 
 @inner_kernel
 def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a):
-    """Lets the corners of a tilting block rest on the walls that they touch and that would push them; more of them come first."""
+    """Lets the corners of a tilting block rest on the touched walls that would push them. Sets with more walls are tried first."""
     touched = (1 if closed_wall(b, z, m[S], False) else 0) + (2 if closed_wall(b, z, -m[S], True) else 0)
     for attempt in range(5):  # where none fits, but for rounding, it rests on all that it touches
         walls = 3 - attempt if attempt < 4 else touched
@@ -328,7 +328,7 @@ def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a):
 
 @inner_kernel
 def _walls_hold(b, m, touched, a):
-    """Whether the walls of the mode push and those that are touched besides are left."""
+    """Whether the mode's walls push, and the block leaves all other walls that it touches."""
     for which in range(2):
         if m[TIP if which == 0 else FAR] != 0:
             if leading(a, NA if which == 0 else NB, _LOOK - 2, NOISE[FORCE], AHEAD) < 0:
@@ -343,10 +343,10 @@ def _walls_hold(b, m, touched, a):
 
 @inner_kernel
 def _aim(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a):
-    """Sets the sign of P, whose series the workspace then holds; returns whether P has it.
+    """Assumes a sign of P and fills the workspace with the series for it; returns whether P has that sign.
 
-    Below Painleve's limit it does not depend on the sign that is assumed for it. Beyond, where a push would pull itself along (its
-    denominator is negative), pull and push both solve the equations or neither does: the motion goes on with the pull.
+    Below Painleve's limit P does not depend on the sign that is assumed. Beyond it the denominator is negative for a push, and pull
+    and push both solve the equations or neither does. The motion then goes on with the pull.
     """
     m[PULL] = 1
     friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
@@ -435,7 +435,7 @@ def locate(b, m, order, h, slack, a, stack):
 
 @placed_kernel
 def wind_up(r, order, tau, tolerance, log, a):
-    """Takes z to the end of a step of tau; where it has come to +-1 the pivot has yielded."""
+    """Moves z to the end of a step of tau. Where it has come to +-1 the pivot has yielded."""
     m = r.m
     if m[FLOOR] != SLIPPING or r.counts[HOLDS] == 0:
         return

@@ -40,7 +40,7 @@ def stand(b, z):
 
 @inner_kernel
 def stop(z):
-    """Nothing moves."""
+    """Sets all velocities to zero."""
     z[W] = z[VX] = z[VY] = 0.0
 
 
@@ -84,7 +84,7 @@ def closed_floor(b, z):
 
 @inner_kernel
 def closed_gap(gap, rate):
-    """A gap and its rate, zero where it touches and closes so slowly that it rests: then its acceleration decides."""
+    """A gap and its rate; both zero where it touches and closes slowly enough to rest. Then its acceleration decides."""
     if abs(gap) < CLOSED:
         if -SLOW < rate < 0.0:
             return 0.0, 0.0
@@ -105,7 +105,7 @@ def upright(b, z):
 
 @inner_kernel
 def land_upright(b, z, sign, on_floor):
-    """Sets theta from nearly to exactly zero, the pivot keeping its place; a side that then touches a wall touches it exactly."""
+    """Sets a theta near zero to exactly zero and keeps the pivot's place. A side that then touches a wall touches it exactly."""
     side = side_of(b, sign)
     z[X] += sign * (side.arm - side.radius * math.sin(side.alpha - sign * z[THETA]))
     if on_floor:

@@ -10,7 +10,8 @@ from rockcheck.ebm.core.ground import GAUSSIAN, STILL, acceleration, impulse_ahe
 from rockcheck.ebm.core.motion import FAMILY, FAR, FLAT, FLOOR, HEIGHT, STICK, THETA, TILT, TIP, VX, VY, S, W, side_of
 from rockcheck.scenes.compiled import inner_kernel
 
-# A pulse is over when this part of the tolerance is left of it; a bound on the energy keeps this margin where impacts may add some.
+# A pulse is over when its acceleration is below this share of the tolerance. The second is the energy bound's margin where impacts
+# may add energy.
 _LEFT, _MARGIN = 1e-3, 0.9
 _TINIEST = math.ulp(0.0)
 
@@ -36,7 +37,7 @@ def decided(b, m, z, gh, gv, t, quiet, peak):
 
 @inner_kernel
 def _by_energy(b, m, z, ahead, peak):
-    """The verdict of the energy that the block has and can get.
+    """What the energy that the block has and can still gain says of its outcome.
 
     `ahead` bounds the integral of |u| to come, I. The energy E of block and floor, counted from standing, grows by no other
     work: dE/dt <= |u| sqrt(2 E), so that sqrt(2 E) grows by at most I. A block that can never reach the energy of standing on

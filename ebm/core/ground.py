@@ -38,7 +38,7 @@ class Ground(NamedTuple):
 
 
 _NO_SAMPLES = np.zeros(1)
-#: Times nearer to each other than this part of a sample interval, or of a pulse, are one; rounding of a double.
+#: Times that differ by less than this share of a sample interval, or of a pulse's width, are the same time. Rounding of a double.
 _SAME, _EPSILON = 2.0**-30, 2.0**-52
 STILL_GROUND = Ground(STILL, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _NO_SAMPLES)
 _RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, 40)])
@@ -234,8 +234,8 @@ def _passage(g, a, b, fa, fb, level):
 def next_exceedance(g, t, low, high, noise, ahead):
     """The time from t on at which the acceleration passes below `low` or above `high`, on that side, to be beyond by `noise`; else NEVER.
 
-    It is the passage of the limit itself, but no more than `ahead` before that of the limit and the noise: what lingers at its limit has
-    not left it.
+    This is when it passes the limit itself, but at most `ahead` before it passes the limit by the noise: an acceleration that stays
+    near its limit has not exceeded it.
     """
     here = acceleration(g, t)
     while True:

@@ -43,7 +43,7 @@ from rockcheck.ebm.core.motion import (
 from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, POSITION, RATE, first_root
 from rockcheck.scenes.compiled import inner_kernel
 
-# In the order in which those of one instant count: floor before walls, contacts before friction.
+# In order of priority at one instant: floor before walls, contacts before friction.
 (
     G_PHI,
     G_TOPPLE,
@@ -74,7 +74,7 @@ def _has(a, which, shorter):
 
 @inner_kernel
 def drop(a, which):
-    """Takes a guard from the table."""
+    """Removes a guard from the table."""
     a[TABLE + which, _SHORTER] = -1.0
 
 
@@ -179,7 +179,7 @@ def _fill_flat(b, m, a):
     for plus in (True, False):
         held = m[TIP if plus else FAR] != 0
         uplift = G_UPLIFT_PLUS if plus else G_UPLIFT_MINUS
-        # What hangs by both corners tips as soon as anything tells to which side.
+        # A block that hangs by both corners tips as soon as anything favours one side.
         a[TABLE + uplift, P] = 0.0 if hangs and not on_wall else (b.left.arm if plus else b.right.arm)
         a[TABLE + uplift, Q] = -b.height if plus else b.height
         _has(a, uplift, -1 if m[FLOOR] == STICK and held else 2)
@@ -218,9 +218,9 @@ def guard(which, order, a):
 
 @inner_kernel
 def _with_slack(which, slack, a):
-    """The noise of the guard in the workspace in a mode with this slack; a contact that is not closed any more is no noise.
+    """The noise allowed to the guard in the workspace, in a mode with this slack. An open contact is not noise.
 
-    A gap that touches without speed may close so far: that takes time, so that events at one instant end.
+    A gap that touches without speed may close by the noise. That takes time, so that the events of one instant come to an end.
     """
     if KIND[which] != POSITION:
         return slack * NOISE[KIND[which]]
@@ -232,9 +232,9 @@ def _with_slack(which, slack, a):
 
 @inner_kernel
 def seen(kind, smooth):
-    """How far ahead a guard of this kind is weighed where the base motion is smooth for the time `smooth`.
+    """How far ahead a guard of this kind is judged where the base motion is smooth for the time `smooth`.
 
-    Forces follow the base acceleration at once, and beyond its next kink the series knows nothing of it; positions outlast a kink.
+    Forces follow the base acceleration at once, and the series does not know it beyond its next kink. Positions change little at one.
     """
     return min(AHEAD, smooth) if kind == FORCE else AHEAD
 
@@ -250,7 +250,7 @@ def first_event(order, h, slack, a, stack):
         degree = guard(k, order, a)
         if degree >= 0:
             noise = _with_slack(k, slack, a)
-            # In h, not tau: the mirror image has another order.
+            # Compared in h, not tau: a mirror image has its guards in another order.
             root = first_root(a, GUARD, degree, h, noise, seen(KIND[k], h), stack)
             closes = 0 <= which <= G_FAR_GAP < k
             if root != NO_ROOT and root < tau - (INSTANT if closes else 0.0):
@@ -263,7 +263,7 @@ def first_event(order, h, slack, a, stack):
 
 @inner_kernel
 def rock_guards_hold(b, order, h, a):
-    """A cheap proof that a rocking block keeps every guard of ROCK but G_PHI through a step h, or False where it is open.
+    """A cheap proof that a rocking block keeps every guard of ROCK but G_PHI through a step h. False where it proves nothing.
 
     Each guard is bounded from below by its value now less the sum of its other terms.
     """

@@ -228,7 +228,7 @@ def _sample_rest(r, until, control, records):
 
 @placed_kernel
 def _may_go_on(b, gh, gv, r, t_end, control):
-    """GOING, or how the run ends here: its time is up, its outcome is certain, or it has taken too many steps."""
+    """GOING, or why the run ends here: its time is up, its outcome is certain, or it has taken too many steps."""
     z, now = r.z, r.now
     if now[T] >= t_end:
         return DONE
@@ -285,7 +285,7 @@ def _expand(b, m, z, gh, gv, t, reach, control, a):
     if m[FAMILY] == FLAT:
         order = flat_series(b, m, z, gh, gv, t, control.order, a)
         return order, 0.0, step_size(a, U, G, order, control.tolerance, reach)
-    # A motion that is still tiny, and may grow, keeps its digits.
+    # The tolerance is relative to a motion that is still tiny, since it may grow.
     enough = 0.01 * control.tolerance * min(1.0, 1e2 * (abs(z[THETA]) + abs(z[W])))
     order = tilt_series(b, m, z, gh, gv, t, control.order, enough, reach, a)
     h = reach
@@ -353,9 +353,9 @@ def _advance(b, r, order, pivot, tau, a, stack):
 
 @placed_kernel
 def _grazes(b, r, order, pivot, tau, h, control, a):
-    """Whether a block that comes down hanging, with less energy than is known, does not land; it is then put where it turns back.
+    """Whether a hanging block that comes down with less energy than the tolerance does not land. It is then put where it turns back.
 
-    Left at rest as the floor falls away, a block swings back to just where it started, which nothing tells from a touch.
+    A block at rest whose floor falls away swings back to just where it started. That cannot be told from a touch.
     """
     z, m = r.z, r.m
     if m[TIP] != 0 or m[FAR] != 0 or value(a, G, order, tau) >= 0.0:
@@ -384,7 +384,7 @@ def _resolve(b, gh, gv, r, which, yields, records, a):
         struck, known = strike(b, m, z, which, gh, t, resting, r.impulse, r.gains, r.rules)
         kind = WALL_IMPACT if struck == ON_WALL else (LANDS if struck == LANDING else FLOOR_IMPACT)
         if r.impulse[0] + r.impulse[1] > 0.0:
-            forget(r.tried, r.memory, t)  # a new motion: all modes are open again
+            forget(r.tried, r.memory, t)  # a new motion: all modes may be tried again
         elif yields is not None:
             slacken(r.memory)
     elif yields is None:
@@ -402,7 +402,10 @@ def _resolve(b, gh, gv, r, which, yields, records, a):
 
 @inner_kernel
 def _lies_along_wall(m, z, which, rules):
-    """Whether a block that turns over about a standing pivot meets the wall as it comes to lie: the gap goes with the rest squared."""
+    """Whether a block that turns over about a standing pivot meets the wall as it comes to lie.
+
+    Its gap goes with the square of the angle that is left.
+    """
     rest = math.cos(z[THETA])
     lies = which == G_TIP_GAP and m[FAMILY] == TILT and m[FLOOR] == STICK and rest * rest < CLOSED and m[S] * z[W] > 0.0
     rules[LANDS_ALONG] += lies
@@ -418,7 +421,7 @@ def _release(b, m, z, which):
         stand(b, z)
         return STICKS
     if not b.unilateral and m[FAMILY] == FLAT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0:
-        return LEAVES_REST  # or hangs on, or lands again: the mode that follows tells
+        return LEAVES_REST  # or hangs on, or lands again: the next mode says which
     if which == G_CONE_PLUS or which == G_CONE_MINUS:
         return SLIPS
     if which == G_UPLIFT_PLUS or which == G_UPLIFT_MINUS:

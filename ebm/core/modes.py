@@ -6,9 +6,9 @@ Applied to the bilateral pivot this selection is the paper's: its rules for upli
 tilted block and for the corner that stays on the wall come out as the one consistent candidate; tests hold the closed forms
 against it.
 
-Termination. At one instant a mode is selected once: one that was selected and has ended there is taken again only where no other
-fits, and then, as where none fits at all, the one that contradicts itself least goes on with a *slack*, the noise that its guards are
-allowed. Each further such selection at that instant doubles the least slack, so that it soon exceeds all forces and time goes on.
+Termination. At one instant a mode is selected once. One that has ended at that instant is selected again only where no other fits.
+Then, and where none fits at all, the mode that is wrong by least goes on with a *slack*: the noise that its guards are allowed. Each
+further such selection at that instant doubles the least slack. It soon exceeds all forces, and time goes on.
 """
 
 from __future__ import annotations
@@ -49,23 +49,23 @@ from rockcheck.scenes.compiled import inner_kernel
 
 #: Order of the series that a selection looks at.
 _LOOK = 6
-#: A base acceleration that is zero shows where it goes so soon (samples of a record may be much nearer than AHEAD).
+#: Where a base acceleration is zero, its sign is read this much later (samples of a record may be much closer than AHEAD).
 SOON = 1e-6
-# What a run remembers of the selections at one instant: the slack of the mode, in noises, the least slack of the next one that does not
-# fit, when the instant began, and when the mode was selected. The modes tried in it are a row of flags.
+# What a run remembers of the selections at one instant: the mode's slack (in units of noise), the least slack of the next mode that
+# does not fit, when the instant began, and when the mode was selected. A row of flags marks the modes that were tried.
 SLACK, LEAST_SLACK, SINCE, BEGAN = range(4)
 MEMORY = 4
 MODES = 128
 
 
 def _candidates() -> np.ndarray:
-    """All modes in the order in which they are tried: more contacts first, sticking before slipping, a pushing floor before a pull.
+    """All modes in the order of trial: more contacts first, sticking before slipping, a pushing floor before a pulling one.
 
     Columns: family, sense of tilting or slip, what the pivot does, slip, pull, walls (1 tip or left, 2 far or right, 3 both), whether
     only a flat block tries it. For a flat block all senses are relative to that of `tips_first`.
     """
     stands = [(FLAT, 1, STICK, 0, pull, walls, 0) for walls in (3, 1, 2, 0) for pull in (1, -1)]
-    # Static friction above kinetic can leave both rocking and sliding consistent: it holds as long as it can.
+    # With static friction above kinetic both rocking and sliding can be consistent. Then the pivot sticks.
     rows = [*stands, (TILT, 1, STICK, 0, 1, 0, 1)]
     for family, sense in ((FLAT, 1), (TILT, 1), (TILT, -1)):
         pivot = ((STICK, 0), (SLIPPING, -1), (SLIPPING, 1))
@@ -100,7 +100,7 @@ def forget(tried, memory, t):
 
 @inner_kernel
 def leave(m, tried, memory, t, kind):
-    """A guard of this kind has ended mode m at time t; where it was a force's, and by rounding only, the same mode may go on, once."""
+    """Notes that a guard of this kind has ended mode m at time t. If it was a force's, and by rounding only, the mode may go on once."""
     if t - memory[SINCE] > INSTANT:
         forget(tried, memory, t)
     tried[code_of(m)] = kind != FORCE or t - memory[BEGAN] <= INSTANT
@@ -108,16 +108,16 @@ def leave(m, tried, memory, t, kind):
 
 @inner_kernel
 def slacken(memory):
-    """The next slack at this instant is twice the last one."""
+    """Gives the mode the least slack, and doubles that for the next selection at this instant."""
     memory[SLACK] = memory[LEAST_SLACK]
     memory[LEAST_SLACK] *= 2.0
 
 
 @inner_kernel
 def wrong_by(b, m, z, gh, gv, t, a):
-    """0 where mode m can begin at state z: every guard leaves zero upward; else the slack, in noises, with which it could.
+    """0 if mode m can begin at state z, with every guard leaving zero upward; else the slack (in units of noise) with which it could.
 
-    It is infinite where what must begin to move does not.
+    Infinite if the mode needs a motion that does not begin.
     """
     look = min(_LOOK, MOST_TERMS)  # the plain constant would make numba compile all series once more, for it alone
     pivot = 0.0
@@ -132,7 +132,7 @@ def wrong_by(b, m, z, gh, gv, t, a):
     for which in range(GUARDS):
         degree = guard(which, order, a)
         if degree < 0 or (which <= G_FAR_GAP and a[GUARD, 1] < -SLOW):
-            continue  # a contact that closes is the impact's
+            continue  # a closing contact is the impact handler's
         noise, ahead = NOISE[KIND[which]], seen(KIND[which], smooth)
         sign = leading(a, GUARD, degree, noise, ahead)
         if not math.isfinite(a[GUARD, 0]) or (sign <= 0 and which == G_PHI and (m[FLOOR] != OFF or sign < 0)):
@@ -148,9 +148,9 @@ def wrong_by(b, m, z, gh, gv, t, a):
 def tips_first(b, z, gh, t):
     """The side to which a flat block is first asked to tip, +1 left or -1 right: the sense in which all of it is calculated.
 
-    Both fit only for rounding, or where the floor falls away faster than g under a pivot that cannot let go: then the base
-    acceleration decides, now or soon, or the friction. Its place and its walls tell apart only what is calculated in which order, so that a
-    mirror image comes out alike; where nothing does it is its own mirror image.
+    Both sides fit only by rounding, or where the floor falls away faster than g under a pivot that cannot let go. Then the base
+    acceleration decides, now or soon, or the friction. Failing these the block's place and its walls fix the order of calculation,
+    so that a mirror image gives the mirrored result. Where they do not either, the scene is its own mirror image.
     """
     toward = acceleration(gh, t)
     if abs(toward) <= NOISE[FORCE]:
@@ -186,7 +186,7 @@ def _write(number, first, m):
 
 @inner_kernel
 def _possible(b, m, z, v, floor, walls):
-    """Whether the contacts of m are closed, and its slip is not against the motion; v is the slip rate, `walls` those touched, as bits."""
+    """Whether the contacts of m are closed and its slip agrees with the slip rate v; `walls` are the touched ones, as bits."""
     flat, mine = m[FAMILY] == FLAT, m[TIP] + 2 * m[FAR]
     if (not b.unilateral and floor) if m[FLOOR] == OFF else not floor:
         return False
@@ -219,7 +219,7 @@ def _touched(b, z, sense, flat):
 
 @inner_kernel
 def _clean(b, z, floor):
-    """Sets to zero what is zero but for rounding: a tilt, a slip, the motion of a block that stands on floor and wall."""
+    """Sets to zero what differs from it by rounding only: a tilt, a slip, the motion of a block that stands on floor and wall."""
     upright(b, z)
     if floor and abs(slip_velocity(b, z)) < SLOW:
         stand(b, z)
@@ -230,7 +230,7 @@ def _clean(b, z, floor):
 
 @inner_kernel
 def select(b, z, gh, gv, t, m, tried, memory, rules, a):
-    """Writes into m the mode that is consistent at state z, or contradicts itself least; False where the state is not finite."""
+    """Writes the consistent mode at state z into m, or the one that is wrong by least. False where the state is not finite."""
     memory[BEGAN] = t
     floor = closed_floor(b, z) or not b.unilateral
     _clean(b, z, floor)

@@ -79,19 +79,19 @@ class Setting(NamedTuple):
     no_slip: bool
     #: The floor can only push (otherwise it can also hold the pivot down: the paper's model).
     unilateral: bool
-    #: Largest impact restitution that adds no energy is used instead of e.
+    #: An impact that would add energy uses the largest restitution that does not, instead of e.
     energy_cap: bool
     #: The law of impacts at several contacts, an index into LAWS.
     law: int
 
 
-#: Static friction of a frictionless floor: with less, the rounding of a base acceleration that dies out moves a resting block.
+#: Static friction of a frictionless floor. With less, rounding in the tail of a base acceleration would move a resting block.
 LEAST_FRICTION = 1e-9
 
 # A mode is a small integer vector.
 FAMILY, S, FLOOR, SLIP, PULL, TIP, FAR = range(7)
 MODE_SIZE = 7
-# m[FAMILY]: FLAT has theta = 0; m[S] is the sign of theta, also what phi = 0 is about to become.
+# m[FAMILY]: FLAT has theta = 0. m[S] is the sign of theta; at phi = 0, the sign that it is about to take.
 FLAT, TILT = 0, 1
 # m[FLOOR]: what the pivot (or, flat, the base) does; m[SLIP] is the direction of slip (frame; world where flat).
 OFF, STICK, SLIPPING = 0, 1, 2
@@ -125,7 +125,7 @@ def workspace(rows=ROWS):
 
 @inner_kernel
 def sine_cosine(angle, a):
-    """Sine and cosine of the angle; those asked for last are kept in the workspace."""
+    """Sine and cosine of the angle. The workspace keeps the last ones."""
     if a[ANGLE, 0] != angle:
         a[ANGLE, 0], a[ANGLE, 1], a[ANGLE, 2] = angle, np.sin(angle), np.cos(angle)
     return a[ANGLE, 1], a[ANGLE, 2]
@@ -198,7 +198,7 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
         a[COS, k + 1] = dc * r
         a[OMEGA, k + 1] = share * (push - weight) * r
         scale *= reach
-        # A uniform rotation has no rates left, but its sine and cosine have.
+        # A uniform rotation has no higher rates, but its sine and cosine do.
         size = abs(a[OMEGA, k + 1]) + abs(a[SIN, k + 1]) + abs(a[COS, k + 1])
         small = small + 1 if size * scale < enough else 0
         if not still_vertical and abs(a[G, k]) * scale >= enough:  # at its balance point only P feels the vertical motion
@@ -218,7 +218,7 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
 def _lean_series(b, side, tip, order, a):
     """LEAN: nothing moves, and the wall takes the moment about the pivot.
 
-    Written out, for the arm of a far wall can be so short that the general solution has no digits left.
+    Written out: the arm of a far wall can be so short that the general solution loses all its digits.
     """
     s, c = a[SIN, 0], a[COS, 0]
     wall = 1.0 if tip else -1.0

@@ -5,13 +5,13 @@ Each has one home in the code, is counted in every run (`History.cost.rules`), a
 
 from __future__ import annotations
 
-#: A flat block under a floor that falls away faster than g, and nothing to tell left from right: it hangs flat, on both corners.
+#: The floor falls away faster than g under a flat block, and nothing favours left or right: it hangs flat, by both corners.
 HANGS = 0
-#: A mode is taken once at an instant; one that has just ended goes on only where no other fits.
+#: A mode is selected once at an instant. One that has just ended goes on only where no other fits.
 MODE_AGAIN = 1
-#: Where no mode, or no set of contacts at an impact, fits, for rounding or beyond Painleve's limit, the one that is wrong by least.
+#: No mode, or no set of contacts at an impact, fits (rounding, or beyond Painleve's limit): the one that is wrong by least is taken.
 LEAST_CONTRADICTION = 2
-#: Impacts that go on at one instant end plastic.
+#: Impacts that go on at one instant become plastic.
 ENDLESS_STAGES = 3
 #: A landing or rebound slower than the settling speed ends in rest.
 SETTLES = 4

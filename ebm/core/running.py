@@ -26,7 +26,7 @@ EVENT_NAMES = (
     "overturned right",
 )
 (UPLIFT, SLIPS, STICKS, FLOOR_IMPACT, WALL_IMPACT, LIFT_OFF, LANDS, RELEASE, SETTLED, LEFT, RIGHT) = range(11)
-#: No event of the log; the end of rest, whose event the mode that follows tells.
+#: Not in the log; the end of rest, whose event depends on the next mode.
 NO_EVENT, LEAVES_REST = -1, -2
 
 # How a run ended; while it has not: GOING in its mode, or CHANGING it.
@@ -105,7 +105,7 @@ STEPS, EVENTS, WALL_IMPACTS, ROWS, HOLDS, KIND, BEFORE = range(7)
 
 @placed_kernel
 def mode_code(r):
-    """Index into MODE_NAMES."""
+    """The mode's index in MODE_NAMES."""
     m = r.m
     if m[FLOOR] == OFF:
         return 6

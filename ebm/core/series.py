@@ -15,14 +15,14 @@ from rockcheck.scenes.compiled import inner_kernel
 
 #: Width of the arrays that hold a polynomial: orders up to 28, and two numbers that the root search keeps behind them.
 MOST_TERMS = 32
-#: Natural time over which the first coefficients of a guard are weighed against each other.
+#: Natural time at which the first coefficients of a guard are compared.
 AHEAD = 2e-2
-#: The error bound of a position, of a velocity, of a force: a coefficient below it is rounding. They are one bound: what a velocity
-#: or a force of this size moves within AHEAD, so that where a contact pulls by more than noise, its gap opens by more than noise.
+#: Error bounds of a position, a velocity and a force: a coefficient below its bound is rounding. They are one bound, seen after AHEAD:
+#: a velocity or a force of this size moves a position by its bound. So a contact that pulls by more than noise opens by more, too.
 POSITION, RATE, FORCE = range(3)
 _ERROR = 1e-13
 NOISE = np.array([_ERROR, _ERROR / AHEAD, 2.0 * _ERROR / AHEAD**2])
-#: The zero in time: what happens within it is one event, for the time of an event is not known better.
+#: The zero in time: an event's time is not known better, so what happens within it is one event.
 INSTANT = 1e-9
 NO_ROOT = -1.0
 _NARROWEST, _EPSILON, _SMALL = 2.0**-44, 2.0**-52, 2.0**-10
@@ -100,8 +100,8 @@ def contradiction(a, row, n, floor, ahead):
 def _order_of_zero(a, row, n, floor, ahead):
     """The index of the first coefficient of c that counts; n + 1 where there is none.
 
-    Coefficients that are rounding (below `floor`, see NOISE), by themselves or with the noise before them, or turn to the other sign
-    within an INSTANT, are taken as zero, so that a guard that has just fired (and is zero by construction) does not fire again.
+    A coefficient counts as zero if it is rounding (below `floor`, see NOISE), alone or with the noise before it, or if the sign turns
+    within an INSTANT. So a guard that has just fired, and is zero by construction, does not fire again.
     """
     noise = floor
     scale = _ERROR
@@ -137,7 +137,7 @@ def first_root(a, row, n, h, floor, ahead, stack):
     zeros = _order_of_zero(a, row, n, floor, ahead)
     lift = 0.0
     if zeros > n:
-        # Noise as far as is looked ahead; in a long step it may yet become what is not.
+        # Noise within AHEAD may grow beyond noise in a long step.
         if a[row, 0] + low > -floor:
             return NO_ROOT
         zeros, lift = 0, floor + abs(a[row, 0])

@@ -40,7 +40,7 @@ _ON_FLOOR = 1 << F | 1 << E
 # Rounding of a velocity, of the velocities at play; rows of contacts that are nearer to parallel than this give no solution.
 _ROUNDING, _PARALLEL = NOISE[POSITION], CLOSED
 _MOST_STAGES = 40
-#: What a whole impact was: it obeys the law, or in a stage only contradicts it least, or its stages do not end.
+#: What came of an impact: all stages obey the law; a stage only violates it by least; or the stages do not end.
 ENDLESS, FITS, LEAST_WRONG = range(3)
 _HALVINGS = 45
 
@@ -153,7 +153,7 @@ def _try_set(rows, spin, number, friction, target, mu_k, v, system, trial, lam):
 
 @inner_kernel
 def _violation(rows, number, friction, taking, target, mu_s, trial, lam):
-    """By how much a solution contradicts the law: a pull, a contact that still closes, friction beyond its cone or the wrong way."""
+    """By how much a solution violates the law: a pull, a contact that still closes, friction beyond its cone or in the wrong sense."""
     count = _SETS[number, 0]
     worst = 0.0
     floor_normal = 0.0
@@ -257,7 +257,7 @@ def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, t
     rounding = _ROUNDING * _size(v)
     found = FITS
     for stage in range(_MOST_STAGES):
-        plastic = 2 * stage >= _MOST_STAGES  # what goes to and fro between floor and wall ends plastic
+        plastic = 2 * stage >= _MOST_STAGES  # impacts that alternate between floor and wall without end become plastic
         closes = False
         for j in range(CONTACTS):
             approach[j] = _dot(rows[j], v) if touching[j] else 0.0

@@ -85,7 +85,7 @@ def strike(b, m, z, which, gh, t, resting, impulse, gains, rules):
 def touch(b, m, z, which):
     """Puts the block onto the contact whose gap has just closed: the series knows the gap to the tolerance only.
 
-    A standing pivot keeps its place where the rotation can give way (else it would creep, impact by impact).
+    A standing pivot keeps its place if the rotation can take up the correction. Otherwise the pivot would creep, impact by impact.
     """
     phi = abs(z[THETA])
     if which == G_LANDING:
@@ -108,7 +108,7 @@ def touch(b, m, z, which):
 
 @inner_kernel
 def _settle_flat(b, z, resting, rules):
-    """A block upright with less spin than counts lies flat: along a wall that spin slips too, and does not count either."""
+    """An upright block with a spin below the settling speed lies flat. Along a wall such a spin is a slip, too, and is dropped with it."""
     rules[SETTLES] += 1
     v = slip_velocity(b, z)
     z[VX] = v if abs(v) > max(resting, 4.0 * SETTLE) else 0.0
