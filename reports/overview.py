@@ -12,6 +12,7 @@ import numpy as np
 
 from rockcheck.reports.style import PAGE, figure_style, log_scales, looks, save
 from rockcheck.reports.tables import overrun
+from rockcheck.reports.view import FALL
 from rockcheck.scenes.trust.experience import Trust, known
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.suite.experience import FEWEST, bias_and_scatter, pairs_of
@@ -129,20 +130,31 @@ def entry(run: Run, scene: str, model: str) -> Entry | None:
     figures = [check.figure for check in cell.checks] + list(cell.figures)
     found = [f for f in figures if f.measure == "theta_rms" and f.against == run.reference and f.value is not None]
     whole = next((f for f in found if not f.window), None)
-    outcomes = [_fall(one.outcome) for one in (cell, reference) if one is not None and one.status == "done"]
+    falls = [_side(outcome_of(one)) for one in (cell, reference) if one is not None and one.status == "done"]
     return Entry(
         cell=cell,
         rms=min(found, key=lambda figure: figure.until or math.inf, default=None),
         whole=whole,
         ratio=next((f.value for f in figures if f.measure == "peak_ratio" and f.against == run.reference and not f.window), None),
         u_num=cell.numerical.u_num("theta_rms") if cell.numerical and whole else None,
-        outcome=cell.fate,
-        apart=len(set(outcomes)) > 1,
+        outcome=outcome_of(cell),
+        apart=len(set(falls)) > 1,
     )
 
 
-def _fall(outcome: str) -> str:
-    return outcome if outcome.startswith("overturned") else ""
+def outcome_of(cell: Cell) -> str:
+    """What became of the block; "falling left" or "falling right" where the run ends while it falls."""
+    figures = (*(check.figure for check in cell.checks), *cell.figures)
+    last = next((f.value for f in figures if f.measure == "last_rotation" and f.unit == "alpha" and not f.window), None)
+    if cell.outcome == "moving" and last is not None and abs(last) > FALL:
+        return f"falling {'left' if last > 0.0 else 'right'}"
+    return cell.fate
+
+
+def _side(outcome: str) -> str:
+    """The side to which a block falls, empty where it stays."""
+    words = outcome.split()
+    return words[1] if words and words[0] in ("overturned", "falling") else ""
 
 
 def accuracies(run: Run) -> list[Accuracy]:

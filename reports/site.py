@@ -19,7 +19,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from rockcheck.reports import tables, words
 from rockcheck.reports.ensembles import EnsembleView, distributions_figure, ensemble_views, write_ensemble_figures
 from rockcheck.reports.figures import figure_stem, histories_figure, write_figures
-from rockcheck.reports.overview import entry, write_overview
+from rockcheck.reports.overview import entry, outcome_of, write_overview
 from rockcheck.reports.payload import script
 from rockcheck.reports.scene_file import write_scene_file
 from rockcheck.reports.style import FORMATS, LOOKS, SPARE, looks, save
@@ -300,6 +300,7 @@ def _environment() -> Environment:
         tables.events_of,
         figure_stem,
         entry,
+        outcome_of,
     ):
         environment.globals[function.__name__] = function
     environment.globals |= {"VERDICTS": VERDICTS, "finite": math.isfinite}

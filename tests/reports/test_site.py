@@ -16,7 +16,7 @@ import pytest
 from rockcheck.reports import write_site
 from rockcheck.reports.ensembles import distributions_figure, ensemble_views
 from rockcheck.reports.figures import histories_figure
-from rockcheck.reports.overview import PEAKS, accuracies, glance, matrix
+from rockcheck.reports.overview import PEAKS, accuracies, entry, glance, matrix
 from rockcheck.reports.payload import packed
 from rockcheck.reports.scene_file import write_scene_file
 from rockcheck.reports.site import PAGES
@@ -29,7 +29,7 @@ from rockcheck.validation.commands.cli import main
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.discrepancy.measures import Pair, theta_rms
 from rockcheck.validation.execute.models import FAMILIES
-from rockcheck.validation.suite.results import Check, Run
+from rockcheck.validation.suite.results import Cell, Check, Run
 
 
 class Addresses(HTMLParser):
@@ -153,6 +153,20 @@ def test_a_figure_that_is_as_it_was_accepted_has_not_changed_though_its_limit_is
     found = glance(finished.model_copy(update={"cells": cells}))
     assert found.judged > 0
     assert found.changed == ()
+
+
+def test_a_run_that_ends_during_a_fall_says_so(finished: Run) -> None:
+    """Two models fall to one side, one of them after the scene's end: the outcome does not depend on the model."""
+
+    def ending(cell: Cell, last: float) -> Cell:
+        figure = Figure(measure="last_rotation", label="last rotation", unit="alpha", value=last)
+        return cell.model_copy(update={"outcome": "moving", "overturned_at": None, "figures": (*cell.figures, figure)})
+
+    for last, outcome, apart in ((5.8, "falling left", False), (-5.8, "falling right", True), (0.4, "moving", True)):
+        cells = tuple(ending(cell, last) if (cell.scene, cell.model) == ("Free", "ebm") else cell for cell in finished.cells)
+        found = entry(finished.model_copy(update={"cells": cells}), "Free", "ebm")
+        assert found is not None
+        assert (found.outcome, found.apart) == (outcome, apart)
 
 
 def test_index_shows_peaks_against_the_reference_s(site: Path) -> None:
@@ -481,7 +495,7 @@ def test_an_ensemble_is_shown_by_its_distributions(site: Path) -> None:
     for measure in ("overturning_accuracy", "peak_bias", "peak_scatter"):
         figure = view.figure("cm", measure, "ebm-unilateral")
         assert number(figure.value) in words
-        assert figure.note.replace("], ", "]\n") in words, "its confidence interval"
+        assert readable(figure.note.replace("], ", "]\n")) in words, "its confidence interval"
     rows = (site / PAGES / "data" / "crowd.csv").read_text(encoding="utf-8").splitlines()
     assert rows[0] == ",".join(["scene", *(f"{what} {m}" for m in run.ensembles[0].peaks for what in ("peak_rotation_alpha", "outcome"))])
     assert len(rows) == 41

@@ -393,7 +393,7 @@ const Plots = (() => {
       data: [store.t, ...models.map(() => new Array(store.t.length).fill(null))],
       series: models.map(model => seriesOf(store, model, 1)),
       scale: { range: () => [-0.6, models.length - 0.4], dir: -1 },
-      axis: { splits: () => models.map((_, k) => k), values: () => models.map(model => cut(model.label, box.clientWidth < 520 ? 9 : 16)) },
+      axis: { splits: () => models.map((_, k) => k), values: () => models.map(model => cut(model.label, box.clientWidth < 520 ? 8 : 16)) },
       draw: { above: draw },
     });
   }
