@@ -153,7 +153,7 @@ def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order
     push = NA if m[TIP] != 0 else NB
     a[PHI, 0], a[OMEGA, 0] = sign * z[THETA], sign * z[W]
     side = side_of(b, m[S])
-    along, across = (side.tip_sin, side.tip_cos) if m[TIP] != 0 else (side.far_sin, side.far_cos)
+    wall_sin, wall_cos = (side.tip_sin, side.tip_cos) if m[TIP] != 0 else (side.far_sin, side.far_cos)
     sine, cosine = sine_cosine(side.alpha - a[PHI, 0], a)
     a[SIN, 0], a[COS, 0] = side.radius * sine, side.radius * cosine
     for k in range(order):
@@ -165,13 +165,13 @@ def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order
             break
         a[SPIN2, k] = _product(a, OMEGA, OMEGA, k)
         a[WEIGHT, k] = a[G, k] - _product(a, COS, SPIN2, k)  # g
-        a[TURN, k] = wall * (along * a[SIN, k] + across * a[COS, k])  # C
+        a[TURN, k] = wall * (wall_sin * a[SIN, k] + wall_cos * a[COS, k])  # C
         a[ARM, k] = a[COS, k] + a[TURN, k]
         a[INERTIA, k] = 1.0 / b.spin if k == 0 else 0.0
         a[LOAD, k] = 0.0  # f
         normal = a[WEIGHT, k] / b.spin
         if wall != 0.0:
-            a[REACH, k] = along * a[COS, k] - across * a[SIN, k]  # s'
+            a[REACH, k] = wall_sin * a[COS, k] - wall_cos * a[SIN, k]  # s'
             a[INERTIA, k] += _product(a, TURN, TURN, k)
             a[LOAD, k] = a[U, k] - wall * _product(a, REACH, SPIN2, k)
             a[PUSH, k] = _product(a, TURN, LOAD, k)  # C f

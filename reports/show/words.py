@@ -82,10 +82,10 @@ def mass_facts(block: Block) -> list[tuple[str, str]]:
     if block.homogeneous:
         return []
     (x, z), left, right = block.offset, block.pivot("left"), block.pivot("right")
-    place = f"{number(abs(x))} m to the {'right' if x >= 0.0 else 'left'}, {number(abs(z))} m {'up' if z >= 0.0 else 'down'}"
+    place = f"{number(abs(x))} m {'right' if x >= 0.0 else 'left'} of the box's, {number(abs(z))} m {'above' if z >= 0.0 else 'below'} it"
     gyration = f"radius of gyration {number(math.sqrt(block.gyration_squared))} m"
     return [
-        ("mass's centre", f"{place} of the box's; {gyration}"),
+        ("mass's centre", f"{place}; {gyration}"),
         ("pivots", f"left α = {number(left.alpha)} rad, right α = {number(right.alpha)} rad"),
     ]
 
@@ -130,4 +130,5 @@ def spectrum_html(spectrum: Spectrum) -> str:
     shares = (f"{number(100.0 * float(np.mean(spectrum.outcomes == side)))} %" for side in (SAFE, LEFT, RIGHT))
     facts = [*zip(("safe", "overturned left", "overturned right"), shares, strict=True)]
     facts += [("nodes", f"{spectrum.outcomes.size}, from {spectrum.evaluations} runs"), ("undecided", str(len(spectrum.undecided)))]
-    return html_table(f"Overturning spectrum: {spectrum.scene.name}", [*facts, *scene_facts(spectrum.scene)[:4]])
+    about = scene_facts(spectrum.scene)[: 4 + len(mass_facts(spectrum.scene.block))]
+    return html_table(f"Overturning spectrum: {spectrum.scene.name}", [*facts, *about])

@@ -112,6 +112,20 @@ def test_of_a_fallen_block_the_way_to_the_balance_point_is_drawn_and_the_time():
     assert compare(fallen, fallen).plot().axes[0].get_ylim()[1] == pytest.approx(1.3)
 
 
+def test_a_loaded_block_says_where_its_mass_is():
+    """Its table names both pivots, its picture marks the mass's centre; a homogeneous block's has neither."""
+    block = Block(half_width=0.3, half_height=1.0, mass=400.0, centre_of_mass=(0.08, -0.25), moment_of_inertia=110.0)
+    loaded = Scene(name="rack", block=block, floor=Floor(friction=0.5), duration=1.0)
+    plain = loaded.replace(block=Block(half_width=0.3, half_height=1.0))
+    shown = " ".join(loaded._repr_html_().split())
+    assert "0.08 m right of the box&#x27;s, 0.25 m below it; radius of gyration 0.524 m" in shown
+    assert "left α = 0.469 rad, right α = 0.285 rad" in shown
+    assert "pivots" not in plain._repr_html_()
+    marks, none = ([line.get_xydata() for line in one.plot().axes[0].lines if line.get_marker() == "+"] for one in (loaded, plain))
+    np.testing.assert_allclose(marks[0], [[0.08, 0.75]])
+    assert none == []
+
+
 def test_text_is_escaped():
     made = History(
         name=NASTY, model=NASTY, channels={"t": np.arange(3.0), "theta": np.zeros(3)}, event_list=(), outcome=NASTY, notes=(NASTY,)
