@@ -303,3 +303,34 @@ def test_unilateral_walls_conserve_momentum_about_the_right_corners():
     theta, x = float(history.channels["theta"][-1]), float(history.channels["x"][-1])
     assert kinematics.wall_gap(scene, "left", x, theta) == pytest.approx(0.0, abs=1e-9)
     assert isinstance(scene.vertical, Rest)
+
+
+@pytest.mark.parametrize("case", [1, -1], ids=["tip wall", "far wall"])
+def test_bouc_wens_series_keep_the_corner_on_its_wall(case):
+    """x follows the corner's reach, +-s', in every term of the series, for 100 loaded blocks that turn along a wall."""
+    from rockcheck.ebm.core import bouc_wen, motion
+
+    rng, order = np.random.default_rng(14), 8
+    a, _ = bouc_wen.friction_workspace()
+    for _ in range(100):
+        scene = random_scene(rng).replace(walls=(Wall(side="left", gap=0.01), Wall(side="right", gap=0.01)))
+        b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
+        S = int(rng.choice([-1, 1]))
+        side = b.left if S > 0 else b.right
+        sine, cosine = (side.tip_sin, side.tip_cos) if case > 0 else (side.far_sin, side.far_cos)
+        phi, w = rng.uniform(0.1, 0.8) * side.alpha, rng.uniform(-0.3, 0.3)
+        s, c = side.radius * math.sin(side.alpha - phi), side.radius * math.cos(side.alpha - phi)
+        m = np.zeros(motion.MODE_SIZE, dtype=np.int64)
+        m[motion.FAMILY], m[motion.S], m[motion.FLOOR], m[motion.PULL], m[motion.SLIP] = (
+            motion.TILT,
+            S,
+            motion.SLIPPING,
+            1,
+            1 if w > 0 else -1,
+        )
+        m[motion.TIP], m[motion.FAR] = case > 0, case < 0
+        z = np.array([0.0, c, S * phi, S * case * (sine * s + cosine * c) * w, S * S * s * w, S * w])
+        bouc_wen.friction_series(b, m, z, 0.3, False, 0.1, *natural.grounds_of(scene), 1.0, order, a)
+        for k in range(1, order - 1):
+            reach = case * (sine * a[motion.COS, k] - cosine * a[motion.SIN, k])
+            assert a[motion.XI, k] == pytest.approx(reach, rel=1e-10, abs=1e-10), k
