@@ -46,3 +46,8 @@ class Figure(Stored):
     window: str = ""
     until: float | None = None
     note: str = ""
+
+    @property
+    def of_a_fall(self) -> bool:
+        """Whether it is the peak rotation of a block that has fallen, which is no peak: the measure's note says so."""
+        return self.measure == "peak_rotation" and bool(self.note)

@@ -85,7 +85,7 @@ def _of_cell(old: Cell, new: Cell) -> Iterator[Change]:
             yield Change(**place, what="verdict", name=name, before=was, after=now)
     figures = [{_key(figure): figure for figure in cell.figures} for cell in (old, new)]
     for name, one, other in _pairs(*figures):
-        if one and other and _moved(one, other):
+        if one and other and not (one.of_a_fall or other.of_a_fall) and _moved(one, other):
             yield Change(**place, what="figure", name=name, before=one.value, after=other.value)
 
 
@@ -129,7 +129,7 @@ def moment_of(run: Run, folder: Path) -> Moment:
         suite=run.suite,
         verdict=run.words,
         wall_seconds=run.wall_seconds,
-        figures={name: check.figure.value for name, check in names},
+        figures={name: None if check.figure.of_a_fall else check.figure.value for name, check in names},
         not_passed=tuple(name for name, check in names if check.verdict != "pass"),
     )
 

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from rockcheck.validation.commands.cli import main
-from rockcheck.validation.suite.changes import read_history
+from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.suite.changes import changes, moment_of, read_history
 from rockcheck.validation.suite.results import Run
 
 SUITE = """
@@ -110,6 +111,24 @@ def test_runs_of_two_suites_are_not_compared(capsys):
     assert capsys.readouterr().err == "rockcheck: the runs are of two suites, mine and other\n"
     assert main(["diff", "a", "none"]) == 2
     assert "no finished run here" in capsys.readouterr().err
+
+
+def test_the_peak_of_a_block_that_fell_is_no_figure_that_changes():
+    run = Run.load("a")
+    near = run.cell("short", "near")
+
+    def reached(peak: float, note: str) -> Run:
+        figure = Figure(measure="peak_rotation", label="peak rotation", unit="alpha", value=peak, note=note)
+        others = tuple(one for one in near.figures if one.measure != "peak_rotation")
+        check = near.checks[0].model_copy(update={"figure": figure})
+        cell = near.model_copy(update={"figures": (*others, figure), "checks": (check,)})
+        return run.model_copy(update={"cells": tuple(cell if one is near else one for one in run.cells)})
+
+    fell = "the block overturned at 1 s"
+    assert [one.name for one in changes(reached(0.3, ""), reached(0.4, ""))] == ["peak_rotation"]
+    assert changes(reached(7.8, fell), reached(7.9, fell)) == []
+    assert list(moment_of(reached(0.3, ""), Path()).figures.values()) == [0.3]
+    assert list(moment_of(reached(7.8, fell), Path()).figures.values()) == [None]
 
 
 @pytest.mark.skipif(shutil.which("git") is None, reason="needs POSIX tools: git")
