@@ -84,7 +84,7 @@ def verticals_of(paths: Sequence[Path], reading: Reading) -> dict[str, Recording
         up = upward[source] if source else []
         if source is None or len(up) != 1:
             where = "in it or in a file of the set that is named alike"
-            raise InputError(f"{printable(path)}: {len(up)} vertical components {where}; one is asked for", "vertical")
+            raise InputError(f"{printable(path)}: {len(up)} vertical components {where}: give exactly one", "vertical")
         used.add(source)
         found |= dict.fromkeys(names, up[0])
     if unused := [path for path in alone if path not in used]:
