@@ -344,6 +344,8 @@ def write_page(folder: Path) -> Path:
             figures=shown,
             own=own,
             heading=heading,
+            free=any(not record.scene.get("walls") for record in index.spectra),
+            walled=any(record.scene.get("walls") for record in index.spectra),
             scripts=scripts,
             played=KEPT_AN_AXIS**2 if any(glimpses_path(data, record.name).exists() for record in index.spectra) else 0,
             **found,

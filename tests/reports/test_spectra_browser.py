@@ -61,6 +61,8 @@ def place(page: playwright.Page, panel: int, row: int, column: int) -> tuple[flo
 
 def test_the_panels_stand_as_in_the_paper_and_are_painted(page: playwright.Page) -> None:
     assert page.locator(".panel h3").all_inner_texts() == [panel.title for panel in paper_panels(8)]
+    outcomes = ["safe", "no wall: overturned clockwise", "overturned; no wall: counterclockwise", "undecided"]
+    assert page.locator(".key.outcomes span").all_inner_texts() == outcomes
     colours = """([panel, nodes]) => {
         const c = document.querySelectorAll('.panel canvas')[panel], w = c.clientWidth - 48, h = c.clientHeight - 30, r = devicePixelRatio;
         const all = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
@@ -93,6 +95,7 @@ def test_ones_own_block_is_told_in_hertz_and_g(visitor: Callable[..., playwright
     save(own_figure(panel, spectrum), tmp_path / SPECTRA / "shelf")
     page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
     page.goto(write_page(tmp_path).as_uri())
+    assert page.locator(".key.outcomes span").all_inner_texts() == ["safe", "overturned", "undecided"]  # it is beside a wall
     page.evaluate("Object.values(rockcheckFigures)[0].point([4, 7])")
     said = page.locator("output.node").inner_text()
     g, hertz = map(float, re.search(r"a pulse of ([\d.]+) g .*, ([\d.]+) Hz", said).groups())
