@@ -1,6 +1,6 @@
 """Scenes at which rounding decides: round numbers, equal lengths, accelerations exactly at a limit, motions as small as noise.
 
-Random scenes are drawn from continuous distributions and meet no tie; users write round numbers and meet many.
+Random scenes from continuous distributions meet no ties. Users write round numbers and meet many.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ LONG, LASTS = 0.02, 1e4
 
 
 def exact_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
-    """Scene `number` of the run with this seed: the same one for all kinds, up to what a kind cannot play."""
+    """Scene `number` of the run with this seed. It is the same for all kinds, except for what a kind cannot play."""
     r = np.random.default_rng([seed, number, 1])
     width, height = SIDES[int(r.integers(len(SIDES)))]
     block = Block(half_width=width, half_height=height)
@@ -73,7 +73,7 @@ def _sign(r: np.random.Generator) -> float:
 
 
 def _walls(r: np.random.Generator, block: Block) -> list[Wall]:
-    """No wall, one, or two: touching, equally far, or so that the diagonal just fits between them."""
+    """No wall, one, or two: touching, at equal distances, or so that the block's diagonal just fits between them."""
     sides: tuple[tuple[Literal["left", "right"], ...], ...] = ((), ("left",), ("right",), ("left", "right"))
     gaps = (0.0, 0.0, 0.003, 0.1, block.half_width, block.radius - block.half_width, 2.0 * block.half_width)
     gap, e = _pick(r, gaps), _pick(r, RESTITUTIONS)

@@ -1,4 +1,4 @@
-"""Random scenes over all that a user could write, each from a seed and a number, so that any one can be made again alone."""
+"""Random scenes over all that a user could write. Each follows from a seed and a number, so any one can be made again."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Excitation = Rest | Ricker | Sine | Record
 
 
 def random_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
-    """Scene `number` of the run with this seed: the same one for all kinds, up to what a kind cannot play."""
+    """Scene `number` of the run with this seed. It is the same for all kinds, except for what a kind cannot play."""
     r = np.random.default_rng([seed, number])
     alpha = float(r.uniform(*ALPHA)) if r.random() < 0.7 else _log(r, *ALPHA)
     radius = _log(r, *RADIUS)

@@ -1,4 +1,4 @@
-"""What must hold of every history, whatever the scene: each invariant gives a figure and the bound that it has to keep.
+"""What must hold of every history, whatever the scene. Each invariant gives a figure, which must stay below its bound.
 
 Figures are in natural units (lengths in R, accelerations in g, times in sqrt(R/g)), energies relative to what was at play.
 """
@@ -139,8 +139,8 @@ def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: boo
 def _energy(model: EventBasedModel, scene: Scene) -> float | None:
     """The energy's error, or None where it cannot be judged.
 
-    It is taken from rows four times as near where it is too large, or cannot be judged: an error of the integral is then gone, one of
-    the motion not.
+    If it is too large, or cannot be judged, it is computed again from rows four times as dense. That removes an error of the integral,
+    but not one of the motion.
     """
     error = energy_error(model, scene, model.simulate(scene))
     if error is None or error > INVARIANTS["energy"].bound:
@@ -156,7 +156,7 @@ def finer(model: EventBasedModel, times: float = 100.0) -> EventBasedModel:
 
 
 def audited(scene: Scene) -> Scene:
-    """The scene with rows so near to each other that integrals over them are exact to 1e-10, and no longer than affordable."""
+    """The scene with rows so dense that integrals over them are exact to 1e-10, and no longer than can be afforded."""
     unit = math.sqrt(scene.block.radius / scene.gravity)
     step = 0.03 * unit
     for excitation in (scene.excitation, scene.vertical):
@@ -178,7 +178,7 @@ def _not_finite(history: History) -> float:
 
 
 def _contradicts(scene: Scene, history: History) -> bool:
-    """Whether the run ends otherwise than it says."""
+    """Whether the run's end contradicts its outcome."""
     falls = [event for event in history.event_list if event.kind.startswith("overturned")]
     rows, theta = len(history.channels["t"]), history.channels["theta"]
     times = [event.t for event in history.event_list]
@@ -197,7 +197,7 @@ def conditions(model: EventBasedModel, scene: Scene, history: History) -> dict[s
     t, theta, mode = channels["t"], channels["theta"], channels["mode"]
     height = kinematics.pivot_height(block, channels["y"], theta) / radius
     gaps = _gaps(scene, channels["x"], theta)
-    # The rounding of x is not depth.
+    # Rounding of x does not count as depth.
     rounding = 4e-16 * np.abs(channels["x"]) / radius
     depth = [float(np.max(-height)), *(float(np.max(-gap - rounding)) for gap in gaps.values())]
     on_floor, stands = np.isin(mode, ON_FLOOR), np.isin(mode, STANDS)
@@ -275,8 +275,8 @@ def _force_conditions(
     on = np.ones(int(tilted.sum()), dtype=bool)
     touching = on, (tip & walls)[tilted], (far & walls)[tilted]
     over, pulls = np.full(len(on), math.inf), np.full(len(on), math.inf)
-    # What happens within NEAR is one event, for the core and here: a block that spins passes through its cone in less. So a condition is
-    # broken only where it is so long before and after.
+    # What happens within NEAR is one event, in the core and here: a spinning block passes through its friction cone in less time. So a
+    # condition is broken only where it is broken for that long before and after.
     for moment in (0.0, -NEAR, NEAR):
         turned = np.abs(theta)[tilted] + moment * (sign * w)[tilted]
         forces = tilted_forces(
@@ -320,7 +320,7 @@ def energy_error(model: EventBasedModel, scene: Scene, history: History) -> floa
     size = 1.0 + np.maximum(energy[GROUP::GROUP][: len(work)], moved)
     off = (change - work) / size
     doubt = np.where(whole, np.abs(work - rough) / size, 0.0)
-    # In a group before and after, too: where the difference of the two rules changes its sign it says nothing.
+    # Checked in the groups before and after, too: the difference of the two rules says nothing where it changes its sign.
     whole &= np.maximum(doubt, np.maximum(np.append(doubt[1:], 0.0), np.append(0.0, doubt[:-1]))) < RESOLVED
     if model.friction == "bouc-wen":
         rise = np.abs(np.diff(channels["y_dot"])) / speed / step  # per row; with gravity it is the floor's force
@@ -430,7 +430,7 @@ def similar(scene: Scene, seed: int) -> Scene:
 
 
 class _Horizon:
-    """Compares histories of a scene up to where a small disturbance of its data shows; finds that only where it is needed."""
+    """Compares histories of a scene up to the time at which a small disturbance of its data shows; that time is computed only if needed."""
 
     def __init__(self, model: EventBasedModel, scene: Scene, seed: int) -> None:
         self.model, self.scene, self.seed = model, scene, seed
@@ -458,7 +458,7 @@ class _Horizon:
         if self._row is None:
             self.found = 1
             self._row = len(history.channels["t"])
-            exact = self.model.model_copy(update={"tolerance": EXACT})  # the horizon is the scene's, however coarse the model is
+            exact = self.model.model_copy(update={"tolerance": EXACT})  # the horizon belongs to the scene, however coarse the model is
             for by in (10.0, 100.0):  # rounding is a disturbance, too: finer tolerances must agree on the answer
                 with suppress(ModelFailure):
                     a, b = (finer(exact, times).simulate(self.scene) for times in (by, 100.0 * by))
@@ -475,11 +475,11 @@ class _Horizon:
 
 
 def _amplified(scene: Scene, history: History) -> Floats:
-    """How far, as a logarithm, sliding friction has let a small difference of the rate of rotation grow by each row.
+    """The logarithm, by each row, of how much sliding friction has amplified a small difference of the rotation rate.
 
     With P = N/D a slipping pivot has theta'' = -3 (s + k c) N/D, in which N falls with w^2: near Painleve's limit, where D is small,
-    a difference of w grows or decays at a rate beyond all others. What has decayed is no disturbance any more, which is why those of
-    the scene's data do not tell; a rounding error of the moment grows alike. So the sum starts anew wherever it is negative.
+    a difference of w grows or decays faster than all else. A disturbance of the scene's data may have decayed before, and then does not
+    show this growth; a rounding error of the moment grows all the same. So the sum starts anew wherever it is negative.
     """
     channels, step = history.channels, 1e-4
     unit = math.sqrt(scene.block.radius / scene.gravity)

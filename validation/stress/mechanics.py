@@ -1,4 +1,4 @@
-"""Newton-Euler for a block with given contacts, once more and by other means than `ebm`: what its histories are held against.
+"""Newton-Euler for a block with given contacts, solved by other means than in `ebm`: its histories are checked against it.
 
 Natural units: lengths in R, accelerations in g, unit mass, moment of inertia 1/3. As in `ebm.core.motion`, a tilted block is seen in
 the frame of its pivot, which is then the lower-left corner: with S = sign theta, phi = |theta|, s, c = sin, cos(alpha - phi),
@@ -70,7 +70,7 @@ def tilted_forces(
 
 
 def _solved(matrix: Floats, right: Floats) -> Floats:
-    """Solves a system a row; of contacts whose rows are parallel to rounding (a corner that has hardly left its wall) the least forces."""
+    """Solves one system for each row. Where contacts are parallel to rounding (a corner just off its wall), takes the least forces."""
     try:
         return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
     except np.linalg.LinAlgError:
@@ -81,7 +81,7 @@ def _triple(x: Floats, y: Floats, turn: Floats) -> Floats:
     return np.stack([x, y, turn], axis=1)
 
 
-#: Weights of the closed Newton-Cotes rule with nine nodes: exact up to degree 9.
+#: Weights of the closed Newton-Cotes rule with nine nodes, which is exact up to degree 9.
 NEWTON_COTES = np.array([989.0, 5888.0, -928.0, 10496.0, -4540.0, 10496.0, -928.0, 5888.0, 989.0]) * 4.0 / 14175.0
 GROUP = len(NEWTON_COTES) - 1
 #: The same interval by Boole's rule twice, exact up to degree 5. The difference of the two rules estimates the error.

@@ -1,4 +1,4 @@
-"""The models that are stressed: with which settings each plays which scenes, and which invariants it is held to."""
+"""The models that are stressed: the settings and scenes of each, and the invariants that it must keep."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ class EventBased(Player):
 
 @dataclass(frozen=True)
 class Approximate(Player):
-    """The continuous model or an engine: it is held to its own stated depth, and to energy that only the base can bring.
+    """The continuous model or an engine: it may sink no deeper than it states, and gain energy from the base only.
 
     Lengths and times of its settings are in R and sqrt(R/g), so that they mean the same for every block; runs last at most `longest`.
     """
@@ -124,7 +124,7 @@ class Approximate(Player):
         return " ".join([f"--model {self.family}", *(f"--set {key}={value!r}" for key, value in self.settings(scene).items())])
 
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
-        """Ends, finite numbers, depth and energy. Of an engine that breaks the last two it is said what half the step does."""
+        """Checks the run's end, finite numbers, depth and energy. If an engine breaks one of the last two, says what half the step does."""
         played = self._check(scene)
         broken = [name for name in played.broken if name in ("depth", "source")]
         if broken and self.family != "cm":
