@@ -604,6 +604,18 @@ def test_what_was_tried_at_an_instant():
     assert tried.sum() == 1, "what was tried at an earlier instant is forgotten"
 
 
+def test_a_mode_that_must_go_on_has_twice_the_slack_each_time():
+    """Where all modes were tried at an instant the one that fits goes on, counted each time, with a slack of 1, 2, 4 noises."""
+    core = Core(upright(0.1, 1.0, 0.3, 0.5, 0.5).scene, "unilateral")
+    z, chosen = np.array(upright(0.1, 1.0, 0.3, 0.5, 0.5).state), np.zeros(rules.RULES, dtype=np.int64)
+    m, tried, memory = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.ones(modes.MODES, dtype=bool), np.zeros(modes.MEMORY)
+    memory[modes.SLACK] = memory[modes.LEAST_SLACK] = 1.0
+    for count, slack in enumerate((1.0, 2.0, 4.0), 1):
+        assert modes.select(core.setting, z, *core.grounds, 0.0, m, tried, memory, chosen, core.work)
+        assert (m[motion.FAMILY], m[motion.FLOOR]) == (motion.FLAT, motion.STICK)
+        assert (memory[modes.SLACK], chosen[rules.MODE_AGAIN], chosen.sum()) == (slack, count, count)
+
+
 def test_the_model_starts_as_the_selection_says():
     """The adapter looks at the core that the model runs: the same mode in the first row of a history."""
     rng = np.random.default_rng(48)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel, natural
+from rockcheck.ebm.core import rules, settle
 from rockcheck.ebm.core.laws import contact_impacts as ci
 from rockcheck.ebm.core.laws import impacts
 from rockcheck.scenes import Block, Floor, Scene
@@ -193,3 +194,29 @@ def test_a_block_rocks_on_until_its_rate_is_a_ten_millionth(pivot):
     assert rates[-1] < 1e-6
     if pivot == "bilateral":
         assert len(rates) == math.ceil(math.log(5e-8 / first) / math.log(ratio))
+
+
+def test_the_settling_speed_rises_as_impacts_accumulate():
+    """Tenfold with every hundred impacts up to 2.5e-3, without a bound after five hundred times as many; back after a quiet 0.025."""
+    counts, rattle, t = np.zeros(rules.RULES, dtype=np.int64), settle.no_impacts(), 0.0
+    speeds = []
+    for _ in range(50_100):
+        t += 2.5e-7
+        speeds.append(settle.settling_speed(rattle, t, counts))
+    rises = [k + 1 for k in range(1, len(speeds)) if speeds[k] != speeds[k - 1]]
+    assert rises == [100, 200, 300, 400, 500, 50_000]
+    np.testing.assert_allclose([speeds[0], *(speeds[k - 1] for k in rises)], [5e-8, 5e-7, 5e-6, 5e-5, 5e-4, 2.5e-3, np.inf])
+    assert counts[rules.RATTLES] == 501
+    assert settle.settling_speed(rattle, t + 0.024, counts) == np.inf
+    assert settle.settling_speed(rattle, t + 0.024 + 0.026, counts) == 5e-8
+    slow = settle.no_impacts()
+    for k in range(300):  # as many in a longer time are no rattle
+        assert settle.settling_speed(slow, 3e-4 * k, np.zeros(rules.RULES, dtype=np.int64)) == 5e-8
+
+
+def test_impacts_at_one_instant_end_plastic():
+    counts, rattle = np.zeros(rules.RULES, dtype=np.int64), settle.no_impacts()
+    speeds = [settle.settling_speed(rattle, 1.0, counts) for _ in range(21)]
+    assert speeds == [5e-8] * 20 + [np.inf]  # the first, and twenty more at its instant
+    assert counts[rules.ENDLESS_STAGES] == 1
+    assert settle.settling_speed(rattle, 1.001, counts) == 5e-8

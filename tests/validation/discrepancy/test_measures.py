@@ -12,7 +12,7 @@ from rockcheck.scenes import Event, Floor, InputError, Scene
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation import compare
 from rockcheck.validation.discrepancy.compare import describe
-from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, match_impacts
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, Pair, match_impacts
 
 T = np.linspace(0.0, 10.0, 4001)
 WAVE = 0.3 * np.sin(2 * np.pi * T)
@@ -64,6 +64,23 @@ def test_grids_may_differ_and_until_cuts(made):
     assert found["theta_peak"] < 1e-4
     assert found.end == 5.0
     assert found.figures[0].window == "5s"
+
+
+def test_the_window_is_the_common_time_and_holds_its_own_ends(made):
+    """From the later start to the earlier end, or to `until`; rows, and events, just at an end are inside."""
+    t = np.arange(11.0)
+    late, early = made(np.zeros(9), t[2:]), made(np.zeros(9), t[:-2])
+    for pair in ((early, late), (late, early)):
+        found = compare(*pair)
+        assert (found.start, found.end) == (2.0, 8.0)
+        np.testing.assert_array_equal(Pair(*pair).time, t[2:9])
+        np.testing.assert_array_equal(Pair(*pair, until=6.0).time, t[2:7])
+    struck = made(np.linspace(0.0, 1.0, 11), t, events=[impact(4.0), impact(6.0), impact(7.0)])
+    values = {figure.measure: figure.value for figure in describe(struck, until=6.0)}
+    assert (values["floor_impacts"], values["peak_rotation"]) == (2, pytest.approx(0.6))
+    pairs = Pair(struck, made(np.zeros(11), t, events=[impact(6.0)]), until=6.0).impacts
+    assert [(first.t, second.t) for first, second in pairs.pairs] == [(6.0, 6.0)]
+    assert ([e.t for e in pairs.only_reference], list(pairs.only_candidate)) == ([4.0], [])
 
 
 def test_hausdorff_counts_a_late_jump_as_lateness(made):

@@ -12,7 +12,7 @@ from rockcheck.scenes import InputError
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
-from rockcheck.validation.suite.results import Cell, Check, Run
+from rockcheck.validation.suite.results import Cell, Check, CostRecord, Run
 from rockcheck.validation.suite.tolerances import Tolerance, judge, parse_tolerances
 from rockcheck.validation.suite.verdicts import junit, markdown
 
@@ -94,6 +94,43 @@ def test_the_summary_names_what_is_not_a_pass():
 def test_limit_and_drift_themselves_are_inside(value, expected):
     """Numbers that a computer holds exactly: a figure just at its drift passes, one just at its limit does not fail."""
     assert check(value).verdict == expected
+
+
+def test_what_waits_for_its_tolerance_has_not_failed():
+    """Nor has what no tolerance is written for: unless nothing was computed, part of the window is missing, or something else failed."""
+    waits = check(0.25).model_copy(update={"limit": None, "verdict": "fail"})
+    gone = waits.model_copy(update={"figure": waits.figure.model_copy(update={"value": None})})
+    assert [one.words for one in (waits, waits.model_copy(update={"gap": "ends early"}), gone)] == ["no tolerance yet", "fail", "fail"]
+    for cells, faults, expected in (
+        ((cell("a", "m", waits),), (), "no tolerance yet"),
+        ((cell("a", "m", waits),), ("a tolerance without its cell",), "fail"),
+        ((cell("a", "m", waits), cell("b", "m", check(0.75))), (), "fail"),
+        ((cell("a", "m", waits), cell("b", "m", reason="no motion")), (), "error"),
+    ):
+        assert run_of(*cells, faults=faults).words == expected
+
+
+def test_the_worst_cell_is_the_verdict_of_the_run_and_has_its_exit_code():
+    """A model that is not installed, a figure that has changed, a tolerance without its cell, nothing to judge by, a fault inside."""
+    absent = Cell(scene="a", model="n", status="absent", reason="needs it")
+    passes, changed, failed = (cell("a", "m", check(value)) for value in (0.25, 0.4, 0.75))
+    strange = Cell(scene="a", model="o", status="failed", reason="a fault", unexpected=True)
+    for cells, more, verdict, code, strict in (
+        ((passes,), {}, "pass", 0, 0),
+        ((passes, absent), {}, "incomplete", 0, 1),
+        ((passes, absent, changed), {}, "changed", 0, 1),
+        ((changed, failed), {}, "fail", 1, 1),
+        ((failed, cell("b", "m", reason="no motion")), {}, "error", 3, 3),
+        ((passes, strange), {}, "error", 70, 70),
+        ((passes,), {"faults": ("no such cell",)}, "fail", 1, 1),
+        ((cell("a", "m"),), {}, "fail", 1, 1),
+        ((cell("a", "m"),), {"judged": False}, "pass", 0, 0),
+    ):
+        runs = [run_of(*cells, strict=how, **more) for how in (False, True)]
+        assert [run.verdict for run in runs] == [verdict, verdict]
+        assert [run.exit_code for run in runs] == [code, strict]
+    assert run_of(cell("a", "m"), judged=False).words == "not judged"
+    assert not any(value for name, value in CostRecord().model_dump().items() if name != "rules"), "what was not counted is nothing"
 
 
 def test_a_figure_that_is_missing_is_not_the_worst_of_those_that_are_there():
