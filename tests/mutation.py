@@ -54,7 +54,6 @@ TARGETS = {
     "validation/suite/results.py": [
         "tests/validation/suite/test_verdicts.py",
         "tests/validation/commands/test_cli.py",
-        "tests/validation/commands/test_exit_codes.py",
     ],
     "ebm/core/settle.py": ["tests/ebm/core/test_impact_laws.py", "tests/ebm/test_edges.py"],
     "ebm/core/laws/strike.py": [

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel, natural
-from rockcheck.ebm.core import rules, settle
+from rockcheck.ebm.core import contacts, guards, motion, rules, settle
 from rockcheck.ebm.core.laws import contact_impacts as ci
-from rockcheck.ebm.core.laws import impacts
-from rockcheck.scenes import Block, Floor, Scene
+from rockcheck.ebm.core.laws import impacts, strike
+from rockcheck.scenes import Block, Floor, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 
@@ -194,6 +194,41 @@ def test_a_block_rocks_on_until_its_rate_is_a_ten_millionth(pivot):
     assert rates[-1] < 1e-6
     if pivot == "bilateral":
         assert len(rates) == math.ceil(math.log(5e-8 / first) / math.log(ratio))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_block_is_put_onto_the_contact_that_closes(side):
+    """The gap is zero to rounding, whichever it was and whatever the pivot does; what need not give way keeps its place."""
+    alpha, gap, off = 0.4, 0.05, 1e-7
+    walls = (Wall(side="left", gap=gap), Wall(side="right", gap=2.0 * gap))
+    block = Block(half_width=math.sin(alpha), half_height=math.cos(alpha))
+    scene = Scene(name="touch", block=block, floor=Floor(friction=0.5), walls=walls, duration=1.0)
+    b = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
+    for tilt in (0.0, 0.15):
+        family, tip = (motion.TILT, side) if tilt else (motion.FLAT, 1)
+        for which, floor, wall in (
+            (guards.G_LANDING, motion.OFF, 0),
+            (guards.G_TIP_GAP, motion.STICK, tip),
+            (guards.G_TIP_GAP, motion.SLIPPING, tip),
+            (guards.G_FAR_GAP, motion.SLIPPING, -tip),
+        ):
+            z = np.array([0.0, math.cos(alpha - tilt), side * tilt, 0.0, 0.0, 0.0])
+            if wall:
+                z[motion.X] = -wall * (contacts.wall_gap(b, z, wall) - off)
+            else:
+                z[motion.HEIGHT] += off
+            m, before = np.zeros(motion.MODE_SIZE, dtype=np.int64), z.copy()
+            m[motion.FAMILY], m[motion.S], m[motion.FLOOR] = family, tip, floor
+            strike.touch(b, m, z, which)
+            assert (contacts.wall_gap(b, z, wall) if wall else contacts.floor_gap(b, z)) == pytest.approx(0.0, abs=1e-13)
+            assert np.max(np.abs(z - before)) == pytest.approx(off, rel=1.0)
+            if wall and tilt and floor == motion.STICK:
+                pivots = [one[motion.X] - side * math.sin(alpha - abs(one[motion.THETA])) for one in (before, z)]
+                assert pivots[1] == pytest.approx(pivots[0], abs=1e-15)
+                assert contacts.floor_gap(b, z) == 0.0
+            else:
+                kept = [k for k in range(6) if k != (motion.X if wall else motion.HEIGHT)]
+                np.testing.assert_array_equal(z[kept], before[kept])
 
 
 def test_the_settling_speed_rises_as_impacts_accumulate():

@@ -221,3 +221,9 @@ def test_shares_have_wilsons_interval():
 def test_a_failed_scene_is_counted():
     sample = Sample(np.array([0.1, np.nan, np.inf]), ("at rest", "", "overturned left"))
     assert (sample.failures, list(sample.fallen)) == (2, [False, False, True])
+
+
+def test_what_a_statistic_tells_apart():
+    """One of a thousand scenes is a thousandth of a share; areas and logarithms are told to a ten-thousandth."""
+    shares = {"ks_distance", "overturning_accuracy", "overturning_precision", "overturning_recall"}
+    assert {name: one.resolution for name, one in STATISTICS.items()} == {name: 1e-3 if name in shares else 1e-4 for name in STATISTICS}
