@@ -231,6 +231,23 @@ def test_a_block_is_put_onto_the_contact_that_closes(side):
                 np.testing.assert_array_equal(z[kept], before[kept])
 
 
+@pytest.mark.parametrize(("slip", "kept"), [(0.1, True), (-3e-7, True), (1e-7, False), (-1e-7, False)])
+def test_a_block_that_lands_with_less_spin_than_counts_slides_on(slip, kept):
+    """Its spin, and a bounce and a slip below the settling speed, are gone; a slip above it, and a faster bounce, are not."""
+    block = Block(half_width=math.sin(0.4), half_height=math.cos(0.4))
+    scene = Scene(name="lands", block=block, floor=Floor(friction=0.5), duration=1.0)
+    b = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
+    for bounce, stays in ((0.1, False), (4e-8, True)):
+        z = np.array([0.2, math.cos(0.4), 0.0, slip, bounce, 3e-8])
+        v, counts = contacts.slip_velocity(b, z), np.zeros(rules.RULES, dtype=np.int64)
+        strike._settle_flat(b, z, settle.SETTLE, counts)
+        assert z[:3].tolist() == [0.2, math.cos(0.4), 0.0]
+        assert z[motion.VX] == (v if kept else 0.0)
+        assert z[motion.VY] == (0.0 if stays else bounce)
+        assert z[motion.W] == 0.0
+        assert (counts[rules.SETTLES], counts.sum()) == (1, 1)
+
+
 def test_the_settling_speed_rises_as_impacts_accumulate():
     """Tenfold with every hundred impacts up to 2.5e-3, without a bound after five hundred times as many; back after a quiet 0.025."""
     counts, rattle, t = np.zeros(rules.RULES, dtype=np.int64), settle.no_impacts(), 0.0
