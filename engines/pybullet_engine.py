@@ -10,16 +10,15 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.engines.adaptive import Vector
 from rockcheck.engines.contacts import contacts_of
 from rockcheck.engines.engine import Engine
 from rockcheck.engines.world import State, World
 from rockcheck.scenes import Scene
 
 FloatArray = NDArray[np.float64]
-CORNER_RADIUS = 3e-6  # of the block's radius
-SLAB = 10.0  # half the thickness of floor and walls
-REACH = 300.0  # half their extent; a larger one costs digits of the normals on so small spheres
+CORNER_RADIUS = 1e-9  # of the block's radius; contacts are points, and Bullet has no contact of a point with a plane
+SLAB = 10.0  # half the thickness, in m, of floor and walls as the engine comes
+REACH = 300.0  # half their extent
 FLOOR_ERP = 0.02  # share of a penetration that one step removes; none where it would add to a bounce or make one
 
 
@@ -62,8 +61,6 @@ def _aloft(scene: Scene) -> tuple[float, float, float]:
 class _PyBulletWorld(World):
     """A physics server of its own with block, floor and walls, and PyBullet's default parameters."""
 
-    inset = 0.0  # m: how far behind their surfaces floor and walls stand
-
     def __init__(self, scene: Scene) -> None:
         self.bullet = pybullet = _bullet()
         self.client: int = pybullet.connect(pybullet.DIRECT)
@@ -72,10 +69,10 @@ class _PyBulletWorld(World):
         self.dt = 0.0
         # A step in the air, in which Bullet takes notice of an inertia that was changed.
         pybullet.stepSimulation(**self.options)
-        self._make_slab(0.0, 1.0, 0.0, scene.floor.friction, scene.floor.restitution)
+        self._make_surface(0.0, 1.0, 0.0, scene.floor.friction, scene.floor.restitution)
         for wall in scene.walls:
             inward = 1.0 if wall.side == "left" else -1.0
-            self._make_slab(inward, 0.0, scene.block.half_width + wall.gap, 0.0, wall.restitution)
+            self._make_surface(inward, 0.0, scene.block.half_width + wall.gap, 0.0, wall.restitution)
 
     def make_block(self, scene: Scene) -> int:
         """A box. Friction and restitution of two bodies multiply: the block's are 1, so that those of floor and walls count."""
@@ -90,13 +87,17 @@ class _PyBulletWorld(World):
             self.bullet.changeDynamics(body, -1, mass=1.0, localInertiaDiagonal=[inertia] * 3, **self.options)
         return body
 
-    def _make_slab(self, normal_x: float, normal_z: float, distance: float, friction: float, restitution: float) -> None:
-        """A thick box whose face looks along the normal."""
-        depth = distance + self.inset + SLAB
-        extent = [SLAB if normal_x else REACH, REACH, SLAB if normal_z else REACH]
-        shape = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=extent, **self.options)
+    def _make_surface(self, normal_x: float, normal_z: float, distance: float, friction: float, restitution: float) -> None:
+        """The floor, or a wall, `distance` m from the point below the block."""
+        shape, depth = self.make_shape(normal_x, normal_z)
+        depth += distance
         body = self.bullet.createMultiBody(0.0, shape, basePosition=[-normal_x * depth, 0.0, -normal_z * depth], **self.options)
         self.bullet.changeDynamics(body, -1, lateralFriction=friction, restitution=restitution, **self.options)
+
+    def make_shape(self, normal_x: float, normal_z: float) -> tuple[int, float]:
+        """A thick box whose face looks along the normal, and how far behind that its centre is, m."""
+        extent = [SLAB if normal_x else REACH, REACH, SLAB if normal_z else REACH]
+        return self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=extent, **self.options), SLAB
 
     def place(self, state: FloatArray | State) -> None:
         """Put the block where `state` says. Bullet's y axis points into the plane: its angles are clockwise."""
@@ -125,13 +126,14 @@ class _PyBulletWorld(World):
 
 
 class _RigidPyBulletWorld(_PyBulletWorld):
-    """Contacts of points, solved to convergence."""
+    """Contacts of points with planes, solved to convergence.
 
-    inset = CORNER_RADIUS
+    A sphere is pushed at its lowest point: its radius below the corner turns the block with a moment that no step makes
+    smaller. On planes Bullet's normals are exact for spheres however small; on boxes it would lose them.
+    """
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
-        self.far = 2.0 + max((wall.gap for wall in scene.walls), default=0.0)  # away from all walls, x does not matter; the floor ends
         self.bounces = any(contact.restitution > 0.0 for contact in contacts_of(scene))
         # Where it would add to a bounce or make one, a penetration is left as it is.
         self.erp = 0.0 if self.bounces or scene.walls else FLOOR_ERP
@@ -166,9 +168,15 @@ class _RigidPyBulletWorld(_PyBulletWorld):
             spinningFriction=0.0,
             rollingFriction=0.0,
             restitution=1.0,
+            contactProcessingThreshold=0.0,  # of a corner that touches, not of one that is about to
             **self.options,
         )
         return body
+
+    def make_shape(self, normal_x: float, normal_z: float) -> tuple[int, float]:
+        """A plane, behind the surface by the radius of the corners."""
+        normal = [normal_x, 0.0, normal_z]
+        return self.bullet.createCollisionShape(self.bullet.GEOM_PLANE, planeNormal=normal, **self.options), CORNER_RADIUS
 
     def march(self, felt: FloatArray, dt: float) -> FloatArray:
         """States after each step."""
@@ -181,8 +189,3 @@ class _RigidPyBulletWorld(_PyBulletWorld):
         if bouncing is not self.bouncing and (self.bounces or self.bouncing is None):
             self.bullet.setPhysicsEngineParameter(restitutionVelocityThreshold=0.0 if bouncing else 1e30, **self.options)
             self.bouncing = bouncing
-
-    def push(self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool) -> Vector:
-        """Velocity after `dt` s with the contacts closed at `pose`."""
-        x, y, theta = pose
-        return super().push((min(max(x, -self.far), self.far), y, theta), velocity, dt, felt, bouncing)

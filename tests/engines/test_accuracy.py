@@ -38,6 +38,17 @@ def test_adaptive_steps_are_of_third_order(varying_engine, pulse, rotation_error
     assert errors[1e-3] < 2e-6  # what the impacts leave
 
 
+def test_no_error_is_left_that_no_step_changes(varying_engine, pulse, rotation_error):
+    """With impacts ten times as short, so is the error: neither the corners' size nor the table of the base motion shows."""
+    scene = pulse(1.6, 1.96, duration=4.5)
+    usual, short = (
+        rotation_error(varying_engine(time_step="adaptive", short_steps=k).simulate(scene).channels["theta"], scene) for k in (1, 0.1)
+    )
+    assert usual < 5e-7
+    assert short < 1e-7
+    assert usual / short > 4.0
+
+
 def test_adaptive_steps_resolve_each_impact(varying_engine, free_rocking, rotation_error):
     """Ten times better than a fixed step of a tenth of their length."""
     adaptive = varying_engine(time_step="adaptive", largest_step=4e-3)

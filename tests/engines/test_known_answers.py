@@ -6,7 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
+from rockcheck.engines.base_motion import BaseVelocity
 from rockcheck.scenes import Block, Floor, Record, Ricker, Scene, Sine, Wall
 
 SQUAT = Block(half_width=1.0, half_height=0.5)
@@ -103,6 +105,26 @@ def test_both_walls(bouncing_model):
     assert np.min(history.channels["x"]) == pytest.approx(-0.030037, abs=1e-3)
     assert np.max(history.channels["x"]) == pytest.approx(0.050537, abs=1e-3)
     assert abs(history.channels["x_dot"][-1]) == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "excitation",
+    [
+        Ricker(amplitude=4.0, period=1.5),
+        Ricker(amplitude=4.0, period=0.5, symmetric=True),
+        Sine(amplitude=4.0, period=0.5, cycles=2),
+        Record.from_samples([0.0, 3.0, -2.0, 1.0, 0.5], time_step=0.2),
+    ],
+    ids=lambda excitation: excitation.kind,
+)
+def test_the_base_gains_what_its_acceleration_gives(excitation):
+    """The velocity of the base against an integral of its own, to rounding; it stays when the shaking has ended."""
+    velocity = BaseVelocity(excitation)
+    for share in (0.1, 0.37, 0.5, 0.81, 1.0, 1.3):
+        t = share * excitation.quiet_after
+        kinks = 0.2 * np.arange(1, 5) if excitation.kind == "record" else None
+        gained = quad(lambda s: float(excitation.acceleration(s)), 0.0, t, points=kinks, epsabs=1e-13, limit=500)[0]
+        assert velocity(t) == pytest.approx(gained, abs=1e-10)
 
 
 def test_base_motion_moves_the_floor_under_a_loose_block(model):
