@@ -8,9 +8,6 @@ from __future__ import annotations
 
 import math
 
-#: A clamped Kelvin-Voigt contact reaches a restitution of zero only at infinite damping: this is the least one asked of it.
-LEAST_RESTITUTION = 1e-4
-
 
 def felt_share(x: float) -> float:
     """Share of a step's change of speed that a damper feels within that step, for x = c K step (damping, mobility, step).
@@ -95,16 +92,25 @@ def restitution_of(damping_ratio: float) -> float:
     return math.exp(-2.0 * xi * math.acosh(xi) / math.sqrt(xi * xi - 1.0))
 
 
-def damping_ratio(restitution: float) -> float:
+def least_restitution(stiffness: float, frequency_parameter: float) -> float:
+    """Restitution that is asked of a contact with restitution zero: p/sqrt(k/m), with p and k/m as 1/s and 1/s^2.
+
+    A clamped contact reaches zero only at infinite damping. This one vanishes with the length of a contact, so that what it
+    leaves is told from runs with softer contacts.
+    """
+    return min(frequency_parameter / math.sqrt(stiffness), 1.0)
+
+
+def damping_ratio(restitution: float, least: float) -> float:
     """Damping ratio at which a clamped Kelvin-Voigt contact has this restitution: the inverse of `restitution_of`.
 
-    Restitutions below `LEAST_RESTITUTION` get its damping ratio, about 50.
+    Restitutions below `least` (> 0) get its damping ratio.
     """
-    if restitution == 1.0:
+    aim = max(restitution, least)
+    if aim >= 1.0:
         return 0.0
-    aim = max(restitution, LEAST_RESTITUTION)
-    low, high = 0.0, 100.0
-    while high - low > 1e-12:
+    low, high = 0.0, 1.0 / math.sqrt(aim)
+    while high - low > 1e-12 * high:
         middle = 0.5 * (low + high)
         if restitution_of(middle) > aim:
             low = middle

@@ -6,12 +6,12 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from rockcheck.cm.contact import (
-    LEAST_RESTITUTION,
     damping_ratio,
     damping_ratio_of_paper,
     effective_mass,
     felt_share,
     friction_force,
+    least_restitution,
     normal_forces,
     restitution_of,
 )
@@ -40,11 +40,19 @@ def test_restitution_is_smooth_through_critical_damping():
 
 @pytest.mark.parametrize("e", [0.005, 0.05, 0.25, 0.5, 0.75, 0.99, 1.0])
 def test_damping_ratio_inverts_restitution(e):
-    assert restitution_of(damping_ratio(e)) == pytest.approx(e, abs=1e-10)
+    assert restitution_of(damping_ratio(e, 1e-4)) == pytest.approx(e, abs=1e-10)
 
 
-def test_no_restitution_gets_the_least():
-    assert restitution_of(damping_ratio(0.0)) == pytest.approx(LEAST_RESTITUTION, abs=1e-10)
+@pytest.mark.parametrize("least", [1e-2, 1e-4, 1e-6])
+def test_no_restitution_gets_the_least(least):
+    assert restitution_of(damping_ratio(0.0, least)) == pytest.approx(least, rel=1e-6)
+
+
+def test_the_least_restitution_vanishes_with_the_length_of_a_contact():
+    """Four times as stiff, half as long: so a study of the step finds it."""
+    assert least_restitution(4e8, 2.0) == pytest.approx(1e-4)
+    assert least_restitution(1e8, 2.0) == pytest.approx(2.0 * least_restitution(4e8, 2.0))
+    assert damping_ratio(0.0, least_restitution(1e-3, 2.0)) == 0.0
 
 
 @pytest.mark.parametrize("e", [0.25, 0.5, 0.75, 1.0])
