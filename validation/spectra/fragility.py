@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,7 +18,7 @@ from rockcheck.validation.spectra.tiles import Tiles
 
 #: Frequencies of the set of pulses.
 PULSES = 50
-BOOTSTRAPS, CONFIDENCE = 2000, 0.95
+CONFIDENCE = 0.95
 FEWEST = 2
 
 
@@ -67,8 +66,8 @@ def fragility(panel: Panel, request: SpectrumRequest, records: Sequence[tuple[st
         cases.append(curve_of(label, sides != SAFE, failed, request.amplitudes))
     motions = f"{len(records)} records" if records else f"{PULSES} pulses"
     about = (
-        f"{motions}, each in both directions. Lines: share of the runs that overturn the block; bands: {CONFIDENCE:.0%}, by drawing the"
-        f" {'records' if records else 'pulses'} anew {BOOTSTRAPS} times; dots: the lognormal curve of the greatest likelihood."
+        f"{motions}, each in both directions. Lines: share of the runs that overturn the block; bands: its {CONFIDENCE:.0%} interval"
+        f" (Wilson), with the {'records' if records else 'pulses'} as independent; dots: the lognormal curve of the greatest likelihood."
     )
     if undecided := sum(case.undecided for case in cases):
         about += f" {undecided} runs failed: they count neither as overturned nor as safe."
@@ -112,18 +111,10 @@ def _play_records(scene: Scene, request: SpectrumRequest, records: Sequence[tupl
 
 
 def curve_of(label: str, overturned: NDArray[np.bool_], failed: NDArray[np.bool_], intensities: Floats) -> FragilityCurve:
-    """The curve of one case from its runs (motion, direction, intensity): which overturned, and which failed.
-
-    The two directions of a motion are drawn together for the band, since they tell of the same motion.
-    """
+    """The curve of one case from its runs (motion, direction, intensity): which overturned, and which failed."""
     motions = len(overturned)
-    drawn = np.random.default_rng(1).integers(motions, size=(BOOTSTRAPS, motions))
     fallen, decided = (overturned & ~failed).sum(axis=1), (~failed).sum(axis=1)  # (motion, intensity)
-    with np.errstate(invalid="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # an intensity at which all failed has no quantiles
-        share = fallen.sum(axis=0) / decided.sum(axis=0)
-        shares = fallen[drawn].sum(axis=1) / decided[drawn].sum(axis=1)
-        low, high = np.nanquantile(shares, [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2], axis=0)
+    share, low, high = _band(fallen, decided)
     fit = fit_lognormal(intensities, fallen.sum(axis=0), decided.sum(axis=0))
     fitted = lognormal(intensities, *fit) if fit else np.full(len(intensities), np.nan)
     columns = (intensities, share, low, high, fitted)
@@ -131,6 +122,27 @@ def curve_of(label: str, overturned: NDArray[np.bool_], failed: NDArray[np.bool_
     median, dispersion = fit or (None, None)
     undecided = int(failed.sum())
     return FragilityCurve(label=label, motions=motions, undecided=undecided, median=median, dispersion=dispersion, points=points)
+
+
+def _band(fallen: NDArray[np.int64], decided: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
+    """Share that overturns and the ends of its interval at each intensity, from counts of runs (motion, intensity).
+
+    Wilson's interval, which holds near 0 and 1, too, where motions drawn anew all say the same. The directions of a motion
+    tell of the same motion, so the number in it is the effective one: share (1 - share) over the variance of the share
+    between motions, at least that of the motions and at most that of the runs (Korn and Graubard 1998). NaN where no run
+    was decided.
+    """
+    from scipy.special import ndtri
+
+    runs, motions = decided.sum(axis=0), (decided > 0).sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = fallen.sum(axis=0) / runs
+        variance = motions / (motions - 1) * ((fallen - share * decided) ** 2).sum(axis=0) / runs**2
+        count = np.where(variance > 0.0, np.clip(share * (1.0 - share) / variance, motions, runs), motions)
+        z2 = float(ndtri(0.5 + 0.5 * CONFIDENCE)) ** 2 / count
+        middle = (share + 0.5 * z2) / (1.0 + z2)
+        half = np.sqrt(z2 * share * (1.0 - share) + 0.25 * z2 * z2) / (1.0 + z2)
+    return share, middle - half, middle + half
 
 
 def lognormal(intensities: Floats, median: float, dispersion: float) -> Floats:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from rockcheck import Block, ContinuousModel, EventBasedModel, Floor, InputError, Ricker, Scene, Wall
+from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.scenes.files import load_scene, load_uncertain_scene
 from rockcheck.scenes.observation import observe
 from rockcheck.scenes.trust.experience import Experience, Range, Trust, axes_of, expected, outside
@@ -47,6 +48,22 @@ gap = { low = 0.05, high = 0.06 }
 kind = "ricker"
 amplitude = { value = 6.0, sd = 0.2, distribution = "lognormal" }
 period = 1.0
+"""
+FIVE = """
+duration = 6.0
+[block]
+half_width = 0.397
+half_height = 1.555
+[floor]
+friction = { value = 0.4, sd = 0.04 }
+[[walls]]
+side = "left"
+gap = { value = 0.053, sd = 0.01 }
+restitution = { low = 0.2, high = 0.6 }
+[excitation]
+kind = "ricker"
+amplitude = { value = 5.0, sd = 0.4, distribution = "lognormal" }
+period = { value = 1.2, sd = 0.1 }
 """
 
 
@@ -214,6 +231,46 @@ def test_sobol_indices_of_a_free_slide(tmp_path):
     block = "duration = 1.0\ninitial_velocity = 0.1\n[block]\nhalf_width = 1.0\nhalf_height = 0.5\n"
     path.write_text(block + "[floor]\nfriction = { value = 0.3, sd = 0.01 }\n", encoding="utf-8")
     assert sensitivities(load_uncertain_scene(path), EventBasedModel(), samples=16) == ()
+
+
+@pytest.mark.slow
+def test_sobol_indices_agree_with_brute_force(tmp_path):
+    """The bookcase with five uncertain numbers: 100,000 draws, means within bins and numbers drawn again one at a time."""
+    path, model, draws, again = tmp_path / "bookcase.toml", EventBasedModel(pivot="unilateral", tolerance=1e-8), 100_000, 20_000
+    path.write_text(FIVE, encoding="utf-8")
+    given = load_uncertain_scene(path)
+    chance = np.random.default_rng(5)
+
+    def peaks(points):
+        scenes = [given.at(row) for row in given.values(points)]
+        return np.minimum(run_batch(pack(scenes, model), model, until_decided=False).peak / BOOKCASE.block.alpha, 1.0)
+
+    points = chance.random((draws, len(given.names)))
+    found = peaks(points)
+    indices = {row.name: row for row in sensitivities(given, model)}
+    assert set(indices) == set(given.names)
+    for k, name in enumerate(given.names):
+        inside = [found[(points[:, k] * 50).astype(int) == n] for n in range(50)]
+        first = np.var([np.mean(one) for one in inside]) - np.mean([np.var(one, ddof=1) / len(one) for one in inside])
+        other = points[:again].copy()
+        other[:, k] = chance.random(again)
+        total = 0.5 * np.mean((found[:again] - peaks(other)) ** 2)
+        assert indices[name].first == pytest.approx(first / np.var(found), abs=0.06)
+        assert indices[name].total == pytest.approx(total / np.var(found), abs=0.06)
+
+
+def test_the_interval_of_the_share_that_falls_covers(uncertain):
+    """Of few draws it holds what many say, and so does the interval of the draws' own peaks, as often as they should."""
+    given = load_uncertain_scene(uncertain)
+    many = propagate(given, samples=8192, seed=99, indices=False)
+    (peak, *_), share = many.inputs.figures, many.inputs.overturns.value
+    falls, peaks = 0, []
+    for seed in range(60):
+        few = propagate(given, samples=32, seed=seed, indices=False)
+        falls += few.inputs.overturns.low <= share <= few.inputs.overturns.high
+        peaks.append(np.mean((peak.low <= few.peaks) & (few.peaks <= peak.high)))
+    assert falls / 60 >= 0.9
+    assert np.mean(peaks) == pytest.approx(0.95, abs=0.01)
 
 
 # --- repeats of a test

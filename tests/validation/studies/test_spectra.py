@@ -622,7 +622,28 @@ def test_the_band_holds_the_binomial_spread():
     assert share == 0.5
     assert low == pytest.approx(0.5 - 1.96 * 0.05, abs=0.015)  # the normal approximation of the binomial
     assert high == pytest.approx(0.5 + 1.96 * 0.05, abs=0.015)
-    assert case.points[0][2:4] == (0.0, 0.0)
+    (_, share, low, high, _) = case.points[0]  # none of 100 motions: at most 3.7 %, Wilson's z^2/(n + z^2)
+    assert (share, low) == (0.0, 0.0)
+    assert high == pytest.approx(3.8415 / 103.8415, rel=1e-4)
+
+
+def test_the_band_covers_as_often_as_it_says():
+    """Motions with capacities of their own and directions that scatter about them; shares between 2 and 98 %.
+
+    Counts are whole numbers: nearer to 0 and 1 Wilson's interval may hold only 83 % (Brown, Cai and DasGupta 2001).
+    """
+    chance, intensities, median, dispersion = np.random.default_rng(3), np.geomspace(0.7, 3.3, 8), 1.5, 0.4
+    truth = fragility.lognormal(intensities, median, dispersion)
+    for motions, shared in ((10, 0.0), (20, 0.3), (50, 0.4)):
+        inside = np.zeros(len(intensities))
+        for _ in range(400):
+            alone = math.sqrt(dispersion**2 - shared**2) * chance.standard_normal((motions, 2))
+            capacity = median * np.exp(shared * chance.standard_normal((motions, 1)) + alone)
+            overturned = intensities > capacity[:, :, None]
+            points = np.array(fragility.curve_of("", overturned, np.zeros_like(overturned), intensities).points)
+            inside += (points[:, 2] <= truth) & (truth <= points[:, 3])
+        assert np.mean(inside) / 400 >= 0.94
+        assert np.min(inside) / 400 >= 0.9
 
 
 def test_records_are_scaled_to_the_intensity(tmp_path, monkeypatch):
@@ -660,7 +681,7 @@ def test_a_fragility_curve_never_counts_a_failed_run_as_safe():
     curve = fragility.curve_of("made", overturned, failed, intensities)
     assert [point[1] for point in plain.points] == [0.0, 0.5, 1.0]
     assert [point[1] for point in curve.points] == [0.0, 1.0, 1.0]
-    assert curve.points[1][2:4] == (1.0, 1.0)
+    assert curve.points[1][2:4] == (pytest.approx(2 / (2 + 3.8415), rel=1e-4), 1.0)  # both motions, and nothing else is known
     assert curve.undecided == 5
     assert curve.median < plain.median
     failed[:, :, 1] = True
