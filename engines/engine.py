@@ -26,7 +26,7 @@ from rockcheck.scenes.errors import NotInstalled, printable
 from rockcheck.scenes.observation import observe
 
 MOST_STEPS = 5_000_000
-#: The step of an engine as it comes, where none is given, s.
+#: The step of an engine that cannot step adaptively, where none is given, s.
 STOCK_STEP = 1e-4
 
 
@@ -35,7 +35,7 @@ class Engine(Frozen):
 
     `time_step` in s, or "adaptive": then steps end at the events and are at most `largest_step` s long, and those at
     impacts and just after events `short_steps` times their usual length; neither has a meaning otherwise. Where none is given it is
-    the class's own, or `STOCK_STEP` with settings that cannot step adaptively. `settings`
+    "adaptive", or `STOCK_STEP` where that cannot be. `settings`
     "best" is the set-up that converges to rigid contact with Coulomb friction and Newton's restitution; "default" is the
     engine as it comes, a box on a floor with the engine's own contact parameters, which cannot step adaptively.
     """
@@ -48,7 +48,7 @@ class Engine(Frozen):
     fixed_because: ClassVar[str] = ""
     #: The settings in which contacts have Newton's coefficient of restitution.
     bounces_with: ClassVar[tuple[str, ...]] = ("best", "default")
-    time_step: float | Literal["adaptive"] = 1e-4
+    time_step: float | Literal["adaptive"] = "adaptive"
     largest_step: Positive = 5e-4
     short_steps: Positive = 1.0
     settings: Literal["best", "default"] = "best"
@@ -56,7 +56,7 @@ class Engine(Frozen):
     @model_validator(mode="before")
     @classmethod
     def _stock_step(cls, given: Any) -> Any:
-        if isinstance(given, dict) and given.get("settings") == "default":
+        if isinstance(given, dict) and (cls.fixed_because or given.get("settings") == "default"):
             return {"time_step": STOCK_STEP, **given}
         return given
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,6 @@ class MuJoCo(Engine):
 
     name: ClassVar[str] = "mujoco"
     bounces_with: ClassVar[tuple[str, ...]] = ("best",)
-    time_step: float | Literal["adaptive"] = "adaptive"
     cone_correction: bool = True
 
     def rigid_world(self, scene: Scene) -> World:

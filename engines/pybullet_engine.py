@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from functools import cache
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,6 @@ class PyBullet(Engine):
     name: ClassVar[str] = "pybullet"
     module: ClassVar[str] = "pybullet"
     extra: ClassVar[str] = "pybullet"
-    time_step: float | Literal["adaptive"] = "adaptive"
 
     def rigid_world(self, scene: Scene) -> World:
         """The scene as PyBullet holds it: point contacts of the corners."""

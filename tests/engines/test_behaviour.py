@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.engines import MuJoCo, PyBullet
+from rockcheck.engines import Drake, MuJoCo, PyBullet
 from rockcheck.engines.engine import Engine
 from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Ricker, Scene, Sine, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
@@ -77,11 +77,9 @@ def test_wrong_settings(varying_engine, settings, words):
         varying_engine(**settings)
 
 
-@pytest.mark.parametrize("kind", [MuJoCo, PyBullet], ids=["mujoco", "pybullet"])
-def test_steps_are_adaptive_unless_something_else_is_asked_for(kind):
+def test_steps_are_adaptive_unless_something_else_is_asked_for(varying_engine):
     """An engine as it comes cannot step so: it has a fixed step, also by default."""
-    if not kind.installed():
-        pytest.skip("not installed")
+    kind = varying_engine
     assert (kind().time_step, kind().largest_step) == ("adaptive", 5e-4)
     assert kind(settings="default").time_step == 1e-4
     assert kind(settings="default", time_step=1e-3).time_step == 1e-3
@@ -90,11 +88,12 @@ def test_steps_are_adaptive_unless_something_else_is_asked_for(kind):
         kind(settings="default", time_step="adaptive")
 
 
-@pytest.mark.parametrize("kind", [MuJoCo, PyBullet], ids=["mujoco", "pybullet"])
-def test_a_default_run_of_the_readmes_scene_is_converged(kind):
+def test_an_engine_whose_steps_cannot_vary_has_a_fixed_one():
+    assert (Drake().time_step, Drake(settings="default").time_step, Drake(time_step=1e-3).time_step) == (1e-4, 1e-4, 1e-3)
+
+
+def test_a_default_run_of_the_readmes_scene_is_converged(varying_engine):
     """A wall that the block strikes at 5.95 alpha and comes back from: at fixed steps of 1e-4 s it is not."""
-    if not kind.installed():
-        pytest.skip("not installed")
     scene = Scene(
         name="bookcase",
         block=PAPER_BLOCK,
@@ -103,7 +102,7 @@ def test_a_default_run_of_the_readmes_scene_is_converged(kind):
         excitation=Ricker(amplitude=4.0, period=1.5),
         duration=6.0,
     )
-    model = kind()
+    model = varying_engine()
     history = model.simulate(scene)
     reference = EventBasedModel(pivot="unilateral").simulate(scene)
     error = np.sqrt(np.mean((history.channels["theta"] - reference.channels["theta"]) ** 2)) / scene.block.alpha
