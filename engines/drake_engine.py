@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 CORNER_RADIUS = 1e-5  # of the block's radius
 STIFFNESS = 2e8  # of each of two bodies in contact, N/m for a block of 1 kg and R = 1 m
 DISSIPATION = 1e3  # of Hunt and Crossley, s/m: nothing bounces
-STICTION = 1e-7  # m/s: slower slip counts as none; at 1e-8 the solver often fails
+STICTION, COARSEST_STICTION = 1e-7, 1e-3  # m/s: slower slip counts as none; at 1e-8 the solver often fails
 IMPACT_STEPS = 40  # in which an impact can bounce
 SLAB, REACH = 20.0, 600.0  # thickness and extent of floor and walls
 
@@ -74,7 +74,11 @@ class _DrakeWorld(World):
         try:
             self.simulator.AdvanceTo(self.steps * dt)
         except RuntimeError as error:  # its solver has not converged
-            raise ModelFailure(f"Drake: {printable(error, 200)}") from None
+            self.step_unsolved(felt, dt, ModelFailure(f"Drake: {printable(error, 200)}"))
+
+    def step_unsolved(self, felt: tuple[float, float], dt: float, failure: ModelFailure) -> None:
+        """What to do about a step that Drake's solver did not solve."""
+        raise failure
 
     def state(self) -> State:
         """Where the block is."""
@@ -134,6 +138,19 @@ class _RigidDrakeWorld(_DrakeWorld):
     def __init__(self, scene: Scene, stiffness: float = STIFFNESS, dissipation: float = DISSIPATION, stiction: float = STICTION) -> None:
         super().__init__(scene)
         self.stiffness, self.dissipation, self.stiction = stiffness, dissipation, stiction
+        self.coarser: _RigidDrakeWorld | None = None
+
+    def step_unsolved(self, felt: tuple[float, float], dt: float, failure: ModelFailure) -> None:
+        """The one step with a larger stiction speed, which smooths the turn from stick to slip that TAMSI stumbles over."""
+        if self.stiction >= COARSEST_STICTION:
+            raise failure
+        if self.coarser is None:
+            self.coarser = _RigidDrakeWorld(self.scene, self.stiffness, self.dissipation, 10.0 * self.stiction)
+        self.coarser.place(self.state())
+        self.coarser.step(felt, dt)
+        self.place(self.coarser.state())
+        self.simulator.get_mutable_context().SetTime(self.steps * dt)
+        self.simulator.Initialize()
 
     def shape(self, body: Any) -> None:
         """Give the block, the floor and the walls their shapes."""

@@ -13,7 +13,7 @@ import pytest
 from rockcheck.ebm import EventBasedModel
 from rockcheck.engines import Drake, MuJoCo, PyBullet
 from rockcheck.engines.engine import Engine
-from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Ricker, Scene, Sine, Wall
+from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Ricker, Scene, Sine, Wall, load_scene
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
 
@@ -86,6 +86,20 @@ def test_steps_are_adaptive_unless_something_else_is_asked_for(varying_engine):
     assert kind(time_step=1e-3).coarser(2.0).time_step == 2e-3
     with pytest.raises(InputError, match='"adaptive" is not allowed with settings = "default"'):
         kind(settings="default", time_step="adaptive")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Drake.installed(), reason="Drake is not installed")
+def test_drake_goes_on_where_its_solver_stumbles(monkeypatch):
+    """Two steps of this record are not solved as they stand: the run ends all the same, and does so again."""
+    scene = load_scene("fig4a").replace(duration=8.0)
+    history = Drake(time_step=1e-3).simulate(scene)
+    reference = EventBasedModel(pivot="unilateral").simulate(scene)
+    assert np.sqrt(np.mean((history.channels["theta"] - reference.channels["theta"]) ** 2)) < 0.02 * scene.block.alpha
+    np.testing.assert_array_equal(Drake(time_step=1e-3).simulate(scene).channels["theta"], history.channels["theta"])
+    monkeypatch.setattr("rockcheck.engines.drake_engine.COARSEST_STICTION", 0.0)
+    with pytest.raises(ModelFailure, match="failed to converge"):
+        Drake(time_step=1e-3).simulate(scene)
 
 
 def test_an_engine_whose_steps_cannot_vary_has_a_fixed_one():

@@ -79,6 +79,9 @@ SETUPS = {
         ModelSetup("pymunk adaptive", "pymunk", (("time_step", "adaptive"),), "largest_step"),
         ModelSetup("dart default", "dart", (("settings", "default"),)),
         ModelSetup("dart", "dart", ()),
+        ModelSetup("dart adaptive", "dart", (("time_step", "adaptive"),), "largest_step"),
+        ModelSetup("drake default", "drake", (("settings", "default"),)),
+        ModelSetup("drake", "drake", ()),
         ModelSetup("cm paper", "cm", (("damping_rule", "paper"),)),
         ModelSetup("cm", "cm", ()),
     )
