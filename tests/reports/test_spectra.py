@@ -15,7 +15,7 @@ from rockcheck.reports.show.spectrum import COLOURS, draw
 from rockcheck.reports.studies import spectra as pages
 from rockcheck.reports.studies.spectra import draw_figures, maps_shown, paper_figure, write_page
 from rockcheck.reports.style import save, stamp_in, stamp_of
-from rockcheck.validation.spectra.agreement import Agreement, mapped
+from rockcheck.validation.spectra.agreement import CANDIDATES, PLAYED_SHARE, Agreement, mapped
 from rockcheck.validation.spectra.claims import Claim, Claims
 from rockcheck.validation.spectra.findings import findings, kept_spectra
 from rockcheck.validation.spectra.refinement import Refined, Refinement
@@ -71,7 +71,7 @@ def test_the_page_shows_what_the_folder_holds(tmp_path):
     assert "Fig. 8: " not in text
     # The long studies came with the package, and the page says so.
     assert text.count("came with the package") == 2
-    assert "84.6 %" in text
+    assert "84.7 %" in text  # ebm-unilateral near a boundary
     assert (folder / "models.svg").exists()
     for link in re.findall(r'(?:href|src)="([^"#:]+)"', text):
         assert (tmp_path / link).exists(), link
@@ -129,7 +129,8 @@ def test_the_documentation_shows_the_kept_studies():
     assert set(refinement.rows) <= shown
     assert len(refinement.spectra) == len({share.spectrum for share in agreement.shares}) == 28
     assert refinement.runs < refinement.nodes / 8
-    assert all(share.nodes == 100 for share in agreement.shares)
+    assert all(share.nodes == 100 for share in agreement.shares if share.model not in PLAYED_SHARE)
+    assert {share.model for share in agreement.shares} == set(CANDIDATES)
 
 
 def test_the_documentation_tells_the_findings_of_the_kept_spectra():

@@ -12,15 +12,20 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from rockcheck.ebm import Spectrum
+from rockcheck.engines.engine import Engine
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.execute import provenance
+from rockcheck.validation.execute.models import Model, build, not_installed
 from rockcheck.validation.spectra.claims import percent
 from rockcheck.validation.spectra.study import Panel, SpectrumRequest, play_panels
 from rockcheck.validation.spectra.tiles import CODES, SETTLE, UNDECIDED, Tiles
 
-CANDIDATES = ("ebm-unilateral", "cm", "mujoco", "pybullet")
+CANDIDATES = ("ebm-unilateral", "cm", "mujoco", "pybullet", "pymunk", "dart", "drake")
+#: The share of the nodes that a model plays, where it is not all. These engines draw no map: whether they, too, agree is told by fewer
+#: nodes, and a run of DART costs four times, one of Drake twice the others'.
+PLAYED_SHARE = {"pymunk": 0.3, "dart": 0.1, "drake": 0.2}
 REFERENCES = ("ebm", "ebm-unilateral")
-COLUMNS = ("spectrum", "model", "near, bilateral", "away, bilateral", "near, unilateral", "away, unilateral", "failed")
+COLUMNS = ("spectrum", "model", "near, bilateral", "away, bilateral", "near, unilateral", "away, unilateral", "nodes", "failed")
 #: A node is near the boundary if a node of another outcome is among those at most this many nodes away, diagonals included.
 NEAR = 2
 #: The paper's figure of which every model draws a map, and the map's nodes an axis.
@@ -74,7 +79,8 @@ class Agreement(Stored):
         models = list(dict.fromkeys(share.model for share in self.shares))
         rows = [_row("all", model, [share for share in self.shares if share.model == model]) for model in models]
         for name in dict.fromkeys(share.spectrum for share in self.shares):
-            rows += [_row(name, model, [s for s in self.shares if (s.spectrum, s.model) == (name, model)]) for model in models]
+            groups = {model: [s for s in self.shares if (s.spectrum, s.model) == (name, model)] for model in models}
+            rows += [_row(name, model, shares) for model, shares in groups.items() if shares]
         return tuple(rows)
 
 
@@ -95,6 +101,15 @@ def choose_nodes(spectrum: Spectrum, count: int, name: str) -> tuple[NDArray[np.
     return nodes, near[nodes[:, 0], nodes[:, 1]]
 
 
+def first_of(near: NDArray[np.bool_], count: int) -> NDArray[np.int64]:
+    """The indices of `count` of the chosen nodes, in the order chosen: the first half of each side, or all nodes."""
+    if count >= len(near):
+        return np.arange(len(near))
+    sides = [np.flatnonzero(near == part) for part in (True, False)]
+    wanted = [min(count // 2, len(sides[0])), min(count - count // 2, len(sides[1]))]
+    return np.concatenate([side[:number] for side, number in zip(sides, wanted, strict=True)])
+
+
 def near_boundary(outcomes: NDArray[np.int8]) -> NDArray[np.bool_]:
     """Which nodes have another outcome within `NEAR` nodes."""
     width = 2 * NEAR + 1
@@ -104,6 +119,27 @@ def near_boundary(outcomes: NDArray[np.int8]) -> NDArray[np.bool_]:
     return near
 
 
+def candidates() -> tuple[str, ...]:
+    """The models that are held against the event-based ones and are installed."""
+    return tuple(model for model in CANDIDATES if not not_installed(model))
+
+
+def drawing(models: Sequence[str]) -> tuple[str, ...]:
+    """Those of the models that draw maps."""
+    return tuple(model for model in models if model not in PLAYED_SHARE)
+
+
+def nodes_of(model: str, count: int) -> int:
+    """At how many of `count` nodes of a spectrum a model plays; two at least, one on each side."""
+    return max(2, round(PLAYED_SHARE.get(model, 1.0) * count))
+
+
+def has_contacts_of(model: Model, panel: Panel) -> bool:
+    """Whether the model has what the panel asks of contacts; an engine without restitution does not play walls that bounce."""
+    lacks = model.lacks() if isinstance(model, Engine) else ()
+    return "restitution" not in lacks or panel.wall is None or panel.wall.restitution == 0.0
+
+
 def agree(
     panels: Sequence[Panel],
     spectra: Sequence[Spectrum],
@@ -111,25 +147,26 @@ def agree(
     count: int,
     tiles: Tiles,
 ) -> Agreement:
-    """Plays `count` nodes of each spectrum by the other models and counts equal outcomes; then a map of one figure by each model."""
+    """Plays up to `count` nodes of each spectrum by the other models and counts equal outcomes; then a map of one figure by each model."""
     shares: list[Share] = []
-    settings = {model: SpectrumRequest(request.frequencies, request.amplitudes, model).settings for model in CANDIDATES}
+    models = candidates()
+    settings = {model: SpectrumRequest(request.frequencies, request.amplitudes, model).settings for model in models}
     for panel, spectrum in zip(panels, spectra, strict=True):
         nodes, near = choose_nodes(spectrum, count, panel.name)
         i, j = nodes.T
         sides = {"ebm": spectrum.outcomes[i, j]}
-        failures = {}
-        for model in CANDIDATES:
-            amplitudes, frequencies = request.amplitudes[i], request.frequencies[j]
-            sides[model], failures[model] = tiles.play(panel.scene, amplitudes, frequencies, model=model, settings=settings[model])
-        for model in CANDIDATES:
+        for model in models:
+            if not has_contacts_of(build(model, settings[model]), panel):
+                continue
+            chosen = first_of(near, nodes_of(model, count))
+            amplitudes, frequencies = request.amplitudes[i[chosen]], request.frequencies[j[chosen]]
+            mine, failures = tiles.play(panel.scene, amplitudes, frequencies, model=model, settings=settings[model])
+            if model in REFERENCES:
+                sides[model] = mine
             for part in (True, False):
-                here = near == part
-                fine = here & ~failures[model]
-                equal = {
-                    reference: int(np.sum(fine & (sides[model] == sides[reference]))) for reference in REFERENCES if reference != model
-                }
-                failed = int(np.sum(here & failures[model]))
+                here = near[chosen] == part
+                fine = here & ~failures
+                equal = {other: int(np.sum(fine & (mine == sides[other][chosen]))) for other in REFERENCES if other != model}
                 shares.append(
                     Share(
                         spectrum=panel.name,
@@ -137,7 +174,7 @@ def agree(
                         model=model,
                         near=part,
                         nodes=int(here.sum()),
-                        failed=failed,
+                        failed=int(np.sum(here & failures)),
                         equal=equal,
                     )
                 )
@@ -148,8 +185,11 @@ def agree(
         " which lets the block hop as the other models do. Runs of the other models end with the pulse where the block then lacks the"
         f" energy to tip over, otherwise {SETTLE:g} s later. A block that then stands counts as safe."
     )
+    if fewer := [model for model in models if model in PLAYED_SHARE]:
+        about += f" Played at fewer of the nodes: {', '.join(fewer)}."
     plain = {request.model: dict(request.settings)} | {model: dict(chosen) for model, chosen in settings.items()}
     across, up = (np.linspace(axis[0], axis[-1], MAP_SIZE) for axis in (request.frequencies, request.amplitudes))
+    mapping = [SpectrumRequest(across, up, model, plain[model]) for model in drawing(tuple(plain))]
     return Agreement(
         about=about,
         date=datetime.now(UTC).date().isoformat(),
@@ -158,7 +198,7 @@ def agree(
         shares=tuple(shares),
         map_frequencies=tuple(across.tolist()),
         map_amplitudes=tuple(up.tolist()),
-        maps=_maps(mapped(panels), [SpectrumRequest(across, up, model, chosen) for model, chosen in plain.items()], tiles),
+        maps=_maps(mapped(panels), mapping, tiles),
     )
 
 
@@ -219,4 +259,4 @@ def _row(name: str, model: str, shares: Sequence[Share]) -> tuple[str, ...]:
             mine = [share for share in shares if share.near == near and reference in share.equal]
             nodes = sum(share.nodes for share in mine)
             cells.append(percent(sum(share.equal[reference] for share in mine) / nodes) if nodes else "–")
-    return (name, model, *cells, str(sum(share.failed for share in shares)))
+    return (name, model, *cells, *(str(sum(getattr(share, what) for share in shares)) for what in ("nodes", "failed")))

@@ -38,8 +38,9 @@ FREQUENCIES, AMPLITUDES = (0.5, 8.0), (1.0, 12.0)
 SETTINGS: dict[str, dict[str, Any]] = {
     "ebm": {"tolerance": TOLERANCE},
     "ebm-unilateral": {"tolerance": TOLERANCE},
-    "mujoco": {"time_step": "adaptive", "largest_step": 2e-3},
-    "pybullet": {"time_step": "adaptive", "largest_step": 2e-3},
+    **{engine: {"time_step": "adaptive", "largest_step": 2e-3} for engine in ("mujoco", "pybullet", "pymunk")},
+    "dart": {"time_step": "adaptive", "largest_step": 4e-3},
+    "drake": {"time_step": 1e-3},
 }
 SPECTRA = "spectra"
 #: Results of the long studies of spectra, as they come with the package.

@@ -532,8 +532,8 @@ def test_agreement_counts_equal_outcomes(tmp_path, monkeypatch):
         ("cm", True): (19, 20, 0),
         ("cm", False): (19, 20, 1),
     }
-    assert found.rows[0] == ("all", "ebm-unilateral", "100.0 %", "100.0 %", "–", "–", "0")
-    assert found.rows[1] == ("all", "cm", "95.0 %", "95.0 %", "95.0 %", "95.0 %", "1")
+    assert found.rows[0] == ("all", "ebm-unilateral", "100.0 %", "100.0 %", "–", "–", "40", "0")
+    assert found.rows[1] == ("all", "cm", "95.0 %", "95.0 %", "95.0 %", "95.0 %", "40", "1")
     again = agreement.Agreement.model_validate_json(found.model_dump_json())
     assert again == found
     maps = {one.model: one for one in found.maps}
@@ -541,6 +541,33 @@ def test_agreement_counts_equal_outcomes(tmp_path, monkeypatch):
     (drawn,) = agreement.map_spectra(found, maps["cm"], [panel])
     assert agreement.encoded(drawn) == maps["cm"].outcomes[panel.name]
     assert drawn.undecided.tolist() == [[4, 4]]
+
+
+def test_slow_engines_play_fewer_nodes_and_only_contacts_that_they_have(tmp_path, monkeypatch):
+    monkeypatch.setattr(agreement, "candidates", lambda: ("ebm-unilateral", "cm", "dart", "drake"))
+    monkeypatch.setattr(agreement, "PLAYED_SHARE", {"dart": 0.2, "drake": 0.2})
+    monkeypatch.setattr(agreement, "MAP_SIZE", 3)
+    request = small(20)
+    panels = [panel for panel in paper_panels(8) if panel.name.endswith(("gap-3-e-0", "gap-3-e-1"))]
+    played = {}
+
+    class Player(Tiles):
+        def play(self, scene, amplitudes, frequencies, *, model, settings):
+            played.setdefault((scene.name, model), set()).update(zip(amplitudes, frequencies, strict=True))
+            return np.zeros(len(amplitudes), dtype=np.int8), np.zeros(len(amplitudes), dtype=bool)
+
+    with Player(tmp_path) as tiles:
+        spectra = [play_panels([panel], request, Tiles(tmp_path))[0] for panel in panels]
+        found = agreement.agree(panels, spectra, request, 40, tiles)
+    counted = {name: [(s.near, s.nodes) for s in found.shares if (s.spectrum, s.model) == name] for name in played}
+    flat, bouncing = "figure-8-gap-3-e-0", "figure-8-gap-3-e-1"
+    assert counted[flat, "cm"] == [(True, 20), (False, 20)]
+    assert counted[flat, "dart"] == counted[flat, "drake"] == counted[bouncing, "dart"] == [(True, 4), (False, 4)]
+    assert played[flat, "dart"] == played[flat, "drake"] < played[flat, "cm"]
+    assert (bouncing, "drake") not in played
+    assert {one.model for one in found.maps} == {"ebm", "ebm-unilateral", "cm"}
+    assert "fewer of the nodes: dart, drake" in found.about
+    assert [(row[1], row[6]) for row in found.rows[:4]] == [("ebm-unilateral", "80"), ("cm", "80"), ("dart", "16"), ("drake", "8")]
 
 
 def test_the_command_compares_models_and_refinement(tmp_path, monkeypatch, capsys):

@@ -20,7 +20,7 @@ from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT
 from rockcheck.scenes import InputError, load_scene
 from rockcheck.scenes.compiled import threads
-from rockcheck.scenes.errors import NotInstalled, unknown_name
+from rockcheck.scenes.errors import unknown_name
 from rockcheck.scenes.progress import Count
 from rockcheck.scenes.recordings import Reading, Recording
 from rockcheck.scenes.recordings.sets import files_of, motions_of
@@ -289,23 +289,24 @@ def _agreement(
 ) -> None:
     from rockcheck.reports.studies.spectra import draw_maps
     from rockcheck.validation.execute.models import not_installed
-    from rockcheck.validation.spectra.agreement import CANDIDATES, COLUMNS, MAP_SIZE, agree, mapped
+    from rockcheck.validation.spectra.agreement import CANDIDATES, COLUMNS, MAP_SIZE, agree, candidates, drawing, mapped, nodes_of
 
     if request.model != "ebm":
         raise InputError("cannot be given together with --model or --pivot: all models are compared", "--agreement")
     for model in CANDIDATES:
         if missing := not_installed(model):
-            raise NotInstalled(missing, model)
+            screen.print(f"{model} is left out: {missing}", markup=False, highlight=False)
     if not 2 <= count <= len(request.frequencies) * len(request.amplitudes):
         raise InputError(f"{count} is not allowed: give 2 up to the number of the spectrum's nodes", "--agreement")
     spectra = play_panels(panels, request, tiles)
-    on_maps = MAP_SIZE**2 * len(mapped(panels)) * (1 + len(CANDIDATES))
+    models = candidates()
+    on_maps = MAP_SIZE**2 * len(mapped(panels)) * (1 + len(drawing(models)))
     with progress("agreement") as on_progress:
-        tiles.count = Count(on_progress, count * len(CANDIDATES) * len(panels) + on_maps)
+        tiles.count = Count(on_progress, sum(nodes_of(model, count) for model in models) * len(panels) + on_maps)
         found = agree(panels, spectra, request, count, tiles)
     _write_table("agreement", found, COLUMNS, data)
     draw_maps(found, mapped(panels), data, formats)
-    screen.print(_table(COLUMNS[1:], [row[1:] for row in found.rows[: len(CANDIDATES)]], words=1))
+    screen.print(_table(COLUMNS[1:], [row[1:] for row in found.rows if row[0] == "all"], words=1))
 
 
 def _write_table(name: str, found: Agreement | Refinement, columns: Sequence[str], data: Path) -> None:
@@ -318,7 +319,7 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, words: int)
     """A table whose first `words` columns are words, the others numbers."""
     table = Table(box=None, pad_edge=False)
     for n, column in enumerate(columns):
-        table.add_column(column, justify="right" if n >= words else "left")
+        table.add_column(column, justify="right" if n >= words else "left", no_wrap=n < words)
     for row in rows:
         table.add_row(*row)
     return table
