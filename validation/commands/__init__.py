@@ -7,7 +7,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -133,6 +133,7 @@ def answer(value: Any) -> None:
 def progress(title: str) -> Iterator[OnProgress]:
     """A bar on stderr with the time left, on a terminal only."""
     screen = Console(stderr=True)
+    shown = screen.is_terminal and _voice.get() == "tables"
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(20),
@@ -142,9 +143,9 @@ def progress(title: str) -> Iterator[OnProgress]:
         TextColumn("left"),
         console=screen,
         transient=True,
-        disable=not screen.is_terminal or _voice.get() != "tables",  # a pipe would get an empty line
+        disable=not shown,
     )
-    with bar:
+    with bar if shown else nullcontext():  # older versions of rich end a bar that is not shown with an empty line
         task = bar.add_task(title, total=None)
 
         def on_progress(done: float, total: float, what: str = "") -> None:
