@@ -231,6 +231,24 @@ def test_a_block_is_put_onto_the_contact_that_closes(side):
                 np.testing.assert_array_equal(z[kept], before[kept])
 
 
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_flush_landing_rebounds_as_the_wall_does_that_it_meets(side):
+    """The paper's pivot, closed branch: a block that tipped to one side lands against the other one's wall, with that one's restitution."""
+    walls = (Wall(side="left", gap=0.0, restitution=0.3), Wall(side="right", gap=0.0, restitution=0.7))
+    block = Block(half_width=math.sin(0.4), half_height=math.cos(0.4))
+    scene = Scene(name="flush", block=block, floor=Floor(friction=0.5), walls=walls, duration=1.0)
+    b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
+    e, w = (0.7 if side > 0 else 0.3), -0.2 * side
+    m, impulse, counts = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.zeros(2), np.zeros(rules.RULES, dtype=np.int64)
+    m[motion.FAMILY], m[motion.S], m[motion.FLOOR] = motion.TILT, side, motion.STICK
+    z = np.array([0.0, math.cos(0.4), 0.0, -math.cos(0.4) * w, 0.0, w])
+    assert not strike._floor_impact(b, m, z, 1e-9, impulse, counts)
+    assert z[motion.W] == pytest.approx(-e * w, abs=1e-15)
+    assert (z[motion.VX], z[motion.VY]) == pytest.approx((math.cos(0.4) * e * w, -side * math.sin(0.4) * e * w), abs=1e-15)
+    assert impulse.tolist() == [pytest.approx((1.0 + e) * math.sin(0.4) * abs(w)), 0.0]
+    assert (counts[rules.FLUSH_LANDING], counts.sum()) == (1, 1)
+
+
 @pytest.mark.parametrize(("slip", "kept"), [(0.1, True), (-3e-7, True), (1e-7, False), (-1e-7, False)])
 def test_a_block_that_lands_with_less_spin_than_counts_slides_on(slip, kept):
     """Its spin, and a bounce and a slip below the settling speed, are gone; a slip above it, and a faster bounce, are not."""
