@@ -270,7 +270,8 @@ def test_the_interval_of_the_share_that_falls_covers(uncertain):
         falls += few.inputs.overturns.low <= share <= few.inputs.overturns.high
         peaks.append(np.mean((peak.low <= few.peaks) & (few.peaks <= peak.high)))
     assert falls / 60 >= 0.9
-    assert np.mean(peaks) == pytest.approx(0.95, abs=0.01)
+    assert many.inputs.figures[0].high == 1.0  # some fall, and count as 1: then only the lower end leaves draws out
+    assert np.mean(peaks) == pytest.approx(0.975, abs=0.01)
 
 
 # --- repeats of a test
