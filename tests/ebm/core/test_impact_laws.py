@@ -249,6 +249,23 @@ def test_a_flush_landing_rebounds_as_the_wall_does_that_it_meets(side):
     assert (counts[rules.FLUSH_LANDING], counts.sum()) == (1, 1)
 
 
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_corner_rebounds_as_the_wall_does_that_it_strikes(side):
+    """The paper's pivot, held: a block that tips to one side meets that wall, and its corner leaves with that one's restitution."""
+    walls = (Wall(side="left", gap=0.5, restitution=0.3), Wall(side="right", gap=0.5, restitution=0.7))
+    block = Block(half_width=math.sin(0.4), half_height=math.cos(0.4))
+    scene = Scene(name="corner", block=block, floor=Floor(friction=0.5), walls=walls, duration=1.0)
+    b = natural.setting_of(scene, unilateral=False, no_slip=True, energy_cap=False)
+    m, counts = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.zeros(rules.RULES, dtype=np.int64)
+    m[motion.FAMILY], m[motion.S], m[motion.FLOOR] = motion.TILT, side, motion.STICK
+    w = 0.3 * side
+    z = np.array([0.0, math.cos(0.25), 0.15 * side, -math.cos(0.25) * w, math.sin(0.25) * abs(w), w])
+    assert strike._wall_impact(b, m, z, True, 1e-9, np.zeros(2), np.zeros(2), counts)
+    e = 0.3 if side > 0 else 0.7
+    assert z[motion.W] == pytest.approx(-e * w, abs=1e-15)
+    assert z[motion.VX] == pytest.approx(math.cos(0.25) * e * w, abs=1e-15)
+
+
 @pytest.mark.parametrize(("slip", "kept"), [(0.1, True), (-3e-7, True), (1e-7, False), (-1e-7, False)])
 def test_a_block_that_lands_with_less_spin_than_counts_slides_on(slip, kept):
     """Its spin, and a bounce and a slip below the settling speed, are gone; a slip above it, and a faster bounce, are not."""
