@@ -190,16 +190,16 @@ def run_batch(
 def row_ground(row, samples):
     """The base motion of a packed row, of the types that a single history has: the loop is then compiled once for both."""
     return Ground(
-        kind=int(row.kind),
-        c0=row.c0,
-        c1=row.c1,
-        c2=row.c2,
-        c3=row.c3,
-        rate=row.rate,
-        centre=row.centre,
-        quiet=row.quiet,
-        step=row.step,
-        samples=samples[row.first : row.first + row.count],
+        kind=int(row["kind"]),
+        c0=row["c0"],
+        c1=row["c1"],
+        c2=row["c2"],
+        c3=row["c3"],
+        rate=row["rate"],
+        centre=row["centre"],
+        quiet=row["quiet"],
+        step=row["step"],
+        samples=samples[row["first"] : row["first"] + row["count"]],
     )
 
 
@@ -207,16 +207,16 @@ def row_ground(row, samples):
 def row_side(r):
     """One side of the block of a packed row."""
     return Side(
-        alpha=r.alpha,
-        radius=r.radius,
-        arm=r.arm,
-        top_alpha=r.top_alpha,
-        top_radius=r.top_radius,
-        tip_sin=r.tip_sin,
-        tip_cos=r.tip_cos,
-        far_sin=r.far_sin,
-        far_cos=r.far_cos,
-        share=r.share,
+        alpha=r["alpha"],
+        radius=r["radius"],
+        arm=r["arm"],
+        top_alpha=r["top_alpha"],
+        top_radius=r["top_radius"],
+        tip_sin=r["tip_sin"],
+        tip_cos=r["tip_cos"],
+        far_sin=r["far_sin"],
+        far_cos=r["far_cos"],
+        share=r["share"],
     )
 
 
@@ -224,22 +224,22 @@ def row_side(r):
 def row_setting(r):
     """Block, floor and walls of a packed row, of the types that a single history has."""
     return Setting(
-        left=row_side(r.left),
-        right=row_side(r.right),
-        height=r.height,
-        spin=r.spin,
-        mu_s=r.mu_s,
-        mu_k=r.mu_k,
-        e_floor=r.e_floor,
-        gap_left=r.gap_left,
-        gap_right=r.gap_right,
-        e_left=r.e_left,
-        e_right=r.e_right,
-        walls=r.walls != 0.0,
-        no_slip=r.no_slip != 0.0,
-        unilateral=r.unilateral != 0.0,
-        energy_cap=r.energy_cap != 0.0,
-        law=int(r.law),
+        left=row_side(r["left"]),
+        right=row_side(r["right"]),
+        height=r["height"],
+        spin=r["spin"],
+        mu_s=r["mu_s"],
+        mu_k=r["mu_k"],
+        e_floor=r["e_floor"],
+        gap_left=r["gap_left"],
+        gap_right=r["gap_right"],
+        e_left=r["e_left"],
+        e_right=r["e_right"],
+        walls=r["walls"] != 0.0,
+        no_slip=r["no_slip"] != 0.0,
+        unilateral=r["unilateral"] != 0.0,
+        energy_cap=r["energy_cap"] != 0.0,
+        law=int(r["law"]),
     )
 
 

@@ -42,8 +42,8 @@ def _cases(cell: Cell, strict: bool) -> Iterator[TestCase]:
     ran = _case(place, "runs", {"failed": Error(cell.reason), "absent": missing}.get(cell.status))
     ran.time = cell.cost.worker_seconds
     yield ran
-    if cell.converged is not None:
-        yield _case(place, "converged", None if cell.converged else Skipped("; ".join(cell.numerical.reasons) if cell.numerical else ""))
+    if cell.numerical is not None:
+        yield _case(place, "converged", None if cell.numerical.converged else Skipped("; ".join(cell.numerical.reasons)))
     for check in cell.checks:
         failed = check.verdict == "fail" or (strict and check.verdict == "changed")
         yield _case(place, title(check), Failure(check.reason, check.verdict) if failed else None)

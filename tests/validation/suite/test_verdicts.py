@@ -10,11 +10,13 @@ from scipy.stats import ttest_1samp
 
 from rockcheck.scenes import InputError
 from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.discrepancy.impact_laws import LawFollowed
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.suite.results import Cell, Check, CostRecord, Run
 from rockcheck.validation.suite.tolerances import Tolerance, judge, parse_tolerances
 from rockcheck.validation.suite.verdicts import junit, markdown
+from rockcheck.validation.uncertainty.numerical import Numerical, Quantity
 
 LINE = Tolerance(expected=0.25, limit=0.5, drift=0.125, why="a test")
 
@@ -69,6 +71,37 @@ def test_totals_and_failures_of_the_junit_file(strict, failures):
 def test_a_run_without_a_fault_is_green():
     root = ET.fromstring(junit(run_of(cell("a", "m", check(0.25)))))
     assert totals(root) == {"tests": 2, "failures": 0, "errors": 0}
+
+
+def test_a_cell_that_has_not_converged_is_skipped_with_its_reason():
+    """A case of its own, beside the run's: green where the run has converged, none where nothing was asked for."""
+
+    def found(*quantities: Quantity) -> Cell:
+        return cell("a", "m", check(0.25)).model_copy(update={"numerical": Numerical(method="steps h, 2h and 4h", quantities=quantities)})
+
+    sure = Quantity(name="theta_peak", unit="alpha", value=0.5, verdict="converged")
+    unsure = Quantity(name="outcome", unit="", value="right", verdict="not converged", reason="the outcome changes: right, right, stands")
+    cases = {}
+    for name, one in {"asked": found(sure), "unsure": found(sure, unsure), "unasked": cell("a", "m", check(0.25))}.items():
+        root = ET.fromstring(junit(run_of(one)))
+        cases[name] = [case for case in root.iter("testcase") if case.get("name") == "converged"]
+        assert totals(root) == {"tests": 2 + len(cases[name]), "failures": 0, "errors": 0}
+    assert cases["unasked"] == []
+    assert [len(case) for case in cases["asked"]] == [0]
+    (skipped,) = cases["unsure"][0]
+    assert (skipped.tag, skipped.get("message")) == ("skipped", unsure.reason)
+
+
+def test_the_table_of_laws_has_the_models_that_met_a_landing():
+    """One row a scene with such a landing, one column a model that followed a law in any scene; others have none."""
+
+    def followed(scene: str, model: str, law: str) -> Cell:
+        return cell(scene, model).model_copy(update={"impact_law": LawFollowed(t=1.25, law=law, errors={}, spread=0.1)})
+
+    cells = (followed("a", "m", "closed"), cell("a", "n"), cell("a", "o"), followed("b", "n", "open"), cell("b", "m"), cell("c", "m"))
+    table = markdown(run_of(*cells)).split("(not judged):")[1].strip().splitlines()
+    rows = [[entry.strip() for entry in line.strip("|").split("|")] for line in table]
+    assert [rows[0], *rows[2:]] == [["scene", "landing", "m", "n"], ["a", "1.250 s", "closed", ""], ["b", "1.250 s", "", "open"]]
 
 
 def test_the_summary_names_what_is_not_a_pass():
