@@ -33,11 +33,12 @@ STOCK_STEP = 1e-4
 class Engine(Frozen):
     """A physics engine as a model of the block.
 
-    `time_step` in s, or "adaptive": then steps end at the events and are at most `largest_step` s long, and those at
-    impacts and just after events `short_steps` times their usual length; neither has a meaning otherwise. Where none is given it is
-    "adaptive", or `STOCK_STEP` where that cannot be. `settings`
-    "best" is the set-up that converges to rigid contact with Coulomb friction and Newton's restitution; "default" is the
-    engine as it comes, a box on a floor with the engine's own contact parameters, which cannot step adaptively.
+    `time_step` in s, or "adaptive": then steps end at the events and are at most `largest_step` s long. Those at impacts and just
+    after events are `short_steps` times their usual length. Where no step is given it is "adaptive", or `STOCK_STEP` where the
+    engine cannot vary its steps.
+
+    `settings` "best" is the set-up that converges to rigid contact with Coulomb friction and Newton's restitution; "default" is
+    the engine as it comes, a box on a floor with the engine's own contact parameters, which cannot step adaptively.
     """
 
     name: ClassVar[str]

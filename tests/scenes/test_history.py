@@ -118,7 +118,7 @@ def test_a_compressed_table_is_bounded(tmp_path, monkeypatch):
 
 
 def test_another_compressed_file_is_refused(history, tmp_path):
-    with pytest.raises(InputError, match=r"written as \.csv, \.csv\.gz, \.json or \.mat"):
+    with pytest.raises(InputError, match=r"written as \.csv, \.csv\.gz, \.json, \.mat or \.parquet"):
         history.save(tmp_path / "run.json.gz")
 
 

@@ -95,7 +95,7 @@ class Calibration:
 
 
 def calibrate(engine: str, *, restitution: float, friction: float, step: float, penetration: float = math.inf) -> Calibration:
-    """The parameters for a block that drops 0.2 m onto a floor, and slides on it from 1.5 m/s.
+    """The parameters with which a block dropped from 0.2 m rebounds, and one at 1.5 m/s slides, as wanted.
 
     Raises `InputError` where the engine cannot reach the restitution, naming what it can.
     """

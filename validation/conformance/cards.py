@@ -38,7 +38,7 @@ class Row:
 
     @property
     def phenomenon(self) -> Phenomenon:
-        """What it is about."""
+        """The phenomenon of this row."""
         return next(one for one in PHENOMENA if one.id == self.id)
 
 

@@ -93,7 +93,7 @@ CREEP = Scene(
 
 
 def sliding_distance(found: Histories) -> float:
-    """The way of a block that slides to a stop, over v^2/(2 mu g)."""
+    """The distance in which a sliding block stops, over v^2/(2 mu g)."""
     x = _column(found["slide"], "x")
     return float((x[-1] - x[0]) / (1.5**2 / (2.0 * 0.3 * G)))
 
@@ -119,7 +119,7 @@ def lift(found: Histories) -> float:
 
 
 def coasting(found: Histories) -> float:
-    """The way without friction, over v t."""
+    """The distance that a block slides without friction, over v t."""
     t, x = found["coast"].channels["t"], _column(found["coast"], "x")
     return float((x[-1] - x[0]) / (5.0 * (t[-1] - t[0])))
 
@@ -290,7 +290,10 @@ def restlessness(found: Histories) -> float:
 
 
 def moving_base(found: Histories) -> float:
-    """The larger of two: how far a loose block leaves its place in space, and half of gravity from a base that falls with half of it."""
+    """The larger of two errors, both shares.
+
+    How far a loose block leaves its place in space; how far the motion on a base that falls with g/2 is from that under g/2.
+    """
     t, x = found["loose"].channels["t"], _column(found["loose"], "x")
     pulse = 2.0 * math.pi / SHAKE.period
     base = SHAKE.amplitude / pulse * (t - np.sin(pulse * t) / pulse)

@@ -152,7 +152,10 @@ def test_floor_first_is_a_trajectory_beside_a_wall_that_stands_farther_off(wall)
     both = 0
     for _ in range(400):
         alpha, floor_e, wall_e = rng.uniform(0.1, 1.2), rng.uniform(0.3, 0.9), rng.uniform(0.3, 0.9)
-        rows, v, mass = ci.contact_rows(alpha, 0.0), rng.normal(0.0, 0.5, 3), np.array([1.0, 1.0, 3.0])
+        block = Block(half_width=math.sin(alpha), half_height=math.cos(alpha))
+        scene = Scene(name="flush", block=block, floor=Floor(friction=0.0, restitution=floor_e), duration=1.0)
+        setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False, impacts="floor-first")
+        rows, v, mass = ci.contact_rows(setting, 1, 0.0), rng.normal(0.0, 0.5, 3), np.array([1.0, 1.0, 3.0])
         v[0] = math.copysign(v[0], -rows[wall[0], 0])  # toward the wall
         away, struck, after = dict.fromkeys((ci.F, ci.E), 0.0) | dict.fromkeys(wall, 1.0), [], v.copy()
         if not min(rows[ci.F] @ v, rows[ci.E] @ v) < -1e-3 < 1e-3 < max(rows[ci.F] @ v, rows[ci.E] @ v):
@@ -167,13 +170,10 @@ def test_floor_first_is_a_trajectory_beside_a_wall_that_stands_farther_off(wall)
             restitution = floor_e if first in (ci.F, ci.E) else wall_e
             after = after - (1.0 + restitution) * rates[first] / (rows[first] @ (mass * rows[first])) * mass * rows[first]
             struck.append(first)
-        block = Block(half_width=math.sin(alpha), half_height=math.cos(alpha))
-        scene = Scene(name="flush", block=block, floor=Floor(friction=0.0, restitution=floor_e), duration=1.0)
-        setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False, impacts="floor-first")
         touching = np.isin(np.arange(ci.CONTACTS), (ci.F, ci.E, *wall))
         found = v.copy()
         if len(struck) < 20:  # of more stages the rest are plastic
-            assert ci.contact_impact(setting, 0.0, touching, wall_e, wall_e, 1e-9, found, np.zeros(2), np.zeros(2)) == ci.FITS
+            assert ci.contact_impact(setting, 1, 0.0, touching, wall_e, wall_e, 1e-9, found, np.zeros(2), np.zeros(2)) == ci.FITS
             np.testing.assert_allclose(found, after, rtol=0.0, atol=1e-9)
             both += set(wall) <= set(struck)
     assert both > 30
