@@ -15,7 +15,7 @@ from rockcheck.validation.discrepancy.measures import DIFFERENCES
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.suite.results import Cell, Check, CostRecord, Run
 from rockcheck.validation.suite.tolerances import Tolerance, judge, parse_tolerances
-from rockcheck.validation.suite.verdicts import junit, markdown
+from rockcheck.validation.suite.verdicts import MARKS, junit, markdown
 from rockcheck.validation.uncertainty.numerical import Numerical, Quantity
 
 LINE = Tolerance(expected=0.25, limit=0.5, drift=0.125, why="a test")
@@ -102,6 +102,13 @@ def test_the_table_of_laws_has_the_models_that_met_a_landing():
     table = markdown(run_of(*cells)).split("(not judged):")[1].strip().splitlines()
     rows = [[entry.strip() for entry in line.strip("|").split("|")] for line in table]
     assert [rows[0], *rows[2:]] == [["scene", "landing", "m", "n"], ["a", "1.250 s", "closed", ""], ["b", "1.250 s", "", "open"]]
+
+
+def test_the_summary_of_a_run_that_nothing_judges_tells_the_outcomes():
+    """And of a cell without a history that it failed, not an outcome."""
+    fell = cell("a", "m").model_copy(update={"outcome": "overturned left", "overturned_at": 3.21})
+    row = markdown(run_of(fell, cell("a", "n", reason="more than 10 events"), judged=False)).splitlines()[-1]
+    assert [entry.strip() for entry in row.strip("|").split("|")] == ["a", "", "overturned left at 3.21 s", MARKS["error"]]
 
 
 def test_the_summary_names_what_is_not_a_pass():
