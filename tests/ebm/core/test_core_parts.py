@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel, natural
+from rockcheck.ebm.core import contacts as contacts_of_the_core
 from rockcheck.ebm.core import ground, guards, modes, motion, rules, series
 from rockcheck.scenes import Block, Floor, Record, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
@@ -602,6 +603,24 @@ def test_what_was_tried_at_an_instant():
         assert tried[modes.code_of(m)] != may
     modes.leave(m, tried, memory, 4.0, series.RATE)
     assert tried.sum() == 1, "what was tried at an earlier instant is forgotten"
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_spin_of_rounding_is_taken_from_a_block_that_leans_on_a_wall(side):
+    """One wall is enough; the same block a little away from it keeps its spin, which is then a motion."""
+    alpha, phi, gap = 0.3, 0.1, 0.2
+    sign = 1.0 if side == "left" else -1.0
+    walls = [Wall(side=side, gap=gap, restitution=0.0)]
+    block = Block(half_width=math.sin(alpha), half_height=math.cos(alpha))
+    scene = Scene(name="leans", block=block, floor=Floor(friction=0.5), walls=walls, duration=1.0)
+    setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
+    touches = math.sin(alpha + phi) - math.sin(alpha) - gap  # where the top corner meets the wall
+    for away, spin in ((0.0, 0.0), (0.05, 0.1 * contacts_of_the_core.SLOW)):
+        z = np.zeros(6)
+        z[motion.X], z[motion.HEIGHT], z[motion.THETA] = sign * (touches + away), math.cos(alpha - phi), sign * phi
+        z[motion.W] = 0.1 * contacts_of_the_core.SLOW
+        modes._clean(setting, z, True)
+        assert z[motion.W] == spin
 
 
 def test_a_mode_that_must_go_on_has_twice_the_slack_each_time():
