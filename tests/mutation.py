@@ -100,6 +100,7 @@ EQUIVALENT = {
     ): "on one wall the other's gap cannot close, and its own is zero throughout",
     ("ebm/core/modes.py", "m[PULL] < 0 and (b.unilateral", "m[PULL] < 0  ->  m[PULL] <= 0"): "a floor pushes or pulls: it is never 0",
     ("ebm/core/modes.py", "m[PULL] < 0", "0  ->  1"): "a floor pushes or pulls, 1 or -1",
+    ("ebm/core/modes.py", "_touched(b, z, 1, True)", "1  ->  2"): "of an upright block both sides are looked at, whatever the sense",
     ("ebm/core/modes.py", "if flat else 0", "0  ->  1"): "only a flat block asks for it",
     ("ebm/core/guards.py", "a[PHI, 0] > 0.5", "a[PHI, 0] > 0.5  ->  a[PHI, 0] >= 0.5"): "a bound that saves the guards, met or not",
     (
