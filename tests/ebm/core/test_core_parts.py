@@ -15,7 +15,7 @@ import pytest
 
 from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import contacts as contacts_of_the_core
-from rockcheck.ebm.core import ground, guards, modes, motion, rules, series
+from rockcheck.ebm.core import ground, guards, march, modes, motion, rules, series
 from rockcheck.scenes import Block, Floor, Record, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
@@ -621,6 +621,20 @@ def test_a_spin_of_rounding_is_taken_from_a_block_that_leans_on_a_wall(side):
         z[motion.W] = 0.1 * contacts_of_the_core.SLOW
         modes._clean(setting, z, True)
         assert z[motion.W] == spin
+
+
+def test_a_block_that_lies_down_along_a_wall_meets_it_while_it_turns_over():
+    """However slowly it turns; one that turns back, or has some way to go, does not."""
+    m, z, count = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.zeros(6), np.zeros(rules.RULES, dtype=np.int64)
+    m[motion.FAMILY], m[motion.FLOOR] = motion.TILT, motion.STICK
+    for sign in (1, -1):
+        m[motion.S] = sign
+        for left, spin, lies in ((1e-6, 0.5, True), (1e-6, 1e-3, True), (1e-6, 0.0, False), (1e-6, -0.5, False), (1e-3, 0.5, False)):
+            z[motion.THETA], z[motion.W] = sign * (0.5 * math.pi - left), sign * spin
+            before = count[rules.LANDS_ALONG]
+            assert march._lies_along_wall(m, z, guards.G_TIP_GAP, count) == lies
+            assert count[rules.LANDS_ALONG] == before + lies
+            assert not march._lies_along_wall(m, z, guards.G_FAR_GAP, count)
 
 
 def test_a_mode_that_must_go_on_has_twice_the_slack_each_time():
