@@ -97,7 +97,7 @@ def _units(axes: Any, scene: Scene) -> None:
     if scene.excitation.kind == "record":
         return
     hertz = scene.frequency_parameter / (2.0 * np.pi)
-    pga_g = scene.gravity * scene.block.half_width / scene.block.half_height / GRAVITY_OF_RECORDS
+    pga_g = scene.gravity * scene.block.slope / GRAVITY_OF_RECORDS
     axes.secondary_xaxis("top", functions=(lambda x: x * hertz, lambda x: x / hertz)).set_xlabel("frequency of the pulse, Hz")
     axes.secondary_yaxis("right", functions=(lambda y: y * pga_g, lambda y: y / pga_g)).set_ylabel(PGA)
 

@@ -75,7 +75,7 @@ def fragility(panel: Panel, request: SpectrumRequest, records: Sequence[tuple[st
         title=f"{panel.title}, {motions}",
         about=about,
         intensity="peak acceleration / (g tan α)",
-        pga_g=scene.gravity * scene.block.half_width / scene.block.half_height / GRAVITY_OF_RECORDS,
+        pga_g=scene.gravity * scene.block.slope / GRAVITY_OF_RECORDS,
         cases=tuple(cases),
     )
 
@@ -101,8 +101,7 @@ def _play_records(scene: Scene, request: SpectrumRequest, records: Sequence[tupl
         peak = float(np.max(np.abs(record.samples)))
         if peak == 0.0:
             raise InputError(f"{name}: a record without motion has no intensity", "--record")
-        pivot = scene.block.weaker_pivot
-        scales = request.amplitudes * scene.gravity * pivot.arm / pivot.height / peak
+        scales = request.amplitudes * scene.gravity * scene.block.slope / peak
         both = np.concatenate([scales, -scales])
         played = tiles.play(scene.replace(excitation=record), both, np.ones(len(both)), model=request.model, settings=request.settings)
         found.append([runs.reshape(2, len(scales)) for runs in played])

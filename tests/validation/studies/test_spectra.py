@@ -20,7 +20,7 @@ import pytest
 from rockcheck.cm import ContinuousModel
 from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.spectrum import node_scene
-from rockcheck.scenes import InputError, Ricker
+from rockcheck.scenes import Block, InputError, Ricker, load_scene
 from rockcheck.scenes.progress import Count
 from rockcheck.scenes.recordings import Reading
 from rockcheck.scenes.recordings.sets import motions_of
@@ -693,6 +693,15 @@ def test_records_are_scaled_to_the_intensity(tmp_path, monkeypatch):
     assert {point[1] for point in case.points} <= {0.0, 0.5, 1.0}
     with pytest.raises(InputError, match="too few"):
         fragility.fragility(panel, request, motions("0.csv"), Tiles(tmp_path / "tiles"))
+
+
+def test_the_intensity_in_g_is_that_of_the_pivot_that_lifts_first(tmp_path):
+    """Of a block whose mass lies to the right and low: its right corner, nearer to the mass's centre."""
+    block = Block(half_width=0.3, half_height=1.0, centre_of_mass=(0.1, -0.2))
+    scene = load_scene("loaded").replace(block=block)
+    request = SpectrumRequest(np.array([1.0, 2.0]), np.array([0.5, 1.0]))
+    found = fragility.fragility(Panel("case", "case", scene), request, (), Tiles(tmp_path / "tiles"))
+    assert found.pga_g == pytest.approx((0.3 - 0.1) / (1.0 - 0.2) * scene.gravity / 9.80665)
 
 
 def test_a_fragility_curve_never_counts_a_failed_run_as_safe():
