@@ -27,15 +27,14 @@ Vector = tuple[float, float, float]  # along x, y and theta
 Touching = tuple[list[Contact], list[Contact]]  # the closed contacts with the floor and with walls
 
 # Lengths in units of the block's radius R, times in units of 1/p.
-CLOSED = 5e-8  # a corner nearer than this touches
-EMBEDDED = 5e-9  # how deep the engine sees a corner that touches
-IMPACT_STEP = 2e-6
+CLOSED = 5e-9  # a corner nearer than this touches
+EMBEDDED = 5e-10  # how deep the engine sees a corner that touches
 PROBE_STEP = 6e-5  # the longest step where the acceleration is not known, that is, after an event
-SHORTEST_STEP = 2e-7
+SHORTEST_STEP = 2e-8  # that of an impact: the time and the place of each are wrong by so much
 LONG_APPROACH = 6e-4  # from farther away the prediction of an event is only trusted to 95 %
 RESTING = 0.001  # of g times the longest step: slower approaches and departures are not told from rest
 SETTLING_GAP = 2e-6
-SETTLING_TIME = 0.15  # of the longest step: a corner that is back on the floor within twice that time is taken to stay
+SETTLING_TIME = 0.2  # of the longest step, after an event of the probe: a corner that is back within twice that time stays
 
 
 class Push(Protocol):
@@ -53,23 +52,24 @@ class _Limits:
     """The steps and speeds that count as short, long and slow in a scene, s and 1/s (lengths in R)."""
 
     longest: float
-    impact: float
     probe: float
     shortest: float
     long_approach: float
     resting: float
+    staying: float
 
     @classmethod
     def of(cls, scene: Scene, longest: float, short: float) -> _Limits:
         """Those of a scene whose steps are at most `longest` s, and at events `short` times the usual."""
         moment = short / scene.frequency_parameter
+        probe = min(PROBE_STEP * moment, longest)
         return cls(
             longest=longest,
-            impact=min(IMPACT_STEP * moment, longest),
-            probe=min(PROBE_STEP * moment, longest),
-            shortest=SHORTEST_STEP * moment,
+            probe=probe,
+            shortest=min(SHORTEST_STEP * moment, longest),
             long_approach=LONG_APPROACH * moment,
             resting=RESTING * longest * scene.gravity,
+            staying=SETTLING_TIME * probe * scene.gravity,
         )
 
     def trusted(self, predicted: float) -> float:
@@ -149,6 +149,7 @@ def _plan(
     """The next step, at most `dt` s long: it ends before a gap closes or a slip stops that the present acceleration brings."""
     (x, y, theta), (vx, vy, w), resting = pose, velocity, limits.resting
     dt = min(dt, limits.longest if acceleration is not None else limits.probe)
+    leaving = resting if acceleration is not None else max(resting, limits.staying)
     impact = stops = False
     touching: Touching = ([], [])
     cos, sin = math.cos(theta), math.sin(theta)
@@ -156,7 +157,7 @@ def _plan(
         for contact in sides[side]:
             arm = contact.arm(cos, sin)
             gap, rate = contact.gap(x, y, arm), contact.rate(vx, vy, w, arm)
-            if gap > CLOSED or rate > resting:
+            if gap > CLOSED or rate > leaving:
                 curvature = 0.0 if acceleration is None else contact.acceleration(*acceleration, w, arm)
                 closing = _time_to_close(gap, rate, curvature)
                 if closing < dt:
@@ -172,7 +173,7 @@ def _plan(
                     stopping = abs(slip / slowing)
                     dt = limits.trusted(stopping)
                     stops = dt == stopping
-    return _Plan(limits.impact if impact else dt, touching, impact, stops)
+    return _Plan(limits.shortest if impact else dt, touching, impact, stops)
 
 
 def _drift_kick_drift(

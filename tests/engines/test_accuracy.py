@@ -35,18 +35,18 @@ def test_adaptive_steps_are_of_third_order(varying_engine, pulse, rotation_error
     assert errors[1.6e-2] / errors[8e-3] > 5.0
     assert errors[8e-3] < 1e-5
     assert errors[4e-3] < 3e-6
-    assert errors[1e-3] < 2e-6  # what the impacts leave
+    assert errors[1e-3] < 1e-6
 
 
 def test_no_error_is_left_that_no_step_changes(varying_engine, pulse, rotation_error):
-    """With impacts ten times as short, so is the error: neither the corners' size nor the table of the base motion shows."""
+    """With impacts a hundred times as long, the error grows: neither the corners' size nor the table of the base motion shows."""
     scene = pulse(1.6, 1.96, duration=4.5)
-    usual, short = (
-        rotation_error(varying_engine(time_step="adaptive", short_steps=k).simulate(scene).channels["theta"], scene) for k in (1, 0.1)
+    usual, long = (
+        rotation_error(varying_engine(time_step="adaptive", short_steps=k).simulate(scene).channels["theta"], scene) for k in (1, 100)
     )
-    assert usual < 5e-7
-    assert short < 1e-7
-    assert usual / short > 4.0
+    print(usual, long)
+    assert usual < 5e-8
+    assert long / usual > 4.0
 
 
 def test_adaptive_steps_resolve_each_impact(varying_engine, free_rocking, rotation_error):
