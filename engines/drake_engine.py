@@ -19,7 +19,7 @@ from rockcheck.scenes.errors import printable
 FloatArray = NDArray[np.float64]
 CORNER_RADIUS = 1e-5  # of the block's radius
 STIFFNESS = 2e8  # of each of two bodies in contact, N/m for a block of 1 kg and R = 1 m
-DISSIPATION = 1e3  # of Hunt and Crossley, s/m: nothing bounces
+DISSIPATION = 1e4  # of Hunt and Crossley, s/m: nothing bounces, and an impact is over within its step
 STICTION, COARSEST_STICTION = 1e-7, 1e-3  # m/s: slower slip counts as none; at 1e-8 the solver often fails
 IMPACT_STEPS = 40  # in which an impact can bounce
 SLAB, REACH = 20.0, 600.0  # thickness and extent of floor and walls
