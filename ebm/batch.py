@@ -1,4 +1,4 @@
-"""Many runs of the event-based model at once, compiled and on all cores: outcomes and peaks, no histories.
+"""Many runs of the event-based model at once, compiled and on all cores: outcomes and peaks, and their motion where it is asked for.
 
 Scenes are packed into plain arrays, one row a run, so that the loop over them never comes back to Python. Threads take
 chunks of rows; the result of a row does not depend on the others, nor on the number of threads.
@@ -66,8 +66,12 @@ class Outcomes:
     peak: Floats
     t_end: Floats
     series: NDArray[np.int64]
-    #: How each run ended, a key of `ebm.core.march.FAILURES` where it failed.
+    #: How each run ended, a key of `ebm.core.march.FAILURES` where it failed; and whether it then was at rest.
     ending: NDArray[np.int64]
+    at_rest: NDArray[np.bool_]
+    #: Of each run `written` rows, equally spaced from its start on: x, y, theta and their rates, as in `Packed.states`.
+    motion: Floats
+    written: NDArray[np.int64]
 
     @property
     def failed(self) -> NDArray[np.bool_]:
@@ -141,18 +145,21 @@ def run_batch(
     model: EventBasedModel,
     *,
     until_decided: bool = True,
+    parts: int = 0,
     strict: bool = True,
     jobs: int | None = None,
     on_progress: OnProgress = unheard,
 ) -> Outcomes:
     """Runs every row; with `until_decided` to the moment when outcome and peak are certain, whatever its duration.
 
-    `jobs` threads (default: all cores). `on_progress` is told the rows done. Where a row reaches
+    With `parts` the motion is kept at the ends of so many equal parts of each row's duration, its start included; not together
+    with `until_decided`. `jobs` threads (default: all cores). `on_progress` is told the rows done. Where a row reaches
     a cap or has no consistent motion: `ModelFailure` if `strict`, else only its `ending` says so.
     """
-    count = len(packed)
+    count, kept = len(packed), parts + 1 if parts and not until_decided else 0
     side, peak, t_end = np.zeros(count, dtype=np.int8), np.zeros(count), np.zeros(count)
-    series, ending = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
+    series, ending, written = (np.zeros(count, dtype=np.int64) for _ in range(3))
+    at_rest, motion, modes = np.zeros(count, dtype=bool), np.zeros((count, kept, 6)), np.zeros((count, kept), dtype=np.int8)
     control = Control(model.tolerance, model.order, min(model.most_steps, 2_000_000), model.most_events, until_decided, 1.0)
     durations = np.full(count, 1e6) if until_decided else packed.durations
 
@@ -171,6 +178,10 @@ def run_batch(
             t_end[rows],
             series[rows],
             ending[rows],
+            at_rest[rows],
+            motion[rows],
+            modes[rows],
+            written[rows],
         )
         return rows.stop - rows.start
 
@@ -179,7 +190,7 @@ def run_batch(
         for rows in pool.map(chunk, range(0, count, _CHUNK)):
             done += rows
             on_progress(done, count)
-    found = Outcomes(side=side, peak=peak, t_end=t_end, series=series, ending=ending)
+    found = Outcomes(side=side, peak=peak, t_end=t_end, series=series, ending=ending, at_rest=at_rest, motion=motion, written=written)
     if strict and found.failed.any():
         first = int(np.argmax(found.failed))
         raise ModelFailure(f"{model.name}: run {first} of the batch: {FAILURES[int(ending[first])]}")
@@ -244,15 +255,31 @@ def row_setting(r):
 
 
 @kernel
-def _run_rows(settings, horizontal, vertical, states, durations, samples, control, side, peak, t_end, series, ending):
+def _run_rows(
+    settings, horizontal, vertical, states, durations, samples, control, side, peak, t_end, series, ending, at_rest, motion, modes, written
+):
     a, stack = workspace()
-    out, out_mode, log = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
+    log = np.empty((0, 5))
     z = np.empty(6)
+    parts = max(motion.shape[1] - 1, 1)
     for i in range(len(durations)):
         b = row_setting(settings[i])
         z[:] = states[i]
+        own = Control(
+            control.tolerance, control.order, control.most_steps, control.most_events, control.until_decided, durations[i] / parts
+        )
         tally = run(
-            b, row_ground(horizontal[i], samples), row_ground(vertical[i], samples), z, durations[i], control, out, out_mode, log, a, stack
+            b,
+            row_ground(horizontal[i], samples),
+            row_ground(vertical[i], samples),
+            z,
+            durations[i],
+            own,
+            motion[i],
+            modes[i],
+            log,
+            a,
+            stack,
         )
         ending[i] = tally.ending
         if tally.ending == OVERTURNED:
@@ -260,3 +287,5 @@ def _run_rows(settings, horizontal, vertical, states, durations, samples, contro
         peak[i] = tally.peak
         t_end[i] = tally.t
         series[i] = tally.steps
+        at_rest[i] = tally.at_rest
+        written[i] = tally.rows

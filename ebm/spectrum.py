@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +16,10 @@ from rockcheck.scenes.base import Shown
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.excitations import Record
 from rockcheck.scenes.progress import Count, OnProgress, unheard
-from rockcheck.scenes.scene import Scene
+from rockcheck.scenes.scene import Block, Scene
+
+if TYPE_CHECKING:
+    from rockcheck.ebm.batch import Packed
 
 Floats = NDArray[np.float64]
 MOST_NODES = 50_000_000
@@ -162,14 +165,56 @@ def _batch_of(
 ) -> Nodes:
     from rockcheck.ebm import batch
 
-    if scene.excitation.kind == "record":
-        packed = batch.pack([node_scene(scene, a, f) for a, f in zip(amplitude_ratios, frequency_ratios, strict=True)], model)
-    else:
-        p, tan_alpha = scene.frequency_parameter, scene.block.slope
-        periods = 2.0 * math.pi / (frequency_ratios * p)
-        packed = batch.pack_pulses(scene, model, amplitude_ratios * scene.gravity * tan_alpha, periods)
+    packed = _packed(scene, amplitude_ratios, frequency_ratios, model)
     found = batch.run_batch(packed, model, jobs=jobs, on_progress=on_progress, strict=False)
     return found.side, found.failed
+
+
+def _packed(scene: Scene, amplitude_ratios: Floats, frequency_ratios: Floats, model: EventBasedModel) -> Packed:
+    from rockcheck.ebm import batch
+
+    if scene.excitation.kind == "record":
+        return batch.pack([node_scene(scene, a, f) for a, f in zip(amplitude_ratios, frequency_ratios, strict=True)], model)
+    periods = 2.0 * math.pi / (frequency_ratios * scene.frequency_parameter)
+    return batch.pack_pulses(scene, model, amplitude_ratios * scene.gravity * scene.block.slope, periods)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The motion at one node: `rows` of t (s), theta (rad), x and y (m), fewer where the node's `block` overturns; and the outcome."""
+
+    block: Block
+    rows: Floats
+    outcome: str
+
+
+def play_motions(
+    scene: Scene, amplitude_ratios: Floats, frequency_ratios: Floats, *, model: EventBasedModel, parts: int
+) -> list[Motion | None]:
+    """The motion at nodes of a spectrum (1-D arrays of one length), None where the run failed.
+
+    Each lasts as long as its `node_scene`, and has a row at its start and at the ends of so many equal parts.
+    """
+    from rockcheck.ebm import batch, natural
+
+    nodes = list(zip(amplitude_ratios.tolist(), frequency_ratios.tolist(), strict=True))
+    changing = scene.excitation.kind == "record"  # its nodes are blocks of other sizes; the length of a pulse is its period's
+    scenes = {key: node_scene(scene, *key) for key in (nodes if changing else [(1.0, f) for f in np.unique(frequency_ratios).tolist()])}
+    played = [scenes[a if changing else 1.0, f] for a, f in nodes]
+    lengths = np.array([one.duration / natural.time_unit(one) for one in played])
+    packed = replace(_packed(scene, amplitude_ratios, frequency_ratios, model), durations=lengths)
+    found = batch.run_batch(packed, model, until_decided=False, parts=parts, strict=False)
+    motions: list[Motion | None] = []
+    for one, failed, side, at_rest, states, written in zip(
+        played, found.failed, found.side, found.at_rest, found.motion, found.written, strict=True
+    ):
+        x, y, theta = natural.to_si(one, states[: max(int(written), 1)])[:, :3].T
+        upright = int(np.argmax(fallen)) if (fallen := np.abs(theta) >= 0.5 * math.pi).any() else len(theta)
+        t = one.duration / parts * np.arange(len(theta))
+        rows = np.column_stack([t, theta, x, y])[: max(upright, 1)]
+        outcome = {LEFT: "overturned left", RIGHT: "overturned right"}.get(int(side), "at rest" if at_rest else "moving")
+        motions.append(None if failed else Motion(one.block, rows, outcome))
+    return motions
 
 
 def node_scene(scene: Scene, amplitude_ratio: float, frequency_ratio: float, settle: float = 6.0) -> Scene:

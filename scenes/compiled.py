@@ -47,7 +47,11 @@ _KEPT = 7 * 86400.0  # s
 #: A compilation that takes longer is announced, s.
 _SILENT = 2.0
 #: What the code of a package is for, in an announcement.
-_PURPOSES = {"rockcheck.ebm": "the event-based models", "rockcheck.cm": "the continuous model"}
+_PURPOSES = {
+    "rockcheck.ebm": "the event-based models",
+    "rockcheck.cm": "the continuous model",
+    "rockcheck.validation": "the loops of the studies",
+}
 
 
 class _Compiling(Listener):

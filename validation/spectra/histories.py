@@ -14,16 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel, Spectrum
-from rockcheck.ebm.spectrum import node_scene
-from rockcheck.scenes import InputError, ModelFailure
+from rockcheck.ebm.spectrum import play_motions
+from rockcheck.scenes import InputError
+from rockcheck.scenes.compiled import kernel
 from rockcheck.scenes.reading import read_arrays
 from rockcheck.scenes.writing import write_whole
 
 #: Nodes an axis whose histories are kept, both ends of the axis among them.
 KEPT_AN_AXIS = 16
-#: A history is played with so many rows, and thinned until straight lines between the rows that stay are within this much of
+#: A history is played in so many equal parts, and thinned until straight lines between the rows that stay are within this much of
 #: it: of alpha in rotation, of the half width in position.
-ROWS, COARSE = 400, 0.01
+PARTS, COARSE = 400, 0.01
 
 Floats = NDArray[np.float64]
 
@@ -40,17 +41,14 @@ class Glimpse:
 
 def glimpses(spectrum: Spectrum, model: EventBasedModel) -> list[Glimpse]:
     """Histories of `KEPT_AN_AXIS` nodes an axis, where the model could play them."""
+    i, j = (nodes.ravel() for nodes in np.meshgrid(*map(_spread, spectrum.outcomes.shape), indexing="ij"))
+    played = play_motions(spectrum.scene, spectrum.amplitude_ratios[i], spectrum.frequency_ratios[j], model=model, parts=PARTS)
     found = []
-    for i in _spread(len(spectrum.amplitude_ratios)):
-        for j in _spread(len(spectrum.frequency_ratios)):
-            scene = node_scene(spectrum.scene, float(spectrum.amplitude_ratios[i]), float(spectrum.frequency_ratios[j]))
-            try:
-                history = model.simulate(scene.replace(output_step=scene.duration / ROWS))
-            except ModelFailure:
-                continue
-            motion = np.column_stack([np.asarray(history.channels[name], dtype=float) for name in ("t", "theta", "x", "y")])
-            scale = np.array([scene.block.alpha, scene.block.half_width, scene.block.half_width])
-            found.append(Glimpse(int(i), int(j), history.outcome, motion[_enough(motion[:, 0], motion[:, 1:] / scale)]))
+    for row, column, motion in zip(i.tolist(), j.tolist(), played, strict=True):
+        if motion is not None:
+            block, rows = motion.block, motion.rows
+            enough = _enough(rows[:, 0].copy(), rows[:, 1:] / np.array([block.alpha, block.half_width, block.half_width]))
+            found.append(Glimpse(row, column, motion.outcome, rows[enough]))
     return found
 
 
@@ -58,21 +56,30 @@ def _spread(size: int) -> NDArray[np.int64]:
     return np.unique(np.round(np.linspace(0, size - 1, min(size, KEPT_AN_AXIS))).astype(np.int64))
 
 
-def _enough(t: Floats, values: Floats) -> list[int]:
-    """The rows to keep: from the first and last row on, each part is split at the row farthest from its straight line."""
-    kept, open_ = {0, len(t) - 1}, [(0, len(t) - 1)]
-    while open_:
-        first, last = open_.pop()
-        if last - first < 2:
-            continue
-        share = ((t[first : last + 1] - t[first]) / (t[last] - t[first]))[:, None]
-        line = (1.0 - share) * values[first] + share * values[last]
-        apart = np.abs(values[first : last + 1] - line).max(axis=1)
-        worst = int(np.argmax(apart))
-        if apart[worst] > COARSE:
-            kept.add(first + worst)
-            open_ += [(first, first + worst), (first + worst, last)]
-    return sorted(kept)
+@kernel
+def _enough(t: Floats, values: Floats) -> NDArray[np.bool_]:
+    """Which rows to keep: from the first and last row on, each part is split at the row farthest from its straight line."""
+    kept = np.zeros(len(t), dtype=np.bool_)
+    kept[0] = kept[-1] = True
+    waiting = np.empty((len(t), 2), dtype=np.int64)
+    waiting[0, 0], waiting[0, 1] = 0, len(t) - 1
+    count = 1
+    while count > 0:
+        count -= 1
+        first, last = waiting[count, 0], waiting[count, 1]
+        worst, farthest = first, COARSE
+        for row in range(first + 1, last):
+            share = (t[row] - t[first]) / (t[last] - t[first])
+            for k in range(values.shape[1]):
+                apart = abs(values[row, k] - ((1.0 - share) * values[first, k] + share * values[last, k]))
+                if apart > farthest:
+                    worst, farthest = row, apart
+        if worst > first:
+            kept[worst] = True
+            waiting[count, 0], waiting[count, 1] = first, worst
+            waiting[count + 1, 0], waiting[count + 1, 1] = worst, last
+            count += 2
+    return kept
 
 
 def kept(path: Path, key: str) -> bool:
