@@ -8,11 +8,15 @@ import numpy as np
 
 from rockcheck.ebm.core.ground import GAUSSIAN, STILL, acceleration, impulse_ahead, largest_ahead
 from rockcheck.ebm.core.motion import FAMILY, FAR, FLAT, FLOOR, HEIGHT, STICK, THETA, TILT, TIP, VX, VY, S, W, side_of
+from rockcheck.ebm.core.running import PIVOT, QUIET, SWUNG, T
+from rockcheck.ebm.core.series import NOISE, POSITION
 from rockcheck.scenes.compiled import inner_kernel
 
 # A pulse is over when its acceleration is below this share of the tolerance. The second is the energy bound's margin where impacts
 # may add energy.
 _LEFT, _MARGIN = 1e-3, 0.9
+#: Steps of a swing, from one impact to the next.
+_STEPS = 4.0
 _TINIEST = math.ulp(0.0)
 
 
@@ -48,7 +52,7 @@ def _by_energy(b, m, z, ahead, peak):
     phi = abs(z[THETA])
     if ahead > 0.0 and (b.walls or phi >= peak):
         return -1.0
-    energy = 0.5 * (z[VX] * z[VX] + z[VY] * z[VY] + z[W] * z[W] / b.spin) + z[HEIGHT] - b.height
+    energy = _energy(b, z)
     side, other = side_of(b, m[S]), side_of(b, -m[S])
     corner = min(side.radius, other.radius) - b.height
     most = 0.5 * (math.sqrt(2.0 * max(energy, 0.0)) + ahead) ** 2
@@ -64,6 +68,29 @@ def _by_energy(b, m, z, ahead, peak):
     if rocks and m[S] * z[W] >= 0.0 and (phi > side.alpha or energy > side.radius - b.height):
         return 0.5 * math.pi
     return -1.0
+
+
+@inner_kernel
+def _energy(b, z):
+    """The block's energy relative to the floor, counted from standing."""
+    return 0.5 * (z[VX] * z[VX] + z[VY] * z[VY] + z[W] * z[W] / b.spin) + z[HEIGHT] - b.height
+
+
+@inner_kernel
+def swings_again(b, m, z, pivot, tolerance, now):
+    """Whether this swing, which turns back in the step that starts here, is the last one again: then so are all to come.
+
+    After the excitation the energy and the place of the pivot are all that a swing depends on. Beside a wall that takes no energy
+    a block may rock so for ever, however near its balance it turns back. Only what sticks to the floor and touches no wall swings.
+    A step errs by the tolerance, or by rounding, in rotation and speed: energy by the speed times as much.
+    """
+    if now[T] < now[QUIET] or m[FLOOR] != STICK or m[TIP] != 0 or m[FAR] != 0:
+        return False
+    energy, place = _energy(b, z), m[S] * pivot
+    error = _STEPS * (tolerance + NOISE[POSITION])
+    again = abs(energy - now[SWUNG]) <= error * math.sqrt(2.0 * max(energy, 0.0)) and abs(place - now[PIVOT]) <= error
+    now[SWUNG], now[PIVOT] = energy, place
+    return again
 
 
 @inner_kernel

@@ -11,7 +11,7 @@ import numpy as np
 
 from rockcheck.ebm.core import bouc_wen
 from rockcheck.ebm.core.contacts import CLOSED, closed_floor, stand, stop
-from rockcheck.ebm.core.decide import decided, quiet_from
+from rockcheck.ebm.core.decide import decided, quiet_from, swings_again
 from rockcheck.ebm.core.ground import STILL, next_exceedance, next_kink
 from rockcheck.ebm.core.guards import (
     G_CONE_MINUS,
@@ -82,6 +82,7 @@ from rockcheck.ebm.core.running import (
     PEAK,
     QUIET,
     RELEASE,
+    REPEATS,
     RIGHT,
     ROWS,
     SETTLED,
@@ -124,7 +125,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack, yields=None)
     r = Run(
         z,
         np.zeros(MODE_SIZE, dtype=np.int64),
-        np.array([0.0, abs(z[THETA]), 0.0, np.nan, quiet_from(gh, gv, control.tolerance), np.nan]),
+        np.array([0.0, abs(z[THETA]), 0.0, np.nan, quiet_from(gh, gv, control.tolerance), np.nan, np.nan, np.nan, 0.0]),
         np.zeros(7, dtype=np.int64),
         np.zeros(RULES, dtype=np.int64),
         np.zeros(MODES, dtype=np.bool_),
@@ -233,6 +234,8 @@ def _may_go_on(b, gh, gv, r, t_end, control):
     if now[T] >= t_end:
         return DONE
     if control.until_decided:
+        if now[REPEATS] != 0.0:
+            return DONE
         verdict = decided(b, r.m, z, gh, gv, now[T], now[QUIET], now[PEAK])
         if verdict > 0.0:
             now[PEAK] = verdict
@@ -262,7 +265,7 @@ def _step(b, gh, gv, r, t_end, control, yields, records, a, stack):
         return NOT_FINITE
     whole = which < 0 and tau >= end - t
     _sample(b, r, t, end if whole else t + tau, order, pivot, control, records, a)
-    _advance(b, r, order, pivot, tau, a, stack)
+    _advance(b, r, order, pivot, tau, control, a, stack)
     now[T] = end if whole else t + tau
     if yields is not None:
         bouc_wen.wind_up(r, order, tau, control.tolerance, records.log, a)
@@ -338,7 +341,7 @@ def _state(b, m, order, tau, pivot, a, z):
 
 
 @placed_kernel
-def _advance(b, r, order, pivot, tau, a, stack):
+def _advance(b, r, order, pivot, tau, control, a, stack):
     """Moves the state to tau after the start of the step; keeps the largest rotation on the way."""
     z, now = r.z, r.now
     turns = r.m[FAMILY] == TILT and a[OMEGA, 0] > 0.0 and value(a, OMEGA, order - 1, tau) < 0.0
@@ -346,6 +349,8 @@ def _advance(b, r, order, pivot, tau, a, stack):
         top = first_root(a, OMEGA, order - 1, tau, NOISE[POSITION], AHEAD, stack)
         if top > 0.0:
             now[PEAK] = max(now[PEAK], value(a, PHI, order, top))
+    if turns and control.until_decided:
+        now[REPEATS] = swings_again(b, r.m, z, pivot, control.tolerance, now)
     _state(b, r.m, order, tau, pivot, a, z)
     now[PEAK] = max(now[PEAK], abs(z[THETA]))
     now[SWING] = max(now[SWING], abs(z[W]))

@@ -95,9 +95,9 @@ class Records(NamedTuple):
     log: NDArray[np.float64]
 
 
-# The clock: time, largest |theta|, largest |omega| since the last event, since when it rests, from when the base is quiet; and the
-# variable z of Bouc-Wen friction.
-T, PEAK, SWING, T_REST, QUIET, ZETA = range(6)
+# The clock: time, largest |theta|, largest |omega| since the last event, since when it rests, from when the base is quiet; the
+# variable z of Bouc-Wen friction; energy and pivot of the last swing on a quiet base, and whether it was as the one before it.
+T, PEAK, SWING, T_REST, QUIET, ZETA, SWUNG, PIVOT, REPEATS = range(9)
 # The counts; with Bouc-Wen friction, whether the pivot has not yielded; the event
 # that has ended a mode, and that mode's code.
 STEPS, EVENTS, WALL_IMPACTS, ROWS, HOLDS, KIND, BEFORE = range(7)

@@ -126,6 +126,39 @@ def test_a_run_that_fails_is_made_again_at_a_finer_tolerance(monkeypatch):
     assert whole[1] != 0
 
 
+@pytest.mark.parametrize("tolerance", [1e-7, 1e-8, 1e-9, 1e-11, 1e-13, 1e-15])
+def test_a_block_that_rocks_for_ever_beside_an_elastic_wall_is_safe(tolerance):
+    """It stands along the wall, loses nothing, and has so much energy that no bound calls it safe: each swing is the one before it."""
+    wall, model = Wall(side="left", gap=0.003, restitution=1.0), EventBasedModel(tolerance=tolerance)
+    a, f = np.array([1.0 + 11.0 * i / 99 for i in (6, 7, 7)]), np.array([0.5 + 7.5 * j / 99 for j in (17, 19, 20)])
+    sides, failed = play_nodes(scene(wall), a, f, model=model)
+    assert not failed.any()
+    assert not sides.any()
+    nodes = [node_scene(scene(wall), *node, settle=300.0) for node in zip(a, f, strict=True)]
+    early = batch.run_batch(batch.pack(nodes, model), model)
+    fine = EventBasedModel(tolerance=1e-13)
+    whole = batch.run_batch(batch.pack(nodes, fine), fine, until_decided=False)
+    assert early.series.max() < 500 < whole.series.min()
+    assert (whole.t_end / early.t_end).min() > 20.0
+    np.testing.assert_allclose(early.peak, whole.peak, rtol=100.0 * tolerance + 1e-9)  # errors before the wall grow
+    energy = np.cos(PAPER_BLOCK.alpha - early.peak) - np.cos(PAPER_BLOCK.alpha)
+    assert (energy / (1.0 - np.cos(PAPER_BLOCK.alpha))).max() > 0.9  # where impacts might add what is missing
+    mirrored, failed = play_nodes(scene(wall).mirrored(), -a, f, model=model)
+    assert not failed.any()
+    assert not mirrored.any()
+
+
+@pytest.mark.parametrize("restitution", [0.9, 0.99, 1.0])
+def test_no_swing_that_loses_or_gains_is_taken_for_the_one_before(restitution):
+    """Peaks decided early against those of runs that go on, beside walls that return nearly all."""
+    wall, model = Wall(side="right", gap=0.053, restitution=restitution), EventBasedModel(tolerance=1e-9)
+    a, f = (axis.ravel() for axis in np.meshgrid(np.linspace(1.0, 9.0, 9), np.linspace(0.5, 6.0, 9)))
+    nodes = [node_scene(scene(wall), *node, settle=60.0) for node in zip(a, f, strict=True)]
+    early, whole = (batch.run_batch(batch.pack(nodes, model), model, until_decided=decided) for decided in (True, False))
+    np.testing.assert_array_equal(early.side, whole.side)
+    np.testing.assert_allclose(early.peak, whole.peak, rtol=1e-6)
+
+
 def test_a_record_is_scaled_and_the_block_resized():
     record = Record.from_samples(3.0 * np.sin(2.0 * np.pi * np.arange(0.0, 2.0, 0.02)), 0.02)
     start = scene(excitation=record)
