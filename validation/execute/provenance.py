@@ -85,6 +85,7 @@ def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]
     return found
 
 
+@cache
 def _source(name: str, search_path: tuple[str, ...]) -> Path | None:
     """The file of a module, None where there is none (a name inside a module). No code of `search_path` is run."""
     parts = name.split(".")

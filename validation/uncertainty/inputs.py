@@ -14,8 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.ebm.batch import pack, run_batch
-from rockcheck.ebm.ensemble import play_ensemble
 from rockcheck.scenes import InputError
 from rockcheck.scenes.trust.inputs import UncertainScene
 from rockcheck.validation.discrepancy.figures import Stored
@@ -103,6 +101,8 @@ def propagate(
     """
     from scipy.stats import binomtest, qmc
 
+    from rockcheck.ebm.ensemble import play_ensemble
+
     if not given.spreads:
         raise InputError("no number of this scene is uncertain: write one as { value = 0.3, sd = 0.03 }")
     model = model or EventBasedModel(pivot="unilateral", tolerance=1e-8)
@@ -136,6 +136,8 @@ def sensitivities(given: UncertainScene, model: EventBasedModel, *, samples: int
     `samples` (a power of two) times the number of inputs and two more runs. Empty where the peak does not vary.
     """
     from scipy.stats import sobol_indices
+
+    from rockcheck.ebm.batch import pack, run_batch
 
     def peak_and_fall(points: Floats) -> Floats:
         scenes = [given.at(row) for row in points.T]
