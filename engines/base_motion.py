@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,14 +40,19 @@ class BaseVelocity:
 
     def __call__(self, t: float) -> float:
         """Velocity of the base in m/s at the time `t` >= 0 in s, zero at t = 0."""
-        index = int(t / self.interval)
-        if index >= len(self.pieces):
-            return self.last
-        since, power, velocity = t - self.interval * index, 1.0, 0.0
-        for coefficient in self.pieces[index]:
-            velocity += coefficient * power
-            power *= since
-        return velocity
+        return float(velocity_at(t, self.pieces, self.interval, self.last))
+
+
+def velocity_at(t: Any, pieces: Any, interval: Any, last: Any) -> Any:
+    """`last` after all `pieces`, polynomials in the time since their start, which follow each other after `interval` s."""
+    index = int(t / interval)
+    if index >= len(pieces):
+        return last
+    since, power, velocity = t - interval * index, 1.0, 0.0
+    for coefficient in pieces[index]:
+        velocity += coefficient * power
+        power *= since
+    return velocity
 
 
 class BaseMotion:

@@ -25,24 +25,36 @@ class Contact:
 
     def arm(self, cos: Any, sin: Any) -> Arm:
         """From the mass's centre to the corner of the block turned by theta, given its cosine and sine: right, up, m."""
-        bx, bz = self.corner
-        return bx * cos - bz * sin, bx * sin + bz * cos
+        return arm_of(*self.corner, cos, sin)
 
     def gap(self, x: Any, y: Any, arm: Arm) -> Any:
         """Clear distance between corner and surface, m; negative is a penetration."""
-        nx, nz = self.normal
-        return nx * (x + arm[0]) + nz * (y + arm[1]) + self.distance
+        return gap_of(*self.normal, self.distance, x, y, arm)
 
     def rate(self, x_dot: Any, y_dot: Any, theta_dot: Any, arm: Arm) -> Any:
         """The gap's rate, m/s."""
-        nx, nz = self.normal
-        return nx * (x_dot - theta_dot * arm[1]) + nz * (y_dot + theta_dot * arm[0])
+        return rate_of(*self.normal, x_dot, y_dot, theta_dot, arm)
 
-    def acceleration(self, x_ddot: Any, y_ddot: Any, theta_ddot: Any, theta_dot: Any, arm: Arm) -> Any:
-        """The gap's acceleration, m/s^2."""
-        nx, nz = self.normal
-        turning = theta_dot * theta_dot
-        return nx * (x_ddot - theta_ddot * arm[1] - turning * arm[0]) + nz * (y_ddot + theta_ddot * arm[0] - turning * arm[1])
+
+def arm_of(bx: Any, bz: Any, cos: Any, sin: Any) -> Arm:
+    """`Contact.arm` of the corner (bx, bz)."""
+    return bx * cos - bz * sin, bx * sin + bz * cos
+
+
+def gap_of(nx: Any, nz: Any, distance: Any, x: Any, y: Any, arm: Arm) -> Any:
+    """`Contact.gap` of a surface with the normal (nx, nz)."""
+    return nx * (x + arm[0]) + nz * (y + arm[1]) + distance
+
+
+def rate_of(nx: Any, nz: Any, x_dot: Any, y_dot: Any, theta_dot: Any, arm: Arm) -> Any:
+    """`Contact.rate` of a surface with the normal (nx, nz)."""
+    return nx * (x_dot - theta_dot * arm[1]) + nz * (y_dot + theta_dot * arm[0])
+
+
+def acceleration_of(nx: Any, nz: Any, x_ddot: Any, y_ddot: Any, theta_ddot: Any, theta_dot: Any, arm: Arm) -> Any:
+    """The acceleration of the gap to a surface with the normal (nx, nz), m/s^2."""
+    turning = theta_dot * theta_dot
+    return nx * (x_ddot - theta_ddot * arm[1] - turning * arm[0]) + nz * (y_ddot + theta_ddot * arm[0] - turning * arm[1])
 
 
 def contacts_of(scene: Scene) -> tuple[Contact, ...]:

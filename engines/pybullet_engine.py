@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.engines.adaptive import Vector
 from rockcheck.engines.contacts import contacts_of
 from rockcheck.engines.engine import Engine
 from rockcheck.engines.world import State, World
@@ -118,6 +119,14 @@ class _PyBulletWorld(World):
         (x, _, z), (_, turn, _, whole) = self.bullet.getBasePositionAndOrientation(self.body, physicsClientId=self.client)
         (vx, _, vz), (_, w, _) = self.bullet.getBaseVelocity(self.body, physicsClientId=self.client)
         return x, z, -2.0 * math.atan2(turn, whole), vx, vz, -w
+
+    def push(self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool) -> Vector:
+        """Velocity after `dt` s with the contacts closed at `pose`."""
+        self.bounce(bouncing)
+        self.place((*pose, *velocity))
+        self.step(felt, dt)
+        (vx, _, vz), (_, w, _) = self.bullet.getBaseVelocity(self.body, physicsClientId=self.client)
+        return vx, vz, -w
 
     def close(self) -> None:
         """End the physics server."""

@@ -50,6 +50,7 @@ _SILENT = 2.0
 _PURPOSES = {
     "rockcheck.ebm": "the event-based models",
     "rockcheck.cm": "the continuous model",
+    "rockcheck.engines": "the adaptive steps of the physics engines",
     "rockcheck.validation": "the loops of the studies",
 }
 

@@ -31,15 +31,14 @@ class Family:
     libraries: tuple[str, ...] = ()
     #: Whether the block can leave the floor; a model that cannot differs in form from one that can.
     flies: bool = True
-
-    @property
-    def compiled(self) -> bool:
-        """Whether its first run on a machine compiles, which may take longer than any cell."""
-        return "numba" in self.libraries
+    #: Whether its first run on a machine compiles for longer than any cell takes; the engines' steps compile in seconds.
+    compiled: bool = False
 
 
 ENGINES = "rockcheck.engines"
 COMPILED = ("numba", "llvmlite", "numpy", "scipy")
+#: What the engines that step adaptively depend on besides the engine.
+STEPPED = ("numba", "llvmlite", "numpy")
 FAMILIES: dict[str, Family] = {
     "ebm": Family(
         "rockcheck.ebm",
@@ -48,6 +47,7 @@ FAMILIES: dict[str, Family] = {
         {"pivot": "bilateral", "friction": "coulomb"},
         COMPILED,
         flies=False,
+        compiled=True,
     ),
     "ebm-unilateral": Family(
         "rockcheck.ebm",
@@ -55,6 +55,7 @@ FAMILIES: dict[str, Family] = {
         "event-based model whose floor can only push: the block may hop",
         {"pivot": "unilateral", "friction": "coulomb"},
         COMPILED,
+        compiled=True,
     ),
     "ebm-bouc-wen": Family(
         "rockcheck.ebm",
@@ -63,12 +64,13 @@ FAMILIES: dict[str, Family] = {
         {"pivot": "bilateral", "friction": "bouc-wen"},
         COMPILED,
         flies=False,
+        compiled=True,
     ),
-    "cm": Family("rockcheck.cm", "ContinuousModel", "the paper's penalty-based continuous model", {}, COMPILED),
-    "mujoco": Family(ENGINES, "MuJoCo", "the physics engine MuJoCo", {}, ("mujoco", "numpy")),
-    "pybullet": Family(ENGINES, "PyBullet", "the physics engine PyBullet", {}, ("pybullet", "numpy")),
-    "pymunk": Family(ENGINES, "Pymunk", "the physics engine pymunk (Chipmunk, in two dimensions)", {}, ("pymunk", "numpy")),
-    "dart": Family(ENGINES, "Dart", "the physics engine DART", {}, ("dartpy", "numpy")),
+    "cm": Family("rockcheck.cm", "ContinuousModel", "the paper's penalty-based continuous model", {}, COMPILED, compiled=True),
+    "mujoco": Family(ENGINES, "MuJoCo", "the physics engine MuJoCo", {}, ("mujoco", *STEPPED)),
+    "pybullet": Family(ENGINES, "PyBullet", "the physics engine PyBullet", {}, ("pybullet", *STEPPED)),
+    "pymunk": Family(ENGINES, "Pymunk", "the physics engine pymunk (Chipmunk, in two dimensions)", {}, ("pymunk", *STEPPED)),
+    "dart": Family(ENGINES, "Dart", "the physics engine DART", {}, ("dartpy", *STEPPED)),
     "drake": Family(ENGINES, "Drake", "the physics engine Drake", {}, ("drake", "numpy")),
     "measured": Family(
         "rockcheck.validation.discrepancy.measured", "Measured", "a CSV history from a shake table, or from any other program"

@@ -48,11 +48,21 @@ def _continuous() -> None:
     ContinuousModel().simulate(_scene())
 
 
+def _engine_steps() -> None:
+    from rockcheck.engines.adaptive import march_adaptively
+    from rockcheck.engines.base_motion import BaseMotion
+    from rockcheck.engines.marching import in_units_of
+
+    scene = in_units_of(_scene().block.radius, _scene())
+    march_adaptively(scene, BaseMotion(scene), lambda pose, velocity, dt, felt, bouncing: velocity, longest=1e-3)
+
+
 #: What is compiled, the longest first. Batches share the loop of histories, so they come after it and in one process with it.
 PARTS: Mapping[str, tuple[Callable[[], None], ...]] = {
     "the event-based model with Bouc-Wen friction": (_bouc_wen,),
     "the event-based models: histories, batches, ensembles": (_histories, _batches, _samples),
     "the continuous model": (_continuous,),
+    "the physics engines: their adaptive steps": (_engine_steps,),
 }
 
 

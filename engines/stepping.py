@@ -1,0 +1,291 @@
+"""The step of `engines.adaptive`, compiled: what is asked of the engine next, and what its answer makes of the block.
+
+Lengths are in R. A contact is a row of `corners`, first those of the floor's two, then those of walls: the corner (2), the surface's
+normal (2) and its distance, see `engines.contacts`. A base motion is its pieces, their interval and the last velocity.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.engines.base_motion import velocity_at
+from rockcheck.engines.contacts import acceleration_of, arm_of, gap_of, rate_of
+from rockcheck.scenes import Scene
+from rockcheck.scenes.compiled import inner_kernel, kernel
+
+Floats = NDArray[np.float64]
+Base = tuple[Floats, float, float]
+
+# Lengths in units of the block's radius R, times in units of 1/p.
+CLOSED = 5e-9  # a corner nearer than this touches
+EMBEDDED = 5e-10  # how deep the engine sees a corner that touches
+PROBE_STEP = 6e-5  # the longest step where the acceleration is not known, that is, after an event
+SHORTEST_STEP = 2e-8  # that of an impact: the time and the place of each are wrong by so much
+LONG_APPROACH = 6e-4  # from farther away the prediction of an event is only trusted to 95 %
+RESTING = 0.001  # of g times the longest step: slower approaches and departures are not told from rest
+SETTLING_GAP = 2e-6
+SETTLING_TIME = 0.2  # of the longest step, after an event of the probe: a corner that is back within twice that time stays
+
+#: Contacts with the floor, the first rows of `corners`; all others are with walls.
+FLOOR = 2
+#: What a step answers: the run is over, it goes on, or it has blown up.
+OVER, GOES_ON, LOST = 0, 1, 2
+#: Of a row of the march: time, state (6), felt acceleration (2).
+COLUMNS = 9
+# The state: pose, velocity; mean acceleration and length of the step before, and whether they are known; time, velocity of the base
+# then.
+X, Y, THETA, VX, VY, W, AX, AY, SPIN, PAST_DT, KNOWN, T, BASE_X, BASE_Y = range(14)
+# What is asked of the engine: mean pose, velocity, length of the step, felt acceleration, and whether it is an impact.
+POSE, VELOCITY, DT, FELT_X, FELT_Y, IMPACT = 0, 3, 6, 7, 8, 9
+
+
+class Limits(NamedTuple):
+    """The steps and speeds that count as short, long and slow in a scene, s and 1/s; its gravity; its block's height, standing."""
+
+    longest: float
+    probe: float
+    shortest: float
+    long_approach: float
+    resting: float
+    staying: float
+    gravity: float
+    standing: float
+
+
+class March(NamedTuple):
+    """What a run keeps from step to step; which contacts are closed in this step and were in the one before; what it asks for."""
+
+    state: Floats
+    closed: NDArray[np.bool_]
+    before: NDArray[np.bool_]
+    #: Whether the step ends where slip stops; the velocity at which a contact is carried along its arc, right and up.
+    stops: NDArray[np.bool_]
+    carry: Floats
+    asked: Floats
+    #: Index of the next time at which the base may set a resting block in motion.
+    next_start: NDArray[np.int64]
+
+
+def limits_of(scene: Scene, longest: float, short: float) -> Limits:
+    """Those of a scene whose steps are at most `longest` s, and at events `short` times the usual."""
+    moment = short / scene.frequency_parameter
+    probe = min(PROBE_STEP * moment, longest)
+    return Limits(
+        longest=longest,
+        probe=probe,
+        shortest=min(SHORTEST_STEP * moment, longest),
+        long_approach=LONG_APPROACH * moment,
+        resting=RESTING * longest * scene.gravity,
+        staying=SETTLING_TIME * probe * scene.gravity,
+        gravity=scene.gravity,
+        standing=scene.block.weaker_pivot.height,
+    )
+
+
+def begun(state: Floats, base: tuple[float, float], contacts: int) -> March:
+    """A run at its start, from the state of the mass's centre and the velocity of the base."""
+    whole = np.zeros(BASE_Y + 1)
+    whole[:6], whole[BASE_X : BASE_Y + 1] = state, base
+    closed, before, stops = (np.zeros(count, dtype=bool) for count in (contacts, contacts, 1))
+    return March(whole, closed, before, stops, np.zeros(2), np.zeros(IMPACT + 1), np.zeros(1, dtype=np.int64))
+
+
+for _shared in (velocity_at, arm_of, gap_of, rate_of, acceleration_of):
+    inner_kernel(_shared)
+
+
+@inner_kernel
+def trusted(predicted: float, limits: Limits) -> float:
+    """How much of the predicted time to an event one step may take, s."""
+    return 0.95 * predicted if predicted > limits.long_approach else predicted
+
+
+@inner_kernel
+def time_to_close(gap: float, rate: float, curvature: float) -> float:
+    """When a gap with this rate and acceleration is zero, s; infinity if never. A gap that opens closes on its way back."""
+    discriminant = rate * rate - 2.0 * curvature * gap
+    if discriminant < 0.0:
+        return math.inf
+    if rate < 0.0:
+        return 2.0 * gap / (math.sqrt(discriminant) - rate)
+    return (rate + math.sqrt(discriminant)) / -curvature if curvature < 0.0 else math.inf
+
+
+@inner_kernel
+def stopping_time(z: Floats, arm: Any, dt: float, limits: Limits) -> float:
+    """When the slip of a corner on the floor stops within `dt`, s; infinity if it does not."""
+    slip = z[VX] - z[W] * arm[1]
+    slowing = z[AX] - z[SPIN] * arm[1] - z[W] * z[W] * arm[0]
+    if slip * slowing < 0.0 and 0.2 * limits.resting < abs(slip) < abs(slowing) * dt:
+        return abs(slip / slowing)
+    return math.inf
+
+
+@inner_kernel
+def length(run: March, corners: Floats, limits: Limits, dt: float) -> tuple[float, bool]:
+    """The next step, at most `dt` s long, and whether it is an impact.
+
+    It ends before a gap closes or a slip stops that the present acceleration brings.
+    """
+    z, known, resting = run.state, run.state[KNOWN] != 0.0, limits.resting
+    dt = min(dt, limits.longest if known else limits.probe)
+    leaving = resting if known else max(resting, limits.staying)
+    impact = stops = False
+    cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
+    for i in range(len(corners)):
+        bx, bz, nx, nz, distance = corners[i]
+        arm = arm_of(bx, bz, cos, sin)
+        gap, rate = gap_of(nx, nz, distance, z[X], z[Y], arm), rate_of(nx, nz, z[VX], z[VY], z[W], arm)
+        run.closed[i] = not (gap > CLOSED or rate > leaving)
+        if not run.closed[i]:
+            curvature = acceleration_of(nx, nz, z[AX], z[AY], z[SPIN], z[W], arm) if known else 0.0
+            closing = time_to_close(gap, rate, curvature)
+            if closing < dt:
+                dt, stops = max(trusted(closing, limits), limits.shortest), False
+        elif rate < -resting:
+            impact = True
+        elif i < FLOOR and known:
+            stopping = stopping_time(z, arm, dt, limits)
+            if stopping < math.inf:
+                dt = trusted(stopping, limits)
+                stops = dt == stopping
+    run.stops[0] = stops
+    return limits.shortest if impact else dt, impact
+
+
+@inner_kernel
+def drift(run: March, corners: Floats, dt: float) -> None:
+    """The mean pose of the step and the velocity that the engine sees, into `asked`.
+
+    The engine sees the block in its mean pose, with the corners that touch just below the surface. What rests on a surface at the
+    step's end still moves along its arc in the mean pose; `carry` is that velocity. The engine's contacts know nothing of arcs, but
+    in a frame that moves with it they are right.
+    """
+    z, (ax, ay, spin) = run.state, smooth(run)[:3]
+    half, sixth, later = 0.5 * dt, dt * dt / 6.0, z[W] + dt * spin
+    px, py, mean = z[X] + half * z[VX] + sixth * ax, z[Y] + half * z[VY] + sixth * ay, z[THETA] + half * z[W] + sixth * spin
+    run.carry[:] = 0.0
+    cos, sin = math.cos(mean), math.sin(mean)
+    for first, end in ((0, FLOOR), (FLOOR, len(corners))):
+        highest, last = -math.inf, -1
+        for i in range(first, end):
+            if run.closed[i]:
+                bx, bz, nx, nz, distance = corners[i]
+                highest, last = max(highest, gap_of(nx, nz, distance, px, py, arm_of(bx, bz, cos, sin))), i
+        if last >= 0:
+            bx, bz, nx, nz, _ = corners[last]
+            px, py = px - nx * (highest + EMBEDDED), py - nz * (highest + EMBEDDED)
+            final = z[THETA] + half * (z[W] + later)
+            arm, ends = arm_of(bx, bz, cos, sin), arm_of(bx, bz, math.cos(final), math.sin(final))
+            run.carry[0] = -later * (ends[1] - arm[1])
+            if nz != 0.0:
+                run.carry[1] = later * (ends[0] - arm[0])
+    run.asked[POSE], run.asked[POSE + 1], run.asked[POSE + 2] = px, py, mean
+    run.asked[VELOCITY], run.asked[VELOCITY + 1], run.asked[VELOCITY + 2] = z[VX] + run.carry[0], z[VY] + run.carry[1], z[W]
+
+
+@inner_kernel
+def smooth(run: March) -> tuple[float, float, float, bool]:
+    """The acceleration of the step before where the same contacts were closed in it, else zero; and whether they were."""
+    z = run.state
+    if z[KNOWN] == 0.0:
+        return 0.0, 0.0, 0.0, False
+    for i in range(len(run.closed)):
+        if run.closed[i] != run.before[i]:
+            return 0.0, 0.0, 0.0, False
+    return z[AX], z[AY], z[SPIN], True
+
+
+@kernel
+def plan(run: March, corners: Floats, starts: Floats, across: Base, up: Base, limits: Limits, end: float) -> int:
+    """Asks for the next step; returns OVER at the `end` or where the block lies, else GOES_ON."""
+    z = run.state
+    if not (z[T] < end - 1e-12 and abs(z[THETA]) < math.pi / 2):
+        return OVER
+    while starts[run.next_start[0]] <= z[T] + 1e-9:
+        run.next_start[0] += 1
+    dt, impact = length(run, corners, limits, min(end - z[T], starts[run.next_start[0]] - z[T]))
+    z[T] += dt
+    base_x, base_y = velocity_at(z[T], across[0], across[1], across[2]), velocity_at(z[T], up[0], up[1], up[2])
+    run.asked[DT], run.asked[IMPACT] = dt, impact
+    run.asked[FELT_X], run.asked[FELT_Y] = (z[BASE_X] - base_x) / dt, (z[BASE_Y] - base_y) / dt - limits.gravity
+    z[BASE_X], z[BASE_Y] = base_x, base_y
+    drift(run, corners, dt)
+    return GOES_ON
+
+
+@kernel
+def step(
+    run: March, corners: Floats, starts: Floats, across: Base, up: Base, limits: Limits, end: float,
+    kicked_x: float, kicked_y: float, kicked_w: float, row: Floats,
+) -> int:  # fmt: skip
+    """Ends the step with the velocity that the engine gave, writes its `row`, and plans the next one; LOST where it has blown up."""
+    z, dt = run.state, run.asked[DT]
+    known = z[KNOWN] != 0.0
+    move(run, kicked_x - run.carry[0], kicked_y - run.carry[1], kicked_w, dt)
+    put_back(run, corners, limits)
+    if not known and (run.closed[0] or run.closed[1]) and settles(z, corners, limits):
+        z[Y], z[THETA], z[VY], z[W] = limits.standing, 0.0, 0.0, 0.0
+    z[KNOWN] = run.asked[IMPACT] == 0.0 and not run.stops[0]
+    z[PAST_DT] = dt
+    run.before[:] = run.closed
+    row[0], row[7], row[8] = z[T], run.asked[FELT_X], run.asked[FELT_Y]
+    for i in range(6):
+        row[1 + i] = z[i]
+    if not math.sqrt(z[VX] * z[VX] + z[VY] * z[VY] + z[W] * z[W]) < 1e6:  # nan, too
+        return LOST
+    return plan(run, corners, starts, across, up, limits, end)
+
+
+@inner_kernel
+def move(run: March, vx: float, vy: float, w: float, dt: float) -> None:
+    """Pose, velocity and mean acceleration at the step's end, where the block has the velocity (vx, vy, w).
+
+    Where the same contacts were closed in the step before, the acceleration is taken to be linear over both steps, for the mean
+    pose (there the last one will do) and for the drift: dt/2 (v + v_new) - dt^2/12 (change of the acceleration over the step).
+    """
+    z, (ax, ay, spin, same) = run.state, smooth(run)
+    bend = dt**3 / (6.0 * (dt + z[PAST_DT])) if same else 0.0
+    half = 0.5 * dt
+    new_ax, new_ay, new_spin = (vx - z[VX]) / dt, (vy - z[VY]) / dt, (w - z[W]) / dt
+    z[X] = z[X] + half * (z[VX] + vx) - bend * (new_ax - ax)
+    z[Y] = z[Y] + half * (z[VY] + vy) - bend * (new_ay - ay)
+    z[THETA] = z[THETA] + half * (z[W] + w) - bend * (new_spin - spin)
+    z[VX], z[VY], z[W], z[AX], z[AY], z[SPIN] = vx, vy, w, new_ax, new_ay, new_spin
+
+
+@inner_kernel
+def put_back(run: March, corners: Floats, limits: Limits) -> None:
+    """The pose with the one corner that stays on a surface put back onto it."""
+    z = run.state
+    cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
+    for first, end in ((0, FLOOR), (FLOOR, len(corners))):
+        count, last = 0, -1
+        for i in range(first, end):
+            if run.closed[i]:
+                count, last = count + 1, i
+        if count == 1:
+            bx, bz, nx, nz, distance = corners[last]
+            arm = arm_of(bx, bz, cos, sin)
+            if abs(rate_of(nx, nz, z[VX], z[VY], z[W], arm)) < limits.resting:
+                gap = gap_of(nx, nz, distance, z[X], z[Y], arm)
+                z[X], z[Y] = z[X] - nx * gap, z[Y] - nz * gap
+
+
+@inner_kernel
+def settles(z: Floats, corners: Floats, limits: Limits) -> bool:
+    """Whether both lower corners are on the floor, or so near and slow that they are back on it at once."""
+    cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
+    for i in range(FLOOR):
+        bx, bz, nx, nz, distance = corners[i]
+        arm = arm_of(bx, bz, cos, sin)
+        rate = rate_of(nx, nz, z[VX], z[VY], z[W], arm)
+        pulled = acceleration_of(nx, nz, z[AX], z[AY], z[SPIN], z[W], arm)
+        slow = abs(rate) <= max(SETTLING_GAP, -SETTLING_TIME * limits.longest * pulled)
+        if gap_of(nx, nz, distance, z[X], z[Y], arm) > SETTLING_GAP or not slow:
+            return False
+    return True
