@@ -78,7 +78,7 @@ from rockcheck.ebm.core.motion import (
 )
 from rockcheck.ebm.core.rules import HANGS, LEAST_CONTRADICTION, PULLS
 from rockcheck.ebm.core.running import GOING, HOLDS, RELEASE, SLIPS, STICKS, UPLIFT, ZETA, T, mode_code, note
-from rockcheck.ebm.core.series import AHEAD, FORCE, NO_ROOT, NOISE, POSITION, first_root, leading, step_size, value
+from rockcheck.ebm.core.series import AHEAD, FORCE, NO_ROOT, NOISE, POSITION, first_root, force_step, leading, step_size, value
 from rockcheck.scenes.compiled import inner_kernel, kernel, placed_kernel
 
 # Rows of the workspace after those of ebm.core.motion: z, V and what the recurrences need.
@@ -410,7 +410,7 @@ def expand(b, gh, gv, r, reach, control, yields, a):
         order = _wedged_series(b, m, z, zeta, gh, gv, t, order, reach, a)
     h = step_size(a, U, G, order - 1, control.tolerance, reach)
     if m[FLOOR] == SLIPPING:
-        h = step_size(a, XI, Z, order - 1, control.tolerance, h)
+        h = step_size(a, XI, XI, order - 1, control.tolerance, force_step(a, Z, order - 1, control.tolerance, h))
         if m[FAMILY] == TILT:
             h = step_size(a, PHI, COS, order, control.tolerance, h)
     return order, m[S] * z[X] - a[SIN, 0], h

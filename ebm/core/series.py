@@ -80,6 +80,15 @@ def step_size(a, first, second, order, tolerance, reach):
 
 
 @inner_kernel
+def force_step(a, row, order, tolerance, reach):
+    """The step at which the last two terms of a force stay below the tolerance, at most `reach`. An error of its rate moves nothing."""
+    for k in (order, order - 1):
+        if a[row, k] != 0.0:
+            reach = min(reach, (tolerance / abs(a[row, k])) ** (1.0 / k))
+    return reach
+
+
+@inner_kernel
 def leading(a, row, n, floor, ahead):
     """The sign with which c leaves tau = 0: +1, -1, or 0 where it is zero throughout the time `ahead`, at most AHEAD."""
     k = _order_of_zero(a, row, n, floor, ahead)
@@ -140,7 +149,7 @@ def first_root(a, row, n, h, floor, ahead, stack):
         # Noise within AHEAD may grow beyond noise in a long step.
         if a[row, 0] + low > -floor:
             return NO_ROOT
-        zeros, lift = 0, floor + abs(a[row, 0])
+        zeros, lift = 0, floor if a[row, 0] > -floor else floor - a[row, 0]
     elif a[row, zeros] < 0.0:
         return 0.0
     scale = 1.0

@@ -20,7 +20,7 @@ from rockcheck.validation.stress.invariants import CheckedRun, check_run
 
 Floats = NDArray[np.float64]
 
-#: Caps of an event-based run: a block that bounces between two near walls with e = 1 needs the most, 27 steps an impact with Bouc-Wen.
+#: Caps of an event-based run: the Zeno rule ends what bounces without end after some 1e5 impacts, of up to 18 steps with Bouc-Wen.
 MOST_STEPS, MOST_EVENTS = 2_000_000, 400_000
 #: One in so many runs is audited: sampled so finely that its energy can be integrated.
 AUDIT = 10

@@ -192,6 +192,26 @@ def test_a_zero_at_the_start_is_divided_out():
             assert Core.first_root(-c, 1.0) == 0.0
 
 
+@pytest.mark.parametrize("start", [-0.9, -0.4, 0.0, 0.4, 0.9])
+def test_a_guard_that_begins_as_noise_ends_its_mode_where_it_is_more_than_noise(start):
+    """So it does not matter how a motion is cut into steps, nor with which noise one begins."""
+    noise = series.NOISE[series.FORCE]
+    falls = noise * np.array([start, -0.01, -1.0])  # noise throughout the time AHEAD
+    end = -0.005 + math.sqrt(0.005**2 + 1.0 + start)
+    for cut in (0.0, 0.3 * end, 0.7 * end):
+        moved = np.array([value(falls, cut), falls[1] + 2.0 * falls[2] * cut, falls[2]])
+        assert cut + Core.first_root(moved, 2.0, noise) == pytest.approx(end, rel=1e-12)
+
+
+def test_a_force_may_change_faster_than_what_it_moves():
+    """Its step is the one at which its own last two terms are below the tolerance; a position's is shorter, for those of its rate to be."""
+    terms = _row([1.0, 1e3, 1e6, 1e9])
+    assert series.force_step(terms, 0, 3, 1e-9, 1.0) == pytest.approx(math.sqrt(1e-15))
+    assert series.force_step(terms, 0, 3, 1e-9, 1e-8) == 1e-8
+    assert series.force_step(_row([1.0, 0.0, 0.0]), 0, 2, 1e-9, 1.0) == 1.0
+    assert series.step_size(terms, 0, 0, 3, 1e-9, 1.0) < 1e-8
+
+
 @pytest.mark.parametrize("place", [0.3, 0.5, 0.7310585])
 def test_touching_is_no_root_and_dipping_is_one(place):
     """A double root lifted by 1e-12 is none; lowered by as much it is one, to the square root of that. A triple one crosses."""
