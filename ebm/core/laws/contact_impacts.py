@@ -275,10 +275,11 @@ def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, t
         before = kinetic_energy(b.spin, v)
         if not _strike(rows, b.spin, taking, target, b.mu_s, b.mu_k, v, after, part, system):
             found = LEAST_WRONG
-        if b.energy_cap and not plastic and kinetic_energy(b.spin, after) > before:
+        noise = 2.0 * _ROUNDING * before
+        if b.energy_cap and not plastic and kinetic_energy(b.spin, after) - before > noise:
             _strike_without_gain(b, rows, taking, target, v, after, part, system, before)
         gain = kinetic_energy(b.spin, after) - before
-        if gain > 2.0 * _ROUNDING * before:
+        if gain > noise:
             tally[0] += 1.0
             tally[1] = max(tally[1], gain / before)
         for j in range(CONTACTS):

@@ -145,6 +145,19 @@ def test_the_energy_cap_takes_the_largest_restitution_that_adds_none():
     assert untouched > 1000
 
 
+def test_the_energy_cap_leaves_an_elastic_impact_as_it_is():
+    """A side that strikes an elastic wall keeps its energy but for rounding, which is no gain."""
+    touching = np.array([True, True, True, True, False, False])
+    rng = np.random.default_rng(23)
+    for _ in range(200):
+        alpha, mu, v = rng.uniform(0.1, 1.2), rng.uniform(0.0, 1.2), np.array([-rng.uniform(0.01, 100.0), 0.0, 0.0])
+        plain, held = v.copy(), v.copy()
+        for after, cap in ((plain, False), (held, True)):
+            assert ci.contact_impact(setting_of(alpha, mu, 0.9, cap), 1.0, 0.0, touching, 1.0, 0.0, 1e-9, after, np.zeros(2), np.zeros(2))
+        np.testing.assert_array_equal(held, plain)
+        assert plain == pytest.approx(-v, rel=1e-12)
+
+
 @pytest.mark.parametrize("wall", [(ci.TIP_TOP, ci.TIP_BOTTOM), (ci.FAR_BOTTOM, ci.FAR_TOP)], ids=["tip", "far"])
 def test_floor_first_is_a_trajectory_beside_a_wall_that_stands_farther_off(wall):
     """A block that lands flush, without friction: its corners strike one by one, each as it arrives where the wall is a unit away."""
