@@ -336,6 +336,7 @@ def _walls_hold(b, m, touched, a):
         elif touched >> which & 1:
             fill_guards(b, m, 0.0, a)
             guard(G_TIP_GAP if which == 0 else G_FAR_GAP, _LOOK, a)
+            a[GUARD, 0] = a[GUARD, 1] = 0.0  # it is closed: its acceleration decides
             if leading(a, GUARD, _LOOK, NOISE[POSITION], AHEAD) < 0:
                 return False
     return True
