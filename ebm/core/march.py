@@ -257,9 +257,13 @@ def _step(b, gh, gv, r, t_end, control, yields, records, a, stack):
     end = min(min(next_kink(gh, t), next_kink(gv, t)), t_end)
     if yields is None:
         order, pivot, h = _expand(b, m, z, gh, gv, t, end - t, control, a)
-        tau, which = _locate(b, m, order, pivot, h, r.memory[SLACK], a, stack)
     else:
         order, pivot, h = bouc_wen.expand(b, gh, gv, r, end - t, control, yields, a)
+    if not h > 0.0:  # no step is good for a series that is not finite
+        return NOT_FINITE
+    if yields is None:
+        tau, which = _locate(b, m, order, pivot, h, r.memory[SLACK], a, stack)
+    else:
         tau, which = bouc_wen.locate(b, m, order, h, r.memory[SLACK], a, stack)
     if not math.isfinite(tau):
         return NOT_FINITE
