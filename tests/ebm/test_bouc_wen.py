@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Block, Floor, InputError, Ricker, Scene, Wall, kinematics, load_scene
+from rockcheck.scenes import Block, Floor, InputError, Record, Ricker, Scene, Wall, kinematics, load_scene
 from rockcheck.scenes.errors import ModelFailure
 from rockcheck.scenes.scene import PAPER_BLOCK
 
@@ -150,6 +150,23 @@ def test_overturning_ends_the_run():
     assert history.outcome == exact.outcome
     assert history.event_list[-1].kind == history.outcome
     assert history.channels["t"][-1] <= history.event_list[-1].t
+
+
+def test_a_motion_that_grows_beyond_all_bounds_is_an_error():
+    """On a wall, friction 1.333 is beyond Painleve's limit: neither a push nor a pull of the floor solves the equations."""
+    scene = Scene(
+        name="painleve",
+        block=Block(half_width=1.1228, half_height=1.0681),
+        floor=Floor(friction=1.333),
+        walls=[Wall(side="left", gap=0.20385, restitution=0.0), Wall(side="right", gap=0.64593, restitution=0.53577)],
+        excitation=Record.from_samples([9.3] * 8 + [9.4] * 8 + [12.0] * 6, 0.0622598),
+        initial_angular_velocity=1.74098,
+        initial_velocity=1.400567,
+        gravity=4.300029,
+        duration=1.3,
+    )
+    with pytest.raises(ModelFailure, match="not finite at t = 1"):
+        bouc_wen(scene, yield_displacement=1.54969e-3)
 
 
 def test_what_it_cannot_do_is_refused():
