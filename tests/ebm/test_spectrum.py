@@ -11,7 +11,7 @@ import pytest
 
 from rockcheck.ebm import EventBasedModel, batch, overturning_spectrum
 from rockcheck.ebm.core.march import TOO_MANY_STEPS
-from rockcheck.ebm.spectrum import node_scene, play_nodes
+from rockcheck.ebm.spectrum import node_scene, play_motions, play_nodes
 from rockcheck.scenes import Floor, InputError, Record, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
@@ -172,6 +172,27 @@ def test_a_record_is_scaled_and_the_block_resized():
             outcome = EventBasedModel(tolerance=1e-9).simulate(node_scene(start, scale, size, settle=20.0)).outcome
             assert outcome.startswith("overturned") == bool(spectrum.outcomes[i, j])
     assert 0 < np.count_nonzero(spectrum.outcomes) < spectrum.outcomes.size
+
+
+def test_motions_at_nodes_are_those_that_the_model_simulates():
+    record = Record.from_samples(3.0 * np.sin(2.0 * np.pi * np.arange(0.0, 2.0, 0.02)), 0.02)
+    model, seen = EventBasedModel(tolerance=1e-10), set()
+    a, f = np.array([1.2, 2.0, 4.0, 9.0]), np.array([0.8, 0.5, 1.0, 2.5])
+    for start in (scene(Wall(side="left", gap=0.053, restitution=0.5)), scene(excitation=record)):
+        for motion, *node in zip(play_motions(start, a, f, model=model, parts=50), a, f, strict=True):
+            one = node_scene(start, *node)
+            history = model.simulate(one.replace(output_step=one.duration / 50))
+            expected = np.column_stack([history.channels[name] for name in ("t", "theta", "x", "y")])
+            assert motion.rows.shape == expected.shape
+            np.testing.assert_allclose(motion.rows, expected, atol=1e-8)
+            assert (motion.outcome, motion.block) == (history.outcome, one.block)
+            seen.add(motion.outcome)
+    assert len(seen) >= 2
+
+
+def test_a_motion_that_fails_is_none():
+    model = EventBasedModel(tolerance=1e-8, most_steps=5)
+    assert play_motions(scene(), np.array([4.0]), np.array([2.0]), model=model, parts=10) == [None]
 
 
 def test_the_mirror_image_and_the_number_of_threads():
