@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 Base = tuple[Floats, float, float]
 
 # Lengths in units of the block's radius R, times in units of 1/p.
-CLOSED = 5e-9  # a corner nearer than this touches
+CLOSED = 5e-6  # of the longest step times R: a corner nearer than this touches
 EMBEDDED = 5e-10  # how deep the engine sees a corner that touches
 PROBE_STEP = 6e-5  # the longest step where the acceleration is not known, that is, after an event
 SHORTEST_STEP = 2e-8  # that of an impact: the time and the place of each are wrong by so much
@@ -47,6 +47,7 @@ class Limits(NamedTuple):
     """The steps and speeds that count as short, long and slow in a scene, s and 1/s; its gravity; its block's height, standing."""
 
     longest: float
+    closed: float
     probe: float
     shortest: float
     long_approach: float
@@ -76,6 +77,7 @@ def limits_of(scene: Scene, longest: float, short: float) -> Limits:
     probe = min(PROBE_STEP * moment, longest)
     return Limits(
         longest=longest,
+        closed=CLOSED * longest * scene.frequency_parameter,
         probe=probe,
         shortest=min(SHORTEST_STEP * moment, longest),
         long_approach=LONG_APPROACH * moment,
@@ -140,7 +142,7 @@ def length(run: March, corners: Floats, limits: Limits, dt: float) -> tuple[floa
         bx, bz, nx, nz, distance = corners[i]
         arm = arm_of(bx, bz, cos, sin)
         gap, rate = gap_of(nx, nz, distance, z[X], z[Y], arm), rate_of(nx, nz, z[VX], z[VY], z[W], arm)
-        run.closed[i] = not (gap > CLOSED or rate > leaving)
+        run.closed[i] = not (gap > limits.closed or rate > leaving)
         if not run.closed[i]:
             curvature = acceleration_of(nx, nz, z[AX], z[AY], z[SPIN], z[W], arm) if known else 0.0
             closing = time_to_close(gap, rate, curvature)
