@@ -168,7 +168,7 @@ def try_case(case: Case) -> str:
     with tempfile.TemporaryDirectory() as inside:
         folder = _folder(Path(inside))
         case.prepare(folder)
-        command = [sys.executable, "-c", LIMITED, *case.limit, *case.words] if case.limit else [*ROCKCHECK, *case.words]
+        command = [sys.executable, "-B", "-c", LIMITED, *case.limit, *case.words] if case.limit else [*ROCKCHECK, *case.words]
         running = subprocess.Popen(
             command, cwd=folder, env={**os.environ, **case.environment}, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
         )

@@ -53,8 +53,9 @@ def leavings(folder: Path) -> list[Path]:
 
 
 def limited(size: int, *words: str) -> subprocess.CompletedProcess[str]:
-    """rockcheck where no file can be larger than `size` bytes; without coverage.py, whose own file would be too large."""
-    command = [sys.executable, "-c", _LIMITED, str(size), *words]
+    """rockcheck where no file can be larger than `size` bytes; without coverage.py and
+    Python's own caches (-B), which would be cut off at that size."""
+    command = [sys.executable, "-B", "-c", _LIMITED, str(size), *words]
     environment = {name: value for name, value in os.environ.items() if not name.startswith("COVERAGE_PROCESS")}
     return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=environment)
 
