@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 Base = tuple[Floats, float, float]
 
 # Lengths in units of the block's radius R, times in units of 1/p.
-CLOSED = 5e-6  # of the longest step times R: a corner nearer than this touches
+CLOSED, DRIFT = 5e-9, 3e-6  # a corner nearer than this touches; of the longest step, where that is more: the drift of a long one
 EMBEDDED = 5e-10  # how deep the engine sees a corner that touches
 PROBE_STEP = 6e-5  # the longest step where the acceleration is not known, that is, after an event
 SHORTEST_STEP = 2e-8  # that of an impact: the time and the place of each are wrong by so much
@@ -77,7 +77,7 @@ def limits_of(scene: Scene, longest: float, short: float) -> Limits:
     probe = min(PROBE_STEP * moment, longest)
     return Limits(
         longest=longest,
-        closed=CLOSED * longest * scene.frequency_parameter,
+        closed=max(CLOSED, DRIFT * longest * scene.frequency_parameter),
         probe=probe,
         shortest=min(SHORTEST_STEP * moment, longest),
         long_approach=LONG_APPROACH * moment,
