@@ -21,14 +21,16 @@ Floats = NDArray[np.float64]
 Base = tuple[Floats, float, float]
 
 # Lengths in units of the block's radius R, times in units of 1/p.
-CLOSED, DRIFT = 5e-9, 3e-6  # a corner nearer than this touches; of the longest step, where that is more: the drift of a long one
+CLOSED = 5e-9  # a corner nearer than this touches
+DRIFT = 3e-6  # of the longest step: a corner that rests may leave its surface by so much in one, and touches from there if it is more
 EMBEDDED = 5e-10  # how deep the engine sees a corner that touches
 PROBE_STEP = 6e-5  # the longest step where the acceleration is not known, that is, after an event
-SHORTEST_STEP = 2e-8  # that of an impact: the time and the place of each are wrong by so much
+SHORTEST_STEP = 2e-8  # an impact takes one: its time is wrong by so much, its place by what the block moves in it
 LONG_APPROACH = 6e-4  # from farther away the prediction of an event is only trusted to 95 %
 RESTING = 0.001  # of g times the longest step: slower approaches and departures are not told from rest
 SETTLING_GAP = 2e-6
-SETTLING_TIME = 0.2  # of the longest step, after an event of the probe: a corner that is back within twice that time stays
+# A corner that leaves and is back within twice this share of a step is taken to stay: of the longest step, after an event of a probe.
+SETTLING_TIME = 0.2
 
 #: Contacts with the floor, the first rows of `corners`; all others are with walls.
 FLOOR = 2
@@ -44,7 +46,7 @@ POSE, VELOCITY, DT, FELT_X, FELT_Y, IMPACT = 0, 3, 6, 7, 8, 9
 
 
 class Limits(NamedTuple):
-    """The steps and speeds that count as short, long and slow in a scene, s and 1/s; its gravity; its block's height, standing."""
+    """What counts as near, short, long and slow in a scene, in R, s and R/s; its gravity; its block's height, standing."""
 
     longest: float
     closed: float
