@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from statistics import median
@@ -25,12 +25,15 @@ from rockcheck.scenes.compiled import kernel
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.scene import PAPER_BLOCK
 
+Floats = NDArray[np.float64]
 #: The grid of Ricker pulses: omega_p/p, a_p/(g tan alpha), and its nodes along each axis.
 FREQUENCY_RATIOS, AMPLITUDE_RATIOS, NODES = (0.5, 8.0), (1.0, 12.0), 100
 TOLERANCES = (1e-6, 1e-7, 2e-8, 1e-8, 1e-9, 1e-10, 1e-12)
 REFERENCE_TOLERANCE, ROUNDS = 1e-14, 3
 #: The error at which a trajectory's cost is given: 95th percentile of the peak's error, rad.
 LEVEL = 1e-8
+#: Runs of a batch whose cost is taken whole, packing included; and in a quick benchmark.
+SIZES, QUICK_SIZES = (1, 10, 100, 1000, 10_000, 100_000, 1_000_000), (1, 100, 10_000)
 
 
 @dataclass(frozen=True)
@@ -74,12 +77,22 @@ class ColdStart:
 
 
 @dataclass(frozen=True)
+class BatchSize:
+    """What a batch of so many random pulses (μ 0.3, no wall) takes whole with so many threads, packing included: s a run (median)."""
+
+    runs: int
+    threads: int
+    wall: float
+
+
+@dataclass(frozen=True)
 class EbmSpeed:
-    """All batches, the time of one right-hand side (s), and cold starts."""
+    """All batches, the time of one right-hand side (s), cold starts, and cost against size."""
 
     right_hand_side: float
     times: tuple[BatchTime, ...]
     cold_starts: tuple[ColdStart, ...]
+    sizes: tuple[BatchSize, ...] = ()
 
     def at_level(self, case: str) -> BatchTime | None:
         """The cheapest tolerance whose p95 error is at most `LEVEL`, None where there is none."""
@@ -92,11 +105,16 @@ def _scene(*walls: Wall, friction: float = 0.3) -> Scene:
     return Scene(name="grid", block=PAPER_BLOCK, floor=Floor(friction=friction), walls=walls, excitation=pulse, duration=10.0)
 
 
-def grid(scene: Scene, nodes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def grid(scene: Scene, nodes: int) -> tuple[Floats, Floats]:
     """Amplitudes (m/s^2) and periods (s) of the grid of pulses, `nodes` along each axis."""
     frequency, amplitude = np.meshgrid(np.linspace(*FREQUENCY_RATIOS, nodes), np.linspace(*AMPLITUDE_RATIOS, nodes))
-    strength = amplitude.ravel() * scene.gravity * math.tan(scene.block.alpha)
-    return strength, 2.0 * math.pi / (frequency.ravel() * scene.frequency_parameter)
+    return _pulse(scene, frequency.ravel(), amplitude.ravel())
+
+
+def _pulse(scene: Scene, frequency: Floats, amplitude: Floats) -> tuple[Floats, Floats]:
+    """Amplitudes (m/s^2) and periods (s) of pulses whose frequency is given over p, whose amplitude over g tan(alpha)."""
+    strength = amplitude * scene.gravity * math.tan(scene.block.alpha)
+    return strength, 2.0 * math.pi / (frequency * scene.frequency_parameter)
 
 
 def _pulses(scene: Scene) -> Callable[[EventBasedModel, int], Packed]:
@@ -131,7 +149,26 @@ def ebm_speed(*, quick: bool = False, cold: bool = True, on_progress: OnProgress
     for done, case in enumerate(CASES):
         on_progress(done, len(CASES), f"batches: {case.name}")
         times += _times(case, nodes, ones)
-    return EbmSpeed(median(ones), tuple(times), cold_starts(on_progress, without_cache=not quick) if cold else ())
+    sizes = batch_sizes(QUICK_SIZES if quick else SIZES, on_progress)
+    return EbmSpeed(median(ones), tuple(times), cold_starts(on_progress, without_cache=not quick) if cold else (), sizes)
+
+
+def batch_sizes(sizes: Sequence[int] = SIZES, on_progress: OnProgress = unheard) -> tuple[BatchSize, ...]:
+    """Times batches of these sizes, on one thread and on one a core."""
+    scene, model = _scene(), EventBasedModel(tolerance=LEVEL)
+    rows = []
+    for done, runs in enumerate(sizes):
+        on_progress(done, len(sizes), f"a batch of {runs:,}")
+        random = np.random.default_rng(1)
+        pulses = _pulse(scene, random.uniform(*FREQUENCY_RATIOS, runs), random.uniform(*AMPLITUDE_RATIOS, runs))
+        for count in sorted({1, os.cpu_count() or 1}):
+            taken = []
+            for _ in range(ROUNDS):
+                began = time.perf_counter()
+                run_batch(pack_pulses(scene, model, *pulses), model, strict=False, jobs=count)
+                taken.append((time.perf_counter() - began) / runs)
+            rows.append(BatchSize(runs, count, median(taken)))
+    return tuple(rows)
 
 
 def _times(case: BatchCase, nodes: int, ones: list[float]) -> list[BatchTime]:

@@ -76,7 +76,7 @@ def save(found: Benchmark, folder: Path) -> None:
             "engines": found.models.pooled,
         }
     if found.ebm is not None:
-        tables |= {"batches": found.ebm.times, "cold-starts": found.ebm.cold_starts}
+        tables |= {"batches": found.ebm.times, "batch-sizes": found.ebm.sizes, "cold-starts": found.ebm.cold_starts}
     if found.savings is not None:
         tables |= {"savings": found.savings}
     for name, rows in tables.items():

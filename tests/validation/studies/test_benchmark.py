@@ -9,7 +9,7 @@ import pytest
 from rockcheck.reports.studies.benchmark import write_benchmark
 from rockcheck.reports.style import power_of_ten
 from rockcheck.validation.bench import models as benchmark_models
-from rockcheck.validation.bench.ebm import CASES, LEVEL, EbmSpeed, _times
+from rockcheck.validation.bench.ebm import CASES, LEVEL, EbmSpeed, _times, batch_sizes
 from rockcheck.validation.bench.models import (
     LINES,
     BenchmarkRun,
@@ -25,6 +25,7 @@ from rockcheck.validation.bench.models import (
 from rockcheck.validation.bench.scenes import FAMILIES, MEMBERS, prepared
 from rockcheck.validation.bench.skipping import Saving, skipping
 from rockcheck.validation.bench.study import Benchmark, save
+from rockcheck.validation.bench.tables import markdown
 from rockcheck.validation.commands.cli import main
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import not_installed
@@ -203,14 +204,14 @@ def test_the_page_holds_every_table_and_asks_nothing_of_others(tmp_path: Path) -
         wall_seconds=1.0,
         versions=provenance.versions(),
         hardware=provenance.hardware(),
-        ebm=EbmSpeed(1e-8, tuple(_times(CASES[0], 6, [])), ()),
+        ebm=EbmSpeed(1e-8, tuple(_times(CASES[0], 6, [])), (), batch_sizes((1, 20))),
         models=evaluated([*samples, failed], ()),
         savings=(Saving("cm", "wall", "ms", 2.0, 1.0),),
     )
     save(found, tmp_path)
     page = write_benchmark(found, tmp_path).read_text(encoding="utf-8")
     assert json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))["suite"] == "benchmark all"
-    for name in ("runs", "work-precision", "orders-and-ratios", "batches", "savings"):
+    for name in ("runs", "work-precision", "orders-and-ratios", "batches", "batch-sizes", "savings"):
         assert len((tmp_path / f"{name}.csv").read_text(encoding="utf-8").splitlines()) > 1
     for name in ("ratios", "batches", "without-wall", "with-wall"):
         assert (tmp_path / "pages" / "figures" / f"{name}.svg").stat().st_size > 1000
@@ -219,6 +220,8 @@ def test_the_page_holds_every_table_and_asks_nothing_of_others(tmp_path: Path) -
     assert "it blew up &lt;fast&gt;" in page
     assert "https://" not in page
     assert "PyBullet" in page
+    assert "packing included" in page
+    assert "| 20 |" in markdown(found)
 
 
 def test_axis_labels() -> None:
