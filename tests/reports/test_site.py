@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import re
+import zlib
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
@@ -17,7 +19,7 @@ from rockcheck.reports import write_site
 from rockcheck.reports.ensembles import distributions_figure, ensemble_views
 from rockcheck.reports.figures import histories_figure
 from rockcheck.reports.overview import PEAKS, accuracies, entry, glance, matrix
-from rockcheck.reports.payload import packed
+from rockcheck.reports.payload import packed, packed_lines
 from rockcheck.reports.scene_file import write_scene_file
 from rockcheck.reports.site import PAGES
 from rockcheck.reports.style import LOOKS, SPARE, looks, save
@@ -25,6 +27,7 @@ from rockcheck.reports.tables import overrun, run_times, worst_first
 from rockcheck.reports.view import FALL, scene_views, slugs_of
 from rockcheck.reports.words import number, ratio, readable
 from rockcheck.scenes import Block, Floor, History, InputError, Record, Scene, Sine, Wall, load_scene
+from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
 from rockcheck.validation.commands.cli import main
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.discrepancy.measures import Pair, theta_rms
@@ -54,9 +57,17 @@ def pages_of(site: Path) -> list[Path]:
     return [site / "index.html", *sorted((site / PAGES).glob("*.html"))]
 
 
-def payload_of(site: Path, slug: str) -> dict:
+def payload_of(site: Path, slug: str) -> tuple[dict, np.ndarray]:
+    """The data of a page, and its lines of values."""
     text = (site / PAGES / "data" / f"{slug}.js").read_text(encoding="utf-8")
-    return json.loads(text.removeprefix("window.rockcheck = ").rstrip(";\n"))
+    data = json.loads(text.removeprefix("window.rockcheck = ").rstrip(";\n"))
+    return data, lines_of(data["lines"], data["rows"])
+
+
+def lines_of(text: str, rows: int) -> np.ndarray:
+    """Unpacks as a page does."""
+    places = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8).reshape(4, -1)
+    return np.ascontiguousarray(places.T).view("<f4").reshape(-1, rows)
 
 
 def test_every_scene_has_a_page(site: Path) -> None:
@@ -207,11 +218,12 @@ def test_a_run_without_tolerances_says_how_to_get_them(tmp_path: Path, finished:
 def test_data_are_the_histories(site: Path) -> None:
     run = Run.load(site)
     view = next(view for view in scene_views(run, site) if view.name == "beside a wall")
-    data = payload_of(site, view.slug)
+    data, lines = payload_of(site, view.slug)
     assert data["rows"] == len(view.t)
+    assert lines[data["ground"]] == pytest.approx(view.ground / GRAVITY_OF_RECORDS, rel=1e-7)
     for model in data["models"]:
         history = view.histories[model["name"]]
-        theta = np.frombuffer(base64.b64decode(model["values"]["theta"]), dtype="<f4")
+        theta = lines[model["values"]["theta"]]
         assert theta == pytest.approx(history.channels["theta"] / view.scene.block.alpha, rel=1e-7)
         assert [event[1] for event in model["events"]] == [event.kind for event in history.event_list]
     assert data["horizon"] == 10.0
@@ -221,8 +233,8 @@ def test_data_are_the_histories(site: Path) -> None:
 
 
 def test_a_history_that_ends_early_is_padded(site: Path) -> None:
-    data = payload_of(site, "Free-2")
-    theta = np.frombuffer(base64.b64decode(data["models"][0]["values"]["theta"]), dtype="<f4")
+    data, lines = payload_of(site, "Free-2")
+    theta = lines[data["models"][0]["values"]["theta"]]
     assert len(theta) == data["rows"]
     assert np.isnan(theta[-1])
     assert not np.isnan(theta[0])
@@ -411,6 +423,12 @@ def test_numbers_for_people() -> None:
     assert [number(v) for v in (None, 0.0, -0.5, 1.23456e-7, 5300.0)] == ["–", "0", "−0.5", "1.23·10⁻⁷", "5.3·10³"]
     assert [ratio(v) for v in (None, 1.0, 0.054, 5876.0)] == ["–", "1×", "0.054×", "5\u202f876×"]
     assert base64.b64decode(packed([1.0])) == b"\x00\x00\x80\x3f"
+
+
+def test_lines_of_values_are_packed_and_unpacked() -> None:
+    lines = [[1.0, -2.5, 3e-9], [math.nan, 0.0, 1e30], [2.0, 3.0, math.nan]]
+    assert zlib.decompress(base64.b64decode(packed_lines([[1.0, 1.0]]))) == b"\x00\x00\x00\x00\x80\x80\x3f\x3f"
+    assert lines_of(packed_lines([*lines[:2], lines[2][:2]]), 3) == pytest.approx(np.array(lines, dtype="<f4"), abs=0.0, nan_ok=True)
 
 
 def files_of(site: Path) -> dict[str, tuple[int, bytes]]:

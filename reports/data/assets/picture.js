@@ -1,7 +1,6 @@
 "use strict";
 // The plots over time as they stand on a scene's page, with its window, models and reference, as one picture: SVG or PNG.
-(() => {
-  const { store, drawn } = window.rockcheckPage;
+const buildPicture = (store, drawn) => {
   const find = id => document.getElementById(id);
   const HEAD = 18, LEGEND = 26, FONT = "11px system-ui, sans-serif";
 
@@ -122,4 +121,4 @@
   find("as-svg").addEventListener("click", () => give(new Blob([svg()], { type: "image/svg+xml" }), "svg"));
   find("as-png").addEventListener("click", () => png().toBlob(blob => give(blob, "png")));
   for (const id of ["as-svg", "as-png"]) find(id).disabled = false;
-})();
+};

@@ -1,19 +1,21 @@
 "use strict";
 // A scene's page: unpacks the data, keeps what plots and animation share, and listens to the controls.
-(() => {
+(async () => {
   const data = window.rockcheck;
   const find = id => document.getElementById(id);
-  const floats = text => {
-    const bytes = Uint8Array.from(atob(text), c => c.charCodeAt(0));
-    const view = new DataView(bytes.buffer);
-    return Array.from({ length: bytes.length / 4 }, (_, k) => {
-      const value = view.getFloat32(4 * k, true);
-      return Number.isNaN(value) ? null : value;
-    });
-  };
+  // The values of all lines: deflated, all first bytes of the float32 first, then all second ones, and so on.
+  const packed = new Blob([Uint8Array.from(atob(data.lines), c => c.charCodeAt(0))]).stream();
+  const bytes = new Uint8Array(await new Response(packed.pipeThrough(new DecompressionStream("deflate"))).arrayBuffer());
+  const count = bytes.length / 4, view = new DataView(new ArrayBuffer(4));
+  const floats = line => Array.from({ length: data.rows }, (_, k) => {
+    for (let place = 0; place < 4; place++) view.setUint8(place, bytes[place * count + line * data.rows + k]);
+    const value = view.getFloat32(0, true);
+    return Number.isNaN(value) ? null : value;
+  });
+  data.lines = null;
 
   for (const model of data.models) {
-    model.columns = Object.fromEntries(Object.entries(model.values).map(([name, text]) => [name, floats(text)]));
+    model.columns = Object.fromEntries(Object.entries(model.values).map(([name, line]) => [name, floats(line)]));
     model.values = null;
     model.end = data.step * Math.max(0, model.columns.theta.findLastIndex(v => v !== null));
     // What is drawn: up to the fall; of a measured history only its samples.
@@ -22,7 +24,7 @@
     model.upright = model.fell === null ? model.columns : kept(k => k <= last);
     model.drawn = samples ? kept(k => k <= last && samples.has(k)) : model.upright;
   }
-  for (const band of data.bands) if (band.running) band.running = floats(band.running);
+  for (const band of data.bands) if (band.running !== undefined) band.running = floats(band.running);
   const placed = model => model.columns.x.some(v => v !== null);
 
   const listeners = [];
@@ -181,5 +183,6 @@
   });
   tell();
   document.addEventListener("themechange", () => { Plots.forgetColours(); store.change({ theme: true }); });
+  buildPicture(store, drawn);
   window.rockcheckPage = { store, drawn };
 })();
