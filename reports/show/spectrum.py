@@ -1,15 +1,14 @@
-"""Draws an overturning spectrum in the paper's colours. Imports matplotlib."""
+"""Draws an overturning spectrum in the paper's colours."""
 
 from __future__ import annotations
 
-from typing import Any
-
-from matplotlib.colors import ListedColormap
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Any
 
 from rockcheck.ebm.spectrum import Spectrum
-from rockcheck.reports.show.drawing import new_figure
 from rockcheck.scenes import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: The paper's colours.
 COLOURS = {"safe": "#3b6fb6", "counterclockwise": "#e8833a", "clockwise": "#f2cf4a", "overturned": "#e8833a", "undecided": "#9a9a9a"}
@@ -26,6 +25,8 @@ LAW_MARK: dict[str, Any] = {
 
 def spectrum_figure(spectrum: Spectrum) -> Figure:
     """The spectrum as a figure of its own."""
+    from rockcheck.reports.show.drawing import new_figure
+
     figure = new_figure(4.5, 3.6)
     draw(spectrum, figure.subplots())
     return figure
@@ -37,6 +38,8 @@ def draw(spectrum: Spectrum, axes: Any) -> None:
     Blue is safe. Without a wall orange is overturned counterclockwise and yellow clockwise; with a wall orange is overturned.
     Grey is undecided, a black ring around a node says that its outcome depends on the law of impacts.
     """
+    from matplotlib.colors import ListedColormap
+
     names = ("counterclockwise", "safe", "overturned" if spectrum.scene.walls else "clockwise", "undecided")
     shown = spectrum.outcomes.copy()
     shown[tuple(spectrum.undecided.T)] = 2

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from rockcheck.ebm import Spectrum
 from rockcheck.engines.engine import Engine
@@ -112,6 +111,8 @@ def first_of(near: NDArray[np.bool_], count: int) -> NDArray[np.int64]:
 
 def near_boundary(outcomes: NDArray[np.int8]) -> NDArray[np.bool_]:
     """Which nodes have another outcome within `NEAR` nodes."""
+    from scipy import ndimage
+
     width = 2 * NEAR + 1
     near: NDArray[np.bool_] = ndimage.maximum_filter(outcomes, width, mode="nearest") != ndimage.minimum_filter(
         outcomes, width, mode="nearest"

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, Spectrum
 from rockcheck.validation.discrepancy.figures import Stored
@@ -87,6 +86,8 @@ def verify(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles) -> R
 
 def compared(name: str, full: Spectrum, refined: Spectrum) -> Refined:
     """A refined spectrum against the full grid."""
+    from scipy import ndimage
+
     return Refined(
         spectrum=name,
         nodes=full.outcomes.size,
