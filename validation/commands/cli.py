@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import inspect
 import os
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, TextIO, cast
@@ -18,54 +20,35 @@ import typer.core
 
 from rockcheck.scenes import InputError, ModelFailure
 from rockcheck.scenes.errors import printable
-from rockcheck.validation.commands import (
-    accept,
-    begun,
-    compare,
-    diff,
-    new,
-    record,
-    report_file,
-    run,
-    scenes,
-    simulate,
-    speaking,
-    total_told,
-    uncertainty,
-    validate,
-    warm,
-)
-from rockcheck.validation.commands.engines import calibrate, conformance
-from rockcheck.validation.commands.pages import figure, report
-from rockcheck.validation.commands.studies import benchmark, convergence, ida, spectrum, stress
+from rockcheck.validation.commands import begun, report_file, speaking, total_told
 from rockcheck.validation.suite.results import FAULT
 
-#: The commands, in the order of the help, each with an example.
+#: The commands, in the order of the help: where each has its function `run` below this package, and an example.
 COMMANDS = {
-    scenes: "rockcheck scenes",
-    new: "rockcheck new bookcase.toml",
-    record: "rockcheck record station.V2 --component 1 --plot station.png",
-    simulate: "rockcheck simulate fig5a --model mujoco --set time_step=1e-3 -o mujoco.csv",
-    run: "rockcheck run fig5a --models ebm,cm,mujoco",
-    compare: "rockcheck compare ebm.csv mujoco.csv --until 8",
-    uncertainty: "rockcheck uncertainty fig5a --model mujoco --set time_step=1e-3",
-    validate: "rockcheck validate smoke --out rockcheck-report",
-    accept: 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"',
-    diff: "rockcheck diff last-week rockcheck-report",
-    spectrum: "rockcheck spectrum --figure 8 --size 50 --refine",
-    ida: "rockcheck ida shelf.toml records --intensity sa --period 0.5",
-    benchmark: "rockcheck benchmark --quick",
-    convergence: "rockcheck convergence --quick",
-    conformance: "rockcheck conformance --engine mujoco --settings default",
-    calibrate: "rockcheck calibrate --engine mujoco --restitution 0.5 --step 1e-3",
-    stress: "rockcheck stress --quick",
-    report: "rockcheck report rockcheck-report",
-    figure: "rockcheck figure rockcheck-report fig4a -o fig4a.pdf",
-    warm: "rockcheck warm",
+    "scenes": ("scenes", "rockcheck scenes"),
+    "new": ("new", "rockcheck new bookcase.toml"),
+    "record": ("record", "rockcheck record station.V2 --component 1 --plot station.png"),
+    "simulate": ("simulate", "rockcheck simulate fig5a --model mujoco --set time_step=1e-3 -o mujoco.csv"),
+    "run": ("run", "rockcheck run fig5a --models ebm,cm,mujoco"),
+    "compare": ("compare", "rockcheck compare ebm.csv mujoco.csv --until 8"),
+    "uncertainty": ("uncertainty", "rockcheck uncertainty fig5a --model mujoco --set time_step=1e-3"),
+    "validate": ("validate", "rockcheck validate smoke --out rockcheck-report"),
+    "accept": ("accept", 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"'),
+    "diff": ("diff", "rockcheck diff last-week rockcheck-report"),
+    "spectrum": ("studies.spectrum", "rockcheck spectrum --figure 8 --size 50 --refine"),
+    "ida": ("studies.ida", "rockcheck ida shelf.toml records --intensity sa --period 0.5"),
+    "benchmark": ("studies.benchmark", "rockcheck benchmark --quick"),
+    "convergence": ("studies.convergence", "rockcheck convergence --quick"),
+    "conformance": ("engines.conformance", "rockcheck conformance --engine mujoco --settings default"),
+    "calibrate": ("engines.calibrate", "rockcheck calibrate --engine mujoco --restitution 0.5 --step 1e-3"),
+    "stress": ("studies.stress", "rockcheck stress --quick"),
+    "report": ("pages.report", "rockcheck report rockcheck-report"),
+    "figure": ("pages.figure", "rockcheck figure rockcheck-report fig4a -o fig4a.pdf"),
+    "warm": ("warm", "rockcheck warm"),
 }
 
 #: Commands that answer at once: nobody asks how long they took.
-AT_ONCE = (scenes, new, record, compare, diff)
+AT_ONCE = ("scenes", "new", "record", "compare", "diff")
 
 #: Exit code of a run that Ctrl-C ended.
 INTERRUPTED = 130
@@ -80,13 +63,6 @@ EXIT_CODES = {
 
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only; the exit code is the answer.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="The result as JSON on stdout, instead of tables.")]
-
-app = typer.Typer(
-    name="rockcheck",
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    epilog="\b\nExit codes:\n" + "\n".join(f"{code:5}  {meaning}" for code, meaning in EXIT_CODES.items()),
-)
 
 
 def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
@@ -119,6 +95,43 @@ class _EachOnce(typer.core.TyperCommand):
         return super().parse_args(ctx, args)
 
 
+class _Loaded(Mapping[str, Any]):
+    """The commands by name. Only that which is asked for is imported: half of them need the compiler, or what draws."""
+
+    def __getitem__(self, name: str) -> Any:
+        return _loaded(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(COMMANDS)
+
+    def __len__(self) -> int:
+        return len(COMMANDS)
+
+
+@cache
+def _loaded(name: str) -> Any:
+    module, example = COMMANDS[name]
+    does = importlib.import_module(f"rockcheck.validation.commands.{module}").run
+    alone = typer.Typer(rich_markup_mode=None, add_completion=False)
+    alone.command(name=name, cls=_EachOnce, epilog=f"Example: {example}")(spoken(does, timed=name not in AT_ONCE))
+    return typer.main.get_command(alone)
+
+
+class _Commands(typer.core.TyperGroup):
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.commands = cast(Any, _Loaded())
+
+
+app = typer.Typer(
+    name="rockcheck",
+    cls=_Commands,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    epilog="\b\nExit codes:\n" + "\n".join(f"{code:5}  {meaning}" for code, meaning in EXIT_CODES.items()),
+)
+
+
 def _version(asked: bool) -> None:
     if asked:
         print(f"rockcheck {version('rockcheck')}")
@@ -130,11 +143,6 @@ def common(
     _: Annotated[bool, typer.Option("--version", is_eager=True, callback=_version, help="Show the version and exit.")] = False,
 ) -> None:
     """Simulate a rigid block on a shaking floor with several models, compare them, and judge them against tolerances."""
-
-
-for module, example in COMMANDS.items():
-    spoken_run = spoken(module.run, timed=module not in AT_ONCE)
-    app.command(name=module.__name__.rpartition(".")[2], cls=_EachOnce, epilog=f"Example: {example}")(spoken_run)
 
 
 def main(arguments: Sequence[str] | None = None, *, began: float | None = None) -> int:

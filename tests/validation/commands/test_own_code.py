@@ -188,6 +188,7 @@ UNPICKLE = {
 }
 IMPORT = {
     "rockcheck/__init__.py": "the public names",
+    "validation/commands/cli.py": "rockcheck's own commands",
     "validation/execute/models.py": "models by rockcheck's own names; one's own only as the command line allows, in a worker",
 }
 

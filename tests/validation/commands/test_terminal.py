@@ -20,7 +20,7 @@ from rockcheck.validation.commands.cli import COMMANDS, app, main
 
 STILL = "faulty:Still", "--allow-code", "faulty:Still"
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
-NAMES = [module.__name__.rpartition(".")[2] for module in COMMANDS]
+NAMES = list(COMMANDS)
 SUITE = """
 reference = "still"
 [models.still]
