@@ -21,7 +21,6 @@ Floats = NDArray[np.float64]
 Base = tuple[Floats, float, float]
 
 # Lengths in units of the block's radius R, times in units of 1/p.
-CLOSED = 5e-9  # a corner nearer than this touches
 DRIFT = 3e-6  # of the longest step: a corner that rests may leave its surface by so much in one, and touches from there if it is more
 EMBEDDED = 5e-10  # how deep the engine sees a corner that touches
 PROBE_STEP = 6e-5  # the longest step where the acceleration is not known, that is, after an event
@@ -73,13 +72,13 @@ class March(NamedTuple):
     next_start: NDArray[np.int64]
 
 
-def limits_of(scene: Scene, longest: float, short: float) -> Limits:
-    """Those of a scene whose steps are at most `longest` s, and at events `short` times the usual."""
+def limits_of(scene: Scene, longest: float, short: float, closed: float) -> Limits:
+    """Those of a scene whose steps are at most `longest` s, at events `short` times the usual; a corner nearer than `closed` touches."""
     moment = short / scene.frequency_parameter
     probe = min(PROBE_STEP * moment, longest)
     return Limits(
         longest=longest,
-        closed=max(CLOSED, DRIFT * longest * scene.frequency_parameter),
+        closed=max(closed, DRIFT * longest * scene.frequency_parameter),
         probe=probe,
         shortest=min(SHORTEST_STEP * moment, longest),
         long_approach=LONG_APPROACH * moment,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from rockcheck import engines
 from rockcheck.ebm import EventBasedModel
 from rockcheck.engines import MuJoCo
 from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
@@ -73,6 +74,30 @@ SLIDES = Scene(
     duration=2.536,
     output_step=0.002,
 )
+
+
+ALL_AT_ONCE = Scene(
+    name="all corners at one instant",
+    block=Block(half_width=0.19823976575679186, half_height=0.9801535569861961),
+    floor=Floor(friction=0.6553428619246915),
+    walls=[Wall(side="right", gap=0.0, restitution=0.75)],
+    initial_rotation=0.024850248047026815,
+    initial_angular_velocity=-0.0662681837727805,
+    duration=0.3,
+    output_step=0.002,
+)
+
+
+@pytest.mark.parametrize("engine", ["Dart", "MuJoCo", "PyBullet", "Pymunk"])
+def test_corners_that_land_at_one_instant_share_the_impact(engine: str) -> None:
+    """DART's, which sink unevenly, too."""
+    model = getattr(engines, engine)
+    if not model.installed():
+        pytest.skip(f"{engine} is not installed")
+    found = law_followed(ALL_AT_ONCE, model(time_step="adaptive").simulate(ALL_AT_ONCE))
+    assert found is not None
+    assert found.law == "closed"
+    assert found.errors["closed"] < 2e-6
 
 
 @pytest.mark.parametrize("scene", [PIVOT_IS_LIFTED, SLIDES], ids=lambda scene: scene.name)
