@@ -63,8 +63,20 @@ from rockcheck.scenes.compiled import inner_kernel
 GUARDS = 14
 # What a guard is; a rate is the rate of its combination.
 KIND = np.array((POSITION,) * 5 + (FORCE,) * 5 + (RATE,) + (FORCE,) * 2 + (POSITION,))
+# The series that a guard can combine. The guard itself fills the empty places: it has no weight.
+_COMBINES = np.array(
+    [(PHI, GUARD, GUARD)] * 2
+    + [(COS, Y, GUARD)]
+    + [(SIN, COS, XI)] * 2
+    + [(P, GUARD, GUARD), (Q, NA, GUARD), (NB, GUARD, GUARD)]
+    + [(P, Q, GUARD)] * 2
+    + [(PHI, SIN, XI)]
+    + [(P, Q, GUARD)] * 2
+    + [(GUARD, GUARD, GUARD)]
+)
+_MOST = 3
 # The columns of the table: the weight of each series, a constant, and how many terms fewer than the order the guard has (-1: no guard).
-_SERIES, _CONSTANT, _SHORTER = 12, 30, 31
+_CONSTANT, _SHORTER = 30, 31
 
 
 @inner_kernel
@@ -82,8 +94,8 @@ def drop(a, which):
 def fill_guards(b, m, pivot, a):
     """Writes the guards of mode m into the table; `pivot` is the place of a sticking pivot."""
     for which in range(GUARDS):
-        for column in range(_SERIES):
-            a[TABLE + which, column] = 0.0
+        for k in range(_MOST):
+            a[TABLE + which, _COMBINES[which, k]] = 0.0
         a[TABLE + which, _CONSTANT] = 0.0
         a[TABLE + which, _SHORTER] = -1.0
     if m[FAMILY] == FLAT:
@@ -195,7 +207,8 @@ def guard(which, order, a):
         return -1
     degree = order - int(a[row, _SHORTER])
     first = True
-    for series in range(_SERIES):
+    for part in range(_MOST):
+        series = _COMBINES[which, part]
         weight = a[row, series]
         if weight == 0.0:
             continue
@@ -262,18 +275,35 @@ def first_event(order, h, slack, a, stack):
 
 
 @inner_kernel
-def rock_guards_hold(b, order, h, a):
+def rock_guards_hold(b, m, pivot, order, h, a):
     """A cheap proof that a rocking block keeps every guard of ROCK but G_PHI through a step h. False where it proves nothing.
 
-    Each guard is bounded from below by its value now less the sum of its other terms.
+    Each guard is bounded from below as in `first_root`, without being written. Inside the cone the floor pushes.
     """
-    if b.walls or a[PHI, 0] > 0.5:
+    if a[PHI, 0] > 0.5:
         return False
+    if b.walls:
+        for which in (G_TIP_GAP, G_FAR_GAP):
+            drop(a, which)
+            _fill_gap(b, m, which == G_TIP_GAP, pivot, a)
+            if a[TABLE + which, _SHORTER] == 0.0 and not _rock_gap_holds(TABLE + which, order, h, a):
+                return False
     if b.no_slip and not b.unilateral:
         return True
-    spread = 0.0
-    push = 0.0
+    mu, share = (1.0, 0.0) if b.no_slip else (b.mu_s, 1.0)
+    plus = minus = 0.0
     for k in range(order - 2, 0, -1):
-        spread = (spread + b.mu_s * abs(a[P, k]) + abs(a[Q, k])) * h
-        push = (push + abs(a[P, k])) * h
-    return b.mu_s * a[P, 0] - abs(a[Q, 0]) > spread and a[P, 0] > push
+        push, pull = mu * a[P, k], share * a[Q, k]
+        plus, minus = min(plus + (push - pull), 0.0) * h, min(minus + (push + pull), 0.0) * h
+    push, pull = mu * a[P, 0], share * a[Q, 0]
+    return min(push - pull + plus, push + pull + minus) > NOISE[FORCE]
+
+
+@inner_kernel
+def _rock_gap_holds(row, order, h, a):
+    """Whether a bound on the gap that this row of the table gives to ROCK shows it open through a step h."""
+    along, across = a[row, COS], a[row, SIN]
+    low = 0.0
+    for k in range(order, 0, -1):
+        low = min(low + (along * a[COS, k] + across * a[SIN, k]), 0.0) * h
+    return along * a[COS, 0] + across * a[SIN, 0] + a[row, _CONSTANT] + low > CLOSED

@@ -80,6 +80,7 @@ from rockcheck.ebm.core.running import (
     NOT_FINITE,
     OVERTURNED,
     PEAK,
+    PIVOT,
     QUIET,
     RELEASE,
     REPEATS,
@@ -90,12 +91,14 @@ from rockcheck.ebm.core.running import (
     STEPS,
     STICKS,
     SWING,
+    SWUNG,
     T_REST,
     TOO_MANY_EVENTS,
     TOO_MANY_STEPS,
     UPLIFT,
     WALL_IMPACT,
     WALL_IMPACTS,
+    ZETA,
     Control,
     Records,
     Run,
@@ -122,19 +125,25 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack, yields=None)
     kind, mode before, mode after, impulse. `a` and `stack` are a `workspace()`. With Bouc-Wen friction `yields` is its yield
     displacement; without it the loop is compiled for Coulomb's.
     """
+    # Parts of two arrays: to make one takes as long as a fifth of a step.
+    reals, whole = np.zeros(9 + MEMORY + 16), np.zeros(MODE_SIZE + 7 + RULES, dtype=np.int64)
     r = Run(
         z,
-        np.zeros(MODE_SIZE, dtype=np.int64),
-        np.array([0.0, abs(z[THETA]), 0.0, np.nan, quiet_from(gh, gv, control.tolerance), np.nan, np.nan, np.nan, 0.0]),
-        np.zeros(7, dtype=np.int64),
-        np.zeros(RULES, dtype=np.int64),
+        whole[:MODE_SIZE],
+        reals[:9],
+        whole[MODE_SIZE : MODE_SIZE + 7],
+        whole[MODE_SIZE + 7 :],
         np.zeros(MODES, dtype=np.bool_),
-        np.zeros(MEMORY),
-        no_impacts(),
-        np.zeros(2),
-        np.zeros(2),
-        np.zeros(6),
+        reals[9 : 9 + MEMORY],
+        reals[9 + MEMORY : 15 + MEMORY],
+        reals[15 + MEMORY : 17 + MEMORY],
+        reals[17 + MEMORY : 19 + MEMORY],
+        reals[19 + MEMORY :],
     )
+    now = r.now
+    now[T_REST] = now[ZETA] = now[SWUNG] = now[PIVOT] = np.nan
+    now[PEAK], now[QUIET] = abs(z[THETA]), quiet_from(gh, gv, control.tolerance)
+    no_impacts(r.rattle)
     records = Records(out, out_mode, log)
     for k in range(a.shape[1]):  # the series of 1 + vertical acceleration: of a still base it stays as it is
         a[G, k] = 0.0
@@ -309,8 +318,8 @@ def _expand(b, m, z, gh, gv, t, reach, control, a):
 def _locate(b, m, order, pivot, h, slack, a, stack):
     """The first time within the step at which a guard ends the mode, and which; h and -1 where none does."""
     rocks = m[FAMILY] == TILT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
-    if rocks and m[PULL] > 0 and rock_guards_hold(b, order, h, a):
-        tau = first_root(a, PHI, order, h, NOISE[POSITION], AHEAD, stack)
+    if rocks and m[PULL] > 0 and rock_guards_hold(b, m, pivot, order, h, a):
+        tau = first_root(a, PHI, order, h, min(slack * NOISE[POSITION], CLOSED), AHEAD, stack)
         return (h, -1) if tau == NO_ROOT else (tau, G_PHI)
     fill_guards(b, m, pivot, a)
     return first_event(order, h, slack, a, stack)

@@ -114,10 +114,10 @@ def slacken(memory):
 
 
 @inner_kernel
-def wrong_by(b, m, z, gh, gv, t, a):
+def wrong_by(b, m, z, gh, gv, t, measured, a):
     """0 if mode m can begin at state z, with every guard leaving zero upward; else the slack (in units of noise) with which it could.
 
-    Infinite if the mode needs a motion that does not begin.
+    Infinite if the mode needs a motion that does not begin, or if that slack is not `measured`: only where no mode fits is it asked for.
     """
     look = min(_LOOK, MOST_TERMS)  # the plain constant would make numba compile all series once more, for it alone
     pivot = 0.0
@@ -137,9 +137,12 @@ def wrong_by(b, m, z, gh, gv, t, a):
         sign = leading(a, GUARD, degree, noise, ahead)
         if not math.isfinite(a[GUARD, 0]) or (sign <= 0 and which == G_PHI and (m[FLOOR] != OFF or sign < 0)):
             return np.inf
+        undecided = sign == 0 and which == G_SLIP
+        if not measured and (sign < 0 or undecided):
+            return np.inf
         if sign < 0:
             worst = max(worst, contradiction(a, GUARD, degree, noise, ahead) / noise)
-        elif sign == 0 and which == G_SLIP:
+        elif undecided:
             worst = max(worst, 1.0)
     return worst
 
@@ -242,13 +245,14 @@ def select(b, z, gh, gv, t, m, tried, memory, rules, a):
     v = slip_velocity(b, z)
     begin, end = (0, _CANDIDATES.shape[0]) if flat else (_TILTED, _TILTED_END)
     least, chosen = np.inf, -1
-    for again in (False, True):
+    for trial in range(3):  # one that fits; else that which is wrong by least, among those not tried and those tried
+        again = trial == 2
         for number in range(begin, end):
             _write(number, first, m)
             walls = upright_walls if m[FAMILY] == FLAT else (near if m[S] == first else away)
             if tried[code_of(m)] != again or not _possible(b, m, z, v, floor, walls):
                 continue
-            wrong = wrong_by(b, m, z, gh, gv, t, a)
+            wrong = wrong_by(b, m, z, gh, gv, t, trial > 0, a)
             if wrong == 0.0 and not again:
                 memory[SLACK] = 1.0
                 rules[HANGS] += hangs_flat(m)

@@ -11,7 +11,7 @@ import numpy as np
 
 from rockcheck.ebm.core.rules import ENDLESS_STAGES, RATTLES
 from rockcheck.ebm.core.series import INSTANT
-from rockcheck.scenes.compiled import inner_kernel, kernel
+from rockcheck.scenes.compiled import inner_kernel
 
 #: The settling speed, sqrt(g R): 1e-7 rad/s for the paper's block.
 SETTLE = 5e-8
@@ -23,10 +23,11 @@ _AT_ONCE = 20
 _SPEED, _SINCE, _LAST, _COUNT, _FULL, _SAME = range(6)
 
 
-@kernel
-def no_impacts():
-    """The memory of the rule: the settling speed, when the count began, the last impact, the count, how often it was full, at once."""
-    return np.array([SETTLE, -1.0, -1.0, 0.0, 0.0, 0.0])
+@inner_kernel
+def no_impacts(rattle):
+    """Begins the memory: the settling speed, when the count began, the last impact, the count, how often it was full, at once."""
+    rattle[:] = 0.0
+    rattle[_SPEED], rattle[_SINCE], rattle[_LAST] = SETTLE, -1.0, -1.0
 
 
 @inner_kernel

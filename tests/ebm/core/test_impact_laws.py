@@ -296,9 +296,15 @@ def test_a_block_that_lands_with_less_spin_than_counts_slides_on(slip, kept):
         assert (counts[rules.SETTLES], counts.sum()) == (1, 1)
 
 
+def no_impacts() -> np.ndarray:
+    rattle = np.empty(6)
+    settle.no_impacts(rattle)
+    return rattle
+
+
 def test_the_settling_speed_rises_as_impacts_accumulate():
     """Tenfold with every hundred impacts up to 2.5e-3, without a bound after five hundred times as many; back after a quiet 0.025."""
-    counts, rattle, t = np.zeros(rules.RULES, dtype=np.int64), settle.no_impacts(), 0.0
+    counts, rattle, t = np.zeros(rules.RULES, dtype=np.int64), no_impacts(), 0.0
     speeds = []
     for _ in range(50_100):
         t += 2.5e-7
@@ -309,13 +315,13 @@ def test_the_settling_speed_rises_as_impacts_accumulate():
     assert counts[rules.RATTLES] == 501
     assert settle.settling_speed(rattle, t + 0.024, counts) == np.inf
     assert settle.settling_speed(rattle, t + 0.024 + 0.026, counts) == 5e-8
-    slow = settle.no_impacts()
+    slow = no_impacts()
     for k in range(300):  # as many in a longer time are no rattle
         assert settle.settling_speed(slow, 3e-4 * k, np.zeros(rules.RULES, dtype=np.int64)) == 5e-8
 
 
 def test_impacts_at_one_instant_end_plastic():
-    counts, rattle = np.zeros(rules.RULES, dtype=np.int64), settle.no_impacts()
+    counts, rattle = np.zeros(rules.RULES, dtype=np.int64), no_impacts()
     speeds = [settle.settling_speed(rattle, 1.0, counts) for _ in range(21)]
     assert speeds == [5e-8] * 20 + [np.inf]  # the first, and twenty more at its instant
     assert counts[rules.ENDLESS_STAGES] == 1
