@@ -93,12 +93,15 @@ def fill_series(g, t, sign, n, a, row):
         q1 = g.c1 + tau * (2.0 * g.c2 + 3.0 * tau * g.c3)
         q2 = g.c2 + 3.0 * tau * g.c3
         e1 = e2 = e3 = 0.0  # coefficients k-1, k-2, k-3 of the bell, which obeys bell' = -2 rate tau bell
+        spread = -2.0 * g.rate
+        fall = spread * tau
         for k in range(n + 1):
             a[row, k] = q0 * bell + q1 * e1 + q2 * e2 + g.c3 * e3
             e3 = e2
             e2 = e1
             e1 = bell
-            bell = -2.0 * g.rate * (tau * e1 + e2) * _RECIPROCAL[k + 1]
+            r = _RECIPROCAL[k + 1]
+            bell = (fall * r) * e1 + (spread * r) * e2  # two operations from one coefficient to the next
         return
     for k in range(n + 1):
         a[row, k] = 0.0

@@ -173,20 +173,44 @@ def tilt_series(b, m, z, gh, gv, t, order, enough, reach, a):
 
 
 @inner_kernel
+def _products(a, x, y, first, last, n):
+    """The sum of x_j y_(n-j) for j from `first` to `last`. The ends, which are the newest coefficients, are added last:
+
+    so the processor need not wait for them to begin with the sum.
+    """
+    total = 0.0
+    for j in range(first + 1, last):
+        total += a[x, j] * a[y, n - j]
+    if first < last:
+        total += a[x, first] * a[y, n - first]
+    if first <= last:
+        total += a[x, last] * a[y, n - last]
+    return total
+
+
+@inner_kernel
 def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
     """ROCK, (3): theta'' = (u c - S s G0)/(I + R^2), the pivot sticking; xi and y are s and c up to a constant."""
     scale = 1.0
     small = 0
     for k in range(order):
+        # The newest coefficients come last in each sum, so that the processor need not wait for them to begin with the next one.
         ds = 0.0
         dc = 0.0
         push = 0.0
-        i = k
-        for j in range(k + 1):
+        i = k - 1
+        for j in range(1, k):
             ds += a[OMEGA, j] * a[COS, i]
             dc += a[OMEGA, j] * a[SIN, i]
             push += a[U, j] * a[COS, i]
             i -= 1
+        if k > 0:
+            push += a[U, k] * a[COS, 0]
+            ds += a[OMEGA, 0] * a[COS, k]
+            dc += a[OMEGA, 0] * a[SIN, k]
+        ds += a[OMEGA, k] * a[COS, 0]
+        dc += a[OMEGA, k] * a[SIN, 0]
+        push += a[U, 0] * a[COS, k]
         weight = a[SIN, k]
         if not still_vertical:
             weight = 0.0
@@ -280,11 +304,8 @@ def _contact_series(b, side, m, order, enough, reach, a):
     for k in range(order - 1):
         i = k + 2
         # The rates of sine and cosine at order k + 1 lack only the term of phi's acceleration at order k, the unknown.
-        ds = 0.0
-        dc = 0.0
-        for j in range(k + 1):
-            ds -= a[OMEGA, j] * a[COS, k + 1 - j]
-            dc += a[OMEGA, j] * a[SIN, k + 1 - j]
+        ds = -_products(a, OMEGA, COS, 0, k, k + 1)
+        dc = _products(a, OMEGA, SIN, 0, k, k + 1)
         a[ACCELERATION, 0], a[ACCELERATION, 1] = -a[U, k], -a[G, k]
         a[ACCELERATION, 2] = b.spin * _moment_of_lower_orders(side, kappa, floor, stick, tip, far, k, a)
         _forces(b, side, n, kappa, floor, stick, tip, far, ds * (i - 1.0), dc * (i - 1.0), k, a)
@@ -316,16 +337,13 @@ def _moment_of_lower_orders(side, kappa, floor, stick, tip, far, k, a):
     moment = 0.0
     if floor:
         a[FLOOR_ARM, k] = a[SIN, k] + kappa * a[COS, k]
-        for j in range(1, k + 1):
-            moment -= a[FLOOR_ARM, j] * a[P, k - j]
+        moment -= _products(a, FLOOR_ARM, P, 1, k, k)
     if stick:
-        for j in range(1, k + 1):
-            moment += a[COS, j] * a[Q, k - j]
+        moment += _products(a, COS, Q, 1, k, k)
     if tip or far:
         along, across = (side.tip_sin, side.tip_cos) if tip else (side.far_sin, side.far_cos)
         a[WALL_ARM, k] = along * a[SIN, k] + across * a[COS, k]
-        for j in range(1, k + 1):
-            moment -= a[WALL_ARM, j] * a[WALL_PUSH, k - j]
+        moment -= _products(a, WALL_ARM, WALL_PUSH, 1, k, k)
     return moment
 
 
