@@ -32,7 +32,10 @@ def quiet_from(gh, gv, tolerance):
 def decided(b, m, z, gh, gv, t, quiet, peak):
     """The final peak rotation (>= pi/2: overturns) if the rest of the motion is certain, else -1."""
     still = gv.kind == STILL
-    ahead = 0.0 if t >= quiet else (impulse_ahead(gh, t) if still else math.inf)
+    ahead = 0.0
+    if t < quiet:
+        told = still and (t > gh.quiet or not (b.walls or abs(z[THETA]) >= peak))  # else no finite impulse tells anything
+        ahead = impulse_ahead(gh, t) if told else math.inf
     verdict = _by_energy(b, m, z, ahead, peak)
     if verdict <= 0.0 and ahead > 0.0 and still and abs(z[THETA]) > side_of(b, z[THETA]).alpha:
         verdict = _falls(b, m, z, gh, t)

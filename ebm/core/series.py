@@ -203,12 +203,13 @@ def _isolate(stack, n):
 
 @inner_kernel
 def _falling_root(stack, row, n, end):
-    """The root in [0, 1] of a polynomial that falls from positive to `end` <= 0: Newton from the chord, kept inside its bracket.
+    """The root in [0, 1] of a polynomial that falls from positive to `end` <= 0: Newton from a parabola's, kept inside its bracket.
 
     It ends where the step after the next one, if they go on shrinking quadratically, would be below rounding.
     """
     a, b = 0.0, 1.0
-    z = stack[row, 0] / (stack[row, 0] - end)
+    begin, fall = stack[row, 0], -stack[row, 1]
+    z = min(2.0 * begin / (fall + math.sqrt(max(fall * fall - 4.0 * begin * (end - begin + fall), 0.0))), 1.0)
     last = 0.0
     for _ in range(100):
         f, gradient = stack[row, n], 0.0

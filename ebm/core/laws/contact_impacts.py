@@ -180,8 +180,7 @@ def _strike(rows, spin, taking, target, mu_s, mu_k, v, after, impulse, system):
     none does, but for rounding or for friction that jams (Painleve), the one that contradicts it least.
     """
     least, lowest = np.inf, np.inf
-    lam = np.zeros(4)
-    trial = np.zeros(3)
+    lam, trial = system[3], system[4]
     bits = 0
     for j in range(CONTACTS):
         bits |= (1 if taking[j] else 0) << j
@@ -251,9 +250,10 @@ def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, t
     """
     rows = contact_rows(b, sense, phi)
     taking = np.zeros(CONTACTS, dtype=np.bool_)
-    restitution, target, part, approach, ahead = np.zeros(CONTACTS), np.zeros(7), np.zeros(CONTACTS), np.zeros(CONTACTS), np.zeros(CONTACTS)
-    after = np.zeros(3)
-    system = np.zeros((3, 4))
+    # Parts of one array: to make each would take as long as to solve for its impulses.
+    parts = np.zeros((6, CONTACTS))
+    restitution, target, part, approach, ahead, after = parts[0], parts[1], parts[2], parts[3], parts[4], parts[5]
+    system = np.zeros((5, 4))  # the impulses and velocities of a trial stand below it
     rounding = _ROUNDING * _size(v)
     found = FITS
     for stage in range(_MOST_STAGES):
