@@ -34,8 +34,9 @@ def decided(b, m, z, gh, gv, t, quiet, peak):
     still = gv.kind == STILL
     ahead = 0.0
     if t < quiet:
-        told = still and (t > gh.quiet or not (b.walls or abs(z[THETA]) >= peak))  # else no finite impulse tells anything
-        ahead = impulse_ahead(gh, t) if told else math.inf
+        # Beside a wall, or at its peak, no outcome is certain before all is quiet, however little is to come.
+        open_yet = t <= gh.quiet and (b.walls or abs(z[THETA]) >= peak)
+        ahead = math.inf if open_yet or not still else impulse_ahead(gh, t)
     verdict = _by_energy(b, m, z, ahead, peak)
     if verdict <= 0.0 and ahead > 0.0 and still and abs(z[THETA]) > side_of(b, z[THETA]).alpha:
         verdict = _falls(b, m, z, gh, t)

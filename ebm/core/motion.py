@@ -104,9 +104,9 @@ PHI, OMEGA, SIN, COS, U, G, XI, Y, P, Q, NA, NB, GUARD, KNOWN, FORCE, FLOOR_ARM,
 # Rows in which the small linear system of the contacts is put together, three each.
 ROW, COLUMN, MATRIX, INVERSE = range(18, 30, 3)
 # The last angle whose sine and cosine were taken, and these: the end of a step is the start of the next one.
-ANGLE, ACCELERATION = 30, 31
+ANGLE = 30
 # The guards of the mode, a row each: the weights of the series in it (see ebm.core.guards).
-TABLE = 32
+TABLE = 31
 ROWS = TABLE + 14
 
 RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, MOST_TERMS + 2)])
@@ -306,20 +306,19 @@ def _contact_series(b, side, m, order, enough, reach, a):
         # The rates of sine and cosine at order k + 1 lack only the term of phi's acceleration at order k, the unknown.
         ds = -_products(a, OMEGA, COS, 0, k, k + 1)
         dc = _products(a, OMEGA, SIN, 0, k, k + 1)
-        a[ACCELERATION, 0], a[ACCELERATION, 1] = -a[U, k], -a[G, k]
-        a[ACCELERATION, 2] = b.spin * _moment_of_lower_orders(side, kappa, floor, stick, tip, far, k, a)
-        _forces(b, side, n, kappa, floor, stick, tip, far, ds * (i - 1.0), dc * (i - 1.0), k, a)
+        moment = _moment_of_lower_orders(side, kappa, floor, stick, tip, far, k, a)
+        ax, ay, aphi = _accelerations(b, side, n, kappa, floor, stick, tip, far, ds * (i - 1.0), dc * (i - 1.0), moment, k, a)
         if static:
-            a[ACCELERATION, 0] = a[ACCELERATION, 2] = 0.0
-            a[ACCELERATION, 1] = 0.0 if floor else a[ACCELERATION, 1]
-        a[XI, i] = a[ACCELERATION, 0] / (i * (i - 1.0))
-        a[Y, i] = a[ACCELERATION, 1] / (i * (i - 1.0))
-        a[OMEGA, k + 1] = a[ACCELERATION, 2] * RECIPROCAL[k + 1]
+            ax = aphi = 0.0
+            ay = 0.0 if floor else ay
+        twice = RECIPROCAL[i] * RECIPROCAL[k + 1]
+        a[XI, i], a[Y, i] = ax * twice, ay * twice
+        a[OMEGA, k + 1] = aphi * RECIPROCAL[k + 1]
         a[PHI, i] = a[OMEGA, k + 1] * RECIPROCAL[i]
         a[SIN, i] = (ds - a[OMEGA, k + 1] * c0) * RECIPROCAL[i]
         a[COS, i] = (dc + a[OMEGA, k + 1] * s0) * RECIPROCAL[i]
         scale *= reach
-        size = abs(a[ACCELERATION, 2]) + abs(a[ACCELERATION, 0]) + abs(a[ACCELERATION, 1]) + abs(a[SIN, k + 1]) + abs(a[COS, k + 1])
+        size = abs(aphi) + abs(ax) + abs(ay) + abs(a[SIN, k + 1]) + abs(a[COS, k + 1])
         size += abs(a[P, k]) + abs(a[Q, k]) + abs(a[NA, k]) + abs(a[NB, k])
         small = small + 1 if size * scale < enough else 0
         if small == 3:
@@ -348,15 +347,15 @@ def _moment_of_lower_orders(side, kappa, floor, stick, tip, far, k, a):
 
 
 @inner_kernel
-def _forces(b, side, n, kappa, floor, stick, tip, far, ks, kc, k, a):
-    """Coefficient k of the n contact forces, so that the constraints hold; adds what they do to ACCELERATION (xi, y, phi).
+def _accelerations(b, side, n, kappa, floor, stick, tip, far, ks, kc, moment, k, a):
+    """Coefficient k of the accelerations (xi, y, phi) and of the n contact forces, so that the constraints hold.
 
-    `ks`, `kc` are the accelerations of sine and cosine but for phi's own.
+    `ks`, `kc` are the accelerations of sine and cosine but for phi's own, `moment` that of the forces' lower coefficients.
     """
     tip_reach, far_reach = side.tip_sin * kc - side.tip_cos * ks, side.far_sin * kc - side.far_cos * ks  # of s'
     s, c = a[SIN, 0], a[COS, 0]
     tip_arm, far_arm = side.tip_sin * s + side.tip_cos * c, side.far_sin * s + side.far_cos * c
-    ax, ay, aphi = a[ACCELERATION, 0], a[ACCELERATION, 1], a[ACCELERATION, 2]
+    ax, ay, aphi = -a[U, k], -a[G, k], b.spin * moment
     r = 0
     for which in range(4):
         if (floor, stick, tip, far)[which]:
@@ -375,7 +374,6 @@ def _forces(b, side, n, kappa, floor, stick, tip, far, ks, kc, k, a):
         ax += a[COLUMN + r, 0] * force
         ay += a[COLUMN + r, 1] * force
         aphi += b.spin * a[COLUMN + r, 2] * force
-    a[ACCELERATION, 0], a[ACCELERATION, 1], a[ACCELERATION, 2] = ax, ay, aphi
     r = 0
     for which in range(4):
         if (floor, stick, tip, far)[which]:
@@ -384,6 +382,7 @@ def _forces(b, side, n, kappa, floor, stick, tip, far, ks, kc, k, a):
     if not stick:
         a[Q, k] = -kappa * a[P, k]
     a[WALL_PUSH, k] = a[NA, k] + a[NB, k]
+    return ax, ay, aphi
 
 
 @inner_kernel
