@@ -68,6 +68,13 @@ def window(page: playwright.Page) -> list[float]:
     return page.evaluate("rockcheckPage.store.window")
 
 
+def test_a_browser_that_cannot_unpack_the_data_is_told(visit: Visit) -> None:
+    visit.page.add_init_script("delete window.DecompressionStream")
+    visit.page.goto((visit.site / WALL).as_uri())
+    assert visit.page.locator("#too-old").is_visible()
+    assert not visit.page.locator("#live").is_visible()
+
+
 @pytest.mark.parametrize("address", PAGES)
 def test_opens_and_draws(visit: Visit, address: str) -> None:
     page = visit.open(address)

@@ -3,6 +3,8 @@
 (async () => {
   const data = window.rockcheck;
   const find = id => document.getElementById(id);
+  find("too-old").hidden = "DecompressionStream" in window;
+  if (!find("too-old").hidden) return;
   // The values of all lines: deflated, all first bytes of the float32 first, then all second ones, and so on.
   const packed = new Blob([Uint8Array.from(atob(data.lines), c => c.charCodeAt(0))]).stream();
   const bytes = new Uint8Array(await new Response(packed.pipeThrough(new DecompressionStream("deflate"))).arrayBuffer());
