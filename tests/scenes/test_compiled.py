@@ -9,6 +9,7 @@ import pickle
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections import deque
 from pathlib import Path
@@ -260,6 +261,34 @@ def test_an_interruptible_call_is_the_call_itself():
     assert compiled.interruptible(lambda: 3) == 3
     with pytest.raises(ZeroDivisionError):
         compiled.interruptible(lambda: 1 // 0)
+
+
+def test_interruptible_calls_share_a_thread_and_a_forked_process_has_its_own():
+    first = compiled.interruptible(threading.get_ident)
+    assert first != threading.get_ident()
+    with pytest.raises(ZeroDivisionError):
+        compiled.interruptible(lambda: 1 // 0)
+    assert compiled.interruptible(threading.get_ident) == first
+    if hasattr(os, "fork"):
+        child = os.fork()
+        if child == 0:
+            signal.alarm(60)
+            os._exit(compiled.interruptible(lambda: 7))
+        assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+
+
+@posix
+def test_the_call_after_an_interrupted_one_works_while_that_one_goes_on():
+    released = threading.Event()
+    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            compiled.interruptible(lambda: (os.kill(os.getpid(), signal.SIGINT), released.wait(60.0)))
+        assert compiled.interruptible(lambda: 3) == 3
+        assert not released.is_set()
+    finally:
+        released.set()
+        signal.signal(signal.SIGINT, previous)
 
 
 def compilation(compiling, module):
