@@ -97,8 +97,8 @@ def begun(state: Floats, base: tuple[float, float], contacts: int) -> March:
     return March(whole, closed, before, stops, np.zeros(2), np.zeros(IMPACT + 1), np.zeros(1, dtype=np.int64))
 
 
-for _shared in (velocity_at, arm_of, gap_of, rate_of, acceleration_of):
-    inner_kernel(_shared)
+_velocity_at, _rate_of = inner_kernel(velocity_at), inner_kernel(rate_of)
+_arm_of, _gap_of, _acceleration_of = inner_kernel(arm_of), inner_kernel(gap_of), inner_kernel(acceleration_of)
 
 
 @inner_kernel
@@ -141,11 +141,11 @@ def length(run: March, corners: Floats, limits: Limits, dt: float) -> tuple[floa
     cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
     for i in range(len(corners)):
         bx, bz, nx, nz, distance = corners[i]
-        arm = arm_of(bx, bz, cos, sin)
-        gap, rate = gap_of(nx, nz, distance, z[X], z[Y], arm), rate_of(nx, nz, z[VX], z[VY], z[W], arm)
+        arm = _arm_of(bx, bz, cos, sin)
+        gap, rate = _gap_of(nx, nz, distance, z[X], z[Y], arm), _rate_of(nx, nz, z[VX], z[VY], z[W], arm)
         run.closed[i] = not (gap > limits.closed or rate > leaving)
         if not run.closed[i]:
-            curvature = acceleration_of(nx, nz, z[AX], z[AY], z[SPIN], z[W], arm) if known else 0.0
+            curvature = _acceleration_of(nx, nz, z[AX], z[AY], z[SPIN], z[W], arm) if known else 0.0
             closing = time_to_close(gap, rate, curvature)
             if closing < dt:
                 dt, stops = max(trusted(closing, limits), limits.shortest), False
@@ -178,12 +178,12 @@ def drift(run: March, corners: Floats, dt: float) -> None:
         for i in range(first, end):
             if run.closed[i]:
                 bx, bz, nx, nz, distance = corners[i]
-                highest, last = max(highest, gap_of(nx, nz, distance, px, py, arm_of(bx, bz, cos, sin))), i
+                highest, last = max(highest, _gap_of(nx, nz, distance, px, py, _arm_of(bx, bz, cos, sin))), i
         if last >= 0:
             bx, bz, nx, nz, _ = corners[last]
             px, py = px - nx * (highest + EMBEDDED), py - nz * (highest + EMBEDDED)
             final = z[THETA] + half * (z[W] + later)
-            arm, ends = arm_of(bx, bz, cos, sin), arm_of(bx, bz, math.cos(final), math.sin(final))
+            arm, ends = _arm_of(bx, bz, cos, sin), _arm_of(bx, bz, math.cos(final), math.sin(final))
             run.carry[0] = -later * (ends[1] - arm[1])
             if nz != 0.0:
                 run.carry[1] = later * (ends[0] - arm[0])
@@ -213,7 +213,7 @@ def plan(run: March, corners: Floats, starts: Floats, across: Base, up: Base, li
         run.next_start[0] += 1
     dt, impact = length(run, corners, limits, min(end - z[T], starts[run.next_start[0]] - z[T]))
     z[T] += dt
-    base_x, base_y = velocity_at(z[T], across[0], across[1], across[2]), velocity_at(z[T], up[0], up[1], up[2])
+    base_x, base_y = _velocity_at(z[T], across[0], across[1], across[2]), _velocity_at(z[T], up[0], up[1], up[2])
     run.asked[DT], run.asked[IMPACT] = dt, impact
     run.asked[FELT_X], run.asked[FELT_Y] = (z[BASE_X] - base_x) / dt, (z[BASE_Y] - base_y) / dt - limits.gravity
     z[BASE_X], z[BASE_Y] = base_x, base_y
@@ -273,9 +273,9 @@ def put_back(run: March, corners: Floats, limits: Limits) -> None:
                 count, last = count + 1, i
         if count == 1:
             bx, bz, nx, nz, distance = corners[last]
-            arm = arm_of(bx, bz, cos, sin)
-            if abs(rate_of(nx, nz, z[VX], z[VY], z[W], arm)) < limits.resting:
-                gap = gap_of(nx, nz, distance, z[X], z[Y], arm)
+            arm = _arm_of(bx, bz, cos, sin)
+            if abs(_rate_of(nx, nz, z[VX], z[VY], z[W], arm)) < limits.resting:
+                gap = _gap_of(nx, nz, distance, z[X], z[Y], arm)
                 z[X], z[Y] = z[X] - nx * gap, z[Y] - nz * gap
 
 
@@ -285,10 +285,10 @@ def settles(z: Floats, corners: Floats, limits: Limits) -> bool:
     cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
     for i in range(FLOOR):
         bx, bz, nx, nz, distance = corners[i]
-        arm = arm_of(bx, bz, cos, sin)
-        rate = rate_of(nx, nz, z[VX], z[VY], z[W], arm)
-        pulled = acceleration_of(nx, nz, z[AX], z[AY], z[SPIN], z[W], arm)
+        arm = _arm_of(bx, bz, cos, sin)
+        rate = _rate_of(nx, nz, z[VX], z[VY], z[W], arm)
+        pulled = _acceleration_of(nx, nz, z[AX], z[AY], z[SPIN], z[W], arm)
         slow = abs(rate) <= max(SETTLING_GAP, -SETTLING_TIME * limits.longest * pulled)
-        if gap_of(nx, nz, distance, z[X], z[Y], arm) > SETTLING_GAP or not slow:
+        if _gap_of(nx, nz, distance, z[X], z[Y], arm) > SETTLING_GAP or not slow:
             return False
     return True

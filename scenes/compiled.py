@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import hashlib
+import importlib
 import os
 import pickle
 import shutil
@@ -28,19 +29,35 @@ from typing import Any, TypeVar
 
 import numba
 import numpy as np
+from numba import types
 from numba.core import config as numba_config
 from numba.core import serialize
 from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.event import Event, Listener, register
-from numba.extending import register_jitable
+from numba.core.registry import CPUDispatcher
+from numba.np import linalg
 
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.progress import announce, announced
 from rockcheck.scenes.reading import MOST_BYTES, open_regular
 from rockcheck.scenes.writing import write_whole
 
+
+def _import_array_functions() -> None:
+    """Import numba's array functions. They would import scipy.linalg (0.2 s) only to know that it is there.
+
+    It is, since rockcheck needs scipy; what calls BLAS looks for it again when it is compiled.
+    """
+    look, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+    try:
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        linalg.ensure_blas = look
+
+
+_import_array_functions()
 config: Any = numba_config
 Result = TypeVar("Result")
 
@@ -343,20 +360,40 @@ def threads(count: int) -> Iterator[ThreadPoolExecutor]:
     pool.shutdown()
 
 
-#: How an inner kernel is compiled: it divides as IEEE 754 does, and has neither counted references nor an entrance of its own.
-_INNER = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True, "pipeline_class": _InnerCompiler}
+class _Inner(CPUDispatcher):
+    """A function that kernels call: compiled once for the types that it is given, whoever calls it. Python calls the plain function."""
+
+    def __call__(self, *args: Any, **named: Any) -> Any:
+        return self.py_func(*args, **named)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """For numba: a constant is compiled as a number, else each would be a copy of its own. Where the code is placed it is one again."""
+        return super().get_call_template([types.unliteral(a) for a in args], {name: types.unliteral(a) for name, a in kws.items()})
+
+
+def _inner(function: Callable[..., Any], **options: bool) -> Any:
+    """All options are named: numba would take those of the first caller for the others."""
+    if config.DISABLE_JIT:
+        return function
+    named = {"nopython": True, "error_model": "numpy", "_nrt": False, "forceinline": True} | options
+    return _Inner(function, targetoptions=named | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}, pipeline_class=_InnerCompiler)
 
 
 def inner_kernel(function: Callable[..., Any]) -> Any:
     """A part of kernels that neither makes nor returns an array, but works on those that it is given.
 
-    It is compiled into the kernels that call it. It has no reference counting, whose atomic operations cost as much as a short
-    loop, and no entry point for Python, which calls the plain function instead. numba refuses to compile one that
-    makes an array; one that returns an array would free it too early.
+    Its code stands where it is called: most are given much, and a call would take longer than they do. It has no reference
+    counting, whose atomic operations cost as much as a short loop, and no entry point for Python, which calls the plain function
+    instead. numba refuses to compile one that makes an array; one that returns an array would free it too early.
     """
-    return register_jitable(**_INNER)(function)
+    return _inner(function)
 
 
 def placed_kernel(function: Callable[..., Any]) -> Any:
-    """An inner kernel whose code stands where it is called: for what is called once a step and is given much."""
-    return register_jitable(**_INNER, forceinline=True)(function)
+    """An inner kernel (see there)."""
+    return _inner(function)
+
+
+def event_kernel(function: Callable[..., Any]) -> Any:
+    """A part of kernels that is called, and may make arrays: for what is long and rare. In place it would take longer to compile."""
+    return _inner(function, forceinline=False, _nrt=True)

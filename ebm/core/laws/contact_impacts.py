@@ -27,7 +27,7 @@ import numpy as np
 from rockcheck.ebm.core.contacts import CLOSED
 from rockcheck.ebm.core.motion import CLOSED_BRANCH, FLOOR_FIRST, MOREAU, side_of
 from rockcheck.ebm.core.series import NOISE, POSITION
-from rockcheck.scenes.compiled import inner_kernel, kernel
+from rockcheck.scenes.compiled import event_kernel, inner_kernel
 
 F, E, TIP_TOP, TIP_BOTTOM, FAR_BOTTOM, FAR_TOP = range(6)
 CONTACTS = 6
@@ -45,7 +45,7 @@ ENDLESS, FITS, LEAST_WRONG = range(3)
 _HALVINGS = 45
 
 
-@kernel
+@event_kernel
 def contact_rows(b, sense, phi):
     """Rows (xi, y, phi) of the six normal contacts and, last, of the floor's tangent, for a block that tips by phi to `sense`."""
     pivot, other = side_of(b, sense), side_of(b, -sense)
@@ -172,7 +172,7 @@ def _violation(rows, number, friction, taking, target, mu_s, trial, lam):
     return worst
 
 
-@kernel
+@event_kernel
 def _strike(rows, spin, taking, target, mu_s, mu_k, v, after, impulse, system):
     """One stage over the contacts in `taking`: writes the velocities after it and the impulses; False where only the least wrong fits.
 
@@ -239,7 +239,7 @@ def _floor_first(touching, approach, stage, rounding, ahead, taking):
             taking[j] = abs(approach[j]) <= rounding and ahead[j] <= _PARALLEL
 
 
-@kernel
+@event_kernel
 def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, tally):
     """All stages at one instant; v (xi, y, phi rates) becomes the velocities after them. Returns FITS, LEAST_WRONG or ENDLESS.
 
@@ -289,7 +289,7 @@ def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, t
     return ENDLESS
 
 
-@kernel
+@event_kernel
 def _strike_without_gain(b, rows, taking, target, v, after, part, system, before):
     """Strikes with the largest share of the rebound at which no energy is gained."""
     full = target.copy()
@@ -305,7 +305,7 @@ def _strike_without_gain(b, rows, taking, target, v, after, part, system, before
             low = scale
 
 
-@kernel
+@event_kernel
 def _close(rows, spin, touching, resting, v, system):
     """Contacts that part more slowly than `resting` are closed: the velocity is projected onto them, mass-orthogonally."""
     members = np.zeros(3, dtype=np.int64)

@@ -42,7 +42,7 @@ from rockcheck.ebm.core.motion import FAMILY, FAR, FLAT, FLOOR, HEIGHT, OFF, PUL
 from rockcheck.ebm.core.rules import ENDLESS_STAGES, FLUSH_LANDING, LANDS_ALONG, LEAST_CONTRADICTION, SETTLES, WEDGED
 from rockcheck.ebm.core.series import NOISE, POSITION
 from rockcheck.ebm.core.settle import SETTLE
-from rockcheck.scenes.compiled import inner_kernel, kernel
+from rockcheck.scenes.compiled import event_kernel, inner_kernel
 
 #: What an impact was.
 ON_FLOOR, ON_WALL, LANDING = range(3)
@@ -199,7 +199,7 @@ def count_gain(before, after, gains):
         gains[1] = max(gains[1], after / before - 1.0)
 
 
-@kernel
+@event_kernel
 def _strike_all(b, m, z, gh, t, resting, impulse, gains, rules):
     """Unilateral pivot: resolves all contacts touched at this instant."""
     sign = float(tips_first(b, z, gh, t) if m[FAMILY] == FLAT else m[S])
