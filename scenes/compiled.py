@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import gc
 import hashlib
-import importlib
 import os
 import pickle
 import shutil
@@ -52,7 +51,7 @@ def _import_array_functions() -> None:
     """
     look, linalg.ensure_blas = linalg.ensure_blas, lambda: None
     try:
-        importlib.import_module("numba.np.arraymath")
+        from numba.np import arraymath  # noqa: F401
     finally:
         linalg.ensure_blas = look
 
@@ -386,11 +385,6 @@ def inner_kernel(function: Callable[..., Any]) -> Any:
     counting, whose atomic operations cost as much as a short loop, and no entry point for Python, which calls the plain function
     instead. numba refuses to compile one that makes an array; one that returns an array would free it too early.
     """
-    return _inner(function)
-
-
-def placed_kernel(function: Callable[..., Any]) -> Any:
-    """An inner kernel (see there)."""
     return _inner(function)
 
 

@@ -79,7 +79,7 @@ from rockcheck.ebm.core.motion import (
 from rockcheck.ebm.core.rules import HANGS, LEAST_CONTRADICTION, PULLS
 from rockcheck.ebm.core.running import GOING, HOLDS, RELEASE, SLIPS, STICKS, UPLIFT, ZETA, T, mode_code, note
 from rockcheck.ebm.core.series import AHEAD, FORCE, NO_ROOT, NOISE, POSITION, first_root, force_step, leading, step_size, value
-from rockcheck.scenes.compiled import inner_kernel, kernel, placed_kernel
+from rockcheck.scenes.compiled import inner_kernel, kernel
 
 # Rows of the workspace after those of ebm.core.motion: z, V and what the recurrences need.
 Z, V, Z2, SPIN2, WEIGHT, ARM, TURN, REACH, INERTIA, LOAD, PUSH, ZA, LEVER, DEN, TORQUE = range(ROWS, ROWS + 15)
@@ -381,7 +381,7 @@ def _initial_friction(b, m, z, gh, gv, t, a):
     return -sense * a[Q, 0] / most if abs(a[Q, 0]) < most else -math.copysign(1.0, sense * a[Q, 0])
 
 
-@placed_kernel
+@inner_kernel
 def begin(b, gh, gv, r, yields, a):
     """The contacts of a block that starts, or goes on after an impact, and its z."""
     z, m, t = r.z, r.m, r.now[T]
@@ -392,13 +392,13 @@ def begin(b, gh, gv, r, yields, a):
     _holds(r, m[FLOOR] != SLIPPING or abs(r.now[ZETA]) != 1.0 or r.now[ZETA] * slip_velocity(b, z) <= SLOW)
 
 
-@placed_kernel
+@inner_kernel
 def _holds(r, whether):
     """Notes whether the pivot holds or has yielded."""
     r.counts[HOLDS] = 1 if whether else 0
 
 
-@placed_kernel
+@inner_kernel
 def expand(b, gh, gv, r, reach, control, yields, a):
     """Series of the motion: their order, the place of the pivot, and the step they are good for."""
     z, m, t, zeta = r.z, r.m, r.now[T], r.now[ZETA]
@@ -434,7 +434,7 @@ def locate(b, m, order, h, slack, a, stack):
     return tau, which
 
 
-@placed_kernel
+@inner_kernel
 def wind_up(r, order, tau, tolerance, log, a):
     """Moves z to the end of a step of tau. Where it has come to +-1 the pivot has yielded."""
     m = r.m
@@ -450,7 +450,7 @@ def wind_up(r, order, tau, tolerance, log, a):
     r.now[ZETA] = zeta
 
 
-@placed_kernel
+@inner_kernel
 def follow(b, gh, gv, r, which, before, yields, log, a):
     """What follows an event that is no impact."""
     z, m, t = r.z, r.m, r.now[T]
@@ -478,7 +478,7 @@ def follow(b, gh, gv, r, which, before, yields, log, a):
     return GOING
 
 
-@placed_kernel
+@inner_kernel
 def _turn(b, gh, gv, r, t):
     """The slip has come to its end: the pivot slips back, or a flat block rests. The event's kind, -1 for none."""
     z, m = r.z, r.m
@@ -492,7 +492,7 @@ def _turn(b, gh, gv, r, t):
     return kind
 
 
-@placed_kernel
+@inner_kernel
 def _tip_sliding(b, gh, gv, r, yields, a):
     """A block tilts while it slides; the event's kind, -1 where rounding keeps it flat for a while."""
     z, m = r.z, r.m

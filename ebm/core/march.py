@@ -109,7 +109,7 @@ from rockcheck.ebm.core.running import (
 )
 from rockcheck.ebm.core.series import AHEAD, FORCE, NO_ROOT, NOISE, POSITION, first_root, slope, stays_below, step_size, value
 from rockcheck.ebm.core.settle import no_impacts, settling_speed
-from rockcheck.scenes.compiled import inner_kernel, kernel, placed_kernel
+from rockcheck.scenes.compiled import inner_kernel, kernel
 
 __all__ = ["DONE", "EVENT_NAMES", "FAILURES", "MODE_NAMES", "OVERTURNED", "TOO_MANY_EVENTS", "TOO_MANY_STEPS", "Control", "Tally", "run"]
 
@@ -169,14 +169,14 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack, yields=None)
     return Tally(ending, r.now[T], r.now[PEAK], at_rest, steps, events, walls, int(r.gains[0]), r.gains[1], rows, r.now[T_REST], r.rules)
 
 
-@placed_kernel
+@inner_kernel
 def _change(r, kind, before):
     """The mode has ended, by an event of this kind: CHANGING."""
     r.counts[KIND], r.counts[BEFORE] = kind, before
     return CHANGING
 
 
-@placed_kernel
+@inner_kernel
 def _follow(b, gh, gv, r, yields, records, a):
     """Selects the mode that follows, and notes the event that ended the one before, unless it goes on."""
     kind, ended = r.counts[KIND], code_of(r.m)
@@ -196,7 +196,7 @@ def _follow(b, gh, gv, r, yields, records, a):
     return GOING
 
 
-@placed_kernel
+@inner_kernel
 def _note_event(r, log, kind, before):
     """One row of the log, and one more where an impact ends in rest."""
     note(r, log, kind, before)
@@ -204,7 +204,7 @@ def _note_event(r, log, kind, before):
         note(r, log, SETTLED, before)
 
 
-@placed_kernel
+@inner_kernel
 def _rest(b, gh, r, t_end, control, records):
     """Rest on a base that only moves sideways: straight to the next uplift or slip."""
     m, now = r.m, r.now
@@ -225,7 +225,7 @@ def _rest(b, gh, r, t_end, control, records):
     return _change(r, LEAVES_REST, 0)
 
 
-@placed_kernel
+@inner_kernel
 def _sample_rest(r, until, control, records):
     """Rows of a block that does not change, up to a time."""
     rows = r.counts[ROWS]
@@ -236,7 +236,7 @@ def _sample_rest(r, until, control, records):
     r.counts[ROWS] = rows
 
 
-@placed_kernel
+@inner_kernel
 def _may_go_on(b, gh, gv, r, t_end, control):
     """GOING, or why the run ends here: its time is up, its outcome is certain, or it has taken too many steps."""
     z, now = r.z, r.now
@@ -258,7 +258,7 @@ def _may_go_on(b, gh, gv, r, t_end, control):
     return GOING
 
 
-@placed_kernel
+@inner_kernel
 def _step(b, gh, gv, r, t_end, control, yields, records, a, stack):
     """One step of the series, to its end or to the first event in it, and what that event does."""
     z, m, now = r.z, r.m, r.now
@@ -325,7 +325,7 @@ def _locate(b, m, order, pivot, h, slack, a, stack):
     return first_event(order, h, slack, a, stack)
 
 
-@placed_kernel
+@inner_kernel
 def _sample(b, r, t, until, order, pivot, control, records, a):
     """The rows of this step, which starts at t."""
     rows = r.counts[ROWS]
@@ -337,7 +337,7 @@ def _sample(b, r, t, until, order, pivot, control, records, a):
     r.counts[ROWS] = rows
 
 
-@placed_kernel
+@inner_kernel
 def _write(records, rows, z, code):
     for k in range(6):
         records.out[rows, k] = z[k]
@@ -353,7 +353,7 @@ def _state(b, m, order, tau, pivot, a, z):
         tilt_state(b, m, order, tau, pivot, a, z)
 
 
-@placed_kernel
+@inner_kernel
 def _advance(b, r, order, pivot, tau, control, a, stack):
     """Moves the state to tau after the start of the step; keeps the largest rotation on the way."""
     z, now = r.z, r.now
@@ -369,7 +369,7 @@ def _advance(b, r, order, pivot, tau, control, a, stack):
     now[SWING] = max(now[SWING], abs(z[W]))
 
 
-@placed_kernel
+@inner_kernel
 def _grazes(b, r, order, pivot, tau, h, control, a):
     """Whether a hanging block that comes down with less energy than the tolerance does not land. It is then put where it turns back.
 
@@ -390,7 +390,7 @@ def _grazes(b, r, order, pivot, tau, h, control, a):
     return True
 
 
-@placed_kernel
+@inner_kernel
 def _resolve(b, gh, gv, r, which, yields, records, a):
     """An event: the impact at a gap that closes, or the change of mode at another guard."""
     z, m, t = r.z, r.m, r.now[T]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm.core.motion import FAMILY, FAR, FLAT, FLOOR, OFF, STICK, TIP
-from rockcheck.scenes.compiled import placed_kernel
+from rockcheck.scenes.compiled import inner_kernel
 
 #: Names of the mode codes that `mode_code` gives, and of the event codes.
 MODE_NAMES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight")
@@ -103,7 +103,7 @@ T, PEAK, SWING, T_REST, QUIET, ZETA, SWUNG, PIVOT, REPEATS = range(9)
 STEPS, EVENTS, WALL_IMPACTS, ROWS, HOLDS, KIND, BEFORE = range(7)
 
 
-@placed_kernel
+@inner_kernel
 def mode_code(r):
     """The mode's index in MODE_NAMES."""
     m = r.m
@@ -117,7 +117,7 @@ def mode_code(r):
     return 5 if wall else 3
 
 
-@placed_kernel
+@inner_kernel
 def note(r, log, kind, before):
     """One row of the log; a change at rest has no impulse."""
     count = r.counts[EVENTS]
