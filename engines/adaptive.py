@@ -22,8 +22,6 @@ from rockcheck.scenes.progress import tell
 
 FloatArray = NDArray[np.float64]
 Vector = tuple[float, float, float]  # along x, y and theta
-#: A corner nearer than this touches, of the block's radius, in an engine whose corners all sink alike.
-CLOSED = 5e-9
 #: Rows of the march for which there is room at first.
 _ROOM = 8192
 
@@ -39,18 +37,18 @@ class Push(Protocol):
 
 
 def march_adaptively(
-    scene: Scene, base: BaseMotion, push: Push, longest: float, short: float = 1.0, closed: float = CLOSED
+    scene: Scene, base: BaseMotion, push: Push, longest: float, short: float = 1.0
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Times (n) and states (n, 6) at step ends, and the accelerations (n-1, 2) felt in the steps, until |theta| = pi/2.
 
     The scene is one of a block with R = 1, see `engines.marching.in_units_of`; `base` is its base motion. No step is longer than
-    `longest` s; those at impacts and after events are `short` times the usual. A corner nearer than `closed` touches.
+    `longest` s; those at impacts and after events are `short` times the usual.
     Raises `ModelFailure` if the motion blows up or needs very many steps.
     """
     from rockcheck.engines import stepping
 
     contacts, end = contacts_of(scene), float(scene.output_times[-1])
-    limits = stepping.limits_of(scene, longest, short, closed)
+    limits = stepping.limits_of(scene, longest, short)
     corners = np.array([(*contact.corner, *contact.normal, contact.distance) for contact in contacts])
     starts = np.array([*base.starts, math.inf])
     across, up = ((np.array(one.pieces or np.empty((0, 1))), one.interval, one.last) for one in (base.across, base.up))

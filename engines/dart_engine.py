@@ -27,8 +27,6 @@ class Dart(Engine):
     name: ClassVar[str] = "dart"
     module: ClassVar[str] = "dartpy"
     extra: ClassVar[str] = "dart"
-    #: Its corners sink unevenly, by up to 1e-9 R, which a block's height makes some times as much.
-    closed: ClassVar[float] = 2e-8
 
     def rigid_world(self, scene: Scene) -> World:
         """The scene as DART holds it, in units in which even slow contacts bounce."""

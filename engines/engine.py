@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import field_validator, model_validator
 
-from rockcheck.engines.adaptive import CLOSED, march_adaptively
+from rockcheck.engines.adaptive import march_adaptively
 from rockcheck.engines.base_motion import BaseMotion
 from rockcheck.engines.contacts import contacts_of
 from rockcheck.engines.events import events_of
@@ -49,8 +49,6 @@ class Engine(Frozen):
     fixed_because: ClassVar[str] = ""
     #: The settings in which contacts have Newton's coefficient of restitution.
     bounces_with: ClassVar[tuple[str, ...]] = ("best", "default")
-    #: How near a corner must be to touch, of the block's radius, at adaptive steps: beyond the engine's own differences between corners.
-    closed: ClassVar[float] = CLOSED
     time_step: float | Literal["adaptive"] = "adaptive"
     largest_step: Positive = 5e-4
     short_steps: Positive = 1.0
@@ -143,7 +141,7 @@ class Engine(Frozen):
             world = self.rigid_world(played) if self.settings == "best" else self.stock_world(played)
             stack.callback(world.close)
             if self.time_step == "adaptive":
-                march = partial(march_adaptively, played, base, world.push, step, self.short_steps, self.closed)
+                march = partial(march_adaptively, played, base, world.push, step, self.short_steps)
             else:
                 times = step * np.arange(math.ceil(scene.output_times[-1] / step - 1e-9) + 1)
                 march = partial(march_fixed, world, played, times, base.felt_acceleration(times))

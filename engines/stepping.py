@@ -21,12 +21,14 @@ Floats = NDArray[np.float64]
 Base = tuple[Floats, float, float]
 
 # Lengths in units of the block's radius R, times in units of 1/p.
+CLOSED = 5e-9  # a corner nearer than this touches
 DRIFT = 3e-6  # of the longest step: a corner that rests may leave its surface by so much in one, and touches from there if it is more
 EMBEDDED = 5e-10  # how deep the engine sees a corner that touches
 PROBE_STEP = 6e-5  # the longest step where the acceleration is not known, that is, after an event
 SHORTEST_STEP = 2e-8  # an impact takes one: its time is wrong by so much, its place by what the block moves in it
 LONG_APPROACH = 6e-4  # from farther away the prediction of an event is only trusted to 95 %
 RESTING = 0.001  # of g times the longest step: slower approaches and departures are not told from rest
+TOGETHER = 20.0  # of corners that strike at one moment, one may be so many times as fast as another: the slenderness of a slender block
 SETTLING_GAP = 2e-6
 # A corner that leaves and is back within twice this share of a step is taken to stay: of the longest step, after an event of a probe.
 SETTLING_TIME = 0.2
@@ -72,13 +74,13 @@ class March(NamedTuple):
     next_start: NDArray[np.int64]
 
 
-def limits_of(scene: Scene, longest: float, short: float, closed: float) -> Limits:
-    """Those of a scene whose steps are at most `longest` s, at events `short` times the usual; a corner nearer than `closed` touches."""
+def limits_of(scene: Scene, longest: float, short: float) -> Limits:
+    """Those of a scene whose steps are at most `longest` s, and at events `short` times the usual."""
     moment = short / scene.frequency_parameter
     probe = min(PROBE_STEP * moment, longest)
     return Limits(
         longest=longest,
-        closed=max(closed, DRIFT * longest * scene.frequency_parameter),
+        closed=max(CLOSED, DRIFT * longest * scene.frequency_parameter),
         probe=probe,
         shortest=min(SHORTEST_STEP * moment, longest),
         long_approach=LONG_APPROACH * moment,
@@ -137,7 +139,7 @@ def length(run: March, corners: Floats, limits: Limits, dt: float) -> tuple[floa
     z, known, resting = run.state, run.state[KNOWN] != 0.0, limits.resting
     dt = min(dt, limits.longest if known else limits.probe)
     leaving = resting if known else max(resting, limits.staying)
-    impact = stops = False
+    stops, slowest = False, math.inf
     cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
     for i in range(len(corners)):
         bx, bz, nx, nz, distance = corners[i]
@@ -150,14 +152,33 @@ def length(run: March, corners: Floats, limits: Limits, dt: float) -> tuple[floa
             if closing < dt:
                 dt, stops = max(trusted(closing, limits), limits.shortest), False
         elif rate < -resting:
-            impact = True
+            slowest = min(slowest, -rate)
         elif i < FLOOR and known:
             stopping = stopping_time(z, arm, dt, limits)
             if stopping < math.inf:
                 dt = trusted(stopping, limits)
                 stops = dt == stopping
     run.stops[0] = stops
-    return limits.shortest if impact else dt, impact
+    if slowest == math.inf:
+        return dt, False
+    join(run, corners, limits, slowest)
+    return limits.shortest, True
+
+
+@inner_kernel
+def join(run: March, corners: Floats, limits: Limits, speed: float) -> None:
+    """Lets corners share an impact that would strike at the same moment, not a hair later.
+
+    The corner that strikes touches from `closed` away, at `speed`, so the impact is early by the time in which it would arrive. What
+    comes down k times as fast is then still k times as far.
+    """
+    z = run.state
+    cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
+    for i in range(len(corners)):
+        bx, bz, nx, nz, distance = corners[i]
+        arm = _arm_of(bx, bz, cos, sin)
+        gap, rate = _gap_of(nx, nz, distance, z[X], z[Y], arm), _rate_of(nx, nz, z[VX], z[VY], z[W], arm)
+        run.closed[i] = run.closed[i] or (rate < -speed and gap < limits.closed * min(-rate / speed, TOGETHER))
 
 
 @inner_kernel
