@@ -91,7 +91,9 @@ def models() -> dict[str, Model]:
     found: dict[str, Model] = {}
     for engine in (getattr(engines, name) for name in engines.__all__):
         if engine.installed():
-            steps = (1e-5, 1e-4) if engine.fixed_because else (1e-5, 1e-4, "adaptive")
+            steps: tuple[float | str, ...] = (1e-5, 1e-4) if engine.fixed_because else (1e-5, 1e-4, "adaptive")
+            if engine().lacks():  # without restitution it follows none, whatever the step
+                steps = (1e-4,)
             found |= {f"{engine.name} {step}": engine(time_step=step) for step in steps}
     return found | {"cm": ContinuousModel()}
 

@@ -105,15 +105,16 @@ def _batches(found: EbmSpeed) -> Iterable[str]:
                     f"{row.evaluations:.0f}", f"{row.error_95:.1e}", wrong,
                 ])  # fmt: skip
     yield markdown_table(["batch", "tolerance", "CPU μs a run", "right-hand sides", "p95 error", "wrong outcomes"], rows)
+    for start in found.cold_starts:
+        seconds = f"import {start.importing:.2f} s, first simulation {start.first_simulation:.2f} s"
+        yield f"Fresh process, compile cache {start.cache}: {seconds}."
     if found.sizes:
-        yield "Whole batches of random pulses (μ 0.3, no wall), packing included: wall-clock μs a run."
+        yield "## Cost of a batch against its size"
+        yield "Random pulses (μ 0.3, no wall), packing included: wall-clock μs a run."
         counts = sorted({row.threads for row in found.sizes})
         walls = {(row.runs, row.threads): f"{1e6 * row.wall:.3g}" for row in found.sizes}
         rows = [[f"{runs:,}", *(walls[runs, count] for count in counts)] for runs in dict.fromkeys(row.runs for row in found.sizes)]
         yield markdown_table(["runs", *(f"{count} thread{'s' * (count > 1)}" for count in counts)], rows)
-    for start in found.cold_starts:
-        seconds = f"import {start.importing:.2f} s, first simulation {start.first_simulation:.2f} s"
-        yield f"Fresh process, compile cache {start.cache}: {seconds}."
 
 
 def _savings(found: Sequence[Saving]) -> Iterable[str]:
