@@ -51,6 +51,7 @@ def _import_array_functions() -> None:
     """
     look, linalg.ensure_blas = linalg.ensure_blas, lambda: None
     try:
+        # Nothing here calls it: importing it tells numba how to compile arrays.
         from numba.np import arraymath  # noqa: F401
     finally:
         linalg.ensure_blas = look

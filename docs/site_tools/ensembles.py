@@ -125,13 +125,14 @@ class Heyoka:
     def play(self, packed: Packed, start: Floats, side: Floats) -> Ended:
         """All runs, so many at once as there are lanes."""
         ground, end, integrator = packed.horizontal, packed.durations, self.integrator
-        speed = (pulse_at(ground, start + LATER) * side * math.cos(ALPHA) - math.sin(ALPHA)) * 0.75 / LATER  # of the acceleration
+        # The angular acceleration is zero at the uplift; this is the rate at which it grows.
+        growth = (pulse_at(ground, start + LATER) * side * math.cos(ALPHA) - math.sin(ALPHA)) * 0.75 / LATER
         fell, rotation, steps = np.zeros(len(packed), dtype=bool), np.zeros(len(packed)), 0
         began = time.process_time()
         for first in range(0, len(packed), self.lanes):
             runs = np.minimum(np.arange(first, first + self.lanes), len(packed) - 1)
             integrator.set_time(start[runs] + LATER)
-            integrator.state[:] = speed[runs] * LATER**3 / 6.0, speed[runs] * LATER**2 / 2.0
+            integrator.state[:] = growth[runs] * LATER**3 / 6.0, growth[runs] * LATER**2 / 2.0
             integrator.pars[:] = side[runs], *(ground[name][runs] for name in ("c1", "c3", "rate", "centre")), np.ones(self.lanes)
             integrator.propagate_until(end[runs])
             steps += sum(result[3] for result in integrator.propagate_res)
