@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 
 from rockcheck.ebm.core.contacts import SLOW, closed_wall, slip_velocity, stop, upright
-from rockcheck.ebm.core.ground import acceleration, fill_series
+from rockcheck.ebm.core.ground import acceleration, acceleration_after, fill_series
 from rockcheck.ebm.core.guards import (
     G_CONE_MINUS,
     G_CONE_PLUS,
@@ -39,7 +39,7 @@ from rockcheck.ebm.core.guards import (
     first_event,
     guard,
 )
-from rockcheck.ebm.core.modes import SOON, hangs_flat, slacken, tips_first
+from rockcheck.ebm.core.modes import hangs_flat, slacken, tips_first
 from rockcheck.ebm.core.motion import (
     COS,
     FAMILY,
@@ -78,7 +78,7 @@ from rockcheck.ebm.core.motion import (
 )
 from rockcheck.ebm.core.rules import HANGS, LEAST_CONTRADICTION, PULLS
 from rockcheck.ebm.core.running import GOING, HOLDS, RELEASE, SLIPS, STICKS, UPLIFT, ZETA, T, mode_code, note
-from rockcheck.ebm.core.series import AHEAD, FORCE, NO_ROOT, NOISE, POSITION, first_root, force_step, leading, step_size, value
+from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, POSITION, first_root, force_step, leading, step_size, value
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 # Rows of the workspace after those of ebm.core.motion: z, V and what the recurrences need.
@@ -206,10 +206,10 @@ def _held(b, z, gh, gv, t):
     to_left, to_right = b.left.arm / b.height, b.right.arm / b.height
     slope = to_left if (u > 0.0) == (g >= 0.0) else to_right
     if abs(abs(u) - (min(slope, b.mu_s) if g >= 0.0 else slope) * abs(g)) < NOISE[FORCE]:  # at its limit: where it goes decides
-        g, u = 1.0 + acceleration(gv, t + SOON), acceleration(gh, t + SOON)
+        g, u = 1.0 + acceleration_after(gv, t), acceleration_after(gh, t)
     left, right = closed_wall(b, z, 1, False), closed_wall(b, z, -1, False)
-    if g < 0.0 and not left and not right:  # hanging: by both corners, as long as nothing tells to which side it tips
-        return abs(u) <= NOISE[FORCE]
+    if g < 0.0 and not left and not right:  # hanging: by both corners, as long as nothing at all tells to which side it tips
+        return u == 0.0
     if g < 0.0:  # a wall on which it is pressed holds it flat
         return (left and u >= -to_right * g) or (right and u <= to_left * g)
     share = 1.0 if b.mu_s == LEAST_FRICTION else g
@@ -220,8 +220,8 @@ def _held(b, z, gh, gv, t):
 def _hangs_on(m, gh, gv, t):
     """Whether the floor begins to fall away faster than g under a block at rest, and nothing tells to which side it would tip."""
     stands = m[FLOOR] == STICK and m[PULL] > 0 and m[TIP] == 0 and m[FAR] == 0
-    still = max(abs(acceleration(gh, t)), abs(acceleration(gh, t + SOON))) <= NOISE[FORCE]
-    return stands and still and acceleration(gv, t + SOON) < -1.0
+    still = acceleration(gh, t) == 0.0 and acceleration_after(gh, t) == 0.0
+    return stands and still and acceleration_after(gv, t) < -1.0
 
 
 @inner_kernel
@@ -236,7 +236,7 @@ def _rest(b, m, z, gv, t):
 def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, rules, a):
     """The block at rest starts to slide, or to tilt, as u of sign `sense` grows; returns z = -u/(mu_k G0), +-1 if it slides."""
     u, g = acceleration(gh, t), 1.0 + acceleration(gv, t)
-    soon = 1.0 + acceleration(gv, t + SOON) <= 0.0  # friction falls with P: nothing tips until the floor pulls
+    soon = 1.0 + acceleration_after(gv, t) <= 0.0  # friction falls with P: nothing tips until the floor pulls
     hangs = g <= 0.0 if abs(g) > NOISE[FORCE] else soon
     arm = side_of(b, sense).arm
     tips = b.mu_k * b.height > arm or hangs
@@ -262,7 +262,7 @@ def _tip(b, m, z, first, zeta, yield_displacement, gh, gv, t, rules, a):
     for sense in (first, -first):
         m[:] = 0
         m[FAMILY], m[S], m[SLIP] = TILT, sense, 1 if sense * v > 0.0 else -1
-        _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a)
+        _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, -1, rules, a)
         if leading(a, PHI, _LOOK, NOISE[POSITION], AHEAD) > 0:
             return True
     return False
@@ -284,7 +284,7 @@ def _begin(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a):
     sense = 1 if (z[THETA] if z[THETA] != 0.0 else z[W]) > 0.0 else -1
     m[:] = 0
     m[FAMILY], m[S], m[SLIP] = TILT, sense, 1 if sense * v > 0.0 else -1
-    _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a)
+    _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, -1, rules, a)
     return zeta
 
 
@@ -304,12 +304,17 @@ def _wedged_series(b, m, z, zeta, gh, gv, t, order, reach, a):
 
 
 @inner_kernel
-def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a):
-    """Lets the corners of a tilting block rest on the touched walls that would push them. Sets with more walls are tried first."""
+def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, which, rules, a):
+    """Lets the corners of a tilting block rest on the touched walls that would push them. Sets with more walls are tried first.
+
+    A push that `which` has just ended (-1: none) does not go on where anything else fits, however near to zero it still is.
+    """
+    ended = m[PULL] if which == G_PUSH else 0
+    lets_go = 1 if which == G_TIP_PUSH else (2 if which == G_FAR_PUSH else 0)
     touched = (1 if closed_wall(b, z, m[S], False) else 0) + (2 if closed_wall(b, z, -m[S], True) else 0)
     for attempt in range(5):  # where none fits, but for rounding, it rests on all that it touches
         walls = 3 - attempt if attempt < 4 else touched
-        if walls & touched != walls:
+        if walls & touched != walls or (attempt < 4 and walls & lets_go):
             continue
         m[TIP], m[FAR] = walls & 1, walls >> 1
         if walls == 3:  # wedged
@@ -319,7 +324,11 @@ def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a):
             aimed = True
         else:
             m[FLOOR] = SLIPPING
-            aimed = _aim(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a)
+            aimed = _aim(b, m, z, zeta, yield_displacement, gh, gv, t, ended, rules, a)
+        if attempt == 4:
+            rules[LEAST_CONTRADICTION] += 1
+            if ended != 0:
+                m[PULL] = -ended  # in turn, until the slack allows one
         if attempt == 4 or (aimed and _walls_hold(b, m, touched, a)):
             if walls == 3:
                 stop(z)
@@ -343,20 +352,31 @@ def _walls_hold(b, m, touched, a):
 
 
 @inner_kernel
-def _aim(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a):
+def _aim(b, m, z, zeta, yield_displacement, gh, gv, t, ended, rules, a):
     """Assumes a sign of P and fills the workspace with the series for it; returns whether P has that sign.
 
-    Below Painleve's limit P does not depend on the sign that is assumed. Beyond it the denominator is negative for a push, and pull
-    and push both solve the equations or neither does. The motion then goes on with the pull.
+    The sign that has just `ended` (+-1, else 0) is not tried. Below Painleve's limit P does not depend on the sign that is assumed.
+    Beyond it the denominator is negative for a push, and pull and push both solve the equations or neither does. Where both do, the
+    motion goes on with the pull.
     """
     m[PULL] = 1
-    friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
-    if leading(a, P, _LOOK - 2, NOISE[FORCE], AHEAD) >= 0 and a[DEN, 0] > 0.0:
+    if ended <= 0:
+        friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
+        rules[PULLS] += a[DEN, 0] <= 0.0
+        if _has_sign(a, 1, ended) and a[DEN, 0] > 0.0:
+            return True
+    if ended >= 0:
+        m[PULL] = -1
+        friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
+    return ended >= 0 and _has_sign(a, -1, ended)
+
+
+@inner_kernel
+def _has_sign(a, sign, ended):
+    """Whether P begins with this sign. Where the other one has just ended, it may do so an instant later."""
+    if ended != 0 and abs(a[P, 0]) <= abs(a[P, 1]) * INSTANT:
         return True
-    m[PULL] = -1
-    rules[PULLS] += 1
-    friction_series(b, m, z, zeta, False, yield_displacement, gh, gv, t, _LOOK, a)
-    return leading(a, P, _LOOK - 2, NOISE[FORCE], AHEAD) <= 0
+    return sign * leading(a, P, _LOOK - 2, NOISE[FORCE], AHEAD) >= 0
 
 
 @inner_kernel
@@ -466,7 +486,7 @@ def follow(b, gh, gv, r, which, before, yields, log, a):
         r.rules[HANGS] += hangs_flat(m)
     elif m[FAMILY] == TILT:  # the push of the floor or of a wall ends
         kind = -1 if which == G_PUSH else RELEASE
-        _close_walls(b, m, z, r.now[ZETA], yields, gh, gv, t, r.rules, a)
+        _close_walls(b, m, z, r.now[ZETA], yields, gh, gv, t, which, r.rules, a)
     elif which >= G_UPLIFT_PLUS and m[FLOOR] == SLIPPING:
         kind = _tip_sliding(b, gh, gv, r, yields, a)
     else:  # the cone, uplift from rest, or a wall that lets go of a standing block

@@ -40,6 +40,8 @@ class Ground(NamedTuple):
 _NO_SAMPLES = np.zeros(1)
 #: Times that differ by less than this share of a sample interval, or of a pulse's width, are the same time. Rounding of a double.
 _SAME, _EPSILON = 2.0**-30, 2.0**-52
+#: The sign with which an acceleration leaves zero is read so much later.
+_SOON = 1e-6
 STILL_GROUND = Ground(STILL, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _NO_SAMPLES)
 _RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, 40)])
 
@@ -137,6 +139,12 @@ def next_kink(g, t):
     if g.kind == SINE:
         return g.quiet if t < g.quiet else NEVER
     return NEVER
+
+
+@inner_kernel
+def acceleration_after(g, t):
+    """Acceleration so soon after t that its sign tells how it leaves a zero at t, and before the next kink."""
+    return acceleration(g, min(t + _SOON, 0.5 * (t + next_kink(g, t))))
 
 
 @inner_kernel

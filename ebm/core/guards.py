@@ -77,6 +77,8 @@ _COMBINES = np.array(
 _MOST = 3
 # The columns of the table: the weight of each series, a constant, and how many terms fewer than the order the guard has (-1: no guard).
 _CONSTANT, _SHORTER = 30, 31
+#: The weight with which the noise of forces hides no base acceleration: nothing is rounded in it.
+_ANY = 2.0**60
 
 
 @inner_kernel
@@ -191,9 +193,10 @@ def _fill_flat(b, m, a):
     for plus in (True, False):
         held = m[TIP if plus else FAR] != 0
         uplift = G_UPLIFT_PLUS if plus else G_UPLIFT_MINUS
-        # A block that hangs by both corners tips as soon as anything favours one side.
-        a[TABLE + uplift, P] = 0.0 if hangs and not on_wall else (b.left.arm if plus else b.right.arm)
-        a[TABLE + uplift, Q] = -b.height if plus else b.height
+        # A block that hangs by both corners tips as soon as anything favours one side, however little.
+        hangs_flat = hangs and not on_wall
+        a[TABLE + uplift, P] = 0.0 if hangs_flat else (b.left.arm if plus else b.right.arm)
+        a[TABLE + uplift, Q] = (-b.height if plus else b.height) * (_ANY if hangs_flat else 1.0)
         _has(a, uplift, -1 if m[FLOOR] == STICK and held else 2)
         if held or hangs:
             _has(a, G_CONE_PLUS if plus else G_CONE_MINUS, -1)

@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from rockcheck.ebm.core.contacts import CLOSED, SLOW, closed_floor, closed_wall, slip_velocity, stand, stop, upright
-from rockcheck.ebm.core.ground import acceleration, next_kink
+from rockcheck.ebm.core.ground import acceleration, acceleration_after, next_kink
 from rockcheck.ebm.core.guards import G_FAR_GAP, G_PHI, G_SLIP, GUARDS, KIND, fill_guards, guard, seen
 from rockcheck.ebm.core.motion import (
     FAMILY,
@@ -157,7 +157,7 @@ def tips_first(b, z, gh, t):
     """
     toward = acceleration(gh, t)
     if abs(toward) <= NOISE[FORCE]:
-        toward = acceleration(gh, t + SOON)
+        toward = acceleration_after(gh, t)
     if toward == 0.0:
         toward = -z[VX]
     if toward == 0.0 and abs(z[X]) > NOISE[0]:

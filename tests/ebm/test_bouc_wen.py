@@ -152,7 +152,7 @@ def test_overturning_ends_the_run():
     assert history.channels["t"][-1] <= history.event_list[-1].t
 
 
-def test_a_motion_that_grows_beyond_all_bounds_is_an_error():
+def test_beyond_painleve_the_sign_of_the_push_that_is_wrong_by_least_goes_on():
     """On a wall, friction 1.333 is beyond Painleve's limit: neither a push nor a pull of the floor solves the equations."""
     scene = Scene(
         name="painleve",
@@ -165,8 +165,9 @@ def test_a_motion_that_grows_beyond_all_bounds_is_an_error():
         gravity=4.300029,
         duration=1.3,
     )
-    with pytest.raises(ModelFailure, match="not finite at t = 1"):
-        bouc_wen(scene, yield_displacement=1.54969e-3)
+    history = bouc_wen(scene, yield_displacement=1.54969e-3)
+    assert history.cost.rules["least contradiction"] > 0
+    assert kinematics.wall_gap(scene, "left", history.channels["x"], history.channels["theta"]).min() > -1e-9 * scene.block.radius
 
 
 def test_what_it_cannot_do_is_refused():
