@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 _CHUNK = 256
 #: Rows of settings and grounds, by the names of their fields.
 SIDE = np.dtype([(name, np.float64) for name in Side._fields])
-SETTING = np.dtype([(name, SIDE if kind is Side else np.float64) for name, kind in get_type_hints(Setting).items()])
+SETTING = np.dtype([(name, SIDE if kind is Side else np.float64) for name, kind in get_type_hints(Setting).items() if name != "law"])
 GROUND = np.dtype(
     [(name, np.int64 if kind == "int" else np.float64) for name, kind in Ground.__annotations__.items() if name != "samples"]
     + [("first", np.int64), ("count", np.int64)]
@@ -39,10 +39,13 @@ GROUND = np.dtype(
 class Packed:
     """Runs as arrays, one row each, natural units: settings (`SETTING`) and grounds (`GROUND`), initial states, lengths.
 
+    All rows have one law of impacts at several contacts (see `Setting`).
+
     Recorded samples of all rows stand in one `samples` array, where a row's ground has `count` of them from `first` on.
     """
 
     settings: NDArray[np.void]
+    law: int | None
     horizontal: NDArray[np.void]
     vertical: NDArray[np.void]
     states: Floats
@@ -93,9 +96,10 @@ def pack(scenes: Sequence[Scene], model: EventBasedModel) -> Packed:
             rows.append((*ground[:-1], offset, len(ground.samples)))
             bank.append(ground.samples)
             offset += len(ground.samples)
-    settings = [_setting(scene, model) for scene in scenes]
+    settings = [_setting(scene, model)[:-1] for scene in scenes]
     return Packed(
         settings=np.array(settings, dtype=SETTING),
+        law=natural.law_of(model.pivot == "unilateral", model.impacts),
         horizontal=np.array(horizontal, dtype=GROUND),
         vertical=np.array(vertical, dtype=GROUND),
         states=np.array([natural.state_of(scene) for scene in scenes]).reshape(len(scenes), 6),
@@ -121,7 +125,8 @@ def pack_pulses(scene: Scene, model: EventBasedModel, amplitudes: Floats, period
     horizontal["quiet"] *= periods
     _, still = natural.grounds_of(scene)
     return Packed(
-        settings=np.repeat(np.array([_setting(scene, model)], dtype=SETTING), count),
+        settings=np.repeat(np.array([_setting(scene, model)[:-1]], dtype=SETTING), count),
+        law=natural.law_of(model.pivot == "unilateral", model.impacts),
         horizontal=horizontal,
         vertical=np.repeat(np.array([(*still[:-1], 1, len(still.samples))], dtype=GROUND), count),
         states=np.tile(natural.state_of(scene), (count, 1)),
@@ -167,6 +172,7 @@ def run_batch(
         rows = slice(first, min(first + _CHUNK, count))
         _run_rows(
             packed.settings[rows],
+            packed.law,
             packed.horizontal[rows],
             packed.vertical[rows],
             packed.states[rows],
@@ -232,8 +238,8 @@ def row_side(r):
 
 
 @kernel
-def row_setting(r):
-    """Block, floor and walls of a packed row, of the types that a single history has."""
+def row_setting(r, law):
+    """Block, floor and walls of a packed row, of the types that a single history has; all rows have one law of impacts, or none."""
     return Setting(
         left=row_side(r["left"]),
         right=row_side(r["right"]),
@@ -250,20 +256,36 @@ def row_setting(r):
         no_slip=r["no_slip"] != 0.0,
         unilateral=r["unilateral"] != 0.0,
         energy_cap=r["energy_cap"] != 0.0,
-        law=int(r["law"]),
+        law=law,
     )
 
 
 @kernel
 def _run_rows(
-    settings, horizontal, vertical, states, durations, samples, control, side, peak, t_end, series, ending, at_rest, motion, modes, written
+    settings,
+    law,
+    horizontal,
+    vertical,
+    states,
+    durations,
+    samples,
+    control,
+    side,
+    peak,
+    t_end,
+    series,
+    ending,
+    at_rest,
+    motion,
+    modes,
+    written,
 ):
     a, stack = workspace()
     log = np.empty((0, 5))
     z = np.empty(6)
     parts = max(motion.shape[1] - 1, 1)
     for i in range(len(durations)):
-        b = row_setting(settings[i])
+        b = row_setting(settings[i], law)
         z[:] = states[i]
         own = Control(
             control.tolerance, control.order, control.most_steps, control.most_events, control.until_decided, durations[i] / parts

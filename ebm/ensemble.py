@@ -58,8 +58,8 @@ def play_ensemble(scenes: Sequence[Scene], model: EventBasedModel, *, rows: int 
         part = slice(begin, begin + _CHUNK)
         grounds = packed.horizontal[part], packed.vertical[part]
         _sample_rows(
-            packed.settings[part], *grounds, states[part], packed.durations[part], packed.samples, control, steps[part], theta[part],
-            peak[part], ending[part],
+            packed.settings[part], packed.law, *grounds, states[part], packed.durations[part], packed.samples, control, steps[part],
+            theta[part], peak[part], ending[part],
         )  # fmt: skip
 
     with threads(jobs or os.cpu_count() or 1) as pool:
@@ -76,7 +76,7 @@ def play_ensemble(scenes: Sequence[Scene], model: EventBasedModel, *, rows: int 
 
 
 @kernel
-def _sample_rows(settings, horizontal, vertical, states, durations, samples, control, steps, theta, peak, ending):
+def _sample_rows(settings, law, horizontal, vertical, states, durations, samples, control, steps, theta, peak, ending):
     """Plays each row to its end: its rotations on the grid, its last state (in place of the first), its peak and how it ended."""
     a, stack = workspace()
     rows = theta.shape[1]
@@ -86,7 +86,7 @@ def _sample_rows(settings, horizontal, vertical, states, durations, samples, con
         c = Control(control.tolerance, control.order, control.most_steps, control.most_events, False, steps[i])
         grounds = row_ground(horizontal[i], samples), row_ground(vertical[i], samples)
         z[:] = states[i]
-        tally = run(row_setting(settings[i]), grounds[0], grounds[1], z, durations[i], c, out, out_mode, log, a, stack)
+        tally = run(row_setting(settings[i], law), grounds[0], grounds[1], z, durations[i], c, out, out_mode, log, a, stack)
         states[i] = z
         peak[i], ending[i] = tally.peak, tally.ending
         for k in range(rows):

@@ -129,7 +129,6 @@ class EventBasedModel(Frozen):
         state = natural.state_of(scene)
         times = scene.output_times
         order = type(self)(tolerance=tolerance).order
-        control = march.Control(tolerance, order, self.most_steps, self.most_events, False, scene.output_step / unit)
         out = np.empty((len(times), 6))
         out_mode = np.zeros(len(times), dtype=np.int8)
         log = np.empty((self.most_events, 5))
@@ -137,10 +136,19 @@ class EventBasedModel(Frozen):
         if self.friction == "bouc-wen":
             yields = self.yield_displacement / scene.block.radius
         scratch = motion.workspace() if yields is None else (*bouc_wen.friction_workspace(), yields)
-        _compiled(scratch)
-        go = partial(march.run, b, horizontal, vertical, state, scene.duration / unit, control, out, out_mode, log, *scratch)
+        _compiled(scratch, self.pivot == "unilateral")
+
+        def play(most_steps: int) -> Tally:
+            control = march.Control(tolerance, order, most_steps, self.most_events, False, scene.output_step / unit)
+            state[:] = natural.state_of(scene)
+            return march.run(b, horizontal, vertical, state, scene.duration / unit, control, out, out_mode, log, *scratch)
+
         ready, cpu = time.perf_counter(), time.process_time()
-        tally = interruptible(go)
+        # Each sample of a record is a step. What takes few runs here at once: to hand it over takes longer.
+        few = min(self.most_steps, _AT_ONCE if max(len(horizontal.samples), len(vertical.samples)) < _AT_ONCE else 0)
+        tally = play(few) if few else None
+        if tally is None or (tally.ending == march.TOO_MANY_STEPS and few < self.most_steps):
+            tally = interruptible(partial(play, self.most_steps))
         seconds, cpu = time.perf_counter() - ready, time.process_time() - cpu
         if tally.ending in march.FAILURES:
             raise ModelFailure(f"{self.name}: {march.FAILURES[tally.ending]} at t = {tally.t * unit:.6g} s")
@@ -193,9 +201,10 @@ def vars_of(history: History) -> dict[str, Any]:
     return {name: getattr(history, name) for name in History.__dataclass_fields__}
 
 
-def _compiled(scratch: tuple[Any, ...]) -> None:
+def _compiled(scratch: tuple[Any, ...], unilateral: bool) -> None:
     """Loads or compiles the event loop by a run of no steps, so that no run's time holds it."""
-    if len(scratch) in _READY:
+    kind = len(scratch), unilateral
+    if kind in _READY:
         return
     from rockcheck.ebm import natural
     from rockcheck.ebm.core import march
@@ -203,15 +212,17 @@ def _compiled(scratch: tuple[Any, ...]) -> None:
     from rockcheck.scenes.scene import Block, Floor
 
     scene = Scene(name="warm-up", block=Block(half_width=1.0, half_height=4.0), floor=Floor(friction=0.5), excitation=Rest(), duration=1.0)
-    b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
+    b = natural.setting_of(scene, unilateral=unilateral, no_slip=False, energy_cap=False)
     control = march.Control(WARM_UP_TOLERANCE, 12, 1, 1, False, 1.0)
     nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
     march.run(b, *natural.grounds_of(scene), natural.state_of(scene), 1.0, control, *nothing, *scratch)
-    _READY.add(len(scratch))
+    _READY.add(kind)
 
 
-#: The kinds of scratch for which the event loop is compiled: with Coulomb and with Bouc-Wen friction.
-_READY: set[int] = set()
+#: Steps that take about as long as to hand a run over to the thread that Ctrl-C need not wait for.
+_AT_ONCE = 500
+#: The variants of the event loop that are compiled: by the friction (its kind of scratch) and by the pivot.
+_READY: set[tuple[int, bool]] = set()
 WARM_UP_TOLERANCE = 0.01
 #: Highest order of a Taylor step (see ebm.core.series, which is not imported here because it needs the compiler).
 HIGHEST_ORDER = 28

@@ -44,8 +44,13 @@ def setting_of(scene: Scene, *, unilateral: bool, no_slip: bool, energy_cap: boo
         no_slip=no_slip,
         unilateral=unilateral,
         energy_cap=energy_cap,
-        law=LAWS.index(impacts),
+        law=law_of(unilateral, impacts),
     )
+
+
+def law_of(unilateral: bool, impacts: str) -> int | None:
+    """The law of impacts at several contacts, as the event loop knows it; the bilateral pivot has none."""
+    return LAWS.index(impacts) if unilateral else None
 
 
 def side_of(block: Block, side: Literal["left", "right"]) -> Side:

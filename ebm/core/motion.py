@@ -81,8 +81,9 @@ class Setting(NamedTuple):
     unilateral: bool
     #: An impact that would add energy uses the largest restitution that does not, instead of e.
     energy_cap: bool
-    #: The law of impacts at several contacts, an index into LAWS.
-    law: int
+    #: The law of impacts at several contacts, an index into LAWS. None with the bilateral pivot, which needs none: the event loop is
+    #: then compiled without it.
+    law: int | None
 
 
 #: Static friction of a frictionless floor. With less, rounding in the tail of a base acceleration would move a resting block.

@@ -68,7 +68,7 @@ def strike(b, m, z, which, gh, t, resting, impulse, gains, rules):
     wall = which == G_TIP_GAP or which == G_FAR_GAP
     known = False
     if b.unilateral:
-        _strike_all(b, m, z, gh, t, resting, impulse, gains, rules)
+        _strike_by(b.law, b, m, z, gh, t, resting, impulse, gains, rules)
     elif wall:
         known = _wall_impact(b, m, z, which == G_TIP_GAP, resting, impulse, gains, rules)
     else:
@@ -197,6 +197,13 @@ def count_gain(before, after, gains):
     if after > before * (1.0 + 10.0 * NOISE[POSITION]):
         gains[0] += 1.0
         gains[1] = max(gains[1], after / before - 1.0)
+
+
+@inner_kernel
+def _strike_by(law, b, m, z, gh, t, resting, impulse, gains, rules):
+    """Resolves all contacts. Where there is no law for them the code for it is not even compiled: numba looks at arguments only."""
+    if law is not None:
+        _strike_all(b, m, z, gh, t, resting, impulse, gains, rules)
 
 
 @event_kernel
