@@ -52,9 +52,10 @@ _LOOK = 6
 #: Where a base acceleration is zero, its sign is read this much later (samples of a record may be much closer than AHEAD).
 SOON = 1e-6
 # What a run remembers of the selections at one instant: the mode's slack (in units of noise), the least slack of the next mode that
-# does not fit, when the instant began, and when the mode was selected. A row of flags marks the modes that were tried.
-SLACK, LEAST_SLACK, SINCE, BEGAN = range(4)
-MEMORY = 4
+# does not fit, when the instant began, when the mode was selected, and which mode a force has just ended (its code, or -1). A row of
+# flags marks the modes that were tried.
+SLACK, LEAST_SLACK, SINCE, BEGAN, ENDED = range(5)
+MEMORY = 5
 MODES = 128
 
 
@@ -95,7 +96,7 @@ def forget(tried, memory, t):
     for k in range(MODES):
         tried[k] = False
     memory[SLACK] = memory[LEAST_SLACK] = 1.0
-    memory[SINCE] = t
+    memory[SINCE], memory[ENDED] = t, -1.0
 
 
 @inner_kernel
@@ -104,6 +105,7 @@ def leave(m, tried, memory, t, kind):
     if t - memory[SINCE] > INSTANT:
         forget(tried, memory, t)
     tried[code_of(m)] = kind != FORCE or t - memory[BEGAN] <= INSTANT
+    memory[ENDED] = code_of(m) if kind == FORCE else -1
 
 
 @inner_kernel
@@ -148,12 +150,12 @@ def wrong_by(b, m, z, gh, gv, t, measured, a):
 
 
 @inner_kernel
-def tips_first(b, z, gh, t):
-    """The side to which a flat block is first asked to tip, +1 left or -1 right: the sense in which all of it is calculated.
+def _favoured(b, z, gh, t):
+    """The side to which a flat block at rest would rather tip, +1 left or -1 right; 0 where the scene is its own mirror image.
 
     Both sides fit only by rounding, or where the floor falls away faster than g under a pivot that cannot let go. Then the base
     acceleration decides, now or soon, or the friction. Failing these the block's place and its walls fix the order of calculation,
-    so that a mirror image gives the mirrored result. Where they do not either, the scene is its own mirror image.
+    so that a mirror image gives the mirrored result.
     """
     toward = acceleration(gh, t)
     if abs(toward) <= NOISE[FORCE]:
@@ -166,7 +168,13 @@ def tips_first(b, z, gh, t):
         toward = b.gap_left - b.gap_right
     if toward == 0.0:
         toward = b.right.arm - b.left.arm
-    return 1 if toward >= 0.0 else -1
+    return 0 if toward == 0.0 else (1 if toward > 0.0 else -1)
+
+
+@inner_kernel
+def tips_first(b, z, gh, t):
+    """The side to which a flat block is first asked to tip, +1 left or -1 right: the sense in which all of it is calculated."""
+    return 1 if _favoured(b, z, gh, t) >= 0 else -1
 
 
 @inner_kernel
@@ -239,7 +247,8 @@ def select(b, z, gh, gv, t, m, tried, memory, rules, a):
     _clean(b, z, floor)
     flat = z[THETA] == 0.0 and z[W] == 0.0
     lean = z[THETA] if z[THETA] != 0.0 else z[W]
-    first = tips_first(b, z, gh, t) if flat else (1 if lean > 0.0 else -1)
+    favoured = _favoured(b, z, gh, t) if flat else (1 if lean > 0.0 else -1)
+    first = 1 if favoured >= 0 else -1
     upright_walls = _touched(b, z, 1, True) if flat else 0
     near, away = _touched(b, z, first, False), _touched(b, z, -first, False) if flat else 0
     v = slip_velocity(b, z)
@@ -249,12 +258,15 @@ def select(b, z, gh, gv, t, m, tried, memory, rules, a):
         again = trial == 2
         for number in range(begin, end):
             _write(number, first, m)
+            if m[FAMILY] == TILT and favoured == 0:
+                continue  # where nothing tells left from right a block does not tilt
             walls = upright_walls if m[FAMILY] == FLAT else (near if m[S] == first else away)
             if tried[code_of(m)] != again or not _possible(b, m, z, v, floor, walls):
                 continue
             wrong = wrong_by(b, m, z, gh, gv, t, trial > 0, a)
             if wrong == 0.0 and not again:
-                memory[SLACK] = 1.0
+                # One that goes on, since what ended it was noise, is allowed twice that: else the same noise would end it again and again.
+                memory[SLACK] = 2.0 if code_of(m) == memory[ENDED] else 1.0
                 rules[HANGS] += hangs_flat(m)
                 return True
             wrong = max(wrong, memory[LEAST_SLACK] if again else 0.0)

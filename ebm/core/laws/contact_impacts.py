@@ -286,6 +286,9 @@ def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, t
             impulse[0 if j <= E else 1] += part[j]
         for k in range(3):
             v[k] = after[k]
+    if touching[TIP_TOP] and touching[FAR_BOTTOM]:
+        # Its diagonal just fits between two walls, with a lever so short that no impulse can be solved for: it jams.
+        v[0] = v[2] = 0.0
     return ENDLESS
 
 
