@@ -46,6 +46,7 @@ def march_adaptively(
     Raises `ModelFailure` if the motion blows up or needs very many steps.
     """
     from rockcheck.engines import stepping
+    from rockcheck.scenes.compiled import for_types_of
 
     contacts, end = contacts_of(scene), float(scene.output_times[-1])
     limits = stepping.limits_of(scene, longest, short)
@@ -57,13 +58,14 @@ def march_adaptively(
     run = stepping.begun(np.array(kinematics.of_mass(scene.block, scene.initial_state), dtype=float), base.velocity(0.0), len(contacts))
     rows, count = np.empty((_ROOM, stepping.COLUMNS)), 1
     rows[0, :7] = 0.0, *run.state[:6]
+    step = for_types_of(stepping.step, run, corners, starts, across, up, limits, end, 0.0, 0.0, 0.0, rows[0])
     going = stepping.plan(run, corners, starts, across, up, limits, end)
     while going:
         x, y, theta, vx, vy, w, dt, ax, ay, impact = run.asked.tolist()
         kicked = push((x, y, theta), (vx, vy, w), dt, (ax, ay), impact != 0.0)
         if count == len(rows):
             rows = np.concatenate([rows, np.empty_like(rows)])
-        going = stepping.step(run, corners, starts, across, up, limits, end, kicked[0], kicked[1], kicked[2], rows[count])
+        going = step(run, corners, starts, across, up, limits, end, kicked[0], kicked[1], kicked[2], rows[count])
         count += 1
         if count % 512 == 0:
             tell(rows[count - 1, 0], end)

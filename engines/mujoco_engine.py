@@ -156,7 +156,7 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
             self.damping[:] = (self.bouncing if bouncing else self.stopping) * (IMPEDANCE[0] / dt)
             self.tuned = dt, bouncing
         self.mujoco.mj_step1(model, data)
-        data.efc_D[:] = RIGID  # MuJoCo caps the impedance, and with it the share of an impact that its contacts take up
+        data.efc_D.fill(RIGID)  # MuJoCo caps the impedance, and with it the share of an impact that its contacts take up
         self.mujoco.mj_fwdAcceleration(model, data)
         self.mujoco.mj_fwdConstraint(model, data)
         if self.friction > 0.0 and (rows := self._slipping_rows()):

@@ -94,6 +94,18 @@ def test_an_inner_kernel_is_linked_and_no_machine_code_is_made_of_it_alone(monke
     assert lowest(1, 2) == 1  # for Python it stays the function that it is
 
 
+def test_the_machine_code_for_some_types_is_the_kernel_that_is_kept(tmp_path, play):
+    """A loop in Python takes it once: found for the types of tuples and arrays, and read back by the next process."""
+    (tmp_path / "tiny" / "kernels.py").write_text(
+        _TINY.replace("assert doubled(np", "assert for_types_of(doubled, np.ones(1))(np", 1).replace(
+            "import inner_kernel", "import for_types_of, inner_kernel"
+        )
+    )
+    assert play("0 read, 2 compiled") == ""
+    assert play("2 read, 0 compiled") == ""
+    assert play("interpreted", NUMBA_DISABLE_JIT="1") == ""
+
+
 def files(tmp_path: Path) -> list[Path]:
     return sorted((tmp_path / "cache").glob("tiny-kernels-*/*.nbc"))
 
