@@ -7,7 +7,7 @@ import json
 import math
 import re
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -132,7 +132,8 @@ def write_site(folder: Path, *, jobs: int = 1, afresh: bool = True, on_progress:
     """
     pages = _Pages(folder)
     pages.site.assets()
-    waiting = [view.name for view in pages.views.values() if afresh or _stamp_of(folder / _address(view)) != pages.stamp(view)]
+    stamps = {name: pages.stamp(view) for name, view in pages.views.items()}
+    waiting = {name: stamp for name, stamp in stamps.items() if afresh or _stamp_of(folder / _address(pages.views[name])) != stamp}
     for done, _ in enumerate(_write_pages(pages, waiting, jobs), 1):
         on_progress(done, len(waiting))
     current = {f"{view.slug}.html" for view in pages.views.values()}
@@ -143,13 +144,13 @@ def write_site(folder: Path, *, jobs: int = 1, afresh: bool = True, on_progress:
     return pages.write_index()
 
 
-def _write_pages(pages: _Pages, names: Sequence[str], jobs: int) -> Iterator[None]:
-    """Write these pages; a process of its own costs a second, so a few pages do not get one."""
-    if min(jobs, len(names)) < 2 or len(names) < FEW:
-        yield from map(pages.write, names)
+def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterator[None]:
+    """Write these pages, each with its stamp; a process of its own costs a second, so a few pages do not get one."""
+    if min(jobs, len(stamps)) < 2 or len(stamps) < FEW:
+        yield from map(pages.write, stamps, stamps.values())
         return
-    with Pool(min(jobs, len(names))) as pool:
-        for ended in pool.run(deque(Call(_write_page, (pages.folder, name)) for name in names)):
+    with Pool(min(jobs, len(stamps))) as pool:
+        for ended in pool.run(deque(Call(_write_page, (pages.folder, name, stamp)) for name, stamp in stamps.items())):
             if ended.error is not None:
                 raise ended.error
             yield
@@ -168,16 +169,16 @@ class _Pages:
         links += [(title, address) for title, address in STUDIES if (folder / address).exists()]
         self.site = Site(folder, f"rockcheck: {self.run.suite}", tuple(links))
 
-    def write(self, name: str) -> None:
-        """Figures, data, and last the page, which names the stamp of what it shows."""
+    def write(self, name: str, stamp: str) -> None:
+        """Figures, data, and last the page, which names the stamp of what it shows (`stamp`)."""
         view = self.views[name]
         page = self.folder / _address(view)
         before = _belongings(page)
-        self._write_ensemble(view) if isinstance(view, EnsembleView) else self._write_scene(view)
+        self._write_ensemble(view, stamp) if isinstance(view, EnsembleView) else self._write_scene(view, stamp)
         for old in before - _belongings(page):
             (self.folder / PAGES / old).unlink(missing_ok=True)
 
-    def _write_scene(self, view: SceneView) -> None:
+    def _write_scene(self, view: SceneView, stamp: str) -> None:
         pages = self.folder / PAGES
         write_figures(view, _made(pages / "figures"))
         write_whole(_made(pages / "data") / f"{view.slug}.js", script(view))
@@ -188,16 +189,16 @@ class _Pages:
             "previous": self.views[scenes[place - 1]] if place else None,
             "following": self.views[scenes[place + 1]] if place + 1 < len(scenes) else None,
         }
-        self._page(view, "scene.html", files=files, **beside)
+        self._page(view, stamp, "scene.html", files=files, **beside)
 
-    def _write_ensemble(self, view: EnsembleView) -> None:
+    def _write_ensemble(self, view: EnsembleView, stamp: str) -> None:
         pages = self.folder / PAGES
         write_ensemble_figures(view, _made(pages / "figures"))
         write_whole(_made(pages / "data") / f"{view.slug}.csv", view.table())
-        self._page(view, "ensemble.html", columns=STATISTICS_SHOWN)
+        self._page(view, stamp, "ensemble.html", columns=STATISTICS_SHOWN)
 
-    def _page(self, view: View, template: str, **context: Any) -> None:
-        self.site.page(_address(view), template, view=view, stamp=self.stamp(view), **context, **_common(self.run))
+    def _page(self, view: View, stamp: str, template: str, **context: Any) -> None:
+        self.site.page(_address(view), template, view=view, stamp=stamp, **context, **_common(self.run))
 
     def write_index(self) -> Path:
         """The page to open, which shows when the run was."""
@@ -234,8 +235,8 @@ def _pages_of(folder: Path) -> _Pages:
     return _Pages(folder)
 
 
-def _write_page(folder: Path, name: str) -> None:
-    _pages_of(folder).write(name)
+def _write_page(folder: Path, name: str, stamp: str) -> None:
+    _pages_of(folder).write(name, stamp)
 
 
 @cache
