@@ -3,7 +3,7 @@
 | folder | a result |
 |---|---|
 | `histories/` | `.csv.gz` and `.events.csv.gz` (`scenes.History.save`); `.json`, the record with their hashes, is written last |
-| `comparisons/` | `.json`: figures of a cell, peaks of an ensemble's batch, a horizon of predictability |
+| `comparisons/` | `.json`: the comparisons of a cell, peaks of an ensemble's batch, a horizon of predictability |
 | `tiles/` | `.json`: outcomes at some nodes of a spectrum |
 
 A name contains the hash of everything that the content depends on. So runs that share a folder can only ever write the same
@@ -105,7 +105,7 @@ class Store:
 
 def _sealed(name: str, content: Mapping[str, Any]) -> str:
     """A record with the hash of its name and content."""
-    return json.dumps({"content": content, "sha256": _seal(name, content)}, sort_keys=True) + "\n"
+    return json.dumps({"content": content, "sha256": _seal(name, content)}, sort_keys=True, separators=(",", ":")) + "\n"
 
 
 def _seal(name: str, content: Mapping[str, Any]) -> str:

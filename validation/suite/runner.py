@@ -7,6 +7,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import lru_cache
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import field_validator
 
 from rockcheck.scenes import History, InputError, Scene
 from rockcheck.scenes.progress import OnProgress, unheard
@@ -82,6 +84,8 @@ class PlannedBatch:
 
 
 Planned = PlannedCell | PlannedBatch
+#: What a cell is compared with, None for its own figures; and the measures that are asked for over a window, or on request.
+Asked = tuple[PlannedCell | None, list[Windowed]]
 
 
 class CellRecord(Stored):
@@ -103,6 +107,10 @@ class BatchRecord(Stored):
     cost: CostRecord
 
 
+#: A figure as it is kept: measure, unit, value, window, until, note. Its label is the measure's.
+FigureRow = tuple[str, str, float | None, str, float | None, str]
+
+
 class ComparisonRecord(Stored):
     """The figures of a comparison; by window, what could not be compared, and whether because one block fell.
 
@@ -110,10 +118,40 @@ class ComparisonRecord(Stored):
     a cell's own figures.
     """
 
-    figures: tuple[Figure, ...]
+    figures: tuple[FigureRow, ...]
     gaps: dict[str, tuple[str, bool]]
     impact_law: LawFollowed | None = None
     overturned_at: float | None = None
+
+    @field_validator("figures")
+    @classmethod
+    def _known(cls, rows: tuple[FigureRow, ...]) -> tuple[FigureRow, ...]:
+        if unknown := {row[0] for row in rows} - MEASURES.keys():
+            raise ValueError(f"unknown measures: {', '.join(sorted(unknown))}")
+        return rows
+
+    def figures_against(self, name: str) -> list[Figure]:
+        """The figures, `name` being the reference's or OWN_FIGURES."""
+        against = "" if name == OWN_FIGURES else name
+        return [
+            Figure(
+                measure=measure,
+                label=MEASURES[measure].label,
+                unit=unit,
+                value=value,
+                against=against,
+                window=window,
+                until=until,
+                note=note,
+            )
+            for measure, unit, value, window, until, note in self.figures
+        ]
+
+
+class CellComparisons(Stored):
+    """What is kept of a cell's comparisons: by the name of the reference, and by OWN_FIGURES its own figures."""
+
+    of: dict[str, ComparisonRecord]
 
 
 def _is(kind: type[Stored], found: Mapping[str, Any] | None) -> bool:
@@ -163,6 +201,7 @@ def run_suite(
     on_progress(len(records), len(items), f"{len(records)} up to date")
     limits = [suite.suite_of(item.place).limits for item in waiting]
     by_place = {(planned.scene.name, planned.variant.label): planned for planned in planned_cells}
+    compared: dict[PlannedCell, Cell] = {}
     by_scene = {scene: list(of) for scene, of in groupby(planned_cells, key=lambda planned: planned.scene.name)}
     for index, result in play(
         [_task(item, suite) for item in waiting],
@@ -185,11 +224,14 @@ def run_suite(
                 store.put_record(COMPARISONS, item.name, result.record)
         on_progress(len(records) + len(failures), len(items), f"{item.place}, {item.variant.label}")
         of_scene = by_scene.get(item.place, [])
-        if all(planned in records or planned in failures for planned in of_scene):  # compared while others play, and kept
+        if all(planned in records or planned in failures for planned in of_scene):  # compared while others play
             for planned in of_scene:
-                _cell(suite, planned, by_place, records, failures, store, False)
+                compared[planned] = _cell(suite, planned, by_place, records, failures, store, planned in read_back)
     inputs = {name: inputs_of(store, given) for name, given in suite.uncertain.items()}
-    cells = [_cell(suite, planned, by_place, records, failures, store, planned in read_back) for planned in planned_cells]
+    cells = [
+        compared.get(planned) or _cell(suite, planned, by_place, records, failures, store, planned in read_back)
+        for planned in planned_cells
+    ]
     ensembles, ensemble_cells = _ensembles(suite, batches, records, failures, read_back)
     cells = [_explained(suite, cell, cells, by_place, records, inputs.get(cell.scene)) for cell in cells] + ensemble_cells
     cells = [cell.model_copy(update=faults.get((cell.scene, cell.model), {})) for cell in cells]
@@ -351,21 +393,15 @@ def _cell(
     record = records[planned]
     required = suite.required(scene.name, label)
     own = suite.suite_of(scene.name)
-    figures: list[Figure] = []
-    gaps: dict[tuple[str, str], tuple[str, bool]] = {}
-    law: dict[str, Any] | None = None
-    overturned_at: float | None = None
+    asked: dict[str, Asked] = {}
     for name in dict.fromkeys([OWN_FIGURES, own.reference, own.model_form, *(place.against for place in required)]):
-        reference = planned_cells.get((scene.name, name))
-        if name != OWN_FIGURES and (reference is None or reference is planned or reference not in records):
-            continue
-        extra = sorted(p.what for p in required if p.against == name and (p.what.window or p.what.definition.on_request))
-        horizon = _horizon(store, scene) if any(what.window == HORIZON for what in extra) else None
-        found = _compared(store, scene, planned, reference, extra, horizon)
-        figures += [Figure(**figure) for figure in found["figures"]]
-        gaps |= {(name, window): (text, fall) for window, (text, fall) in found["gaps"].items()}
-        law = law or found.get("impact_law")
-        overturned_at = overturned_at or found.get("overturned_at")
+        reference = None if name == OWN_FIGURES else planned_cells.get((scene.name, name))
+        if name == OWN_FIGURES or (reference is not None and reference is not planned and reference in records):
+            extra = sorted(p.what for p in required if p.against == name and (p.what.window or p.what.definition.on_request))
+            asked[name] = reference, extra
+    found = _compared(store, scene, planned, asked)
+    figures = [figure for name, one in found.items() for figure in one.figures_against(name)]
+    gaps = {(name, window): gap for name, one in found.items() for window, gap in one.gaps.items()}
     checks = []
     for place, kind in required.items() if suite.judged else ():
         figure = _figure(figures, place)
@@ -381,13 +417,13 @@ def _cell(
         settings=record["settings"],
         history=f"{HISTORIES}/{planned.name}{TABLE}",
         outcome=record["outcome"],
-        overturned_at=overturned_at,
+        overturned_at=found[OWN_FIGURES].overturned_at,
         notes=tuple(record["notes"]),
         cost=CostRecord(**record["cost"]),
         figures=tuple(figures),
         checks=tuple(checks),
         numerical=numerical_of(record),
-        impact_law=None if law is None else LawFollowed.model_validate(law),
+        impact_law=found[OWN_FIGURES].impact_law,
     )
 
 
@@ -448,21 +484,21 @@ def _horizon(store: Store, scene: Scene) -> float:
     return float(found["horizon"])
 
 
-def _compared(
-    store: Store, scene: Scene, planned: PlannedCell, reference: PlannedCell | None, windowed: Sequence[Windowed], horizon: float | None
-) -> dict[str, Any]:
-    """All figures over the whole time, and those asked for over a window; kept in the store.
+def _compared(store: Store, scene: Scene, planned: PlannedCell, asked: Mapping[str, Asked]) -> dict[str, ComparisonRecord]:
+    """The comparisons that are asked of a cell, by name of the reference, and by OWN_FIGURES its own figures; kept in the store.
 
-    Figures of the cell itself where `reference` is None, with the law of impacts that it followed. "gaps" says by window what could
-    not be compared, and whether because one block fell.
+    Each has all figures over the whole time, and those asked for over a window.
     """
+    horizon = _horizon(store, scene) if any(what.window == HORIZON for _, extra in asked.values() for what in extra) else None
     code = provenance.code_digest("rockcheck.validation.suite.impact_laws")  # with `compare`
-    key = provenance.digest(json.dumps([planned.key, reference.key if reference else "", list(map(str, windowed)), horizon, code]))
-    name = name_of(scene.name, planned.variant.label, reference.variant.label if reference else OWN_FIGURES, key)
-    found = store.get_record(COMPARISONS, name)
-    if found is None or not _is(ComparisonRecord, found):
-        found = _compute(store, scene, planned, reference, windowed, horizon)
-        store.put_record(COMPARISONS, name, found)
+    against = [[name, reference.key if reference else "", list(map(str, extra))] for name, (reference, extra) in asked.items()]
+    name = name_of(scene.name, planned.variant.label, provenance.digest(json.dumps([planned.key, against, horizon, code])))
+    with suppress(ValueError):  # what is kept is not trusted to have the fields that it must have
+        kept = CellComparisons.model_validate(store.get_record(COMPARISONS, name))
+        if kept.of.keys() == asked.keys():
+            return {one: kept.of[one] for one in asked}
+    found = {one: _compute(store, scene, planned, reference, extra, horizon) for one, (reference, extra) in asked.items()}
+    store.put_record(COMPARISONS, name, CellComparisons(of=found).model_dump(mode="json"))
     return found
 
 
@@ -478,7 +514,8 @@ def _load(path: Path, written: int) -> History:
 
 def _compute(
     store: Store, scene: Scene, planned: PlannedCell, reference: PlannedCell | None, windowed: Sequence[Windowed], horizon: float | None
-) -> dict[str, Any]:
+) -> ComparisonRecord:
+    """The figures of the cell itself where `reference` is None, with the law of impacts that it followed."""
     candidate = _loaded(store, planned)
     yardstick = _loaded(store, reference) if reference else None
     figures: list[Figure] = []
@@ -501,9 +538,9 @@ def _compute(
                 gaps |= {str(Windowed(measure, window)): gap for measure, gap in own.items()}
         figures += [figure.model_copy(update={"window": window}) for figure in found]
     law = landing.followed_by(candidate, scene) if landing and yardstick is None else None
-    return {
-        "figures": [figure.model_dump(mode="json") for figure in figures],
-        "gaps": gaps,
-        "impact_law": None if law is None else law.model_dump(mode="json"),
-        "overturned_at": None if yardstick else candidate.overturned_at,
-    }
+    return ComparisonRecord(
+        figures=tuple((f.measure, f.unit, f.value, f.window, f.until, f.note) for f in figures),
+        gaps=gaps,
+        impact_law=law,
+        overturned_at=None if yardstick else candidate.overturned_at,
+    )
