@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import resources
@@ -186,12 +187,14 @@ def differing(spectrum: Spectrum, other: Spectrum) -> NDArray[np.int64]:
     return np.argwhere(differ)
 
 
-def save(panels: Sequence[Panel], spectra: Sequence[Spectrum], request: SpectrumRequest, folder: Path) -> None:
+def save(panels: Sequence[Panel], spectra: Sequence[Spectrum], request: SpectrumRequest, folder: Path, *, jobs: int | None = None) -> None:
     """Write each spectrum's outcomes with its settings as NPZ and CSV, and note it in the folder's `spectra.json`.
 
-    Beside them go histories of some nodes (`spectra.histories`), where the model is quick enough.
+    Beside them go histories of some nodes (`spectra.histories`), where the model is quick enough: those of `jobs` spectra (default:
+    all cores) are played at once.
     """
     records = []
+    waiting: list[tuple[Spectrum, Path, str]] = []
     model = build(request.model, request.settings)
     for panel, spectrum in zip(panels, spectra, strict=True):
         record = SpectrumRecord(
@@ -217,8 +220,11 @@ def save(panels: Sequence[Panel], spectra: Sequence[Spectrum], request: Spectrum
         if compiled(model):
             path, key = glimpses_path(folder, record.name), _glimpses_key(spectrum, request)
             if not kept(path, key):
-                save_glimpses(glimpses(spectrum, model), path, key)
+                waiting.append((spectrum, path, key))
         records.append(record)
+    if compiled(model):
+        with threads(jobs or os.cpu_count() or 1) as pool:
+            list(pool.map(lambda one: save_glimpses(glimpses(one[0], model), *one[1:]), waiting))
     index = read_index(folder)
     new = {record.name: record for record in records}
     merged = [*(old for old in index.spectra if old.name not in new), *records]

@@ -204,7 +204,7 @@ def _spectra(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, da
             drawn.append(drawing.submit(_draw_areas, panels, spectra, data, formats))
         screen.print(_shares(panels, spectra))
         _speed(spectra, request, tiles, tiles.cpu - aside, screen)
-        save(panels, spectra, request, data)
+        save(panels, spectra, request, data, jobs=tiles.jobs)
         if papers:
             _claims(spectra, request, tiles, data, screen)
         for one in drawn:
