@@ -54,6 +54,11 @@ class EnsembleView:
         return self.record.name
 
     @property
+    def printed(self) -> bool:
+        """Whether it has figures for a paper: each has."""
+        return True
+
+    @property
     def description(self) -> str:
         """What it is, in a line."""
         return self.record.description

@@ -45,8 +45,9 @@ STATISTICS_SHOWN = (
     ("peak_bias", "bias"),
     ("peak_scatter", "scatter"),
 )
-#: Fewer pages than this are written by the process itself.
-FEW = 3
+#: What a page takes to be made, in pages without figures for a paper. Less than FEW in all are written by the process itself: it has
+#: what draws anyway, and another process takes as long as six pages to have it, too.
+PRINTED, FEW = 10, 12
 #: What a verdict is called and the sign that goes with its colour.
 VERDICTS = {
     "pass": ("within tolerance", "✓"),
@@ -145,8 +146,9 @@ def write_site(folder: Path, *, jobs: int = 1, afresh: bool = True, on_progress:
 
 
 def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterator[None]:
-    """Write these pages, each with its stamp; a process of its own costs a second, so a few pages do not get one."""
-    if min(jobs, len(stamps)) < 2 or len(stamps) < FEW:
+    """Write these pages, each with its stamp, in processes of their own where that is quicker."""
+    work = sum(PRINTED if pages.views[name].printed else 1 for name in stamps)
+    if min(jobs, len(stamps)) < 2 or work < FEW:
         yield from map(pages.write, stamps, stamps.values())
         return
     with Pool(min(jobs, len(stamps))) as pool:
