@@ -138,8 +138,8 @@ CASES = (
 )
 
 
-def ebm_speed(*, quick: bool = False, cold: bool = True, on_progress: OnProgress = unheard) -> EbmSpeed:
-    """Times all batches on one core, interleaved; `quick` with 400 trajectories instead of 10,000.
+def ebm_speed(*, quick: bool = False, cold: bool = True, jobs: int | None = None, on_progress: OnProgress = unheard) -> EbmSpeed:
+    """Times all batches on one core, interleaved; `quick` with 400 trajectories instead of 10,000. Then batches by size, see `batch_sizes`.
 
     `cold` also starts fresh processes, with the compile cache and (not `quick`) without.
     """
@@ -149,19 +149,19 @@ def ebm_speed(*, quick: bool = False, cold: bool = True, on_progress: OnProgress
     for done, case in enumerate(CASES):
         on_progress(done, len(CASES), f"batches: {case.name}")
         times += _times(case, nodes, ones)
-    sizes = batch_sizes(QUICK_SIZES if quick else SIZES, on_progress)
+    sizes = batch_sizes(QUICK_SIZES if quick else SIZES, on_progress, jobs=jobs)
     return EbmSpeed(median(ones), tuple(times), cold_starts(on_progress, without_cache=not quick) if cold else (), sizes)
 
 
-def batch_sizes(sizes: Sequence[int] = SIZES, on_progress: OnProgress = unheard) -> tuple[BatchSize, ...]:
-    """Times batches of these sizes, on one thread and on one a core."""
+def batch_sizes(sizes: Sequence[int] = SIZES, on_progress: OnProgress = unheard, *, jobs: int | None = None) -> tuple[BatchSize, ...]:
+    """Times batches of these sizes, on one thread and on `jobs` (default: one a core)."""
     scene, model = _scene(), EventBasedModel(tolerance=LEVEL)
     rows = []
     for done, runs in enumerate(sizes):
         on_progress(done, len(sizes), f"a batch of {runs:,}")
         random = np.random.default_rng(1)
         pulses = _pulse(scene, random.uniform(*FREQUENCY_RATIOS, runs), random.uniform(*AMPLITUDE_RATIOS, runs))
-        for count in sorted({1, os.cpu_count() or 1}):
+        for count in sorted({1, jobs or os.cpu_count() or 1}):
             taken = []
             for _ in range(ROUNDS):
                 began = time.perf_counter()

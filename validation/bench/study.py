@@ -42,7 +42,8 @@ def run_benchmark(
     minutes: float | None = None,
     on_progress: OnProgress = unheard,
 ) -> Benchmark:
-    """Measures `what`. `jobs` processes (default: one a core) play the longest runs side by side, all else runs alone.
+    """Measures `what`. `jobs` processes (default: one a core) play the longest runs side by side, all else runs alone; batches
+    by size run on one thread and on `jobs`.
 
     `minutes` (default 25, quick 2): runs that have not begun shortly before are left out and listed.
     """
@@ -52,7 +53,7 @@ def run_benchmark(
     if what in ("all", "ebm"):
         from rockcheck.validation.bench.ebm import ebm_speed
 
-        parts["ebm"] = ebm_speed(quick=quick, on_progress=on_progress)
+        parts["ebm"] = ebm_speed(quick=quick, jobs=jobs, on_progress=on_progress)
     if what in ("all", "skipping"):
         from rockcheck.validation.bench.skipping import skipping
 

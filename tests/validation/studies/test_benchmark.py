@@ -204,10 +204,11 @@ def test_the_page_holds_every_table_and_asks_nothing_of_others(tmp_path: Path) -
         wall_seconds=1.0,
         versions=provenance.versions(),
         hardware=provenance.hardware(),
-        ebm=EbmSpeed(1e-8, tuple(_times(CASES[0], 6, [])), (), batch_sizes((1, 20))),
+        ebm=EbmSpeed(1e-8, tuple(_times(CASES[0], 6, [])), (), batch_sizes((1, 20), jobs=3)),
         models=evaluated([*samples, failed], ()),
         savings=(Saving("cm", "wall", "ms", 2.0, 1.0),),
     )
+    assert [(row.runs, row.threads) for row in found.ebm.sizes] == [(1, 1), (1, 3), (20, 1), (20, 3)]  # as many as were asked for
     save(found, tmp_path)
     page = write_benchmark(found, tmp_path).read_text(encoding="utf-8")
     assert json.loads((tmp_path / "run.json").read_text(encoding="utf-8"))["suite"] == "benchmark all"
