@@ -141,7 +141,7 @@ class Pool:
 
     def _begin(self, waiting: deque[Call], running: dict[Future[Any], tuple[Call, float]]) -> None:
         """Gives calls to all idle processes. A call that waits for another one to compile is passed over."""
-        compiling = {call.compiles for call, _ in running.values()} - self._compiled
+        compiling = {call.compiles for call, _ in running.values() if call.compiles} - self._compiled
         held: list[Call] = []
         while waiting and len(running) < self.jobs:
             call = waiting.popleft()

@@ -157,10 +157,25 @@ def local(
     """
     if not tasks:
         return
-    calls = (Call(play, (task,), limit, compiled_by(task), n) for n, (task, limit) in enumerate(zip(tasks, seconds, strict=True)))
+    calls = (Call(play, (tasks[n],), seconds[n], compiled_by(tasks[n]), n) for n in in_order(tasks))
     with Pool(max(1, min(jobs, len(tasks))), memory_mb) as pool:
         for ended in pool.run(deque(calls)):
             yield ended.call.key, TaskResult(failure=ended.fault) if ended.error else ended.result
+
+
+def in_order(tasks: Sequence[Work]) -> list[int]:
+    """The numbers of the tasks as they are to begin.
+
+    One of each package that compiles goes first, since the others of it wait for that one; then what is not compiled, which takes
+    longest; the quick rest fills the processes up to the end.
+    """
+    first = {compiled_by(task): n for n, task in reversed(list(enumerate(tasks)))}
+
+    def turn(n: int) -> int:
+        package = compiled_by(tasks[n])
+        return 1 if not package else 0 if first[package] == n else 2
+
+    return sorted(range(len(tasks)), key=turn)
 
 
 def compiled_by(task: Work) -> str:
