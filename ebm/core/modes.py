@@ -234,8 +234,11 @@ def _clean(b, z, floor):
     upright(b, z)
     if floor and abs(slip_velocity(b, z)) < SLOW:
         stand(b, z)
-    stands = floor and b.walls and z[THETA] != 0.0 and abs(z[W]) < SLOW
-    if stands and (closed_wall(b, z, 1, False) or closed_wall(b, z, -1, False)):
+    if not floor or not b.walls or (z[THETA] == 0.0 and z[W] == 0.0):
+        return
+    side = 1 if (z[THETA] if z[THETA] != 0.0 else z[W]) > 0.0 else -1
+    near, away = closed_wall(b, z, side, False), closed_wall(b, z, -side, True)
+    if (near and away) or (z[THETA] != 0.0 and abs(z[W]) < SLOW and (near or away)):
         stop(z)
 
 
