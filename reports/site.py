@@ -36,6 +36,8 @@ from rockcheck.validation.suite.results import Run
 DATA = Path(str(resources.files("rockcheck.reports"))) / "data"
 #: The folder beside `index.html` that holds everything else.
 PAGES = "pages"
+#: The page to open.
+INDEX = "index.html"
 #: Columns of an ensemble's table: measure and title.
 STATISTICS_SHOWN = (
     ("overturning_accuracy", "agreement"),
@@ -136,23 +138,26 @@ def write_site(folder: Path, *, jobs: int = 1, afresh: bool = True, on_progress:
     stamps = {name: pages.stamp(view) for name, view in pages.views.items()}
     waiting = {name: stamp for name, stamp in stamps.items() if afresh or _stamp_of(folder / _address(pages.views[name])) != stamp}
     for done, _ in enumerate(_write_pages(pages, waiting, jobs), 1):
-        on_progress(done, len(waiting))
+        on_progress(done, len(waiting) + 1)
     current = {f"{view.slug}.html" for view in pages.views.values()}
     for page in (folder / PAGES).glob("*.html"):
         if page.name not in current and _stamp_of(page):
             for name in (page.name, *_belongings(page)):
                 (folder / PAGES / name).unlink(missing_ok=True)
-    return pages.write_index()
+    return folder / INDEX
 
 
 def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterator[None]:
-    """Write these pages, each with its stamp, in processes of their own where that is quicker."""
+    """Write these pages, each with its stamp, and last the index, in processes of their own where that is quicker."""
     work = sum(PRINTED if pages.views[name].printed else 1 for name in stamps)
     if min(jobs, len(stamps)) < 2 or work < FEW:
         yield from map(pages.write, stamps, stamps.values())
+        pages.write_index()
+        yield
         return
+    calls = [Call(_write_page, (pages.folder, name, stamp)) for name, stamp in stamps.items()]
     with Pool(min(jobs, len(stamps))) as pool:
-        for ended in pool.run(deque(Call(_write_page, (pages.folder, name, stamp)) for name, stamp in stamps.items())):
+        for ended in pool.run(deque([*calls, Call(_write_index, (pages.folder,))])):
             if ended.error is not None:
                 raise ended.error
             yield
@@ -202,7 +207,7 @@ class _Pages:
     def _page(self, view: View, stamp: str, template: str, **context: Any) -> None:
         self.site.page(_address(view), template, view=view, stamp=stamp, **context, **_common(self.run))
 
-    def write_index(self) -> Path:
+    def write_index(self) -> None:
         """The page to open, which shows when the run was."""
         scenes = [view for view in self.views.values() if isinstance(view, SceneView)]
         ensembles = [view for view in self.views.values() if isinstance(view, EnsembleView)]
@@ -210,7 +215,7 @@ class _Pages:
         summaries = {model: FAMILIES[model].summary for model in self.run.models if model in FAMILIES}
         shown: dict[str, Any] = {"scenes": scenes, "ensembles": ensembles, "worst": worst, "times": times, "summaries": summaries}
         shown |= write_overview(self.run, _made(self.folder / PAGES / "figures"))
-        return self.site.page("index.html", "index.html", **shown, **_common(self.run))
+        self.site.page(INDEX, "index.html", **shown, **_common(self.run))
 
     def stamp(self, view: View) -> str:
         """Hash of all that a page shows and of the code that draws it; not when the run was, nor what was read back."""
@@ -239,6 +244,10 @@ def _pages_of(folder: Path) -> _Pages:
 
 def _write_page(folder: Path, name: str, stamp: str) -> None:
     _pages_of(folder).write(name, stamp)
+
+
+def _write_index(folder: Path) -> None:
+    _pages_of(folder).write_index()
 
 
 @cache
