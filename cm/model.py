@@ -102,7 +102,7 @@ class ContinuousModel(Frozen):
         """
         began = time.perf_counter()
         from rockcheck.cm import kernels
-        from rockcheck.scenes.compiled import interruptible
+        from rockcheck.scenes.threads import interruptible
 
         times = scene.output_times
         parameters = self._parameters(scene)

@@ -19,10 +19,11 @@ from rockcheck.ebm.core.ground import Ground
 from rockcheck.ebm.core.march import DONE, FAILURES, OVERTURNED, Control, run
 from rockcheck.ebm.core.motion import Setting, Side, workspace
 from rockcheck.ebm.model import EventBasedModel
-from rockcheck.scenes.compiled import kernel, threads
+from rockcheck.scenes.compiled import kernel
 from rockcheck.scenes.errors import InputError, ModelFailure
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.scene import Scene
+from rockcheck.scenes.threads import threads
 
 Floats = NDArray[np.float64]
 _CHUNK = 256

@@ -15,9 +15,10 @@ from rockcheck.ebm.core.march import FAILURES, OVERTURNED, Control, run
 from rockcheck.ebm.core.motion import THETA, X, workspace
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes import kinematics
-from rockcheck.scenes.compiled import kernel, threads
+from rockcheck.scenes.compiled import kernel
 from rockcheck.scenes.errors import ModelFailure
 from rockcheck.scenes.scene import Scene
+from rockcheck.scenes.threads import threads
 
 Floats = NDArray[np.float64]
 _CHUNK = 32

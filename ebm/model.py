@@ -115,7 +115,7 @@ class EventBasedModel(Frozen):
         start = time.perf_counter()
         from rockcheck.ebm import natural
         from rockcheck.ebm.core import bouc_wen, march, motion
-        from rockcheck.scenes.compiled import interruptible
+        from rockcheck.scenes.threads import interruptible
 
         b = natural.setting_of(
             scene,

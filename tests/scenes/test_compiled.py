@@ -21,7 +21,7 @@ import pytest
 
 from rockcheck import ebm
 from rockcheck.ebm.core import march
-from rockcheck.scenes import compiled
+from rockcheck.scenes import compiled, threads
 from rockcheck.scenes.progress import announce, announcing
 from rockcheck.validation.commands.cli import main
 from rockcheck.validation.execute.pool import Call, Pool
@@ -246,7 +246,8 @@ def test_the_wait_for_compiled_code_can_be_interrupted(tmp_path):
 
 _SLOW = """
 import os, sys
-from rockcheck.scenes.compiled import interruptible, kernel, threads
+from rockcheck.scenes.compiled import kernel
+from rockcheck.scenes.threads import interruptible, threads
 
 @kernel
 def spin(count):
@@ -270,22 +271,22 @@ except KeyboardInterrupt:
 
 
 def test_an_interruptible_call_is_the_call_itself():
-    assert compiled.interruptible(lambda: 3) == 3
+    assert threads.interruptible(lambda: 3) == 3
     with pytest.raises(ZeroDivisionError):
-        compiled.interruptible(lambda: 1 // 0)
+        threads.interruptible(lambda: 1 // 0)
 
 
 def test_interruptible_calls_share_a_thread_and_a_forked_process_has_its_own():
-    first = compiled.interruptible(threading.get_ident)
+    first = threads.interruptible(threading.get_ident)
     assert first != threading.get_ident()
     with pytest.raises(ZeroDivisionError):
-        compiled.interruptible(lambda: 1 // 0)
-    assert compiled.interruptible(threading.get_ident) == first
+        threads.interruptible(lambda: 1 // 0)
+    assert threads.interruptible(threading.get_ident) == first
     if hasattr(os, "fork"):
         child = os.fork()
         if child == 0:
             signal.alarm(60)
-            os._exit(compiled.interruptible(lambda: 7))
+            os._exit(threads.interruptible(lambda: 7))
         assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
 
 
@@ -295,8 +296,8 @@ def test_the_call_after_an_interrupted_one_works_while_that_one_goes_on():
     previous = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
-            compiled.interruptible(lambda: (os.kill(os.getpid(), signal.SIGINT), released.wait(60.0)))
-        assert compiled.interruptible(lambda: 3) == 3
+            threads.interruptible(lambda: (os.kill(os.getpid(), signal.SIGINT), released.wait(60.0)))
+        assert threads.interruptible(lambda: 3) == 3
         assert not released.is_set()
     finally:
         released.set()

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.spectrum import play_motions
 from rockcheck.scenes import InputError
-from rockcheck.scenes.compiled import kernel
 from rockcheck.scenes.reading import read_arrays
 from rockcheck.scenes.writing import write_whole
 
@@ -41,45 +40,21 @@ class Glimpse:
 
 def glimpses(spectrum: Spectrum, model: EventBasedModel) -> list[Glimpse]:
     """Histories of `KEPT_AN_AXIS` nodes an axis, where the model could play them."""
+    from rockcheck.validation.spectra.thinning import enough  # needs numba, which a page of what is kept does not
+
     i, j = (nodes.ravel() for nodes in np.meshgrid(*map(_spread, spectrum.outcomes.shape), indexing="ij"))
     played = play_motions(spectrum.scene, spectrum.amplitude_ratios[i], spectrum.frequency_ratios[j], model=model, parts=PARTS)
     found = []
     for row, column, motion in zip(i.tolist(), j.tolist(), played, strict=True):
         if motion is not None:
             block, rows = motion.block, motion.rows
-            enough = _enough(rows[:, 0].copy(), rows[:, 1:] / np.array([block.alpha, block.half_width, block.half_width]))
-            found.append(Glimpse(row, column, motion.outcome, rows[enough]))
+            few = enough(rows[:, 0].copy(), rows[:, 1:] / np.array([block.alpha, block.half_width, block.half_width]), COARSE)
+            found.append(Glimpse(row, column, motion.outcome, rows[few]))
     return found
 
 
 def _spread(size: int) -> NDArray[np.int64]:
     return np.unique(np.round(np.linspace(0, size - 1, min(size, KEPT_AN_AXIS))).astype(np.int64))
-
-
-@kernel
-def _enough(t: Floats, values: Floats) -> NDArray[np.bool_]:
-    """Which rows to keep: from the first and last row on, each part is split at the row farthest from its straight line."""
-    kept = np.zeros(len(t), dtype=np.bool_)
-    kept[0] = kept[-1] = True
-    waiting = np.empty((len(t), 2), dtype=np.int64)
-    waiting[0, 0], waiting[0, 1] = 0, len(t) - 1
-    count = 1
-    while count > 0:
-        count -= 1
-        first, last = waiting[count, 0], waiting[count, 1]
-        worst, farthest = first, COARSE
-        for row in range(first + 1, last):
-            share = (t[row] - t[first]) / (t[last] - t[first])
-            for k in range(values.shape[1]):
-                apart = abs(values[row, k] - ((1.0 - share) * values[first, k] + share * values[last, k]))
-                if apart > farthest:
-                    worst, farthest = row, apart
-        if worst > first:
-            kept[worst] = True
-            waiting[count, 0], waiting[count, 1] = first, worst
-            waiting[count + 1, 0], waiting[count + 1, 1] = worst, last
-            count += 2
-    return kept
 
 
 def kept(path: Path, key: str) -> bool:

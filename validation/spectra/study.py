@@ -22,9 +22,9 @@ from rockcheck.ebm import EventBasedModel, Spectrum, overturning_spectrum
 from rockcheck.ebm.horizon import other_law
 from rockcheck.ebm.spectrum import LEFT, RIGHT, TOLERANCE, Floats
 from rockcheck.scenes import Floor, InputError, Ricker, Scene, Wall
-from rockcheck.scenes.compiled import threads
 from rockcheck.scenes.reading import read_arrays
 from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.scenes.threads import threads
 from rockcheck.scenes.writing import table_text, write_whole
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.execute import provenance

@@ -19,11 +19,11 @@ from rich.table import Table
 from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT
 from rockcheck.scenes import InputError, load_scene
-from rockcheck.scenes.compiled import threads
 from rockcheck.scenes.errors import unknown_name
 from rockcheck.scenes.progress import Count
 from rockcheck.scenes.recordings import Reading, Recording
 from rockcheck.scenes.recordings.sets import files_of, motions_of
+from rockcheck.scenes.threads import threads
 from rockcheck.scenes.writing import table_text, write_whole
 from rockcheck.validation.commands import (
     OUT,
