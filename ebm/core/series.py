@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from rockcheck.scenes.compiled import inner_kernel
+from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 #: Width of the arrays that hold a polynomial: orders up to 28, and two numbers that the root search keeps behind them.
 MOST_TERMS = 32
@@ -130,7 +130,7 @@ def _order_of_zero(a, row, n, floor, ahead):
     return n + 1
 
 
-@inner_kernel
+@called_kernel
 def first_root(a, row, n, h, floor, ahead, stack):
     """The first tau in [0, h] at which c turns negative, or NO_ROOT.
 
