@@ -240,6 +240,7 @@ def _clean(b, z, floor):
     near, away = closed_wall(b, z, side, False), closed_wall(b, z, -side, True)
     if (near and away) or (z[THETA] != 0.0 and abs(z[W]) < SLOW and (near or away)):
         stop(z)
+        upright(b, z)
 
 
 @inner_kernel
