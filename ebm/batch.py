@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import get_type_hints
+from typing import Any, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,7 +97,7 @@ def pack(scenes: Sequence[Scene], model: EventBasedModel) -> Packed:
             rows.append((*ground[:-1], offset, len(ground.samples)))
             bank.append(ground.samples)
             offset += len(ground.samples)
-    settings = [_setting(scene, model)[:-1] for scene in scenes]
+    settings = [_without_law(_setting(scene, model)) for scene in scenes]
     return Packed(
         settings=np.array(settings, dtype=SETTING),
         law=natural.law_of(model.pivot == "unilateral", model.impacts),
@@ -125,9 +125,10 @@ def pack_pulses(scene: Scene, model: EventBasedModel, amplitudes: Floats, period
     horizontal["centre"] *= periods
     horizontal["quiet"] *= periods
     _, still = natural.grounds_of(scene)
+    setting = _setting(scene, model)
     return Packed(
-        settings=np.repeat(np.array([_setting(scene, model)[:-1]], dtype=SETTING), count),
-        law=natural.law_of(model.pivot == "unilateral", model.impacts),
+        settings=np.repeat(np.array([_without_law(setting)], dtype=SETTING), count),
+        law=setting.law,
         horizontal=horizontal,
         vertical=np.repeat(np.array([(*still[:-1], 1, len(still.samples))], dtype=GROUND), count),
         states=np.tile(natural.state_of(scene), (count, 1)),
@@ -144,6 +145,11 @@ def _setting(scene: Scene, model: EventBasedModel) -> Setting:
         energy_cap=model.energy_cap,
         impacts=model.impacts,
     )
+
+
+def _without_law(setting: Setting) -> tuple[Any, ...]:
+    """A row of `SETTING`. The law, the last field, is the same for all rows, and its type tells what is compiled."""
+    return setting[:-1]
 
 
 def run_batch(

@@ -144,7 +144,7 @@ class EventBasedModel(Frozen):
             return march.run(b, horizontal, vertical, state, scene.duration / unit, control, out, out_mode, log, *scratch)
 
         ready, cpu = time.perf_counter(), time.process_time()
-        # Each sample of a record is a step. What takes few runs here at once: to hand it over takes longer.
+        # A run of few steps is played here: to hand it over takes longer. Each sample of a record is a step.
         few = min(self.most_steps, _AT_ONCE if max(len(horizontal.samples), len(vertical.samples)) < _AT_ONCE else 0)
         tally = play(few) if few else None
         if tally is None or (tally.ending == march.TOO_MANY_STEPS and few < self.most_steps):

@@ -212,7 +212,7 @@ def test_no_folder_that_could_be_foreseen(tmp_path, play):
 
 
 def test_without_the_compiler(play):
-    play("interpreted", NUMBA_DISABLE_JIT="1")
+    assert play("interpreted", NUMBA_DISABLE_JIT="1") == ""
 
 
 def test_everything_can_be_imported_without_the_compiler():
