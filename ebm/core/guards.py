@@ -77,8 +77,8 @@ _COMBINES = np.array(
 _MOST = 3
 # The columns of the table: the weight of each series, a constant, and how many terms fewer than the order the guard has (-1: no guard).
 _CONSTANT, _SHORTER = 30, 31
-#: The weight with which the noise of forces hides no base acceleration: nothing is rounded in it.
-_ANY = 2.0**60
+#: The weight with which the noise of forces hides no base acceleration: nothing is rounded in it. Its square is a number, too.
+_ANY = 2.0**400
 
 
 @inner_kernel
