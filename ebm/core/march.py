@@ -90,6 +90,7 @@ from rockcheck.ebm.core.running import (
     SLIPS,
     STEPS,
     STICKS,
+    STRIDE,
     SWING,
     SWUNG,
     T_REST,
@@ -115,6 +116,8 @@ __all__ = ["DONE", "EVENT_NAMES", "FAILURES", "MODE_NAMES", "OVERTURNED", "TOO_M
 
 #: Events that are changes of mode and nothing else.
 _CHANGES = (UPLIFT, SLIPS, LIFT_OFF, RELEASE)
+#: A step reaches at most so many times as far as the last ones went: where a block rattles, its series need few terms.
+_FARTHER = 8.0
 
 
 @kernel
@@ -126,23 +129,23 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack, yields=None)
     displacement; without it the loop is compiled for Coulomb's.
     """
     # Parts of two arrays: to make one takes as long as a fifth of a step.
-    reals, whole = np.zeros(9 + MEMORY + 16), np.zeros(MODE_SIZE + 7 + RULES, dtype=np.int64)
+    reals, whole = np.zeros(10 + MEMORY + 16), np.zeros(MODE_SIZE + 7 + RULES, dtype=np.int64)
     r = Run(
         z,
         whole[:MODE_SIZE],
-        reals[:9],
+        reals[:10],
         whole[MODE_SIZE : MODE_SIZE + 7],
         whole[MODE_SIZE + 7 :],
         np.zeros(MODES, dtype=np.bool_),
-        reals[9 : 9 + MEMORY],
-        reals[9 + MEMORY : 15 + MEMORY],
-        reals[15 + MEMORY : 17 + MEMORY],
-        reals[17 + MEMORY : 19 + MEMORY],
-        reals[19 + MEMORY :],
+        reals[10 : 10 + MEMORY],
+        reals[10 + MEMORY : 16 + MEMORY],
+        reals[16 + MEMORY : 18 + MEMORY],
+        reals[18 + MEMORY : 20 + MEMORY],
+        reals[20 + MEMORY :],
     )
     now = r.now
     now[T_REST] = now[ZETA] = now[SWUNG] = now[PIVOT] = np.nan
-    now[PEAK], now[QUIET] = abs(z[THETA]), quiet_from(gh, gv, control.tolerance)
+    now[PEAK], now[QUIET], now[STRIDE] = abs(z[THETA]), quiet_from(gh, gv, control.tolerance), np.inf
     no_impacts(r.rattle)
     records = Records(out, out_mode, log)
     for k in range(a.shape[1]):  # the series of 1 + vertical acceleration: of a still base it stays as it is
@@ -220,7 +223,7 @@ def _rest(b, gh, r, t_end, control, records):
     if until >= t_end:
         now[T] = t_end if not control.until_decided else now[T]
         return DONE
-    now[T] = until
+    now[T], now[STRIDE] = until, np.inf
     leave(m, r.tried, r.memory, until, FORCE)
     return _change(r, LEAVES_REST, 0)
 
@@ -265,7 +268,7 @@ def _step(b, gh, gv, r, t_end, control, yields, records, a, stack):
     t = now[T]
     end = min(min(next_kink(gh, t), next_kink(gv, t)), t_end)
     if yields is None:
-        order, pivot, h = _expand(b, m, z, gh, gv, t, end - t, control, a)
+        order, pivot, h = _expand(b, m, z, gh, gv, t, min(end - t, _FARTHER * now[STRIDE]), control, a)
     else:
         order, pivot, h = bouc_wen.expand(b, gh, gv, r, end - t, control, yields, a)
     if not h > 0.0:  # no step is good for a series that is not finite
@@ -279,6 +282,7 @@ def _step(b, gh, gv, r, t_end, control, yields, records, a, stack):
     whole = which < 0 and tau >= end - t
     _sample(b, r, t, end if whole else t + tau, order, pivot, control, records, a)
     _advance(b, r, order, pivot, tau, control, a, stack)
+    now[STRIDE] = max(tau, 0.25 * min(now[STRIDE], h))
     now[T] = end if whole else t + tau
     if yields is not None:
         bouc_wen.wind_up(r, order, tau, control.tolerance, records.log, a)

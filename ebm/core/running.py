@@ -96,8 +96,9 @@ class Records(NamedTuple):
 
 
 # The clock: time, largest |theta|, largest |omega| since the last event, since when it rests, from when the base is quiet; the
-# variable z of Bouc-Wen friction; energy and pivot of the last swing on a quiet base, and whether it was as the one before it.
-T, PEAK, SWING, T_REST, QUIET, ZETA, SWUNG, PIVOT, REPEATS = range(9)
+# variable z of Bouc-Wen friction; energy and pivot of the last swing on a quiet base, and whether it was as the one before it; how long
+# the last steps were.
+T, PEAK, SWING, T_REST, QUIET, ZETA, SWUNG, PIVOT, REPEATS, STRIDE = range(10)
 # The counts; with Bouc-Wen friction, whether the pivot has not yielded; the event
 # that has ended a mode, and that mode's code.
 STEPS, EVENTS, WALL_IMPACTS, ROWS, HOLDS, KIND, BEFORE = range(7)

@@ -97,8 +97,9 @@ def touch(b, m, z, which):
         arms = side.radius * math.cos(side.alpha - phi) + side.top_radius * math.cos(side.top_alpha + phi)
         turned = phi + wall_gap(b, z, m[S]) / arms
         if turned > 0.0:
-            z[X], z[THETA] = sign * (pivot + side.radius * math.sin(side.alpha - turned)), sign * turned
-            z[HEIGHT] = side.radius * math.cos(side.alpha - turned)
+            s, c = side.radius * math.sin(side.alpha - turned), side.radius * math.cos(side.alpha - turned)
+            z[X], z[HEIGHT], z[THETA] = sign * (pivot + s), c, sign * turned
+            z[VX], z[VY] = -c * z[W], s * sign * z[W]  # else the pivot would approach the floor, or leave it, by the correction
         else:  # past upright it would stand on its other corner, without an impact
             z[X] -= sign * wall_gap(b, z, m[S])
     elif which == G_TIP_GAP or which == G_FAR_GAP:
