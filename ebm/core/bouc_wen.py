@@ -448,7 +448,7 @@ def locate(b, m, order, h, slack, a, stack):
     if m[FLOOR] == SLIPPING and m[SLIP] * a[Z, 0] <= -NOISE[POSITION]:
         for k in range(order):
             a[GUARD, k] = -m[SLIP] * a[Z, k]
-        root = first_root(a, GUARD, order - 1, tau, NOISE[POSITION], AHEAD, stack)
+        root = first_root(a, GUARD, order - 1, tau, tau, NOISE[POSITION], AHEAD, stack)
         if root != NO_ROOT:
             return root, G_LOADS
     return tau, which

@@ -267,7 +267,7 @@ def first_event(order, h, slack, a, stack):
         if degree >= 0:
             noise = _with_slack(k, slack, a)
             # Compared in h, not tau: a mirror image has its guards in another order.
-            root = first_root(a, GUARD, degree, h, noise, seen(KIND[k], h), stack)
+            root = first_root(a, GUARD, degree, h, tau, noise, seen(KIND[k], h), stack)
             closes = 0 <= which <= G_FAR_GAP < k
             if root != NO_ROOT and root < tau - (INSTANT if closes else 0.0):
                 tau, which = root, k

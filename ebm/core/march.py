@@ -108,7 +108,7 @@ from rockcheck.ebm.core.running import (
     mode_code,
     note,
 )
-from rockcheck.ebm.core.series import AHEAD, FORCE, NO_ROOT, NOISE, POSITION, first_root, slope, stays_below, step_size, value
+from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, POSITION, first_root, slope, stays_below, step_size, value
 from rockcheck.ebm.core.settle import no_impacts, settling_speed
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
@@ -282,7 +282,7 @@ def _step(b, gh, gv, r, t_end, control, yields, records, a, stack):
     whole = which < 0 and tau >= end - t
     _sample(b, r, t, end if whole else t + tau, order, pivot, control, records, a)
     _advance(b, r, order, pivot, tau, control, a, stack)
-    now[STRIDE] = max(tau, 0.25 * min(now[STRIDE], h))
+    now[STRIDE] = max(tau, INSTANT, 0.25 * min(now[STRIDE], h))
     now[T] = end if whole else t + tau
     if yields is not None:
         bouc_wen.wind_up(r, order, tau, control.tolerance, records.log, a)
@@ -323,7 +323,7 @@ def _locate(b, m, order, pivot, h, slack, a, stack):
     """The first time within the step at which a guard ends the mode, and which; h and -1 where none does."""
     rocks = m[FAMILY] == TILT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
     if rocks and m[PULL] > 0 and rock_guards_hold(b, m, pivot, order, h, a):
-        tau = first_root(a, PHI, order, h, min(slack * NOISE[POSITION], CLOSED), AHEAD, stack)
+        tau = first_root(a, PHI, order, h, h, min(slack * NOISE[POSITION], CLOSED), AHEAD, stack)
         return (h, -1) if tau == NO_ROOT else (tau, G_PHI)
     fill_guards(b, m, pivot, a)
     return first_event(order, h, slack, a, stack)
@@ -363,7 +363,7 @@ def _advance(b, r, order, pivot, tau, control, a, stack):
     z, now = r.z, r.now
     turns = r.m[FAMILY] == TILT and a[OMEGA, 0] > 0.0 and value(a, OMEGA, order - 1, tau) < 0.0
     if turns and not stays_below(a, PHI, order, tau, now[PEAK]):
-        top = first_root(a, OMEGA, order - 1, tau, NOISE[POSITION], AHEAD, stack)
+        top = first_root(a, OMEGA, order - 1, tau, tau, NOISE[POSITION], AHEAD, stack)
         if top > 0.0:
             now[PEAK] = max(now[PEAK], value(a, PHI, order, top))
     if turns and control.until_decided:

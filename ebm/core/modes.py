@@ -261,10 +261,11 @@ def select(b, z, gh, gv, t, m, tried, memory, rules, a):
     for trial in range(3):  # one that fits; else that which is wrong by least, among those not tried and those tried
         again = trial == 2
         for number in range(begin, end):
+            tilts = _CANDIDATES[number, 0] == TILT
+            walls = (near if _CANDIDATES[number, 1] > 0 else away) if tilts else upright_walls
+            if tilts and (favoured == 0 or _CANDIDATES[number, 5] & ~walls):
+                continue  # where nothing tells left from right a block does not tilt; nor does it lean on a wall that it does not touch
             _write(number, first, m)
-            if m[FAMILY] == TILT and favoured == 0:
-                continue  # where nothing tells left from right a block does not tilt
-            walls = upright_walls if m[FAMILY] == FLAT else (near if m[S] == first else away)
             if tried[code_of(m)] != again or not _possible(b, m, z, v, floor, walls):
                 continue
             wrong = wrong_by(b, m, z, gh, gv, t, trial > 0, a)

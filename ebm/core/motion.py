@@ -17,8 +17,8 @@ its slenderness, whichever the corner), the contacts are
 
 where a triple gives the force on xi, y and the moment about the centroid (relative to unit force), and also the row of the
 constraint. A slipping pivot adds Q = -mu_k d |P|. Newton-Euler with these forces and constraints *is* the paper's (3) in
-ROCK, (7) and (8) in SLIDE-ROCK and the equations of LEAN and LADDER; tests hold the closed forms against it. Only ROCK is
-written out, for speed. While the block is *flat* (theta = 0, both corners down or both walls' corners touching) it
+ROCK, (7) and (8) in SLIDE-ROCK and the equations of LEAN and LADDER; tests hold the closed forms against it. ROCK and
+SLIDE-ROCK are written out, for speed. While the block is *flat* (theta = 0, both corners down or both walls' corners touching) it
 only translates.
 """
 
@@ -170,6 +170,8 @@ def tilt_series(b, m, z, gh, gv, t, order, enough, reach, a):
     a[Y, 1] = z[VY]
     if m[FLOOR] == STICK and m[TIP] != m[FAR]:
         return _lean_series(b, side, m[TIP] != 0, order, a)
+    if m[FLOOR] == SLIPPING and m[TIP] == 0 and m[FAR] == 0:
+        return _slide_series(b.spin, b.mu_k * m[SLIP] * m[PULL], order, enough, reach, a)
     return _contact_series(b, side, m, order, enough, reach, a)
 
 
@@ -236,6 +238,44 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
             a[P, k] = (k + 2) * (k + 1) * a[COS, k + 2] + a[G, k]
             a[Q, k] = (k + 2) * (k + 1) * a[SIN, k + 2] + a[U, k]
         a[P, order - 1] = a[P, order] = a[Q, order - 1] = a[Q, order] = 0.0
+    return order
+
+
+@inner_kernel
+def _slide_series(spin, kappa, order, enough, reach, a):
+    """SLIDE-ROCK, (7): of the contacts only the pivot's acts, with P and Q = -kappa P. The general solution, written out for speed."""
+    sine, cosine = a[SIN, 0], a[COS, 0]
+    arm = sine + kappa * cosine
+    share = 1.0 / (1.0 + spin * sine * arm)
+    a[PHI, 1], a[SIN, 1], a[COS, 1] = a[OMEGA, 0], -a[OMEGA, 0] * cosine, a[OMEGA, 0] * sine
+    scale = 1.0
+    small = 0
+    for k in range(order - 1):
+        # The rates of sine and cosine at order k + 1 lack only the term of phi's acceleration at order k, the unknown.
+        ds = dc = moment = 0.0
+        i = k
+        for j in range(1, k + 1):
+            ds -= a[OMEGA, j] * a[COS, i]
+            dc += a[OMEGA, j] * a[SIN, i]
+            moment -= (a[SIN, j] + kappa * a[COS, j]) * a[P, i - 1]
+            i -= 1
+        ds -= a[OMEGA, 0] * a[COS, k + 1]
+        dc += a[OMEGA, 0] * a[SIN, k + 1]
+        push = share * (dc * (k + 1.0) + a[G, k] + sine * spin * moment)
+        turn, slide, rise = spin * (moment - arm * push), -a[U, k] - kappa * push, push - a[G, k]
+        a[P, k], a[Q, k] = push, -kappa * push
+        once, twice = RECIPROCAL[k + 1], RECIPROCAL[k + 1] * RECIPROCAL[k + 2]
+        a[XI, k + 2], a[Y, k + 2] = slide * twice, rise * twice
+        a[OMEGA, k + 1], a[PHI, k + 2] = turn * once, turn * twice
+        a[SIN, k + 2] = (ds - turn * once * cosine) * RECIPROCAL[k + 2]
+        a[COS, k + 2] = (dc + turn * once * sine) * RECIPROCAL[k + 2]
+        scale *= reach
+        size = abs(turn) + abs(slide) + abs(rise) + abs(a[SIN, k + 1]) + abs(a[COS, k + 1]) + abs(push) + abs(kappa * push)
+        small = small + 1 if size * scale < enough else 0
+        if small == 3:
+            order = k + 2
+            break
+    a[OMEGA, order] = a[P, order - 1] = a[P, order] = a[Q, order - 1] = a[Q, order] = 0.0
     return order
 
 

@@ -131,22 +131,26 @@ def _order_of_zero(a, row, n, floor, ahead):
 
 
 @called_kernel
-def first_root(a, row, n, h, floor, ahead, stack):
-    """The first tau in [0, h] at which c turns negative, or NO_ROOT.
+def first_root(a, row, n, h, until, floor, ahead, stack):
+    """The first tau in [0, h] at which c turns negative, or NO_ROOT; where that is after `until`, either.
 
     A zero at tau = 0 (within `floor`) is divided out: 0.0 comes back only where c leaves it downward. `stack` is scratch of shape
     (>= 48, MOST_TERMS). The search is complete: an interval is dropped only where a bound on the polynomial, or on its
     slope and end value, shows that it holds no root. Touching zero without crossing is no root.
     """
-    low = 0.0
-    for k in range(n, 0, -1):  # c_k + tau (c_k+1 + ...) >= c_k + h min(0, ...)
-        low = min(low + a[row, k], 0.0) * h
-    if a[row, 0] > floor and a[row, 0] + low > _ERROR * a[row, 0]:
-        return NO_ROOT
+    if a[row, 0] > floor:
+        low = 0.0
+        for k in range(n, 0, -1):  # c_k + tau (c_k+1 + ...) >= c_k + until min(0, ...)
+            low = min(low + a[row, k], 0.0) * until
+        if a[row, 0] + low > _ERROR * a[row, 0]:
+            return NO_ROOT
     zeros = _order_of_zero(a, row, n, floor, ahead)
     lift = 0.0
     if zeros > n:
         # Noise within AHEAD may grow beyond noise in a long step.
+        low = 0.0
+        for k in range(n, 0, -1):
+            low = min(low + a[row, k], 0.0) * h
         if a[row, 0] + low > -floor:
             return NO_ROOT
         zeros, lift = 0, floor if a[row, 0] > -floor else floor - a[row, 0]

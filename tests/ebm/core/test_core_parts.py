@@ -53,7 +53,8 @@ class Core:
     @staticmethod
     def first_root(coefficients, h: float, noise: float = series.NOISE[series.POSITION]) -> float | None:
         """First time in [0, h] at which the polynomial (constant first) turns negative."""
-        found = series.first_root(_row(coefficients), 0, len(coefficients) - 1, h, noise, series.AHEAD, np.zeros((48, series.MOST_TERMS)))
+        row, stack = _row(coefficients), np.zeros((48, series.MOST_TERMS))
+        found = series.first_root(row, 0, len(coefficients) - 1, h, h, noise, series.AHEAD, stack)
         return None if found == series.NO_ROOT else found
 
     @staticmethod
@@ -572,6 +573,45 @@ def test_selection_of_a_flat_block_at_a_wall(pivot, side):
     assert (modes["pressed"].tip, modes["pressed"].far) == (side > 0, side < 0)
     assert modes["away"].name == "slide"
     assert (modes["away"].slip, modes["away"].tip, modes["away"].far) == (side, False, False)
+
+
+@pytest.mark.parametrize("mode", [("stick", 0, 1), ("slip", 1, 1), ("slip", -1, 1), ("slip", 1, -1), ("off", 0, 1)], ids=str)
+def test_series_obey_newton_and_euler_in_every_term(mode):
+    """Rock, slide-rock and flight: forces and motion, contacts and Coulomb's law hold as polynomials of time, not only at the start."""
+    floor, slip, pull = mode
+    block, phi, w, v = Block(half_width=0.6, half_height=0.8), 0.2, -0.3, 0.4 * slip
+    core = Core(
+        Scene(
+            name="series",
+            block=block,
+            floor=Floor(friction=0.3),
+            excitation=Ricker(amplitude=0.7, period=2.0),
+            vertical=Ricker(amplitude=0.2, period=1.5),
+            duration=1.0,
+            gravity=1.0,
+        ),
+        "unilateral",
+    )
+    s, c = math.sin(block.alpha - phi), math.cos(block.alpha - phi)
+    core.guards(Mode(True, 1, floor, slip, pull, tip=False, far=False), (0.0, c, phi, v - c * w, s * w, w))
+    rows = {name: core.work[getattr(motion, name), : ORDER + 1] for name in ("PHI", "OMEGA", "SIN", "COS", "XI", "Y", "P", "Q", "U", "G")}
+    known = ORDER - 1  # accelerations have two terms fewer
+
+    def product(one, other):
+        return np.convolve(rows[one], rows[other])[:known]
+
+    def rate(name, times=1):
+        return np.polynomial.polynomial.polyder(rows[name], times)
+
+    np.testing.assert_allclose(rate("SIN")[:known], -product("OMEGA", "COS"), atol=1e-14)
+    np.testing.assert_allclose(rate("COS")[:known], product("OMEGA", "SIN"), atol=1e-14)
+    np.testing.assert_allclose(rate("PHI", 2), 3.0 * (product("COS", "Q") - product("SIN", "P")), atol=1e-13)
+    xi, y = (rate("SIN", 2), rate("COS", 2)) if floor == "stick" else (rate("XI", 2), rate("Y", 2))
+    np.testing.assert_allclose(xi, rows["Q"][:known] - rows["U"][:known], atol=1e-13)
+    np.testing.assert_allclose(y, rows["P"][:known] - rows["G"][:known], atol=1e-13)
+    if floor == "slip":
+        np.testing.assert_allclose(rows["Y"], rows["COS"], atol=1e-14)
+        np.testing.assert_allclose(rows["Q"], -0.3 * slip * pull * rows["P"], atol=1e-14)
 
 
 def test_flight_of_a_block_whose_floor_falls_away():
