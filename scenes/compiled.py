@@ -170,6 +170,32 @@ def _remove_old(folder: Path, package: str) -> None:
             shutil.rmtree(old, ignore_errors=True)
 
 
+def _call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
+    """The types of a call of one of numba's own functions, `operator.add` too: for the same arguments those of the call before.
+
+    numba tries all that such a function may mean, some ten things, at each place where it stands: a quarter of the time that the
+    event loop takes to compile.
+    """
+    known, asked = self.__dict__.setdefault("_rockcheck_known", {}), (args, tuple(kws.items()))
+    if asked not in known:
+        known[asked] = types.functions.BaseFunction.get_call_type(self, context, args, kws)
+    return known[asked]
+
+
+class _Compiler(Compiler):
+    """numba's own compiler, which looks up each kind of call once. Only one thread compiles: it holds numba's lock."""
+
+    def _compile_core(self) -> Any:
+        already = "get_call_type" in vars(types.Function)
+        if already:
+            return super()._compile_core()
+        types.Function.get_call_type = _call_type
+        try:
+            return super()._compile_core()
+        finally:
+            del types.Function.get_call_type
+
+
 class _Linked(JITCodeLibrary):
     """The code of an inner kernel, which is linked into the kernels that call it: no machine code is made of it alone.
 
@@ -201,8 +227,8 @@ class _Linked(JITCodeLibrary):
         """Nothing (see `codegen`)."""
 
 
-class _InnerCompiler(Compiler):
-    """numba's own compiler, whose result is linked only."""
+class _InnerCompiler(_Compiler):
+    """A compiler whose result is linked only."""
 
     def __init__(self, typing: Any, target: Any, library: Any, *about: Any) -> None:
         super().__init__(typing, target, library or _Linked(target.codegen(), "inner kernel"), *about)
@@ -280,7 +306,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     """
     if config.DISABLE_JIT:
         return np.errstate(all="ignore")(function)
-    compiled = numba.njit(nogil=True, error_model="numpy", _nrt=True, no_cfunc_wrapper=True)(function)
+    compiled = numba.njit(nogil=True, error_model="numpy", _nrt=True, no_cfunc_wrapper=True, pipeline_class=_Compiler)(function)
     folder = _cache_folder(_package(function))
     if folder is not None:
         compiled._cache = _Cache(function, folder)

@@ -48,6 +48,8 @@ def stop(z):
 def wall_gap(b, z, side):
     """The clear gap between the wall on `side` (+1 left, -1 right) and the corner that faces it; infinite without a wall."""
     gap, faces = b.gap_left if side > 0 else b.gap_right, side_of(b, side)
+    if gap == math.inf:
+        return gap
     radius, alpha = (faces.top_radius, faces.top_alpha) if side * z[THETA] > 0.0 else (faces.radius, faces.alpha)
     return side * z[X] + faces.arm + gap - radius * math.sin(alpha + abs(z[THETA]))
 
@@ -58,13 +60,14 @@ def closed_wall(b, z, side, bottom):
 
     A tilted block has one such corner; `bottom` picks, at theta = 0, the corner that keeps touching while it tilts away.
     """
+    if not abs(wall_gap(b, z, side)) < CLOSED:
+        return False
     phi, faces = side * z[THETA], side_of(b, side)  # positive: tips toward that wall, top corner
     if phi < 0.0 or (phi == 0.0 and bottom):
         arm = -faces.radius * math.cos(faces.alpha + abs(phi))
     else:
         arm = faces.top_radius * math.cos(faces.top_alpha + abs(phi))
-    rate = side * (z[VX] - arm * z[W])
-    return abs(wall_gap(b, z, side)) < CLOSED and abs(rate) < SLOW
+    return abs(z[VX] - arm * z[W]) < SLOW
 
 
 @inner_kernel
