@@ -38,7 +38,7 @@ def decided(b, m, z, gh, gv, t, quiet, peak):
         open_yet = t <= gh.quiet and (b.walls or abs(z[THETA]) >= peak)
         ahead = math.inf if open_yet or not still else impulse_ahead(gh, t)
     verdict = _by_energy(b, m, z, ahead, peak)
-    if verdict <= 0.0 and ahead > 0.0 and still and abs(z[THETA]) > side_of(b, z[THETA]).alpha:
+    if verdict <= 0.0 and still and abs(z[THETA]) > side_of(b, z[THETA]).alpha:
         verdict = _falls(b, m, z, gh, t)
     return verdict
 

@@ -191,3 +191,16 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
     with np.errstate(all="ignore"):
         run(setting, *natural.grounds_of(scene), natural.state_of(scene), 3.0, control, *nothing, *scratch)
     assert len(seen) > 30
+
+
+@pytest.mark.parametrize("settings", [{}, {"pivot": "unilateral"}, {"friction": "no-slip"}], ids=str)
+def test_a_block_that_falls_away_from_its_wall_is_decided_on_the_way(settings):
+    """On a base at rest, as soon as it is steeper than friction: whatever it does then turns it farther."""
+    model = EventBasedModel(**settings)
+    scene = scene_of(PAPER_BLOCK, 0.3, 10.0, walls=[Wall(side="left", gap=0.003)], initial_rotation=-1.05 * PAPER_BLOCK.alpha)
+    whole = model.simulate(scene)
+    assert whole.outcome == "overturned right"
+    decided = run_batch(pack([scene], model), model)
+    assert decided.side[0] == 1
+    assert decided.peak[0] == pytest.approx(0.5 * math.pi)
+    assert decided.t_end[0] * math.sqrt(PAPER_BLOCK.radius / scene.gravity) < whole.event_list[-1].t - 0.1
