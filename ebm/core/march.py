@@ -116,8 +116,9 @@ __all__ = ["DONE", "EVENT_NAMES", "FAILURES", "MODE_NAMES", "OVERTURNED", "TOO_M
 
 #: Events that are changes of mode and nothing else.
 _CHANGES = (UPLIFT, SLIPS, LIFT_OFF, RELEASE)
-#: A step reaches at most so many times as far as the last ones went: where a block rattles, its series need few terms.
-_FARTHER = 8.0
+#: A step reaches at most so many times as far as the last ones went: where a block rattles, its series need few terms. Of a longer
+#: step before, this share counts after each further one.
+_FARTHER, _FADES = 8.0, 0.25
 
 
 @kernel
@@ -282,7 +283,7 @@ def _step(b, gh, gv, r, t_end, control, yields, records, a, stack):
     whole = which < 0 and tau >= end - t
     _sample(b, r, t, end if whole else t + tau, order, pivot, control, records, a)
     _advance(b, r, order, pivot, tau, control, a, stack)
-    now[STRIDE] = max(tau, INSTANT, 0.25 * min(now[STRIDE], h))
+    now[STRIDE] = max(tau, INSTANT, _FADES * min(now[STRIDE], h))
     now[T] = end if whole else t + tau
     if yields is not None:
         bouc_wen.wind_up(r, order, tau, control.tolerance, records.log, a)

@@ -358,3 +358,18 @@ def test_what_is_compiled_ahead_is_not_compiled_again(capsys):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True)
     assert done.stdout == "0 True\n"
+
+
+def test_each_kind_of_call_is_typed_once(monkeypatch):
+    """numba tries all that an operator may mean; for the same types what it found goes for all places. Afterwards numba is as it was."""
+    plain, asked = numba.types.functions.BaseFunction.get_call_type, []
+
+    def counted(self, context, args, kws):
+        asked.append((str(self), args))
+        return plain(self, context, args, kws)
+
+    monkeypatch.setattr(numba.types.functions.BaseFunction, "get_call_type", counted)
+    powers = numba.njit(pipeline_class=compiled._Compiler)(lambda x: x * x * x * x - x * x)
+    assert powers(3.0) == 72.0
+    assert len(asked) == len(set(asked)) <= 2
+    assert "get_call_type" not in vars(numba.types.Function)

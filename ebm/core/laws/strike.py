@@ -86,6 +86,7 @@ def touch(b, m, z, which):
     """Puts the block onto the contact whose gap has just closed: the series knows the gap to the tolerance only.
 
     A standing pivot keeps its place if the rotation can take up the correction. Otherwise the pivot would creep, impact by impact.
+    It stands after it, too: else it would approach the floor, or leave it, by as much as the correction.
     """
     phi = abs(z[THETA])
     if which == G_LANDING:
@@ -99,7 +100,7 @@ def touch(b, m, z, which):
         if turned > 0.0:
             s, c = side.radius * math.sin(side.alpha - turned), side.radius * math.cos(side.alpha - turned)
             z[X], z[HEIGHT], z[THETA] = sign * (pivot + s), c, sign * turned
-            z[VX], z[VY] = -c * z[W], s * sign * z[W]  # else the pivot would approach the floor, or leave it, by the correction
+            z[VX], z[VY] = -c * z[W], s * sign * z[W]
         else:  # past upright it would stand on its other corner, without an impact
             z[X] -= sign * wall_gap(b, z, m[S])
     elif which == G_TIP_GAP or which == G_FAR_GAP:
