@@ -28,7 +28,7 @@ FINEST = 1e-15
 class EventBasedModel(Frozen):
     """The paper's Event-Based Model and its extensions.
 
-    `tolerance` bounds the local truncation error of each Taylor step, in natural units (rotation in rad, lengths in R).
+    `tolerance` bounds the local truncation error of each Taylor step: of a rotation in alpha, of a length in alpha R.
     `pivot`: "bilateral" is the paper's model, in which the pivot never leaves the floor; "unilateral" lets the floor only
     push, so that the block may hop. `friction`: "coulomb" switches exactly between stick and slip, "bouc-wen" is the paper's
     regularisation (9) with the `yield_displacement` u_y in m, "no-slip" is Housner's block. `impacts` (unilateral) is the law of

@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 
 from rockcheck.ebm.core.contacts import SLOW, closed_wall, slip_velocity, stop, upright
-from rockcheck.ebm.core.ground import acceleration, acceleration_after, fill_series
+from rockcheck.ebm.core.ground import acceleration, acceleration_after, fill_series, weightless_at
 from rockcheck.ebm.core.guards import (
     G_CONE_MINUS,
     G_CONE_PLUS,
@@ -233,6 +233,14 @@ def _rest(b, m, z, gv, t):
 
 
 @inner_kernel
+def _waits(z, gv, r):
+    """The time at which a block at rest may move. Friction fails as the push of the floor ends: what moves in between is rounding."""
+    if z[THETA] == 0.0 and z[W] == 0.0 and z[VX] == 0.0:
+        r.now[T] = weightless_at(gv, r.now[T])
+    return r.now[T]
+
+
+@inner_kernel
 def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, rules, a):
     """The block at rest starts to slide, or to tilt, as u of sign `sense` grows; returns z = -u/(mu_k G0), +-1 if it slides."""
     u, g = acceleration(gh, t), 1.0 + acceleration(gv, t)
@@ -404,8 +412,9 @@ def _initial_friction(b, m, z, gh, gv, t, a):
 @inner_kernel
 def begin(b, gh, gv, r, yields, a):
     """The contacts of a block that starts, or goes on after an impact, and its z."""
-    z, m, t = r.z, r.m, r.now[T]
+    z, m = r.z, r.m
     upright(b, z)
+    t = _waits(z, gv, r)
     zeta = _initial_friction(b, m, z, gh, gv, t, a) if math.isnan(r.now[ZETA]) else r.now[ZETA]
     r.now[ZETA] = _begin(b, m, z, zeta, yields, gh, gv, t, r.rules, a)
     # It has yielded where the pivot slips with z = +-1.
@@ -473,7 +482,8 @@ def wind_up(r, order, tau, tolerance, log, a):
 @inner_kernel
 def follow(b, gh, gv, r, which, before, yields, log, a):
     """What follows an event that is no impact."""
-    z, m, t = r.z, r.m, r.now[T]
+    z, m = r.z, r.m
+    t = _waits(z, gv, r)
     kind = -1
     # At one instant each further event doubles the slack, as in a selection (ebm.core.modes).
     slacken(r.memory)

@@ -144,7 +144,19 @@ def next_kink(g, t):
 @inner_kernel
 def acceleration_after(g, t):
     """Acceleration so soon after t that its sign tells how it leaves a zero at t, and before the next kink."""
-    return acceleration(g, min(t + _SOON, 0.5 * (t + next_kink(g, t))))
+    return acceleration(g, _soon(g, t))
+
+
+@inner_kernel
+def _soon(g, t):
+    return min(t + _SOON, 0.5 * (t + next_kink(g, t)))
+
+
+@inner_kernel
+def weightless_at(g, t):
+    """The time at which vertical base motion falls away with 1 g, if it falls away with less at t, and with more soon after; else t."""
+    now, after = 1.0 + acceleration(g, t), 1.0 + acceleration_after(g, t)
+    return t + (_soon(g, t) - t) * now / (now - after) if now > 0.0 > after else t
 
 
 @inner_kernel

@@ -131,6 +131,7 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack, yields=None)
     """
     # Parts of two arrays: to make one takes as long as a fifth of a step.
     reals, whole = np.zeros(10 + MEMORY + 16), np.zeros(MODE_SIZE + 7 + RULES, dtype=np.int64)
+    control = _in_rad(control, b)
     r = Run(
         z,
         whole[:MODE_SIZE],
@@ -171,6 +172,15 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack, yields=None)
     at_rest = r.m[FAMILY] == FLAT and r.m[FLOOR] == STICK
     steps, events, walls, rows = r.counts[STEPS], r.counts[EVENTS], r.counts[WALL_IMPACTS], r.counts[ROWS]
     return Tally(ending, r.now[T], r.now[PEAK], at_rest, steps, events, walls, int(r.gains[0]), r.gains[1], rows, r.now[T_REST], r.rules)
+
+
+@inner_kernel
+def _in_rad(control, b):
+    """The control with its tolerance in rad, given in alpha: all that a block does before it topples happens within alpha."""
+    alpha = min(b.left.alpha, b.right.alpha)
+    return Control(
+        control.tolerance * alpha, control.order, control.most_steps, control.most_events, control.until_decided, control.output_step
+    )
 
 
 @inner_kernel

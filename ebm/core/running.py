@@ -43,6 +43,7 @@ FAILURES = {
 class Control(NamedTuple):
     """What a run is asked for."""
 
+    #: Of a Taylor step, in alpha; inside the loop in rad.
     tolerance: float
     order: int
     most_steps: int

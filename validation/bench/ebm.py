@@ -28,7 +28,7 @@ from rockcheck.scenes.scene import PAPER_BLOCK
 Floats = NDArray[np.float64]
 #: The grid of Ricker pulses: omega_p/p, a_p/(g tan alpha), and its nodes along each axis.
 FREQUENCY_RATIOS, AMPLITUDE_RATIOS, NODES = (0.5, 8.0), (1.0, 12.0), 100
-TOLERANCES = (1e-6, 1e-7, 2e-8, 1e-8, 1e-9, 1e-10, 1e-12)
+TOLERANCES = (1e-6, 1e-7, 4e-8, 1e-8, 1e-9, 1e-10, 1e-12)
 REFERENCE_TOLERANCE, ROUNDS = 1e-14, 3
 #: The error at which a trajectory's cost is given: 95th percentile of the peak's error, rad.
 LEVEL = 1e-8
