@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import History, ModelFailure
+from rockcheck.scenes import Block, Floor, History, ModelFailure, Scene, Sine
 
 CASES = {
     "rocking": (2.0, 1.1, 1.0),
@@ -34,6 +36,23 @@ def test_error_falls_with_the_tolerance(pivot, case, pulse_scene):
     assert np.all(errors <= 200.0 * tolerances)
     assert errors[-1] <= 1e-5 * errors[0]
     assert np.polyfit(np.log10(tolerances), np.log10(errors), 1)[0] == pytest.approx(1.0, abs=0.2)
+
+
+@pytest.mark.parametrize("alpha", [0.02, 0.05, 0.1, 0.25, 0.5])
+def test_a_slender_block_is_as_exact_as_a_stout_one(alpha):
+    """The tolerance is in alpha: the same motion in theta/alpha has the same error in tolerances, until the block overturns."""
+    scene = Scene(
+        name="slenderness",
+        block=Block(half_width=math.sin(alpha), half_height=math.cos(alpha)),
+        floor=Floor(friction=1.3),
+        excitation=Sine(amplitude=2.0 * 9.81 * math.tan(alpha), period=2.0, cycles=2),
+        duration=5.0,
+        output_step=0.01,
+    )
+    truth = EventBasedModel(tolerance=1e-13).simulate(scene)
+    for tolerance in (1e-5, 1e-6, 1e-8):
+        found = EventBasedModel(tolerance=tolerance).simulate(scene)
+        assert distance(found, truth) <= 30.0 * tolerance * alpha
 
 
 def test_error_estimate_is_the_error(pulse_scene):
