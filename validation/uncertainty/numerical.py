@@ -16,6 +16,8 @@ in quadrature. Contact codes often are not asymptotic, so the estimate may refus
 | else, and no change is above `SMALL` | converged | 3 times the largest change (Eca and Hoekstra 2014) |
 | else | not converged: not asymptotic | none |
 
+An event-based model has a tolerance instead of a step: u_num = F times the change at a hundredth of it, F = 1.25.
+
 All uncertainties here are expanded ones: intervals that are meant to hold 95 % of the cases.
 """
 
@@ -32,7 +34,8 @@ from rockcheck.validation.discrepancy.figures import Stored
 
 #: Steps of the runs, in units of the finest.
 FACTORS = (1.0, 2.0, 4.0)
-#: Factor of safety where the observed order is as expected, within so much; where it is not, or says nothing.
+#: Factor of safety where the observed order is as expected, within so much; where it is not, or says nothing. The first is that of a
+#: change with the tolerance, too.
 SAFETY, POOR_SAFETY, NEARLY = 1.25, 3.0, 0.1
 #: A higher order is observed, but not relied on.
 TRUSTED_ORDER = 1.0
@@ -166,15 +169,16 @@ def _between_rows(history: History) -> float:
 
 
 def _from_tolerance(scene: Scene, given: History, finer: History) -> tuple[Quantity, ...]:
+    """The change, times the factor of safety: the finer run errs, too, by a few hundredths of it."""
     if _side(given) != _side(finer):
         reason = "the outcome changes with the tolerance"
         return (Quantity(name="outcome", unit="", value=given.outcome, verdict="not converged", reason=reason),)
     rows = min(len(given.channels["theta"]), len(finer.channels["theta"]))
     change = (finer.channels["theta"][:rows] - given.channels["theta"][:rows]) / scene.block.alpha
     rms = float(np.sqrt(np.mean(change**2)))
-    found = [Quantity(name="theta_rms", unit="alpha", value=rms, u_num=rms, verdict="converged")]
+    found = [Quantity(name="theta_rms", unit="alpha", value=rms, u_num=SAFETY * rms, verdict="converged")]
     for (name, unit, value), (_, _, better) in zip(_scalars(scene, given), _scalars(scene, finer), strict=True):
-        found.append(Quantity(name=name, unit=unit, value=value, u_num=abs(better - value), verdict="converged"))
+        found.append(Quantity(name=name, unit=unit, value=value, u_num=SAFETY * abs(better - value), verdict="converged"))
     return (*found, Quantity(name="outcome", unit="", value=given.outcome, u_num=0.0, verdict="converged"))
 
 
