@@ -76,7 +76,7 @@ from rockcheck.ebm.core.motion import (
     tilt_series,
     workspace,
 )
-from rockcheck.ebm.core.rules import HANGS, LEAST_CONTRADICTION, PULLS
+from rockcheck.ebm.core.rules import HANGS, LEAST_CONTRADICTION, MODE_AGAIN, PULLS
 from rockcheck.ebm.core.running import GOING, HOLDS, RELEASE, SLIPS, STICKS, UPLIFT, ZETA, T, mode_code, note
 from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, POSITION, first_root, force_step, leading, step_size, value
 from rockcheck.scenes.compiled import inner_kernel, kernel
@@ -247,15 +247,17 @@ def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, rules, a):
     soon = 1.0 + acceleration_after(gv, t) <= 0.0  # friction falls with P: nothing tips until the floor pulls
     hangs = g <= 0.0 if abs(g) > NOISE[FORCE] else soon
     arm = side_of(b, sense).arm
-    tips = b.mu_k * b.height > arm or hangs
-    if tips:
+    held = hangs or soon or closed_wall(b, z, sense, False)
+    tips = b.mu_k * b.height > (1.0 + _YIELDS) * arm
+    if hangs or tips:
         zeta = min(max(-u / max(b.mu_k * abs(g), SLOW), -1.0), 1.0)
         if u != 0.0 and abs(abs(u) - g * min(arm / b.height, b.mu_k)) < NOISE[FORCE]:
             # Just where it tips or slips. Near g = 0 the quotient is no better known, and its rounding would act as a moment.
             zeta = -math.copysign(min(arm / (b.height * b.mu_k), 1.0) if b.mu_k > 0.0 else 1.0, u)
-        if _tip(b, m, z, sense, zeta, yield_displacement, gh, gv, t, rules, a):
+        if _tip(b, m, z, sense, zeta, not held, yield_displacement, gh, gv, t, rules, a):
             return zeta
-    if hangs or soon or closed_wall(b, z, sense, False) or (tips and abs(u) < g * max((1.0 + _YIELDS) * arm / b.height, b.mu_k)):
+    if held or (tips and abs(u) < g * b.mu_k):
+        rules[MODE_AGAIN] += 1
         _rest(b, m, z, gv, t)
         return 0.0
     m[:] = 0
@@ -264,14 +266,18 @@ def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, rules, a):
 
 
 @inner_kernel
-def _tip(b, m, z, first, zeta, yield_displacement, gh, gv, t, rules, a):
-    """Lets a flat block tilt to the side on which its rotation grows, `first` if it can; returns whether there is one."""
+def _tip(b, m, z, first, zeta, free, yield_displacement, gh, gv, t, rules, a):
+    """Lets a flat block tilt to the side on which its rotation grows, `first` if it can; returns whether there is one.
+
+    One that nothing holds is `free` to tilt though its rotation grows so slowly that rounding hides it: friction has yet to wind up.
+    """
     v = slip_velocity(b, z)
     for sense in (first, -first):
         m[:] = 0
         m[FAMILY], m[S], m[SLIP] = TILT, sense, 1 if sense * v > 0.0 else -1
         _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, -1, rules, a)
-        if leading(a, PHI, _LOOK, NOISE[POSITION], AHEAD) > 0:
+        grows = leading(a, PHI, _LOOK, NOISE[POSITION], AHEAD)
+        if grows > 0 or (grows == 0 and free):
             return True
     return False
 
@@ -531,7 +537,7 @@ def _tip_sliding(b, gh, gv, r, yields, a):
         r.now[ZETA] = float(slip)
         _holds(r, False)
         return SLIPS
-    if _tip(b, m, z, -slip, r.now[ZETA], yields, gh, gv, r.now[T], r.rules, a):
+    if _tip(b, m, z, -slip, r.now[ZETA], False, yields, gh, gv, r.now[T], r.rules, a):
         return UPLIFT
     r.rules[LEAST_CONTRADICTION] += 1
     m[:] = 0

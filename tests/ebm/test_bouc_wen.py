@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Block, Floor, InputError, Record, Ricker, Scene, Wall, kinematics, load_scene
+from rockcheck.scenes import Block, Floor, InputError, Record, Ricker, Scene, Sine, Wall, kinematics, load_scene
 from rockcheck.scenes.errors import ModelFailure
 from rockcheck.scenes.scene import PAPER_BLOCK
 
@@ -179,3 +179,20 @@ def test_what_it_cannot_do_is_refused():
         bouc_wen(pulse().replace(floor=Floor(friction=0.3, restitution=0.2)))
     with pytest.raises(ModelFailure, match="cap on steps"):
         bouc_wen(pulse(), most_steps=50)
+
+
+@pytest.mark.parametrize("share", [1.0, 1.0 + 2e-16, 1.0 + 1e-9])
+def test_friction_at_the_blocks_slope_slides_at_its_limit(share):
+    """Just where a block slips as it tips, z is +-1 but for rounding, and no tilt grows: it slides when Coulomb's does, not later."""
+    scene = Scene(
+        name="slope",
+        block=Block(half_width=0.25, half_height=1.0),
+        floor=Floor(friction=0.25 * share),
+        excitation=Sine(amplitude=3.2, period=2.0, cycles=1),
+        duration=3.0,
+        output_step=0.01,
+    )
+    exact, smooth = EventBasedModel().simulate(scene), EventBasedModel(friction="bouc-wen").simulate(scene)
+    assert np.max(np.abs(exact.channels["x"])) > 0.01
+    np.testing.assert_allclose(smooth.channels["x"], exact.channels["x"], rtol=0.0, atol=1e-10)
+    assert smooth.cost.rules == {}
