@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 MOST_NODES = 50_000_000
-#: Tolerance of the model that plays a spectrum by default: far too small to move a boundary by a node.
+#: Tolerance (alpha) of the model that plays a spectrum by default: far too small to move a boundary by a node.
 TOLERANCE = 4e-8
 #: Of a refined spectrum: distance of the nodes that are run first, the fewest cells an axis that they may leave, and how far (in
 #: nodes) around a boundary nothing is inferred: hairs thinner than the nodes' distance break into dots, which are found so.

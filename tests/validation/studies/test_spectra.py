@@ -19,7 +19,7 @@ import pytest
 
 from rockcheck.cm import ContinuousModel
 from rockcheck.ebm import EventBasedModel, Spectrum
-from rockcheck.ebm.spectrum import TOLERANCE, node_scene
+from rockcheck.ebm.spectrum import node_scene
 from rockcheck.scenes import Block, InputError, Ricker, load_scene
 from rockcheck.scenes.progress import Count
 from rockcheck.scenes.recordings import Reading
@@ -232,7 +232,7 @@ def test_the_command_writes_figures_data_and_page(tmp_path, capsys):
         outcomes = data["outcomes"]
         settings = json.loads(str(data["settings"]))
     assert settings["scene"]["walls"] == [{"side": "right", "gap": 0.003, "restitution": 0.0}]
-    assert settings["settings"] == {"tolerance": TOLERANCE}
+    assert settings["settings"] == {"tolerance": 4e-8}
     table = np.loadtxt(folder / "figure-8-gap-3-e-0.csv", delimiter=",", skiprows=2)
     np.testing.assert_array_equal(table[:, 1:], outcomes)
     np.testing.assert_allclose(table[:, 0], np.linspace(1.0, 12.0, 9))
