@@ -533,6 +533,11 @@ def _tip_sliding(b, gh, gv, r, yields, a):
     """A block tilts while it slides; the event's kind, -1 where rounding keeps it flat for a while."""
     z, m = r.z, r.m
     slip = m[SLIP]
+    if abs(z[VX]) < SLOW and _held(b, z, gh, gv, r.now[T]):  # it rests but for rounding, whose sign would choose the side
+        z[VX] = r.now[ZETA] = 0.0
+        _holds(r, True)
+        _rest(b, m, z, gv, r.now[T])
+        return STICKS
     if r.counts[HOLDS] != 0 and 1.0 - slip * r.now[ZETA] < _YIELDS:
         r.now[ZETA] = float(slip)
         _holds(r, False)
