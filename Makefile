@@ -7,14 +7,17 @@ LOCK := .ci/requirements.txt
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: install validate test test-all nightly coverage mutation lint format docs gallery wheel lock clean
+.PHONY: install validate test test-change test-all nightly coverage mutation lint format docs gallery wheel lock clean
 
 install: $(VENV)/.ready ## the command `rockcheck` in .venv/bin
 
 validate: $(VENV)/.ready ## run the suite `paper` and write rockcheck-report/index.html
 	$(BIN)/rockcheck validate paper
 
-test: $(VENV)/.ready ## the everyday tests
+test: $(VENV)/.ready ## the everyday tests, below five minutes
+	$(BIN)/python -m pytest -q -m "not slow and not long" -n auto --dist loadfile
+
+test-change: $(VENV)/.ready ## also the long ones: what must pass before a change lands
 	$(BIN)/python -m pytest -q -m "not slow" -n auto --dist loadfile
 
 test-all: $(VENV)/.ready ## also the slow ones

@@ -116,6 +116,7 @@ def test_every_block_has_a_language(page):
         assert block.file or block.language in ("python", "bash"), f"{page.name}, line {block.line}: a file without a name is not run"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_blocks_run(page, tmp_path, monkeypatch):
     blocks = list(blocks_of(page))

@@ -15,6 +15,8 @@ from playwright import sync_api as playwright
 import rockcheck
 
 ROOT = Path(__file__).parents[2]
+#: Building the site takes half a minute.
+pytestmark = pytest.mark.long
 SOURCES = sorted(path.stem for path in (ROOT / "docs").glob("*.md"))
 
 

@@ -18,14 +18,15 @@ from rockcheck.scenes.scene import PAPER_BLOCK
 
 ALL = [engine for engine in (getattr(engines, name) for name in engines.__all__) if engine.installed()]
 VARYING = [engine for engine in ALL if not engine.fixed_because]
+MARKS = {"dart": pytest.mark.long, "drake": pytest.mark.slow}
 BOUNCING = [engine for engine in ALL if engine.bounces_with]
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Every engine that is installed: as a class, as one whose steps can vary, or as a model with its steps; Drake takes its time."""
+    """Every engine that is installed: as a class, as one whose steps can vary, or as a model with its steps; two take their time."""
 
     def parameters(models: list[Any]) -> list:
-        return [pytest.param(one, marks=[pytest.mark.slow] if one.name == "drake" else []) for one in models]
+        return [pytest.param(one, marks=MARKS.get(one.name, ())) for one in models]
 
     fixed, bouncing = ([one(time_step=1e-4) for one in some] for some in (ALL, BOUNCING))
     adaptive = [one(time_step="adaptive") for one in VARYING]

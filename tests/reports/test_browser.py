@@ -226,6 +226,7 @@ def test_a_falling_block_stays_where_it_fell(visit: Visit) -> None:
     assert block.evaluate("e => Number(e.style.opacity)") == 0.4
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("address", ["index.html", WALL])
 def test_accessible(visits: Visits, address: str, scheme: str) -> None:

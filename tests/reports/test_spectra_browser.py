@@ -187,6 +187,7 @@ def test_the_lines_of_an_ida_are_named_under_the_pointer(visitor: Callable[..., 
     assert "50 % " in said
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("what", ["spectra", "fragility", "ida"])
 def test_accessible(visitor: Callable[..., playwright.Page], folder: Path, tmp_path: Path, what: str, scheme: str) -> None:

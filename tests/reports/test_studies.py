@@ -124,6 +124,7 @@ def test_opens_on_a_desk_and_on_a_phone_and_asks_for_nothing(visitor, studies, n
         assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", STUDIES)
 def test_accessible(browser, studies, name):
     for scheme in ("light", "dark"):

@@ -343,6 +343,7 @@ def test_a_worker_announces_on_the_runs_own_stderr(capfd):
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.long
 def test_what_is_compiled_ahead_is_not_compiled_again(capsys):
     """`rockcheck warm` covers what commands need; a second time all of it is there."""
     assert main(["warm"]) == 0

@@ -355,6 +355,7 @@ COMMAND_LINES = st.lists(st.one_of(st.sampled_from(WORDS), st.sampled_from(NASTY
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("reader", READERS)
 def test_any_input(tmp_path, reader):
     """A result or one clear line, which each `feed_...` asserts of what it is given; all else is raised."""

@@ -27,6 +27,8 @@ from rockcheck.validation.stress.players import PLAYERS, EventBased
 from rockcheck.validation.stress.results import Failure, RunTotals
 from rockcheck.validation.stress.study import Chunk
 
+#: They wait for processes that hang or are killed.
+pytestmark = pytest.mark.long
 ROCKCHECK = [sys.executable, "-m", "rockcheck"]
 posix = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX: its limits and signals")
 

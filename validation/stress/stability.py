@@ -41,7 +41,8 @@ AXIS_WORDS: dict[Axis, str] = {
 #: Steps that are tried, sqrt(R/g), coarse to fine, and what a stable run keeps to: depth in R, energy without source.
 STEPS = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4)
 DEEPEST, MOST_ENERGY = 0.02, 0.1
-#: Stand-still runs: a block left alone, one that is pushed or shaken, and in a quick run, s; and the step (s).
+#: Stand-still runs: a block left alone, one that is pushed or shaken (or left alone, where a step takes a millisecond), and in a quick
+#: run, s; and the step (s).
 HOUR, PUSHED, QUICK_REST, REST_STEP = 3600.0, 300.0, 10.0, 5e-3
 QUICK_STEPS, QUICK_VALUES = STEPS[1:-1:2], 2
 #: Memory that a worker may take, MB.
@@ -50,12 +51,16 @@ MEMORY = 4096.0
 
 @dataclass(frozen=True)
 class ModelSetup:
-    """A model with settings as they come ("default") or at their best; `knob` is what the step is called there."""
+    """A model with settings as they come ("default") or at their best; `knob` is what the step is called there.
+
+    A block is left `alone` for so long, s.
+    """
 
     label: str
     family: str
     settings: tuple[tuple[str, Any], ...]
     knob: str = "time_step"
+    alone: float = HOUR
 
     def built(self, scene: Scene, step: float) -> Any:
         """The model with a step in s; the CM's contact is as stiff as the block's size asks for."""
@@ -79,7 +84,7 @@ SETUPS = {
         ModelSetup("pymunk adaptive", "pymunk", (("time_step", "adaptive"),), "largest_step"),
         ModelSetup("dart default", "dart", (("settings", "default"),)),
         ModelSetup("dart", "dart", ()),
-        ModelSetup("dart adaptive", "dart", (("time_step", "adaptive"),), "largest_step"),
+        ModelSetup("dart adaptive", "dart", (("time_step", "adaptive"),), "largest_step", PUSHED),
         ModelSetup("drake default", "drake", (("settings", "default"),)),
         ModelSetup("drake", "drake", ()),
         ModelSetup("cm paper", "cm", (("damping_rule", "paper"),)),
@@ -246,7 +251,7 @@ def tasks(quick: bool = False) -> list[MapTask]:
     values = {axis: some[:: max(1, len(some) // QUICK_VALUES)] if quick else some for axis, some in AXES.items()}
     labels = [label for label, setup in SETUPS.items() if not not_installed(setup.family)]
     still = [
-        MapTask(stand_still, (label, case, QUICK_REST if quick else PUSHED if CASES[case] else HOUR, REST_STEP))
+        MapTask(stand_still, (label, case, QUICK_REST if quick else PUSHED if CASES[case] else SETUPS[label].alone, REST_STEP))
         for case, label in itertools.product(CASES, labels)
     ]
     return still + [MapTask(largest_stable, (label, axis, value, steps)) for axis in AXES for value in values[axis] for label in labels]

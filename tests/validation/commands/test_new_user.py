@@ -42,6 +42,7 @@ def type_(capsys):
     return typed
 
 
+@pytest.mark.long
 def test_from_a_v2_record_to_a_report_and_a_curve_in_four_commands(type_):
     Path("station.V2").write_bytes(makers().cosmos_three())
     type_("new rack.toml")

@@ -208,6 +208,7 @@ def test_faults_of_the_file_are_one_line(uncertain, old, new, said):
     assert "\n" not in str(fault.value)
 
 
+@pytest.mark.long
 def test_draws_agree_with_many_more_draws(uncertain):
     given = load_uncertain_scene(uncertain)
     few, many = (propagate(given, samples=n, seed=seed, indices=False) for n, seed in ((256, 1), (2048, 7)))

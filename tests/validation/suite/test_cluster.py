@@ -18,6 +18,7 @@ OWN = [f"faulty:{name}" for name in ("Still", "Segfault", "Hang", "Hog", "Fails"
 MODELS = "\n".join(f'[models.{name}]\nmodel = "faulty:{name}"' for name in ("Segfault", "Hang", "Hog", "Fails"))
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("default")
 def test_a_cluster_gives_the_same_run_and_survives_failures(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", list(sys.path))  # the suite's folder joins it

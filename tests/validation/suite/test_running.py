@@ -71,6 +71,7 @@ def in_this_process(tasks, **limits):
     return enumerate(map(workers.play, tasks))
 
 
+@pytest.mark.long
 def test_every_kind_of_failure_fails_its_cell_alone(tmp_path, run):
     faults = {name: f'model = "faulty:{name}"' for name in ("Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")}
     path = write_suite(tmp_path, {**faults, "again": 'model = "faulty:Still"'}, FINE.format(model="again"), seconds=15.0)
