@@ -90,7 +90,7 @@ def show(found: Stress, out: Console) -> None:
         out.print(line, soft_wrap=True)
     runs = sum(batch.runs for batch in found.batches.values())
     broken = len(found.broken)
-    verdict = "no failure of an event-based model" if not broken else f"{broken} failures of event-based models"
+    verdict = "no failure of an event-based model" if not broken else f"failures of event-based models: {broken}"
     out.print(f"seed {found.seed}: {runs} runs, {verdict}; {found.wall_seconds:.0f} s with {found.jobs} processes")
 
 
