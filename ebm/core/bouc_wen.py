@@ -517,15 +517,22 @@ def follow(b, gh, gv, r, which, before, yields, log, a):
 @inner_kernel
 def _turn(b, gh, gv, r, t):
     """The slip has come to its end: the pivot slips back, or a flat block rests. The event's kind, -1 for none."""
-    z, m = r.z, r.m
     kind = -1 if r.counts[HOLDS] != 0 else STICKS
     _holds(r, True)
-    m[SLIP] = -m[SLIP]
-    if m[FAMILY] == FLAT and _held(b, z, gh, gv, t):
-        z[VX] = 0.0
-        _rest(b, m, z, gv, t)
-        kind = STICKS
-    return kind
+    r.m[SLIP] = -r.m[SLIP]
+    return STICKS if _comes_to_rest(b, gh, gv, r, t) else kind
+
+
+@inner_kernel
+def _comes_to_rest(b, gh, gv, r, t):
+    """Whether a flat block whose slip has ended is held: then it rests."""
+    z, m = r.z, r.m
+    if m[FAMILY] != FLAT or not _held(b, z, gh, gv, t):
+        return False
+    z[VX] = 0.0
+    _holds(r, True)
+    _rest(b, m, z, gv, t)
+    return True
 
 
 @inner_kernel
@@ -533,10 +540,7 @@ def _tip_sliding(b, gh, gv, r, yields, a):
     """A block tilts while it slides; the event's kind, -1 where rounding keeps it flat for a while."""
     z, m = r.z, r.m
     slip = m[SLIP]
-    if abs(z[VX]) < SLOW and _held(b, z, gh, gv, r.now[T]):  # it rests but for rounding, whose sign would choose the side
-        z[VX] = r.now[ZETA] = 0.0
-        _holds(r, True)
-        _rest(b, m, z, gv, r.now[T])
+    if abs(z[VX]) < SLOW and _comes_to_rest(b, gh, gv, r, r.now[T]):  # it slid by rounding, whose sign would choose the side
         return STICKS
     if r.counts[HOLDS] != 0 and 1.0 - slip * r.now[ZETA] < _YIELDS:
         r.now[ZETA] = float(slip)
