@@ -34,9 +34,8 @@ def decided(b, m, z, gh, gv, t, quiet, peak):
     still = gv.kind == STILL
     ahead = 0.0
     if t < quiet:
-        # Beside a wall, or at its peak, no outcome is certain before all is quiet, however little is to come.
-        open_yet = t <= gh.quiet and (b.walls or abs(z[THETA]) >= peak)
-        ahead = math.inf if open_yet or not still else impulse_ahead(gh, t)
+        at_its_peak = t <= gh.quiet and abs(z[THETA]) >= peak  # which is not certain, however little is to come
+        ahead = math.inf if at_its_peak or not still else impulse_ahead(gh, t)
     verdict = _by_energy(b, m, z, ahead, peak)
     if verdict <= 0.0 and still and abs(z[THETA]) > side_of(b, z[THETA]).alpha:
         verdict = _falls(b, m, z, gh, t)
@@ -54,7 +53,7 @@ def _by_energy(b, m, z, ahead, peak):
     much it would turn farther on its other corner.
     """
     phi = abs(z[THETA])
-    if ahead > 0.0 and (b.walls or phi >= peak):
+    if ahead > 0.0 and phi >= peak:
         return -1.0
     energy = _energy(b, z)
     side, other = side_of(b, m[S]), side_of(b, -m[S])

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rockcheck.ebm import EventBasedModel, batch, overturning_spectrum
+from rockcheck.ebm import EventBasedModel, batch, natural, overturning_spectrum
+from rockcheck.ebm.core.decide import quiet_from
 from rockcheck.ebm.core.march import TOO_MANY_STEPS
 from rockcheck.ebm.spectrum import node_scene, play_motions, play_nodes
 from rockcheck.scenes import Floor, InputError, Record, Ricker, Scene, Wall
@@ -157,6 +158,19 @@ def test_no_swing_that_loses_or_gains_is_taken_for_the_one_before(restitution):
     early, whole = (batch.run_batch(batch.pack(nodes, model), model, until_decided=decided) for decided in (True, False))
     np.testing.assert_array_equal(early.side, whole.side)
     np.testing.assert_allclose(early.peak, whole.peak, rtol=1e-6)
+
+
+def test_beside_a_wall_a_safe_block_is_known_before_the_pulse_is_over():
+    """What is left of the pulse bounds the energy that it can still bring; peaks are those of runs that go on."""
+    wall, model = Wall(side="left", gap=0.003), EventBasedModel(tolerance=1e-9)
+    a, f = (axis.ravel() for axis in np.meshgrid(np.linspace(1.0, 5.0, 9), np.linspace(0.5, 6.0, 9)))
+    nodes = [node_scene(scene(wall), *node, settle=60.0) for node in zip(a, f, strict=True)]
+    early, whole = (batch.run_batch(batch.pack(nodes, model), model, until_decided=decided) for decided in (True, False))
+    np.testing.assert_array_equal(early.side, whole.side)
+    np.testing.assert_allclose(early.peak, whole.peak, rtol=1e-6)
+    quiet = np.array([quiet_from(*natural.grounds_of(node), model.tolerance) for node in nodes])
+    safe = (early.side == 0) & (early.peak > 0.0)
+    assert np.count_nonzero(early.t_end[safe] < quiet[safe]) > 0.8 * np.count_nonzero(safe) > 20
 
 
 def test_a_record_is_scaled_and_the_block_resized():
