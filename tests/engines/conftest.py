@@ -18,8 +18,9 @@ from rockcheck.scenes.scene import PAPER_BLOCK
 
 ALL = [engine for engine in (getattr(engines, name) for name in engines.__all__) if engine.installed()]
 VARYING = [engine for engine in ALL if not engine.fixed_because]
-MARKS = {"dart": pytest.mark.long, "drake": pytest.mark.slow}
 BOUNCING = [engine for engine in ALL if engine.bounces_with]
+#: Engines whose tests take their time.
+MARKS = {"dart": pytest.mark.long, "drake": pytest.mark.slow}
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
