@@ -41,6 +41,8 @@ AXIS_WORDS: dict[Axis, str] = {
 #: Steps that are tried, sqrt(R/g), coarse to fine, and what a stable run keeps to: depth in R, energy without source.
 STEPS = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4)
 DEEPEST, MOST_ENERGY = 0.02, 0.1
+#: Adaptive steps are as fine as they need to be: what is tried is how large they may grow, from here on.
+ADAPTIVE_FINEST = 3e-3
 #: Stand-still runs: a block left alone, one that is pushed or shaken (or left alone, where a step takes a millisecond), and in a quick
 #: run, s; and the step (s).
 HOUR, PUSHED, QUICK_REST, REST_STEP = 3600.0, 300.0, 10.0, 5e-3
@@ -53,7 +55,7 @@ MEMORY = 4096.0
 class ModelSetup:
     """A model with settings as they come ("default") or at their best; `knob` is what the step is called there.
 
-    A block is left `alone` for so long, s.
+    A block is left `alone` for so long, s. `finest` is the finest step that is tried, sqrt(R/g).
     """
 
     label: str
@@ -61,6 +63,7 @@ class ModelSetup:
     settings: tuple[tuple[str, Any], ...]
     knob: str = "time_step"
     alone: float = HOUR
+    finest: float = STEPS[-1]
 
     def built(self, scene: Scene, step: float) -> Any:
         """The model with a step in s; the CM's contact is as stiff as the block's size asks for."""
@@ -75,16 +78,16 @@ SETUPS = {
     for line in (
         ModelSetup("mujoco default", "mujoco", (("settings", "default"),)),
         ModelSetup("mujoco", "mujoco", ()),
-        ModelSetup("mujoco adaptive", "mujoco", (("time_step", "adaptive"),), "largest_step"),
+        ModelSetup("mujoco adaptive", "mujoco", (("time_step", "adaptive"),), "largest_step", finest=ADAPTIVE_FINEST),
         ModelSetup("pybullet default", "pybullet", (("settings", "default"),)),
         ModelSetup("pybullet", "pybullet", ()),
-        ModelSetup("pybullet adaptive", "pybullet", (("time_step", "adaptive"),), "largest_step"),
+        ModelSetup("pybullet adaptive", "pybullet", (("time_step", "adaptive"),), "largest_step", finest=ADAPTIVE_FINEST),
         ModelSetup("pymunk default", "pymunk", (("settings", "default"),)),
         ModelSetup("pymunk", "pymunk", ()),
-        ModelSetup("pymunk adaptive", "pymunk", (("time_step", "adaptive"),), "largest_step"),
+        ModelSetup("pymunk adaptive", "pymunk", (("time_step", "adaptive"),), "largest_step", finest=ADAPTIVE_FINEST),
         ModelSetup("dart default", "dart", (("settings", "default"),)),
         ModelSetup("dart", "dart", ()),
-        ModelSetup("dart adaptive", "dart", (("time_step", "adaptive"),), "largest_step", PUSHED),
+        ModelSetup("dart adaptive", "dart", (("time_step", "adaptive"),), "largest_step", PUSHED, ADAPTIVE_FINEST),
         ModelSetup("drake default", "drake", (("settings", "default"),)),
         ModelSetup("drake", "drake", ()),
         ModelSetup("cm paper", "cm", (("damping_rule", "paper"),)),
@@ -178,7 +181,7 @@ def largest_stable(label: str, axis: Axis, value: float, steps: Sequence[float] 
     """Tries steps from the finest up to the first one that breaks."""
     scene = scene_at(axis, value)
     best = 0.0
-    for step in reversed(steps):
+    for step in sorted(step for step in steps if step >= SETUPS[label].finest):
         fault = fault_of(SETUPS[label], scene, step)
         if fault:
             return Stable(label, axis, value, best, fault)
