@@ -40,7 +40,7 @@ from rockcheck.ebm.core.motion import (
     delta,
     side_of,
 )
-from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, POSITION, RATE, first_root
+from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, POSITION, RATE, first_root, leads_up
 from rockcheck.scenes.compiled import inner_kernel
 
 # In order of priority at one instant: floor before walls, contacts before friction.
@@ -83,7 +83,11 @@ _ANY = 2.0**400
 
 @inner_kernel
 def _has(a, which, shorter):
-    a[TABLE + which, _SHORTER] = shorter
+    """Enters a guard into the table, without weights so far, or leaves it out (`shorter` below zero)."""
+    row = TABLE + which
+    for k in range(_MOST):
+        a[row, _COMBINES[which, k]] = 0.0
+    a[row, _CONSTANT], a[row, _SHORTER] = 0.0, shorter
 
 
 @inner_kernel
@@ -96,24 +100,22 @@ def drop(a, which):
 def fill_guards(b, m, pivot, a):
     """Writes the guards of mode m into the table; `pivot` is the place of a sticking pivot."""
     for which in range(GUARDS):
-        for k in range(_MOST):
-            a[TABLE + which, _COMBINES[which, k]] = 0.0
-        a[TABLE + which, _CONSTANT] = 0.0
-        a[TABLE + which, _SHORTER] = -1.0
+        drop(a, which)
     if m[FAMILY] == FLAT:
         _fill_flat(b, m, a)
         return
-    a[TABLE + G_PHI, PHI] = 1.0
     _has(a, G_PHI, 0)
+    a[TABLE + G_PHI, PHI] = 1.0
     if a[PHI, 0] >= 0.5 or m[FLOOR] == OFF:  # else no step on the floor is long enough to turn the block over
-        a[TABLE + G_TOPPLE, PHI], a[TABLE + G_TOPPLE, _CONSTANT] = -1.0, 0.5 * math.pi
         _has(a, G_TOPPLE, 0)
+        a[TABLE + G_TOPPLE, PHI], a[TABLE + G_TOPPLE, _CONSTANT] = -1.0, 0.5 * math.pi
     if m[FLOOR] == OFF:
-        a[TABLE + G_LANDING, Y], a[TABLE + G_LANDING, COS] = 1.0, -1.0
         _has(a, G_LANDING, 0)
+        a[TABLE + G_LANDING, Y], a[TABLE + G_LANDING, COS] = 1.0, -1.0
     else:
         _fill_friction(b, m, b.mu_s * m[PULL], a)
     if m[FLOOR] == SLIPPING:
+        _has(a, G_SLIP, 1)
         along_wall = m[TIP] != 0 or m[FAR] != 0
         # Along a wall V = (c + C) dtheta/dt, and C = -c at theta = 0: the rotation tells the sense of slip everywhere.
         a[TABLE + G_SLIP, PHI if along_wall else XI] = m[SLIP]
@@ -121,23 +123,25 @@ def fill_guards(b, m, pivot, a):
     if b.walls:
         _fill_gap(b, m, True, pivot, a)
         _fill_gap(b, m, False, pivot, a)
-        a[TABLE + G_TIP_PUSH, NA] = a[TABLE + G_FAR_PUSH, NB] = 1.0
-        _has(a, G_TIP_PUSH, 2 if m[TIP] != 0 else -1)
-        _has(a, G_FAR_PUSH, 2 if m[FAR] != 0 else -1)
+        if m[TIP] != 0:
+            _has(a, G_TIP_PUSH, 2)
+            a[TABLE + G_TIP_PUSH, NA] = 1.0
+        if m[FAR] != 0:
+            _has(a, G_FAR_PUSH, 2)
+            a[TABLE + G_FAR_PUSH, NB] = 1.0
 
 
 @inner_kernel
 def _fill_friction(b, m, mu, a):
-    """The floor's push, the two sides of the friction cone |Q| <= mu P, and the sense of slip (whose weights are the family's)."""
-    a[TABLE + G_PUSH, P] = m[PULL]
-    _has(a, G_PUSH, 2 if b.unilateral or m[FLOOR] == SLIPPING else -1)
+    """The floor's push, and the two sides of the friction cone |Q| <= mu P."""
+    if b.unilateral or m[FLOOR] == SLIPPING:
+        _has(a, G_PUSH, 2)
+        a[TABLE + G_PUSH, P] = m[PULL]
     if m[FLOOR] == STICK and not b.no_slip:
-        a[TABLE + G_CONE_PLUS, P] = a[TABLE + G_CONE_MINUS, P] = mu
-        a[TABLE + G_CONE_PLUS, Q], a[TABLE + G_CONE_MINUS, Q] = -1.0, 1.0
         _has(a, G_CONE_PLUS, 2)
         _has(a, G_CONE_MINUS, 2)
-    if m[FLOOR] == SLIPPING:
-        _has(a, G_SLIP, 1)
+        a[TABLE + G_CONE_PLUS, P] = a[TABLE + G_CONE_MINUS, P] = mu
+        a[TABLE + G_CONE_PLUS, Q], a[TABLE + G_CONE_MINUS, Q] = -1.0, 1.0
 
 
 @inner_kernel
@@ -152,6 +156,7 @@ def _fill_gap(b, m, tip, pivot, a):
     if rock and not tip and distance - pivot - (b.left.arm + b.right.arm) > -CLOSED:
         # About a fixed pivot the far gap shrinks with phi, down to this value as the block lands: it cannot close before.
         return
+    _has(a, which, 0)
     row, side = TABLE + which, side_of(b, m[S])
     along, across = (side.tip_sin, side.tip_cos) if tip else (side.far_sin, side.far_cos)
     a[row, COS], a[row, SIN], a[row, _CONSTANT] = -along, across, distance
@@ -160,7 +165,6 @@ def _fill_gap(b, m, tip, pivot, a):
         a[row, _CONSTANT] += sense * pivot
     else:
         a[row, XI] = sense
-    _has(a, which, 0)
 
 
 @inner_kernel
@@ -170,36 +174,40 @@ def _fill_flat(b, m, a):
     hangs = m[FLOOR] != OFF and m[PULL] < 0  # a floor that pulls at what a wall holds
     for which in (G_TIP_GAP, G_FAR_GAP):
         gap = b.gap_left if which == G_TIP_GAP else b.gap_right
-        a[TABLE + which, XI] = 1.0 if which == G_TIP_GAP else -1.0
-        a[TABLE + which, _CONSTANT] = gap
-        _has(a, which, -1 if gap == np.inf or m[TIP if which == G_TIP_GAP else FAR] != 0 else 0)
+        if gap < np.inf and m[TIP if which == G_TIP_GAP else FAR] == 0:
+            _has(a, which, 0)
+            a[TABLE + which, XI] = 1.0 if which == G_TIP_GAP else -1.0
+            a[TABLE + which, _CONSTANT] = gap
     if m[TIP] != m[FAR] and (m[FLOOR] == OFF or hangs):  # on the floor, Q is the base acceleration that the wall takes
-        a[TABLE + G_TIP_PUSH, NA if m[FLOOR] == OFF else Q] = 1.0 if m[FLOOR] == OFF else m[TIP] - m[FAR]
         _has(a, G_TIP_PUSH, 2)
+        a[TABLE + G_TIP_PUSH, NA if m[FLOOR] == OFF else Q] = 1.0 if m[FLOOR] == OFF else m[TIP] - m[FAR]
     if m[FLOOR] == OFF:
-        a[TABLE + G_LANDING, Y], a[TABLE + G_LANDING, _CONSTANT] = 1.0, -b.height
         _has(a, G_LANDING, 0)
+        a[TABLE + G_LANDING, Y], a[TABLE + G_LANDING, _CONSTANT] = 1.0, -b.height
         return
-    a[TABLE + G_SLIP, XI] = m[SLIP]
+    if m[FLOOR] == SLIPPING:
+        _has(a, G_SLIP, 1)
+        a[TABLE + G_SLIP, XI] = m[SLIP]
     if b.mu_s == LEAST_FRICTION:  # a force below rounding, which is to stay what it is where P vanishes
         _fill_friction(b, m, 0.0, a)
         a[TABLE + G_CONE_PLUS, _CONSTANT] = a[TABLE + G_CONE_MINUS, _CONSTANT] = b.mu_s
     else:
         _fill_friction(b, m, b.mu_s, a)
-    if not b.unilateral and not on_wall and not hangs:  # the paper's floor holds what no wall does
-        _has(a, G_PUSH, -1)
-    else:
+    drop(a, G_PUSH)
+    if b.unilateral or on_wall or hangs:  # otherwise the paper's floor holds what no wall does
         _has(a, G_PUSH, 2)
+        a[TABLE + G_PUSH, P] = m[PULL]
     for plus in (True, False):
         held = m[TIP if plus else FAR] != 0
         uplift = G_UPLIFT_PLUS if plus else G_UPLIFT_MINUS
-        # A block that hangs by both corners tips as soon as anything favours one side, however little.
-        hangs_flat = hangs and not on_wall
-        a[TABLE + uplift, P] = 0.0 if hangs_flat else (b.left.arm if plus else b.right.arm)
-        a[TABLE + uplift, Q] = (-b.height if plus else b.height) * (_ANY if hangs_flat else 1.0)
-        _has(a, uplift, -1 if m[FLOOR] == STICK and held else 2)
+        if m[FLOOR] != STICK or not held:
+            # A block that hangs by both corners tips as soon as anything favours one side, however little.
+            hangs_flat = hangs and not on_wall
+            _has(a, uplift, 2)
+            a[TABLE + uplift, P] = 0.0 if hangs_flat else (b.left.arm if plus else b.right.arm)
+            a[TABLE + uplift, Q] = (-b.height if plus else b.height) * (_ANY if hangs_flat else 1.0)
         if held or hangs:
-            _has(a, G_CONE_PLUS if plus else G_CONE_MINUS, -1)
+            drop(a, G_CONE_PLUS if plus else G_CONE_MINUS)
 
 
 @inner_kernel
@@ -256,6 +264,26 @@ def seen(kind, smooth):
 
 
 @inner_kernel
+def _coefficient(which, k, a):
+    """Coefficient k of a guard of the table that is no rate, without its constant."""
+    row, one, two, three = TABLE + which, _COMBINES[which, 0], _COMBINES[which, 1], _COMBINES[which, 2]
+    return a[row, one] * a[one, k] + a[row, two] * a[two, k] + a[row, three] * a[three, k]
+
+
+@inner_kernel
+def starts_positive(which, ahead, a):
+    """A cheap proof, without writing the guard, that it leaves zero upward, seen so far ahead; a mode without it has nothing to prove."""
+    row = TABLE + which
+    if a[row, _SHORTER] < 0.0:
+        return True
+    if KIND[which] == RATE:
+        return False
+    begin = _coefficient(which, 0, a) + a[row, _CONSTANT]
+    floor = max(NOISE[KIND[which]], CLOSED) if G_LANDING <= which <= G_FAR_GAP else NOISE[KIND[which]]
+    return leads_up(begin, _coefficient(which, 1, a), _coefficient(which, 2, a), floor, ahead)
+
+
+@inner_kernel
 def _stays_positive(which, order, until, slack, a):
     """A cheap proof, without writing the guard, that it is positive up to a time: more so than the sum of all its terms that fall."""
     row = TABLE + which
@@ -263,13 +291,11 @@ def _stays_positive(which, order, until, slack, a):
         return True
     if KIND[which] == RATE:
         return False
-    one, two, three = _COMBINES[which, 0], _COMBINES[which, 1], _COMBINES[which, 2]
-    p, q, r = a[row, one], a[row, two], a[row, three]
-    begin = a[row, _CONSTANT] + p * a[one, 0] + q * a[two, 0] + r * a[three, 0]
+    begin = a[row, _CONSTANT] + _coefficient(which, 0, a)
     falls, power = 0.0, 1.0
     for k in range(1, order - int(a[row, _SHORTER]) + 1):
         power *= until
-        falls += max(-(p * a[one, k] + q * a[two, k] + r * a[three, k]), 0.0) * power
+        falls += max(-_coefficient(which, k, a), 0.0) * power
     return begin > max(slack * NOISE[KIND[which]], CLOSED) and falls < 0.999999 * begin
 
 

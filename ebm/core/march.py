@@ -108,7 +108,7 @@ from rockcheck.ebm.core.running import (
     mode_code,
     note,
 )
-from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, POSITION, first_root, slope, stays_below, step_size, value
+from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, POSITION, first_root, longest_step, size_of, slope, stays_below, step_size, value
 from rockcheck.ebm.core.settle import no_impacts, settling_speed
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
@@ -321,11 +321,13 @@ def _expand(b, m, z, gh, gv, t, reach, control, a):
     order = tilt_series(b, m, z, gh, gv, t, control.order, enough, reach, a)
     h = reach
     if order == control.order:
-        h = step_size(a, PHI, COS, order, control.tolerance, reach)
-        if m[FLOOR] != STICK or m[TIP] != 0 or m[FAR] != 0:
-            h = step_size(a, XI, Y, order, control.tolerance, h)
-        if m[FLOOR] != STICK or m[TIP] != 0 or m[FAR] != 0 or gv.kind != STILL:
-            h = step_size(a, U, G, order, control.tolerance, h)  # forces follow the base acceleration
+        last, before = size_of(a, PHI, COS, order), size_of(a, PHI, COS, order - 1)
+        rocks = m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
+        if not rocks:
+            last, before = max(last, size_of(a, XI, Y, order)), max(before, size_of(a, XI, Y, order - 1))
+        if not rocks or gv.kind != STILL:  # forces follow the base acceleration
+            last, before = max(last, size_of(a, U, G, order)), max(before, size_of(a, U, G, order - 1))
+        h = longest_step(last, before, order, control.tolerance, reach)
     return order, m[S] * z[X] - a[SIN, 0], h
 
 

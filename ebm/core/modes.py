@@ -19,7 +19,7 @@ import numpy as np
 
 from rockcheck.ebm.core.contacts import CLOSED, SLOW, closed_floor, closed_wall, slip_velocity, stand, stop, upright
 from rockcheck.ebm.core.ground import acceleration, acceleration_after, next_kink
-from rockcheck.ebm.core.guards import G_FAR_GAP, G_PHI, G_SLIP, GUARDS, KIND, fill_guards, guard, seen
+from rockcheck.ebm.core.guards import G_FAR_GAP, G_PHI, G_SLIP, GUARDS, KIND, fill_guards, guard, seen, starts_positive
 from rockcheck.ebm.core.motion import (
     FAMILY,
     FAR,
@@ -132,10 +132,12 @@ def wrong_by(b, m, z, gh, gv, t, measured, a):
     smooth = min(next_kink(gh, t), next_kink(gv, t)) - t
     worst = 0.0
     for which in range(GUARDS):
-        degree = guard(which, order, a)
-        if degree < 0 or (which <= G_FAR_GAP and a[GUARD, 1] < -SLOW):
-            continue  # a closing contact is the impact handler's
         noise, ahead = NOISE[KIND[which]], seen(KIND[which], smooth)
+        if starts_positive(which, ahead, a):
+            continue
+        degree = guard(which, order, a)
+        if which <= G_FAR_GAP and a[GUARD, 1] < -SLOW:
+            continue  # a closing contact is the impact handler's
         sign = leading(a, GUARD, degree, noise, ahead)
         if not math.isfinite(a[GUARD, 0]) or (sign <= 0 and which == G_PHI and (m[FLOOR] != OFF or sign < 0)):
             return np.inf

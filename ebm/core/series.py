@@ -65,14 +65,25 @@ def stays_below(a, row, n, tau, level):
 
 
 @inner_kernel
+def size_of(a, first, second, k):
+    """The size of two series' coefficients of order k."""
+    return abs(a[first, k]) + abs(a[second, k])
+
+
+@inner_kernel
 def step_size(a, first, second, order, tolerance, reach):
-    """The step at which the last two terms of the series stay below the tolerance, at most `reach`.
+    """The step at which the last two terms of two series stay below the tolerance, at most `reach`."""
+    return longest_step(size_of(a, first, second, order), size_of(a, first, second, order - 1), order, tolerance, reach)
+
+
+@inner_kernel
+def longest_step(last, before, order, tolerance, reach):
+    """The step at which the last two terms of a series, of these sizes, stay below the tolerance, at most `reach`.
 
     In a step shorter than the unit of time the error of the velocity, h times fewer, is the larger one.
     """
     longest = math.inf  # its logarithm
-    for k in (order, order - 1):
-        size = abs(a[first, k]) + abs(a[second, k])
+    for k, size in ((order, last), (order - 1, before)):
         if size > 0.0:
             spare = math.log(tolerance / size)
             longest = min(longest, spare / k if spare > 0.0 else spare / (k - 1))
@@ -95,6 +106,13 @@ def leading(a, row, n, floor, ahead):
     if k > n:
         return 0
     return 1 if a[row, k] > 0.0 else -1
+
+
+@inner_kernel
+def leads_up(begin, rate, half_bend, floor, ahead):
+    """Whether the first three coefficients show that c leaves tau = 0 upward: as `leading`, where c is positive beyond all noise."""
+    noise = _ERROR * max(begin, ahead * abs(rate), ahead * ahead * abs(half_bend))
+    return max(floor, noise) < begin < math.inf
 
 
 @inner_kernel
