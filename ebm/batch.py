@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import natural
 from rockcheck.ebm.core.ground import Ground
-from rockcheck.ebm.core.march import DONE, FAILURES, OVERTURNED, Control, run
-from rockcheck.ebm.core.motion import Setting, Side, workspace
+from rockcheck.ebm.core.march import DONE, FAILURES, OVERTURNED, Control, kept_arrays, march
+from rockcheck.ebm.core.motion import THETA, Setting, Side, workspace
 from rockcheck.ebm.model import EventBasedModel
-from rockcheck.scenes.compiled import kernel
+from rockcheck.scenes.compiled import inner_kernel, kernel
 from rockcheck.scenes.errors import InputError, ModelFailure
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.scene import Scene
@@ -210,7 +210,7 @@ def run_batch(
     return found
 
 
-@kernel
+@inner_kernel
 def row_ground(row, samples):
     """The base motion of a packed row, of the types that a single history has: the loop is then compiled once for both."""
     return Ground(
@@ -227,7 +227,7 @@ def row_ground(row, samples):
     )
 
 
-@kernel
+@inner_kernel
 def row_side(r):
     """One side of the block of a packed row."""
     return Side(
@@ -244,7 +244,7 @@ def row_side(r):
     )
 
 
-@kernel
+@inner_kernel
 def row_setting(r, law):
     """Block, floor and walls of a packed row, of the types that a single history has; all rows have one law of impacts, or none."""
     return Setting(
@@ -265,6 +265,41 @@ def row_setting(r, law):
         energy_cap=r["energy_cap"] != 0.0,
         law=law,
     )
+
+
+@inner_kernel
+def play_row(settings, law, horizontal, vertical, samples, states, durations, i, step, control, out, out_mode, log, z, a, stack, kept):
+    """Plays row i in z, with rows of `out` a `step` apart (see `ebm.core.march.march`, which says what it returns)."""
+    for k in range(6):
+        z[k] = states[i, k]
+    reals, whole, tried = kept
+    return march(
+        row_setting(settings[i], law),
+        row_ground(horizontal[i], samples),
+        row_ground(vertical[i], samples),
+        z,
+        durations[i],
+        Control(control.tolerance, control.order, control.most_steps, control.most_events, control.until_decided, step),
+        None,
+        out,
+        out_mode,
+        log,
+        a,
+        stack,
+        reals,
+        whole,
+        tried,
+    )
+
+
+@inner_kernel
+def _play_into(settings, law, horizontal, vertical, samples, states, durations, i, control, motion, modes, log, z, a, stack, kept):
+    """Plays row i and writes its motion; how it ended, and when, its peak, whether it rests, its series, and the rows written."""
+    step = durations[i] / max(motion.shape[1] - 1, 1)
+    ending, t_end, peak, at_rest, series, _, _, _, _, rows, _ = play_row(
+        settings, law, horizontal, vertical, samples, states, durations, i, step, control, motion[i], modes[i], log, z, a, stack, kept
+    )
+    return ending, t_end, peak, at_rest, series, rows
 
 
 @kernel
@@ -288,33 +323,10 @@ def _run_rows(
     written,
 ):
     a, stack = workspace()
-    log = np.empty((0, 5))
-    z = np.empty(6)
-    parts = max(motion.shape[1] - 1, 1)
+    kept, z, log = kept_arrays(), np.empty(6), np.empty((0, 5))
     for i in range(len(durations)):
-        b = row_setting(settings[i], law)
-        z[:] = states[i]
-        own = Control(
-            control.tolerance, control.order, control.most_steps, control.most_events, control.until_decided, durations[i] / parts
+        ending[i], t_end[i], peak[i], at_rest[i], series[i], written[i] = _play_into(
+            settings, law, horizontal, vertical, samples, states, durations, i, control, motion, modes, log, z, a, stack, kept
         )
-        tally = run(
-            b,
-            row_ground(horizontal[i], samples),
-            row_ground(vertical[i], samples),
-            z,
-            durations[i],
-            own,
-            motion[i],
-            modes[i],
-            log,
-            a,
-            stack,
-        )
-        ending[i] = tally.ending
-        if tally.ending == OVERTURNED:
-            side[i] = -1 if z[2] > 0.0 else 1
-        peak[i] = tally.peak
-        t_end[i] = tally.t
-        series[i] = tally.steps
-        at_rest[i] = tally.at_rest
-        written[i] = tally.rows
+        if ending[i] == OVERTURNED:
+            side[i] = -1 if z[THETA] > 0.0 else 1

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import natural
-from rockcheck.ebm.batch import pack, row_ground, row_setting
-from rockcheck.ebm.core.march import FAILURES, OVERTURNED, Control, run
+from rockcheck.ebm.batch import pack, play_row
+from rockcheck.ebm.core.march import FAILURES, OVERTURNED, Control, kept_arrays
 from rockcheck.ebm.core.motion import THETA, X, workspace
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes import kinematics
@@ -82,13 +82,12 @@ def _sample_rows(settings, law, horizontal, vertical, states, durations, samples
     a, stack = workspace()
     rows = theta.shape[1]
     out, out_mode, log = np.empty((rows, 6)), np.empty(rows, dtype=np.int8), np.empty((0, 5))
-    z = np.empty(6)
+    kept, z = kept_arrays(), np.empty(6)
     for i in range(len(durations)):
-        c = Control(control.tolerance, control.order, control.most_steps, control.most_events, False, steps[i])
-        grounds = row_ground(horizontal[i], samples), row_ground(vertical[i], samples)
-        z[:] = states[i]
-        tally = run(row_setting(settings[i], law), grounds[0], grounds[1], z, durations[i], c, out, out_mode, log, a, stack)
+        found = play_row(
+            settings, law, horizontal, vertical, samples, states, durations, i, steps[i], control, out, out_mode, log, z, a, stack, kept
+        )
         states[i] = z
-        peak[i], ending[i] = tally.peak, tally.ending
+        ending[i], peak[i], written = found[0], found[2], found[9]
         for k in range(rows):
-            theta[i, k] = out[k, THETA] if k < tally.rows else z[THETA]
+            theta[i, k] = out[k, THETA] if k < written else z[THETA]

@@ -114,6 +114,8 @@ from rockcheck.scenes.compiled import inner_kernel, kernel
 
 __all__ = ["DONE", "EVENT_NAMES", "FAILURES", "MODE_NAMES", "OVERTURNED", "TOO_MANY_EVENTS", "TOO_MANY_STEPS", "Control", "Tally", "run"]
 
+# Where the counts of the modelling choices begin in a run's integers.
+_RULES = MODE_SIZE + 7
 #: Events that are changes of mode and nothing else.
 _CHANGES = (UPLIFT, SLIPS, LIFT_OFF, RELEASE)
 #: A step reaches at most so many times as far as the last ones went: where a block rattles, its series need few terms. Of a longer
@@ -129,33 +131,41 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack, yields=None)
     kind, mode before, mode after, impulse. `a` and `stack` are a `workspace()`. With Bouc-Wen friction `yields` is its yield
     displacement; without it the loop is compiled for Coulomb's.
     """
-    # Parts of two arrays: to make one takes as long as a fifth of a step.
-    reals, whole = np.zeros(10 + MEMORY + 16), np.zeros(MODE_SIZE + 7 + RULES, dtype=np.int64)
+    reals, whole, tried = kept_arrays()
+    found = march(b, gh, gv, z, t_end, control, yields, out, out_mode, log, a, stack, reals, whole, tried)
+    return Tally(*found, whole[_RULES:])
+
+
+@kernel
+def kept_arrays():
+    """Arrays for what a run keeps besides its state: numbers, integers, and flags of the modes that it has tried."""
+    return np.zeros(10 + MEMORY + 16), np.zeros(_RULES + RULES, dtype=np.int64), np.zeros(MODES, dtype=np.bool_)
+
+
+@inner_kernel
+def march(b, gh, gv, z, t_end, control, yields, out, out_mode, log, a, stack, reals, whole, tried):
+    """Simulates as `run` does, in `kept_arrays` that another run may have used; returns all that a Tally has but its rules.
+
+    Where arrays are made, or parts of them, their references are counted one by one, unless that is in an inner kernel.
+    """
+    reals[:] = 0.0
+    whole[:] = 0
     control = _in_rad(control, b)
     r = Run(
         z,
         whole[:MODE_SIZE],
         reals[:10],
-        whole[MODE_SIZE : MODE_SIZE + 7],
-        whole[MODE_SIZE + 7 :],
-        np.zeros(MODES, dtype=np.bool_),
+        whole[MODE_SIZE:_RULES],
+        whole[_RULES:],
+        tried,
         reals[10 : 10 + MEMORY],
         reals[10 + MEMORY : 16 + MEMORY],
         reals[16 + MEMORY : 18 + MEMORY],
         reals[18 + MEMORY : 20 + MEMORY],
         reals[20 + MEMORY :],
     )
-    now = r.now
-    now[T_REST] = now[ZETA] = now[SWUNG] = now[PIVOT] = np.nan
-    now[PEAK], now[QUIET], now[STRIDE] = abs(z[THETA]), quiet_from(gh, gv, control.tolerance), np.inf
-    no_impacts(r.rattle)
     records = Records(out, out_mode, log)
-    for k in range(a.shape[1]):  # the series of 1 + vertical acceleration: of a still base it stays as it is
-        a[G, k] = 0.0
-    a[G, 0] = 1.0
-    forget(r.tried, r.memory, 0.0)
-    stands = z[THETA] == 0.0 and z[W] == 0.0 and z[VX] == 0.0 and z[VY] == 0.0 and closed_floor(b, z)
-    ending = _change(r, LEAVES_REST if stands else NO_EVENT, 0)
+    ending = _begin(b, gh, gv, r, control, a)
     while ending >= GOING:
         if ending == CHANGING:
             ending = _follow(b, gh, gv, r, yields, records, a)
@@ -171,7 +181,22 @@ def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack, yields=None)
         _sample_rest(r, np.inf, control, records)
     at_rest = r.m[FAMILY] == FLAT and r.m[FLOOR] == STICK
     steps, events, walls, rows = r.counts[STEPS], r.counts[EVENTS], r.counts[WALL_IMPACTS], r.counts[ROWS]
-    return Tally(ending, r.now[T], r.now[PEAK], at_rest, steps, events, walls, int(r.gains[0]), r.gains[1], rows, r.now[T_REST], r.rules)
+    return ending, r.now[T], r.now[PEAK], at_rest, steps, events, walls, int(r.gains[0]), r.gains[1], rows, r.now[T_REST]
+
+
+@inner_kernel
+def _begin(b, gh, gv, r, control, a):
+    """Prepares the first mode at t = 0."""
+    z, now = r.z, r.now
+    now[T_REST] = now[ZETA] = now[SWUNG] = now[PIVOT] = np.nan
+    now[PEAK], now[QUIET], now[STRIDE] = abs(z[THETA]), quiet_from(gh, gv, control.tolerance), np.inf
+    no_impacts(r.rattle)
+    for k in range(a.shape[1]):  # the series of 1 + vertical acceleration: of a still base it stays as it is
+        a[G, k] = 0.0
+    a[G, 0] = 1.0
+    forget(r.tried, r.memory, 0.0)
+    stands = z[THETA] == 0.0 and z[W] == 0.0 and z[VX] == 0.0 and z[VY] == 0.0 and closed_floor(b, z)
+    return _change(r, LEAVES_REST if stands else NO_EVENT, 0)
 
 
 @inner_kernel

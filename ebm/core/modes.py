@@ -78,9 +78,21 @@ def _candidates() -> np.ndarray:
 
 
 _CANDIDATES = _candidates()
-# Where those of a block that is tilted stand.
-_TILTED = int(np.argmax((_CANDIDATES[:, 0] == TILT) & (_CANDIDATES[:, 6] == 0)))
-_TILTED_END = int(np.argmax((_CANDIDATES[:, 0] == TILT) & (_CANDIDATES[:, 1] < 0)))
+_FLAT_TRIES = 4
+
+
+def _tries() -> np.ndarray:
+    """The candidates, by number, and then -1, of a tilted block that touches these walls (none, 1, 2, 3), and in the last row of a flat one."""
+    family, sense, walls, only_flat = _CANDIDATES[:, [0, 1, 5, 6]].T
+    rows = np.full((_FLAT_TRIES + 1, len(_CANDIDATES) + 1), -1, dtype=np.int8)
+    rows[_FLAT_TRIES, :-1] = range(len(_CANDIDATES))
+    for touched in range(_FLAT_TRIES):
+        found = np.flatnonzero((family == TILT) & (sense > 0) & (only_flat == 0) & (walls & ~touched == 0))
+        rows[touched, : len(found)] = found
+    return rows
+
+
+_TRIES = _tries()
 
 
 @inner_kernel
@@ -258,11 +270,14 @@ def select(b, z, gh, gv, t, m, tried, memory, rules, a):
     upright_walls = _touched(b, z, 1, True) if flat else 0
     near, away = _touched(b, z, first, False), _touched(b, z, -first, False) if flat else 0
     v = slip_velocity(b, z)
-    begin, end = (0, _CANDIDATES.shape[0]) if flat else (_TILTED, _TILTED_END)
+    tries = _FLAT_TRIES if flat else near
     least, chosen = np.inf, -1
     for trial in range(3):  # one that fits; else that which is wrong by least, among those not tried and those tried
         again = trial == 2
-        for number in range(begin, end):
+        for place in range(_TRIES.shape[1]):
+            number = _TRIES[tries, place]
+            if number < 0:
+                break
             tilts = _CANDIDATES[number, 0] == TILT
             walls = (near if _CANDIDATES[number, 1] > 0 else away) if tilts else upright_walls
             if tilts and (favoured == 0 or _CANDIDATES[number, 5] & ~walls):

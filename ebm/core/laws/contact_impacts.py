@@ -36,6 +36,11 @@ _NONE, _STICK, _PLUS, _MINUS = range(4)
 # Every set of at most three contacts: their number, the contacts, and these as bits.
 _CHOSEN = [some for n in range(4) for some in itertools.combinations(range(CONTACTS), n)]
 _SETS = np.array([[len(some), *some, *[0] * (3 - len(some)), sum(1 << j for j in some)] for some in _CHOSEN])
+# By the contacts that take part, as bits: the sets of no others, by their numbers, and then -1.
+_WITHIN = np.full((1 << CONTACTS, len(_SETS) + 1), -1, dtype=np.int8)
+for _bits in range(1 << CONTACTS):
+    _inside = np.flatnonzero(_SETS[:, 4] & ~_bits == 0)
+    _WITHIN[_bits, : len(_inside)] = _inside
 _ON_FLOOR = 1 << F | 1 << E
 # Rounding of a velocity, of the velocities at play; rows of contacts that are nearer to parallel than this give no solution.
 _ROUNDING, _PARALLEL = NOISE[POSITION], CLOSED
@@ -184,9 +189,10 @@ def _strike(rows, spin, taking, target, mu_s, mu_k, v, after, impulse, system):
     bits = 0
     for j in range(CONTACTS):
         bits |= (1 if taking[j] else 0) << j
-    for number in range(_SETS.shape[0]):
-        if _SETS[number, 4] & ~bits:
-            continue
+    for place in range(_WITHIN.shape[1]):
+        number = _WITHIN[bits, place]
+        if number < 0:
+            break
         for friction in range(4):
             if not _fits(number, friction, mu_s == 0.0) or not _try_set(rows, spin, number, friction, target, mu_k, v, system, trial, lam):
                 continue
