@@ -356,8 +356,3 @@ def inner_kernel(function: Callable[..., Any]) -> Any:
 def called_kernel(function: Callable[..., Any]) -> Any:
     """An inner kernel that is called: for what is long and stands in several places, each of which would be compiled again."""
     return _inner(function, forceinline=False)
-
-
-def event_kernel(function: Callable[..., Any]) -> Any:
-    """A part of kernels that is called, and may make arrays: for what is long and rare. In place it would take longer to compile."""
-    return _inner(function, forceinline=False, _nrt=True)

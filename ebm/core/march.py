@@ -108,7 +108,21 @@ from rockcheck.ebm.core.running import (
     mode_code,
     note,
 )
-from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, POSITION, first_root, longest_step, size_of, slope, stays_below, step_size, value
+from rockcheck.ebm.core.series import (
+    AHEAD,
+    FORCE,
+    INSTANT,
+    NO_ROOT,
+    NOISE,
+    POSITION,
+    first_root,
+    longest_step,
+    size_of,
+    slope,
+    stays_below,
+    step_size,
+    value,
+)
 from rockcheck.ebm.core.settle import no_impacts, settling_speed
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
@@ -332,7 +346,7 @@ def _step(b, gh, gv, r, t_end, control, yields, records, a, stack):
         now[PEAK] = 0.5 * math.pi
         note(r, records.log, LEFT if m[S] > 0 else RIGHT, mode_code(r))
         return OVERTURNED
-    return _resolve(b, gh, gv, r, which, yields, records, a)
+    return _resolve(b, gh, gv, r, which, yields, records, a, stack)
 
 
 @inner_kernel
@@ -433,7 +447,7 @@ def _grazes(b, r, order, pivot, tau, h, control, a):
 
 
 @inner_kernel
-def _resolve(b, gh, gv, r, which, yields, records, a):
+def _resolve(b, gh, gv, r, which, yields, records, a, stack):
     """An event: the impact at a gap that closes, or the change of mode at another guard."""
     z, m, t = r.z, r.m, r.now[T]
     before = mode_code(r)
@@ -441,7 +455,7 @@ def _resolve(b, gh, gv, r, which, yields, records, a):
     if which <= G_FAR_GAP:
         r.impulse[:] = 0.0
         resting = settling_speed(r.rattle, t, r.rules)
-        struck, known = strike(b, m, z, which, gh, t, resting, r.impulse, r.gains, r.rules)
+        struck, known = strike(b, m, z, which, gh, t, resting, r.impulse, r.gains, r.rules, stack)
         kind = WALL_IMPACT if struck == ON_WALL else (LANDS if struck == LANDING else FLOOR_IMPACT)
         if r.impulse[0] + r.impulse[1] > 0.0:
             forget(r.tried, r.memory, t)  # a new motion: all modes may be tried again

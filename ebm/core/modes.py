@@ -82,7 +82,7 @@ _FLAT_TRIES = 4
 
 
 def _tries() -> np.ndarray:
-    """The candidates, by number, and then -1, of a tilted block that touches these walls (none, 1, 2, 3), and in the last row of a flat one."""
+    """The candidates, by number, and then -1: of a tilted block that touches these walls (none, 1, 2, 3), in the last row of a flat one."""
     family, sense, walls, only_flat = _CANDIDATES[:, [0, 1, 5, 6]].T
     rows = np.full((_FLAT_TRIES + 1, len(_CANDIDATES) + 1), -1, dtype=np.int8)
     rows[_FLAT_TRIES, :-1] = range(len(_CANDIDATES))

@@ -27,10 +27,12 @@ import numpy as np
 from rockcheck.ebm.core.contacts import CLOSED
 from rockcheck.ebm.core.motion import CLOSED_BRANCH, FLOOR_FIRST, MOREAU, side_of
 from rockcheck.ebm.core.series import NOISE, POSITION
-from rockcheck.scenes.compiled import event_kernel, inner_kernel
+from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 F, E, TIP_TOP, TIP_BOTTOM, FAR_BOTTOM, FAR_TOP = range(6)
 CONTACTS = 6
+#: Rows of scratch that an impact needs.
+WORK = 20
 _TANGENT = 6
 _NONE, _STICK, _PLUS, _MINUS = range(4)
 # Every set of at most three contacts: their number, the contacts, and these as bits.
@@ -50,12 +52,12 @@ ENDLESS, FITS, LEAST_WRONG = range(3)
 _HALVINGS = 45
 
 
-@event_kernel
-def contact_rows(b, sense, phi):
-    """Rows (xi, y, phi) of the six normal contacts and, last, of the floor's tangent, for a block that tips by phi to `sense`."""
+@inner_kernel
+def contact_rows(b, sense, phi, rows):
+    """Writes rows (xi, y, phi) of the six normal contacts and, last, of the floor's tangent, for a block that tips by phi to `sense`."""
     pivot, other = side_of(b, sense), side_of(b, -sense)
     s, c = pivot.radius * math.sin(pivot.alpha - phi), pivot.radius * math.cos(pivot.alpha - phi)
-    rows = np.zeros((7, 3))
+    rows[:] = 0.0
     rows[F, 1], rows[F, 2] = 1.0, -s
     rows[E, 1], rows[E, 2] = 1.0, other.radius * math.sin(other.alpha + phi)
     rows[TIP_TOP, 0], rows[TIP_TOP, 2] = 1.0, -pivot.top_radius * math.cos(pivot.top_alpha + phi)
@@ -63,7 +65,6 @@ def contact_rows(b, sense, phi):
     rows[FAR_BOTTOM, 0], rows[FAR_BOTTOM, 2] = -1.0, -other.radius * math.cos(other.alpha + phi)
     rows[FAR_TOP, 0], rows[FAR_TOP, 2] = -1.0, other.top_radius * math.cos(other.top_alpha - phi)
     rows[_TANGENT, 0], rows[_TANGENT, 2] = 1.0, c
-    return rows
 
 
 @inner_kernel
@@ -172,12 +173,12 @@ def _violation(rows, number, friction, taking, target, mu_s, trial, lam):
     elif friction != _NONE:
         worst = max(worst, -slip if friction == _PLUS else slip)
     for j in range(CONTACTS):
-        if taking[j]:
+        if taking[j] != 0.0:
             worst = max(worst, target[j] - _dot(rows[j], trial))
     return worst
 
 
-@event_kernel
+@called_kernel
 def _strike(rows, spin, taking, target, mu_s, mu_k, v, after, impulse, system):
     """One stage over the contacts in `taking`: writes the velocities after it and the impulses; False where only the least wrong fits.
 
@@ -188,7 +189,7 @@ def _strike(rows, spin, taking, target, mu_s, mu_k, v, after, impulse, system):
     lam, trial = system[3], system[4]
     bits = 0
     for j in range(CONTACTS):
-        bits |= (1 if taking[j] else 0) << j
+        bits |= (1 if taking[j] != 0.0 else 0) << j
     for place in range(_WITHIN.shape[1]):
         number = _WITHIN[bits, place]
         if number < 0:
@@ -218,7 +219,7 @@ def _moreau(law, touching, approach, restitution, rounding, taking):
     """Whatever touches takes part; at an elastic wall only the corners that approach."""
     for j in range(CONTACTS):
         rests = law == CLOSED_BRANCH or (law == MOREAU and restitution[j] < 1.0)
-        taking[j] = touching[j] and (j <= E or approach[j] < -rounding or rests)
+        taking[j] = 1.0 if touching[j] != 0.0 and (j <= E or approach[j] < -rounding or rests) else 0.0
 
 
 @inner_kernel
@@ -236,37 +237,38 @@ def _floor_first(touching, approach, stage, rounding, ahead, taking):
         if approach[j] < -rounding:
             soonest = min(soonest, ahead[j] / -approach[j])
     for j in range(CONTACTS):
-        taking[j] = False
+        taking[j] = 0.0
         if approach[j] < -rounding and ahead[j] <= -approach[j] * soonest * (1.0 + _PARALLEL):
             ahead[j] = 0.0
-            taking[j] = True
-        elif touching[j]:
+            taking[j] = 1.0
+        elif touching[j] != 0.0:
             ahead[j] = max(0.0, ahead[j] + approach[j] * soonest)
-            taking[j] = abs(approach[j]) <= rounding and ahead[j] <= _PARALLEL
+            taking[j] = 1.0 if abs(approach[j]) <= rounding and ahead[j] <= _PARALLEL else 0.0
 
 
-@event_kernel
-def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, tally):
+@called_kernel
+def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, tally, work):
     """All stages at one instant; v (xi, y, phi rates) becomes the velocities after them. Returns FITS, LEAST_WRONG or ENDLESS.
 
-    The block tips by phi to `sense`. `touching[6]` says which gaps are closed, `resting` is the approach speed below which a
-    contact closes for good.
+    The block tips by phi to `sense`. `touching[6]` says which gaps are closed (not 0), `resting` is the approach speed below which a
+    contact closes for good. `work` is scratch, such as that of the root search: `WORK` rows.
     `impulse[2]` gathers the normal impulses of floor and walls; `tally[0]` counts stages that added energy and `tally[1]` keeps the
     largest relative gain.
     """
-    rows = contact_rows(b, sense, phi)
-    taking = np.zeros(CONTACTS, dtype=np.bool_)
-    # Parts of one array: to make each would take as long as to solve for its impulses.
-    parts = np.zeros((6, CONTACTS))
-    restitution, target, part, approach, ahead, after = parts[0], parts[1], parts[2], parts[3], parts[4], parts[5]
-    system = np.zeros((5, 4))  # the impulses and velocities of a trial stand below it
+    rows, system = work[:7], work[7:12]  # the impulses and velocities of a trial stand below the system
+    restitution, target, part, approach, ahead, after, taking, full = (
+        work[12], work[13], work[14], work[15], work[16], work[17], work[18], work[19]
+    )  # fmt: skip
+    contact_rows(b, sense, phi, rows)
+    part[:] = 0.0
+    after[:] = 0.0
     rounding = _ROUNDING * _size(v)
     found = FITS
     for stage in range(_MOST_STAGES):
         plastic = 2 * stage >= _MOST_STAGES  # impacts that alternate between floor and wall without end become plastic
         closes = False
         for j in range(CONTACTS):
-            approach[j] = _dot(rows[j], v) if touching[j] else 0.0
+            approach[j] = _dot(rows[j], v) if touching[j] != 0.0 else 0.0
             closes = closes or approach[j] < -rounding
             restitution[j] = 0.0 if plastic else (b.e_floor if j <= E else (e_tip if j <= TIP_BOTTOM else e_far))
         if not closes:
@@ -277,13 +279,13 @@ def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, t
         else:
             _moreau(MOREAU if plastic else b.law, touching, approach, restitution, rounding, taking)
         for j in range(CONTACTS):
-            target[j] = -restitution[j] * approach[j] if taking[j] and approach[j] < -resting else 0.0
+            target[j] = -restitution[j] * approach[j] if taking[j] != 0.0 and approach[j] < -resting else 0.0
         before = kinetic_energy(b.spin, v)
         if not _strike(rows, b.spin, taking, target, b.mu_s, b.mu_k, v, after, part, system):
             found = LEAST_WRONG
         noise = 2.0 * _ROUNDING * before
         if b.energy_cap and not plastic and kinetic_energy(b.spin, after) - before > noise:
-            _strike_without_gain(b, rows, taking, target, v, after, part, system, before)
+            _strike_without_gain(b, rows, taking, target, v, after, part, system, before, full)
         gain = kinetic_energy(b.spin, after) - before
         if gain > noise:
             tally[0] += 1.0
@@ -292,16 +294,17 @@ def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, t
             impulse[0 if j <= E else 1] += part[j]
         for k in range(3):
             v[k] = after[k]
-    if touching[TIP_TOP] and touching[FAR_BOTTOM]:
+    if touching[TIP_TOP] != 0.0 and touching[FAR_BOTTOM] != 0.0:
         # Its diagonal just fits between two walls, with a lever so short that no impulse can be solved for: it jams.
         v[0] = v[2] = 0.0
     return ENDLESS
 
 
-@event_kernel
-def _strike_without_gain(b, rows, taking, target, v, after, part, system, before):
+@called_kernel
+def _strike_without_gain(b, rows, taking, target, v, after, part, system, before, full):
     """Strikes with the largest share of the rebound at which no energy is gained."""
-    full = target.copy()
+    for j in range(CONTACTS):
+        full[j] = target[j]
     low, high = 0.0, 1.0
     for trial in range(_HALVINGS + 1):
         scale = low if trial == _HALVINGS else 0.5 * (low + high)
@@ -314,23 +317,23 @@ def _strike_without_gain(b, rows, taking, target, v, after, part, system, before
             low = scale
 
 
-@event_kernel
+@called_kernel
 def _close(rows, spin, touching, resting, v, system):
     """Contacts that part more slowly than `resting` are closed: the velocity is projected onto them, mass-orthogonally."""
-    members = np.zeros(3, dtype=np.int64)
-    count = 0
+    members, count = system[3], 0
     for j in range(CONTACTS):
-        if touching[j] and count < 3 and abs(_dot(rows[j], v)) < resting:
+        if touching[j] != 0.0 and count < 3 and abs(_dot(rows[j], v)) < resting:
             members[count] = j
             count += 1
     while count > 0:
         for i in range(count):
+            row = rows[int(members[i])]
             for j in range(count):
-                system[i, j] = _mass_dot(spin, rows[members[i]], rows[members[j]])
-            system[i, count] = -_dot(rows[members[i]], v)
+                system[i, j] = _mass_dot(spin, row, rows[int(members[j])])
+            system[i, count] = -_dot(row, v)
         if solve(system, count):
             for i in range(count):
                 for k in range(3):
-                    v[k] += (spin if k == 2 else 1.0) * rows[members[i], k] * system[i, count]
+                    v[k] += (spin if k == 2 else 1.0) * rows[int(members[i]), k] * system[i, count]
             return
         count -= 1

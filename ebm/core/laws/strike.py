@@ -26,13 +26,13 @@ from rockcheck.ebm.core.contacts import (
 from rockcheck.ebm.core.guards import G_FAR_GAP, G_LANDING, G_PHI, G_TIP_GAP
 from rockcheck.ebm.core.laws import impacts
 from rockcheck.ebm.core.laws.contact_impacts import (
-    CONTACTS,
     FAR_BOTTOM,
     FAR_TOP,
     FITS,
     LEAST_WRONG,
     TIP_BOTTOM,
     TIP_TOP,
+    WORK,
     E,
     F,
     contact_impact,
@@ -42,7 +42,7 @@ from rockcheck.ebm.core.motion import FAMILY, FAR, FLAT, FLOOR, HEIGHT, OFF, PUL
 from rockcheck.ebm.core.rules import ENDLESS_STAGES, FLUSH_LANDING, LANDS_ALONG, LEAST_CONTRADICTION, SETTLES, WEDGED
 from rockcheck.ebm.core.series import NOISE, POSITION
 from rockcheck.ebm.core.settle import SETTLE
-from rockcheck.scenes.compiled import event_kernel, inner_kernel
+from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 #: What an impact was.
 ON_FLOOR, ON_WALL, LANDING = range(3)
@@ -56,8 +56,8 @@ def rocks(m, sense):
 
 
 @inner_kernel
-def strike(b, m, z, which, gh, t, resting, impulse, gains, rules):
-    """Resolves the impact at the closing of gap `which`: what it was, and whether m is already the mode that follows."""
+def strike(b, m, z, which, gh, t, resting, impulse, gains, rules, work):
+    """Resolves the impact at the closing of gap `which`: what it was, and whether m is already the mode that follows. `work` is scratch."""
     touch(b, m, z, which)
     # Near phi = 0 the far gap goes with phi^2, so that its root says phi to the square root of rounding only.
     if which == G_FAR_GAP and m[FAMILY] == TILT and z[THETA] * z[THETA] < CLOSED and m[S] * z[W] < 0.0 and closed_floor(b, z):
@@ -68,7 +68,7 @@ def strike(b, m, z, which, gh, t, resting, impulse, gains, rules):
     wall = which == G_TIP_GAP or which == G_FAR_GAP
     known = False
     if b.unilateral:
-        _strike_by(b.law, b, m, z, gh, t, resting, impulse, gains, rules)
+        _strike_by(b.law, b, m, z, gh, t, resting, impulse, gains, rules, work)
     elif wall:
         known = _wall_impact(b, m, z, which == G_TIP_GAP, resting, impulse, gains, rules)
     else:
@@ -202,35 +202,31 @@ def count_gain(before, after, gains):
 
 
 @inner_kernel
-def _strike_by(law, b, m, z, gh, t, resting, impulse, gains, rules):
+def _strike_by(law, b, m, z, gh, t, resting, impulse, gains, rules, work):
     """Resolves all contacts. Where there is no law for them the code for it is not even compiled: numba looks at arguments only."""
     if law is not None:
-        _strike_all(b, m, z, gh, t, resting, impulse, gains, rules)
+        _strike_all(b, m, z, gh, t, resting, impulse, gains, rules, work)
 
 
-@event_kernel
-def _strike_all(b, m, z, gh, t, resting, impulse, gains, rules):
+@called_kernel
+def _strike_all(b, m, z, gh, t, resting, impulse, gains, rules, work):
     """Unilateral pivot: resolves all contacts touched at this instant."""
     sign = float(tips_first(b, z, gh, t) if m[FAMILY] == FLAT else m[S])
     phi = abs(z[THETA])
     flat = z[THETA] == 0.0
-    touching = np.zeros(CONTACTS, dtype=np.bool_)
-    touching[F] = abs(floor_gap(b, z)) < CLOSED
-    touching[E] = flat and touching[F]
-    touching[TIP_TOP] = abs(wall_gap(b, z, sign)) < CLOSED
-    touching[TIP_BOTTOM] = flat and touching[TIP_TOP]
-    touching[FAR_BOTTOM] = abs(wall_gap(b, z, -sign)) < CLOSED
-    touching[FAR_TOP] = flat and touching[FAR_BOTTOM]
-    v = np.zeros(3)
+    floor, tip, far = abs(floor_gap(b, z)) < CLOSED, abs(wall_gap(b, z, sign)) < CLOSED, abs(wall_gap(b, z, -sign)) < CLOSED
+    touching, v = work[WORK], work[WORK + 1]
+    touching[F], touching[TIP_TOP], touching[FAR_BOTTOM] = floor, tip, far
+    touching[E], touching[TIP_BOTTOM], touching[FAR_TOP] = flat and floor, flat and tip, flat and far
     v[0], v[1], v[2] = sign * z[VX], z[VY], sign * z[W]
     e_tip = b.e_left if sign > 0 else b.e_right
     e_far = b.e_right if sign > 0 else b.e_left
-    if touching[TIP_TOP] and touching[FAR_BOTTOM]:
+    if tip and far:
         rules[WEDGED] += 1
         e_tip = e_far = 0.0
-    found = contact_impact(b, sign, phi, touching, e_tip, e_far, resting, v, impulse, gains)
+    found = contact_impact(b, sign, phi, touching, e_tip, e_far, resting, v, impulse, gains, work)
     if found != FITS:
         rules[LEAST_CONTRADICTION if found == LEAST_WRONG else ENDLESS_STAGES] += 1
     z[VX], z[VY], z[W] = sign * v[0], v[1], sign * v[2]
-    if touching[F] and abs(slip_velocity(b, z)) < SLOW:
+    if floor and abs(slip_velocity(b, z)) < SLOW:
         stand(b, z)
