@@ -261,7 +261,7 @@ def _clean(b, z, floor):
 def select(b, z, gh, gv, t, m, tried, memory, rules, a):
     """Writes the consistent mode at state z into m, or the one that is wrong by least. False where the state is not finite."""
     memory[BEGAN] = t
-    floor = closed_floor(b, z) or not b.unilateral
+    floor = not b.unilateral or closed_floor(b, z)
     _clean(b, z, floor)
     flat = z[THETA] == 0.0 and z[W] == 0.0
     lean = z[THETA] if z[THETA] != 0.0 else z[W]
