@@ -148,7 +148,7 @@ def _try_set(rows, spin, number, friction, target, mu_k, v, system, trial, lam):
     if not solve(system, n):
         return False
     for k in range(3):
-        trial[k] = v[k]
+        trial[k], lam[k] = v[k], 0.0
     for j in range(n):
         lam[j] = system[j, n]
         index = _SETS[number, 1 + j] if j < count else _TANGENT

@@ -108,6 +108,24 @@ def landing(alpha: float, phi: float, mu: float, e: float, v, cap: bool) -> tupl
     return after, float(tally[1])
 
 
+def test_an_impact_reads_no_scratch_that_it_has_not_written():
+    """Whatever the root search has left there: also impacts whose approach is hardly more than rounding."""
+    rng = np.random.default_rng(24)
+    for _ in range(300):
+        alpha, mu, e, resting = rng.uniform(0.1, 1.2), rng.uniform(0.05, 1.2), rng.uniform(0.0, 1.0), 1e-9
+        phi = float(rng.choice([0.0, 1e-8, 0.1 * alpha]))
+        can = range(ci.CONTACTS) if phi == 0.0 else (ci.F, ci.TIP_TOP, ci.FAR_BOTTOM)
+        touching = np.isin(np.arange(ci.CONTACTS), can) & (rng.integers(0, 2, ci.CONTACTS) == 1)
+        v = rng.normal(0.0, 0.5, 3) * 10.0 ** rng.uniform(-9.0, 0.0, 3)
+        setting = setting_of(alpha, mu, e, cap=bool(rng.integers(0, 2)))
+        found = []
+        for scratch in (0.0, np.nan, 1e9):
+            after, impulse, tally = v.copy(), np.zeros(2), np.zeros(2)
+            end = ci.contact_impact(setting, 1.0, phi, touching, e, e, resting, after, impulse, tally, np.full((ci.WORK, 6), scratch))
+            found.append((end, *after, *impulse, *tally))
+        assert found[0] == found[1] == found[2]
+
+
 def test_the_floor_takes_friction_within_its_cone():
     """A corner that lands and slips is held by mu times what holds it up, against the slip; one that sticks by no more than that."""
     rng = np.random.default_rng(22)
