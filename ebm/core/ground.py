@@ -271,9 +271,8 @@ def next_exceedance(g, t, low, high, noise, ahead):
         if there < low - noise or there > high + noise:
             level, beyond = (low, low - noise) if there < low else (high, high + noise)
             passed = t if (here - level) * (there - level) > 0.0 else _passage(g, t, end, here - level, there - level, level)
-            soon = acceleration(g, passed + ahead) - beyond
-            if passed + ahead < end and soon * (there - beyond) > 0.0:
-                return passed
+            if passed + ahead < end and (acceleration(g, passed + ahead) - beyond) * (there - beyond) > 0.0:
+                return passed  # it passes the limit by the noise sooner than `ahead`
             left = _passage(g, passed, end, acceleration(g, passed) - beyond, there - beyond, beyond)
             return max(passed, left - ahead)
         if end <= t:

@@ -83,7 +83,7 @@ _ANY = 2.0**400
 
 @inner_kernel
 def _has(a, which, shorter):
-    """Enters a guard into the table, without weights so far, or leaves it out (`shorter` below zero)."""
+    """Enters a guard into the table: so many terms shorter than the series, its weights and its constant still zero."""
     row = TABLE + which
     for k in range(_MOST):
         a[row, _COMBINES[which, k]] = 0.0
@@ -172,12 +172,12 @@ def _fill_flat(b, m, a):
     """The guards of a translating block; the tip wall is the left one, the far wall the right one."""
     on_wall = m[TIP] != 0 or m[FAR] != 0
     hangs = m[FLOOR] != OFF and m[PULL] < 0  # a floor that pulls at what a wall holds
-    for which in (G_TIP_GAP, G_FAR_GAP):
-        gap = b.gap_left if which == G_TIP_GAP else b.gap_right
-        if gap < np.inf and m[TIP if which == G_TIP_GAP else FAR] == 0:
-            _has(a, which, 0)
-            a[TABLE + which, XI] = 1.0 if which == G_TIP_GAP else -1.0
-            a[TABLE + which, _CONSTANT] = gap
+    for wall in (G_TIP_GAP, G_FAR_GAP):
+        gap = b.gap_left if wall == G_TIP_GAP else b.gap_right
+        if gap < np.inf and m[TIP if wall == G_TIP_GAP else FAR] == 0:
+            _has(a, wall, 0)
+            a[TABLE + wall, XI] = 1.0 if wall == G_TIP_GAP else -1.0
+            a[TABLE + wall, _CONSTANT] = gap
     if m[TIP] != m[FAR] and (m[FLOOR] == OFF or hangs):  # on the floor, Q is the base acceleration that the wall takes
         _has(a, G_TIP_PUSH, 2)
         a[TABLE + G_TIP_PUSH, NA if m[FLOOR] == OFF else Q] = 1.0 if m[FLOOR] == OFF else m[TIP] - m[FAR]
