@@ -314,6 +314,8 @@ def first_event(order, h, slack, a, stack):
             noise = _with_slack(k, slack, a)
             # Compared in h, not tau: a mirror image has its guards in another order.
             root = first_root(a, GUARD, degree, h, tau, noise, seen(KIND[k], h), stack)
+            if math.isnan(root):
+                return root, k
             closes = 0 <= which <= G_FAR_GAP < k
             if root != NO_ROOT and root < tau - (INSTANT if closes else 0.0):
                 tau, which = root, k

@@ -185,7 +185,7 @@ def first_root(a, row, n, h, until, floor, ahead, stack):
 
 @inner_kernel
 def _isolate(stack, n):
-    """First root on [0, 1] of the polynomial in stack[0], positive at 0; halves intervals, left ones first.
+    """First root on [0, 1] of the polynomial in stack[0], positive at 0; halves intervals, left ones first. NaN if it is not finite.
 
     Below the top, the stack holds left halves whose right halves are still to be looked at.
     """
@@ -201,6 +201,8 @@ def _isolate(stack, n):
             high_slope = max(high_slope, 0.0) + k * stack[top, k]
             end += stack[top, k]
         low, end = stack[top, 0] + min(low, 0.0), stack[top, 0] + end
+        if not math.isfinite(end):  # no halving would end
+            return np.nan
         rootless = low > 0.0 or (high_slope < 0.0 and end > 0.0)
         if not rootless and high_slope < 0.0:
             return begin + width * _falling_root(stack, top, n, end)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 
+from rockcheck.ebm.core.contacts import CLOSED
 from rockcheck.ebm.core.motion import side_of
 from rockcheck.ebm.core.series import NOISE, POSITION
 from rockcheck.scenes.compiled import inner_kernel
@@ -87,6 +88,12 @@ def wall_slip(S, s, c, C, spin, w1, xdot1, e, mu_k, Sr, sy):
 
 
 @inner_kernel
+def _stops(branch, S, Sw, s, w1, xdot1):
+    """The block stops, by what impulses of wall and floor that takes."""
+    return branch, 0.0, 0.0, max(0.0, -Sw * xdot1), -S * s * w1, 0.0
+
+
+@inner_kernel
 def wall_impact(S, Sw, s, c, c_prime, share, spin, w1, xdot1, e, mu_s, mu_k, no_slip):
     """A corner strikes the wall, case I (top, S = Sw) or II (bottom): branch, w2, xdot2, N, P, v2, after the cascade of Fig. 3.
 
@@ -103,7 +110,7 @@ def wall_impact(S, Sw, s, c, c_prime, share, spin, w1, xdot1, e, mu_s, mu_k, no_
         xdot2 = -c * w2
         if Sw * (xdot2 - C * w2) >= 0.0:  # (22)
             return B_STICK, w2, xdot2, 0.0, S * s * (w2 - w1), 0.0
-        return C_STICK, 0.0, 0.0, max(0.0, -Sw * xdot1), -S * s * w1, 0.0  # (28)
+        return _stops(C_STICK, S, Sw, s, w1, xdot1)  # (28)
     for Sr in (1.0, -1.0):
         for sy in (1.0, -1.0):
             w2, xdot2, p, q = wall_slip(S, s, c, C, spin, w1, xdot1, e, mu_k, Sr, sy)
@@ -114,7 +121,9 @@ def wall_impact(S, Sw, s, c, c_prime, share, spin, w1, xdot1, e, mu_s, mu_k, no_
             if n >= 0.0:
                 return D_SLIP, w2, xdot2, n, p, v2
             k = -mu_k * Sr * sy
+            if abs(k * S * s - C) <= CLOSED:  # friction and wall have one lever: no speed meets both
+                return _stops(NO_BRANCH, S, Sw, s, w1, xdot1)
             w2 = (k * S * s * w1 - xdot1) / (k * S * s - C)  # (32)
             xdot2 = C * w2
             return E_SLIP, w2, xdot2, 0.0, S * s * (w2 - w1), xdot2 + c * w2
-    return NO_BRANCH, 0.0, 0.0, max(0.0, -Sw * xdot1), -S * s * w1, 0.0
+    return _stops(NO_BRANCH, S, Sw, s, w1, xdot1)

@@ -213,6 +213,14 @@ def test_a_force_may_change_faster_than_what_it_moves():
     assert series.step_size(terms, 0, 0, 3, 1e-9, 1.0) < 1e-8
 
 
+@pytest.mark.parametrize("rate", [-np.inf, np.nan])
+def test_a_search_for_a_root_ends_where_the_series_is_not_finite(rate):
+    """Its halvings would not: no bound holds for what is not a number."""
+    with np.errstate(invalid="ignore"):
+        root = series.first_root(_row([1.0, rate, np.inf, 0.0]), 0, 3, 1.0, 1.0, 1e-13, series.AHEAD, np.zeros((48, series.MOST_TERMS)))
+    assert math.isnan(root)
+
+
 @pytest.mark.parametrize("place", [0.3, 0.5, 0.7310585])
 def test_touching_is_no_root_and_dipping_is_one(place):
     """A double root lifted by 1e-12 is none; lowered by as much it is one, to the square root of that. A triple one crosses."""
