@@ -85,15 +85,20 @@ def swings_again(b, m, z, pivot, tolerance, now):
 
     After the excitation the energy and the place of the pivot are all that a swing depends on. Beside a wall that takes no energy
     a block may rock so for ever, however near its balance it turns back. Only what sticks to the floor and touches no wall swings.
-    A step errs by the tolerance, or by rounding, in rotation and speed: energy by the speed times as much.
     """
     if now[T] < now[QUIET] or m[FLOOR] != STICK or m[TIP] != 0 or m[FAR] != 0:
         return False
     energy, place = _energy(b, z), m[S] * pivot
-    error = _STEPS * (tolerance + NOISE[POSITION])
+    error = swing_error(tolerance)
     again = abs(energy - now[SWUNG]) <= error * math.sqrt(2.0 * max(energy, 0.0)) and abs(place - now[PIVOT]) <= error
     now[SWUNG], now[PIVOT] = energy, place
     return again
+
+
+@inner_kernel
+def swing_error(tolerance):
+    """The error of rotation and speed after a swing, to which each step adds the tolerance, or rounding. Energy errs by the speed times as much."""
+    return _STEPS * (tolerance + NOISE[POSITION])
 
 
 @inner_kernel

@@ -40,7 +40,7 @@ from rockcheck.ebm.core.motion import (
     delta,
     side_of,
 )
-from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, POSITION, RATE, first_root, leads_up
+from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, POSITION, RATE, first_root, leads_up, slope, value
 from rockcheck.scenes.compiled import inner_kernel
 
 # In order of priority at one instant: floor before walls, contacts before friction.
@@ -300,6 +300,20 @@ def _stays_positive(which, order, until, slack, a):
 
 
 @inner_kernel
+def _past_a_touch(degree, root, noise, a):
+    """Where the guard in the workspace is positive again if it falls below zero by less than the noise, by its parabola; else the root.
+
+    The two roots of a touch are known less well than an INSTANT apart.
+    """
+    begin, fall, half_bend, power = value(a, GUARD, degree, root), slope(a, GUARD, degree, root), 0.0, 1.0
+    for k in range(2, degree + 1):
+        half_bend += 0.5 * k * (k - 1) * a[GUARD, k] * power
+        power *= root
+    touches = fall < 0.0 and fall * fall < 4.0 * half_bend * (begin + noise)
+    return root + max(-fall / half_bend, INSTANT) if touches else root
+
+
+@inner_kernel
 def first_event(order, h, slack, a, stack):
     """The first time within the step at which a guard ends the mode, and which; h and -1 where none does.
 
@@ -318,7 +332,11 @@ def first_event(order, h, slack, a, stack):
                 return root, k
             closes = 0 <= which <= G_FAR_GAP < k
             if root != NO_ROOT and root < tau - (INSTANT if closes else 0.0):
-                tau, which = root, k
+                past = _past_a_touch(degree, root, noise, a) if KIND[k] == FORCE and root > 0.0 else root
+                if past == root:
+                    tau, which = root, k
+                elif past < tau:
+                    tau, which = past, -1
     if which >= 0 and KIND[which] == FORCE and tau > 0.25 * h:
         # A force is the second derivative of a truncated series: its zero is found to rounding from nearby only.
         return 0.9 * tau, -1

@@ -11,7 +11,7 @@ import numpy as np
 
 from rockcheck.ebm.core import bouc_wen
 from rockcheck.ebm.core.contacts import CLOSED, closed_floor, stand, stop
-from rockcheck.ebm.core.decide import decided, quiet_from, swings_again
+from rockcheck.ebm.core.decide import decided, quiet_from, swing_error, swings_again
 from rockcheck.ebm.core.ground import STILL, next_exceedance, next_kink
 from rockcheck.ebm.core.guards import (
     G_CONE_MINUS,
@@ -427,7 +427,7 @@ def _advance(b, r, order, pivot, tau, control, a, stack):
 
 @inner_kernel
 def _grazes(b, r, order, pivot, tau, h, control, a):
-    """Whether a hanging block that comes down with less energy than the tolerance does not land. It is then put where it turns back.
+    """Whether a hanging block that comes down with less energy than a swing errs by does not land. It is then put where it turns back.
 
     A block at rest whose floor falls away swings back to just where it started. That cannot be told from a touch.
     """
@@ -436,8 +436,8 @@ def _grazes(b, r, order, pivot, tau, h, control, a):
         return False
     back = slope(a, OMEGA, order - 1, tau)
     past = 2.0 * abs(z[W]) / back
-    energy = 10.0 * control.tolerance * r.now[SWING] ** 2
-    if not (z[W] * z[W] < energy * min(1.0, 10.0 * back) and 0.0 < past <= h - tau):
+    energy = swing_error(control.tolerance) * r.now[SWING]
+    if not (0.5 * z[W] * z[W] < energy * min(1.0, 10.0 * back) and 0.0 < past <= h - tau):
         return False
     r.rules[GRAZES] += 1
     r.now[T] += past

@@ -234,6 +234,28 @@ def test_touching_is_no_root_and_dipping_is_one(place):
     assert Core.first_root([two[0] + 1e-12, *two[1:]], 1.0) == pytest.approx(0.9, abs=1e-9)
 
 
+@pytest.mark.parametrize("dip", [0.0, 1e-16, 1e-10, 4e-10, 1e-9, 1e-6])
+def test_a_force_that_only_touches_zero_ends_no_mode(dip):
+    """A step ends where the force is positive again if it falls by less than noise, and in an event if it falls by more, or begins below."""
+    place, a = 0.1, motion.workspace()[0]
+    for which in range(guards.GUARDS):
+        guards.drop(a, which)
+    a[motion.TABLE + guards.G_PUSH] = 0.0
+    a[motion.TABLE + guards.G_PUSH, motion.P] = 1.0
+    a[motion.P, :3] = place * place - dip, -2.0 * place, 1.0
+    tau, which = guards.first_event(2, 1.0, 1.0, a, np.zeros((48, series.MOST_TERMS)))
+    a[motion.P, 0] = -1e-8
+    assert guards.first_event(2, 1.0, 1.0, a, np.zeros((48, series.MOST_TERMS))) == (0.0, guards.G_PUSH)
+    a[motion.P, 0] = place * place - dip
+    if dip > series.NOISE[series.FORCE]:
+        assert (tau, which) == (pytest.approx(place - math.sqrt(dip), abs=1e-12), guards.G_PUSH)
+    else:
+        assert (tau, which) == (pytest.approx(place + math.sqrt(dip), abs=3e-9), -1) or (dip == 0.0 and (tau, which) == (1.0, -1))
+        a[motion.P, 0] += tau * (a[motion.P, 1] + tau)  # the series about tau
+        a[motion.P, 1] += 2.0 * tau
+        assert guards.first_event(2, 0.5, 1.0, a, np.zeros((48, series.MOST_TERMS))) == (0.5, -1)
+
+
 @pytest.mark.parametrize("noise", NOISES)
 def test_noise_is_no_sign(noise):
     """A value below the noise tells nothing: what follows it does."""
