@@ -97,7 +97,7 @@ def swings_again(b, m, z, pivot, tolerance, now):
 
 @inner_kernel
 def swing_error(tolerance):
-    """The error of rotation and speed after a swing: each step errs by the tolerance, or by rounding. Energy errs by the speed times as much."""
+    """The error of rotation and speed after a swing: a step errs by the tolerance, or by rounding. Energy errs by that times the speed."""
     return _STEPS * (tolerance + NOISE[POSITION])
 
 

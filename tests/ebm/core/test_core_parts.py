@@ -236,7 +236,7 @@ def test_touching_is_no_root_and_dipping_is_one(place):
 
 @pytest.mark.parametrize("dip", [0.0, 1e-16, 1e-10, 4e-10, 1e-9, 1e-6])
 def test_a_force_that_only_touches_zero_ends_no_mode(dip):
-    """A step ends where the force is positive again if it falls by less than noise. It ends in an event if it falls by more, or begins below."""
+    """A step ends where the force is positive again if it falls by less than noise, else in an event, as where it begins below."""
     place, a = 0.1, motion.workspace()[0]
     for which in range(guards.GUARDS):
         guards.drop(a, which)
