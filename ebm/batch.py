@@ -9,15 +9,16 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, get_type_hints
+from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import natural
 from rockcheck.ebm.core.ground import Ground
-from rockcheck.ebm.core.march import DONE, FAILURES, OVERTURNED, Control, kept_arrays, march
+from rockcheck.ebm.core.march import DONE, FAILURES, OVERTURNED, Control, march, scratch_with
 from rockcheck.ebm.core.motion import THETA, Setting, Side, workspace
+from rockcheck.ebm.core.running import Records
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes.compiled import inner_kernel, kernel
 from rockcheck.scenes.errors import InputError, ModelFailure
@@ -55,6 +56,23 @@ class Packed:
 
     def __len__(self) -> int:
         return len(self.durations)
+
+    def rows(self, part: slice, durations: Floats) -> Rows:
+        """Some of the rows, for compiled code, with these durations of all rows."""
+        some = self.settings[part], self.horizontal[part], self.vertical[part], self.states[part], durations[part]
+        return Rows(*some, self.samples, self.law)
+
+
+class Rows(NamedTuple):
+    """Rows of a `Packed` as compiled code takes them."""
+
+    settings: NDArray[np.void]
+    horizontal: NDArray[np.void]
+    vertical: NDArray[np.void]
+    states: Floats
+    durations: Floats
+    samples: Floats
+    law: int | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,25 +195,8 @@ def run_batch(
 
     def chunk(first: int) -> int:
         rows = slice(first, min(first + _CHUNK, count))
-        _run_rows(
-            packed.settings[rows],
-            packed.law,
-            packed.horizontal[rows],
-            packed.vertical[rows],
-            packed.states[rows],
-            durations[rows],
-            packed.samples,
-            control,
-            side[rows],
-            peak[rows],
-            t_end[rows],
-            series[rows],
-            ending[rows],
-            at_rest[rows],
-            motion[rows],
-            modes[rows],
-            written[rows],
-        )
+        found = side[rows], peak[rows], t_end[rows], series[rows], ending[rows], at_rest[rows], motion[rows], modes[rows], written[rows]
+        _run_rows(packed.rows(rows, durations), control, *found)
         return rows.stop - rows.start
 
     with threads(jobs or os.cpu_count() or 1) as pool:
@@ -268,65 +269,29 @@ def row_setting(r, law):
 
 
 @inner_kernel
-def play_row(settings, law, horizontal, vertical, samples, states, durations, i, step, control, out, out_mode, log, z, a, stack, kept):
-    """Plays row i in z, with rows of `out` a `step` apart (see `ebm.core.march.march`, which says what it returns)."""
+def play_row(rows, i, step, control, records, z, scratch):
+    """Plays row i in z, with rows of the motion a `step` apart (see `ebm.core.march.march`); returns its Tally."""
     for k in range(6):
-        z[k] = states[i, k]
-    reals, whole, tried = kept
-    return march(
-        row_setting(settings[i], law),
-        row_ground(horizontal[i], samples),
-        row_ground(vertical[i], samples),
-        z,
-        durations[i],
-        Control(control.tolerance, control.order, control.most_steps, control.most_events, control.until_decided, step),
-        None,
-        out,
-        out_mode,
-        log,
-        a,
-        stack,
-        reals,
-        whole,
-        tried,
-    )
+        z[k] = rows.states[i, k]
+    b = row_setting(rows.settings[i], rows.law)
+    gh, gv = row_ground(rows.horizontal[i], rows.samples), row_ground(rows.vertical[i], rows.samples)
+    control = Control(control.tolerance, control.order, control.most_steps, control.most_events, control.until_decided, step)
+    return march(b, gh, gv, z, rows.durations[i], control, None, records, scratch)
 
 
 @inner_kernel
-def _play_into(settings, law, horizontal, vertical, samples, states, durations, i, control, motion, modes, log, z, a, stack, kept):
-    """Plays row i and writes its motion; how it ended, and when, its peak, whether it rests, its series, and the rows written."""
-    step = durations[i] / max(motion.shape[1] - 1, 1)
-    ending, t_end, peak, at_rest, series, _, _, _, _, rows, _ = play_row(
-        settings, law, horizontal, vertical, samples, states, durations, i, step, control, motion[i], modes[i], log, z, a, stack, kept
-    )
-    return ending, t_end, peak, at_rest, series, rows
+def _play_into(rows, i, control, motion, modes, log, z, scratch):
+    """Plays row i and writes its motion; returns its Tally."""
+    step = rows.durations[i] / max(motion.shape[1] - 1, 1)
+    return play_row(rows, i, step, control, Records(motion[i], modes[i], log), z, scratch)
 
 
 @kernel
-def _run_rows(
-    settings,
-    law,
-    horizontal,
-    vertical,
-    states,
-    durations,
-    samples,
-    control,
-    side,
-    peak,
-    t_end,
-    series,
-    ending,
-    at_rest,
-    motion,
-    modes,
-    written,
-):
-    a, stack = workspace()
-    kept, z, log = kept_arrays(), np.empty(6), np.empty((0, 5))
-    for i in range(len(durations)):
-        ending[i], t_end[i], peak[i], at_rest[i], series[i], written[i] = _play_into(
-            settings, law, horizontal, vertical, samples, states, durations, i, control, motion, modes, log, z, a, stack, kept
-        )
+def _run_rows(rows, control, side, peak, t_end, series, ending, at_rest, motion, modes, written):
+    scratch, z, log = scratch_with(*workspace()), np.empty(6), np.empty((0, 5))
+    for i in range(len(rows.durations)):
+        tally = _play_into(rows, i, control, motion, modes, log, z, scratch)
+        ending[i], t_end[i], peak[i], at_rest[i] = tally.ending, tally.t, tally.peak, tally.at_rest
+        series[i], written[i] = tally.steps, tally.rows
         if ending[i] == OVERTURNED:
             side[i] = -1 if z[THETA] > 0.0 else 1

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import natural
 from rockcheck.ebm.batch import pack, play_row
-from rockcheck.ebm.core.march import FAILURES, OVERTURNED, Control, kept_arrays
+from rockcheck.ebm.core.march import FAILURES, OVERTURNED, Control, scratch_with
 from rockcheck.ebm.core.motion import THETA, X, workspace
+from rockcheck.ebm.core.running import Records
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes import kinematics
 from rockcheck.scenes.compiled import kernel
@@ -51,17 +52,13 @@ def play_ensemble(scenes: Sequence[Scene], model: EventBasedModel, *, rows: int 
     step = max(first.output_step, first.duration / rows) if rows else first.duration
     t = first.replace(output_step=step).output_times if rows else np.empty(0)
     steps = np.array([step / natural.time_unit(scene) for scene in scenes])
-    theta, states = np.empty((count, len(t))), packed.states.copy()
+    theta, states = np.empty((count, len(t))), np.empty((count, 6))
     peak, ending = np.empty(count), np.zeros(count, dtype=np.int64)
     control = Control(model.tolerance, model.order, model.most_steps, model.most_events, False, 1.0)
 
     def chunk(begin: int) -> None:
         part = slice(begin, begin + _CHUNK)
-        grounds = packed.horizontal[part], packed.vertical[part]
-        _sample_rows(
-            packed.settings[part], packed.law, *grounds, states[part], packed.durations[part], packed.samples, control, steps[part],
-            theta[part], peak[part], ending[part],
-        )  # fmt: skip
+        _sample_rows(packed.rows(part, packed.durations), control, steps[part], states[part], theta[part], peak[part], ending[part])
 
     with threads(jobs or os.cpu_count() or 1) as pool:
         list(pool.map(chunk, range(0, count, _CHUNK)))
@@ -77,17 +74,13 @@ def play_ensemble(scenes: Sequence[Scene], model: EventBasedModel, *, rows: int 
 
 
 @kernel
-def _sample_rows(settings, law, horizontal, vertical, states, durations, samples, control, steps, theta, peak, ending):
-    """Plays each row to its end: its rotations on the grid, its last state (in place of the first), its peak and how it ended."""
-    a, stack = workspace()
-    rows = theta.shape[1]
-    out, out_mode, log = np.empty((rows, 6)), np.empty(rows, dtype=np.int8), np.empty((0, 5))
-    kept, z = kept_arrays(), np.empty(6)
-    for i in range(len(durations)):
-        found = play_row(
-            settings, law, horizontal, vertical, samples, states, durations, i, steps[i], control, out, out_mode, log, z, a, stack, kept
-        )
-        states[i] = z
-        ending[i], peak[i], written = found[0], found[2], found[9]
-        for k in range(rows):
-            theta[i, k] = out[k, THETA] if k < written else z[THETA]
+def _sample_rows(rows, control, steps, states, theta, peak, ending):
+    """Plays each row to its end: its rotations on the grid, its last state, its peak and how it ended."""
+    count = theta.shape[1]
+    records = Records(np.empty((count, 6)), np.empty(count, dtype=np.int8), np.empty((0, 5)))
+    scratch, z = scratch_with(*workspace()), np.empty(6)
+    for i in range(len(rows.durations)):
+        tally = play_row(rows, i, steps[i], control, records, z, scratch)
+        states[i], ending[i], peak[i] = z, tally.ending, tally.peak
+        for k in range(count):
+            theta[i, k] = records.out[k, THETA] if k < tally.rows else z[THETA]

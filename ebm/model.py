@@ -18,6 +18,8 @@ from rockcheck.scenes.observation import observe
 from rockcheck.scenes.scene import Scene
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from rockcheck.ebm.core.march import Tally
 
 
@@ -138,7 +140,7 @@ class EventBasedModel(Frozen):
         scratch = motion.workspace() if yields is None else (*bouc_wen.friction_workspace(), yields)
         _compiled(scratch, self.pivot == "unilateral")
 
-        def play(most_steps: int) -> Tally:
+        def play(most_steps: int) -> tuple[Tally, NDArray[np.int64]]:
             control = march.Control(tolerance, order, most_steps, self.most_events, False, scene.output_step / unit)
             state[:] = natural.state_of(scene)
             return march.run(b, horizontal, vertical, state, scene.duration / unit, control, out, out_mode, log, *scratch)
@@ -146,9 +148,10 @@ class EventBasedModel(Frozen):
         ready, cpu = time.perf_counter(), time.process_time()
         # A run of few steps is played here: to hand it over takes longer. Each sample of a record is a step.
         few = min(self.most_steps, _AT_ONCE if max(len(horizontal.samples), len(vertical.samples)) < _AT_ONCE else 0)
-        tally = play(few) if few else None
-        if tally is None or (tally.ending == march.TOO_MANY_STEPS and few < self.most_steps):
-            tally = interruptible(partial(play, self.most_steps))
+        found = play(few) if few else None
+        if found is None or (found[0].ending == march.TOO_MANY_STEPS and few < self.most_steps):
+            found = interruptible(partial(play, self.most_steps))
+        tally, rules = found
         seconds, cpu = time.perf_counter() - ready, time.process_time() - cpu
         if tally.ending in march.FAILURES:
             raise ModelFailure(f"{self.name}: {march.FAILURES[tally.ending]} at t = {tally.t * unit:.6g} s")
@@ -163,7 +166,7 @@ class EventBasedModel(Frozen):
             evaluations=int(tally.steps),
             energy_gains=int(tally.gains),
             largest_energy_gain=float(tally.largest_gain),
-            rules={name: int(count) for name, count in zip(NAMES, tally.rules, strict=True) if count},
+            rules={name: int(count) for name, count in zip(NAMES, rules, strict=True) if count},
         )
         return observe(
             scene,

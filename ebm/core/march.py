@@ -103,6 +103,7 @@ from rockcheck.ebm.core.running import (
     Control,
     Records,
     Run,
+    Scratch,
     T,
     Tally,
     mode_code,
@@ -139,29 +140,29 @@ _FARTHER, _FADES = 8.0, 0.25
 
 @kernel
 def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack, yields=None):
-    """Simulates from state z (changed in place) at t = 0 to t_end; returns a Tally.
+    """Simulates from state z (changed in place) at t = 0 to t_end; returns a Tally, and how often each modelling choice was made.
 
     Row i of `out` (n x 6) is the state at i * output_step, `out_mode` its mode; `log` (n x 5) takes one row an event: time,
     kind, mode before, mode after, impulse. `a` and `stack` are a `workspace()`. With Bouc-Wen friction `yields` is its yield
     displacement; without it the loop is compiled for Coulomb's.
     """
-    reals, whole, tried = kept_arrays()
-    found = march(b, gh, gv, z, t_end, control, yields, out, out_mode, log, a, stack, reals, whole, tried)
-    return Tally(*found, whole[_RULES:])
+    scratch = scratch_with(a, stack)
+    return march(b, gh, gv, z, t_end, control, yields, Records(out, out_mode, log), scratch), scratch.whole[_RULES:]
 
 
 @kernel
-def kept_arrays():
-    """Arrays for what a run keeps besides its state: numbers, integers, and flags of the modes that it has tried."""
-    return np.zeros(10 + MEMORY + 16), np.zeros(_RULES + RULES, dtype=np.int64), np.zeros(MODES, dtype=np.bool_)
+def scratch_with(a, stack):
+    """Scratch for runs, with a `workspace()`."""
+    return Scratch(a, stack, np.zeros(10 + MEMORY + 16), np.zeros(_RULES + RULES, dtype=np.int64), np.zeros(MODES, dtype=np.bool_))
 
 
 @inner_kernel
-def march(b, gh, gv, z, t_end, control, yields, out, out_mode, log, a, stack, reals, whole, tried):
-    """Simulates as `run` does, in `kept_arrays` that another run may have used; returns all that a Tally has but its rules.
+def march(b, gh, gv, z, t_end, control, yields, records, scratch):
+    """Simulates as `run` does, in `Scratch` that another run may have used; returns a Tally.
 
     Where arrays are made, or parts of them, their references are counted one by one, unless that is in an inner kernel.
     """
+    a, stack, reals, whole, tried = scratch
     reals[:] = 0.0
     whole[:] = 0
     control = _in_rad(control, b)
@@ -178,7 +179,6 @@ def march(b, gh, gv, z, t_end, control, yields, out, out_mode, log, a, stack, re
         reals[18 + MEMORY : 20 + MEMORY],
         reals[20 + MEMORY :],
     )
-    records = Records(out, out_mode, log)
     ending = _begin(b, gh, gv, r, control, a)
     while ending >= GOING:
         if ending == CHANGING:
@@ -195,7 +195,7 @@ def march(b, gh, gv, z, t_end, control, yields, out, out_mode, log, a, stack, re
         _sample_rest(r, np.inf, control, records)
     at_rest = r.m[FAMILY] == FLAT and r.m[FLOOR] == STICK
     steps, events, walls, rows = r.counts[STEPS], r.counts[EVENTS], r.counts[WALL_IMPACTS], r.counts[ROWS]
-    return ending, r.now[T], r.now[PEAK], at_rest, steps, events, walls, int(r.gains[0]), r.gains[1], rows, r.now[T_REST]
+    return Tally(ending, r.now[T], r.now[PEAK], at_rest, steps, events, walls, int(r.gains[0]), r.gains[1], rows, r.now[T_REST])
 
 
 @inner_kernel

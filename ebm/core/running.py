@@ -55,7 +55,7 @@ class Control(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """What a run reports besides its samples."""
+    """What a run reports besides its samples, and how often it made each modelling choice."""
 
     ending: int
     t: float
@@ -68,8 +68,6 @@ class Tally(NamedTuple):
     largest_gain: float
     rows: int
     t_rest: float
-    #: How often each modelling choice was made (ebm.core.rules).
-    rules: NDArray[np.int64]
 
 
 class Run(NamedTuple):
@@ -94,6 +92,16 @@ class Records(NamedTuple):
     out: NDArray[np.float64]
     out_mode: NDArray[np.int8]
     log: NDArray[np.float64]
+
+
+class Scratch(NamedTuple):
+    """What a run works in, and the next one again: series, roots, and what it keeps besides its state (numbers, integers, modes tried)."""
+
+    a: NDArray[np.float64]
+    stack: NDArray[np.float64]
+    reals: NDArray[np.float64]
+    whole: NDArray[np.int64]
+    tried: NDArray[np.bool_]
 
 
 # The clock: time, largest |theta|, largest |omega| since the last event, since when it rests, from when the base is quiet; the

@@ -60,7 +60,7 @@ def run_to_end() -> Runner:
         control = march.Control(tolerance, order, 1_000_000, 200_000, False, 1.0)
         unit, radius = natural.time_unit(scene), scene.block.radius
         nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
-        tally = march.run(setting, *natural.grounds_of(scene), state, scene.duration / unit, control, *nothing, *scratch)
+        tally, _ = march.run(setting, *natural.grounds_of(scene), state, scene.duration / unit, control, *nothing, *scratch)
         return Run(
             ending=tally.ending,
             t=tally.t * unit,

@@ -101,7 +101,7 @@ def test_compiled_scratch_is_scratch(pulse_scene):
         a[:], stack[:] = filling, filling
         state = natural.state_of(scene)
         nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
-        tally = march.run(setting, *natural.grounds_of(scene), state, scene.duration / unit, control, *nothing, a, stack)
+        tally, _ = march.run(setting, *natural.grounds_of(scene), state, scene.duration / unit, control, *nothing, a, stack)
         found.append((tally.peak, tally.steps, tally.events, tally.t, *state))
     assert found[0] == found[1] == found[2]
 
