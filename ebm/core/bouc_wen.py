@@ -201,7 +201,10 @@ def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order
 
 @inner_kernel
 def _held(b, z, gh, gv, t):
-    """Whether a flat block without speed stays at rest: the base neither lifts nor slides it, or presses it on a wall."""
+    """Whether a flat block without speed stays at rest: the base neither lifts nor slides it, or presses it on a wall.
+
+    One that stays at its limit, but for rounding, is at rest; its guards say when it leaves.
+    """
     g, u = 1.0 + acceleration(gv, t), acceleration(gh, t)
     to_left, to_right = b.left.arm / b.height, b.right.arm / b.height
     slope = to_left if (u > 0.0) == (g >= 0.0) else to_right
@@ -211,9 +214,10 @@ def _held(b, z, gh, gv, t):
     if g < 0.0 and not left and not right:  # hanging: by both corners, as long as nothing at all tells to which side it tips
         return u == 0.0
     if g < 0.0:  # a wall on which it is pressed holds it flat
-        return (left and u >= -to_right * g) or (right and u <= to_left * g)
+        return (left and u >= -to_right * g - NOISE[FORCE]) or (right and u <= to_left * g + NOISE[FORCE])
     share = 1.0 if b.mu_s == LEAST_FRICTION else g
-    return (u <= min(to_left, b.mu_s) * share or left) and (u >= -min(to_right, b.mu_s) * share or right)
+    low, high = -min(to_right, b.mu_s) * share - NOISE[FORCE], min(to_left, b.mu_s) * share + NOISE[FORCE]
+    return (u <= high or left) and (u >= low or right)
 
 
 @inner_kernel

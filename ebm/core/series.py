@@ -92,11 +92,16 @@ def longest_step(last, before, order, tolerance, reach):
 
 @inner_kernel
 def force_step(a, row, order, tolerance, reach):
-    """The step at which the last two terms of a force stay below the tolerance, at most `reach`. An error of its rate moves nothing."""
-    for k in (order, order - 1):
+    """The step at which the last two terms of a force stay below the tolerance, at most `reach`. An error of its rate moves nothing.
+
+    Friction that winds up under a constant acceleration is a series of every fourth power. So the two terms before count, too: below
+    what the tolerance is for them where terms shrink alike.
+    """
+    longest, bound = math.inf, math.log(tolerance)  # logarithms
+    for k in range(max(order - 3, 1), order + 1):
         if a[row, k] != 0.0:
-            reach = min(reach, (tolerance / abs(a[row, k])) ** (1.0 / k))
-    return reach
+            longest = min(longest, (bound * min(k / (order - 1), 1.0) - math.log(abs(a[row, k]))) / k)
+    return min(reach, math.exp(longest))
 
 
 @inner_kernel

@@ -213,6 +213,17 @@ def test_a_force_may_change_faster_than_what_it_moves():
     assert series.step_size(terms, 0, 0, 3, 1e-9, 1.0) < 1e-8
 
 
+@pytest.mark.parametrize("order", [12, 13, 14, 15])
+def test_a_force_of_which_only_every_fourth_power_is_there_has_a_step(order):
+    """Friction that winds up under a constant acceleration: tanh(tau^2) has a radius of sqrt(pi/2), and no step may come near it."""
+    terms = np.zeros(order + 1)
+    powers = [1.0, -1.0 / 3.0, 2.0 / 15.0, -17.0 / 315.0]
+    terms[2::4] = powers[: len(terms[2::4])]
+    step = series.force_step(_row(terms), 0, order, 1e-10, 10.0)
+    assert 0.15 < step < 0.35
+
+
+
 @pytest.mark.parametrize("rate", [-np.inf, np.nan])
 def test_a_search_for_a_root_ends_where_the_series_is_not_finite(rate):
     """Its halvings would not: no bound holds for what is not a number."""
