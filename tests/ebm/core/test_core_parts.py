@@ -223,7 +223,6 @@ def test_a_force_of_which_only_every_fourth_power_is_there_has_a_step(order):
     assert 0.15 < step < 0.35
 
 
-
 @pytest.mark.parametrize("rate", [-np.inf, np.nan])
 def test_a_search_for_a_root_ends_where_the_series_is_not_finite(rate):
     """Its halvings would not: no bound holds for what is not a number."""
