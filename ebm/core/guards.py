@@ -77,6 +77,8 @@ _COMBINES = np.array(
 _MOST = 3
 # The columns of the table: the weight of each series, a constant, and how many terms fewer than the order the guard has (-1: no guard).
 _CONSTANT, _SHORTER = 30, 31
+#: A force is the second derivative of a truncated series: its zero is found to rounding from nearby only, within this share of a step.
+_NEARBY = 0.25
 #: The weight with which the noise of forces hides no base acceleration: nothing is rounded in it. Its square is a number, too.
 _ANY = 2.0**400
 
@@ -332,13 +334,12 @@ def first_event(order, h, slack, a, stack):
                 return root, k
             closes = 0 <= which <= G_FAR_GAP < k
             if root != NO_ROOT and root < tau - (INSTANT if closes else 0.0):
-                past = _past_a_touch(degree, root, noise, a) if KIND[k] == FORCE and root > 0.0 else root
+                past = _past_a_touch(degree, root, noise, a) if KIND[k] == FORCE and 0.0 < root <= _NEARBY * h else root
                 if past == root:
                     tau, which = root, k
                 elif past < tau:
                     tau, which = past, -1
-    if which >= 0 and KIND[which] == FORCE and tau > 0.25 * h:
-        # A force is the second derivative of a truncated series: its zero is found to rounding from nearby only.
+    if which >= 0 and KIND[which] == FORCE and tau > _NEARBY * h:
         return 0.9 * tau, -1
     return tau, which
 
