@@ -39,7 +39,7 @@ from rockcheck.ebm.core.guards import (
     first_event,
     guard,
 )
-from rockcheck.ebm.core.modes import hangs_flat, slacken, tips_first
+from rockcheck.ebm.core.modes import code_of, hangs_flat, slacken, tips_first
 from rockcheck.ebm.core.motion import (
     COS,
     FAMILY,
@@ -245,8 +245,9 @@ def _waits(z, gv, r):
 
 
 @inner_kernel
-def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, rules, a):
+def _leave_rest(b, gh, gv, r, sense, yield_displacement, a):
     """The block at rest starts to slide, or to tilt, as u of sign `sense` grows; returns z = -u/(mu_k G0), +-1 if it slides."""
+    m, z, t = r.m, r.z, r.now[T]
     u, g = acceleration(gh, t), 1.0 + acceleration(gv, t)
     soon = 1.0 + acceleration_after(gv, t) <= 0.0  # friction falls with P: nothing tips until the floor pulls
     hangs = g <= 0.0 if abs(g) > NOISE[FORCE] else soon
@@ -257,11 +258,12 @@ def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, rules, a):
         zeta = min(max(-u / max(b.mu_k * abs(g), SLOW), -1.0), 1.0)
         if u != 0.0 and abs(abs(u) - g * min(arm / b.height, b.mu_k)) < NOISE[FORCE]:
             # Just where it tips or slips. Near g = 0 the quotient is no better known, and its rounding would act as a moment.
-            zeta = -math.copysign(min(arm / (b.height * b.mu_k), 1.0) if b.mu_k > 0.0 else 1.0, u)
-        if _tip(b, m, z, sense, zeta, not held, yield_displacement, gh, gv, t, rules, a):
+            limit = min(arm / (b.height * b.mu_k), 1.0) if b.mu_k > 0.0 else 1.0
+            zeta = -math.copysign(limit, u if abs(u) > NOISE[FORCE] else float(sense))
+        if _tip(b, gh, gv, r, sense, zeta, not held, yield_displacement, a):
             return zeta
     if held or (tips and abs(u) < g * b.mu_k):
-        rules[MODE_AGAIN] += 1
+        r.rules[MODE_AGAIN] += 1
         _rest(b, m, z, gv, t)
         return 0.0
     m[:] = 0
@@ -270,30 +272,33 @@ def _leave_rest(b, m, z, sense, yield_displacement, gh, gv, t, rules, a):
 
 
 @inner_kernel
-def _tip(b, m, z, first, zeta, free, yield_displacement, gh, gv, t, rules, a):
+def _tip(b, gh, gv, r, first, zeta, free, yield_displacement, a):
     """Lets a flat block tilt to the side on which its rotation grows, `first` if it can; returns whether there is one.
 
     One that nothing holds is `free` to tilt though its rotation grows so slowly that rounding hides it: friction has yet to wind up.
+    A tilt that has ended at this instant does not begin again.
     """
+    m, z, t = r.m, r.z, r.now[T]
     v = slip_velocity(b, z)
     for sense in (first, -first):
         m[:] = 0
         m[FAMILY], m[S], m[SLIP] = TILT, sense, 1 if sense * v > 0.0 else -1
-        _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, -1, rules, a)
+        _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, -1, r.rules, a)
         grows = leading(a, PHI, _LOOK, NOISE[POSITION], AHEAD)
-        if grows > 0 or (grows == 0 and free):
+        if not r.tried[code_of(m)] and (grows > 0 or (grows == 0 and free)):
             return True
     return False
 
 
 @inner_kernel
-def _begin(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a):
+def _begin(b, gh, gv, r, zeta, yield_displacement, a):
     """The contacts of a block that starts, or goes on after an impact, into m; returns z, changed only where it was at rest."""
+    m, z, t = r.m, r.z, r.now[T]
     v = slip_velocity(b, z)
     if z[THETA] == 0.0 and z[W] == 0.0:
         if v == 0.0:
             if not _held(b, z, gh, gv, t):
-                return _leave_rest(b, m, z, tips_first(b, z, gh, t), yield_displacement, gh, gv, t, rules, a)
+                return _leave_rest(b, gh, gv, r, tips_first(b, z, gh, t), yield_displacement, a)
             _rest(b, m, z, gv, t)
             return 0.0
         m[:] = 0
@@ -302,7 +307,7 @@ def _begin(b, m, z, zeta, yield_displacement, gh, gv, t, rules, a):
     sense = 1 if (z[THETA] if z[THETA] != 0.0 else z[W]) > 0.0 else -1
     m[:] = 0
     m[FAMILY], m[S], m[SLIP] = TILT, sense, 1 if sense * v > 0.0 else -1
-    _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, -1, rules, a)
+    _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, -1, r.rules, a)
     return zeta
 
 
@@ -426,7 +431,7 @@ def begin(b, gh, gv, r, yields, a):
     upright(b, z)
     t = _waits(z, gv, r)
     zeta = _initial_friction(b, m, z, gh, gv, t, a) if math.isnan(r.now[ZETA]) else r.now[ZETA]
-    r.now[ZETA] = _begin(b, m, z, zeta, yields, gh, gv, t, r.rules, a)
+    r.now[ZETA] = _begin(b, gh, gv, r, zeta, yields, a)
     # It has yielded where the pivot slips with z = +-1.
     _holds(r, m[FLOOR] != SLIPPING or abs(r.now[ZETA]) != 1.0 or r.now[ZETA] * slip_velocity(b, z) <= SLOW)
 
@@ -510,7 +515,7 @@ def follow(b, gh, gv, r, which, before, yields, log, a):
     elif which >= G_UPLIFT_PLUS and m[FLOOR] == SLIPPING:
         kind = _tip_sliding(b, gh, gv, r, yields, a)
     else:  # the cone, uplift from rest, or a wall that lets go of a standing block
-        r.now[ZETA] = _leave_rest(b, m, z, tips_first(b, z, gh, t), yields, gh, gv, t, r.rules, a)
+        r.now[ZETA] = _leave_rest(b, gh, gv, r, tips_first(b, z, gh, t), yields, a)
         _holds(r, abs(r.now[ZETA]) != 1.0)
         kind = RELEASE if which == G_TIP_PUSH or which == G_FAR_PUSH else (UPLIFT if m[FAMILY] == TILT else SLIPS)
     if kind >= 0:
@@ -550,7 +555,7 @@ def _tip_sliding(b, gh, gv, r, yields, a):
         r.now[ZETA] = float(slip)
         _holds(r, False)
         return SLIPS
-    if _tip(b, m, z, -slip, r.now[ZETA], False, yields, gh, gv, r.now[T], r.rules, a):
+    if _tip(b, gh, gv, r, -slip, r.now[ZETA], False, yields, a):
         return UPLIFT
     r.rules[LEAST_CONTRADICTION] += 1
     m[:] = 0
