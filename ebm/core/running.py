@@ -55,7 +55,7 @@ class Control(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """What a run reports besides its samples, and how often it made each modelling choice."""
+    """What a run reports besides its samples and the modelling choices that it made."""
 
     ending: int
     t: float
