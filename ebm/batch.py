@@ -190,7 +190,7 @@ def run_batch(
     side, peak, t_end = np.zeros(count, dtype=np.int8), np.zeros(count), np.zeros(count)
     series, ending, written = (np.zeros(count, dtype=np.int64) for _ in range(3))
     at_rest, motion, modes = np.zeros(count, dtype=bool), np.zeros((count, kept, 6)), np.zeros((count, kept), dtype=np.int8)
-    control = Control(model.tolerance, model.order, min(model.most_steps, 2_000_000), model.most_events, until_decided, 1.0)
+    control = Control(model.tolerance, min(model.most_steps, 2_000_000), model.most_events, until_decided, 1.0)
     durations = np.full(count, 1e6) if until_decided else packed.durations
 
     def chunk(first: int) -> int:
@@ -275,7 +275,7 @@ def play_row(rows, i, step, control, records, z, scratch):
         z[k] = rows.states[i, k]
     b = row_setting(rows.settings[i], rows.law)
     gh, gv = row_ground(rows.horizontal[i], rows.samples), row_ground(rows.vertical[i], rows.samples)
-    control = Control(control.tolerance, control.order, control.most_steps, control.most_events, control.until_decided, step)
+    control = Control(control.tolerance, control.most_steps, control.most_events, control.until_decided, step)
     return march(b, gh, gv, z, rows.durations[i], control, None, records, scratch)
 
 

@@ -54,7 +54,7 @@ def play_ensemble(scenes: Sequence[Scene], model: EventBasedModel, *, rows: int 
     steps = np.array([step / natural.time_unit(scene) for scene in scenes])
     theta, states = np.empty((count, len(t))), np.empty((count, 6))
     peak, ending = np.empty(count), np.zeros(count, dtype=np.int64)
-    control = Control(model.tolerance, model.order, model.most_steps, model.most_events, False, 1.0)
+    control = Control(model.tolerance, model.most_steps, model.most_events, False, 1.0)
 
     def chunk(begin: int) -> None:
         part = slice(begin, begin + _CHUNK)

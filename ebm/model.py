@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
@@ -58,11 +57,6 @@ class EventBasedModel(Frozen):
         if self.friction == "bouc-wen":
             return "ebm-bouc-wen"
         return "ebm" if self.pivot == "bilateral" else "ebm-unilateral"
-
-    @property
-    def order(self) -> int:
-        """Order of the Taylor series: about half the digits of the tolerance, as usual for such methods, and a few more."""
-        return min(HIGHEST_ORDER, math.ceil(-0.5 * math.log(self.tolerance)) + 4)
 
     def finer(self) -> Self:
         """The same model at a hundredth of its tolerance, or at the finest tolerance that double precision allows."""
@@ -130,7 +124,6 @@ class EventBasedModel(Frozen):
         unit = natural.time_unit(scene)
         state = natural.state_of(scene)
         times = scene.output_times
-        order = type(self)(tolerance=tolerance).order
         out = np.empty((len(times), 6))
         out_mode = np.zeros(len(times), dtype=np.int8)
         log = np.empty((self.most_events, 5))
@@ -141,7 +134,7 @@ class EventBasedModel(Frozen):
         _compiled(scratch, self.pivot == "unilateral")
 
         def play(most_steps: int) -> tuple[Tally, NDArray[np.int64]]:
-            control = march.Control(tolerance, order, most_steps, self.most_events, False, scene.output_step / unit)
+            control = march.Control(tolerance, most_steps, self.most_events, False, scene.output_step / unit)
             state[:] = natural.state_of(scene)
             return march.run(b, horizontal, vertical, state, scene.duration / unit, control, out, out_mode, log, *scratch)
 
@@ -216,7 +209,7 @@ def _compiled(scratch: tuple[Any, ...], unilateral: bool) -> None:
 
     scene = Scene(name="warm-up", block=Block(half_width=1.0, half_height=4.0), floor=Floor(friction=0.5), excitation=Rest(), duration=1.0)
     b = natural.setting_of(scene, unilateral=unilateral, no_slip=False, energy_cap=False)
-    control = march.Control(WARM_UP_TOLERANCE, 12, 1, 1, False, 1.0)
+    control = march.Control(WARM_UP_TOLERANCE, 1, 1, False, 1.0)
     nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
     march.run(b, *natural.grounds_of(scene), natural.state_of(scene), 1.0, control, *nothing, *scratch)
     _READY.add(kind)
@@ -227,5 +220,3 @@ _AT_ONCE = 500
 #: The variants of the event loop that are compiled: by the friction (its kind of scratch) and by the pivot.
 _READY: set[tuple[int, bool]] = set()
 WARM_UP_TOLERANCE = 0.01
-#: Highest order of a Taylor step (see ebm.core.series, which is not imported here because it needs the compiler).
-HIGHEST_ORDER = 28

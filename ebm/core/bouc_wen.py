@@ -78,7 +78,7 @@ from rockcheck.ebm.core.motion import (
 )
 from rockcheck.ebm.core.rules import HANGS, LEAST_CONTRADICTION, MODE_AGAIN, PULLS
 from rockcheck.ebm.core.running import GOING, HOLDS, RELEASE, SLIPS, STICKS, UPLIFT, ZETA, T, mode_code, note
-from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, POSITION, first_root, force_step, leading, step_size, value
+from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, ORDER, POSITION, first_root, force_step, leading, step_size, value
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 # Rows of the workspace after those of ebm.core.motion: z, V and what the recurrences need.
@@ -446,18 +446,18 @@ def _holds(r, whether):
 def expand(b, gh, gv, r, reach, control, yields, a):
     """Series of the motion: their order, the place of the pivot, and the step they are good for."""
     z, m, t, zeta = r.z, r.m, r.now[T], r.now[ZETA]
-    order = control.order
+    order = ORDER
     if m[FLOOR] == SLIPPING:
         friction_series(b, m, z, zeta, r.counts[HOLDS] == 0, yields, gh, gv, t, order, a)
     elif m[FAMILY] == FLAT:
         order = flat_series(b, m, z, gh, gv, t, order, a)
     else:
         order = _wedged_series(b, m, z, zeta, gh, gv, t, order, reach, a)
-    h = step_size(a, U, G, order - 1, control.tolerance, reach)
+    h = step_size(a, U, G, order - 1, control.last_term, reach)
     if m[FLOOR] == SLIPPING:
-        h = step_size(a, XI, XI, order - 1, control.tolerance, force_step(a, Z, order - 1, control.tolerance, h))
+        h = step_size(a, XI, XI, order - 1, control.last_term, force_step(a, Z, order - 1, control.tolerance, h))
         if m[FAMILY] == TILT:
-            h = step_size(a, PHI, COS, order, control.tolerance, h)
+            h = step_size(a, PHI, COS, order, control.last_term, h)
     return order, m[S] * z[X] - a[SIN, 0], h
 
 

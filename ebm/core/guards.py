@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from rockcheck.ebm.core.contacts import CLOSED, SLOW, closed_gap
+from rockcheck.ebm.core.lanes import LANES, above, falls, load, powers, ramp, store, total, upto, zeros
 from rockcheck.ebm.core.motion import (
     COS,
     FAMILY,
@@ -40,7 +41,22 @@ from rockcheck.ebm.core.motion import (
     delta,
     side_of,
 )
-from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, POSITION, RATE, first_root, leads_up, slope, value
+from rockcheck.ebm.core.series import (
+    AHEAD,
+    FORCE,
+    INSTANT,
+    NO_ROOT,
+    NOISE,
+    POSITION,
+    RATE,
+    eighth,
+    first_root,
+    halves,
+    leads_up,
+    least_change,
+    slope,
+    value,
+)
 from rockcheck.scenes.compiled import inner_kernel
 
 # In order of priority at one instant: floor before walls, contacts before friction.
@@ -213,33 +229,28 @@ def _fill_flat(b, m, a):
 
 
 @inner_kernel
+def _coefficients(which, half, a):
+    """Eight coefficients, from `half` on, of a guard of the table, without its constant. A series without weight need not be there."""
+    row, sum, rate = TABLE + which, zeros(), KIND[which] == RATE
+    for part in range(_MOST):
+        series = _COMBINES[which, part]
+        if a[row, series] != 0.0:
+            sum = sum + a[row, series] * load(a, series, half + rate)
+    return sum * (ramp() + (half + 1.0)) if rate else sum
+
+
+@inner_kernel
 def guard(which, order, a):
     """Writes a guard of the table into the workspace and returns its degree, or -1 where the mode has no such guard."""
     row = TABLE + which
     if a[row, _SHORTER] < 0.0:
         return -1
-    degree = order - int(a[row, _SHORTER])
-    first = True
-    for part in range(_MOST):
-        series = _COMBINES[which, part]
-        weight = a[row, series]
-        if weight == 0.0:
-            continue
-        if KIND[which] == RATE:
-            for k in range(degree + 1):
-                rate = weight * (k + 1) * a[series, k + 1]
-                a[GUARD, k] = rate if first else a[GUARD, k] + rate
-        elif first:
-            for k in range(degree + 1):
-                a[GUARD, k] = weight * a[series, k]
-        else:
-            for k in range(degree + 1):
-                a[GUARD, k] += weight * a[series, k]
-        first = False
+    for half in (0, LANES):
+        store(a, GUARD, half, _coefficients(which, half, a))
     a[GUARD, 0] += a[row, _CONSTANT]
     if G_LANDING <= which <= G_FAR_GAP:
         a[GUARD, 0], a[GUARD, 1] = closed_gap(a[GUARD, 0], a[GUARD, 1])
-    return degree
+    return order - int(a[row, _SHORTER])
 
 
 @inner_kernel
@@ -293,12 +304,10 @@ def _stays_positive(which, order, until, slack, a):
         return True
     if KIND[which] == RATE:
         return False
-    begin = a[row, _CONSTANT] + _coefficient(which, 0, a)
-    falls, power = 0.0, 1.0
-    for k in range(1, order - int(a[row, _SHORTER]) + 1):
-        power *= until
-        falls += max(-_coefficient(which, k, a), 0.0) * power
-    return begin > max(slack * NOISE[KIND[which]], CLOSED) and falls < 0.999999 * begin
+    begin, degree = a[row, _CONSTANT] + _coefficient(which, 0, a), order - int(a[row, _SHORTER])
+    low, high = upto(_coefficients(which, 0, a), degree), upto(_coefficients(which, LANES, a), degree - LANES)
+    fallen = total((above(falls(low), 0) + falls(high) * eighth(until)) * powers(until))
+    return begin > max(slack * NOISE[KIND[which]], CLOSED) and -fallen < 0.999999 * begin
 
 
 @inner_kernel
@@ -361,10 +370,10 @@ def rock_guards_hold(b, m, pivot, order, h, a):
     if b.no_slip and not b.unilateral:
         return True
     mu, share = (1.0, 0.0) if b.no_slip else (b.mu_s, 1.0)
-    plus = minus = 0.0
-    for k in range(order - 2, 0, -1):
-        push, pull = mu * a[P, k], share * a[Q, k]
-        plus, minus = min(plus + (push - pull), 0.0) * h, min(minus + (push + pull), 0.0) * h
+    p_low, p_high = halves(a, P, order - 2)
+    q_low, q_high = halves(a, Q, order - 2)
+    plus = least_change(mu * p_low + -share * q_low, mu * p_high + -share * q_high, h)
+    minus = least_change(mu * p_low + share * q_low, mu * p_high + share * q_high, h)
     push, pull = mu * a[P, 0], share * a[Q, 0]
     return min(push - pull + plus, push + pull + minus) > NOISE[FORCE]
 
@@ -373,7 +382,7 @@ def rock_guards_hold(b, m, pivot, order, h, a):
 def _rock_gap_holds(row, order, h, a):
     """Whether a bound on the gap that this row of the table gives to ROCK shows it open through a step h."""
     along, across = a[row, COS], a[row, SIN]
-    low = 0.0
-    for k in range(order, 0, -1):
-        low = min(low + (along * a[COS, k] + across * a[SIN, k]), 0.0) * h
+    cos_low, cos_high = halves(a, COS, order)
+    sin_low, sin_high = halves(a, SIN, order)
+    low = least_change(along * cos_low + across * sin_low, along * cos_high + across * sin_high, h)
     return along * a[COS, 0] + across * a[SIN, 0] + a[row, _CONSTANT] + low > CLOSED

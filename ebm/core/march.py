@@ -115,6 +115,7 @@ from rockcheck.ebm.core.series import (
     INSTANT,
     NO_ROOT,
     NOISE,
+    ORDER,
     POSITION,
     first_root,
     longest_step,
@@ -215,11 +216,15 @@ def _begin(b, gh, gv, r, control, a):
 
 @inner_kernel
 def _in_rad(control, b):
-    """The control with its tolerance in rad, given in alpha: all that a block does before it topples happens within alpha."""
-    alpha = min(b.left.alpha, b.right.alpha)
-    return Control(
-        control.tolerance * alpha, control.order, control.most_steps, control.most_events, control.until_decided, control.output_step
-    )
+    """The control with its tolerance in rad, given in alpha: all that a block does before it topples happens within alpha.
+
+    Terms fall like the powers of a ratio. If the last one is the tolerance, and the first one is 1, that ratio is known, and what is
+    left out is a geometric series. It may be half of the tolerance.
+    """
+    ratio = control.tolerance ** (1.0 / ORDER)
+    tolerance = control.tolerance * min(b.left.alpha, b.right.alpha)
+    last_term = 0.5 * tolerance * (1.0 - ratio) / ratio
+    return Control(tolerance, control.most_steps, control.most_events, control.until_decided, control.output_step, last_term)
 
 
 @inner_kernel
@@ -353,20 +358,20 @@ def _step(b, gh, gv, r, t_end, control, yields, records, a, stack):
 def _expand(b, m, z, gh, gv, t, reach, control, a):
     """Series of the mode's motion about t: their order, the place of a sticking pivot, and the step they are good for."""
     if m[FAMILY] == FLAT:
-        order = flat_series(b, m, z, gh, gv, t, control.order, a)
-        return order, 0.0, step_size(a, U, G, order, control.tolerance, reach)
+        order = flat_series(b, m, z, gh, gv, t, ORDER, a)
+        return order, 0.0, step_size(a, U, G, order, control.last_term, reach)
     # The tolerance is relative to a motion that is still tiny, since it may grow.
     enough = 0.01 * control.tolerance * min(1.0, 1e2 * (abs(z[THETA]) + abs(z[W])))
-    order = tilt_series(b, m, z, gh, gv, t, control.order, enough, reach, a)
+    order = tilt_series(b, m, z, gh, gv, t, ORDER, enough, reach, a)
     h = reach
-    if order == control.order:
+    if order == ORDER:
         last, before = size_of(a, PHI, COS, order), size_of(a, PHI, COS, order - 1)
         rocks = m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
         if not rocks:
             last, before = max(last, size_of(a, XI, Y, order)), max(before, size_of(a, XI, Y, order - 1))
         if not rocks or gv.kind != STILL:  # forces follow the base acceleration
             last, before = max(last, size_of(a, U, G, order)), max(before, size_of(a, U, G, order - 1))
-        h = longest_step(last, before, order, control.tolerance, reach)
+        h = longest_step(last, before, order, control.last_term, reach)
     return order, m[S] * z[X] - a[SIN, 0], h
 
 

@@ -44,7 +44,7 @@ from rockcheck.ebm.core.motion import (
     tilt_series,
 )
 from rockcheck.ebm.core.rules import HANGS, LEAST_CONTRADICTION, MODE_AGAIN
-from rockcheck.ebm.core.series import FORCE, INSTANT, MOST_TERMS, NOISE, contradiction, leading
+from rockcheck.ebm.core.series import FORCE, INSTANT, WIDTH, NOISE, contradiction, leading
 from rockcheck.scenes.compiled import inner_kernel
 
 #: Order of the series that a selection looks at.
@@ -133,7 +133,7 @@ def wrong_by(b, m, z, gh, gv, t, measured, a):
 
     Infinite if the mode needs a motion that does not begin, or if that slack is not `measured`: only where no mode fits is it asked for.
     """
-    look = min(_LOOK, MOST_TERMS)  # the plain constant would make numba compile all series once more, for it alone
+    look = min(_LOOK, WIDTH)  # the plain constant would make numba compile all series once more, for it alone
     pivot = 0.0
     if m[FAMILY] == FLAT:
         order = flat_series(b, m, z, gh, gv, t, look, a)

@@ -29,7 +29,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rockcheck.ebm.core.ground import STILL, fill_series
-from rockcheck.ebm.core.series import MOST_TERMS, slope, value
+from rockcheck.ebm.core.lanes import LANES, first, load, put, ramp, shifted, store, zeros
+from rockcheck.ebm.core.series import WIDTH, slope, value
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 #: The laws of impacts at several contacts (see ebm.core.laws.contact_impacts).
@@ -110,7 +111,7 @@ ANGLE = 30
 TABLE = 31
 ROWS = TABLE + 14
 
-RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, MOST_TERMS + 2)])
+RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, WIDTH + 2)])
 
 # The state vector: world frame.
 X, HEIGHT, THETA, VX, VY, W = range(6)
@@ -119,9 +120,9 @@ X, HEIGHT, THETA, VX, VY, W = range(6)
 @kernel
 def workspace(rows=ROWS):
     """Scratch for one trajectory: the series (G = 1: no vertical motion), and the stack of the root search."""
-    series = np.zeros((rows, MOST_TERMS))
+    series = np.zeros((rows, WIDTH))
     series[G, 0] = series[ANGLE, 2] = 1.0
-    return series, np.zeros((48, MOST_TERMS))
+    return series, np.zeros((48, WIDTH))
 
 
 @inner_kernel
@@ -194,49 +195,45 @@ def _products(a, x, y, first, last, n):
 @inner_kernel
 def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
     """ROCK, (3): theta'' = (u c - S s G0)/(I + R^2), the pivot sticking; xi and y are s and c up to a constant."""
+    w0, s0, c0, u0 = a[OMEGA, 0], a[SIN, 0], a[COS, 0], a[U, 0]
+    w, s, c = w0, s0, c0
+    ds, dc, push = w0 * c0, w0 * s0, u0 * c0
+    # From here on the products of all coefficients but the first ones.
+    of_w = of_s = of_c = of_u = zeros()
+    more_ds = more_dc = more_push = zeros()
     scale = 1.0
     small = 0
     for k in range(order):
-        # The newest coefficients come last in each sum, so that the processor need not wait for them to begin with the next one.
-        ds = 0.0
-        dc = 0.0
-        push = 0.0
-        i = k - 1
-        for j in range(1, k):
-            ds += a[OMEGA, j] * a[COS, i]
-            dc += a[OMEGA, j] * a[SIN, i]
-            push += a[U, j] * a[COS, i]
-            i -= 1
-        if k > 0:
-            push += a[U, k] * a[COS, 0]
-            ds += a[OMEGA, 0] * a[COS, k]
-            dc += a[OMEGA, 0] * a[SIN, k]
-        ds += a[OMEGA, k] * a[COS, 0]
-        dc += a[OMEGA, k] * a[SIN, 0]
-        push += a[U, 0] * a[COS, k]
-        weight = a[SIN, k]
+        weight = s
         if not still_vertical:
             weight = 0.0
             for j in range(k + 1):
                 weight += a[G, j] * a[SIN, k - j]
         r = RECIPROCAL[k + 1]
-        a[PHI, k + 1] = a[OMEGA, k] * r
-        a[SIN, k + 1] = -ds * r
-        a[COS, k + 1] = dc * r
-        a[OMEGA, k + 1] = share * (push - weight) * r
+        a[PHI, k + 1] = w * r
+        w, s, c, u = share * r * (push - weight), -ds * r, dc * r, a[U, k + 1]
+        a[OMEGA, k + 1], a[SIN, k + 1], a[COS, k + 1] = w, s, c
+        ds = first(more_ds) + w0 * c + w * c0
+        dc = first(more_dc) + w0 * s + w * s0
+        push = first(more_push) + u0 * c + u * c0
+        of_w, of_u = put(of_w, k, w), put(of_u, k, u)
+        more_ds = shifted(more_ds) + of_w * c + of_c * w
+        more_dc = shifted(more_dc) + of_w * s + of_s * w
+        more_push = shifted(more_push) + of_u * c + of_c * u
+        of_s, of_c = put(of_s, k, s), put(of_c, k, c)
         scale *= reach
         # A uniform rotation has no higher rates, but its sine and cosine do.
-        size = abs(a[OMEGA, k + 1]) + abs(a[SIN, k + 1]) + abs(a[COS, k + 1])
-        small = small + 1 if size * scale < enough else 0
+        small = small + 1 if (abs(w) + abs(s) + abs(c)) * scale < enough else 0
         if not still_vertical and abs(a[G, k]) * scale >= enough:  # at its balance point only P feels the vertical motion
             small = 0
         if small == 3:
             order = k + 1
             break
     if need_forces:
-        for k in range(order - 1):
-            a[P, k] = (k + 2) * (k + 1) * a[COS, k + 2] + a[G, k]
-            a[Q, k] = (k + 2) * (k + 1) * a[SIN, k + 2] + a[U, k]
+        for half in (0, LANES):
+            bend = (ramp() + (half + 1.0)) * (ramp() + (half + 2.0))
+            store(a, P, half, load(a, COS, half + 2) * bend + load(a, G, half))
+            store(a, Q, half, load(a, SIN, half + 2) * bend + load(a, U, half))
         a[P, order - 1] = a[P, order] = a[Q, order - 1] = a[Q, order] = 0.0
     return order
 
@@ -248,29 +245,39 @@ def _slide_series(spin, kappa, order, enough, reach, a):
     arm = sine + kappa * cosine
     share = 1.0 / (1.0 + spin * sine * arm)
     a[PHI, 1], a[SIN, 1], a[COS, 1] = a[OMEGA, 0], -a[OMEGA, 0] * cosine, a[OMEGA, 0] * sine
+    w0, s, c = a[OMEGA, 0], a[SIN, 1], a[COS, 1]
+    ds, dc, moment = -w0 * c, w0 * s, 0.0
+    first_push = last_arm = 0.0
+    of_w = of_s = of_c = of_arm = of_push = zeros()
+    more_ds = more_dc = more_moment = zeros()
     scale = 1.0
     small = 0
     for k in range(order - 1):
-        # The rates of sine and cosine at order k + 1 lack only the term of phi's acceleration at order k, the unknown.
-        ds = dc = moment = 0.0
-        i = k
-        for j in range(1, k + 1):
-            ds -= a[OMEGA, j] * a[COS, i]
-            dc += a[OMEGA, j] * a[SIN, i]
-            moment -= (a[SIN, j] + kappa * a[COS, j]) * a[P, i - 1]
-            i -= 1
-        ds -= a[OMEGA, 0] * a[COS, k + 1]
-        dc += a[OMEGA, 0] * a[SIN, k + 1]
+        # s, c: of order k + 1; ds, dc: their rates of that order, but for the term of phi's acceleration of order k, the unknown.
         push = share * (dc * (k + 1.0) + a[G, k] + sine * spin * moment)
         turn, slide, rise = spin * (moment - arm * push), -a[U, k] - kappa * push, push - a[G, k]
+        size = abs(turn) + abs(slide) + abs(rise) + abs(s) + abs(c) + abs(push) + abs(kappa * push)
         a[P, k], a[Q, k] = push, -kappa * push
         once, twice = RECIPROCAL[k + 1], RECIPROCAL[k + 1] * RECIPROCAL[k + 2]
         a[XI, k + 2], a[Y, k + 2] = slide * twice, rise * twice
-        a[OMEGA, k + 1], a[PHI, k + 2] = turn * once, turn * twice
-        a[SIN, k + 2] = (ds - turn * once * cosine) * RECIPROCAL[k + 2]
-        a[COS, k + 2] = (dc + turn * once * sine) * RECIPROCAL[k + 2]
+        w = turn * once
+        a[OMEGA, k + 1], a[PHI, k + 2] = w, turn * twice
+        of_w = put(of_w, k, w)
+        more_ds = shifted(more_ds) + of_w * c + of_c * w
+        more_dc = shifted(more_dc) + of_w * s + of_s * w
+        of_s, of_c = put(of_s, k, s), put(of_c, k, c)
+        if k == 0:
+            first_push = push
+        else:
+            of_arm = put(of_arm, k - 1, last_arm)
+            more_moment = shifted(more_moment) + of_arm * push + of_push * last_arm
+            of_push = put(of_push, k - 1, push)
+        last_arm = s + kappa * c
+        moment = -first(more_moment) - last_arm * first_push
+        s, c = (ds - w * cosine) * RECIPROCAL[k + 2], (dc + w * sine) * RECIPROCAL[k + 2]
+        a[SIN, k + 2], a[COS, k + 2] = s, c
+        ds, dc = -first(more_ds) - w0 * c, first(more_dc) + w0 * s
         scale *= reach
-        size = abs(turn) + abs(slide) + abs(rise) + abs(a[SIN, k + 1]) + abs(a[COS, k + 1]) + abs(push) + abs(kappa * push)
         small = small + 1 if size * scale < enough else 0
         if small == 3:
             order = k + 2

@@ -45,13 +45,14 @@ class Control(NamedTuple):
 
     #: Of a Taylor step, in alpha; inside the loop in rad.
     tolerance: float
-    order: int
     most_steps: int
     most_events: int
     #: Stop as soon as the outcome and the peak are decided.
     until_decided: bool
     #: Spacing of the rows of `out`; with no rows nothing is sampled.
     output_step: float
+    #: Inside the loop: how large the last term of a step's series may be, in rad, so that the terms left out stay below the tolerance.
+    last_term: float = 0.0
 
 
 class Tally(NamedTuple):

@@ -1,5 +1,6 @@
 """Taylor polynomials: evaluation and the first root. A polynomial is a row of a two-dimensional array: the
-coefficients a[row, 0..n] of 1, tau, tau^2, ... (Rows are addressed in place; views of them would cost more than the sums.)
+coefficients a[row, 0..n] of 1, tau, tau^2, ..., n <= ORDER. (Rows are addressed in place; views of them would cost more than the
+sums.) They are worked on in two halves of eight, each at once (see ebm.core.lanes). What stands behind a[row, n] does not matter.
 
 Everything that the event-based model follows in time (rotation, position, contact forces, gaps) is one such polynomial a
 step, so an event is the root of a polynomial and can be located to rounding, with a proof that no earlier one was missed.
@@ -11,10 +12,13 @@ import math
 
 import numpy as np
 
+from rockcheck.ebm.core.lanes import LANES, above, falls, first, load, powers, ramp, shifted, store, total, upto
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
-#: Width of the arrays that hold a polynomial: orders up to 28, and two numbers that the root search keeps behind them.
-MOST_TERMS = 32
+#: Order of the series. From 14 to 20 the same error costs about the same, at all tolerances; 16 terms are two registers.
+ORDER = 2 * LANES - 1
+#: Width of the rows that hold a polynomial, and behind it what else is kept with it.
+WIDTH = 32
 #: Natural time at which the first coefficients of a guard are compared.
 AHEAD = 2e-2
 #: Error bounds of a position, a velocity and a force: a coefficient below its bound is rounding. They are one bound, seen after AHEAD:
@@ -26,25 +30,51 @@ NOISE = np.array([_ERROR, _ERROR / AHEAD, 2.0 * _ERROR / AHEAD**2])
 INSTANT = 1e-9
 NO_ROOT = -1.0
 _NARROWEST, _EPSILON, _SMALL = 2.0**-44, 2.0**-52, 2.0**-10
-_WIDTH, _START = 30, 31  # where the root search keeps an interval's width and left end
+_SPAN, _START = 30, 31  # where the root search keeps an interval's width and left end
+
+
+@inner_kernel
+def halves(a, row, n):
+    """The coefficients of 1 to tau^7 and of tau^8 to tau^15 of a polynomial of degree n."""
+    return upto(load(a, row, 0), n), upto(load(a, row, LANES), n - LANES)
+
+
+@inner_kernel
+def eighth(tau):
+    """tau^8, by which the terms of the second half exceed those of the first one."""
+    square = tau * tau
+    return (square * square) * (square * square)
 
 
 @inner_kernel
 def value(a, row, n, tau):
     """c(tau) for a polynomial of degree n."""
-    total = a[row, n]
-    for k in range(n - 1, -1, -1):
-        total = total * tau + a[row, k]
-    return total
+    low, high = halves(a, row, n)
+    return total((low + high * eighth(tau)) * powers(tau))
 
 
 @inner_kernel
 def slope(a, row, n, tau):
     """dc/dtau at tau for a polynomial of degree n >= 1."""
-    total = n * a[row, n]
-    for k in range(n - 1, 0, -1):
-        total = total * tau + k * a[row, k]
-    return total
+    low, high = upto(load(a, row, 1), n - 1), upto(load(a, row, LANES + 1), n - 1 - LANES)
+    return total((low * (ramp() + 1.0) + high * (ramp() + 9.0) * eighth(tau)) * powers(tau))
+
+
+@inner_kernel
+def least_change(low, high, h):
+    """A bound from below on c(tau) - c(0) for 0 <= tau <= h, at most 0; of the polynomial with these halves.
+
+    Terms that fall count in full, those that rise count only where they make up for the ones behind them: c_1 for c_2 and all others,
+    c_2 for the others. What is no number gives none.
+    """
+    low, high = low * powers(h), high * (eighth(h) * powers(h))
+    least = total(above(falls(low), 2) + falls(high))
+    once = shifted(low)
+    for term in (first(shifted(once)), first(once)):
+        least += term
+        if least > 0.0:
+            least = 0.0
+    return least
 
 
 @inner_kernel
@@ -65,27 +95,27 @@ def stays_below(a, row, n, tau, level):
 
 
 @inner_kernel
-def size_of(a, first, second, k):
+def size_of(a, one, other, k):
     """The size of two series' coefficients of order k."""
-    return abs(a[first, k]) + abs(a[second, k])
+    return abs(a[one, k]) + abs(a[other, k])
 
 
 @inner_kernel
-def step_size(a, first, second, order, tolerance, reach):
-    """The step at which the last two terms of two series stay below the tolerance, at most `reach`."""
-    return longest_step(size_of(a, first, second, order), size_of(a, first, second, order - 1), order, tolerance, reach)
+def step_size(a, one, other, order, last_term, reach):
+    """The step at which the last two terms of two series stay below `last_term`, at most `reach`."""
+    return longest_step(size_of(a, one, other, order), size_of(a, one, other, order - 1), order, last_term, reach)
 
 
 @inner_kernel
-def longest_step(last, before, order, tolerance, reach):
-    """The step at which the last two terms of a series, of these sizes, stay below the tolerance, at most `reach`.
+def longest_step(last, before, order, last_term, reach):
+    """The step at which the last two terms of a series, of these sizes, stay below `last_term`, at most `reach`.
 
     In a step shorter than the unit of time the error of the velocity, h times fewer, is the larger one.
     """
     longest = math.inf  # its logarithm
     for k, size in ((order, last), (order - 1, before)):
         if size > 0.0:
-            spare = math.log(tolerance / size)
+            spare = math.log(last_term / size)
             longest = min(longest, spare / k if spare > 0.0 else spare / (k - 1))
     return min(reach, math.exp(longest))
 
@@ -158,31 +188,26 @@ def first_root(a, row, n, h, until, floor, ahead, stack):
     """The first tau in [0, h] at which c turns negative, or NO_ROOT; where that is after `until`, either.
 
     A zero at tau = 0 (within `floor`) is divided out: 0.0 comes back only where c leaves it downward. `stack` is scratch of shape
-    (>= 48, MOST_TERMS). The search is complete: an interval is dropped only where a bound on the polynomial, or on its
+    (>= 48, WIDTH). The search is complete: an interval is dropped only where a bound on the polynomial, or on its
     slope and end value, shows that it holds no root. Touching zero without crossing is no root.
     """
     if a[row, 0] > floor:
-        low = 0.0
-        for k in range(n, 0, -1):  # c_k + tau (c_k+1 + ...) >= c_k + until min(0, ...)
-            low = min(low + a[row, k], 0.0) * until
-        if a[row, 0] + low > _ERROR * a[row, 0]:
+        low, high = halves(a, row, n)
+        if a[row, 0] + least_change(low, high, until) > _ERROR * a[row, 0]:
             return NO_ROOT
     zeros = _order_of_zero(a, row, n, floor, ahead)
     lift = 0.0
     if zeros > n:
         # Noise within AHEAD may grow beyond noise in a long step.
-        low = 0.0
-        for k in range(n, 0, -1):
-            low = min(low + a[row, k], 0.0) * h
-        if a[row, 0] + low > -floor:
+        low, high = halves(a, row, n)
+        if a[row, 0] + least_change(low, high, h) > -floor:
             return NO_ROOT
         zeros, lift = 0, floor if a[row, 0] > -floor else floor - a[row, 0]
     elif a[row, zeros] < 0.0:
         return 0.0
-    scale = 1.0
-    for k in range(n + 1 - zeros):
-        stack[0, k] = a[row, k + zeros] * scale
-        scale *= h
+    terms = powers(h)
+    store(stack, 0, 0, load(a, row, zeros) * terms)
+    store(stack, 0, LANES, load(a, row, zeros + LANES) * (terms * eighth(h)))
     stack[0, 0] += lift
     z = _isolate(stack, n - zeros)
     return NO_ROOT if z < 0.0 else z * h
@@ -195,9 +220,9 @@ def _isolate(stack, n):
     Below the top, the stack holds left halves whose right halves are still to be looked at.
     """
     top = 0
-    stack[0, _WIDTH], stack[0, _START] = 1.0, 0.0
+    stack[0, _SPAN], stack[0, _START] = 1.0, 0.0
     while True:
-        width, begin = stack[top, _WIDTH], stack[top, _START]
+        width, begin = stack[top, _SPAN], stack[top, _START]
         if stack[top, 0] <= 0.0:
             return begin
         low, high_slope, end = 0.0, 0.0, 0.0
@@ -218,14 +243,14 @@ def _isolate(stack, n):
             for i in range(n):  # Taylor shift by one interval, to the right half
                 for k in range(n - 1, i - 1, -1):
                     stack[top, k] += stack[top, k + 1]
-            stack[top, _START] += stack[top, _WIDTH]
+            stack[top, _START] += stack[top, _SPAN]
         else:
             half = 1.0
             for k in range(n + 1):
                 stack[top, k] *= half
                 stack[top + 1, k] = stack[top, k]
                 half *= 0.5
-            stack[top, _WIDTH] = stack[top + 1, _WIDTH] = 0.5 * width
+            stack[top, _SPAN] = stack[top + 1, _SPAN] = 0.5 * width
             stack[top + 1, _START] = begin
             top += 1
 
@@ -236,15 +261,17 @@ def _falling_root(stack, row, n, end):
 
     It ends where the step after the next one, if they go on shrinking quadratically, would be below rounding.
     """
+    low, high = halves(stack, row, n)
+    low_slope = upto(load(stack, row, 1), n - 1) * (ramp() + 1.0)
+    high_slope = upto(load(stack, row, LANES + 1), n - 1 - LANES) * (ramp() + 9.0)
     a, b = 0.0, 1.0
     begin, fall = stack[row, 0], -stack[row, 1]
     z = min(2.0 * begin / (fall + math.sqrt(max(fall * fall - 4.0 * begin * (end - begin + fall), 0.0))), 1.0)
     last = 0.0
     for _ in range(100):
-        f, gradient = stack[row, n], 0.0
-        for k in range(n - 1, -1, -1):
-            gradient = gradient * z + f
-            f = f * z + stack[row, k]
+        terms, far = powers(z), eighth(z)
+        f = total((low + high * far) * terms)
+        gradient = total((low_slope + high_slope * far) * terms)
         if f > 0.0:
             a = z
         else:

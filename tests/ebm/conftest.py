@@ -56,8 +56,7 @@ def run_to_end() -> Runner:
     def run(scene: Scene, *, pivot: str = "bilateral", tolerance: float = 1e-12, impacts: str = "moreau") -> Run:
         setting = natural.setting_of(scene, unilateral=pivot == "unilateral", no_slip=False, energy_cap=False, impacts=impacts)
         state = natural.state_of(scene)
-        order = EventBasedModel(tolerance=tolerance).order
-        control = march.Control(tolerance, order, 1_000_000, 200_000, False, 1.0)
+        control = march.Control(tolerance, 1_000_000, 200_000, False, 1.0)
         unit, radius = natural.time_unit(scene), scene.block.radius
         nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
         tally, _ = march.run(setting, *natural.grounds_of(scene), state, scene.duration / unit, control, *nothing, *scratch)

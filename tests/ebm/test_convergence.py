@@ -94,7 +94,7 @@ def test_compiled_scratch_is_scratch(pulse_scene):
     scene = pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0))
     unit = natural.time_unit(scene)
     setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
-    control = march.Control(1e-10, EventBasedModel().order, 100_000, 100_000, False, 1.0)
+    control = march.Control(1e-10, 100_000, 100_000, False, 1.0)
     found = []
     for filling in (0.0, np.nan, 1e300):
         a, stack = motion.workspace()

@@ -53,7 +53,7 @@ class Core:
     @staticmethod
     def first_root(coefficients, h: float, noise: float = series.NOISE[series.POSITION]) -> float | None:
         """First time in [0, h] at which the polynomial (constant first) turns negative."""
-        row, stack = _row(coefficients), np.zeros((48, series.MOST_TERMS))
+        row, stack = _row(coefficients), np.zeros((48, series.WIDTH))
         found = series.first_root(row, 0, len(coefficients) - 1, h, h, noise, series.AHEAD, stack)
         return None if found == series.NO_ROOT else found
 
@@ -108,7 +108,7 @@ class Core:
 
 
 def _row(coefficients) -> np.ndarray:
-    row = np.zeros((1, series.MOST_TERMS))
+    row = np.zeros((1, series.WIDTH))
     row[0, : len(coefficients)] = coefficients
     return row
 
@@ -227,7 +227,7 @@ def test_a_force_of_which_only_every_fourth_power_is_there_has_a_step(order):
 def test_a_search_for_a_root_ends_where_the_series_is_not_finite(rate):
     """Its halvings would not: no bound holds for what is not a number."""
     with np.errstate(invalid="ignore"):
-        root = series.first_root(_row([1.0, rate, np.inf, 0.0]), 0, 3, 1.0, 1.0, 1e-13, series.AHEAD, np.zeros((48, series.MOST_TERMS)))
+        root = series.first_root(_row([1.0, rate, np.inf, 0.0]), 0, 3, 1.0, 1.0, 1e-13, series.AHEAD, np.zeros((48, series.WIDTH)))
     assert math.isnan(root)
 
 
@@ -253,9 +253,9 @@ def test_a_force_that_only_touches_zero_ends_no_mode(dip):
     a[motion.TABLE + guards.G_PUSH] = 0.0
     a[motion.TABLE + guards.G_PUSH, motion.P] = 1.0
     a[motion.P, :3] = place * place - dip, -2.0 * place, 1.0
-    tau, which = guards.first_event(2, 1.0, 1.0, a, np.zeros((48, series.MOST_TERMS)))
+    tau, which = guards.first_event(2, 1.0, 1.0, a, np.zeros((48, series.WIDTH)))
     a[motion.P, 0] = -1e-8
-    assert guards.first_event(2, 1.0, 1.0, a, np.zeros((48, series.MOST_TERMS))) == (0.0, guards.G_PUSH)
+    assert guards.first_event(2, 1.0, 1.0, a, np.zeros((48, series.WIDTH))) == (0.0, guards.G_PUSH)
     a[motion.P, 0] = place * place - dip
     if dip > series.NOISE[series.FORCE]:
         assert (tau, which) == (pytest.approx(place - math.sqrt(dip), abs=1e-12), guards.G_PUSH)
@@ -263,7 +263,7 @@ def test_a_force_that_only_touches_zero_ends_no_mode(dip):
         assert (tau, which) == (pytest.approx(place + math.sqrt(dip), abs=3e-9), -1) or (dip == 0.0 and (tau, which) == (1.0, -1))
         a[motion.P, 0] += tau * (a[motion.P, 1] + tau)  # the series about tau
         a[motion.P, 1] += 2.0 * tau
-        assert guards.first_event(2, 0.5, 1.0, a, np.zeros((48, series.MOST_TERMS))) == (0.5, -1)
+        assert guards.first_event(2, 0.5, 1.0, a, np.zeros((48, series.WIDTH))) == (0.5, -1)
 
 
 @pytest.mark.parametrize("noise", NOISES)

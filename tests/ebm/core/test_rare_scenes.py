@@ -163,6 +163,7 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
     """They are compiled without reference counts, so that an array that they returned would be freed too early."""
     from rockcheck.ebm import natural
     from rockcheck.ebm.core import contacts, decide, ground, guards, march, modes, motion, series, settle
+    from rockcheck.ebm.core.lanes import LANES
     from rockcheck.ebm.core.laws import contact_impacts, impacts, strike
 
     seen = set()
@@ -171,7 +172,8 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
         def call(*arguments):
             found = function(*arguments)
             parts = found if isinstance(found, tuple) else (found,)
-            assert not any(isinstance(part, np.ndarray) for part in parts), function.__name__
+            # Lanes are an array in the interpreter only.
+            assert not any(isinstance(part, np.ndarray) and part.shape != (LANES,) for part in parts), function.__name__
             seen.add(function.__name__)
             return found
 
@@ -186,7 +188,7 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
             counts_references = function.targetoptions["_nrt"]
             monkeypatch.setattr(module, name, function.py_func if counts_references else watched(function.py_func))
     setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
-    control = march.Control(1e-8, 14, 200, 200, False, 1.0)
+    control = march.Control(1e-8, 200, 200, False, 1.0)
     nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
     with np.errstate(all="ignore"):
         run(setting, *natural.grounds_of(scene), natural.state_of(scene), 3.0, control, *nothing, *scratch)
