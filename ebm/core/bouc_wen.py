@@ -78,7 +78,20 @@ from rockcheck.ebm.core.motion import (
 )
 from rockcheck.ebm.core.rules import HANGS, LEAST_CONTRADICTION, MODE_AGAIN, PULLS
 from rockcheck.ebm.core.running import GOING, HOLDS, RELEASE, SLIPS, STICKS, UPLIFT, ZETA, T, mode_code, note
-from rockcheck.ebm.core.series import AHEAD, FORCE, INSTANT, NO_ROOT, NOISE, ORDER, POSITION, first_root, force_step, leading, step_size, value
+from rockcheck.ebm.core.series import (
+    AHEAD,
+    FORCE,
+    INSTANT,
+    NO_ROOT,
+    NOISE,
+    ORDER,
+    POSITION,
+    first_root,
+    force_step,
+    leading,
+    step_size,
+    value,
+)
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 # Rows of the workspace after those of ebm.core.motion: z, V and what the recurrences need.

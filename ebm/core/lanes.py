@@ -43,7 +43,7 @@ _LANES = Lanes()
 
 
 @register_model(Lanes)
-class _Model(models.PrimitiveModel):  # type: ignore[misc]
+class _Model(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, _VECTOR)
 
@@ -73,7 +73,7 @@ def _compiled(result: Any, *given: Any) -> Callable[[Callable[..., Any]], Callab
     def tell(code: Callable[..., Any]) -> Callable[..., Any]:
         plain = globals()[code.__name__[1:]]
 
-        class _Template(AbstractTemplate):  # type: ignore[misc]
+        class _Template(AbstractTemplate):
             key = plain
 
             def generic(self, args: Any, kws: Any) -> Any:
@@ -86,7 +86,7 @@ def _compiled(result: Any, *given: Any) -> Callable[[Callable[..., Any]], Callab
     return tell
 
 
-class _Arithmetic(AbstractTemplate):  # type: ignore[misc]
+class _Arithmetic(AbstractTemplate):
     """The types of sums and products: of lanes with lanes, and of lanes with a number, which all lanes then have."""
 
     def generic(self, args: Any, kws: Any) -> Any:
@@ -172,7 +172,7 @@ def _shifted(context: Any, b: Any, kinds: Any, values: Any) -> Any:
 
 def put(v: Numbers, place: int, number: float) -> Numbers:
     """The lanes with this number in one place."""
-    return np.where(_PLACES == place, number, v)
+    return np.where(place == _PLACES, number, v)
 
 
 @_compiled(_LANES, _LANES, types.int64, types.float64)
@@ -183,7 +183,7 @@ def _put(context: Any, b: Any, kinds: Any, values: Any) -> Any:
 
 def upto(v: Numbers, place: int) -> Numbers:
     """The lanes up to this place, 0 in those behind it."""
-    return np.where(_PLACES <= place, v, 0.0)
+    return np.where(place >= _PLACES, v, 0.0)
 
 
 @_compiled(_LANES, _LANES, types.int64)
@@ -193,7 +193,7 @@ def _upto(context: Any, b: Any, kinds: Any, values: Any) -> Any:
 
 def above(v: Numbers, place: int) -> Numbers:
     """The lanes behind this place, 0 in those up to it."""
-    return np.where(_PLACES > place, v, 0.0)
+    return np.where(place < _PLACES, v, 0.0)
 
 
 @_compiled(_LANES, _LANES, types.int64)

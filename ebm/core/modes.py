@@ -44,7 +44,7 @@ from rockcheck.ebm.core.motion import (
     tilt_series,
 )
 from rockcheck.ebm.core.rules import HANGS, LEAST_CONTRADICTION, MODE_AGAIN
-from rockcheck.ebm.core.series import FORCE, INSTANT, WIDTH, NOISE, contradiction, leading
+from rockcheck.ebm.core.series import FORCE, INSTANT, NOISE, WIDTH, contradiction, leading
 from rockcheck.scenes.compiled import inner_kernel
 
 #: Order of the series that a selection looks at.

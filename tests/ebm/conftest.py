@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
