@@ -90,20 +90,18 @@ def fill_series(g, t, sign, n, a, row):
     """Taylor coefficients 0..n of sign * acceleration about t, to the right of t, into a[row]."""
     if g.kind == GAUSSIAN:
         tau = t - g.centre
-        bell = sign * math.exp(-g.rate * tau * tau)
-        q0 = g.c0 + tau * (g.c1 + tau * (g.c2 + tau * g.c3))
-        q1 = g.c1 + tau * (2.0 * g.c2 + 3.0 * tau * g.c3)
-        q2 = g.c2 + 3.0 * tau * g.c3
-        e1 = e2 = e3 = 0.0  # coefficients k-1, k-2, k-3 of the bell, which obeys bell' = -2 rate tau bell
+        size = sign * math.exp(-g.rate * tau * tau)
+        q0 = size * (g.c0 + tau * (g.c1 + tau * (g.c2 + tau * g.c3)))
+        q1 = size * (g.c1 + tau * (2.0 * g.c2 + 3.0 * tau * g.c3))
+        q2 = size * (g.c2 + 3.0 * tau * g.c3)
+        q3 = size * g.c3
+        bell, e1, e2, e3 = 1.0, 0.0, 0.0, 0.0  # coefficients k to k-3 of the bell by its value, which obeys bell' = -2 rate tau bell
         spread = -2.0 * g.rate
         fall = spread * tau
         for k in range(n + 1):
-            a[row, k] = q0 * bell + q1 * e1 + q2 * e2 + g.c3 * e3
-            e3 = e2
-            e2 = e1
-            e1 = bell
+            a[row, k] = q0 * bell + q1 * e1 + q2 * e2 + q3 * e3
             r = _RECIPROCAL[k + 1]
-            bell = (fall * r) * e1 + (spread * r) * e2  # two operations from one coefficient to the next
+            bell, e1, e2, e3 = (fall * r) * bell + (spread * r) * e1, bell, e1, e2  # two operations from one coefficient to the next
         return
     for k in range(n + 1):
         a[row, k] = 0.0
