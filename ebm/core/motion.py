@@ -203,7 +203,6 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
     more_ds = more_dc = more_push = zeros()
     scale = 1.0
     small = 0
-    brief = reach < 1.0
     for k in range(order):
         weight = s
         if not still_vertical:
@@ -222,8 +221,6 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
         more_dc = shifted(more_dc) + of_w * s + of_s * w
         more_push = shifted(more_push) + of_u * c + of_c * u
         of_s, of_c = put(of_s, k, s), put(of_c, k, c)
-        if not brief:
-            continue
         scale *= reach
         # A uniform rotation has no higher rates, but its sine and cosine do.
         small = small + 1 if (abs(w) + abs(s) + abs(c)) * scale < enough else 0
