@@ -1,9 +1,9 @@
 """Eight numbers that compiled code adds and multiplies at once: the lanes of one vector register.
 
-A Taylor series has sixteen terms (`ebm.core.series.MOST_TERMS`), two such values. LLVM makes the machine code: one instruction where
-a register holds eight numbers (AVX-512), two or four where it holds fewer. Sums are made in one fixed order, so that all
-machines find the same bits. Here numba learns the type and what can be done with it: for each function there is the plain one, on an
-array of eight, which also says what it does, and the code that is built in its place.
+A Taylor series has sixteen terms (see `ebm.core.series.ORDER`), two such values. LLVM makes the machine code: one instruction where
+a register holds eight numbers (AVX-512), two or four where it holds fewer, with the same result to the bit. Here numba learns
+the type and what can be done with it: for each function there is the plain one, on an array of eight, which also says what it does, and
+the code that is built in its place.
 
 `put`, `upto` and `above` take any lane number: where there is no such lane they put nothing, keep all, or keep none.
 """

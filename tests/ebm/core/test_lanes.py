@@ -1,0 +1,151 @@
+"""Lanes: the compiled code does what the plain functions say, to the bit; polynomials in two halves."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rockcheck.ebm import natural
+from rockcheck.ebm.core import lanes, motion, series
+from rockcheck.ebm.core.lanes import LANES, above, falls, first, load, powers, put, ramp, shifted, store, total, upto, zeros
+from rockcheck.scenes import Floor, Ricker, Scene
+from rockcheck.scenes.scene import PAPER_BLOCK
+
+NUMBERS = np.array([[1.5, -2.25, 0.0, -0.0, 3e300, -1e-310, 0.1, 7.0], [0.3, np.nan, -np.inf, np.inf, -1e-3, 2.0, -5.0, 1e10]])
+
+
+def arithmetic(a, place, number):
+    one, other = load(a, 0, 0), load(a, 1, 0)
+    store(a, 2, 0, one + other)
+    store(a, 3, 0, one * other)
+    store(a, 4, 0, number * one + other * number)
+
+
+def made(a, place, number):
+    store(a, 2, 0, zeros())
+    store(a, 3, 0, ramp())
+    store(a, 4, 0, powers(number))
+
+
+def places(a, place, number):
+    store(a, 2, 0, put(load(a, 0, 0), place, number))
+    store(a, 3, 0, upto(load(a, 1, 0), place))
+    store(a, 4, 0, above(load(a, 1, 0), place))
+
+
+def whole(a, place, number):
+    store(a, 2, 0, shifted(load(a, 1, 0)))
+    store(a, 3, 0, falls(load(a, 1, 0)))
+    a[4, 0], a[4, 1], a[4, 2] = first(load(a, 0, 0)), total(load(a, 0, 0)), total(load(a, 1, 0))
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+@pytest.mark.parametrize("function", [arithmetic, made, places, whole], ids=lambda function: function.__name__)
+def test_compiled_lanes_are_the_plain_ones(function):
+    compiled = numba.njit(error_model="numpy")(function)
+    for place in (-9, -1, 0, 3, LANES - 1, LANES, 2**40):
+        for number in (0.0, 0.37, -1.9, 1e9):
+            both = []
+            for play in (function, compiled):
+                a = np.full((5, LANES), 0.25)
+                a[:2] = NUMBERS
+                with np.errstate(all="ignore"):
+                    play(a, place, number)
+                both.append(a)
+            np.testing.assert_array_equal(both[1], both[0])
+            np.testing.assert_array_equal(np.signbit(both[1]), np.signbit(both[0]))
+
+
+def test_a_series_fills_two_registers():
+    """The rates of a guard are read one coefficient further, and so are the terms behind a zero: all that stands within the row."""
+    assert series.ORDER + 1 == 2 * lanes.LANES
+    assert 2 * series.ORDER < series.WIDTH
+
+
+coefficients = st.lists(st.floats(-4.0, 4.0), min_size=2, max_size=series.ORDER + 1)
+
+
+def row_of(terms: list[float]) -> np.ndarray:
+    """The terms, and behind them what must not be seen."""
+    row = np.full((1, series.WIDTH), np.nan)
+    row[0, : len(terms)] = terms
+    return row
+
+
+@settings(deadline=None, max_examples=300)
+@given(coefficients, st.floats(0.0, 2.0))
+def test_values_and_slopes(terms, tau):
+    """Against exact arithmetic."""
+    n, t = len(terms) - 1, Fraction(tau)
+    exact = sum(Fraction(c) * t**k for k, c in enumerate(terms))
+    rate = sum(k * Fraction(c) * t ** (k - 1) for k, c in enumerate(terms) if k)
+    size = sum(abs(c) * tau**k for k, c in enumerate(terms))
+    assert abs(series.value(row_of(terms), 0, n, tau) - float(exact)) <= 1e-15 * size + 1e-300
+    steepness = sum(k * abs(c) * tau ** (k - 1) for k, c in enumerate(terms) if k)
+    assert abs(series.slope(row_of(terms), 0, n, tau) - float(rate)) <= 1e-15 * steepness + 1e-300
+
+
+@settings(deadline=None, max_examples=300)
+@given(coefficients, st.floats(1e-3, 2.0))
+def test_the_least_change_is_a_bound(terms, h):
+    """Nowhere does the polynomial fall farther; where it only falls, no bound is closer."""
+    row, n = row_of(terms), len(terms) - 1
+    least = series.least_change(*series.halves(row, 0, n), h)
+    lowest = min(series.value(row, 0, n, t) - terms[0] for t in np.linspace(0.0, h, 201))
+    size = sum(abs(c) * h**k for k, c in enumerate(terms))
+    assert least <= min(lowest, 0.0) + 1e-14 * size
+    if all(c <= 0.0 for c in terms[1:]):
+        assert least == pytest.approx(series.value(row, 0, n, h) - terms[0], abs=1e-14 * size)
+
+
+def test_the_least_change_of_what_is_no_number():
+    for place in range(1, series.ORDER + 1):
+        row = np.ones((1, series.WIDTH))
+        row[0, place] = np.nan
+        assert not math.isfinite(series.least_change(*series.halves(row, 0, series.ORDER), 0.5))
+
+
+@pytest.mark.parametrize("vertical", [False, True])
+@pytest.mark.parametrize("slip", [0, 1, -1])
+def test_what_is_written_out_is_the_general_solution(slip, vertical):
+    """All terms of ROCK and SLIDE-ROCK, whose sums are made eight at a time, against the series of any set of contacts."""
+    rng = np.random.default_rng(5)
+    shaken = Ricker(amplitude=3.0, period=1.1) if vertical else None
+    scene = Scene(
+        name="terms",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=0.4),
+        excitation=Ricker(amplitude=6.0, period=1.3, symmetric=False),
+        duration=1.0,
+        **({"vertical": shaken} if vertical else {}),
+    )
+    b = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
+    grounds, a = natural.grounds_of(scene), motion.workspace()[0]
+    m = np.zeros(motion.MODE_SIZE, dtype=np.int64)
+    m[motion.FAMILY], m[motion.PULL], m[motion.SLIP] = motion.TILT, 1, slip
+    m[motion.FLOOR] = motion.SLIPPING if slip else motion.STICK
+    rows = [motion.PHI, motion.OMEGA, motion.SIN, motion.COS, motion.P, motion.Q] + [motion.XI, motion.Y] * (slip != 0)
+    for _ in range(20):
+        m[motion.S] = rng.choice([-1, 1])
+        theta, w = m[motion.S] * rng.uniform(0.0, 1.2) * b.left.alpha, rng.uniform(-0.5, 0.5)
+        lean = b.left.alpha - abs(theta)
+        s, c = math.sin(lean), math.cos(lean)
+        z = np.array([m[motion.S] * s, c, theta, m[motion.S] * (rng.uniform(-1.0, 1.0) if slip else 0.0) - c * w, m[motion.S] * s * w, w])
+        t = rng.uniform(0.5, 2.5)
+        order = motion.tilt_series(b, m, z, *grounds, t, series.ORDER, 0.0, 1.0, a)
+        assert order == series.ORDER
+        a[motion.OMEGA, order] = 0.0  # ROCK has one more
+        found = a[rows, : order + 1].copy()
+        a[motion.XI, :2], a[motion.Y, :2] = [m[motion.S] * z[motion.X], m[motion.S] * z[motion.VX]], [z[motion.HEIGHT], z[motion.VY]]
+        motion._contact_series(b, motion.side_of(b, m[motion.S]), m, order, 0.0, 1.0, a)
+        wanted = a[rows, : order + 1]
+        # Rounding of an early term spreads over all that follow: it is relative to the largest one so far.
+        size = np.maximum.accumulate(np.abs(wanted).max(axis=0))
+        assert np.all(np.abs(found - wanted) <= 2e-13 * size)
+        assert np.abs(wanted).max() < 1e6
