@@ -55,7 +55,7 @@ def _by_energy(b, m, z, ahead, peak):
     phi = abs(z[THETA])
     if ahead > 0.0 and phi >= peak:
         return -1.0
-    energy = _energy(b, z)
+    energy = energy_of(b, z)
     side, other = side_of(b, m[S]), side_of(b, -m[S])
     corner = min(side.radius, other.radius) - b.height
     most = 0.5 * (math.sqrt(2.0 * max(energy, 0.0)) + ahead) ** 2
@@ -74,21 +74,21 @@ def _by_energy(b, m, z, ahead, peak):
 
 
 @inner_kernel
-def _energy(b, z):
+def energy_of(b, z):
     """The block's energy relative to the floor, counted from standing."""
     return 0.5 * (z[VX] * z[VX] + z[VY] * z[VY] + z[W] * z[W] / b.spin) + z[HEIGHT] - b.height
 
 
 @inner_kernel
-def swings_again(b, m, z, pivot, tolerance, now):
-    """Whether this swing, which turns back in the step that starts here, is the last one again: then so are all to come.
+def swings_again(b, m, energy, pivot, tolerance, now):
+    """Whether this swing, which turns back in a step that starts now with this energy, is the last one again: then so are all to come.
 
     After the excitation the energy and the place of the pivot are all that a swing depends on. Beside a wall that takes no energy
     a block may rock so for ever, however near its balance it turns back. Only what sticks to the floor and touches no wall swings.
     """
     if now[T] < now[QUIET] or m[FLOOR] != STICK or m[TIP] != 0 or m[FAR] != 0:
         return False
-    energy, place = _energy(b, z), m[S] * pivot
+    place = m[S] * pivot
     error = swing_error(tolerance)
     again = abs(energy - now[SWUNG]) <= error * math.sqrt(2.0 * max(energy, 0.0)) and abs(place - now[PIVOT]) <= error
     now[SWUNG], now[PIVOT] = energy, place

@@ -11,7 +11,7 @@ import numpy as np
 
 from rockcheck.ebm.core import bouc_wen
 from rockcheck.ebm.core.contacts import CLOSED, closed_floor, stand, stop
-from rockcheck.ebm.core.decide import decided, quiet_from, swing_error, swings_again
+from rockcheck.ebm.core.decide import decided, energy_of, quiet_from, swing_error, swings_again
 from rockcheck.ebm.core.ground import STILL, next_exceedance, next_kink
 from rockcheck.ebm.core.guards import (
     G_CONE_MINUS,
@@ -418,14 +418,15 @@ def _state(b, m, order, tau, pivot, a, z):
 def _advance(b, r, order, pivot, tau, control, a, stack):
     """Moves the state to tau after the start of the step; keeps the largest rotation on the way."""
     z, now = r.z, r.now
-    turns = r.m[FAMILY] == TILT and a[OMEGA, 0] > 0.0 and value(a, OMEGA, order - 1, tau) < 0.0
+    rises, energy = r.m[FAMILY] == TILT and a[OMEGA, 0] > 0.0, energy_of(b, z)
+    _state(b, r.m, order, tau, pivot, a, z)
+    turns = rises and r.m[S] * z[W] < 0.0
     if turns and not stays_below(a, PHI, order, tau, now[PEAK]):
         top = first_root(a, OMEGA, order - 1, tau, tau, NOISE[POSITION], AHEAD, stack)
         if top > 0.0:
             now[PEAK] = max(now[PEAK], value(a, PHI, order, top))
     if turns and control.until_decided:
-        now[REPEATS] = swings_again(b, r.m, z, pivot, control.tolerance, now)
-    _state(b, r.m, order, tau, pivot, a, z)
+        now[REPEATS] = swings_again(b, r.m, energy, pivot, control.tolerance, now)
     now[PEAK] = max(now[PEAK], abs(z[THETA]))
     now[SWING] = max(now[SWING], abs(z[W]))
 

@@ -219,8 +219,6 @@ def _possible(b, m, z, v, floor, walls):
         return False
     if b.no_slip and m[FLOOR] == SLIPPING:
         return False
-    if mine & ~walls:
-        return False
     if flat:
         # At rest it is held on the walls that it touches; sliding it touches none; between two walls that it fills it leans on both.
         held = m[FLOOR] == STICK or (m[FLOOR] == OFF and walls == 3)
@@ -280,8 +278,9 @@ def select(b, z, gh, gv, t, m, tried, memory, rules, a):
                 break
             tilts = _CANDIDATES[number, 0] == TILT
             walls = (near if _CANDIDATES[number, 1] > 0 else away) if tilts else upright_walls
-            if tilts and (favoured == 0 or _CANDIDATES[number, 5] & ~walls):
-                continue  # where nothing tells left from right a block does not tilt; nor does it lean on a wall that it does not touch
+            touched = walls if tilts or first > 0 else walls >> 1 | (walls & 1) << 1
+            if _CANDIDATES[number, 5] & ~touched or (tilts and favoured == 0):
+                continue  # it does not lean on a wall that it does not touch; where nothing tells left from right it does not tilt
             _write(number, first, m)
             if tried[code_of(m)] != again or not _possible(b, m, z, v, floor, walls):
                 continue

@@ -110,14 +110,24 @@ def step_size(a, one, other, order, last_term, reach):
 def longest_step(last, before, order, last_term, reach):
     """The step at which the last two terms of a series, of these sizes, stay below `last_term`, at most `reach`.
 
+    The term before the last one bounds it, as long as terms fall: the logarithm of the other is then not needed.
+    """
+    longest = _step_of_term(before, order - 1, last_term)
+    if not last * longest <= before:
+        longest = min(longest, _step_of_term(last, order, last_term))
+    return min(reach, longest)
+
+
+@inner_kernel
+def _step_of_term(size, k, last_term):
+    """The step at which the term of order k, of this size, is `last_term`.
+
     In a step shorter than the unit of time the error of the velocity, h times fewer, is the larger one.
     """
-    longest = math.inf  # its logarithm
-    for k, size in ((order, last), (order - 1, before)):
-        if size > 0.0:
-            spare = math.log(last_term / size)
-            longest = min(longest, spare / k if spare > 0.0 else spare / (k - 1))
-    return min(reach, math.exp(longest))
+    if not size > 0.0:
+        return math.inf
+    spare = math.log(last_term / size)
+    return math.exp(spare / k if spare > 0.0 else spare / (k - 1))
 
 
 @inner_kernel
