@@ -40,6 +40,8 @@ class Ground(NamedTuple):
 _NO_SAMPLES = np.zeros(1)
 #: Times that differ by less than this share of a sample interval, or of a pulse's width, are the same time. Rounding of a double.
 _SAME, _EPSILON = 2.0**-30, 2.0**-52
+#: Newton's method finds a root in fewer trials, or not at all.
+_SOME = 30
 #: The sign with which an acceleration leaves zero is read so much later.
 _SOON = 1e-6
 STILL_GROUND = Ground(STILL, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _NO_SAMPLES)
@@ -72,17 +74,25 @@ def interval(g, t):
 @inner_kernel
 def acceleration(g, t):
     """Acceleration at time t; where it jumps (a record that ends) that just after."""
+    return _with_rate(g, t)[0]
+
+
+@inner_kernel
+def _with_rate(g, t):
+    """Acceleration at time t, and its rate; where they jump those just after."""
     if g.kind == GAUSSIAN:
         tau = t - g.centre
-        return (g.c0 + tau * (g.c1 + tau * (g.c2 + tau * g.c3))) * math.exp(-g.rate * tau * tau)
-    if g.kind == SINE:
-        return g.c0 * math.sin(g.rate * t) if t < g.quiet else 0.0
+        bell, fall = math.exp(-g.rate * tau * tau), -2.0 * g.rate * tau
+        shape = g.c0 + tau * (g.c1 + tau * (g.c2 + tau * g.c3))
+        return shape * bell, (g.c1 + tau * (2.0 * g.c2 + tau * 3.0 * g.c3) + shape * fall) * bell
+    if g.kind == SINE and t < g.quiet:
+        return g.c0 * math.sin(g.rate * t), g.c0 * g.rate * math.cos(g.rate * t)
     if g.kind == SAMPLED:
         i = interval(g, t)
-        if i + 1 >= g.samples.size:
-            return 0.0
-        return g.samples[i] + (t / g.step - i) * (g.samples[i + 1] - g.samples[i])
-    return 0.0
+        if i + 1 < g.samples.size:
+            rise = g.samples[i + 1] - g.samples[i]
+            return g.samples[i] + (t / g.step - i) * rise, rise / g.step
+    return 0.0, 0.0
 
 
 @inner_kernel
@@ -224,30 +234,27 @@ def impulse_ahead(g, t):
 def _passage(g, a, b, fa, fb, level):
     """Where the acceleration passes the level between a, inside it by fa, and b, beyond it by fb; it is monotone in between.
 
-    Regula falsi (Anderson and Bjoerck's), never nearer to an end than rounding, and halved in between, so that the bracket closes on the
-    root also where a is on it; returns its outer end.
+    Newton's method, aimed a little past the root so that the bracket closes on it from both sides, and halving where that leads
+    nowhere; returns the bracket's outer end.
     """
     rising = fb > 0.0
-    side = 0  # the end that the last step has moved
     close = 2.0 * _EPSILON * abs(b)
+    guess = a - fa * (b - a) / (fb - fa)
     for trial in range(200):
         if b - a <= close:
             break
-        guess = a - fa * (b - a) / (fb - fa) if trial % 4 < 3 else 0.5 * (a + b)
-        middle = min(max(guess, a + close), b - close)
-        if not a < middle < b:
-            middle = 0.5 * (a + b)
-            if not a < middle < b:
+        if not a < guess < b or trial > _SOME:
+            guess = 0.5 * (a + b)
+            if not a < guess < b:
                 break
-        f = acceleration(g, middle) - level
-        if (f > 0.0) == rising and f != 0.0:
-            if side > 0:
-                fa *= 1.0 - f / fb if abs(f) < abs(fb) else 0.5
-            b, fb, side = middle, f, 1
+        here, rate = _with_rate(g, guess)
+        beyond = (here > level) == rising and here != level
+        past = -close if beyond else close
+        if beyond:
+            b = guess
         else:
-            if side < 0:
-                fb *= 1.0 - f / fa if abs(f) < abs(fa) else 0.5
-            a, fa, side = middle, f, -1
+            a = guess
+        guess += past - (here - level) / rate
     return b
 
 
