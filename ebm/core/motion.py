@@ -198,7 +198,8 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
     w0, s0, c0, u0 = a[OMEGA, 0], a[SIN, 0], a[COS, 0], a[U, 0]
     w, s, c = w0, s0, c0
     ds, dc, push = w0 * c0, w0 * s0, u0 * c0
-    # From here on the products of all coefficients but the first ones.
+    # Lane i of `of_w` is w's coefficient i + 1. Lane i of `more_ds` is what is known of the sum that is needed i + 1 orders later: the
+    # products of all coefficients so far but the first ones. These are added where they are needed, so that no order waits for its lanes.
     of_w = of_s = of_c = of_u = zeros()
     more_ds = more_dc = more_push = zeros()
     scale = 1.0
@@ -248,6 +249,7 @@ def _slide_series(spin, kappa, order, enough, reach, a):
     w0, s, c = a[OMEGA, 0], a[SIN, 1], a[COS, 1]
     ds, dc, moment = -w0 * c, w0 * s, 0.0
     first_push = last_arm = 0.0
+    # As for ROCK. The products with P, which is known one order later than the others, are one order behind.
     of_w = of_s = of_c = of_arm = of_push = zeros()
     more_ds = more_dc = more_moment = zeros()
     scale = 1.0
