@@ -94,7 +94,7 @@ FAULTS = [
         "w2 = 1.01 * (1.0 - k2",
         15,
     ),
-    ("a sign in (3)", "ebm/core/motion.py", r"share \* \(push - weight\)", "share * (push + weight)", 15),
+    ("a sign in (3)", "ebm/core/motion.py", r"share \* r \* \(push - weight\)", "share * r * (push + weight)", 15),
 ]
 
 
