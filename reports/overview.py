@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -98,12 +98,13 @@ class Accuracy:
 
 def matrix(run: Run) -> list[Row]:
     """A row a scene, an entry a model of the run."""
-    return [Row(scene, tuple(entry(run, scene, model) for model in run.models)) for scene in run.scenes]
+    cells = run.by_scene()
+    return [Row(scene, tuple(_entry(cells[scene], model, run.reference) for model in run.models)) for scene in run.scenes]
 
 
-def glance(run: Run) -> Glance:
-    """The answers that the index gives first."""
-    rows = matrix(run)
+def glance(run: Run, rows: Sequence[Row] | None = None) -> Glance:
+    """The answers that the index gives first; `rows` are those of the run's `matrix`, where they are known."""
+    rows = matrix(run) if rows is None else rows
     entries = [one for row in rows for one in row.entries if one and one.cell.model != run.reference and one.rms]
     accepted = [(cell, check) for cell, check in run.checks() if check.expected is not None]
     return Glance(
@@ -124,18 +125,23 @@ def _moved(check: Check) -> bool:
 
 def entry(run: Run, scene: str, model: str) -> Entry | None:
     """How far a model lies from the run's reference in a scene; None where it does not play it."""
-    cell, reference = run.cell(scene, model), run.cell(scene, run.reference)
+    return _entry({cell.model: cell for cell in run.of_scene(scene)}, model, run.reference)
+
+
+def _entry(cells: Mapping[str, Cell], model: str, against: str) -> Entry | None:
+    """`entry`, of a scene's cells by model and the name of the reference."""
+    cell, reference = cells.get(model), cells.get(against)
     if cell is None:
         return None
     figures = [check.figure for check in cell.checks] + list(cell.figures)
-    found = [f for f in figures if f.measure == "theta_rms" and f.against == run.reference and f.value is not None]
+    found = [f for f in figures if f.measure == "theta_rms" and f.against == against and f.value is not None]
     whole = next((f for f in found if not f.window), None)
     falls = [_side(outcome_of(one)) for one in (cell, reference) if one is not None and one.status == "done"]
     return Entry(
         cell=cell,
         rms=min(found, key=lambda figure: figure.until or math.inf, default=None),
         whole=whole,
-        ratio=next((f.value for f in figures if f.measure == "peak_ratio" and f.against == run.reference and not f.window), None),
+        ratio=next((f.value for f in figures if f.measure == "peak_ratio" and f.against == against and not f.window), None),
         u_num=cell.numerical.u_num("theta_rms") if cell.numerical and whole else None,
         outcome=outcome_of(cell),
         apart=len(set(falls)) > 1,
@@ -212,12 +218,16 @@ def _points(ax: Axes, one: Accuracy, color: str, ends: tuple[float, float]) -> N
     ax.set_ylim(*ends)
 
 
-def write_overview(run: Run, folder: Path) -> Mapping[str, object]:
-    """Writes the figure of all peaks into `folder`, where there is something to say; returns what the index shows."""
+def write_overview(run: Run, folder: Path, scenes: Container[str]) -> Mapping[str, object]:
+    """Writes the figure of all peaks into `folder`, where there is something to say; returns what the index shows.
+
+    `scenes` are those that have a page; the others stand in no table.
+    """
     found = accuracies(run)
     found = found if any(one.here or one.everywhere for one in found) else []
     if found:
         save(peaks_figure(run, found), folder / PEAKS, ["svg"])
     else:
         (folder / f"{PEAKS}.svg").unlink(missing_ok=True)
-    return {"matrix": matrix(run), "accuracies": found, "glance": glance(run)}
+    rows = matrix(run)
+    return {"matrix": [row for row in rows if row.scene in scenes], "accuracies": found, "glance": glance(run, rows)}

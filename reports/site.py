@@ -7,7 +7,7 @@ import json
 import math
 import re
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -32,6 +32,7 @@ from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.suite.results import Run
+from rockcheck.validation.suite.tables import shown
 
 DATA = Path(str(resources.files("rockcheck.reports"))) / "data"
 #: The folder beside `index.html` that holds everything else.
@@ -47,9 +48,9 @@ STATISTICS_SHOWN = (
     ("peak_bias", "bias"),
     ("peak_scatter", "scatter"),
 )
-#: What a page takes to be made, in pages without figures for a paper. Less than FEW in all are written by the process itself: it has
-#: what draws anyway, and another process takes as long as six pages to have it, too.
-PRINTED, FEW = 10, 12
+#: What a page with figures for a paper takes to be made, in pages without. Less than FEW in all are written by the process itself: it
+#: has what draws anyway, and another process takes as long as twenty pages to have it, too.
+PRINTED, FEW = 25, 40
 #: What a verdict is called and the sign that goes with its colour.
 VERDICTS = {
     "pass": ("within tolerance", "✓"),
@@ -112,10 +113,8 @@ def write_figure(folder: Path, name: str, path: Path, against: str | None = None
     if kind not in FORMATS:
         allowed = ", ".join(f".{one}" for one in FORMATS)
         raise InputError(f"{printable(path)}: a figure is written as {allowed}, not as {printable(path.suffix)!r}")
-    pages = _Pages(folder)
-    view = pages.views.get(name)
-    if view is None:
-        raise unknown_name("scene of the run", name, pages.views)
+    pages = _Pages(folder, (name,))
+    view = pages.views[name]
     if isinstance(view, EnsembleView):
         if against is not None:
             raise InputError("an ensemble's figure shows differences from its reference", "--against")
@@ -127,13 +126,14 @@ def write_figure(folder: Path, name: str, path: Path, against: str | None = None
     return save(histories_figure(view, against), path.with_suffix(""), [kind])[0]
 
 
-def write_site(folder: Path, *, jobs: int = 1, afresh: bool = True, on_progress: OnProgress = unheard) -> Path:
+def write_site(folder: Path, *, jobs: int = 1, afresh: bool = True, wanted: Sequence[str] = (), on_progress: OnProgress = unheard) -> Path:
     """Write `index.html` and a page a scene and an ensemble, with figures and data, beside a finished run; returns the index.
 
-    Pages are made in up to `jobs` processes. Unless `afresh`, one stays that shows the same as it would now. What belonged
-    to scenes that the run does not have any more is removed.
+    In a large run the scenes that are `shown` have a page, and those that are `wanted`. Pages are made in up to `jobs` processes.
+    Unless `afresh`, one stays that shows the same as it would now. What belonged to scenes without a page is removed. Raises
+    `InputError` where a wanted scene is not of the run.
     """
-    pages = _Pages(folder)
+    pages = _Pages(folder, wanted)
     pages.site.assets()
     stamps = {name: pages.stamp(view) for name, view in pages.views.items()}
     waiting = {name: stamp for name, stamp in stamps.items() if afresh or _stamp_of(folder / _address(pages.views[name])) != stamp}
@@ -155,22 +155,28 @@ def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterato
         pages.write_index()
         yield
         return
-    calls = [Call(_write_page, (pages.folder, name, stamp)) for name, stamp in stamps.items()]
+    calls = [Call(_write_page, (pages.folder, pages.wanted, name, stamp)) for name, stamp in stamps.items()]
     with Pool(min(jobs, len(stamps))) as pool:
-        for ended in pool.run(deque([*calls, Call(_write_index, (pages.folder,))])):
+        for ended in pool.run(deque([*calls, Call(_write_index, (pages.folder, pages.wanted))])):
             if ended.error is not None:
                 raise ended.error
             yield
 
 
 class _Pages:
-    """The pages of a finished run, by name of the scene or the ensemble."""
+    """The pages of a finished run, by name of the scene or the ensemble: of those that are shown, and those that are wanted."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, wanted: Sequence[str] = ()) -> None:
         self.folder = folder
         self.run = Run.load(folder)
-        slugs = slugs_of([*self.run.scenes, *(ensemble.name for ensemble in self.run.ensembles)])
-        found: list[View] = [*scene_views(self.run, folder), *ensemble_views(self.run, folder, slugs)]
+        self.wanted = tuple(wanted)
+        ensembles = [ensemble.name for ensemble in self.run.ensembles]
+        for name in wanted:
+            if name not in (*self.run.scenes, *ensembles):
+                raise unknown_name("scene of the run", name, [*self.run.scenes, *ensembles])
+        slugs = slugs_of([*self.run.scenes, *ensembles])
+        chosen = {*shown(self.run), *wanted}
+        found: list[View] = [*scene_views(self.run, folder, chosen), *ensemble_views(self.run, folder, slugs)]
         self.views = {view.name: view for view in found}
         links = [(view.name, _address(view)) for view in found]
         links += [(title, address) for title, address in STUDIES if (folder / address).exists()]
@@ -190,11 +196,11 @@ class _Pages:
         write_figures(view, _made(pages / "figures"))
         write_whole(_made(pages / "data") / f"{view.slug}.js", script(view))
         files = write_scene_file(view.scene, _made(pages / "scene-files"), view.slug)
-        scenes = list(self.run.scenes)
-        place = scenes.index(view.name)
+        scenes = [one for one in self.views.values() if isinstance(one, SceneView)]
+        place = [one.name for one in scenes].index(view.name)
         beside = {
-            "previous": self.views[scenes[place - 1]] if place else None,
-            "following": self.views[scenes[place + 1]] if place + 1 < len(scenes) else None,
+            "previous": scenes[place - 1] if place else None,
+            "following": scenes[place + 1] if place + 1 < len(scenes) else None,
         }
         self._page(view, stamp, "scene.html", files=files, **beside)
 
@@ -214,7 +220,7 @@ class _Pages:
         worst, times = tables.worst_first(self.run), tables.run_times(self.run)
         summaries = {model: FAMILIES[model].summary for model in self.run.models if model in FAMILIES}
         shown: dict[str, Any] = {"scenes": scenes, "ensembles": ensembles, "worst": worst, "times": times, "summaries": summaries}
-        shown |= write_overview(self.run, _made(self.folder / PAGES / "figures"))
+        shown |= write_overview(self.run, _made(self.folder / PAGES / "figures"), self.views)
         self.site.page(INDEX, "index.html", **shown, **_common(self.run))
 
     def stamp(self, view: View) -> str:
@@ -237,17 +243,17 @@ def _address(view: View) -> str:
 
 
 @cache
-def _pages_of(folder: Path) -> _Pages:
+def _pages_of(folder: Path, wanted: Sequence[str]) -> _Pages:
     """In a process of the pool, which ends with the run: it reads the run once for all its pages."""
-    return _Pages(folder)
+    return _Pages(folder, wanted)
 
 
-def _write_page(folder: Path, name: str, stamp: str) -> None:
-    _pages_of(folder).write(name, stamp)
+def _write_page(folder: Path, wanted: Sequence[str], name: str, stamp: str) -> None:
+    _pages_of(folder, wanted).write(name, stamp)
 
 
-def _write_index(folder: Path) -> None:
-    _pages_of(folder).write_index()
+def _write_index(folder: Path, wanted: Sequence[str]) -> None:
+    _pages_of(folder, wanted).write_index()
 
 
 @cache
@@ -295,7 +301,9 @@ def model_styles() -> str:
     return "\n".join(rows) + "\n"
 
 
+@cache
 def _environment() -> Environment:
+    """The templates with what they call. Kept, since compiling a page's templates takes longer than drawing its figures."""
     environment = Environment(
         loader=FileSystemLoader(DATA / "templates"), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -114,7 +114,7 @@ class SceneView:
     def _read(self) -> tuple[dict[str, History], dict[str, str]]:
         return _read(self.cells, self.folder)
 
-    @property
+    @cached_property
     def cells(self) -> tuple[Cell, ...]:
         """The scene's cells, in the models' order."""
         return self.run.of_scene(self.name)
@@ -322,12 +322,13 @@ class SceneView:
         return min(wide), max(wide), min(tall), max(tall)
 
 
-def scene_views(run: Run, folder: Path, most_values: int = 2_000_000) -> list[SceneView]:
-    """The views of all scenes of a run. Where the run holds more than `most_values` values, each scene shows every n-th row."""
+def scene_views(run: Run, folder: Path, chosen: Container[str] | None = None, *, most_values: int = 2_000_000) -> list[SceneView]:
+    """The views of the chosen scenes of a run, or of all. Where they hold more than `most_values` values, each shows every n-th row."""
     slugs = slugs_of(run.scenes)
-    share = most_values / max(1, len(run.scenes))
+    names = [name for name in run.scenes if chosen is None or name in chosen]
+    share = most_values / max(1, len(names))
     views = []
-    for name in run.scenes:
+    for name in names:
         scene = run.load_scene(name)
         columns = (len(CHANNELS) + 2) * max(1, sum(cell.status == "done" for cell in run.of_scene(name)))
         values = (scene.duration / scene.output_step + 1.0) * columns
@@ -338,11 +339,13 @@ def scene_views(run: Run, folder: Path, most_values: int = 2_000_000) -> list[Sc
 def slugs_of(names: Iterable[str]) -> dict[str, str]:
     """A file name for each scene: safe on any system, different for different scenes also where case does not count."""
     slugs: dict[str, str] = {}
+    taken: set[str] = set()
     for name in names:
         base = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or "scene"
         slug, n = base, 2
-        while slug.lower() in {other.lower() for other in slugs.values()}:
+        while slug.lower() in taken:
             slug, n = f"{base}-{n}", n + 1
+        taken.add(slug.lower())
         slugs[name] = slug
     return slugs
 

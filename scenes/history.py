@@ -21,7 +21,7 @@ from rockcheck.scenes.block import Block
 from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.reading import read_table
 from rockcheck.scenes.trust.experience import Expected, expected, known
-from rockcheck.scenes.writing import json_text, write_together
+from rockcheck.scenes.writing import columns_text, json_text, write_together
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -180,7 +180,30 @@ class History(Shown):
         """
         path = Path(path)
         check_format(path)
-        about = {
+        about = self._about()
+        if path.suffix.lower() in (".json", ".mat"):
+            events = {name: [getattr(event, name) for event in self.event_list] for name in EVENT_COLUMNS}
+            write_together({path: (_json if path.suffix.lower() == ".json" else _mat)(about, self.channels, events)})
+            return
+        if path.suffix.lower() == ".parquet":
+            attrs = {ABOUT: json.loads(json.dumps(about, default=str))}
+            write_together({events_path(path): _parquet(self.events, {}), path: _parquet(self.frame, attrs)})
+            return
+        table, beside = self._tables(about)
+        contents = {path: table}
+        if path.is_file() or not path.exists():  # beside /dev/stdout there is nothing to be written
+            contents = {events_path(path): beside, **contents}
+        packed = path.suffix.lower() == ".gz"
+        write_together({one: _packed(text) if packed else text for one, text in contents.items()})
+
+    def packed(self) -> dict[str, bytes]:
+        """The two files that `save` writes for a name ending in ".csv.gz", by their endings: ".csv.gz", ".events.csv.gz"."""
+        table, events = self._tables(self._about())
+        return {".csv.gz": _packed(table), ".events.csv.gz": _packed(events)}
+
+    def _about(self) -> dict[str, Any]:
+        """What a file says of a history beside its table."""
+        return {
             "name": self.name,
             "model": self.model,
             "outcome": self.outcome,
@@ -192,20 +215,14 @@ class History(Shown):
             "uncertainty": dict(self.uncertainty),
             "cost": {key: value for key, value in vars(self.cost).items() if value is not None},
         }
-        if path.suffix.lower() in (".json", ".mat"):
-            events = {name: [getattr(event, name) for event in self.event_list] for name in EVENT_COLUMNS}
-            write_together({path: (_json if path.suffix.lower() == ".json" else _mat)(about, self.channels, events)})
-            return
-        if path.suffix.lower() == ".parquet":
-            attrs = {ABOUT: json.loads(json.dumps(about, default=str))}
-            write_together({events_path(path): _parquet(self.events, {}), path: _parquet(self.frame, attrs)})
-            return
-        said = [json.dumps(about, sort_keys=True, default=str), *["-"] * len(self.frame)][: len(self.frame)]
-        contents = {path: self.frame.assign(**{ABOUT: said}).to_csv(index=False, lineterminator="\n")}
-        if path.is_file() or not path.exists():  # beside /dev/stdout there is nothing to be written
-            contents = {events_path(path): self.events.to_csv(index=False, lineterminator="\n"), **contents}
-        packed = path.suffix.lower() == ".gz"
-        write_together({one: _packed(table) if packed else table for one, table in contents.items()})
+
+    def _tables(self, about: Mapping[str, Any]) -> tuple[str, str]:
+        """The motion and the events as CSV."""
+        columns = {name: np.asarray(self.channels[name]).tolist() for name in COLUMNS if name in self.channels}
+        rows = len(next(iter(columns.values()), ()))
+        columns[ABOUT] = [json.dumps(about, sort_keys=True, default=str), *["-"] * rows][:rows]
+        events = {name: [getattr(event, name) for event in self.event_list] for name in EVENT_COLUMNS}
+        return columns_text(columns), columns_text(events)
 
     @classmethod
     def load(cls, path: str | Path, *, columns: Mapping[str, str] | None = None) -> History:

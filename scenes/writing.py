@@ -6,7 +6,9 @@ import csv
 import io
 import json
 import math
+import operator
 import os
+import stat
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
@@ -31,16 +33,16 @@ def write_together(contents: Mapping[Path, str | bytes]) -> None:
         for path, content in contents.items():
             try:
                 data = content.encode() if isinstance(content, str) else content
-                if path.exists() and not path.is_file() and not path.is_dir():
+                target, there = _target(path)
+                if there and not stat.S_ISREG(there) and not stat.S_ISDIR(there):
                     path.write_bytes(data)
                     continue
-                target = Path(os.path.realpath(path))
                 handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:60]}.", suffix=".part")
                 leavings.callback(Path(temporary).unlink, missing_ok=True)
                 with os.fdopen(handle, "wb") as stream:
                     stream.write(data)
                 os.chmod(temporary, 0o644)
-                if target.is_dir():
+                if stat.S_ISDIR(there):
                     raise IsADirectoryError(21, "Is a directory")
                 finished.append((temporary, target))
             except OSError as error:
@@ -50,6 +52,18 @@ def write_together(contents: Mapping[Path, str | bytes]) -> None:
                 os.replace(temporary, target)
             except OSError as error:
                 raise _named(error, target) from None
+        leavings.pop_all()
+
+
+def _target(path: Path) -> tuple[Path, int]:
+    """The file that a path leads to, and its mode; 0 where it is not there yet."""
+    try:
+        there = os.lstat(path).st_mode
+    except FileNotFoundError:
+        return path, 0
+    if not stat.S_ISLNK(there):
+        return path, there
+    return Path(os.path.realpath(path)), os.stat(path).st_mode if path.exists() else 0
 
 
 def write_new(path: Path, content: str) -> Path:
@@ -74,10 +88,21 @@ def _named(error: OSError, path: Path) -> OSError:
 
 def table_text(columns: Sequence[str], rows: Iterable[Sequence[object]], *, digits: int | None = None) -> str:
     """A table as CSV; floats with all their digits, or with so many significant ones. None and NaN are empty cells."""
+    return _csv(columns, ([_cell(value, digits) for value in row] for row in rows))
+
+
+def columns_text(columns: Mapping[str, Sequence[object]]) -> str:
+    """Columns of one length as CSV, floats with all their digits; NaN are empty cells."""
+    # A value is looked at for itself only in a column that holds a NaN, the one value that does not equal itself.
+    listed = [[_cell(v, None) for v in values] if any(map(operator.ne, values, values)) else values for values in columns.values()]
+    return _csv(list(columns), zip(*listed, strict=True))
+
+
+def _csv(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows([_cell(value, digits) for value in row] for row in rows)
+    writer.writerows(rows)
     return text.getvalue()
 
 

@@ -457,6 +457,25 @@ def test_only_what_would_show_something_else_is_written_again(tmp_path: Path, si
     assert all(again[name] == first[name] for name in first if "beside-a-wall" in name)
 
 
+def test_a_large_run_has_pages_of_the_scenes_that_are_shown_and_of_those_that_are_wanted(
+    tmp_path: Path, finished: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The index names the others where it has to, without a link, and says how to get their pages."""
+    monkeypatch.setattr("rockcheck.reports.site.shown", lambda run: ("free",))
+    index = write_site(tmp_path).read_text(encoding="utf-8")
+    assert f"1 of {len(finished.scenes)} scenes have a page" in index
+    assert "rockcheck report DIR --scene NAME" in index
+    scenes = {f"pages/{slug}.html": name for name, slug in slugs_of(finished.scenes).items()}
+    linked = set(Addresses(index).found) & scenes.keys()
+    assert {scenes[one] for one in linked} == {"free"}
+    assert re.findall('data-scene="(.*?)"', index) == ["free"]
+
+    write_site(tmp_path, wanted=("beside a wall",), afresh=False)
+    assert (tmp_path / PAGES / "beside-a-wall.html").is_file()
+    with pytest.raises(InputError, match=r"did you mean 'free'"):
+        write_site(tmp_path, wanted=("fre",))
+
+
 def test_pages_of_scenes_that_are_gone_go(tmp_path: Path, finished: Run) -> None:
     write_site(tmp_path)
     (tmp_path / PAGES / "figures" / "study.svg").touch()  # of another command, in the same folder

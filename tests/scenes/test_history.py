@@ -85,6 +85,9 @@ def test_a_compressed_history_is_the_same_and_opens_in_pandas(history, tmp_path)
     written = path.read_bytes()
     history.save(tmp_path / "run.csv")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run.csv", "run.csv.gz", "run.events.csv", "run.events.csv.gz"]
+    assert {f"run{ending}": content for ending, content in history.packed().items()} == {
+        p.name: p.read_bytes() for p in tmp_path.iterdir() if p.suffix == ".gz"
+    }
     assert gzip.decompress(written) == (tmp_path / "run.csv").read_bytes()
     again = History.load(path)
     assert list(again.event_list) == list(history.event_list)

@@ -257,8 +257,9 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
                 taken_first.add(i)
                 taken_second.add(j)
                 pairs.append((first[i], second[j]))
-        left += [e for i, e in enumerate(first) if i not in taken_first and _strong(e, first)]
-        right += [e for j, e in enumerate(second) if j not in taken_second and _strong(e, second)]
+        weak = _weak(first), _weak(second)
+        left += [e for i, e in enumerate(first) if i not in taken_first and abs(e.impulse) >= weak[0]]
+        right += [e for j, e in enumerate(second) if j not in taken_second and abs(e.impulse) >= weak[1]]
     in_time = attrgetter("t")
     return MatchedImpacts(sorted(pairs, key=lambda two: two[0].t), sorted(left, key=in_time), sorted(right, key=in_time))
 
@@ -268,8 +269,9 @@ def _as_impacts(events: Sequence[Event]) -> list[Event]:
     return [replace(event, kind="floor impact") if event.kind == "landing" and event.impulse != 0.0 else event for event in events]
 
 
-def _strong(event: Event, others: Sequence[Event]) -> bool:
-    return abs(event.impulse) >= WEAK_IMPACT * max(abs(other.impulse) for other in others)
+def _weak(events: Sequence[Event]) -> float:
+    """The impulse below which one of these is weak beside the strongest."""
+    return WEAK_IMPACT * max((abs(event.impulse) for event in events), default=0.0)
 
 
 # --- differences -------------------------------------------------------------------------------------------------------
@@ -549,7 +551,8 @@ def energy_gain(motion: WindowedHistory) -> float:
 
 def _strong_count(motion: WindowedHistory, kind: str) -> float:
     events = motion.events(kind)
-    return float(sum(_strong(event, events) for event in events))
+    weak = _weak(events)
+    return float(sum(abs(event.impulse) >= weak for event in events))
 
 
 def _extreme(motion: WindowedHistory, choose: Callable[[Array], Any]) -> float:

@@ -24,6 +24,8 @@ from rockcheck.scenes.progress import announce_by, announced
 
 #: One thread a process: the calls are what runs in parallel.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+#: So many calls a process are given out: it begins the next while its last result is looked at.
+AHEAD = 2
 #: What the first call that uses compiled code may take in addition, to compile it, s.
 COMPILING = 600.0
 
@@ -140,10 +142,10 @@ class Pool:
                 future.cancel()
 
     def _begin(self, waiting: deque[Call], running: dict[Future[Any], tuple[Call, float]]) -> None:
-        """Gives calls to all idle processes. A call that waits for another one to compile is passed over."""
+        """Gives each process a call, and one ahead. A call that waits for another one to compile is passed over."""
         compiling = {call.compiles for call, _ in running.values() if call.compiles} - self._compiled
         held: list[Call] = []
-        while waiting and len(running) < self.jobs:
+        while waiting and len(running) < AHEAD * self.jobs:
             call = waiting.popleft()
             if call.compiles in compiling:
                 held.append(call)

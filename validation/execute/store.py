@@ -18,12 +18,14 @@ import hashlib
 import json
 import re
 import time
+from collections import OrderedDict
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from rockcheck.scenes.errors import InputError
+from rockcheck.scenes.history import History
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.writing import write_whole
 
@@ -33,6 +35,8 @@ TILES = "tiles"
 #: What a history's files are called after its name.
 TABLE = ".csv.gz"
 SUFFIXES = {TABLE, f".events{TABLE}"}
+#: So many histories are held in memory: a scene's are compared with each other.
+RECENT = 16
 #: A result that no run has used for so long is removed, s.
 KEEP = 14 * 86400.0
 
@@ -48,6 +52,7 @@ class Store:
 
     folder: Path
     kinds: tuple[str, ...] = (HISTORIES, COMPARISONS)
+    _recent: OrderedDict[str, History] = field(default_factory=OrderedDict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for kind in self.kinds:
@@ -57,12 +62,26 @@ class Store:
         """Path of a history's CSV."""
         return self.folder / HISTORIES / f"{name}{TABLE}"
 
-    def put(self, name: str, files: Mapping[str, bytes], record: Mapping[str, Any]) -> None:
-        """Keep a history: its files by suffix (".csv.gz", ".events.csv.gz") and its record."""
+    def put(self, name: str, files: Mapping[str, bytes], record: Mapping[str, Any], history: History | None = None) -> None:
+        """Keep a history: its files by suffix (".csv.gz", ".events.csv.gz") and its record; `history` is what the files hold."""
         for suffix, content in files.items():
             write_whole(self.folder / HISTORIES / f"{name}{suffix}", content)
         hashes = {suffix: _hash(content) for suffix, content in files.items()}
         write_whole(self.folder / HISTORIES / f"{name}.json", _sealed(name, {**record, "files": hashes}))
+        if history is not None:
+            self._remember(name, history)
+
+    def load(self, name: str) -> History:
+        """The history of that name: from memory where it was put or loaded lately, else from its file. Raises `InputError`."""
+        found = self._recent.get(name)
+        return self._remember(name, History.load(self.history(name)) if found is None else found)
+
+    def _remember(self, name: str, history: History) -> History:
+        self._recent[name] = history
+        self._recent.move_to_end(name)
+        if len(self._recent) > RECENT:
+            self._recent.popitem(last=False)
+        return history
 
     def get(self, name: str) -> dict[str, Any] | None:
         """The record of a history whose files are whole, else None."""
@@ -114,6 +133,8 @@ def _seal(name: str, content: Mapping[str, Any]) -> str:
 
 def _read(path: Path) -> dict[str, Any] | None:
     """The content of a record that is whole, else None."""
+    if not path.exists():
+        return None
     try:
         found = json.loads(read_text(path))
         content, seal = found["content"], found["sha256"]

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-import tempfile
 import time
 import traceback
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rockcheck.scenes import History, InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
-from rockcheck.validation.execute.models import build_own, family
+from rockcheck.validation.execute.models import build_own, family, is_own
 from rockcheck.validation.execute.pool import Call, Pool
-from rockcheck.validation.execute.store import TABLE
 from rockcheck.validation.uncertainty.numerical import failed, numerical_uncertainty
 
 
@@ -55,10 +52,12 @@ class BatchTask(Work):
 class TaskResult:
     """What a worker gives back: the history's files by suffix and the record, or the reason of its failure.
 
+    `history` is the history itself, where it is sure to be the one that the files hold: a model of the user's own may give anything.
     `bad_input` says that the model refused what it was given. `traceback` is that of an exception which no model may raise.
     """
 
     files: dict[str, bytes] = field(default_factory=dict, repr=False)
+    history: History | None = field(default=None, repr=False)
     record: dict[str, Any] = field(default_factory=dict)
     failure: str = ""
     bad_input: bool = False
@@ -74,9 +73,7 @@ def play(task: Task | BatchTask) -> TaskResult:
     history, failed = _simulate(task, task.scene)
     if history is None:
         return failed
-    with tempfile.TemporaryDirectory() as folder:
-        history.save(Path(folder) / f"history{TABLE}")
-        files = {path.name.removeprefix("history"): path.read_bytes() for path in Path(folder).iterdir()}
+    files = history.packed()
     cost = {key: value for key, value in vars(history.cost).items() if value is not None}
     record = {
         "outcome": history.outcome,
@@ -86,7 +83,7 @@ def play(task: Task | BatchTask) -> TaskResult:
         "numerical": _numerical(task, history) if task.uncertainty else None,
         "cost": {**cost, "worker_seconds": time.perf_counter() - began},
     }
-    return TaskResult(files=files, record=record)
+    return TaskResult(files=files, history=None if is_own(task.family) else history, record=record)
 
 
 def _play_batch(task: BatchTask, began: float) -> TaskResult:

@@ -33,8 +33,9 @@ def pairs_of(runs: Iterable[Run]) -> dict[tuple[str, str], list[tuple[float, flo
     """
     found: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for run in runs:
+        references = {cell.scene: cell for cell in run.cells if cell.model == run.reference}
         for cell in run.cells:
-            yardstick = run.cell(cell.scene, run.reference)
+            yardstick = references.get(cell.scene)
             if yardstick is None or yardstick is cell or "failed" in (cell.status, yardstick.status):
                 continue
             if cell.outcome.startswith("overturned") or yardstick.outcome.startswith("overturned"):

@@ -232,7 +232,14 @@ class Run(Stored):
     @property
     def places(self) -> tuple[str, ...]:
         """Names of scenes and ensembles that have cells, in order."""
-        return tuple(dict.fromkeys(cell.scene for cell in self.cells))
+        return tuple(self.by_scene())
+
+    def by_scene(self) -> dict[str, dict[str, Cell]]:
+        """All cells by scene or ensemble, and by model, in order: for whoever goes through all of them."""
+        found: dict[str, dict[str, Cell]] = {}
+        for cell in self.cells:
+            found.setdefault(cell.scene, {})[cell.model] = cell
+        return found
 
     def of_scene(self, scene: str) -> tuple[Cell, ...]:
         """The cells of one scene, in the models' order."""

@@ -10,7 +10,6 @@ from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from functools import lru_cache
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from typing import Any
 import numpy as np
 from pydantic import field_validator
 
-from rockcheck.scenes import History, InputError, Scene
+from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.discrepancy.compare import compare, describe, evaluate, too_short
@@ -219,7 +218,7 @@ def run_suite(
         else:
             records[item] = result.record
             if isinstance(item, PlannedCell):
-                store.put(item.name, result.files, result.record)
+                store.put(item.name, result.files, result.record, result.history)
             else:
                 store.put_record(COMPARISONS, item.name, result.record)
         on_progress(len(records) + len(failures), len(items), f"{item.place}, {item.variant.label}")
@@ -233,7 +232,8 @@ def run_suite(
         for planned in planned_cells
     ]
     ensembles, ensemble_cells = _ensembles(suite, batches, records, failures, read_back)
-    cells = [_explained(suite, cell, cells, by_place, records, inputs.get(cell.scene)) for cell in cells] + ensemble_cells
+    beside = {name: list(of) for name, of in groupby(cells, key=lambda cell: cell.scene)}
+    cells = [_explained(suite, cell, beside[cell.scene], by_place, records, inputs.get(cell.scene)) for cell in cells] + ensemble_cells
     cells = [cell.model_copy(update=faults.get((cell.scene, cell.model), {})) for cell in cells]
     store.prune()
     return Run(
@@ -435,17 +435,15 @@ def _explained(
     records: Mapping[Planned, Mapping[str, Any]],
     inputs: Inputs | None,
 ) -> Cell:
-    """The cell with the verdicts on its differences from the references that finished; unchanged where nothing is known."""
+    """The cell with the verdicts on its differences from the references among `cells`, of its scene, that finished; unchanged where
+    nothing is known."""
     own = suite.suite_of(cell.scene)
     if cell.numerical is None:
         return cell
     others = {
         other.model: other
         for other in cells
-        if other.scene == cell.scene
-        and other.model in (own.reference, own.model_form)
-        and other.model != cell.model
-        and other.status == "done"
+        if other.model in (own.reference, own.model_form) and other.model != cell.model and other.status == "done"
     }
     found = explanations(
         own.scenes[cell.scene],
@@ -502,22 +500,12 @@ def _compared(store: Store, scene: Scene, planned: PlannedCell, asked: Mapping[s
     return found
 
 
-def _loaded(store: Store, planned: PlannedCell) -> History:
-    path = store.history(planned.name)
-    return _load(path, path.stat().st_mtime_ns)
-
-
-@lru_cache(maxsize=16)  # a scene's histories are held against each other
-def _load(path: Path, written: int) -> History:
-    return History.load(path)
-
-
 def _compute(
     store: Store, scene: Scene, planned: PlannedCell, reference: PlannedCell | None, windowed: Sequence[Windowed], horizon: float | None
 ) -> ComparisonRecord:
     """The figures of the cell itself where `reference` is None, with the law of impacts that it followed."""
-    candidate = _loaded(store, planned)
-    yardstick = _loaded(store, reference) if reference else None
+    candidate = store.load(planned.name)
+    yardstick = store.load(reference.name) if reference else None
     figures: list[Figure] = []
     gaps: dict[str, tuple[str, bool]] = {}
     by_window: dict[str, list[str]] = {"": [m.name for m in (DIFFERENCES if reference else FIGURES).values() if not m.on_request]}
@@ -536,7 +524,7 @@ def _compute(
             if other and landing and (until is None or until > landing.t):
                 found, own = by_either(discrepancy, *other, candidate, scene, until, measures)
                 gaps |= {str(Windowed(measure, window)): gap for measure, gap in own.items()}
-        figures += [figure.model_copy(update={"window": window}) for figure in found]
+        figures += [figure.model_copy(update={"window": window}) for figure in found] if window else found
     law = landing.followed_by(candidate, scene) if landing and yardstick is None else None
     return ComparisonRecord(
         figures=tuple((f.measure, f.unit, f.value, f.window, f.until, f.note) for f in figures),

@@ -43,6 +43,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
@@ -161,6 +162,14 @@ class Suite:
     #: Whether each scene's figure for a paper is drawn.
     print_figures: bool = False
 
+    @cached_property
+    def _judged(self) -> dict[tuple[str, str], list[Place]]:
+        """The places that have a tolerance, by scene and model."""
+        found: dict[tuple[str, str], list[Place]] = {}
+        for place in self.tolerances:
+            found.setdefault((place.scene, place.model), []).append(place)
+        return found
+
     def suite_of(self, scene: str) -> Suite:
         """The suite that a scene or an ensemble comes from: this one, or the included one."""
         return next((suite for suite in self.included if scene in suite.scenes or scene in suite.ensembles), self)
@@ -205,7 +214,7 @@ class Suite:
         for against, texts in ((own.reference, require.difference), (own.model_form, require.model_form)):
             if against and model not in (own.reference, against):
                 places += [Place(scene, model, against, Windowed.parse(text)) for text in texts]
-        places += [place for place in own.tolerances if (place.scene, place.model) == (scene, model)]
+        places += own._judged.get((scene, model), [])
         return {place: own.kind(place) for place in places}
 
     def kind(self, place: Place) -> Kind:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from rich.table import Table
@@ -11,14 +11,45 @@ from rich.text import Text
 
 from rockcheck.scenes.writing import table_text
 from rockcheck.validation.discrepancy.figures import Figure, value_words
-from rockcheck.validation.suite.results import Cell, Check, Run
+from rockcheck.validation.suite.results import SEVERITY, Cell, Check, Run, worst
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES
 
+#: The most scenes that tables and pages show one by one.
+MOST_SHOWN = 200
 COLOURS = {"pass": "green", "incomplete": "yellow", "changed": "yellow", "fail": "red", "error": "red"}
 
 
+def shown(run: Run, most: int = MOST_SHOWN) -> tuple[str, ...]:
+    """The scenes and ensembles that are shown one by one, in the suite's order: all, of a large run the worst `most`.
+
+    The worst are those with the worst verdict, and of these the nearest to a limit. Ensembles are always shown.
+    """
+    cells = run.by_scene()
+    if len(cells) <= most:
+        return tuple(cells)
+    ensembles = {ensemble.name for ensemble in run.ensembles}
+
+    def badness(place: str) -> tuple[int, float]:
+        of_place = cells[place].values()
+        shares = (used(check) for cell in of_place for check in cell.checks)
+        return SEVERITY.index(worst([cell.verdict for cell in of_place])), max(shares, default=0.0)
+
+    scenes = [place for place in cells if place not in ensembles]
+    chosen = ensembles | set(sorted(scenes, key=badness, reverse=True)[:most])
+    return tuple(place for place in cells if place in chosen)
+
+
+def left_out(run: Run, places: Sequence[str]) -> Iterator[str]:
+    """A line that says how many scenes are not shown, where some are not."""
+    if more := len(run.places) - len(places):
+        yield f"and {more} scenes more, none of them worse: their figures are in figures.csv"
+
+
 def verdict_table(run: Run) -> Table:
-    """A row a cell, within 80 columns: the check that is nearest to its limit, how much of that it uses, and the verdict."""
+    """A row a cell, within 80 columns: the check that is nearest to its limit, how much of that it uses, and the verdict.
+
+    Of a large run, the scenes that are `shown`.
+    """
     table = Table(box=None, pad_edge=False, expand=False)
     table.add_column("scene", overflow="ellipsis", no_wrap=True, max_width=22)
     table.add_column("model", overflow="ellipsis", no_wrap=True, max_width=14)
@@ -26,7 +57,10 @@ def verdict_table(run: Run) -> Table:
     table.add_column("used", justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     before = ""
+    places = set(shown(run))
     for cell in run.cells:
+        if cell.scene not in places:
+            continue
         near = nearest(cell)
         judged = windowed(near) if near else "as it must be" if cell.checks else "nothing judged"
         words = judged if cell.status == "done" else cell.reason or "failed"
@@ -40,13 +74,13 @@ def verdict_table(run: Run) -> Table:
 
 def outcome_tables(run: Run) -> Iterator[tuple[str, Table]]:
     """Each scene with a row a model, within 80 columns: what becomes of the block, its peak rotation, and how far from the reference."""
-    for scene in run.places:
+    for scene, cells in run.by_scene().items():
         table = Table(box=None, pad_edge=False, expand=False)
         for name, width in (("", 0), ("model", 16), ("outcome", 26)):
             table.add_column(name, overflow="fold", min_width=width)
         for name in ("peak", "apart", "took"):
             table.add_column(name, justify="right", no_wrap=True, min_width=8)
-        for cell in run.of_scene(scene):
+        for cell in cells.values():
             words = cell.fate if cell.status == "done" else cell.reason or "failed"
             colour = "red" if cell.status == "failed" else "yellow" if cell.status == "absent" else ""
             row = outcome_row(cell, run.reference)

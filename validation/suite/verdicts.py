@@ -10,7 +10,7 @@ from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.writing import markdown_table
 from rockcheck.validation.suite.results import Cell, Check, Run
-from rockcheck.validation.suite.tables import share, title, used, verdict_lines
+from rockcheck.validation.suite.tables import MOST_SHOWN, left_out, share, shown, title, used, verdict_lines
 
 MARKS = {"pass": "✅", "incomplete": "⚪", "changed": "🟡", "fail": "❌", "error": "💥"}
 
@@ -21,16 +21,15 @@ def junit(run: Run) -> str:
     A figure that changed within its limit, and a model that is not installed, are failures only in a strict run.
     """
     document = JUnitXml(f"rockcheck {run.suite}")
-    for scene in run.places:
+    for scene, cells in run.by_scene().items():
         suite = TestSuite(scene)
-        for cell in run.of_scene(scene):
-            suite.add_testcases(list(_cases(cell, run.strict)))
-        document.add_testsuite(suite)
+        suite.extend([case for cell in cells.values() for case in _cases(cell, run.strict)])
+        document.append(suite)  # `add_testsuite` looks through all that are there
     if run.faults:
         suite = TestSuite("tolerances")
         for fault in run.faults:
             suite.add_testcase(_case("tolerances", fault, Failure(fault)))
-        document.add_testsuite(suite)
+        document.append(suite)
     document.update_statistics()
     text = bytes(document.tostring()).decode()
     return "".join(c if c.isprintable() or c == "\n" else "?" for c in text) + "\n"  # XML knows no control characters
@@ -66,9 +65,12 @@ def markdown(run: Run) -> str:
     ]
     reasons = list(verdict_lines(run))
     if reasons:
-        lines += [*(f"- {_plain(reason)}" for reason in reasons), ""]
-    rows = ((_plain(scene), *(_entry(run.cell(scene, model), run.judged) for model in run.models)) for scene in run.places)
-    return "\n".join([*lines, markdown_table(("scene", *map(_plain, run.models)), rows), *_laws(run)]) + "\n"
+        more = [f"- and {len(reasons) - MOST_SHOWN} more, in checks.csv"] if len(reasons) > MOST_SHOWN else []
+        lines += [*(f"- {_plain(reason)}" for reason in reasons[:MOST_SHOWN]), *more, ""]
+    cells, places = run.by_scene(), shown(run)
+    rows = ((_plain(scene), *(_entry(cells[scene].get(model), run.judged) for model in run.models)) for scene in places)
+    table = markdown_table(("scene", *map(_plain, run.models)), rows)
+    return "\n".join([*lines, table, *left_out(run, places), *_laws(run)]) + "\n"
 
 
 def _laws(run: Run) -> Iterator[str]:

@@ -71,6 +71,16 @@ def in_this_process(tasks, **limits):
     return enumerate(map(workers.play, tasks))
 
 
+def test_figures_are_the_same_from_memory_and_from_files(tmp_path):
+    """A history is compared as its worker gave it; read back from its files, where the comparisons are lost, it gives the same."""
+    folder = tmp_path / "out"
+    first = run_suite(load_suite("smoke"), folder, jobs=2)
+    shutil.rmtree(folder / "comparisons")
+    again = run_suite(load_suite("smoke"), folder, jobs=2)
+    assert again.up_to_date == len(again.cells)
+    assert [cell.figures for cell in again.cells] == [cell.figures for cell in first.cells]
+
+
 @pytest.mark.long
 def test_every_kind_of_failure_fails_its_cell_alone(tmp_path, run):
     faults = {name: f'model = "faulty:{name}"' for name in ("Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")}

@@ -13,7 +13,8 @@ from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.discrepancy.impact_laws import LawFollowed
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
-from rockcheck.validation.suite.results import Cell, Check, CostRecord, Run
+from rockcheck.validation.suite.results import Cell, Check, CostRecord, EnsembleRecord, Run
+from rockcheck.validation.suite.tables import MOST_SHOWN, shown, verdict_table
 from rockcheck.validation.suite.tolerances import Tolerance, judge, parse_tolerances
 from rockcheck.validation.suite.verdicts import MARKS, junit, markdown
 from rockcheck.validation.uncertainty.numerical import Numerical, Quantity
@@ -134,6 +135,28 @@ def test_the_summary_names_what_is_not_a_pass():
 def test_limit_and_drift_themselves_are_inside(value, expected):
     """Numbers that a computer holds exactly: a figure just at its drift passes, one just at its limit does not fail."""
     assert check(value).verdict == expected
+
+
+def test_a_large_run_shows_its_worst_scenes_in_the_suites_order():
+    """The one that is out of tolerance, the nearest to their limits, and all ensembles; JUnit has every scene."""
+    near = [cell(f"near {n}", "m", check(0.4)) for n in range(MOST_SHOWN - 1)]
+    far = [cell(f"far {n}", "m", check(0.25)) for n in range(30)]
+    drawn = EnsembleRecord(name="drawn", definition={}, peaks={}, outcomes={})
+    run = run_of(*far[:10], cell("drawn", "m", check(0.1)), *near, *far[10:], cell("out", "m", check(0.75)), ensembles=(drawn,))
+    assert shown(run) == ("drawn", *(one.scene for one in near), "out")
+    assert verdict_table(run).row_count == MOST_SHOWN + 1
+    text = markdown(run)
+    assert "| out |" in text
+    assert "| far 3 |" not in text
+    assert "and 30 scenes more" in text
+    assert len(ET.fromstring(junit(run)).findall("testsuite")) == len(run.cells)
+    assert shown(run_of(*near)) == tuple(one.scene for one in near)
+
+
+def test_the_summary_of_a_run_that_is_wrong_everywhere_has_an_end():
+    text = markdown(run_of(*(cell(f"s{n}", "m", check(0.75)) for n in range(MOST_SHOWN + 7))))
+    assert text.count("is more than 0.5") == MOST_SHOWN
+    assert "- and 7 more, in checks.csv" in text
 
 
 def test_what_waits_for_its_tolerance_has_not_failed():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -63,12 +63,16 @@ def keep(run: Run, folder: Path) -> Path:
         return run.save(folder)
 
 
-def publish(folder: Path, *, jobs: int | None = None, afresh: bool = False, on_progress: OnProgress = unheard) -> Path:
+def publish(
+    folder: Path, *, jobs: int | None = None, afresh: bool = False, wanted: Sequence[str] = (), on_progress: OnProgress = unheard
+) -> Path:
     """Write the pages of the run that was kept in `folder`; returns the page to open.
 
-    Unless `afresh`, only those that would show something else than they do. `jobs` processes draw, by default one a core.
+    Unless `afresh`, only those that would show something else than they do. `jobs` processes draw, by default one a core. Scenes
+    that are `wanted` have a page in a large run, too.
     """
     from rockcheck import reports
 
     with _turn(folder):
-        return Path(reports.write_site(folder, jobs=jobs or os.cpu_count() or 1, afresh=afresh, on_progress=on_progress))
+        written = reports.write_site(folder, jobs=jobs or os.cpu_count() or 1, afresh=afresh, wanted=wanted, on_progress=on_progress)
+        return Path(written)
