@@ -13,6 +13,7 @@ import pytest
 from rockcheck.scenes import Block, Cost, Event, Floor, History, InputError, Rest, Scene, reading
 from rockcheck.scenes.history import COLUMNS
 from rockcheck.scenes.observation import observe
+from rockcheck.scenes.writing import columns_text
 
 SCENE = Scene(
     name="observed",
@@ -240,3 +241,9 @@ def test_overturning_cuts_the_rows(side):
     assert len(history.channels["t"]) == 4
     with pytest.raises(ValueError, match="must report the event"):
         observe(SCENE, "model", state)
+
+
+def test_columns_as_csv_have_all_digits_and_no_word_for_what_is_not_a_number():
+    columns = {"a": [0.1 + 0.2, math.nan, -0.0], "b": ["x, y", "", "z"], "c": [1e-300, 1.0, math.inf]}
+    assert columns_text(columns) == 'a,b,c\n0.30000000000000004,"x, y",1e-300\n,,1.0\n-0.0,z,inf\n'
+    assert columns_text(columns) == pd.DataFrame(columns).to_csv(index=False, lineterminator="\n")

@@ -25,7 +25,7 @@ def test_every_pinned_scene_is_listed():
 @pytest.mark.parametrize("slug", INDEX["faults"])
 def test_a_fault_that_was_found(slug: str):
     entry = INDEX["faults"][slug]
-    model = EventBasedModel(**INDEX["limits"], **entry["model"])
+    model = EventBasedModel(**INDEX["limits"] | entry["model"])
     played = check_run(model, load_scene(FOLDER / f"{slug}.toml"), seed=entry["seed"], audit=entry["audited"])
     assert played.broken == [], (entry["fault"], played)
     assert ("energy" in played.figures) == entry["audited"]
