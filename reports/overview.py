@@ -99,7 +99,7 @@ class Accuracy:
 def matrix(run: Run) -> list[Row]:
     """A row a scene, an entry a model of the run."""
     cells = run.by_scene()
-    return [Row(scene, tuple(_entry(cells[scene], model, run.reference) for model in run.models)) for scene in run.scenes]
+    return [Row(scene, tuple(_entry(cells.get(scene, {}), model, run.reference) for model in run.models)) for scene in run.scenes]
 
 
 def glance(run: Run, rows: Sequence[Row] | None = None) -> Glance:

@@ -476,6 +476,14 @@ def test_a_large_run_has_pages_of_the_scenes_that_are_shown_and_of_those_that_ar
         write_site(tmp_path, wanted=("fre",))
 
 
+def test_a_scene_that_no_model_plays_has_no_page(tmp_path: Path, finished: Run) -> None:
+    """No suite makes such a run, but a file may say so."""
+    finished.model_copy(update={"scenes": {**finished.scenes, "nobody's": {**finished.scenes["free"], "name": "nobody's"}}}).save(tmp_path)
+    index = write_site(tmp_path).read_text(encoding="utf-8")
+    assert f"{len(finished.scenes)} of {len(finished.scenes) + 1} scenes have a page" in index
+    assert not (tmp_path / PAGES / "nobody-s.html").exists()
+
+
 def test_pages_of_scenes_that_are_gone_go(tmp_path: Path, finished: Run) -> None:
     write_site(tmp_path)
     (tmp_path / PAGES / "figures" / "study.svg").touch()  # of another command, in the same folder
