@@ -170,11 +170,10 @@ class _Pages:
         self.folder = folder
         self.run = Run.load(folder)
         self.wanted = tuple(wanted)
-        ensembles = [ensemble.name for ensemble in self.run.ensembles]
+        slugs = slugs_of([*self.run.scenes, *(ensemble.name for ensemble in self.run.ensembles)])
         for name in wanted:
-            if name not in (*self.run.scenes, *ensembles):
-                raise unknown_name("scene of the run", name, [*self.run.scenes, *ensembles])
-        slugs = slugs_of([*self.run.scenes, *ensembles])
+            if name not in slugs:
+                raise unknown_name("scene of the run", name, slugs)
         chosen = {*shown(self.run), *wanted}
         found: list[View] = [*scene_views(self.run, folder, chosen), *ensemble_views(self.run, folder, slugs)]
         self.views = {view.name: view for view in found}
@@ -196,11 +195,11 @@ class _Pages:
         write_figures(view, _made(pages / "figures"))
         write_whole(_made(pages / "data") / f"{view.slug}.js", script(view))
         files = write_scene_file(view.scene, _made(pages / "scene-files"), view.slug)
-        scenes = [one for one in self.views.values() if isinstance(one, SceneView)]
-        place = [one.name for one in scenes].index(view.name)
+        names = [one.name for one in self.views.values() if isinstance(one, SceneView)]
+        place = names.index(view.name)
         beside = {
-            "previous": scenes[place - 1] if place else None,
-            "following": scenes[place + 1] if place + 1 < len(scenes) else None,
+            "previous": self.views[names[place - 1]] if place else None,
+            "following": self.views[names[place + 1]] if place + 1 < len(names) else None,
         }
         self._page(view, stamp, "scene.html", files=files, **beside)
 
@@ -219,9 +218,9 @@ class _Pages:
         ensembles = [view for view in self.views.values() if isinstance(view, EnsembleView)]
         worst, times = tables.worst_first(self.run), tables.run_times(self.run)
         summaries = {model: FAMILIES[model].summary for model in self.run.models if model in FAMILIES}
-        shown: dict[str, Any] = {"scenes": scenes, "ensembles": ensembles, "worst": worst, "times": times, "summaries": summaries}
-        shown |= write_overview(self.run, _made(self.folder / PAGES / "figures"), self.views)
-        self.site.page(INDEX, "index.html", **shown, **_common(self.run))
+        told: dict[str, Any] = {"scenes": scenes, "ensembles": ensembles, "worst": worst, "times": times, "summaries": summaries}
+        told |= write_overview(self.run, _made(self.folder / PAGES / "figures"), self.views)
+        self.site.page(INDEX, "index.html", **told, **_common(self.run))
 
     def stamp(self, view: View) -> str:
         """Hash of all that a page shows and of the code that draws it; not when the run was, nor what was read back."""

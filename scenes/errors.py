@@ -30,17 +30,22 @@ class ModelFailure(RuntimeError):
     """A model could not finish a scene (blow-up, unsupported physics, a cap reached); its cell fails, the run goes on."""
 
 
+#: So many names a message lists.
+MOST_NAMES = 100
+
+
 def unknown_name(what: str, name: str, allowed: Iterable[str]) -> InputError:
     """An `InputError` for a name that is not among `allowed`, suggesting the nearest one."""
     return InputError(f"unknown {what} {printable(name)!r}{suggestion(name, allowed)}")
 
 
 def suggestion(name: str, allowed: Iterable[str]) -> str:
-    """What to say after a name that is not among `allowed`: the nearest one, and all of them."""
+    """What to say after a name that is not among `allowed`: the nearest one, and all of them, or some of very many."""
     names = sorted(allowed)
     near = get_close_matches(name, names, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
-    return f"; {hint}allowed: {', '.join(names)}" if names else ""
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return f"; {hint}allowed: {', '.join(names[:MOST_NAMES])}{more}" if names else ""
 
 
 def printable(value: object, limit: int = 80) -> str:

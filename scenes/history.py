@@ -182,8 +182,7 @@ class History(Shown):
         check_format(path)
         about = self._about()
         if path.suffix.lower() in (".json", ".mat"):
-            events = {name: [getattr(event, name) for event in self.event_list] for name in EVENT_COLUMNS}
-            write_together({path: (_json if path.suffix.lower() == ".json" else _mat)(about, self.channels, events)})
+            write_together({path: (_json if path.suffix.lower() == ".json" else _mat)(about, self.channels, self._event_columns())})
             return
         if path.suffix.lower() == ".parquet":
             attrs = {ABOUT: json.loads(json.dumps(about, default=str))}
@@ -221,8 +220,11 @@ class History(Shown):
         columns = {name: np.asarray(self.channels[name]).tolist() for name in COLUMNS if name in self.channels}
         rows = len(next(iter(columns.values()), ()))
         columns[ABOUT] = [json.dumps(about, sort_keys=True, default=str), *["-"] * rows][:rows]
-        events = {name: [getattr(event, name) for event in self.event_list] for name in EVENT_COLUMNS}
-        return columns_text(columns), columns_text(events)
+        return columns_text(columns), columns_text(self._event_columns())
+
+    def _event_columns(self) -> dict[str, list[Any]]:
+        """The events, a list a column."""
+        return {name: [getattr(event, name) for event in self.event_list] for name in EVENT_COLUMNS}
 
     @classmethod
     def load(cls, path: str | Path, *, columns: Mapping[str, str] | None = None) -> History:

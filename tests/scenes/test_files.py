@@ -106,3 +106,10 @@ def test_the_papers_scenes(name, friction, gap, restitution):
     assert scene.wall("right") is None
     assert scene.block.alpha == pytest.approx(0.25, abs=1e-4)
     assert scene.description
+
+
+def test_a_message_lists_no_more_names_than_fit_a_line():
+    said = suggestion("s7x", [f"s{n}" for n in range(MOST_NAMES + 20)])
+    assert said.startswith("; did you mean 's7'? allowed: s0, s1, s10, ")
+    assert said.endswith(" and 20 more")
+    assert suggestion("ebn", ["ebm", "cm"]) == "; did you mean 'ebm'? allowed: cm, ebm"

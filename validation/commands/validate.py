@@ -29,7 +29,7 @@ from rockcheck.validation.commands.run import ForceOption, chosen_models, play, 
 from rockcheck.validation.suite.changes import Moment, moment_of, remember, trends
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.suites import is_scene, load_suite, scene_suite
-from rockcheck.validation.suite.tables import left_out, shown, summary, verdict_lines, verdict_table
+from rockcheck.validation.suite.tables import not_shown, summary, verdict_lines, verdict_table
 
 #: The folder of the trend's page, and so many figures that moved are told.
 TREND, MOST_MOVED = "trend", 10
@@ -106,7 +106,7 @@ def tell_trend(moments: Sequence[Moment], path: Path) -> None:
 def show(finished: Run, out: Console) -> None:
     """The verdicts: a table, the reasons of what is not a pass, and a last line."""
     out.print(verdict_table(finished))
-    for line in left_out(finished, shown(finished)):
+    for line in not_shown(finished):
         out.print(line)
     for line in verdict_lines(finished):
         out.print(line, style="red" if finished.exit_code else "yellow")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 from rich.table import Table
@@ -39,10 +39,10 @@ def shown(run: Run, most: int = MOST_SHOWN) -> tuple[str, ...]:
     return tuple(place for place in cells if place in chosen)
 
 
-def left_out(run: Run, places: Sequence[str]) -> Iterator[str]:
-    """A line that says how many scenes are not shown, where some are not."""
-    if more := len(run.places) - len(places):
-        yield f"and {more} scenes more, none of them worse: their figures are in figures.csv"
+def not_shown(run: Run) -> Iterator[str]:
+    """A line that says how many scenes are not `shown`, where some are not."""
+    if more := len(run.places) - len(shown(run)):
+        yield f"and {more} more scenes, none of them worse; their figures are in figures.csv"
 
 
 def verdict_table(run: Run) -> Table:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.writing import markdown_table
 from rockcheck.validation.suite.results import Cell, Check, Run
-from rockcheck.validation.suite.tables import MOST_SHOWN, left_out, share, shown, title, used, verdict_lines
+from rockcheck.validation.suite.tables import MOST_SHOWN, not_shown, share, shown, title, used, verdict_lines
 
 MARKS = {"pass": "✅", "incomplete": "⚪", "changed": "🟡", "fail": "❌", "error": "💥"}
 
@@ -65,17 +65,18 @@ def markdown(run: Run) -> str:
     ]
     reasons = list(verdict_lines(run))
     if reasons:
-        more = [f"- and {len(reasons) - MOST_SHOWN} more, in checks.csv"] if len(reasons) > MOST_SHOWN else []
+        more = [f"- and {len(reasons) - MOST_SHOWN} more, in junit.xml"] if len(reasons) > MOST_SHOWN else []
         lines += [*(f"- {_plain(reason)}" for reason in reasons[:MOST_SHOWN]), *more, ""]
     cells, places = run.by_scene(), shown(run)
     rows = ((_plain(scene), *(_entry(cells[scene].get(model), run.judged) for model in run.models)) for scene in places)
     table = markdown_table(("scene", *map(_plain, run.models)), rows)
-    return "\n".join([*lines, table, *left_out(run, places), *_laws(run)]) + "\n"
+    rest = [line for one in not_shown(run) for line in ("", one)]  # a line right below would be a row of the table
+    return "\n".join([*lines, table, *rest, *_laws(run, places)]) + "\n"
 
 
-def _laws(run: Run) -> Iterator[str]:
-    """Which law of impacts each model followed, where scenes have a landing that tells; it is no verdict."""
-    told = {cell.scene: cell.impact_law.t for cell in run.cells if cell.impact_law}
+def _laws(run: Run, places: Container[str]) -> Iterator[str]:
+    """Which law of impacts each model followed, where these scenes have a landing that tells; it is no verdict."""
+    told = {cell.scene: cell.impact_law.t for cell in run.cells if cell.impact_law and cell.scene in places}
     if not told:
         return
     models = [model for model in run.models if any(cell.model == model and cell.impact_law for cell in run.cells)]
