@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from rockcheck.scenes import InputError, Ricker, load_scene, named_scenes
+from rockcheck.scenes.errors import MOST_NAMES, suggestion
 
 TEXT = """
 duration = 8.0
