@@ -45,7 +45,7 @@ lint: $(VENV)/.ready ## linter, formatter's check, type checker
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	cd build/typed && ../../$(BIN)/lint-imports --config ../../pyproject.toml --no-logo
+	$(BIN)/lint-imports --no-logo
 
 format: $(VENV)/.ready
 	$(BIN)/ruff check --fix .
@@ -72,9 +72,8 @@ clean:
 $(VENV)/.ready: pyproject.toml $(if $(LOCKED),$(LOCK))
 	$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "rockcheck needs Python 3.11 or newer: make PYTHON=python3.12")'
 	@$(PYTHON) -c 'import sys; v = sys.version_info; print("Python", ".".join(map(str, v[:3])), "from $(PYTHON)" + ("" if v < (3, 12) else "; PyBullet has wheels for Python 3.11 only and is left out here (make PYTHON=python3.11)"))'
+	@test -d rockcheck/scenes || { echo "rockcheck/scenes is no link to scenes/: git config core.symlinks true, then check out again"; exit 1; }
 	$(PYTHON) -m venv --clear $(VENV)
-	mkdir -p build/typed/rockcheck # the folders as they are installed, for tools that do not follow the install
-	for part in rockcheck/*.py scenes ebm cm engines validation reports; do ln -sfn ../../../$$part build/typed/rockcheck/; done
 	$(if $(LOCKED),$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement $(LOCK))
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check $(if $(LOCKED),--no-deps --no-build-isolation --editable .,--editable '.[test,docs,lint]')
 	$(BIN)/rockcheck warm

@@ -8,7 +8,11 @@ next to nothing. The parts lie in `rockcheck.scenes`, `rockcheck.ebm`, `rockchec
 from __future__ import annotations
 
 import importlib
+import os
 from typing import TYPE_CHECKING, Any
+
+if os.path.isfile(os.path.join(os.path.dirname(__file__), "scenes")):  # what git writes where it may make no links
+    raise ImportError("rockcheck/scenes is no link to scenes/: git config core.symlinks true, then check out again")
 
 if TYPE_CHECKING:
     from rockcheck.cm import ContinuousModel, measured_restitution
