@@ -43,7 +43,7 @@ TARGETS = {
     "validation/suite/verdicts.py": [
         "tests/validation/suite/test_verdicts.py",
         "tests/validation/suite/test_impact_laws.py",
-        "tests/validation/commands/test_cli.py",
+        "tests/commands/test_cli.py",
     ],
     "validation/discrepancy/statistics.py": ["tests/validation/suite/test_verdicts.py", "tests/validation/suite/test_ensembles.py"],
     "validation/discrepancy/compare.py": ["tests/validation/discrepancy/test_measures.py", "tests/validation/discrepancy/test_measured.py"],
@@ -53,7 +53,7 @@ TARGETS = {
     ],
     "validation/suite/results.py": [
         "tests/validation/suite/test_verdicts.py",
-        "tests/validation/commands/test_cli.py",
+        "tests/commands/test_cli.py",
     ],
     "ebm/core/settle.py": ["tests/ebm/core/test_impact_laws.py", "tests/ebm/test_edges.py"],
     "ebm/core/laws/strike.py": [

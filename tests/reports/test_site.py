@@ -15,6 +15,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
+from rockcheck.commands.cli import main
 from rockcheck.reports import write_site
 from rockcheck.reports.ensembles import distributions_figure, ensemble_views
 from rockcheck.reports.figures import histories_figure
@@ -28,7 +29,6 @@ from rockcheck.reports.view import FALL, scene_views, slugs_of
 from rockcheck.reports.words import number, ratio, readable
 from rockcheck.scenes import Block, Floor, History, InputError, Record, Scene, Sine, Wall, load_scene
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
-from rockcheck.validation.commands.cli import main
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.discrepancy.measures import Pair, theta_rms
 from rockcheck.validation.execute.models import FAMILIES

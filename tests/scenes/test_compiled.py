@@ -20,10 +20,10 @@ import numpy as np
 import pytest
 
 from rockcheck import ebm
+from rockcheck.commands.cli import main
 from rockcheck.ebm.core import march
 from rockcheck.scenes import compiled, threads
 from rockcheck.scenes.progress import announce, announcing
-from rockcheck.validation.commands.cli import main
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.execute.warming import PARTS
 

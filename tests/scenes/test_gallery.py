@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rockcheck.commands.cli import main
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import History, Scene, load_scene, named_scenes
 from rockcheck.scenes.excitations import Ricker
-from rockcheck.validation.commands.cli import main
 
 CASES = ("rack", "loaded", "bookcase", "statue", "vial", "boulder")
 

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rockcheck.commands.cli import main
 from rockcheck.scenes import InputError, Record, load_scene
 from rockcheck.scenes.observation import scene_notes
 from rockcheck.scenes.recordings import Reading, intensity, read_components, read_record
 from rockcheck.scenes.recordings.recording import Recording
 from rockcheck.scenes.recordings.sets import _vertical_file, is_vertical
-from rockcheck.validation.commands.cli import main
 
 G = 9.80665
 STEP = 0.01

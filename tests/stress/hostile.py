@@ -94,7 +94,7 @@ LIMITED = """
 import resource, signal, sys
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(getattr(resource, sys.argv[1]), (int(sys.argv[2]),) * 2)
-from rockcheck.validation.commands.cli import main
+from rockcheck.commands.cli import main
 sys.exit(main(sys.argv[3:]))
 """
 ROCKCHECK = (sys.executable, "-m", "rockcheck")

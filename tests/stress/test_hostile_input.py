@@ -23,9 +23,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from rockcheck.commands.cli import main
 from rockcheck.scenes import History, InputError, load_scene
 from rockcheck.scenes.recordings import read_components
-from rockcheck.validation.commands.cli import main
 from rockcheck.validation.discrepancy.measured import read_measured
 from rockcheck.validation.execute.models import build
 from rockcheck.validation.execute.store import COMPARISONS, SUFFIXES, TABLE, Store, _sealed, name_of
@@ -408,7 +408,7 @@ import resource, sys, time
 from pathlib import Path
 import pandas, numba, ebm.core.march  # what a run needs in any case
 resource.setrlimit(resource.RLIMIT_DATA, (2**30, 2**30))
-from rockcheck.validation.commands.cli import main
+from rockcheck.commands.cli import main
 from rockcheck.scenes import InputError
 from rockcheck.scenes.recordings import read_record
 for path in sorted(Path(sys.argv[1]).iterdir()):

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
+from rockcheck.commands.cli import main
 from rockcheck.scenes import Scene, load_scene
 from rockcheck.scenes.writing import write_whole
-from rockcheck.validation.commands.cli import main
 from rockcheck.validation.execute import pool
 from rockcheck.validation.execute import store as stores
 from rockcheck.validation.execute.store import HISTORIES, Store
@@ -39,7 +39,7 @@ _LIMITED = """
 import resource, signal, sys
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)
-from rockcheck.validation.commands.cli import main
+from rockcheck.commands.cli import main
 sys.exit(main(sys.argv[2:]))
 """
 

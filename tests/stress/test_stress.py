@@ -9,10 +9,10 @@ import math
 import numpy as np
 import pytest
 
+from rockcheck.commands.cli import main
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
 from rockcheck.scenes.scene import PAPER_BLOCK
-from rockcheck.validation.commands.cli import main
 from rockcheck.validation.stress import invariants, players, study
 from rockcheck.validation.stress.exact import exact_scene
 from rockcheck.validation.stress.generator import ALPHA, FRICTION, RADIUS, random_scene

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rockcheck.commands.cli import main
 from rockcheck.scenes import InputError
-from rockcheck.validation.commands.cli import main
 from rockcheck.validation.discrepancy.measured import Measured, read_measured
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from rockcheck import Block, ContinuousModel, EventBasedModel, Floor, InputError, Ricker, Scene, Wall
+from rockcheck.commands.cli import main
 from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.scenes.files import load_scene, load_uncertain_scene
 from rockcheck.scenes.observation import observe
 from rockcheck.scenes.trust.experience import Experience, Range, Trust, axes_of, expected, outside
-from rockcheck.validation.commands.cli import main
 from rockcheck.validation.discrepancy.repeats import mean_history, shifted, time_shift
 from rockcheck.validation.suite.confidence import explanations
 from rockcheck.validation.suite.experience import bias_and_scatter

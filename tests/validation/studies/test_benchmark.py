@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from rockcheck.commands.cli import main
 from rockcheck.reports.studies.benchmark import write_benchmark
 from rockcheck.reports.style import power_of_ten
 from rockcheck.validation.bench import models as benchmark_models
@@ -26,7 +27,6 @@ from rockcheck.validation.bench.scenes import FAMILIES, MEMBERS, prepared
 from rockcheck.validation.bench.skipping import Saving, skipping
 from rockcheck.validation.bench.study import Benchmark, save
 from rockcheck.validation.bench.tables import markdown
-from rockcheck.validation.commands.cli import main
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import not_installed
 

@@ -7,7 +7,7 @@ import json
 import mujoco
 import pytest
 
-from rockcheck.validation.commands.cli import main
+from rockcheck.commands.cli import main
 from rockcheck.validation.conformance.calibration import KNOBS, calibrate
 from rockcheck.validation.conformance.study import engines_here
 

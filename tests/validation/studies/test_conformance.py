@@ -13,10 +13,10 @@ import pytest
 from junitparser import JUnitXml
 
 from rockcheck import engines
+from rockcheck.commands.cli import main
 from rockcheck.engines import MuJoCo
 from rockcheck.reports.scene_file import write_scene_file
 from rockcheck.scenes import Floor, InputError, ModelFailure, Wall, load_scene
-from rockcheck.validation.commands.cli import main
 from rockcheck.validation.conformance import cards as cards_module
 from rockcheck.validation.conformance.cards import as_json, changes, junit, make_card, markdown, read_cards
 from rockcheck.validation.conformance.phenomena import PHENOMENA, SCENES

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from rockcheck.commands.cli import main
 from rockcheck.reports.studies.convergence import write_convergence
 from rockcheck.validation.bench import convergence
 from rockcheck.validation.bench.convergence import (
@@ -24,7 +25,6 @@ from rockcheck.validation.bench.convergence import (
     save,
     study_scene,
 )
-from rockcheck.validation.commands.cli import main
 from rockcheck.validation.execute.models import not_installed
 
 SOME = ("long 53 mm e 0.5", "short 3 mm e 0")

@@ -8,11 +8,11 @@ import math
 import numpy as np
 import pytest
 
+from rockcheck.commands.cli import main
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Scene, Wall
 from rockcheck.scenes.recordings import Reading
 from rockcheck.scenes.recordings.sets import files_of, motions_of
-from rockcheck.validation.commands.cli import main
 from rockcheck.validation.spectra import ida
 
 SCENE = Scene(

@@ -18,13 +18,13 @@ import numpy as np
 import pytest
 
 from rockcheck.cm import ContinuousModel
+from rockcheck.commands.cli import main
 from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.spectrum import node_scene
 from rockcheck.scenes import Block, InputError, Ricker, load_scene
 from rockcheck.scenes.progress import Count
 from rockcheck.scenes.recordings import Reading
 from rockcheck.scenes.recordings.sets import motions_of
-from rockcheck.validation.commands.cli import main
 from rockcheck.validation.spectra import agreement, claims, fragility, refinement
 from rockcheck.validation.spectra import study as spectra
 from rockcheck.validation.spectra import tiles as tiling
@@ -138,7 +138,7 @@ def test_a_block_past_its_balance_is_not_safe_for_want_of_energy(tmp_path):
 def test_a_killed_run_goes_on_where_it_was(tmp_path, capsys):
     words = ["spectrum", "--figure", "8", "--size", "150", "--out", "out"]
     tiles = tmp_path / "out" / "spectra" / "tiles"
-    command = [sys.executable, "-c", "import sys; from rockcheck.validation.commands.cli import main; sys.exit(main())", *words]
+    command = [sys.executable, "-c", "import sys; from rockcheck.commands.cli import main; sys.exit(main())", *words]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL) as run:
         while len(list(tiles.glob("*.json"))) < 4:
             assert run.poll() is None

@@ -1,0 +1,44 @@
+"""`rockcheck accept`: today's figures become the expected ones."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from rockcheck.commands import OUT, AllowCodeOption, JobsOption, OutOption, SchedulerOption, answer, console, usable_folder
+from rockcheck.commands.run import ForceOption, tell_faults
+from rockcheck.commands.validate import SuiteArgument, play_suite
+from rockcheck.validation.suite.acceptance import accept
+from rockcheck.validation.suite.suites import load_suite
+
+
+def run(
+    suite: SuiteArgument = None,
+    reason: Annotated[str | None, typer.Option("--reason", help="Why limits may be loosened; it is written into the file.")] = None,
+    out: OutOption = OUT,
+    jobs: JobsOption = None,
+    force: ForceOption = False,
+    scheduler: SchedulerOption = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Show the changes, write none.")] = False,
+    allow_code: AllowCodeOption = None,
+) -> None:
+    """Make today's figures the expected ones.
+
+    They are written into the suite's tolerances, each change is shown. Limits are loosened only with --reason.
+    """
+    name = suite or "paper"
+    folder = usable_folder(out)
+    finished = play_suite(name, folder, jobs, force, False, scheduler, allow_code)
+    changes, refused = accept(load_suite(name, allow_code=allow_code or ()), finished, reason, write=not dry_run)
+    screen = console()
+    for line in changes:
+        screen.print(line, soft_wrap=True)
+    done = "would be written to" if dry_run else "in"
+    screen.print(f"{len(changes)} changes {done} {finished.tolerances_file}", soft_wrap=True)
+    for line in refused:
+        screen.print(f"not accepted: {line}", style="red", soft_wrap=True)
+    answer({"changes": changes, "refused": refused, "file": finished.tolerances_file, "written": not dry_run})
+    tell_faults(finished, folder)
+    failed = finished.exit_code if finished.verdict == "error" else 0
+    raise typer.Exit(failed or int(bool(refused)))

@@ -1,0 +1,214 @@
+"""The command `rockcheck`: one module a command under rockcheck.commands; here they meet, and errors become one line."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import inspect
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any, TextIO, cast
+
+import typer
+import typer.core
+
+from rockcheck.commands import begun, report_file, speaking, total_told
+from rockcheck.scenes import InputError, ModelFailure
+from rockcheck.scenes.errors import printable
+from rockcheck.validation.suite.results import FAULT
+
+#: The commands, in the order of the help: where each has its function `run` below this package, and an example.
+COMMANDS = {
+    "scenes": ("scenes", "rockcheck scenes"),
+    "new": ("new", "rockcheck new bookcase.toml"),
+    "record": ("record", "rockcheck record station.V2 --component 1 --plot station.png"),
+    "simulate": ("simulate", "rockcheck simulate fig5a --model mujoco --set time_step=1e-3 -o mujoco.csv"),
+    "run": ("run", "rockcheck run fig5a --models ebm,cm,mujoco"),
+    "compare": ("compare", "rockcheck compare ebm.csv mujoco.csv --until 8"),
+    "uncertainty": ("uncertainty", "rockcheck uncertainty fig5a --model mujoco --set time_step=1e-3"),
+    "validate": ("validate", "rockcheck validate smoke --out rockcheck-report"),
+    "accept": ("accept", 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"'),
+    "diff": ("diff", "rockcheck diff last-week rockcheck-report"),
+    "spectrum": ("spectrum", "rockcheck spectrum --figure 8 --size 50 --refine"),
+    "ida": ("ida", "rockcheck ida shelf.toml records --intensity sa --period 0.5"),
+    "benchmark": ("benchmark", "rockcheck benchmark --quick"),
+    "convergence": ("convergence", "rockcheck convergence --quick"),
+    "conformance": ("conformance", "rockcheck conformance --engine mujoco --settings default"),
+    "calibrate": ("calibrate", "rockcheck calibrate --engine mujoco --restitution 0.5 --step 1e-3"),
+    "stress": ("stress", "rockcheck stress --quick"),
+    "report": ("report", "rockcheck report rockcheck-report"),
+    "figure": ("figure", "rockcheck figure rockcheck-report fig4a -o fig4a.pdf"),
+    "warm": ("warm", "rockcheck warm"),
+}
+
+#: Commands that answer at once: nobody asks how long they took.
+AT_ONCE = ("scenes", "new", "record", "compare", "diff")
+
+#: Exit code of a run that Ctrl-C ended.
+INTERRUPTED = 130
+EXIT_CODES = {
+    0: "done; of a verdict: within tolerance",
+    1: "out of tolerance, or an invariant is broken",
+    2: "bad input, or a file that cannot be read or written",
+    3: "a model failed",
+    FAULT: "a fault of rockcheck itself: please report it",
+    INTERRUPTED: "interrupted by Ctrl-C",
+}
+
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only; the exit code is the answer.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="The result as JSON on stdout, instead of tables.")]
+
+
+def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
+    """A command with the options that all of them have, --quiet and --json; one that is `timed` says how long it took."""
+
+    def command(*, quiet: bool, as_json: bool, **arguments: Any) -> None:
+        with speaking("json" if as_json else "quiet" if quiet else "tables"), total_told() if timed else contextlib.nullcontext():
+            does(**arguments)
+
+    signature = inspect.signature(does, eval_str=True)
+    common = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=option)
+        for name, option in (("quiet", QuietOption), ("as_json", JsonOption))
+    ]
+    command.__doc__ = does.__doc__
+    command.__signature__ = signature.replace(parameters=[*signature.parameters.values(), *common])  # type: ignore[attr-defined]
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in (*signature.parameters.values(), *common)}
+    return command
+
+
+class _EachOnce(typer.core.TyperCommand):
+    """A command whose options may be given once, but for those that gather several values: the last would silently win."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        _, _, order = self.make_parser(ctx).parse_args(args=list(args))
+        for option in order:
+            single = isinstance(option, typer.core.TyperOption) and not (option.multiple or option.is_flag or option.count)
+            if single and sum(one is option for one in order) > 1:
+                raise InputError("is given twice: give one value", option.opts[-1])
+        return super().parse_args(ctx, args)
+
+
+class _Loaded(Mapping[str, Any]):
+    """The commands by name. Only that which is asked for is imported: half of them need the compiler, or what draws."""
+
+    def __getitem__(self, name: str) -> Any:
+        return _loaded(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(COMMANDS)
+
+    def __len__(self) -> int:
+        return len(COMMANDS)
+
+
+@cache
+def _loaded(name: str) -> Any:
+    module, example = COMMANDS[name]
+    does = importlib.import_module(f"rockcheck.commands.{module}").run
+    alone = typer.Typer(rich_markup_mode=None, add_completion=False)
+    alone.command(name=name, cls=_EachOnce, epilog=f"Example: {example}")(spoken(does, timed=name not in AT_ONCE))
+    return typer.main.get_command(alone)
+
+
+class _Commands(typer.core.TyperGroup):
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.commands = cast(Any, _Loaded())
+
+
+app = typer.Typer(
+    name="rockcheck",
+    cls=_Commands,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    epilog="\b\nExit codes:\n" + "\n".join(f"{code:5}  {meaning}" for code, meaning in EXIT_CODES.items()),
+)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        print(f"rockcheck {version('rockcheck')}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    _: Annotated[bool, typer.Option("--version", is_eager=True, callback=_version, help="Show the version and exit.")] = False,
+) -> None:
+    """Simulate a rigid block on a shaking floor with several models, compare them, and judge them against tolerances."""
+
+
+def main(arguments: Sequence[str] | None = None, *, began: float | None = None) -> int:
+    """Run the command line; returns the exit code, one of `EXIT_CODES`. The program `began` then (of `time.perf_counter`; None: now)."""
+    with _readers_may_go(), begun(time.perf_counter() if began is None else began):
+        try:
+            code = app(args=list(sys.argv[1:] if arguments is None else arguments), prog_name="rockcheck", standalone_mode=False)
+        except (typer.TyperException, InputError) as error:
+            return _told(error.format_message() if isinstance(error, typer.TyperException) else str(error), 2)
+        except ModelFailure as error:
+            return _told(str(error), 3)
+        except (KeyboardInterrupt, typer.Abort):
+            return _told("interrupted; what was finished is kept", INTERRUPTED)
+        except OSError as error:  # a disk that is full, a folder that has gone: what was written before is whole
+            return _told(f"{printable(Path(os.fsdecode(error.filename or 'output')))}: cannot be used: {error.strerror or error}", 2)
+        except MemoryError:
+            return _told("out of memory; what was finished is kept", 3)
+        except Exception as error:
+            trace = "".join([f"rockcheck {version('rockcheck')}, Python {sys.version}\n", *traceback.format_exception(error)])
+            where = report_file(trace) or f"this: {error}"
+            return _told(f"a fault of rockcheck itself, {type(error).__name__}: please report it with {where}", FAULT)
+        if code == INTERRUPTED:  # Typer has caught it
+            return _told("interrupted; what was finished is kept", INTERRUPTED)
+        return code if isinstance(code, int) else 0
+
+
+class _Pipe:
+    """A text stream whose reader may go, as that of `rockcheck scenes | head -1` does: the rest is then written to nobody."""
+
+    def __init__(self, stream: Any) -> None:
+        self._stream = stream
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        with contextlib.suppress(BrokenPipeError):
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        try:
+            self._stream.flush()
+        except BrokenPipeError:  # what waits to be written would be tried again as Python ends
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self._stream.fileno())
+            os.close(nowhere)
+
+
+@contextlib.contextmanager
+def _readers_may_go() -> Iterator[None]:
+    """Within this block nobody needs to read what is said: the exit code stays what it is."""
+    before = sys.stdout, sys.stderr
+    sys.stdout, sys.stderr = cast(TextIO, _Pipe(sys.stdout)), cast(TextIO, _Pipe(sys.stderr))
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        sys.stdout, sys.stderr = before
+
+
+def _told(message: str, code: int) -> int:
+    print(f"rockcheck: {printable(message, 1400)}", file=sys.stderr)
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,114 @@
+"""`rockcheck simulate`: one history."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rockcheck.commands import (
+    AllowCodeOption,
+    PlotOption,
+    answer,
+    check_picture,
+    console,
+    model_names,
+    progress,
+    report_file,
+    save_picture,
+    scene_names,
+    tell_notes,
+)
+from rockcheck.scenes import History, InputError, ModelFailure, Scene, load_scene
+from rockcheck.scenes.errors import printable
+from rockcheck.scenes.history import check_format
+from rockcheck.scenes.progress import listening
+from rockcheck.validation.execute import workers
+from rockcheck.validation.execute.models import FAMILIES, build, check_allowed, family, is_own
+from rockcheck.validation.execute.store import TABLE, name_of
+
+#: The model that plays where none is named: the fair reference for engines.
+REFERENCE = "ebm-unilateral"
+
+
+def run(
+    scene: Annotated[str, typer.Argument(help="A named scene or a .toml file.", autocompletion=scene_names)],
+    model: Annotated[str, typer.Option("--model", help=f"One of {', '.join(FAMILIES)}.", autocompletion=model_names)] = REFERENCE,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="File to write: .csv, .csv.gz, .json or .mat (default: SCENE--MODEL.csv).")
+    ] = None,
+    settings: Annotated[list[str] | None, typer.Option("--set", help="A setting of the model, such as time_step=1e-4; repeatable.")] = None,
+    plot: PlotOption = None,
+    allow_code: AllowCodeOption = None,
+) -> None:
+    """Simulate one scene with one model.
+
+    Writes the history as CSV, its events to a second file beside it; or both to one .json or .mat. --plot draws rotation, slip and impacts.
+    """
+    check_allowed(model, allow_code or ())
+    given = dict(setting_of(text) for text in settings or [])
+    player = None if is_own(model) else build(model, given)
+    what = load_scene(scene)
+    path = output or Path(f"{name_of(what.name, model)}.csv")
+    if not path.parent.is_dir():
+        raise InputError(f"{printable(path.parent)}: no such folder", "--output")
+    check_format(path)
+    check_picture(plot)
+    compiles = ", a first run compiles" if family(model).compiled else ""
+    with progress(f"{what.name}, {model}{compiles}") as on_progress, listening(on_progress):
+        history = player.simulate(what) if player else _played_apart(what, model, given)
+    try:
+        history.save(path)
+    except OSError as error:
+        raise InputError(f"{printable(path)}: cannot be written: {error.strerror}", "--output") from None
+    peak = None if history.overturned_at is not None else history.peak_rotation / what.block.alpha
+    reached = "" if peak is None else f", peak rotation {peak:.4g} alpha"
+    took = f"simulated in {history.cost.wall_seconds:.2g} s"
+    console().print(f"{what.name}, {model}: {history.fate}{reached}, {took}")
+    tell_notes(history)
+    console().print(f"history: {path}", soft_wrap=True)
+    if plot is not None:
+        save_picture(history.plot(), plot)
+    answer(
+        {
+            "scene": what.name,
+            "model": model,
+            "outcome": history.outcome,
+            "peak_rotation_alpha": peak,
+            "overturned_at_s": history.overturned_at,
+            "wall_seconds": history.cost.wall_seconds,
+            "rules": dict(history.cost.rules),
+            "notes": history.notes,
+            "history": path,
+        }
+    )
+
+
+def _played_apart(scene: Scene, model: str, settings: dict[str, Any]) -> History:
+    """The history by a model of the user's own, whose code is imported by a process of its own."""
+    task = workers.Task(label=model, family=model, settings=settings, search_path=(str(Path.cwd()),), scene=scene)
+    ((_, result),) = workers.local([task], jobs=1, seconds=[math.inf], memory_mb=None)
+    if result.bad_input:
+        raise InputError(result.failure)
+    if result.failure:
+        where = f"; its traceback: {report_file(result.traceback)}" if result.traceback else ""
+        raise ModelFailure(f"{result.failure}{where}")
+    with tempfile.TemporaryDirectory() as folder:
+        for suffix, content in result.files.items():
+            (Path(folder) / f"history{suffix}").write_bytes(content)
+        return History.load(Path(folder) / f"history{TABLE}")
+
+
+def setting_of(text: str) -> tuple[str, Any]:
+    """key=value, the value as in TOML; a bare word is a string."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.isidentifier():
+        raise InputError(f"{printable(text)!r}: write key=value", "--set")
+    try:
+        return key, tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key, value

@@ -1,0 +1,164 @@
+"""What changed: `rockcheck diff` between two finished runs, and `validate --history` over many."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from rockcheck.commands.cli import main
+from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.suite.changes import changes, moment_of, read_history
+from rockcheck.validation.suite.results import Run
+
+SUITE = """
+reference = "still"
+[models.still]
+model = "faulty:Still"
+[models.near]
+model = "faulty:{model}"
+offset = {offset}
+[[scene]]
+name = "short"
+duration = 0.2
+block = {{ half_width = 0.4, half_height = 1.5 }}
+floor = {{ friction = 0.5 }}
+[tolerances.short.near.still]
+theta_peak = {{ expected = 0.0038, limit = 0.005, drift = 0.001, why = "a test" }}
+"""
+CODE = ("--allow-code", "faulty:Still", "--jobs", "1")
+
+
+@pytest.fixture(autouse=True)
+def folder(in_an_empty_folder):
+    """A run in the folder `a`, whose one check passes."""
+    ran("a", 0.001)
+
+
+def ran(out: str, offset: float, *words: str, model: str = "Still", code: int = 0) -> None:
+    text = SUITE.format(offset=offset, model=model)
+    Path("mine.toml").write_text(text, encoding="utf-8")
+    assert main(["validate", "mine.toml", *CODE, "--no-report", "--out", out, *words]) == code
+
+
+@pytest.fixture
+def diff(capsys):
+    """The exit code and the changes between two folders."""
+
+    def asked(a: str, b: str) -> tuple[int, list[dict]]:
+        capsys.readouterr()
+        code = main(["diff", a, b, "--json"])
+        told = json.loads(capsys.readouterr().out)
+        assert told["exit_code"] == code
+        return code, told["changes"]
+
+    return asked
+
+
+def test_the_same_run_has_no_change(diff, capsys):
+    ran("b", 0.001)
+    assert diff("a", "b") == (0, [])
+    assert main(["diff", "a", "b"]) == 0
+    assert capsys.readouterr().out == "mine: nothing changed\n"
+
+
+def test_a_figure_that_moves_within_its_limits_is_told_and_no_fault(diff):
+    ran("b", 0.00102)
+    code, changes = diff("a", "b")
+    assert code == 0
+    assert {change["what"] for change in changes} == {"figure"}
+    moved = {change["name"]: (change["before"], change["after"]) for change in changes if change["model"] == "near"}
+    before, after = moved["theta_peak against still"]
+    assert after / before == pytest.approx(1.02, rel=1e-6)
+
+
+def test_a_verdict_that_changes_is_exit_1_and_comes_first(diff, capsys):
+    ran("b", 0.002, code=1)
+    code, changes = diff("a", "b")
+    assert code == 1
+    verdicts = [(c["scene"], c["model"], c["name"], c["before"], c["after"]) for c in changes if c["what"] == "verdict"]
+    assert verdicts == [
+        ("", "", "", "pass", "fail"),
+        ("short", "near", "", "pass", "fail"),
+        ("short", "near", "theta_peak against still", "pass", "fail"),
+    ]
+    assert [change["what"] for change in changes[:3]] == ["verdict"] * 3
+    assert main(["diff", "a", "b"]) == 1
+    out = capsys.readouterr().out
+    assert out.startswith("mine: 3 verdicts, ")
+    assert max(map(len, out.splitlines())) <= 80
+    code, back = diff("b", "a")
+    assert (code, back[0]["before"], back[0]["after"]) == (1, "fail", "pass")
+
+
+def test_a_cell_that_is_gone_is_a_change(diff):
+    run = Run.load("a")
+    Path("b").mkdir()
+    run.model_copy(update={"cells": run.cells[:1]}).save(Path("b"))
+    code, changes = diff("a", "b")
+    assert code == 1
+    assert [(c["model"], c["before"], c["after"]) for c in changes if c["what"] == "cell"] == [("near", "there", None)]
+
+
+def test_runs_of_two_suites_are_not_compared(capsys):
+    run = Run.load("a")
+    Path("b").mkdir()
+    run.model_copy(update={"suite": "other"}).save(Path("b"))
+    assert main(["diff", "a", "b"]) == 2
+    assert capsys.readouterr().err == "rockcheck: the runs are of two suites, mine and other\n"
+    assert main(["diff", "a", "none"]) == 2
+    assert "no finished run here" in capsys.readouterr().err
+
+
+def test_the_peak_of_a_block_that_fell_is_no_figure_that_changes():
+    run = Run.load("a")
+    near = run.cell("short", "near")
+
+    def reached(peak: float, note: str) -> Run:
+        figure = Figure(measure="peak_rotation", label="peak rotation", unit="alpha", value=peak, note=note)
+        others = tuple(one for one in near.figures if one.measure != "peak_rotation")
+        check = near.checks[0].model_copy(update={"figure": figure})
+        cell = near.model_copy(update={"figures": (*others, figure), "checks": (check,)})
+        return run.model_copy(update={"cells": tuple(cell if one is near else one for one in run.cells)})
+
+    fell = "the block overturned at 1 s"
+    assert [one.name for one in changes(reached(0.3, ""), reached(0.4, ""))] == ["peak_rotation"]
+    assert changes(reached(7.8, fell), reached(7.9, fell)) == []
+    assert list(moment_of(reached(0.3, ""), Path()).figures.values()) == [0.3]
+    assert list(moment_of(reached(7.8, fell), Path()).figures.values()) == [None]
+
+
+@pytest.mark.skipif(shutil.which("git") is None, reason="needs POSIX tools: git")
+def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys):
+    for words in (["init", "-q"], ["add", "mine.toml"], ["-c", "user.name=a", "-c", "user.email=a@b", "commit", "-qm", "one"]):
+        subprocess.run(["git", *words], check=True)
+    ran("a", 0.001, "--history", "runs.jsonl")
+    ran("a", 0.00105, "--history", "runs.jsonl")
+    capsys.readouterr()
+    assert main(["validate", "mine.toml", *CODE, "--out", "a", "--history", "runs.jsonl"]) == 0
+    assert "runs.jsonl: 3 runs, 0 figures moved since " in capsys.readouterr().out
+    moments = read_history(Path("runs.jsonl"))
+    head = subprocess.run(["git", "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
+    assert [one.commit for one in moments] == [head, f"{head}-dirty", f"{head}-dirty"]
+    name = "short, near: theta_peak against still"
+    values = [one.figures[name] for one in moments]
+    assert values[1] / values[0] == pytest.approx(1.05, rel=1e-6)
+    assert values[2] == values[1]
+    page = Path("a/trend/index.html").read_text(encoding="utf-8")
+    assert "mine over 3 runs" in page
+    assert name in page
+    assert head in page
+    assert 'href="trend/index.html"' in Path("a/index.html").read_text(encoding="utf-8")
+    ran("a", 0.001, "--history", "runs.jsonl")
+    assert f"  {name}: " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("line", ["{", "[]", '{"suite": 3}', '{"created": "x", "suite": "mine", "verdict": "pass", "more": 1}'])
+def test_a_history_that_is_none_is_named_with_its_line(capsys, line):
+    Path("runs.jsonl").write_text(f"\n{line}\n", encoding="utf-8")
+    ran("a", 0.001, "--history", "runs.jsonl", code=2)
+    assert capsys.readouterr().err.startswith("rockcheck: runs.jsonl, line 2: not a run of a history")
+    assert Path("runs.jsonl").read_text(encoding="utf-8") == f"\n{line}\n"

@@ -1,0 +1,136 @@
+"""The command line: exit codes, and errors of the user as one line without a traceback."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from rockcheck.commands.cli import main
+from rockcheck.scenes import History
+
+STILL = "faulty:Still", "--allow-code", "faulty:Still"
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
+SCENE = "duration = 0.2\nblock = { half_width = 0.4, half_height = 1.5 }\nfloor = { friction = 0.5 }\n"
+
+
+def write(name, text):
+    Path(name).write_text(text, encoding="utf-8")
+    return name
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["validat"], "Did you mean 'validate'"),
+        (["validate", "papre"], "did you mean 'paper'"),
+        (["validate", "--jobs", "0"], "--jobs"),
+        (["validate", "--job", "2"], "--jobs"),
+        (["validate", "paper", "--quick"], "--quick"),
+        (["validate", "paper", "--out", "scene.toml"], "scene.toml: cannot be used as a folder"),
+        (["simulate", "fig4", "--model", "ebm"], "did you mean 'fig4b'"),
+        (["simulate", "fig4a", "--model", "mujcoo"], "did you mean 'mujoco'"),
+        (["simulate", "scene.toml", "--model", "ebm", "--set", "tolerance"], "key=value"),
+        (["simulate", "scene.toml", "--model", "ebm", "--set", "tolerance=tight"], "ebm.tolerance"),
+        (["simulate", "scene.toml", "--model", "ebm", "-o", "no/such/out.csv"], "no such folder"),
+        (["simulate", "negative.toml", "--model", "ebm"], "negative.toml: block.half_width: -0.4 is not allowed"),
+        (["simulate", "unknown.toml", "--model", "ebm"], "unknown.toml: colour: unknown key"),
+        (["simulate", "slippery.toml", "--model", "ebm"], "must be below 4/3"),
+        (["simulate", "gone.toml", "--model", "ebm"], "gone.toml: cannot be read"),
+        (["simulate", "record.toml", "--model", "ebm"], "NPTS says 3, the file has 2 samples"),
+        (["compare", "gone.csv", "gone.csv"], "gone.csv: cannot be read"),
+        (["compare", "scene.toml", "scene.toml"], "scene.toml"),
+        (["report", "."], "no finished run here"),
+        ([], "Missing command"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(words, said, capsys):
+    write("scene.toml", SCENE)
+    write("negative.toml", SCENE.replace("0.4", "-0.4"))
+    write("unknown.toml", "colour = 1\n" + SCENE)
+    write("slippery.toml", SCENE.replace("0.5", "1.4"))
+    write("record.toml", SCENE + '[excitation]\nkind = "record"\nfile = "short.AT2"\n')
+    write("short.AT2", "PEER\nNAME\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 3, DT= .01 SEC\n 0.1 0.2\n")
+    assert main(words) == 2
+    captured = capsys.readouterr()
+    assert said in captured.err
+    assert captured.err.count("\n") == 1
+    assert captured.err.startswith("rockcheck: ")
+
+
+def test_simulate_writes_a_history(capsys):
+    write("scene.toml", SCENE)
+    assert main(["simulate", "scene.toml", "--model", *STILL, "--set", "offset=0.001", "-o", "out.csv"]) == 0
+    assert History.load("out.csv").channels["theta"][0] == 0.001
+    assert "out.csv" in capsys.readouterr().out
+
+
+def test_a_model_that_fails_is_exit_3(capsys):
+    write("scene.toml", SCENE)
+    assert main(["simulate", "scene.toml", "--model", "faulty:Fails", "--allow-code", "faulty:Fails"]) == 3
+    assert capsys.readouterr().err == "rockcheck: more than 10 events\n"
+    assert not Path("scene--faulty_Fails.csv").exists()
+
+
+def test_compare_two_histories(capsys):
+    write("scene.toml", SCENE)
+    for offset in ("0.0", "0.001"):
+        main(
+            [
+                "simulate",
+                "scene.toml",
+                "--model",
+                "faulty:Still",
+                "--allow-code",
+                "faulty:Still",
+                "--set",
+                f"offset={offset}",
+                "-o",
+                f"{offset}.csv",
+            ]
+        )
+    assert main(["compare", "0.0.csv", "0.001.csv"]) == 0
+    out = capsys.readouterr().out
+    assert "RMS difference of rotation" in out
+    assert f"{0.001 / math.atan2(0.4, 1.5):.6g}" in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_validate_keeps_the_run_before_it_tells(capsys):
+    suite = """
+reference = "still"
+[models.still]
+model = "faulty:Still"
+[models.near]
+model = "faulty:Still"
+offset = 1e-3
+[[scene]]
+name = "short"
+duration = 0.2
+block = { half_width = 0.4, half_height = 1.5 }
+floor = { friction = 0.5 }
+"""
+    line = "[tolerances.short.near.still]\ntheta_peak = { expected = 0.0038, limit = %s, drift = 0.0001, why = 'a test' }\n"
+    expected = {"0.01": 0, "0.001": 1}
+    for limit, code in expected.items():
+        write("mine.toml", suite + line % limit)
+        assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1"]) == code
+        out = capsys.readouterr().out
+        assert max(map(len, out.splitlines())) <= 80
+        assert f"verdict: {'pass' if code == 0 else 'fail'}" in out
+    assert {path.name for path in Path("rockcheck-report").iterdir()} >= {
+        "run.json",
+        "checks.csv",
+        "figures.csv",
+        "junit.xml",
+        "summary.md",
+    }
+    assert 'failures="1"' in Path("rockcheck-report/junit.xml").read_text()
+    assert "theta_peak against still: 0.003837 is more than 0.001" in Path("rockcheck-report/summary.md").read_text()
+    write("mine.toml", suite.replace("offset = 1e-3", "offset = 1.2e-3") + line % "0.01")
+    assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1"]) == 0
+    assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1", "--strict"]) == 1
+    assert "verdict: changed" in capsys.readouterr().out
+    assert main(["accept", "mine.toml", "--allow-code", "faulty:Still", "--jobs", "1"]) == 0
+    assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1", "--strict"]) == 0

@@ -1,0 +1,115 @@
+"""Exit codes mean one thing each: whoever reads what is said, and whatever goes wrong inside."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from filelock import FileLock
+
+from rockcheck.commands import cli, publish
+from rockcheck.commands.cli import EXIT_CODES, main
+from rockcheck.scenes import ModelFailure
+from rockcheck.validation.execute.pool import Ended, Pool
+from rockcheck.validation.spectra.study import paper_panels
+from rockcheck.validation.spectra.tiles import Tiles
+from rockcheck.validation.suite.results import Run
+
+ROCKCHECK = [sys.executable, "-m", "rockcheck"]
+
+
+def test_a_fault_inside_has_a_code_of_its_own(tmp_path, monkeypatch, capsys):
+    """70, one line, and the traceback in a file that only the user can read."""
+
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("a fault\nof two lines")
+
+    monkeypatch.setattr(cli, "app", lambda **_: broken())
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", None)
+    assert main(["scenes"]) == 70
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("rockcheck: a fault of rockcheck itself, ZeroDivisionError: please report it with ")
+    report = Path(line.rpartition(" ")[2])
+    assert report.parent == tmp_path
+    assert "in broken" in report.read_text()
+    assert "a fault\nof two lines" in report.read_text()
+    if os.name == "posix":
+        assert report.stat().st_mode & 0o777 == 0o600
+
+
+@pytest.mark.parametrize(
+    ("error", "raised"),
+    [
+        (ZeroDivisionError("ours"), ZeroDivisionError),
+        (ModelFailure("no motion"), ModelFailure),
+        (MemoryError(), ModelFailure),
+        (TimeoutError(), ModelFailure),
+    ],
+)
+def test_a_fault_in_a_worker_of_a_spectrum_is_told_from_a_model_that_fails(tmp_path, monkeypatch, error, raised):
+    monkeypatch.setattr(Pool, "run", lambda _, calls: iter([Ended(calls[0], error=error)]))
+    with Tiles(tmp_path, jobs=1) as tiles, pytest.raises(raised):
+        tiles.play(paper_panels(8)[0].scene, np.ones(1), np.ones(1), model="cm", settings={})
+
+
+def test_a_fault_that_cannot_be_written_down_is_told(monkeypatch, capsys):
+    def broken(**_: object) -> None:
+        raise RecursionError("too deep")
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(cli, "app", broken)
+    monkeypatch.setattr("tempfile.mkstemp", full)
+    assert main(["scenes"]) == 70
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line == "rockcheck: a fault of rockcheck itself, RecursionError: please report it with this: too deep"
+
+
+def test_the_exit_codes_are_told_by_the_help_and_by_the_documentation(capsys):
+    assert main(["--help"]) == 0
+    said = capsys.readouterr().out
+    page = (Path(__file__).parents[2] / "docs" / "ci.md").read_text(encoding="utf-8")
+    for code, meaning in EXIT_CODES.items():
+        assert re.search(rf"^ +{code} +{re.escape(meaning)}$", said, re.MULTILINE), code
+        assert f"\n| {code} | " in page, code
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes of a POSIX shell")
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [("scenes", 0), ("scenes --json", 0), ("--help", 0), ("simulate --help", 0), ("no-such-command", 2), ("compare a.csv b.csv", 2)],
+)
+@pytest.mark.parametrize("reader", ["head -1", "true"])
+def test_a_reader_that_goes_changes_no_exit_code(tmp_path, words, expected, reader):
+    """`rockcheck scenes | head -1` ends with 0, and in silence."""
+    script = f"{' '.join(ROCKCHECK)} {words} | {reader}; echo ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, cwd=tmp_path, timeout=120, check=False)
+    assert done.stdout.splitlines()[-1] == str(expected)
+    assert "Broken" not in done.stderr
+    assert "Traceback" not in done.stderr
+    assert len(done.stderr.splitlines()) == (expected != 0)
+
+
+def a_run() -> Run:
+    return Run(suite="s", created="2026-01-01T00:00:00", reference="ebm", scenes={}, models=("ebm",), cells=())
+
+
+def test_a_held_lock_says_for_whom_it_waits_and_for_how_long(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(publish, "SILENT", 0.0)
+    monkeypatch.setattr(publish, "PATIENCE", 0.1)
+    with FileLock(tmp_path / ".lock"), pytest.raises(publish.InputError, match=r"waited 0\.1 s for another run, which holds .*lock"):
+        publish.keep(a_run(), tmp_path)
+    assert re.fullmatch(r"rockcheck: waiting up to 0\.1 s for another run, which holds .*\.lock\n", capsys.readouterr().err)
+    with publish._turn(tmp_path), pytest.raises(publish.InputError, match=rf"waited 0\.1 s for process {os.getpid()} on "):
+        publish.keep(a_run(), tmp_path)
+    capsys.readouterr()
+    publish.keep(a_run(), tmp_path)
+    assert capsys.readouterr().err == ""
+    assert not (tmp_path / ".lock.holder").exists()

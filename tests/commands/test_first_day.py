@@ -1,0 +1,285 @@
+"""What a user types on the first day with a block, a wall and a test of one's own: what goes wrong is named, and mended by what is said."""
+
+from __future__ import annotations
+
+import json
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rockcheck.commands.cli import main
+from rockcheck.scenes import History, history
+from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.discrepancy.measures import DIFFERENCES
+from rockcheck.validation.suite.acceptance import _accepted
+from rockcheck.validation.suite.tables import percent, used
+from rockcheck.validation.suite.tolerances import Tolerance, judge
+
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
+SCENE = """
+duration = 2.0
+[floor]
+friction = 0.5
+[block]
+half_width = 0.4
+half_height = 1.5
+"""
+SUITE = """
+reference = "still"
+[models.still]
+model = "faulty:Still"
+[models.other]
+model = "{other}"
+[require]
+difference = ["theta_rms", "outcome_agrees"]
+[[scene]]
+name = "short"
+duration = 2.0
+block = {{ half_width = 0.4, half_height = 1.5 }}
+floor = {{ friction = 0.5 }}
+"""
+LINE = """
+[tolerances.short.other.still]
+outcome_agrees = { expected = 1.0, limit = 0.0, drift = 0.0, why = "a test" }
+theta_rms = { expected = 0.0, limit = 0.1, drift = 0.1, why = "a test" }
+"""
+CODE = [word for name in ("Still", "Falls", "Bug", "Nothing") for word in ("--allow-code", f"faulty:{name}")]
+
+
+def write(name: str, text: str) -> str:
+    Path(name).write_text(text, encoding="utf-8")
+    return name
+
+
+def suite(other: str = "faulty:Still") -> str:
+    return write("mine.toml", SUITE.format(other=other))
+
+
+@pytest.fixture
+def type_(capsys):
+    """What a line typed at the prompt says on stdout and stderr, once its exit code is as expected."""
+
+    def typed(*words: str, code: int = 0) -> tuple[str, str]:
+        assert main(list(words)) == code
+        return capsys.readouterr()
+
+    return typed
+
+
+def simulated(type_, model: str, output: str, *words: str) -> str:
+    return type_("simulate", write("rack.toml", SCENE), "--model", f"faulty:{model}", *CODE, "-o", output, *words)[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("[floor]", '[walls]\nside = "left"\ngap = 0.1\n[floor]'), "[[walls]], not [walls]"),
+        (("half_width", "halfwidth"), "block.halfwidth: unknown key; did you mean 'half_width'"),
+        (("[block]", "[blok]"), "blok: unknown key; did you mean 'block'"),
+        (("[floor]", '[excitation]\nkind = "record"\nfile = "a.csv"\nunit = "kg"\n[floor]'), "excitation.unit"),
+    ],
+)
+def test_a_slip_in_a_scene_file_is_named(type_, change, said):
+    write("a.csv", "time_s,acceleration_g\n0,0\n0.01,0.1\n0.02,0\n")
+    _, err = type_("simulate", write("rack.toml", SCENE.replace(*change)), "--model", "ebm", code=2)
+    assert err.startswith("rockcheck: rack.toml: ")
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_a_scene_is_no_suite(type_):
+    write("rack.toml", SCENE)
+    _, err = type_("accept", "rack.toml", code=2)
+    assert err == (
+        "rockcheck: rack.toml: is a scene, not a suite; `rockcheck run` plays a scene,"
+        " and a suite is a file with scenes = ['rack.toml'], and tables [models.NAME]\n"
+    )
+    _, err = type_("validate", "rack.toml", "--strict", code=2)
+    assert err == "rockcheck: --strict: rack.toml is a scene, and nothing of it is judged: give a suite\n"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("simulate", "fig5a", "--model", "ebm", "--model", "cm"), ("compare", "a.csv", "b.csv", "--until", "1", "--until=2")],
+)
+def test_an_option_given_twice_is_refused(type_, words):
+    _, err = type_(*words, code=2)
+    assert err == f"rockcheck: {words[3] if words[0] == 'compare' else words[2]}: is given twice: give one value\n"
+
+
+def test_without_a_model_the_reference_plays(type_):
+    out, _ = type_("simulate", "fig5a")
+    assert "fig5a, ebm-unilateral: at rest, peak rotation 0.1485 alpha" in out
+    assert "note: the horizontal record ends at 31.18 s" in out
+    assert Path("fig5a--ebm-unilateral.csv").exists()
+
+
+def test_what_is_no_format_of_a_history_is_refused_before_the_run(type_):
+    _, err = type_("simulate", "fig5a", "-o", "x.xlsx", code=2)
+    assert err == "rockcheck: x.xlsx: a history is written as .csv, .csv.gz, .json, .mat or .parquet, not as .xlsx\n"
+    assert not Path("x.xlsx").exists()
+
+
+def test_parquet_without_its_package_is_refused_before_the_run(type_, monkeypatch):
+    monkeypatch.setattr(history, "find_spec", lambda name: None)
+    _, err = type_("simulate", "fig5a", "-o", "x.parquet", code=2)
+    assert err == "rockcheck: x.parquet: Parquet needs the package pyarrow: pip install pyarrow\n"
+    assert not Path("x.parquet").exists()
+
+
+@pytest.mark.skipif(find_spec("pyarrow") is None, reason="needs pyarrow")
+def test_a_history_as_parquet_is_that_of_the_csv(type_):
+    for name in ("a.csv", "a.parquet"):
+        simulated(type_, "Falls", name)
+    table, plain = History.load("a.csv"), pd.read_parquet("a.parquet")
+    assert list(plain.columns) == list(table.frame.columns)
+    for name in plain.columns:
+        np.testing.assert_array_equal(plain[name], table.channels[name])
+    assert plain.attrs["rockcheck_history"]["outcome"] == table.outcome
+    assert list(pd.read_parquet("a.events.parquet")["kind"]) == [event.kind for event in table.event_list]
+
+
+def test_a_history_as_json_and_mat_is_that_of_the_csv(type_):
+    from scipy.io import loadmat
+
+    for name in ("a.csv", "a.json", "a.mat"):
+        simulated(type_, "Falls", name)
+    table = History.load("a.csv")
+    plain = json.loads(Path("a.json").read_text())
+    matrix = loadmat("a.mat", simplify_cells=True)
+    assert plain["outcome"] == matrix["about"]["outcome"] == table.outcome
+    for name in ("t", "theta", "x_dot"):
+        np.testing.assert_array_equal(plain["channels"][name], table.channels[name])
+        np.testing.assert_array_equal(matrix["channels"][name], table.channels[name])
+    assert plain["channels"]["mode"] == list(matrix["channels"]["mode"]) == list(table.channels["mode"])
+    assert plain["events"]["kind"] == [event.kind for event in table.event_list]
+
+
+def test_of_a_fallen_block_the_time_is_told_not_the_peak(type_):
+    out = simulated(type_, "Falls", "a.csv")
+    assert "overturned left at 1.5" in out
+    assert "peak rotation" not in out
+    assert "note: made to fall" in out
+    told = json.loads(simulated(type_, "Falls", "a.csv", "--json"))
+    assert told["peak_rotation_alpha"] is None
+    assert told["overturned_at_s"] == History.load("a.csv").overturned_at == pytest.approx(np.pi / 2)
+
+
+def test_compare_says_first_what_matters(type_):
+    simulated(type_, "Still", "a.csv")
+    simulated(type_, "Falls", "b.csv")
+    out, _ = type_("compare", "a.csv", "b.csv")
+    assert out.startswith("outcomes differ, overturned left at 1.5")
+    assert "against at rest; rotations" in out.splitlines()[0]
+    (line,) = (line for line in out.splitlines() if line.startswith("outcome agrees"))
+    assert line.split()[2] == "no"
+    assert "note on the candidate: made to fall" in out
+    out, _ = type_("compare", "a.csv", "a.csv")
+    assert out.startswith("same outcome, at rest; rotations 0 alpha apart (RMS)\n")
+
+
+def test_simulate_and_compare_draw(type_):
+    out = simulated(type_, "Falls", "a.csv", "--plot", "a.png")
+    assert "picture: a.png" in out
+    simulated(type_, "Still", "b.csv")
+    out, _ = type_("compare", "a.csv", "b.csv", "--plot", "c.png")
+    assert out.startswith("outcomes differ, ")
+    for name in ("a.png", "c.png"):
+        assert Path(name).read_bytes().startswith(b"\x89PNG")
+        assert Path(name).stat().st_size > 5000
+
+
+@pytest.mark.parametrize(("name", "said"), [("a.pdf", "a.pdf: give a name that ends in .png"), ("no/a.png", "no: no such folder")])
+def test_a_picture_that_cannot_be_written_is_refused_before_the_run(type_, name, said):
+    _, err = type_("simulate", write("rack.toml", SCENE), "--model", "faulty:Still", *CODE, "--plot", name, code=2)
+    assert err == f"rockcheck: --plot: {said}\n"
+    assert not Path("rack--faulty_Still.csv").exists()
+
+
+def test_a_figure_without_tolerance_has_not_failed(type_):
+    suite()
+    words = ("mine.toml", *CODE, "--jobs", "1")
+    out, _ = type_("validate", *words, "--no-report", code=1)
+    assert "verdict: no tolerance yet" in out
+    assert "fail" not in out
+    before = sorted(path.name for path in Path().iterdir())
+    out, _ = type_("accept", *words, "--dry-run")
+    assert "2 changes would be written to mine.tolerances.toml" in out
+    assert before == sorted(path.name for path in Path().iterdir())
+    type_("accept", *words)
+    text = Path("mine.tolerances.toml").read_text()
+    assert "outcome_agrees = {expected = 1.0, limit = 0.0, drift = 0.0," in text
+    out, _ = type_("validate", *words, "--no-report", "--strict")
+    assert "verdict: pass" in out
+    assert "outcome_agrees" not in out  # it holds, and is near to no limit
+
+
+def test_a_no_is_no_share_of_a_limit(type_):
+    suite("faulty:Falls")
+    words = ("mine.toml", *CODE, "--jobs", "1")
+    out, _ = type_("accept", *words, code=1)
+    assert out.count("not accepted: [short.other.still]") == 2
+    assert not Path("mine.tolerances.toml").exists()
+    write("mine.toml", SUITE.format(other="faulty:Falls") + LINE)
+    out, _ = type_("validate", *words, "--no-report", code=1)
+    assert "%" not in out
+
+
+def test_a_no_that_is_accepted_may_be_either():
+    measure = DIFFERENCES["outcome_agrees"]
+    figure = Figure(measure="outcome_agrees", label=measure.label, unit="1", value=0.0, against="ebm")
+    line = _accepted(judge(figure, None, kind="model form", measure=measure), None)
+    assert line == {"expected": 0.0, "limit": 1.0, "drift": 0.0, "why": "first accepted figure"}
+    check = judge(figure, Tolerance(**line), kind="model form", measure=measure)
+    assert (check.verdict, used(check), percent(check)) == ("pass", 0.0, "no")
+    turned = judge(figure.model_copy(update={"value": 1.0}), Tolerance(**line), kind="model form", measure=measure)
+    assert turned.verdict == "changed"
+
+
+def test_accept_writes_nothing_that_validate_refuses(type_):
+    t = np.linspace(0.5, 2.0, 151)
+    write("table.csv", "t,theta\n" + "\n".join(f"{x:.3f},0.0" for x in t) + "\n")
+    text = SUITE.format(other="measured").replace("[require]", 'files = { short = "table.csv" }\n[require]')
+    words = (write("mine.toml", text), *CODE, "--jobs", "1")
+    out, _ = type_("accept", *words, code=1)
+    assert "not accepted: [short.other.still] theta_rms: other starts only at 0.5 s; `offset` of the measured model" in out
+    assert not Path("mine.tolerances.toml").exists()
+    write(
+        "mine.toml",
+        text.replace("[require]", "offset = -0.5\n[require]").replace('difference = ["theta_rms"', 'difference = ["theta_rms@1s"'),
+    )
+    Path("mine.toml").write_text(Path("mine.toml").read_text().replace(', "outcome_agrees"', ""))
+    type_("accept", *words)
+    type_("validate", *words, "--no-report", "--strict")
+
+
+@pytest.mark.parametrize("command", ["simulate", "validate"])
+def test_a_model_of_ones_own_that_returns_no_history_is_told_so(type_, command):
+    suite("faulty:Nothing")
+    words = (
+        ("mine.toml", "--no-report", "--jobs", "1") if command == "validate" else (write("rack.toml", SCENE), "--model", "faulty:Nothing")
+    )
+    out, err = type_(command, *words, *CODE, code=3)
+    assert "faulty:Nothing returned NoneType" in out + err
+
+
+def test_a_model_of_ones_own_that_raises_shows_its_traceback(type_):
+    suite("faulty:Bug")
+    _, err = type_("validate", "mine.toml", "--no-report", "--jobs", "1", *CODE, code=3)
+    assert err.startswith("rockcheck: short, other: ZeroDivisionError: a bug")
+    assert "ZeroDivisionError" in Path(err.rpartition("traceback in ")[2].strip()).read_text()
+
+
+@pytest.mark.parametrize(("wall", "model"), [('[[walls]]\nside = "left"\ngap = 0.05\n', "ebm-unilateral"), ("", "ebm")])
+def test_beside_a_wall_of_ones_own_the_block_may_hop(type_, wall, model):
+    pulse = '[excitation]\nkind = "ricker"\namplitude = 3.0\nperiod = 1.0\n'
+    scene = write("rack.toml", SCENE + wall + pulse)
+    type_("spectrum", "--scene", scene, "--size", "3")
+    (record,) = json.loads(Path("rockcheck-report/spectra/spectra.json").read_text())["spectra"]
+    assert record["model"] == model
+    type_("spectrum", "--scene", scene, "--size", "3", "--pivot", "bilateral")
+    models = {one["model"] for one in json.loads(Path("rockcheck-report/spectra/spectra.json").read_text())["spectra"]}
+    assert models == {model, "ebm"}

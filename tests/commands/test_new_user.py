@@ -1,0 +1,102 @@
+"""A new user: an own block, an own wall and a record of three components, to a report with several models and an IDA curve."""
+
+from __future__ import annotations
+
+import csv
+import importlib.util
+import json
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from rockcheck.commands.cli import main
+from rockcheck.scenes import load_scene
+from rockcheck.validation.suite.results import Run
+
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
+
+
+def makers() -> ModuleType:
+    """What makes files of records: that of the readers' tests."""
+    spec = importlib.util.spec_from_file_location("made_records", Path(__file__).parents[1] / "scenes" / "test_recordings.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["made_records"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def type_(capsys):
+    """Types a command, which must end well; what it said on stdout."""
+
+    def typed(line: str) -> str:
+        assert main(line.split()) == 0
+        heard = capsys.readouterr()
+        assert heard.err == ""
+        return str(heard.out)
+
+    return typed
+
+
+@pytest.mark.long
+def test_from_a_v2_record_to_a_report_and_a_curve_in_four_commands(type_):
+    Path("station.V2").write_bytes(makers().cosmos_three())
+    type_("new rack.toml")
+    text = Path("rack.toml").read_text(encoding="utf-8")
+    Path("rack.toml").write_text(
+        text.replace("half_width = 0.20", "half_width = 0.25").replace("gap = 0.03", "gap = 0.05"), encoding="utf-8"
+    )
+    scene = load_scene("rack.toml")
+    assert (scene.block.half_width, scene.walls[0].gap) == (0.25, 0.05)
+
+    understood = type_("record station.V2")
+    assert [f"PGA         {peak} g" in understood for peak in (0.31, 0.27, 0.15)] == [True] * 3
+
+    told = type_("run rack.toml --record station.V2 --models ebm,ebm-unilateral,cm,mujoco --set mujoco.time_step=1e-3")
+    assert "left out: station.V2 up (vertical" in told
+    assert "report: rockcheck-report/index.html\n" in told
+    run = Run.load("rockcheck-report")
+    assert run.places == ("rack, station 360 deg", "rack, station 90 deg")
+    assert [cell.status for cell in run.cells] == ["done"] * 8
+    assert [run.load_scene(name).excitation.peak for name in run.places] == pytest.approx([0.31, 0.27], abs=1e-7)
+    for place in run.places:
+        assert (Path("rockcheck-report") / "pages" / f"{place.replace(', ', '-').replace(' ', '-')}.html").exists()
+
+    told = type_("ida rack.toml station.V2 --levels 8")
+    assert "report: rockcheck-report/ida/index.html\n" in told
+    rows = list(csv.DictReader(Path("rockcheck-report/ida/ida.csv").read_text(encoding="utf-8").splitlines()))
+    assert len(rows) == 2 * 2 * 8  # components, directions, intensities
+    assert {row["record"] for row in rows} == {"station.V2 360 deg", "station.V2 90 deg"}
+
+
+def test_a_folder_of_24_files_in_eight_formats_shakes_the_rack(type_):
+    made = makers()
+    Path("records").mkdir()
+    assert len(made.folder_of_records(Path("records"))) == 24
+    type_("new rack.toml")
+    told = json.loads(type_("ida rack.toml records --levels 3 --range 0.1 0.6 --json"))
+    assert len(told["left_out"]) == 8
+    assert all("U-D" in name for name in told["left_out"])
+    lines = json.loads(Path("rockcheck-report/ida/ida.json").read_text(encoding="utf-8"))["lines"]
+    assert len(lines) == 16 * 2
+    for line in lines:
+        (peak,) = (abs(peak) for name, peak in made.PEAKS.items() if name in line["record"])
+        assert line["own"] == pytest.approx(peak, abs=3e-4), line["record"]
+    # Every format holds one motion, so that the block does the same under all of them (K-NET's takes out its mean).
+    for component in ("N-S", "E-W"):
+        peaks = [line["peaks"][0] for line in lines if component in line["record"] and line["direction"] == 1]
+        assert peaks == pytest.approx([peaks[0]] * 8, abs=5e-3)
+
+
+def test_a_fragility_beside_a_wall_of_ones_own_lets_the_block_hop(type_):
+    type_("new rack.toml")
+    found = {}
+    for pivot in ("", "--pivot unilateral", "--pivot bilateral"):
+        type_(f"spectrum --scene rack.toml --fragility --size 4 --amplitudes 1 6 --force {pivot}")
+        found[pivot] = json.loads(Path("rockcheck-report/spectra/fragility.json").read_text(encoding="utf-8"))["cases"]
+    assert found[""] == found["--pivot unilateral"]
+    assert found[""][0] != found["--pivot bilateral"][0]  # beside the wall

@@ -1,0 +1,85 @@
+"""The pytest plugin, in a pytest of its own."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+pytest_plugins = ["pytester"]
+
+SUITE = """
+reference = "still"
+[models.still]
+model = "faulty:Still"
+[models.near]
+model = "faulty:Still"
+offset = 1e-3
+[models.broken]
+model = "faulty:Fails"
+[[scene]]
+name = "my-scene"
+duration = 0.5
+block = { half_width = 0.4, half_height = 1.5 }
+floor = { friction = 0.5 }
+[tolerances.my-scene.near.still]
+theta_peak = { expected = 0.0038, limit = 0.01, drift = 0.001, why = "a test" }
+theta_rms = { expected = 0.001, limit = 0.01, drift = 0.001, why = "a test" }
+[tolerances.my-scene.broken.still]
+theta_peak = { expected = 0.0, limit = 0.01, drift = 0.001, why = "a test" }
+"""
+TESTS = """
+def test_near(rockcheck_check):
+    assert rockcheck_check("my-scene", model="near").figures
+def test_strict(rockcheck_check):
+    rockcheck_check("my-scene", model="near", strict=True)
+def test_broken(rockcheck_check):
+    rockcheck_check("my-scene", model="broken")
+def test_reference(rockcheck_check):
+    rockcheck_check("my-scene", model="still")
+def test_unknown(rockcheck_check):
+    rockcheck_check("my-scene", model="nera")
+"""
+
+
+def test_check_holds_a_cell_against_its_suite(pytester):
+    shutil.copy(Path(__file__).parents[1] / "validation" / "models" / "faulty.py", pytester.path / "faulty.py")
+    (pytester.path / "rockcheck.toml").write_text(SUITE, encoding="utf-8")
+    pytester.makepyfile(TESTS)
+    result = pytester.runpytest_subprocess("-p", "no:randomly", "-rf")
+    result.assert_outcomes(failed=5)
+    result.stdout.fnmatch_lines(["*models.still: 'faulty:Still' is code of your own; it runs only if*"])
+    pytester.makeini("[pytest]\nrockcheck_allow_code = faulty:Still\n")
+    result = pytester.runpytest_subprocess("-p", "no:randomly", "-rf", "--rockcheck-allow-code", "faulty:Fails")
+    result.assert_outcomes(passed=1, failed=4)
+    result.stdout.fnmatch_lines(
+        [
+            "*my-scene, near: theta_rms against still: 0.003* was 0.001 (drift allowed 0.001)*",
+            "*my-scene, broken: more than 10 events*",
+            "*nothing is judged*",
+            "*did you mean 'near'*",
+        ]
+    )
+
+
+PLUGIN = """
+import pytest
+@pytest.fixture
+def check():
+    return "of another plugin"
+"""
+
+
+def test_the_old_name_warns_and_leaves_other_plugins_theirs(pytester, monkeypatch):
+    """`check` was its name; pytest-check has a fixture of that name, which is the one to have where it is installed."""
+    shutil.copy(Path(__file__).parents[1] / "validation" / "models" / "faulty.py", pytester.path / "faulty.py")
+    (pytester.path / "rockcheck.toml").write_text(SUITE, encoding="utf-8")
+    pytester.makepyfile('def test_old(check):\n    assert check("my-scene", model="near").figures\n')
+    pytester.makeini("[pytest]\nrockcheck_allow_code = faulty:Still faulty:Fails\n")
+    result = pytester.runpytest_subprocess("-W", "default::DeprecationWarning")
+    result.assert_outcomes(passed=1, warnings=1)
+    result.stdout.fnmatch_lines(["*fixture `check` is called `rockcheck_check` now*"])
+    (pytester.path / "elsewhere").mkdir()
+    (pytester.path / "elsewhere" / "pytest_check.py").write_text(PLUGIN, encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(pytester.path / "elsewhere"))
+    pytester.makepyfile('def test_theirs(check):\n    assert check == "of another plugin"\n')
+    pytester.runpytest_subprocess("-p", "pytest_check").assert_outcomes(passed=1)

@@ -1,0 +1,237 @@
+"""Sets of records: one scene by all models under each of them, however the files are named; nothing is judged."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rockcheck.commands.cli import main
+from rockcheck.scenes import Record, load_scene
+from rockcheck.validation.execute.models import FAMILIES, not_installed
+from rockcheck.validation.suite.results import Run
+from rockcheck.validation.suite.suites import load_suite
+
+SCENE = """
+duration = 0.5
+[block]
+half_width = 0.2
+half_height = 1.0
+[floor]
+friction = 0.5
+[excitation]
+kind = "ricker"
+amplitude = 1.0
+period = 0.5
+"""
+CODE = [word for name in ("Still", "Falls", "Bug") for word in ("--allow-code", f"faulty:{name}")]
+STILL = ("--models", "faulty:Still", *CODE, "--jobs", "1", "--no-report", "--json")
+
+
+def motion(gain: float) -> np.ndarray:
+    return gain * np.sin(4.0 * 0.02 * np.arange(101))
+
+
+def at2(name: str, gain: float, component: str) -> None:
+    values = " ".join(f"{a:.8e}" for a in motion(gain))
+    head = f"PEER NGA\nSomewhere, 1/1/2000, Station, {component}\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 101, DT= .02 SEC\n"
+    Path(name).write_text(head + values + "\n", encoding="utf-8")
+
+
+@pytest.fixture(autouse=True)
+def files(in_an_empty_folder):
+    Path("rack.toml").write_text(SCENE, encoding="utf-8")
+    Path("records").mkdir()
+    at2("records/RSN1_H1.AT2", 0.1, "180")
+    at2("records/RSN1_H2.AT2", 0.2, "270")
+    at2("records/RSN1_V.AT2", 0.3, "UP")
+
+
+@pytest.fixture
+def told(capsys):
+    def typed(*words: str, code: int = 0) -> dict:
+        assert main(list(words)) == code
+        return json.loads(capsys.readouterr().out)
+
+    return typed
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--record", "records/RSN1_H*.AT2"),  # quoted, or a shell that finds no such file
+        ("--record", "records/RSN1_H1.AT2", "records/RSN1_H2.AT2"),  # as a shell gives a pattern
+        ("--record", "records/RSN1_H1.AT2", "--record", "records/RSN1_H2.AT2"),
+        ("--record", "records"),
+        ("records/RSN1_*.AT2",),
+    ],
+)
+def test_files_folders_and_patterns_each_shake_the_scene(told, words):
+    found = told("run", "rack.toml", *words, *STILL)
+    assert [cell["scene"] for cell in found["cells"]] == ["rack, RSN1_H1", "rack, RSN1_H2"]
+    assert [cell["outcome"] for cell in found["cells"]] == ["at rest"] * 2
+    assert not found["judged"]
+    assert found["left_out"] == (["RSN1_V.AT2"] if words[-1].startswith("records/RSN1_*") or words[-1] == "records" else [])
+
+
+def test_a_record_takes_the_place_of_the_excitation_and_lasts(told):
+    told("run", "rack.toml", "records/RSN1_H2.AT2", "--scale", "1.5", *STILL)
+    scene = Run.load("rockcheck-report").load_scene("rack, RSN1_H2")
+    assert isinstance(scene.excitation, Record)
+    np.testing.assert_allclose(scene.excitation.samples, 1.5 * 9.80665 * motion(0.2), atol=1e-6)
+    assert scene.duration == pytest.approx(2.0)
+    assert scene.block == load_scene("rack.toml").block
+
+
+def test_a_chosen_component_is_played_though_it_is_vertical(told):
+    rows = "".join(f"{0.02 * n:.2f},{a:.6f}\n" for n, a in enumerate(motion(0.3)))
+    Path("up.csv").write_text("time_s,acceleration_g\n" + rows, encoding="utf-8")
+    assert main(["run", "rack.toml", "up.csv", *STILL]) == 2
+    assert [c["scene"] for c in told("run", "rack.toml", "up.csv", "--column", "acceleration_g", *STILL)["cells"]] == ["rack, up"]
+
+
+def test_the_vertical_component_of_a_file_goes_with_its_others(told, capsys):
+    """Two channels in one file (CSMIP): the base moves to the side and upward at once."""
+    text = ""
+    for name, gain in (("90 Deg", 0.1), ("Up", 0.05)):
+        values = "".join(f"{981 * a:10.4f}" + "\n" * (n % 8 == 7) for n, a in enumerate(motion(gain)))
+        text += (
+            f"Corrected data\nChan  1: {name}\n  101 points of accel data equally spaced at   .020 sec, in cm/sec2. (8f10.4)\n{values}\n"
+        )
+    Path("two.v2").write_text(text, encoding="utf-8")
+    words = ("run", "rack.toml", "two.v2", "--scale", "2", *STILL)
+    assert told(*words)["left_out"] == ["two.v2 Up"]
+    assert told(*words, "--vertical")["left_out"] == []
+    scene = Run.load("rockcheck-report").load_scene("rack, two 90 Deg")
+    assert scene.excitation.peak == pytest.approx(2 * 0.1 * 981 / 980.665, rel=1e-3)
+    assert scene.vertical.peak == pytest.approx(2 * 0.05 * 981 / 980.665, rel=1e-3)
+    assert main(["run", "rack.toml", "records/RSN1_H1.AT2", "--vertical", *STILL]) == 2
+    assert "RSN1_H1.AT2: 0 vertical components in it or in a file of the set that is named alike" in capsys.readouterr().err
+
+
+def test_the_vertical_component_may_be_a_file_of_its_own(told, capsys):
+    at2("records/RSN2_H1.AT2", 0.15, "180")
+    at2("records/RSN2_V.AT2", 0.05, "UP")
+    found = told("run", "rack.toml", "records", "--vertical", *STILL)
+    assert [cell["scene"] for cell in found["cells"]] == ["rack, RSN1_H1", "rack, RSN1_H2", "rack, RSN2_H1"]
+    assert found["left_out"] == []
+    peaks = [Run.load("rockcheck-report").load_scene(cell["scene"]).vertical.peak for cell in found["cells"]]
+    assert peaks == pytest.approx([0.3, 0.3, 0.05], rel=1e-2)
+    Path("records/RSN2_H1.AT2").unlink()
+    assert main(["run", "rack.toml", "records", "--vertical", *STILL]) == 2
+    assert "RSN2_V.AT2: a vertical component, and no horizontal one is named alike" in capsys.readouterr().err
+
+
+def test_a_scene_that_there_is_not_is_the_only_line(capsys, monkeypatch):
+    monkeypatch.setattr("rockcheck.validation.execute.models.not_installed", lambda name: "not installed" if name == "drake" else "")
+    assert main(["run", "nothere"]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+
+
+def test_records_of_an_analysis_may_be_an_option_as_elsewhere(told):
+    found = told("ida", "rack.toml", "--record", "records/RSN1_H*.AT2", "--levels", "2", "--jobs", "1", "--json")
+    assert found["left_out"] == []
+    assert len(Path(found["table"]).read_text(encoding="utf-8").splitlines()) == 1 + 2 * 2 * 2  # records, directions, intensities
+
+
+def test_all_models_are_those_that_are_installed(told):
+    found = told("run", "rack.toml", "--models", "all", "--set", "mujoco.time_step=1e-3", "--no-report", "--json")
+    models = [cell["model"] for cell in found["cells"]]
+    assert models == [name for name in FAMILIES if name != "measured" and not not_installed(name)]
+    assert {"ebm", "ebm-unilateral", "cm", "mujoco"} <= set(models)
+    assert found["reference"] == "ebm-unilateral"
+    for cell in found["cells"]:
+        assert (cell["status"], cell["scene"]) == ("done", "rack")
+        assert cell["model"] == "ebm-unilateral" or cell["apart_alpha"] < 0.01
+
+
+def test_what_falls_is_told_with_its_time_and_without_a_peak(capsys):
+    assert main(["run", "rack.toml", "records/RSN1_H1.AT2", "--models", "faulty:Falls,faulty:Still", *CODE, "--jobs", "1"]) == 0
+    out = capsys.readouterr().out
+    (line,) = (line for line in out.splitlines() if "Falls" in line)
+    assert line.split() == ["faulty:Falls", "overturned", "left", "at", "1.57", "s", "ref.", "0.0", "s"]
+    assert max(map(len, out.splitlines())) <= 130
+    page = Path("rockcheck-report/index.html").read_text(encoding="utf-8")
+    assert "Nothing is judged." in page
+    (scene,) = Path("rockcheck-report/pages").glob("*.html")
+    for text in (page, scene.read_text(encoding="utf-8")):
+        assert "ithin tolerance" not in text.replace('<option value="pass">within tolerance</option>', "")
+        assert "overturned left at 1.57 s" in text
+    assert "overturned left at 1.57 s" in Path("rockcheck-report/summary.md").read_text(encoding="utf-8")
+
+
+def test_a_model_that_fails_is_exit_3(told):
+    found = told("run", "rack.toml", "--models", "faulty:Bug,faulty:Still", *CODE, "--no-report", "--json", code=3)
+    assert [cell["status"] for cell in found["cells"]] == ["failed", "done"]
+
+
+def test_validate_plays_a_scene_and_says_so(monkeypatch, capsys):
+    for name in ("cm", "mujoco", "pybullet", "pymunk", "dart", "drake", "ebm-bouc-wen"):
+        monkeypatch.delitem(FAMILIES, name)
+    assert main(["validate", "rack.toml", "--no-report"]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("rack.toml is a scene: all models play it, nothing is judged (as `rockcheck run rack.toml`)\n")
+    assert [cell.model for cell in Run.load("rockcheck-report").cells] == ["ebm", "ebm-unilateral"]
+
+
+SUITE = """
+reference = "still"
+scenes = ["rack.toml", "other.toml"]
+[models.still]
+model = "faulty:Still"
+[require]
+figures = ["peak_rotation"]
+[[records]]
+files = ["records/RSN1_*.AT2"]
+scale = 2.0
+scenes = ["rack"]
+"""
+
+
+def test_a_suite_has_tables_of_records():
+    Path("other.toml").write_text(SCENE, encoding="utf-8")
+    Path("mine.toml").write_text(SUITE, encoding="utf-8")
+    suite = load_suite("mine.toml", allow_code=("faulty:Still",))
+    assert list(suite.scenes) == ["other", "rack, RSN1_H1", "rack, RSN1_H2"]
+    assert suite.left_out == ("RSN1_V.AT2",)
+    assert suite.scenes["rack, RSN1_H2"].excitation.scale == 2.0
+    assert main(["accept", "mine.toml", *CODE, "--jobs", "1"]) == 0
+    assert main(["validate", "mine.toml", *CODE, "--jobs", "1", "--no-report", "--strict"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("run", "rack.toml", "--models", "ebm,mujcoo"), "unknown model 'mujcoo'; did you mean 'mujoco'"),
+        (("run", "rack.toml", "--models", "measured"), "--models: 'measured' is not allowed"),
+        (
+            ("run", "rack.toml", "--models", "ebm", "--set", "cm.tolerance=1"),
+            "--set: 'cm.tolerance=1': write MODEL.key=value, with MODEL one of ebm",
+        ),
+        (("run", "rack.toml", "--models", "ebm", "--set", "ebm.tol=1"), "ebm.tol: unknown key"),
+        (("run", "rack.toml", "--unit", "g"), "--record: is missing"),
+        (("run", "rack.toml", "--record", "records/X*.AT2"), "X*.AT2: no such files"),
+        (("run", "rakc.toml"), "rakc.toml: cannot be read"),
+        (("run", "rack.toml", "records/RSN1_V.AT2"), "RSN1_V.AT2: a vertical component, and no horizontal one is given"),
+        (("validate", "wrong.toml"), "records.scenes: unknown scene 'rakk'; did you mean 'rack'"),
+    ],
+)
+def test_slips_are_named(capsys, words, said):
+    Path("wrong.toml").write_text(SUITE.replace(', "other.toml"', "").replace('["rack"]', '["rakk"]'), encoding="utf-8")
+    assert main([*words, *(CODE if words[0] == "validate" else ())]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "words", [("--record", "records/RSN1_H*.AT2"), ("--record", "records/RSN1_H1.AT2", "records/RSN1_H2.AT2", "records/RSN1_V.AT2")]
+)
+def test_fragility_takes_the_same_sets(words):
+    assert main(["spectrum", "--scene", "rack.toml", "--fragility", "--size", "3", *words]) == 0
+    (case,) = json.loads(Path("rockcheck-report/spectra/fragility.json").read_text(encoding="utf-8"))["cases"]
+    assert case["motions"] == 2

@@ -1,0 +1,242 @@
+"""The terminal: help with examples, --quiet, --json, progress, width, colour, completion, new scene files, nearest names."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import re
+import subprocess
+import sys
+import tomllib
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from rockcheck.commands.cli import COMMANDS, app, main
+from rockcheck.scenes import Block, Floor, InputError, Scene, Wall, load_scene
+from rockcheck.scenes.progress import listening, tell
+
+STILL = "faulty:Still", "--allow-code", "faulty:Still"
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
+NAMES = list(COMMANDS)
+SUITE = """
+reference = "still"
+[models.still]
+model = "faulty:Still"
+[[scene]]
+name = "short"
+duration = 0.2
+block = { half_width = 0.4, half_height = 1.5 }
+floor = { friction = 0.5 }
+"""
+
+
+def rockcheck(*words, **environment):
+    """The command in a process of its own, without a terminal."""
+    line = [sys.executable, "-m", "rockcheck", *words]
+    return subprocess.run(line, capture_output=True, text=True, env={**os.environ, **environment}, timeout=300, check=False)
+
+
+def on_a_terminal(*words, columns=80):
+    """What the command writes to a terminal of that width: stdout and stderr together."""
+    code = (
+        "import fcntl, struct, sys, termios; from rockcheck.commands.cli import main;"
+        f"fcntl.ioctl(1, termios.TIOCSWINSZ, struct.pack('HHHH', 40, {columns}, 0, 0)); sys.exit(main(sys.argv[1:]))"
+    )
+    terminal, inside = pty.openpty()
+    environment = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "COLUMNS", "CI")}
+    with subprocess.Popen(
+        [sys.executable, "-c", code, *words], stdin=inside, stdout=inside, stderr=inside, env={**environment, "TERM": "xterm-256color"}
+    ) as process:
+        os.close(inside)
+        said = b""
+        while True:
+            try:
+                part = os.read(terminal, 65536)
+            except OSError:  # how Linux says that nobody holds the other end any more
+                break
+            if not part:
+                break
+            said += part
+    os.close(terminal)
+    assert process.returncode == 0, said
+    return said.decode()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_help_has_an_example_that_the_command_understands(name, capsys):
+    assert main([name, "--help"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    example = text.partition("Example: ")[2]
+    assert example.startswith(f"rockcheck {name}")
+    for option in re.findall(r"--[a-z]+", example):
+        assert option in text.partition("Example: ")[0], f"the example has {option}, the command has not"
+    assert "--quiet" in text
+    assert "--json" in text
+
+
+def test_the_list_of_commands_is_not_cut_off(capsys):
+    main(["--help"])
+    out = capsys.readouterr().out
+    assert all(re.search(rf"^  {name} +\S", out, re.MULTILINE) for name in NAMES)
+    assert "..." not in out.partition("Commands:")[2]
+
+
+def test_a_new_scene_file_is_a_scene_with_every_setting():
+    assert main(["new", "mine.toml"]) == 0
+    assert load_scene("mine.toml").walls
+    text = Path("mine.toml").read_text()
+    shown = set(re.findall(r"^(?:# )?\[*([a-z_]+)(?=\]| =)", text, re.MULTILINE))
+    settings = {*Scene.model_fields, *Block.model_fields, *Floor.model_fields, *Wall.model_fields}
+    assert settings - shown == {"name"}  # by default the file's
+    assert {"kind", "amplitude", "period", "symmetric", "cycles", "file", "scale"} <= shown
+
+
+def test_settings_shown_as_remarks_are_the_defaults():
+    main(["new", "mine.toml"])
+    text = Path("mine.toml").read_text()
+    head, rest = text.split("[excitation]", 1)
+    loud = re.sub(r"^# (?=[a-z_]+ += )", "", head, flags=re.MULTILINE).replace("mass = 60.0", "").replace("moment_of_inertia = 0.35", "")
+    tables = tomllib.loads(loud)
+    assert tables["initial_height"] == 0.0
+    assert tables["floor"]["static_friction"] == tables["floor"]["friction"]
+    Path("loud.toml").write_text(loud + "[excitation]" + rest)
+    same = {"name": "same"}
+    assert load_scene("loud.toml").replace(floor=Floor(friction=0.4), **same) == load_scene("mine.toml").replace(**same)
+
+
+def test_new_overwrites_nothing(capsys):
+    Path("mine.toml").write_text("precious")
+    assert main(["new", "mine.toml"]) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert Path("mine.toml").read_text() == "precious"
+    assert main(["new", "mine.txt"]) == 2
+    assert main(["new", "no/such/mine.toml"]) == 2
+
+
+def test_quiet_says_nothing_but_errors(capsys):
+    main(["new", "mine.toml"])
+    capsys.readouterr()
+    assert main(["simulate", "mine.toml", "--model", *STILL, "--quiet", "-o", "a.csv"]) == 0
+    assert capsys.readouterr() == ("", "")
+    assert Path("a.csv").exists()
+    assert main(["simulate", "mine.toml", "--model", "faulty:Fails", "--allow-code", "faulty:Fails", "-q"]) == 3
+    assert capsys.readouterr() == ("", "rockcheck: more than 10 events\n")
+
+
+def test_json_is_all_that_is_on_stdout(capsys):
+    def result(*words, code=0):
+        assert main([*words, "--json"]) == code
+        return json.loads(capsys.readouterr().out)
+
+    assert result("new", "mine.toml") == {"file": "mine.toml"}
+    assert "fig4a" in result("scenes")["scenes"]
+    history = result("simulate", "mine.toml", "--model", *STILL, "--set", "offset=0.001", "-o", "a.csv")
+    assert history["history"] == "a.csv"
+    assert history["scene"] == "mine"
+    main(["simulate", "mine.toml", "--model", *STILL, "-o", "b.csv", "-q"])
+    found = result("compare", "b.csv", "a.csv")
+    rms = next(figure for figure in found["figures"] if figure["measure"] == "theta_rms")
+    assert rms["value"] == pytest.approx(0.001 / load_scene("mine.toml").block.alpha)
+    assert result("spectrum", "--scene", "mine.toml", "--size", "3")["report"] == "rockcheck-report/spectra.html"
+    Path("suite.toml").write_text(SUITE)
+    run = result("validate", "suite.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1", code=1)
+    assert run["verdict"] == "fail"
+    assert run["reasons"] == ["nothing was judged: the suite requires no measure and has no tolerance"]
+    nothing = {"overturned_at_s": None, "checks": 0, "verdict": None, "converged": None, "impact_law": None, "explanations": []}
+    assert run["cells"] == [{"scene": "short", "model": "still", "outcome": "at rest", **nothing}]
+    assert result("accept", "suite.toml", "--allow-code", "faulty:Still", "--jobs", "1")["refused"] == []
+
+
+def test_without_a_terminal_no_colour_and_no_progress():
+    done = rockcheck("scenes")
+    assert done.returncode == 0
+    assert done.stderr == ""
+    assert "\x1b" not in done.stdout
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    rockcheck("new", "mine.toml")
+    done = rockcheck("simulate", "mine.toml", "--model", *STILL)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "\x1b" not in done.stdout
+
+
+def test_on_a_terminal_colour_progress_and_its_width():
+    main(["new", "mine.toml", "-q"])
+    said = on_a_terminal("simulate", "mine.toml", "--model", "pybullet", "--set", "time_step=1e-3", "-o", "a.csv")
+    assert "left" in said
+    assert "mine, pybullet" in said
+    assert "\x1b[" in said
+    assert not list(Path().glob("*--*")), "only what was asked for"
+    for columns in (60, 80):
+        plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", on_a_terminal("scenes", columns=columns))
+        assert max(len(line) for line in plain.replace("\r", "").splitlines()) <= columns
+
+
+def test_models_tell_how_far_they_are():
+    from rockcheck.engines import PyBullet
+
+    scene = Scene(name="short", block=Block(half_width=0.4, half_height=1.5), floor=Floor(friction=0.5), duration=4.0, initial_rotation=0.1)
+    heard: list[float] = []
+    for step in (1e-3, "adaptive"):
+        heard.clear()
+        with listening(lambda done, total, what="": heard.append(done / total)):
+            PyBullet(time_step=step).simulate(scene)
+        assert heard == sorted(heard)
+        assert all(0.0 <= share < 1.0 for share in heard)
+        assert len(heard) >= 1
+    tell(1, 2)  # nobody listens
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("rockcheck val", {"validate"}),
+        ("rockcheck validate smo", {"smoke"}),
+        ("rockcheck simulate fig5", {"fig5a", "fig5b"}),
+        ("rockcheck simulate fig5a --model ebm-", {"ebm-unilateral", "ebm-bouc-wen"}),
+        ("rockcheck simulate min", {"mine.toml"}),
+        ("rockcheck validate --sch", {"--scheduler"}),
+    ],
+)
+def test_completion(line, offered):
+    main(["new", "mine.toml", "-q"])
+    words = line.split()
+    done = rockcheck(COMP_WORDS=line, COMP_CWORD=str(len(words) - 1), _ROCKCHECK_COMPLETE="complete_bash")
+    assert set(done.stdout.split()) == offered
+
+
+def test_version(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"rockcheck {version('rockcheck')}\n"
+
+
+def test_completion_can_be_installed(capsys):
+    assert main(["--help"]) == 0
+    assert "--install-completion" in capsys.readouterr().out
+    assert app.info.name == "rockcheck"
+
+
+@pytest.mark.parametrize(
+    ("tables", "said"),
+    [
+        ({"blok": {}}, "blok: unknown key; did you mean 'block'? allowed: block, description, duration"),
+        (
+            {"block": {"half_widht": 1.0, "half_width": 1.0, "half_height": 2.0}},
+            "block.half_widht: unknown key; did you mean 'half_width'",
+        ),
+        ({"excitation": {"kind": "rickr"}}, "excitation: unknown kind 'rickr'; did you mean 'ricker'? allowed: record, rest, ricker, sine"),
+        ({"walls": [{"side": "lft", "gap": 0.1}]}, "walls.0.side: lft is not allowed: input should be 'left' or 'right'"),
+    ],
+)
+def test_nearest_names_in_scene_files(tables, said):
+    given = {"name": "a", "duration": 1.0, "block": {"half_width": 0.4, "half_height": 1.5}, "floor": {"friction": 0.5}} | tables
+    with pytest.raises(InputError) as caught:
+        Scene(**given)
+    assert said in str(caught.value)
+
+
+def test_nearest_names_of_settings(capsys):
+    assert main(["simulate", "fig4a", "--model", "mujoco", "--set", "time_stp=1e-3"]) == 2
+    assert "mujoco.time_stp: unknown key; did you mean 'time_step'?" in capsys.readouterr().err

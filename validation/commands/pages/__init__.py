@@ -1,1 +1,0 @@
-"""Commands that show a finished run, and what they share."""
