@@ -1,9 +1,10 @@
-"""A finding as a terminal's tables, CSV, Markdown and a page: each block is rendered from one description."""
+"""A finding as a terminal's tables, CSV, Markdown and a page: each block is rendered from one
+description."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -27,15 +28,14 @@ MOST_ROWS = 40
 COLOURS = {"fail": "red", "error": "red", "changed": "yellow", "incomplete": "yellow"}
 
 
-def words(cell: Any, column: Column) -> str:
+def words(cell: Any, column: Column, write: Callable[[float, int], str] = number) -> str:
     """A cell's value for people; a sign before it where it has a verdict."""
-    value = plain(cell)
-    shown = _value(value, column)
+    shown = _value(plain(cell), column, write)
     sign = SIGNS[cell.verdict] if isinstance(cell, Mark) else ""
     return f"{sign} {shown}".strip()
 
 
-def _value(value: Any, column: Column) -> str:
+def _value(value: Any, column: Column, write: Callable[[float, int], str]) -> str:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
     if column.kind == "model":
@@ -46,7 +46,12 @@ def _value(value: Any, column: Column) -> str:
         return str(value)
     if column.kind == "percent":
         return f"{100.0 * value:.{max(column.digits - 2, 0)}f} %"
-    return f"{value:,}".replace(",", "\u202f") if isinstance(value, int) else number(value, column.digits)
+    return str(value) if isinstance(value, int) else write(value, column.digits)
+
+
+def _typed(value: float, digits: int) -> str:
+    """A number as a terminal shows it."""
+    return f"{value:.{digits}g}"
 
 
 def row_cells(row: Sequence[Any], columns: Sequence[Column]) -> list[dict[str, Any]]:
@@ -88,10 +93,12 @@ def show(found: Finding, screen: Console) -> None:
 def _grid(table: Table) -> Grid:
     grid = Grid(box=None, pad_edge=False, title=table.title or None, title_justify="left")
     for column in table.columns:
-        left = column.kind in ("text", "model")
-        grid.add_column(column.head, justify="left" if left else "right", overflow="fold")
+        if column.brief:
+            left = column.kind in ("text", "model")
+            grid.add_column(column.head, justify="left" if left else "right", overflow="fold")
     for row in table.rows[:MOST_ROWS]:
-        grid.add_row(*(words(cell, column) for cell, column in zip(row, table.columns, strict=True)))
+        cells = zip(row, table.columns, strict=True)
+        grid.add_row(*(words(cell, column, _typed) for cell, column in cells if column.brief))
     return grid
 
 
@@ -105,7 +112,10 @@ def markdown(found: Finding) -> str:
     """The whole finding as Markdown."""
     parts = [f"# {found.title}", found.answer, *filter(None, map(block_markdown, found.blocks))]
     if found.failures:
-        parts += ["## Failed", "\n".join(f"- {where}: {why}" for where, why in found.failures.items())]
+        parts += [
+            "## Failed",
+            "\n".join(f"- {where}: {why}" for where, why in found.failures.items()),
+        ]
     if found.made is not None:
         about = {"made": found.made.created, **found.made.versions, **found.made.hardware}
         parts.append(", ".join(f"{name} {value}" for name, value in about.items()))
@@ -116,16 +126,22 @@ def block_markdown(block: Table | Plot | Text) -> str:
     """A block as Markdown, as the documentation and `summary.md` have it."""
     title = f"## {block.title}\n\n" if block.title else ""
     if isinstance(block, Text):
-        return title + "\n\n".join(filter(None, [block.text, "\n".join(f"- {item}" for item in block.items)]))
+        return title + "\n\n".join(
+            filter(None, [block.text, "\n".join(f"- {item}" for item in block.items)])
+        )
     if isinstance(block, Plot) or block.on == "file":
         return ""
-    rows = [[words(cell, column) for cell, column in zip(row, block.columns, strict=True)] for row in block.rows]
+    rows = [
+        [words(cell, column) for cell, column in zip(row, block.columns, strict=True)]
+        for row in block.rows
+    ]
     note = f"\n\n{block.note}" if block.note else ""
     return title + markdown_table([column.head for column in block.columns], rows) + note
 
 
 def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -> Path:
-    """Write `run.json`, a CSV a table, `summary.md`, the figures and `index.html`; returns the page."""
+    """Write `run.json`, a CSV a table, `summary.md`, the figures and `index.html`; returns the
+    page."""
     from rockcheck.reports.site import Site
 
     write_whole(folder / "run.json", json_text(found.as_dict()) + "\n")
@@ -134,7 +150,9 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
     write_whole(folder / "summary.md", markdown(found))
     plots = [block for block in found.blocks if isinstance(block, Plot)]
     for plot in plots:
-        keep_drawn(folder / FIGURES / plot.name, json_text(asdict(plot)), partial(figure_of, plot), formats)
+        keep_drawn(
+            folder / FIGURES / plot.name, json_text(asdict(plot)), partial(figure_of, plot), formats
+        )
     above = (("Report", "../index.html"),) if (folder.parent / "index.html").exists() else ()
     site = Site(folder, f"rockcheck: {found.title}", above)
     site.assets()
@@ -142,4 +160,12 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
     if live:
         text = json_text(live).replace("<", "\\u003c")
         write_whole(folder / "curves.js", f"window.rockcheckCurves = {text};\n")
-    return site.page("index.html", "finding.html", found=found, live=bool(live), looks=looks(LOOKS), row_cells=row_cells, figures=FIGURES)
+    return site.page(
+        "index.html",
+        "finding.html",
+        found=found,
+        live=bool(live),
+        looks=looks(LOOKS),
+        row_cells=row_cells,
+        figures=FIGURES,
+    )

@@ -1,4 +1,5 @@
-"""How the plots of a finding are drawn: lines over axes, and by `DRAWERS` what needs a drawer of its own."""
+"""How the plots of a finding are drawn: lines over axes, and by `DRAWERS` what needs a drawer of
+its own."""
 
 from __future__ import annotations
 
@@ -16,7 +17,13 @@ if TYPE_CHECKING:
 #: Drawers of other kinds of plots: module and function, which takes the plot and returns a figure.
 DRAWERS: dict[str, tuple[str, str]] = {}
 #: Colours by day and by night of series without a look, in their order; grey for "thin" ones.
-COLOURS = (("#0072b2", "#3d9fdc"), ("#d55e00", "#e8762a"), ("#009168", "#00b583"), ("#a87900", "#d19a10"), ("#bf5f92", "#d98ab4"))
+COLOURS = (
+    ("#0072b2", "#3d9fdc"),
+    ("#d55e00", "#e8762a"),
+    ("#009168", "#00b583"),
+    ("#a87900", "#d19a10"),
+    ("#bf5f92", "#d98ab4"),
+)
 GREY = ("#9a9a9a", "#767c85")
 #: Panels beside each other.
 COLUMNS = 3
@@ -45,7 +52,9 @@ def lines(plot: Plot) -> Figure:
     columns = min(COLUMNS, len(plot.panels))
     rows = math.ceil(len(plot.panels) / columns)
     with figure_style():
-        figure = Figure(figsize=(PAGE, (3.4 if rows == 1 else 2.1 * rows) + 0.4), layout="constrained")
+        figure = Figure(
+            figsize=(PAGE, (3.4 if rows == 1 else 2.1 * rows) + 0.4), layout="constrained"
+        )
         grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         handles: dict[str, Any] = {}
         for ax, panel in zip(grid.flat, plot.panels, strict=False):
@@ -76,19 +85,30 @@ def _scale(ax: Axes, x: Axis, y: Axis) -> None:
 def _draw(ax: Axes, panel: Panel, handles: dict[str, Any]) -> None:
     for series, colour in zip(panel.series, colours(panel), strict=True):
         if series.style == "level":
-            drawn = ax.axhline(_known(series.y[0]), color="#6e6e6e", linewidth=1.0, linestyle=(0, (6, 3)))
+            drawn = ax.axhline(
+                _known(series.y[0]), color="#6e6e6e", linewidth=1.0, linestyle=(0, (6, 3))
+            )
         else:
             if series.high:
-                low, high = ([_known(value) for value in values] for values in (series.low, series.high))
+                low, high = (
+                    [_known(value) for value in values] for values in (series.low, series.high)
+                )
                 ax.fill_between(series.x, low, high, color=colour[0], alpha=0.15, linewidth=0)
-            look = STYLES[series.style] | ({"marker": LOOKS[series.look].marker} if series.look in LOOKS and series.style == "line" else {})
-            (drawn,) = ax.plot(series.x, [_known(value) for value in series.y], color=colour[0], **look)
+            look = STYLES[series.style] | (
+                {"marker": LOOKS[series.look].marker}
+                if series.look in LOOKS and series.style == "line"
+                else {}
+            )
+            (drawn,) = ax.plot(
+                series.x, [_known(value) for value in series.y], color=colour[0], **look
+            )
         if series.label and series.style != "thin":
             handles.setdefault(series.label, drawn)
 
 
 def colours(panel: Panel) -> list[tuple[str, str]]:
-    """The colours of a panel's series, by day and by night; those of one label, as a line and its fit, share theirs."""
+    """The colours of a panel's series, by day and by night; those of one label, as a line and its
+    fit, share theirs."""
     own: dict[str, tuple[str, str]] = {}
     found = []
     for series in panel.series:
@@ -116,7 +136,9 @@ def live_data(plot: Plot) -> dict[str, Any]:
             "colour": colour,
             "low": _short(series.low),
             "high": _short(series.high),
-            "fit": _short(fits[series.label].y) if series.label in fits and series.style != "thin" else [],
+            "fit": _short(fits[series.label].y)
+            if series.label in fits and series.style != "thin"
+            else [],
             "width": 0.7 if series.style == "thin" else 2.0,
         }
         for series, colour in zip(panel.series, colours(panel), strict=True)
@@ -135,7 +157,10 @@ def live_data(plot: Plot) -> dict[str, Any]:
 
 
 def _short(values: Any) -> list[float | None]:
-    return [None if value is None or not math.isfinite(value) else float(f"{value:.5g}") for value in values]
+    return [
+        None if value is None or not math.isfinite(value) else float(f"{value:.5g}")
+        for value in values
+    ]
 
 
 __all__ = ["DRAWERS", "Series", "figure_of", "lines", "live_data"]

@@ -1,4 +1,5 @@
-"""What a study found, as data: a sentence, and blocks that a terminal, a page, Markdown and CSV show alike.
+"""What a study found, as data: a sentence, and blocks that a terminal, a page, Markdown and CSV
+show alike.
 
 A table is described once. `rockcheck.reports.document` renders it; nothing here draws.
 """
@@ -6,7 +7,7 @@ A table is described once. `rockcheck.reports.document` renders it; nothing here
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, is_dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar, Literal
 
 Verdict = Literal["", "pass", "changed", "incomplete", "fail", "error"]
@@ -29,7 +30,7 @@ class Column:
 
     `name` heads it in CSV and JSON, `label` and `unit` for readers. `kind` says how a value is
     shown: "number" with so many significant `digits`, "percent" (of a share), "text", or "model"
-    (a model's name, with its colour). Files keep all digits.
+    (a model's name, with its colour). Files keep all digits. A terminal shows `brief` columns only.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Column:
     kind: Literal["number", "percent", "text", "model"] = "number"
     digits: int = 3
     help: str = ""
+    brief: bool = True
 
     @property
     def head(self) -> str:
@@ -158,7 +160,8 @@ Block = Table | Plot | Text
 
 @dataclass(frozen=True, kw_only=True)
 class Made:
-    """When it was made (UTC, ISO 8601), in how many processes and how long (s), with what, on what."""
+    """When it was made (UTC, ISO 8601), in how many processes and how long (s), with what, on
+    what."""
 
     created: str
     jobs: int
@@ -195,16 +198,15 @@ class Finding:
         """A table by its name."""
         return next(table for table in self.tables() if table.name == name)
 
-    def as_dict(self, *, tables: bool = True) -> dict[str, Any]:
-        """For JSON: the study's own data first, then its tables by name, then what it was made with."""
-        data = {key: asdict(value) if is_dataclass(value) else value for key, value in self.data.items()}  # type: ignore[arg-type]
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON: the study's own data, its tables by name, and what it was made with."""
         return {
             "title": self.title,
             "answer": self.answer,
             "verdict": self.verdict,
             "exit_code": self.exit_code,
-            **data,
-            **({"tables": {table.name: table.records() for table in self.tables()}} if tables else {}),
+            **self.data,
+            "tables": {table.name: table.records() for table in self.tables()},
             "failures": dict(self.failures),
             "complete": self.complete,
             "made": None if self.made is None else asdict(self.made),

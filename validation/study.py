@@ -15,11 +15,11 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Protocol
+from typing import Any, Literal, Protocol
 
 from pydantic import TypeAdapter
 
@@ -40,26 +40,31 @@ LONG = 10.0
 
 @dataclass(frozen=True)
 class Task:
-    """One piece of a study's work: small, frozen, can be pickled.
+    """One piece of a study's work: small, frozen, can be pickled. Equal tasks are one task.
 
-    Equal tasks are one task.
+    How it is played does not count for what it is: the wall time that it may take (`seconds`) and
+    takes as a rule (`expected`), the code that it may have to compile (see `execute.pool.Call`),
+    and where: in a worker; "here", since it has threads of its own (a cluster takes it all the
+    same); or "timed", in this process with nothing beside it.
     """
 
-    #: Wall time (s) that it may take, and that it takes as a rule.
-    seconds: ClassVar[float] = math.inf
-    expected: ClassVar[float] = 0.0
-    #: Names the code that it may have to compile; see `execute.pool.Call`.
-    compiles: ClassVar[str] = ""
-    #: In a worker; "here", since it has threads of its own (a cluster takes it all the same); or
-    #: "timed": in this process, with nothing beside it.
-    where: ClassVar[Literal["worker", "here", "timed"]] = "worker"
-    #: False: never read back, as a time that is to be measured anew.
-    kept: ClassVar[bool] = True
+    seconds: float = field(default=math.inf, kw_only=True, compare=False, repr=False)
+    expected: float = field(default=0.0, kw_only=True, compare=False, repr=False)
+    compiles: str = field(default="", kw_only=True, compare=False, repr=False)
+    where: Literal["worker", "here", "timed"] = field(
+        default="worker", kw_only=True, compare=False, repr=False
+    )
 
     @property
     def label(self) -> str:
         """A few words for progress and failures."""
-        return ", ".join(str(value) for value in asdict(self).values() if isinstance(value, str | int | float))
+        return ", ".join(
+            f"{v:g}" if isinstance(v, float) else str(v) for v in self.fields().values()
+        )
+
+    def fields(self) -> dict[str, Any]:
+        """What it is: the fields that count."""
+        return {one.name: getattr(self, one.name) for one in fields(self) if one.compare}
 
     def depends(self) -> Any:
         """All that the result depends on, as JSON has it.
@@ -67,7 +72,7 @@ class Task:
         By default the fields, the code that its module can reach, and all libraries.
         """
         code = provenance.code_digest(type(self).__module__)
-        return {"task": asdict(self), "code": code, "versions": provenance.versions()}
+        return {"task": self.fields(), "code": code, "versions": provenance.versions()}
 
     @cached_property
     def key(self) -> str:
@@ -146,20 +151,32 @@ def run(
     after `minutes` is left out. Ctrl-C ends the tasks, and what was played is gathered. Raises
     `InputError` where the folder cannot be used or no cluster answers.
     """
-    return _Run(study, folder, jobs or os.cpu_count() or 1, scheduler, force, on_progress).finding(minutes)
+    return _Run(study, folder, jobs or os.cpu_count() or 1, scheduler, force, on_progress).finding(
+        minutes
+    )
 
 
 class _Run:
     """A study that is being played."""
 
-    def __init__(self, study: Study, folder: Path, jobs: int, scheduler: str | None, force: bool, heard: OnProgress) -> None:
+    def __init__(
+        self,
+        study: Study,
+        folder: Path,
+        jobs: int,
+        scheduler: str | None,
+        force: bool,
+        heard: OnProgress,
+    ) -> None:
         self.study, self.folder, self.jobs, self.scheduler = study, folder, jobs, scheduler
         self.force, self.heard = force, heard
         self.began = time.monotonic()
         try:
             self.store = Store(folder, study.kinds)
         except OSError as error:
-            raise InputError(f"{printable(folder)}: cannot be used as the output folder: {error.strerror}") from None
+            raise InputError(
+                f"{printable(folder)}: cannot be used as the output folder: {error.strerror}"
+            ) from None
         self.known: dict[Task, None] = {}
         self.done: dict[Task, Any] = {}
 
@@ -173,7 +190,9 @@ class _Run:
                 complete = False
         found = self.study.gather(self.done)
         self.store.prune()
-        failed = {task.label: one.reason for task, one in self.done.items() if isinstance(one, Failure)}
+        failed = {
+            task.label: one.reason for task, one in self.done.items() if isinstance(one, Failure)
+        }
         made = Made(
             created=datetime.now(UTC).isoformat(timespec="seconds"),
             jobs=self.jobs,
@@ -197,7 +216,10 @@ class _Run:
                 continue
             if workers is None:
                 workers = stack.enter_context(self._workers())
-            calls = (Call(guarded, (self.study.play, task), task.seconds, task.compiles, task) for task in elsewhere)
+            calls = (
+                Call(guarded, (self.study.play, task), task.seconds, task.compiles, task)
+                for task in elsewhere
+            )
             for ended in workers.run(deque(calls), until=until):
                 self._end(ended.call.key, Failure(ended.fault) if ended.error else ended.result)
             if time.monotonic() >= until:
@@ -205,10 +227,12 @@ class _Run:
 
     def _next(self) -> list[Task]:
         """The tasks of the next wave that have to be played; the others are read back."""
-        while new := [task for task in dict.fromkeys(self.study.tasks(self.done)) if task not in self.known]:
+        while new := [
+            task for task in dict.fromkeys(self.study.tasks(self.done)) if task not in self.known
+        ]:
             self.known.update(dict.fromkeys(new))
             for task in new:
-                if task.kept and not self.force and (record := self.study.find(self.store, task)) is not None:
+                if not self.force and (record := self.study.find(self.store, task)) is not None:
                     self.done[task] = record
             self.heard(len(self.done), len(self.known), f"{len(self.done)} up to date")
             if waiting := [task for task in new if task not in self.done]:
@@ -222,7 +246,7 @@ class _Run:
                 (self.folder / FAULTS).mkdir(exist_ok=True)
                 path = self.folder / FAULTS / f"{name_of(self.study.name, task.key)}.txt"
                 write_whole(path, result.traceback)
-        elif task.kept:
+        else:
             self.study.keep(self.store, task, result)
         self.heard(len(self.done), len(self.known), task.label)
 
@@ -230,11 +254,17 @@ class _Run:
         return task.where == "worker" or (task.where == "here" and self.scheduler is not None)
 
     def _workers(self) -> Any:
-        return Cluster(self.scheduler, self.study.memory_mb) if self.scheduler else Pool(self.jobs, self.study.memory_mb)
+        return (
+            Cluster(self.scheduler, self.study.memory_mb)
+            if self.scheduler
+            else Pool(self.jobs, self.study.memory_mb)
+        )
 
     def _estimate(self, waiting: Sequence[Task]) -> None:
         """Says how long a wave will take where that is long."""
-        seconds = sum(task.expected / (self.jobs if task.where == "worker" else 1) for task in waiting)
+        seconds = sum(
+            task.expected / (self.jobs if task.where == "worker" else 1) for task in waiting
+        )
         if seconds >= LONG:
             announce(f"{self.study.name}: {len(waiting)} tasks, about {words_of(seconds)}")
 

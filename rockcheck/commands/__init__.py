@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import typer
 from rich.console import Console
@@ -23,6 +23,9 @@ from rockcheck.scenes.writing import json_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from rockcheck.validation.finding import Finding
+    from rockcheck.validation.study import Study
 
 OUT = Path("rockcheck-report")
 
@@ -152,6 +155,29 @@ def progress(title: str) -> Iterator[OnProgress]:
             bar.update(task, completed=done, total=total, description=f"{title}: {printable(what, 24)}" if what else title)
 
         yield on_progress
+
+
+def studied(study: Study, out: Path, *, report: bool = True, **how: Any) -> NoReturn:
+    """Run a study with progress, write its page, say what it found; ends with its exit code."""
+    from rockcheck.validation.study import run
+
+    folder = usable_folder(out)
+    with progress(study.name) as on_progress:
+        found = run(study, folder, on_progress=on_progress, **how)
+    told(found, folder, report=report)
+
+
+def told(found: Finding, folder: Path, *, report: bool = True) -> NoReturn:
+    """Write a finding's page, say what it is, and end with its exit code."""
+    from rockcheck.reports.document import publish, show
+
+    page = publish(found, folder) if report else folder / "run.json"
+    show(found, console())
+    console().print(f"report: {page}", soft_wrap=True)
+    answer(found.as_dict() | {"report": page})
+    if not found.complete and not found.exit_code:
+        raise KeyboardInterrupt
+    raise typer.Exit(found.exit_code)
 
 
 def check_picture(path: Path | None) -> None:

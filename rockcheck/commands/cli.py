@@ -38,7 +38,6 @@ COMMANDS = {
     "spectrum": ("spectrum", "rockcheck spectrum --figure 8 --size 50 --refine"),
     "ida": ("ida", "rockcheck ida shelf.toml records --intensity sa --period 0.5"),
     "benchmark": ("benchmark", "rockcheck benchmark --quick"),
-    "convergence": ("convergence", "rockcheck convergence --quick"),
     "conformance": ("conformance", "rockcheck conformance --engine mujoco --settings default"),
     "calibrate": ("calibrate", "rockcheck calibrate --engine mujoco --restitution 0.5 --step 1e-3"),
     "stress": ("stress", "rockcheck stress --quick"),

@@ -247,7 +247,7 @@ def _speed(spectra: Sequence[Spectrum], request: SpectrumRequest, tiles: Tiles, 
     what = "spectrum" if len(spectra) == 1 else "spectra"
     screen.print(f"{len(spectra)} {what}, {nodes} nodes, {evaluations} runs{share}, {tiles.read_back} read back")
     if tiles.seconds:
-        from rockcheck.validation.bench.ebm import right_hand_side_seconds
+        from rockcheck.validation.studies.work_precision.ebm import right_hand_side_seconds
 
         one, each = right_hand_side_seconds(), cpu / tiles.played
         screen.print(

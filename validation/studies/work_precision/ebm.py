@@ -1,4 +1,5 @@
-"""Speed of the event-based model: compiled batches on one core, as microseconds and as right-hand-side evaluations; cold starts."""
+"""Speed of the event-based model: compiled batches on one core, as microseconds and as
+right-hand-side evaluations; cold starts."""
 
 from __future__ import annotations
 
@@ -22,7 +23,6 @@ from rockcheck.ebm.batch import Packed, pack, pack_pulses, run_batch
 from rockcheck.ebm.core.ground import Ground, acceleration
 from rockcheck.scenes import Floor, ModelFailure, Ricker, Scene, Wall, load_scene
 from rockcheck.scenes.compiled import kernel
-from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 Floats = NDArray[np.float64]
@@ -49,10 +49,13 @@ class BatchCase:
 
 @dataclass(frozen=True)
 class BatchTime:
-    """A batch at one tolerance: cost of a trajectory, and what it is wrong by against `REFERENCE_TOLERANCE`.
+    """A batch at one tolerance: cost of a trajectory, and what it is wrong by against
+    `REFERENCE_TOLERANCE`.
 
-    `cpu` and `wall` in s (medians), `evaluations` the CPU time in right-hand-side evaluations, `error_95` and `error_50`
-    percentiles of the peak's error in rad, `wrong` outcomes that differ, `failed` runs without outcome.
+    `cpu` and `wall` in s (medians), `evaluations` the CPU time in right-hand-side evaluations,
+    `error_95` and `error_50` percentiles of the peak's error in rad, `wrong` outcomes that differ,
+    `failed` runs without outcome. `right_hand_side` is the time of one evaluation in the same
+    rounds, s.
     """
 
     case: str
@@ -65,11 +68,13 @@ class BatchTime:
     error_95: float
     wrong: int
     failed: int
+    right_hand_side: float = math.nan
 
 
 @dataclass(frozen=True)
 class ColdStart:
-    """Seconds in a fresh process: importing the package, and its first simulation (compiler's import included)."""
+    """Seconds in a fresh process: importing the package, and its first simulation (compiler's
+    import included)."""
 
     cache: str
     importing: float
@@ -78,41 +83,43 @@ class ColdStart:
 
 @dataclass(frozen=True)
 class BatchSize:
-    """What a batch of so many random pulses (μ 0.3, no wall) takes whole with so many threads, packing included: s a run (median)."""
+    """What a batch of so many random pulses (μ 0.3, no wall) takes whole with so many threads,
+    packing included: s a run (median)."""
 
     runs: int
     threads: int
     wall: float
 
 
-@dataclass(frozen=True)
-class EbmSpeed:
-    """All batches, the time of one right-hand side (s), cold starts, and cost against size."""
-
-    right_hand_side: float
-    times: tuple[BatchTime, ...]
-    cold_starts: tuple[ColdStart, ...]
-    sizes: tuple[BatchSize, ...] = ()
-
-    def at_level(self, case: str) -> BatchTime | None:
-        """The cheapest tolerance whose p95 error is at most `LEVEL`, None where there is none."""
-        good = [row for row in self.times if row.case == case and row.error_95 <= LEVEL]
-        return min(good, key=lambda row: row.cpu, default=None)
+def at_level(rows: Sequence[BatchTime], case: str) -> BatchTime | None:
+    """The cheapest tolerance whose p95 error is at most `LEVEL`, None where there is none."""
+    good = [row for row in rows if row.case == case and row.error_95 <= LEVEL]
+    return min(good, key=lambda row: row.cpu, default=None)
 
 
 def _scene(*walls: Wall, friction: float = 0.3) -> Scene:
     pulse = Ricker(amplitude=1.0, period=1.0)
-    return Scene(name="grid", block=PAPER_BLOCK, floor=Floor(friction=friction), walls=walls, excitation=pulse, duration=10.0)
+    return Scene(
+        name="grid",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=friction),
+        walls=walls,
+        excitation=pulse,
+        duration=10.0,
+    )
 
 
 def grid(scene: Scene, nodes: int) -> tuple[Floats, Floats]:
     """Amplitudes (m/s^2) and periods (s) of the grid of pulses, `nodes` along each axis."""
-    frequency, amplitude = np.meshgrid(np.linspace(*FREQUENCY_RATIOS, nodes), np.linspace(*AMPLITUDE_RATIOS, nodes))
+    frequency, amplitude = np.meshgrid(
+        np.linspace(*FREQUENCY_RATIOS, nodes), np.linspace(*AMPLITUDE_RATIOS, nodes)
+    )
     return _pulse(scene, frequency.ravel(), amplitude.ravel())
 
 
 def _pulse(scene: Scene, frequency: Floats, amplitude: Floats) -> tuple[Floats, Floats]:
-    """Amplitudes (m/s^2) and periods (s) of pulses whose frequency is given over p, whose amplitude over g tan(alpha)."""
+    """Amplitudes (m/s^2) and periods (s) of pulses whose frequency is given over p, whose amplitude
+    over g tan(alpha)."""
     strength = amplitude * scene.gravity * math.tan(scene.block.alpha)
     return strength, 2.0 * math.pi / (frequency * scene.frequency_parameter)
 
@@ -124,8 +131,16 @@ def _pulses(scene: Scene) -> Callable[[EventBasedModel, int], Packed]:
 def _records(model: EventBasedModel, nodes: int) -> Packed:
     """El Centro at `nodes` scales from 1.4 to 1.8, to the record's end."""
     scene = load_scene("fig4a")
-    louder = (scene.excitation.scaled(scale / 1.6) for scale in np.linspace(1.4, 1.8, nodes).tolist())
-    return pack([scene.replace(excitation=record, duration=scene.excitation.quiet_after) for record in louder], model)
+    louder = (
+        scene.excitation.scaled(scale / 1.6) for scale in np.linspace(1.4, 1.8, nodes).tolist()
+    )
+    return pack(
+        [
+            scene.replace(excitation=record, duration=scene.excitation.quiet_after)
+            for record in louder
+        ],
+        model,
+    )
 
 
 _WALL = Wall(side="left", gap=0.053)
@@ -133,53 +148,45 @@ CASES = (
     BatchCase("pure rocking", "no slip, no wall", {"friction": "no-slip"}, _pulses(_scene())),
     BatchCase("friction", "μ 0.3, no wall", {}, _pulses(_scene())),
     BatchCase("wall", "μ 0.3, left wall at 53 mm, e 0", {}, _pulses(_scene(_WALL))),
-    BatchCase("unilateral, wall", "the same, unilateral", {"pivot": "unilateral"}, _pulses(_scene(_WALL))),
-    BatchCase("El Centro", "31 s of El Centro × 1.4 to 1.8, μ 0.3, to the end", {}, _records, until_decided=False),
+    BatchCase(
+        "unilateral, wall", "the same, unilateral", {"pivot": "unilateral"}, _pulses(_scene(_WALL))
+    ),
+    BatchCase(
+        "El Centro",
+        "31 s of El Centro × 1.4 to 1.8, μ 0.3, to the end",
+        {},
+        _records,
+        until_decided=False,
+    ),
 )
 
 
-def ebm_speed(*, quick: bool = False, cold: bool = True, jobs: int | None = None, on_progress: OnProgress = unheard) -> EbmSpeed:
-    """Times all batches on one core, interleaved; `quick` with 400 trajectories instead of 10,000. Then batches by size, see `batch_sizes`.
-
-    `cold` also starts fresh processes, with the compile cache and (not `quick`) without.
-    """
-    nodes = 20 if quick else NODES
-    times: list[BatchTime] = []
-    ones: list[float] = []
-    for done, case in enumerate(CASES):
-        on_progress(done, len(CASES), f"batches: {case.name}")
-        times += _times(case, nodes, ones)
-    sizes = batch_sizes(QUICK_SIZES if quick else SIZES, on_progress, jobs=jobs)
-    return EbmSpeed(median(ones), tuple(times), cold_starts(on_progress, without_cache=not quick) if cold else (), sizes)
-
-
-def batch_sizes(sizes: Sequence[int] = SIZES, on_progress: OnProgress = unheard, *, jobs: int | None = None) -> tuple[BatchSize, ...]:
-    """Times batches of these sizes, on one thread and on `jobs` (default: one a core)."""
+def batch_size(runs: int, threads: int) -> BatchSize:
+    """Times a batch of so many random pulses on so many threads."""
     scene, model = _scene(), EventBasedModel(tolerance=LEVEL)
-    rows = []
-    for done, runs in enumerate(sizes):
-        on_progress(done, len(sizes), f"a batch of {runs:,}")
-        random = np.random.default_rng(1)
-        pulses = _pulse(scene, random.uniform(*FREQUENCY_RATIOS, runs), random.uniform(*AMPLITUDE_RATIOS, runs))
-        for count in sorted({1, jobs or os.cpu_count() or 1}):
-            taken = []
-            for _ in range(ROUNDS):
-                began = time.perf_counter()
-                run_batch(pack_pulses(scene, model, *pulses), model, strict=False, jobs=count)
-                taken.append((time.perf_counter() - began) / runs)
-            rows.append(BatchSize(runs, count, median(taken)))
-    return tuple(rows)
+    random = np.random.default_rng(1)
+    pulses = _pulse(
+        scene, random.uniform(*FREQUENCY_RATIOS, runs), random.uniform(*AMPLITUDE_RATIOS, runs)
+    )
+    taken = []
+    for _ in range(ROUNDS):
+        began = time.perf_counter()
+        run_batch(pack_pulses(scene, model, *pulses), model, strict=False, jobs=threads)
+        taken.append((time.perf_counter() - began) / runs)
+    return BatchSize(runs, threads, median(taken))
 
 
-def _times(case: BatchCase, nodes: int, ones: list[float]) -> list[BatchTime]:
-    """A row a tolerance; the time of one right-hand side, taken in the same rounds, is added to `ones`."""
+def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
+    """A case's cost on one core, a row a tolerance, played in turn with the time of one right-hand
+    side."""
+    case = next(case for case in CASES if case.name == name)
     reference_model = EventBasedModel(tolerance=REFERENCE_TOLERANCE, **case.settings)
     packed = case.packed(reference_model, nodes)
     play = partial(run_batch, packed, until_decided=case.until_decided, strict=False, jobs=1)
     reference = play(reference_model)
     cpu: dict[float, list[float]] = {tolerance: [] for tolerance in TOLERANCES}
     wall: dict[float, list[float]] = {tolerance: [] for tolerance in TOLERANCES}
-    found = {}
+    found, ones = {}, []
     for _ in range(ROUNDS):
         ones.append(right_hand_side_seconds())
         for tolerance in TOLERANCES:
@@ -188,8 +195,7 @@ def _times(case: BatchCase, nodes: int, ones: list[float]) -> list[BatchTime]:
             found[tolerance] = play(model)
             cpu[tolerance].append((time.process_time() - began_cpu) / len(packed))
             wall[tolerance].append((time.perf_counter() - began) / len(packed))
-    rows = []
-    one = median(ones[-ROUNDS:])
+    one, rows = median(ones), []
     for tolerance, outcomes in found.items():
         error = np.abs(outcomes.peak - reference.peak)
         rows.append(
@@ -204,6 +210,7 @@ def _times(case: BatchCase, nodes: int, ones: list[float]) -> list[BatchTime]:
                 error_95=float(np.quantile(error, 0.95)),
                 wrong=int(np.count_nonzero(outcomes.side != reference.side)),
                 failed=int(np.count_nonzero(outcomes.failed)),
+                right_hand_side=one,
             )
         )
     return rows
@@ -214,13 +221,16 @@ def _right_hand_sides(ground: Ground, alpha: float, count: int) -> float:
     """(3) in natural units, `count` times, each at a place that depends on the one before."""
     theta = 0.1 * alpha
     for k in range(count):
-        turn = 0.75 * (acceleration(ground, 1e-6 * k) * math.cos(alpha - theta) - math.sin(alpha - theta))
+        turn = 0.75 * (
+            acceleration(ground, 1e-6 * k) * math.cos(alpha - theta) - math.sin(alpha - theta)
+        )
         theta += 1e-12 * turn
     return theta
 
 
 def right_hand_side_seconds(count: int = 400_000) -> float:
-    """CPU seconds of one evaluation of the rocking equation under a Ricker pulse: sin, cos, exp and a polynomial."""
+    """CPU seconds of one evaluation of the rocking equation under a Ricker pulse: sin, cos, exp and
+    a polynomial."""
     from rockcheck.ebm import natural
 
     ground, _ = natural.grounds_of(_scene())
@@ -246,25 +256,30 @@ print(imported - began, time.perf_counter() - loaded)
 """
 
 
-def cold_starts(on_progress: OnProgress = unheard, *, without_cache: bool = True) -> tuple[ColdStart, ...]:
-    """Import and first simulation in fresh processes: once without compile cache, then (median of three) with it."""
-    found = []
+def cold_start(*, cached: bool) -> ColdStart:
+    """Import and first simulation in fresh processes, without compile cache, or (median of three)
+    with it."""
     with tempfile.TemporaryDirectory() as folder:
-        fresh = {**os.environ, "NUMBA_CACHE_DIR": folder} if without_cache else dict(os.environ)
-        if without_cache:
-            on_progress(0, 2, "cold start without compile cache")
-            found.append(ColdStart("none", *_cold_start(fresh)))
-        on_progress(1, 2, "cold starts with compile cache")
-        if not without_cache:
-            _cold_start(fresh)
-        warm = [_cold_start(fresh) for _ in range(3)]
-        found.append(ColdStart("filled", *(median(column) for column in zip(*warm, strict=True))))
-    return tuple(found)
+        fresh = dict(os.environ) if cached else {**os.environ, "NUMBA_CACHE_DIR": folder}
+        if not cached:
+            return ColdStart("none", *_cold_start(fresh))
+        _cold_start(fresh)
+        return ColdStart(
+            "filled",
+            *(
+                median(column)
+                for column in zip(*(_cold_start(fresh) for _ in range(3)), strict=True)
+            ),
+        )
 
 
 def _cold_start(environment: dict[str, str]) -> tuple[float, float]:
-    played = subprocess.run([sys.executable, "-c", _FRESH], env=environment, capture_output=True, text=True, check=False)
+    played = subprocess.run(
+        [sys.executable, "-c", _FRESH], env=environment, capture_output=True, text=True, check=False
+    )
     if played.returncode:
-        raise ModelFailure(f"ebm: no fresh process could be started: {played.stderr.strip().splitlines()[-1:]}")
+        raise ModelFailure(
+            f"ebm: no fresh process could be started: {played.stderr.strip().splitlines()[-1:]}"
+        )
     importing, first = map(float, played.stdout.split()[-2:])
     return importing, first

@@ -1,1 +1,0 @@
-"""Run time against error, and convergence."""

@@ -1,0 +1,2 @@
+"""The studies: each lists tasks, plays them, gathers a finding (see
+`rockcheck.validation.study`)."""

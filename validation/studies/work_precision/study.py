@@ -1,0 +1,584 @@
+"""`rockcheck benchmark`: run time against error, batches, savings, convergence, as one study."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import Any, Literal
+
+from rockcheck.validation.execute.models import not_installed
+from rockcheck.validation.execute.pool import Failure
+from rockcheck.validation.finding import (
+    Axis,
+    Block,
+    Column,
+    Finding,
+    Panel,
+    Plot,
+    Series,
+    Table,
+    Text,
+    table_of,
+    text,
+)
+from rockcheck.validation.studies.work_precision import ebm, runs, savings
+from rockcheck.validation.studies.work_precision.runs import (
+    LEVEL,
+    LINES,
+    REFERENCES,
+    BenchmarkRun,
+    Play,
+)
+from rockcheck.validation.studies.work_precision.scenes import (
+    FAMILIES,
+    MEMBERS,
+    QUICK,
+    QUICK_MEMBERS,
+    QUICK_WALLS,
+    WALLS,
+    prepared,
+)
+from rockcheck.validation.study import Study, Task
+
+What = Literal["all", "ebm", "models", "skipping", "convergence"]
+#: CPU time of an engine's step as a rule, and of any other run, s: for the estimate.
+A_STEP, A_RUN = 4e-5, 0.02
+#: The diagrams: a title, and how the names of their scenes begin.
+SHEETS = {
+    "Without a wall": ("free", "pulse", "slip"),
+    "Beside a wall": ("wall",),
+    "El Centro": ("fig",),
+}
+#: Below are rounding errors.
+FLOOR = 1e-13
+
+
+@dataclass(frozen=True)
+class Measure(Task):
+    """A timing of something else than a model's run: a batch, its size, a cold start, a saving."""
+
+    kind: Literal["batch", "size", "cold start", "saving"]
+    name: str
+    size: int = 0
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What a task gave: rows of one kind."""
+
+    run: BenchmarkRun | None = None
+    times: tuple[ebm.BatchTime, ...] = ()
+    size: ebm.BatchSize | None = None
+    start: ebm.ColdStart | None = None
+    saved: tuple[savings.Saving, ...] = ()
+
+
+@dataclass(frozen=True)
+class WorkPrecision(Study):
+    """What is measured: all, or a part; `quick` with fewer scenes and settings."""
+
+    what: What = "all"
+    quick: bool = False
+    name = "benchmark"
+    record = Measured
+
+    def tasks(self, done: Mapping[Any, Any]) -> Sequence[Task]:
+        """All at once; what is timed first."""
+        parts = {
+            "ebm": self._batches,
+            "skipping": self._savings,
+            "models": self._models,
+            "convergence": self._convergence,
+        }
+        return [
+            task for name, part in parts.items() if self.what in ("all", name) for task in part()
+        ]
+
+    def _batches(self) -> Iterator[Task]:
+        nodes = 20 if self.quick else ebm.NODES
+        for case in ebm.CASES:
+            yield Measure("batch", case.name, nodes, where="timed", expected=nodes**2 / 1000.0)
+        for size in ebm.QUICK_SIZES if self.quick else ebm.SIZES:
+            for threads in sorted({1, os.cpu_count() or 1}):
+                yield Measure("size", f"{threads}", size, where="timed", expected=6e-5 * size)
+        if not self.quick:
+            yield Measure("cold start", "none", where="timed", expected=15.0)
+        yield Measure("cold start", "filled", where="timed", expected=3.0)
+
+    def _savings(self) -> Iterator[Task]:
+        for name in savings.KINDS:
+            if name.startswith("batches") and name.endswith("quick") != self.quick:
+                continue
+            yield Measure("saving", name, where="timed", expected=3.0)
+
+    def _models(self) -> Iterator[Task]:
+        """Interleaved: whatever else the machine does touches all models alike. An engine's
+        smallest steps go to the workers."""
+        families = QUICK if self.quick else tuple(FAMILIES)
+        for member, family, line in itertools.product(
+            range(QUICK_MEMBERS if self.quick else MEMBERS), families, LINES.values()
+        ):
+            for value in line.quick if self.quick else line.values:
+                if not not_installed(line.model):
+                    small = line.knob == "time_step" and value < runs.SIDE_BY_SIDE
+                    expected = A_STEP * 3.0 / value if line.knob == "time_step" else A_RUN
+                    yield Play(
+                        family,
+                        member,
+                        line.label,
+                        value,
+                        where="worker" if small else "timed",
+                        expected=expected,
+                    )
+
+    def _convergence(self) -> Iterator[Task]:
+        lines = [line for line in LINES.values() if line.converge and not not_installed(line.model)]
+        for place, line, name in itertools.product(
+            (2, 1, 0), lines, QUICK_WALLS if self.quick else tuple(WALLS)
+        ):
+            bounces = WALLS[name].member(0).walls[0].restitution > 0.0
+            if (
+                place < len(line.converge)
+                and not (place == 2 and self.quick)
+                and not (line.model == "drake" and bounces)
+            ):
+                value = line.converge[place]
+                expected = A_STEP * 4.0 / value if line.knob == "time_step" else A_RUN
+                yield Play(name, 0, line.label, value, 1, expected=expected)
+
+    @staticmethod
+    def play(task: Any) -> Measured:
+        """The rows of a task."""
+        if isinstance(task, Play):
+            return Measured(run=runs.play(task))
+        if task.kind == "batch":
+            return Measured(times=tuple(ebm.batch_times(task.name, task.size)))
+        if task.kind == "size":
+            return Measured(size=ebm.batch_size(task.size, int(task.name)))
+        if task.kind == "cold start":
+            return Measured(start=ebm.cold_start(cached=task.name == "filled"))
+        return Measured(saved=tuple(savings.KINDS[task.name]()))
+
+    def gather(self, done: Mapping[Any, Any]) -> Finding:
+        """The tables and diagrams of what was measured."""
+        found = [one for one in done.values() if isinstance(one, Measured)]
+        samples = [one.run for one in found if one.run is not None]
+        samples += [
+            runs.lost(task, one.reason)
+            for task, one in done.items()
+            if isinstance(task, Play) and isinstance(one, Failure)
+        ]
+        plain, walls = (
+            [one for one in samples if (one.family in WALLS) == beside] for beside in (False, True)
+        )
+        blocks: list[Block] = [
+            *(_models(plain) if plain else ()),
+            *(_converged(walls) if walls else ()),
+            *_batches(
+                [row for one in found for row in one.times],
+                [one.size for one in found if one.size],
+                [one.start for one in found if one.start],
+            ),
+            *_saved([row for one in found for row in one.saved]),
+        ]
+        answer = _answer(plain, walls, [row for one in found for row in one.times])
+        return Finding(
+            self.name,
+            f"Benchmark{'' if self.what == 'all' else f': {self.what}'}{', quick' if self.quick else ''}",
+            answer,
+            blocks,
+        )
+
+
+def _answer(
+    plain: Sequence[BenchmarkRun], walls: Sequence[BenchmarkRun], times: Sequence[ebm.BatchTime]
+) -> str:
+    """The figures that a reader comes for."""
+    said = []
+    if (
+        plain
+        and (standings := runs.league(list(runs.pooled(plain))))
+        and math.isfinite(standings[0].cost)
+    ):
+        first = standings[0]
+        said.append(
+            f"The cheapest engine at an error of {LEVEL:g} alpha is {first.line}: {1e3 * first.cost:.2g} ms of CPU a simulated second."
+        )
+    best = [row for case in ebm.CASES if (row := ebm.at_level(times, case.name))]
+    if best:
+        costs = ", ".join(f"{row.case} {row.evaluations:.0f}" for row in best)
+        said.append(f"A run of the event-based model costs, in right-hand sides: {costs}.")
+    if walls:
+        levels = runs.levels_of(walls)
+        finest = {level.model: level for level in levels if level.reference == REFERENCES[0]}
+        errors = ", ".join(f"{model} {level.median:.1e}" for model, level in finest.items())
+        said.append(
+            f"Beside a wall, median errors against {REFERENCES[0]} at the finest setting, alpha: {errors}."
+        )
+    return " ".join(said) or "Nothing was measured."
+
+
+def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
+    points = runs.points_of(samples)
+    trends, pooled = runs.trends_of(points), list(runs.pooled(samples))
+    families = list(dict.fromkeys(point.family for point in points))
+    standings = runs.league(pooled)
+    if standings:
+        yield Table(
+            "league",
+            [
+                Column("line", "engine", kind="text"),
+                Column("cost", f"cost at {LEVEL:g} alpha", "ms", digits=2),
+                Column("error", f"error at {1e3 * runs.EQUAL_COST:g} ms", "alpha", digits=2),
+                Column("best", "least error", "alpha", digits=2),
+                Column("best_cost", "at a cost of", "ms", digits=2),
+            ],
+            [
+                [one.line, 1e3 * one.cost, one.error, one.best, 1e3 * one.best_cost]
+                for one in standings
+            ],
+            "League of engines",
+            "Free rocking and pulses. Error: RMS of theta. Cost: CPU a simulated second. Empty: not reached.",
+        )
+    for title, starts in SHEETS.items():
+        shown = [family for family in families if family.startswith(starts)]
+        if shown:
+            yield _diagram(title, shown, points)
+    of = {(trend.line, trend.family): trend for trend in trends}
+    labels = list(dict.fromkeys(point.line for point in points))
+    yield Table(
+        "ratios",
+        [text("line", "model"), *(Column(family, digits=2) for family in families)],
+        [
+            [
+                label,
+                *(
+                    of[label, family].ratio if (label, family) in of else None
+                    for family in families
+                ),
+            ]
+            for label in labels
+        ],
+        f"Run time at an error of {LEVEL:g} alpha, over the EBM's",
+        on="page",
+    )
+    yield Table(
+        "order-spread",
+        [
+            text("line", "model"),
+            Column("order"),
+            text("ratio", f"run time / ebm's at {LEVEL:g} alpha"),
+            text("reached"),
+        ],
+        [_spread(label, [trend for trend in trends if trend.line == label]) for label in labels],
+        "Order and run time",
+        "Order: median slope of the error in the swept setting.",
+    )
+    yield Table(
+        "scenes",
+        [
+            text("scene"),
+            text("what"),
+            Column("horizon", "compared up to", "s"),
+            Column("model_form", "model form", "alpha", digits=2),
+        ],
+        [[family, FAMILIES[family].words, *_about(family)] for family in families],
+        "Scenes",
+        on="page",
+        folded=True,
+    )
+    yield table_of(
+        "engines",
+        runs.Pooled,
+        pooled,
+        title="Engines over whole kinds of scenes",
+        on="page",
+        folded=True,
+    )
+    yield table_of(
+        "work-precision", runs.Point, points, title="All settings", on="page", folded=True
+    )
+    yield table_of("orders-and-ratios", runs.Trend, trends)
+    yield table_of("runs", BenchmarkRun, samples)
+    yield Text(title="Left out", items=runs.LEFT_OUT, on="page")
+
+
+def _about(family: str) -> tuple[float, float]:
+    members = [prepared(family, k) for k in range(MEMBERS)]
+    return median(one.horizon for one in members), median(one.model_form for one in members)
+
+
+def _spread(label: str, trends: Sequence[runs.Trend]) -> list[Any]:
+    orders = sorted(trend.order for trend in trends if math.isfinite(trend.order))
+    ratios = sorted(trend.ratio for trend in trends if math.isfinite(trend.ratio))
+    spread = f"{ratios[0]:.3g} to {ratios[-1]:.3g}" if ratios else "-"
+    return [
+        label,
+        orders[len(orders) // 2] if orders else None,
+        spread,
+        f"{len(ratios)} of {len(trends)} scenes",
+    ]
+
+
+def _diagram(title: str, families: Sequence[str], points: Sequence[runs.Point]) -> Plot:
+    """Median error with its 10-90 % band over CPU time: a panel a family, a line a model."""
+    panels = []
+    for family in families:
+        series = []
+        for label, line in LINES.items():
+            mine = [
+                p
+                for p in points
+                if (p.family, p.line) == (family, label)
+                and math.isfinite(p.rms)
+                and math.isfinite(p.cpu)
+                and p.rms > 0.0
+            ]
+            style: Any = (
+                "dots"
+                if label.endswith("default")
+                else "marked"
+                if label.endswith("adaptive")
+                else "line"
+            )
+            if mine:
+                low, high = [max(p.rms_10, FLOOR) for p in mine], [min(p.rms_90, 3.0) for p in mine]
+                series.append(
+                    Series(
+                        label,
+                        [p.cpu for p in mine],
+                        [p.rms for p in mine],
+                        low,
+                        high,
+                        line.model,
+                        style,
+                    )
+                )
+        series.append(
+            Series(
+                "model form: EBM against unilateral",
+                y=[max(_about(family)[1], FLOOR)],
+                style="level",
+            )
+        )
+        panels.append(Panel(family, series))
+    name = title.lower().replace(" ", "-")
+    x, y = (
+        Axis("CPU s a simulated s", log=True),
+        Axis("RMS error of θ / α", log=True, limits=(FLOOR, 3.0)),
+    )
+    return Plot(name, f"Work and precision: {title.lower()}", panels=panels, x=x, y=y)
+
+
+def _converged(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
+    levels = runs.levels_of(samples)
+    orders = runs.orders_of(samples, levels)
+    exceptions = list(runs.exceptions_of(samples, orders))
+    form = median(
+        prepared(name, 0).model_form for name in dict.fromkeys(one.family for one in samples)
+    )
+    of = {(level.model, level.value, level.reference): level for level in levels}
+    slopes = {(order.model, order.reference): order.order for order in orders if not order.scene}
+    columns = [
+        Column("model", kind="model"),
+        Column("value", "setting", brief=False),
+        Column("step", "step", "s", digits=2),
+    ]
+    for reference in REFERENCES:
+        columns += [
+            Column(f"median_{reference}", f"against {reference}", "alpha", digits=2),
+            Column(f"largest_{reference}", "largest", "alpha", digits=2, brief=False),
+        ]
+        columns += [
+            text(f"within_{reference}", f"within {LEVEL:g}", brief=False),
+            Column(f"order_{reference}", "order", digits=3),
+        ]
+    rows = []
+    for level in (level for level in levels if level.reference == REFERENCES[0]):
+        both = [of[level.model, level.value, reference] for reference in REFERENCES]
+        cells = [
+            (
+                one.median,
+                one.largest,
+                f"{one.within} of {one.runs}",
+                slopes[one.model, one.reference],
+            )
+            for one in both
+        ]
+        rows.append(
+            [level.model, level.value, level.step, *(cell for some in cells for cell in some)]
+        )
+    yield Table(
+        "levels",
+        columns,
+        rows,
+        "What engines and CM converge to beside a wall",
+        f"As the step falls they tend to the model whose floor can only push. Against the paper's model the error ends at the difference in form, {form:.1e} alpha.",
+    )
+    yield _over_step(samples, levels, form)
+    yield Text(title="What does not converge", items=exceptions or ["Nothing."])
+    yield table_of("orders", runs.Order, orders)
+    yield table_of("wall-runs", BenchmarkRun, samples)
+
+
+def _over_step(samples: Sequence[BenchmarkRun], levels: Sequence[runs.Level], form: float) -> Plot:
+    """The error of every run, thin, and of each model the median, over the step: a panel a
+    reference."""
+    panels = []
+    for reference in REFERENCES:
+        series = []
+        for model in dict.fromkeys(level.model for level in levels):
+            for name in WALLS:
+                line = [
+                    one
+                    for one in samples
+                    if (one.line, one.family) == (model, name)
+                    and math.isfinite(one.error(reference))
+                ]
+                line.sort(key=lambda one: -one.value)
+                series.append(
+                    Series(
+                        model,
+                        [one.step for one in line],
+                        [one.error(reference) for one in line],
+                        look=model,
+                        style="thin",
+                    )
+                )
+            mine = [
+                level for level in levels if (level.model, level.reference) == (model, reference)
+            ]
+            series.append(
+                Series(
+                    model,
+                    [level.step for level in mine],
+                    [min(level.median, 3.0) for level in mine],
+                    look=model,
+                )
+            )
+        if reference == "ebm":
+            series.append(Series("model form: EBM against unilateral", y=[form], style="level"))
+        panels.append(Panel(f"against {reference}", series))
+    return Plot(
+        "error-over-step",
+        panels=panels,
+        x=Axis("step, s", log=True),
+        y=Axis("RMS error of θ / α", log=True),
+    )
+
+
+def _batches(
+    times: Sequence[ebm.BatchTime], sizes: Sequence[ebm.BatchSize], starts: Sequence[ebm.ColdStart]
+) -> Iterator[Block]:
+    if times:
+        best = [row for case in ebm.CASES if (row := ebm.at_level(times, case.name))]
+        yield Table(
+            "batches-at-level",
+            [
+                text("case", "batch, one core"),
+                Column("tolerance"),
+                Column("cpu", "CPU", "μs a run"),
+                Column("evaluations", "right-hand sides"),
+                Column("error_95", "p95 error", "rad", digits=2),
+                text("wrong"),
+            ],
+            [
+                [
+                    row.case,
+                    row.tolerance,
+                    1e6 * row.cpu,
+                    row.evaluations,
+                    row.error_95,
+                    f"{row.wrong} of {row.runs}",
+                ]
+                for row in best
+            ],
+            "Compiled batches of the event-based model",
+            f"The cheapest tolerance with a p95 error of the peak of at most {ebm.LEVEL:g} rad."
+            f" One right-hand side: {1e9 * median(row.right_hand_side for row in times):.1f} ns.",
+        )
+        lines = [
+            (case, [row for row in times if row.case == case.name and row.error_95 > 0.0])
+            for case in ebm.CASES
+        ]
+        series = [
+            Series(
+                f"{case.name}: {case.words}",
+                [row.error_95 for row in rows],
+                [1e6 * row.cpu for row in rows],
+            )
+            for case, rows in lines
+        ]
+        yield Plot(
+            "batches",
+            panels=[Panel("", series)],
+            x=Axis("p95 error of the peak, rad", log=True),
+            y=Axis("CPU μs a run, one core", log=True),
+        )
+        yield table_of(
+            "batch-times", ebm.BatchTime, times, title="All tolerances", on="page", folded=True
+        )
+    if starts:
+        rows = [[start.cache, start.importing, start.first_simulation] for start in starts]
+        columns = [
+            text("cache", "compile cache"),
+            Column("importing", "import", "s"),
+            Column("first_simulation", "first run", "s"),
+        ]
+        yield Table("cold-starts", columns, rows, "Cold starts")
+    if sizes:
+        threads = sorted({one.threads for one in sizes})
+        wall = {(one.runs, one.threads): 1e6 * one.wall for one in sizes}
+        columns = [
+            Column("runs"),
+            *(Column(f"threads_{n}", f"{n} thread{'s' * (n > 1)}", "μs a run") for n in threads),
+        ]
+        rows = [
+            [count, *(wall.get((count, n)) for n in threads)]
+            for count in dict.fromkeys(one.runs for one in sizes)
+        ]
+        yield Table(
+            "batch-sizes",
+            columns,
+            rows,
+            "Cost of a batch against its size",
+            "Random pulses, packing included.",
+            on="page",
+        )
+
+
+def _saved(found: Sequence[savings.Saving]) -> Iterator[Block]:
+    if not found:
+        return
+    yield Table(
+        "savings",
+        [
+            text("model"),
+            text("thing", "not needed"),
+            Column("cost_with", "with"),
+            Column("cost_without", "without"),
+            text("unit"),
+            Column("ratio", "times"),
+            Column("change", "change", "alpha", digits=2),
+            text("remark", "what was compared"),
+        ],
+        [
+            [
+                one.model,
+                one.thing,
+                one.cost_with,
+                one.cost_without,
+                one.unit,
+                one.ratio,
+                one.change,
+                one.remark,
+            ]
+            for one in found
+        ],
+        "What a scene does not need",
+        f"Not measured: {'; '.join(savings.NOT_MEASURED)}.",
+    )
