@@ -41,10 +41,17 @@ COMMANDS = {
     "conformance": ("conformance", "rockcheck conformance --engine mujoco --settings default"),
     "calibrate": ("calibrate", "rockcheck calibrate --engine mujoco --restitution 0.5 --step 1e-3"),
     "stress": ("stress", "rockcheck stress --quick"),
-    "report": ("report", "rockcheck report rockcheck-report"),
-    "figure": ("figure", "rockcheck figure rockcheck-report fig4a -o fig4a.pdf"),
+    "report": ("report", "rockcheck report rockcheck-report --scene fig4a -o fig4a.pdf"),
     "warm": ("warm", "rockcheck warm"),
 }
+
+#: What to call in place of a command that is gone.
+GONE = {
+    "figure": "rockcheck report DIR --scene NAME -o FILE",
+    "convergence": "rockcheck benchmark convergence",
+}
+#: Commands that are not listed.
+HIDDEN = ("warm",)
 
 #: Commands that answer at once: nobody asks how long they took.
 AT_ONCE = ("scenes", "new", "record", "compare", "diff")
@@ -120,6 +127,14 @@ class _Commands(typer.core.TyperGroup):
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
         self.commands = cast(Any, _Loaded())
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return [name for name in COMMANDS if name not in HIDDEN]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        if cmd_name in GONE:
+            raise InputError(f"the command {cmd_name} is gone: {GONE[cmd_name]}")
+        return super().get_command(ctx, cmd_name)
 
 
 app = typer.Typer(

@@ -5,7 +5,7 @@ A suite is a TOML file that a user can write:
     description = "my shelf on my record"
     reference = "ebm-unilateral"                 # judges numerical differences
     model_form = "ebm"                           # optional: shown beside it, with a band of its own
-    print_figures = true                         # each scene's figure for a paper (SVG, PNG, PDF); without it `rockcheck figure` draws one
+    print_figures = true                         # each scene's figure for a paper (SVG, PNG, PDF); without it `rockcheck report` draws one
     scenes = ["fig4a", "shelf.toml"]             # names, or scene files beside this one
 
     [models.ebm-unilateral]
