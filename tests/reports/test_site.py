@@ -517,11 +517,11 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(tmp_path: Path,
     assert (tmp_path / "other.svg").read_bytes() != drawn
     capsys.readouterr()
     for words, said in (
-        (["nowhere"], "unknown scene of the run 'nowhere'; allowed: Free, beside a wall, crowd, free"),
-        (["free", "-o", "free.gif"], "free.gif: a figure is written as .svg, .png, .pdf, not as '.gif'"),
-        (["free", "-o", "none/free.svg"], "--output: none: no such folder"),
-        (["free", "--against", "drake"], "unknown model with a history of this scene 'drake'"),
-        (["crowd", "--against", "ebm"], "--against: an ensemble's figure shows differences from its reference"),
+        (["--scene", "nowhere", "-o", "one.pdf"], "unknown scene of the run 'nowhere'; allowed: Free, beside a wall, crowd, free"),
+        (["--scene", "free", "-o", "free.gif"], "free.gif: a figure is written as .svg, .png, .pdf, not as '.gif'"),
+        (["--scene", "free", "-o", "none/free.svg"], "--output: none: no such folder"),
+        (["--scene", "free", "-o", "one.pdf", "--against", "drake"], "unknown model with a history of this scene 'drake'"),
+        (["--scene", "crowd", "-o", "one.pdf", "--against", "ebm"], "--against: an ensemble's figure shows differences from its reference"),
     ):
         assert main(["report", str(tmp_path), *words]) == 2
         assert said in capsys.readouterr().err
