@@ -130,7 +130,7 @@ def moment_of(run: Run, folder: Path) -> Moment:
         verdict=run.words,
         wall_seconds=run.wall_seconds,
         figures={name: None if check.figure.of_a_fall else check.figure.value for name, check in names},
-        not_passed=tuple(name for name, check in names if check.verdict != "pass"),
+        not_passed=tuple(name for name, check in names if check.weighs != "pass"),
     )
 
 
