@@ -176,8 +176,8 @@ def windowed(check: Check) -> str:
 def used(check: Check) -> float:
     """Share of its limit that a check uses up, 0 to 1 within it; infinite where it cannot be judged, 0 where nothing is asked."""
     value, limit = check.figure.value, check.limit
-    if check.verdict == "not defined":
-        return 0.0
+    if check.verdict == "not defined" or (check.verdict == "better" and check.beside is not None):
+        return 0.0  # a limit around what was expected says nothing of a figure that is better elsewhere
     if check.verdict == "fail" or value is None or limit is None:
         return math.inf
     if asks(check):
@@ -186,7 +186,7 @@ def used(check: Check) -> float:
         return limit / value if value > 0.0 else 0.0
     measure = MEASURES.get(check.figure.measure)
     floor = 0.0 if measure is None or measure.role == "error" else check.floor
-    return min(1.0, apart(value, check.ideal, floor) / limit) if limit > 0.0 else 0.0
+    return apart(value, check.ideal, floor) / limit if limit > 0.0 else 0.0
 
 
 def percent(check: Check) -> str:
