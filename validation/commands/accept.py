@@ -27,7 +27,8 @@ def run(
 ) -> None:
     """Make today's figures the expected ones.
 
-    They are written into the suite's tolerances, each change is shown: new, tightened, loosened or moved, the last two only with --reason.
+    They are written into the suite's tolerances, each change is shown: new, tightened, loosened or
+    moved, the last two only with --reason.
     """
     name = suite or "paper"
     folder = usable_folder(out)

@@ -6,7 +6,7 @@ from pydantic import ConfigDict
 
 from rockcheck.scenes.base import Frozen
 
-#: How the note begins of a figure that asks nothing here, as a ratio to a reference that does not rotate does.
+#: How the note begins of a figure that asks nothing here, as a ratio to nothing does.
 NOT_DEFINED = "not defined here"
 
 
@@ -52,7 +52,7 @@ class Figure(Stored):
 
     @property
     def undefined(self) -> bool:
-        """Whether the measure asks nothing here, so that nothing can be judged: its note says why."""
+        """Whether the measure asks nothing here, so that nothing is judged; its note says why."""
         return self.value is None and self.note.startswith(NOT_DEFINED)
 
     @property

@@ -38,7 +38,7 @@ class Unavailable(Exception):
 
 
 class Undefined(Unavailable):
-    """The measure asks nothing of these histories, as a ratio to nothing does: it neither passes nor fails."""
+    """The measure asks nothing of these histories, as a ratio to nothing: no pass and no fail."""
 
     def __init__(self, why: str) -> None:
         super().__init__(f"{NOT_DEFINED}: {why}")
@@ -69,7 +69,7 @@ class Measure:
 
     @property
     def role(self) -> Literal["error", "quantity", "count"]:
-        """What its values are: an error has a perfect value and is the better the nearer to it; the others are what they are."""
+        """What its values are: an error has a perfect value, and the nearer to it the better."""
         if self.ideal is not None or self.sense == "at least":
             return "error"
         return "quantity" if self.resolution else "count"
@@ -108,9 +108,10 @@ def figure(label: str, unit: str, **settings: Any) -> Definition:
 
 
 def between_rows(unit: str, frequency_parameter: float, gravity: float, step: float) -> float:
-    """What rows `step` (s) apart cannot tell from nothing, in a measure's unit: how far a free block bends from a chord.
+    """What rows `step` (s) apart cannot tell from nothing: how far a free block is from a chord.
 
-    Of an angle (p h)^2/8, in alpha; of a length g h^2/8, in m; of a time h, in s. Other units have no such floor.
+    Of an angle (p h)^2/8, in alpha; of a length g h^2/8, in m; of a time h, in s. Other units have
+    no such floor.
     """
     share = step**2 / 8.0
     return {"angle": frequency_parameter**2 * share, "m": gravity * share, "s": step}.get(unit, 0.0)
@@ -224,7 +225,7 @@ class Pair:
 
     @property
     def rocking(self) -> tuple[Array, Array]:
-        """`theta` where there is something to have a ratio to: the reference's peak is above its floor."""
+        """`theta` where there is something to have a ratio to: the reference's peak is no nothing."""
         floor = DIFFERENCES["theta_peak"].resolution
         if self.alpha is not None and len(self.time) > 1:
             g, step = self.known.gravity, float(self.time[-1] - self.time[0]) / (len(self.time) - 1)

@@ -26,10 +26,10 @@ LEAST_LIMIT, LEAST_DRIFT, LEAST_SHARE = 10.0, 1.0, 0.01
 def accept(suite: Suite, run: Run, reason: str | None, *, write: bool = True) -> tuple[list[str], list[str]]:
     """Write the figures of `run` into the tolerance file of `suite`.
 
-    Returns the changes and what was refused, a line each. A change is new, tightened (to what is better), loosened (a wider limit)
-    or moved (another expected value); the last two need a `reason`, which goes into the file. A check without a figure, and a line
-    that would not pass now, is always refused; a figure that is not defined asks for no line. Without `write` the file stays as it
-    is.
+    Returns the changes and what was refused, a line each. A change is new, tightened (to what is
+    better), loosened (a wider limit) or moved (another expected value); the last two need a `reason`,
+    which goes into the file. A check without a figure, and a line that would not pass now, is always
+    refused; a figure that is not defined asks for no line. Without `write` the file stays as it is.
     """
     changes: list[str] = []
     refused: list[str] = []

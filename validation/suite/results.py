@@ -34,12 +34,13 @@ FORMAT = 1
 #: Exit code of a fault of rockcheck's own, EX_SOFTWARE of sysexits: no verdict has it.
 FAULT = 70
 
-#: Verdict on one check: as expected; nearer to what is perfect; a ratio to nothing; inside the limit, but outside the drift
-#: band; outside the limit or not to be judged. See `tolerances`.
+#: Verdict on one check: as expected; nearer to what is perfect; a ratio to nothing; inside the
+#: limit, but outside the drift band; outside the limit or not to be judged. See `tolerances`.
 CheckVerdict = Literal["pass", "better", "not defined", "changed", "fail"]
 #: Verdict on a cell or a run: the worst of its checks, "incomplete" where a model is not installed, or "error" where one failed.
 Verdict = Literal["pass", "incomplete", "changed", "fail", "error"]
-#: What fails beside what is out of a limit: nothing; what changed and a model that is not installed; what got better, too.
+#: What fails beside what is out of a limit: nothing; what changed and a model that is not
+#: installed; "both": what got better, too.
 Strict = bool | Literal["both"]
 SEVERITY: tuple[Verdict, ...] = ("pass", "incomplete", "changed", "fail", "error")
 #: "numerical": two solutions of the same equations. "model form": the reference forbids free flight, the candidate does not.
@@ -52,9 +53,10 @@ class Check(Stored):
     """A figure with the tolerance that it was held against.
 
     The figure's distance from `ideal` (0 for differences, 1 for ratios, `expected` for absolute figures) may be at most
-    `limit`; a value further than `drift` from `expected` is "better" or "changed". `limit` is None where no tolerance is
-    written down, which never passes. `reason` says why a check is no plain pass, one line; `gap` what part of the window could not
-    be compared. A value below `floor` means nothing; `beside` is the reference's figure, where that says which value is better.
+    `limit`; a value further than `drift` from `expected` is "better" or "changed". `limit` is None
+    where no tolerance is written down, which never passes. `reason` says why a check is no plain
+    pass, one line; `gap` what part of the window could not be compared. A value below `floor` means
+    nothing; `beside` is the reference's figure, where that says which value is better.
     """
 
     figure: Figure
@@ -77,7 +79,8 @@ class Check(Stored):
 
     def fails(self, strict: Strict) -> bool:
         """Whether the check is out of tolerance for a run that is so strict."""
-        return self.weighs == "fail" or (bool(strict) and self.weighs == "changed") or (strict == "both" and self.verdict == "better")
+        fails = ("fail", "changed", "better") if strict == "both" else ("fail", "changed")
+        return self.verdict in (fails if strict else ("fail",))
 
     @property
     def words(self) -> str:
@@ -231,7 +234,7 @@ class Run(Stored):
 
     @property
     def exit_code(self) -> int:
-        """0 pass, 1 out of tolerance (more so under `strict`, see `Strict`), 3 a model failed, `FAULT` where unexpectedly."""
+        """0 pass, 1 out of tolerance (`strict`: see `Strict`), 3 a model failed, else `FAULT`."""
         if any(cell.unexpected for cell in self.cells):
             return FAULT
         if self.verdict == "error":

@@ -441,9 +441,9 @@ def _cell(
 
 
 def _judged_beside(suite: Suite, cell: Cell, cells: Sequence[Cell]) -> Cell:
-    """The cell with its own figures that are not as expected judged beside the reference's, where both solve the same equations.
+    """The cell with its own figures judged beside the reference's, where one is not as expected.
 
-    A figure of the reference that is itself not as expected is no yardstick.
+    Both must solve the same equations. A figure of the reference that is itself not as expected is no yardstick.
     """
     own = suite.suite_of(cell.scene)
     moved = next((check for check in cell.checks if check.kind == "absolute" and check.weighs != "pass"), None)

@@ -142,7 +142,7 @@ def verdict_lines(run: Run) -> Iterator[str]:
         if cell.status != "absent":
             yield from cell_lines(cell)
     if run.judged and not any(cell.status != "done" or any(c.verdict != "not defined" for c in cell.checks) for cell in run.cells):
-        yield "nothing was judged: the suite requires no measure that is defined here, and has no tolerance of one"
+        yield "nothing was judged: no measure that is defined here is required or has a tolerance"
 
 
 def improvements(run: Run) -> Iterator[str]:
@@ -174,10 +174,13 @@ def windowed(check: Check) -> str:
 
 
 def used(check: Check) -> float:
-    """Share of its limit that a check uses up, 0 to 1 within it; infinite where it cannot be judged, 0 where nothing is asked."""
+    """Share of its limit that a check uses up, 0 to 1 within it; infinite where it cannot be judged.
+
+    0 where nothing is asked, and where the limit lies around a value that is no longer wanted.
+    """
     value, limit = check.figure.value, check.limit
     if check.verdict == "not defined" or (check.verdict == "better" and check.beside is not None):
-        return 0.0  # a limit around what was expected says nothing of a figure that is better elsewhere
+        return 0.0
     if check.verdict == "fail" or value is None or limit is None:
         return math.inf
     if asks(check):

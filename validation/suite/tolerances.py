@@ -14,19 +14,22 @@ what a scene's own line leaves out:
     "theta_rms@8s" = { why = "first-order step error" }
 
 `@` bounds the window: seconds, or `@horizon`. `limit` bounds the distance from the perfect value (from `expected`
-for figures of the cell itself; for "at least" measures the value itself). All in the measure's unit.
+for figures of the cell itself; for "at least" measures the value itself). All in the measure's
+unit.
 
 What a figure is judged by depends on its measure's role:
 
 | role | distance within `limit` | better, where it moved by more than `drift` |
 |---|---|---|
-| error (has a perfect value) | from the perfect value, as written | its distance from it fell by more than `drift` |
-| quantity | from `expected`, both less their floor | it came nearer to the reference's by more than `drift` |
+| error (has a perfect value) | from the perfect value | that distance fell by more than it |
+| quantity | from `expected`, beyond its floor | it came nearer to the reference's by more |
 | count | from `expected` | as a quantity |
 
-A figure has moved by what it and `expected` differ beyond their floor (`floor_of`), so two values below it are the same: nothing.
-What moved is *better*, else *changed*; better passes, a quantity or count beyond its limit too. A quantity has a better only
-where the reference solves the same equations and itself is as expected (`runner`). A ratio to nothing is *not defined*.
+A figure has moved by what it and `expected` differ beyond their floor (`floor_of`), so two values
+below it are the same: nothing. The limit of an error holds as it is written. What moved is
+*better*, else *changed*; better passes, a quantity or count beyond its limit too. A quantity has a
+better only where the reference solves the same equations and is itself as expected (`runner`).
+A ratio to nothing is *not defined*.
 """
 
 from __future__ import annotations
@@ -167,10 +170,10 @@ def _lines(tables: Mapping[str, Any], depth: int, above: tuple[str, ...] = ()) -
 
 
 def floor_of(measure: Measure, scene: Scene, numerical: Numerical | None) -> float:
-    """The size below which a figure of a cell means nothing, in the measure's unit; 0 for what is counted.
+    """The size below which a figure of a cell means nothing, in the measure's unit; 0 of a count.
 
-    The largest of the measure's resolution, the run's numerical uncertainty where it is known, and, of a quantity, what the
-    rows cannot tell from nothing. An error is read from two histories at the same times.
+    The largest of the measure's resolution, the run's numerical uncertainty where it is known, and,
+    of a quantity, what the rows cannot tell from nothing. An error is read at the rows' own times.
     """
     if not measure.resolution:
         return 0.0
@@ -190,9 +193,10 @@ def judge(
     floor: float | None = None,
     beside: float | None = None,
 ) -> Check:
-    """The verdict on a figure. What is missing, not finite or not compared over the whole window never passes.
+    """The verdict on a figure. What is missing, not finite or not wholly compared never passes.
 
-    `floor` is the figure's (None: its measure's resolution), `beside` the reference's same figure, where that is a yardstick.
+    `floor` is the figure's (None: its measure's resolution), `beside` the reference's same figure,
+    where that is a yardstick.
     """
     given = tolerance or Tolerance(limit=0.0)
     least = measure.resolution if floor is None else floor
@@ -223,7 +227,7 @@ def judge(
 
 
 def judged_beside(check: Check, beside: float | None) -> Check:
-    """The same check with the reference's figure as a yardstick; without a tolerance or a figure there it stays as it is."""
+    """The same check with the reference's figure as a yardstick, where there are both."""
     if check.limit is None or beside is None:
         return check
     line = Tolerance(limit=check.limit, expected=check.expected, drift=check.drift, why=check.why)
@@ -232,7 +236,7 @@ def judged_beside(check: Check, beside: float | None) -> Check:
 
 
 def _perfect(measure: Measure, kind: Kind, beside: float | None) -> float | None:
-    """The value that a better one is nearer to, None where there is none: another model form is no yardstick."""
+    """The value that a better one is nearer to; None for another model form, no yardstick."""
     if kind == "model form":
         return None
     return math.inf if measure.sense == "at least" else measure.ideal if measure.role == "error" else beside
@@ -241,7 +245,7 @@ def _perfect(measure: Measure, kind: Kind, beside: float | None) -> float | None
 def _verdict(
     figure: Figure, value: float, line: Tolerance, measure: Measure, floor: float, perfect: float | None
 ) -> tuple[CheckVerdict, str]:
-    """The table at the top of this module, for a figure that has a value and a tolerance; and why it is no plain pass."""
+    """The table at the top of this module; and why the figure is no plain pass."""
     expected, drift = line.expected, math.inf if line.drift is None else line.drift
     moved = 0.0 if expected is None else apart(value, expected, floor, measure.ideal or 0.0)
     outside = _outside(figure, value, line, measure, moved)
@@ -250,19 +254,19 @@ def _verdict(
     if expected is None or not (outside or moved > drift):
         return "pass", ""
     if _nearer(value, expected, perfect) > (line.drift or 0.0):
-        return "better", f"{value:.6g} was {expected:.6g}" + (f", nearer to {perfect:.6g}" if perfect else "")
+        return "better", f"{value:.6g} was {expected:.6g}" + (f", nearer to {perfect:.6g}" if perfect and perfect < math.inf else "")
     return ("fail", outside) if outside else ("changed", f"{value:.6g} was {expected:.6g} (drift allowed {drift:.2g})")
 
 
 def _nearer(value: float, expected: float, perfect: float | None) -> float:
-    """By how much a value is nearer to a perfect one than the expected is; 0 where nothing says which is better."""
+    """By how much a value is nearer to a perfect one than the expected is; 0 where there is none."""
     if perfect is None or math.isinf(perfect):
         return 0.0 if perfect is None else value - expected
     return abs(expected - perfect) - abs(value - perfect)
 
 
 def _outside(figure: Figure, value: float, line: Tolerance, measure: Measure, moved: float) -> str:
-    """How a figure is beyond its limit; empty where it is not. `moved` is its distance from what was expected."""
+    """How a figure is beyond its limit, empty where not; `moved` is its distance from expected."""
     limit = line.limit
     if measure.sense == "at least":
         return "" if value >= limit else f"{value:.4g} is below the limit {limit:.4g}"
@@ -276,7 +280,7 @@ def _outside(figure: Figure, value: float, line: Tolerance, measure: Measure, mo
 
 
 def apart(value: float, expected: float, floor: float, zero: float = 0.0) -> float:
-    """How far two values are apart by what each has beyond a `floor` on either side of `zero`: their plain distance far from it."""
+    """The distance of two values by what each has beyond a `floor` on either side of `zero`."""
     one, other = value - zero, expected - zero
     if min(abs(one), abs(other)) > floor and one * other > 0.0:
         return abs(value - expected)

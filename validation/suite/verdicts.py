@@ -27,8 +27,8 @@ MARKS = {"pass": "✅", "incomplete": "⚪", "changed": "🟡", "fail": "❌", "
 def junit(run: Run) -> str:
     """JUnit XML: a test suite a scene, a test case a check and one for each cell's run, which is an error where it failed.
 
-    A figure that changed within its limit, and a model that is not installed, are failures only in a strict run, one that is better
-    in a run that is strict both ways. What is not defined is skipped.
+    A figure that changed within its limit, and a model that is not installed, are failures only in a
+    strict run, one that is better in a run that is strict both ways. What is not defined is skipped.
     """
     document = JUnitXml(f"rockcheck {run.suite}")
     for scene, cells in run.by_scene().items():

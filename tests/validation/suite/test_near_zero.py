@@ -13,6 +13,7 @@ from rockcheck.scenes import Block, Floor, Rest, Scene
 from rockcheck.validation.discrepancy.compare import compare
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.suite.acceptance import accept
+from rockcheck.validation.suite.changes import Trend
 from rockcheck.validation.suite.results import Cell, Check, Run
 from rockcheck.validation.suite.tables import improvements, verdict_lines
 from rockcheck.validation.suite.tolerances import MEASURES, Tolerance, floor_of, judge
@@ -168,3 +169,9 @@ def test_accept_asks_a_reason_for_what_is_moved_or_loosened(tmp_path: Path, wors
     changes, refused = accept(suite, run_of(worse), None)
     assert (changes, ["--reason" in line for line in refused]) == ([], [True])
     assert not suite.tolerances_path.exists()
+
+
+@pytest.mark.parametrize(("values", "moved"), [((1e-15, -3e-17), False), ((1e-15, 1e-3), True), ((0.0, None), True)])
+def test_what_moves_within_its_resolution_is_no_trend(values, moved):
+    for name in ("s, m: last_rotation", "s, m: theta_rms@8s against r"):
+        assert Trend(name=name, values=values).moved == moved
