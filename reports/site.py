@@ -31,7 +31,7 @@ from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.execute.pool import Call, Pool
-from rockcheck.validation.suite.results import Run
+from rockcheck.validation.suite.results import SEVERITY, Run
 from rockcheck.validation.suite.tables import shown
 
 DATA = Path(str(resources.files("rockcheck.reports"))) / "data"
@@ -54,6 +54,8 @@ PRINTED, FEW = 25, 40
 #: What a verdict is called and the sign that goes with its colour.
 VERDICTS = {
     "pass": ("within tolerance", "✓"),
+    "better": ("better", "✓"),
+    "not defined": ("not defined here", "–"),
     "incomplete": ("not installed", "–"),
     "changed": ("changed", "△"),
     "fail": ("out of tolerance", "✕"),
@@ -322,5 +324,5 @@ def _environment() -> Environment:
         outcome_of,
     ):
         environment.globals[function.__name__] = function
-    environment.globals |= {"VERDICTS": VERDICTS, "finite": math.isfinite}
+    environment.globals |= {"VERDICTS": VERDICTS, "SEVERITY": SEVERITY, "finite": math.isfinite}
     return environment

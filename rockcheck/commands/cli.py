@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import inspect
+import itertools
 import os
 import sys
 import time
@@ -56,6 +57,9 @@ HIDDEN = ("warm",)
 #: Commands that answer at once: nobody asks how long they took.
 AT_ONCE = ("scenes", "new", "record", "compare", "diff")
 
+#: Options whose value may be left out, with their values: it is then the first.
+BARE = {"--strict": ("worse", "both")}
+
 #: Exit code of a run that Ctrl-C ended.
 INTERRUPTED = 130
 EXIT_CODES = {
@@ -89,10 +93,21 @@ def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
     return command
 
 
+def _with_value(word: str, after: str) -> str:
+    """An argument, with the value of its option where that is left out."""
+    values = BARE.get(word)
+    return f"{word}={values[0]}" if values and after not in values else word
+
+
 class _EachOnce(typer.core.TyperCommand):
-    """A command whose options may be given once, but for those that gather several values: the last would silently win."""
+    """A command whose options may be given once, but for those that gather several values: the last would silently win.
+
+    An option of `BARE` may be given without its value.
+    """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        if any(name in BARE for parameter in self.params for name in parameter.opts):
+            args = [_with_value(*pair) for pair in itertools.pairwise([*args, ""])]
         _, _, order = self.make_parser(ctx).parse_args(args=list(args))
         for option in order:
             single = isinstance(option, typer.core.TyperOption) and not (option.multiple or option.is_flag or option.count)

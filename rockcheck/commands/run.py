@@ -40,7 +40,7 @@ from rockcheck.scenes.errors import printable
 from rockcheck.validation.execute import remote, workers
 from rockcheck.validation.execute.models import FAMILIES, family, is_own, not_installed
 from rockcheck.validation.suite.record_sets import RecordSet
-from rockcheck.validation.suite.results import Run
+from rockcheck.validation.suite.results import Run, Strict
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import Suite, scene_suite
 from rockcheck.validation.suite.tables import outcome_row, outcome_tables, verdict_lines
@@ -150,7 +150,7 @@ def play_scene(suite: Suite, folder: Path, *, jobs: int | None, force: bool, sch
     raise typer.Exit(finished.exit_code)
 
 
-def play(suite: Suite, folder: Path, jobs: int | None, force: bool, strict: bool, scheduler: str | None) -> Run:
+def play(suite: Suite, folder: Path, jobs: int | None, force: bool, strict: Strict, scheduler: str | None) -> Run:
     """Run a suite with a progress bar on stderr."""
     where = workers.local if scheduler is None else remote.OnCluster(scheduler)
     compiles = ", a first run compiles" if any(not is_own(one.family_name) and one.family.compiled for one in suite.models.values()) else ""

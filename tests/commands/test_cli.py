@@ -132,5 +132,6 @@ floor = { friction = 0.5 }
     assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1"]) == 0
     assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1", "--strict"]) == 1
     assert "verdict: changed" in capsys.readouterr().out
-    assert main(["accept", "mine.toml", "--allow-code", "faulty:Still", "--jobs", "1"]) == 0
+    assert main(["accept", "mine.toml", "--allow-code", "faulty:Still", "--jobs", "1"]) == 1
+    assert main(["accept", "mine.toml", "--allow-code", "faulty:Still", "--jobs", "1", "--reason", "it leans more"]) == 0
     assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1", "--strict"]) == 0

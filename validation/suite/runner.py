@@ -31,9 +31,18 @@ from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, St
 from rockcheck.validation.suite.confidence import explanations, inputs_of, key_of, numerical_of
 from rockcheck.validation.suite.ensembles import Ensemble
 from rockcheck.validation.suite.impact_laws import by_either, landing_of, under_the_other_law
-from rockcheck.validation.suite.results import Cell, CostRecord, EnsembleRecord, Run
+from rockcheck.validation.suite.results import Cell, CostRecord, EnsembleRecord, Run, Strict
 from rockcheck.validation.suite.suites import ModelVariant, Suite
-from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Place, Windowed, judge
+from rockcheck.validation.suite.tolerances import (
+    HORIZON,
+    MEASURES,
+    OWN_FIGURES,
+    Place,
+    Windowed,
+    floor_of,
+    judge,
+    judged_beside,
+)
 from rockcheck.validation.uncertainty.inputs import Inputs
 from rockcheck.validation.uncertainty.numerical import Numerical
 
@@ -167,7 +176,7 @@ def run_suite(
     *,
     jobs: int | None = None,
     force: bool = False,
-    strict: bool = False,
+    strict: Strict = False,
     play: Executor = workers.local,
     on_progress: OnProgress = unheard,
 ) -> Run:
@@ -233,6 +242,7 @@ def run_suite(
     ]
     ensembles, ensemble_cells = _ensembles(suite, batches, records, failures, read_back)
     beside = {name: list(of) for name, of in groupby(cells, key=lambda cell: cell.scene)}
+    cells = [_judged_beside(suite, cell, beside[cell.scene]) for cell in cells]
     cells = [_explained(suite, cell, beside[cell.scene], by_place, records, inputs.get(cell.scene)) for cell in cells] + ensemble_cells
     cells = [cell.model_copy(update=faults.get((cell.scene, cell.model), {})) for cell in cells]
     store.prune()
@@ -400,6 +410,7 @@ def _cell(
             extra = sorted(p.what for p in required if p.against == name and (p.what.window or p.what.definition.on_request))
             asked[name] = reference, extra
     found = _compared(store, scene, planned, asked)
+    numerical = numerical_of(record)
     figures = [figure for name, one in found.items() for figure in one.figures_against(name)]
     gaps = {(name, window): gap for name, one in found.items() for window, gap in one.gaps.items()}
     checks = []
@@ -410,7 +421,9 @@ def _cell(
         gap = "" if fall and kind == "model form" else text
         if gap and kind == "measured" and not fall:
             gap += "; `offset` of the measured model shifts its times, a window such as theta_rms@8s ends sooner"
-        checks.append(judge(figure, own.tolerances.get(place), kind=kind, measure=place.what.definition, gap=gap))
+        measure = place.what.definition
+        floor = floor_of(measure, scene, numerical)
+        checks.append(judge(figure, own.tolerances.get(place), kind=kind, measure=measure, gap=gap, floor=floor))
     return Cell(
         **about,
         status="done",
@@ -422,9 +435,32 @@ def _cell(
         cost=CostRecord(**record["cost"]),
         figures=tuple(figures),
         checks=tuple(checks),
-        numerical=numerical_of(record),
+        numerical=numerical,
         impact_law=found[OWN_FIGURES].impact_law,
     )
+
+
+def _judged_beside(suite: Suite, cell: Cell, cells: Sequence[Cell]) -> Cell:
+    """The cell with its own figures judged beside the reference's, where one is not as expected.
+
+    Both must solve the same equations. A figure of the reference that is itself not as expected is no yardstick.
+    """
+    own = suite.suite_of(cell.scene)
+    moved = next((check for check in cell.checks if check.kind == "absolute" and check.weighs != "pass"), None)
+    reference = next((other for other in cells if other.model == own.reference and other is not cell), None)
+    if moved is None or reference is None:
+        return cell
+    if own.kind(Place(cell.scene, cell.model, own.reference, Windowed(moved.figure.measure))) != "numerical":
+        return cell
+    known = {(f.measure, f.window): f.value for f in reference.figures if not f.against}
+    for check in reference.checks:
+        if check.verdict != "pass" and not check.figure.against:
+            known.pop((check.figure.measure, check.figure.window), None)
+    checks = (
+        judged_beside(check, known.get((check.figure.measure, check.figure.window))) if check.kind == "absolute" else check
+        for check in cell.checks
+    )
+    return cell.model_copy(update={"checks": tuple(checks)})
 
 
 def _explained(

@@ -126,7 +126,7 @@ def test_the_summary_names_what_is_not_a_pass():
         (0.375, "pass"),
         (0.125, "pass"),
         (0.3750001, "changed"),
-        (0.1249999, "changed"),
+        (0.1249999, "better"),
         (0.5, "changed"),
         (0.5000001, "fail"),
         (-0.5, "changed"),
