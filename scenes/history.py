@@ -21,7 +21,7 @@ from rockcheck.scenes.block import Block
 from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.reading import read_table
 from rockcheck.scenes.trust.experience import Expected, expected, known
-from rockcheck.scenes.writing import columns_text, json_text, write_together
+from rockcheck.scenes.writing import columns_text, json_text, write_together, write_whole
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -182,18 +182,19 @@ class History(Shown):
         check_format(path)
         about = self._about()
         if path.suffix.lower() in (".json", ".mat"):
-            write_together({path: (_json if path.suffix.lower() == ".json" else _mat)(about, self.channels, self._event_columns())})
+            form = _json if path.suffix.lower() == ".json" else _mat
+            write_whole(path, form(about, self.channels, self._event_columns()), named=True)
             return
         if path.suffix.lower() == ".parquet":
             attrs = {ABOUT: json.loads(json.dumps(about, default=str))}
-            write_together({events_path(path): _parquet(self.events, {}), path: _parquet(self.frame, attrs)})
+            write_together({events_path(path): _parquet(self.events, {}), path: _parquet(self.frame, attrs)}, named=True)
             return
         table, beside = self._tables(about)
         contents = {path: table}
         if path.is_file() or not path.exists():  # beside /dev/stdout there is nothing to be written
             contents = {events_path(path): beside, **contents}
         packed = path.suffix.lower() == ".gz"
-        write_together({one: _packed(text) if packed else text for one, text in contents.items()})
+        write_together({one: _packed(text) if packed else text for one, text in contents.items()}, named=True)
 
     def packed(self) -> dict[str, bytes]:
         """The two files that `save` writes for a name ending in ".csv.gz", by their endings: ".csv.gz", ".events.csv.gz"."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rockcheck.reports.site import PAGES
 from rockcheck.reports.studies.page import write_study
 from rockcheck.reports.style import LOOKS, PAGE, figure_style, log_scales, save
+from rockcheck.scenes.writing import made
 from rockcheck.validation.bench.ebm import CASES, EbmSpeed
 from rockcheck.validation.bench.ebm import LEVEL as BATCH_LEVEL
 from rockcheck.validation.bench.models import LEVEL, LINES, DiagramLine, Point, WorkPrecision
@@ -33,7 +34,7 @@ FLOOR = 1e-13
 
 def write_benchmark(found: Benchmark, folder: Path) -> Path:
     """Writes `index.html` with its diagrams into the folder of a benchmark; returns the page."""
-    figures = folder / PAGES / "figures"
+    figures = made(folder, PAGES, "figures")
     sheets = []
     if found.models is not None:
         for name, title, starts in SHEETS:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rockcheck.reports.studies.page import write_study
 from rockcheck.reports.style import LOOKS, PAGE, figure_style, log_scales, power_of_ten, save
+from rockcheck.scenes.writing import made
 from rockcheck.validation.bench.convergence import DURATION, LEVEL, PULSES, REFERENCE_TOLERANCE, REFERENCES, SWEEPS, Convergence
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ TITLES = {"ebm-unilateral": "Against the unilateral EBM: numerical error", "ebm"
 
 def write_convergence(found: Convergence, folder: Path) -> Path:
     """Writes `index.html` with its diagram into the folder of a study; returns the page."""
-    save(convergence_figure(found), folder / "figures" / DIAGRAM)
+    save(convergence_figure(found), made(folder, "figures") / DIAGRAM)
     return write_study(
         found,
         folder,
