@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.scenes.base import Shown
+from rockcheck.scenes.base import LEAST, MOST, Shown
 from rockcheck.scenes.block import Block
 from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.reading import read_table
@@ -353,8 +353,8 @@ def _size(about: Mapping[str, Any], key: str, shown: str) -> float | None:
     value = about.get(key)
     if value is None:
         return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
-        raise InputError(f"{printable(value)} is not allowed: give a positive length in m", f"{shown}: {key}")
+    if isinstance(value, bool) or not isinstance(value, int | float) or not LEAST <= value <= MOST:
+        raise InputError(f"{printable(value)} is not allowed: give a length of {LEAST:g} to {MOST:g} m", f"{shown}: {key}")
     return float(value)
 
 
@@ -409,9 +409,10 @@ def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]
             values = pd.to_numeric(frame[name]).to_numpy(dtype=float)
         except (TypeError, ValueError):
             raise InputError(f"{shown}: column {name!r} is not numeric") from None
-        bad = np.flatnonzero(~np.isfinite(values))
+        bad = np.flatnonzero(~(np.abs(values) <= MOST))
         if bad.size:
-            raise InputError(f"{shown}: column {name!r}, row {bad[0] + 1}: {values[bad[0]]} is not finite")
+            why = f"larger than {MOST:g}" if np.isfinite(values[bad[0]]) else "not finite"
+            raise InputError(f"{shown}: column {name!r}, row {bad[0] + 1}: {values[bad[0]]} is {why}")
         channels[name] = values
     if np.any(np.diff(channels["t"]) <= 0.0):
         raise InputError(f"{shown}: column 't' does not increase")

@@ -19,6 +19,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rockcheck.scenes import History, InputError, named_scenes
 from rockcheck.scenes.errors import inert, printable
 from rockcheck.scenes.progress import OnProgress, announcing
+from rockcheck.scenes.recordings.sets import Odd
 from rockcheck.scenes.writing import json_text, made
 
 if TYPE_CHECKING:
@@ -113,10 +114,12 @@ def tell_notes(history: History, of: str = "") -> None:
 
 
 def tell_left_out(names: Sequence[str], hint: str = "") -> None:
-    """Names the vertical components of a set of records, which are not played as if they were horizontal; `hint`: what plays them."""
-    if names:
-        said = f"vertical; {hint}" if hint else "vertical"
-        console().print(f"left out: {', '.join(names)} ({said})", style="yellow", soft_wrap=True)
+    """Names what of a set of records is not played: vertical components (`hint`: what plays them), and files that are no records."""
+    vertical = [name for name in names if not isinstance(name, Odd)]
+    said = f"vertical; {hint}" if hint else "vertical"
+    lines = [f"{', '.join(vertical)} ({said})"] if vertical else []
+    for line in [*lines, *(name for name in names if isinstance(name, Odd))]:
+        console().print(f"left out: {line}", style="yellow", soft_wrap=True)
 
 
 def answer(value: Any) -> None:
