@@ -114,11 +114,9 @@ def numbers(path: Path, lines: Iterable[tuple[int, str]], count: int = 0) -> lis
 
 def _columns(rows: list[tuple[int, str]], count: int) -> list[tuple[int, str]]:
     """The cells of so many numbers in columns of one width, as Fortran writes them; [] where the lines are not cut so."""
-    across = -(-count // len(rows))
-    width, uneven = divmod(len(rows[0][1]), min(across, count))
-    last = (count - across * (len(rows) - 1)) * width
-    lengths = {len(line) for _, line in rows[:-1]} - {across * width}
-    if uneven or lengths or len(rows[-1][1]) != last or not last > 0:
+    width, rest = divmod(sum(len(line) for _, line in rows), count)
+    uneven = len({len(line) for _, line in rows[:-1]}) > 1 or any(len(line) % width for _, line in rows if width)
+    if rest or uneven or not width:
         return []
     return [(n, line[k : k + width].strip()) for n, line in rows for k in range(0, len(line), width)]
 
