@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import PurePath
+from unicodedata import category
 
 from pydantic import ValidationError
 
@@ -46,6 +47,16 @@ def suggestion(name: str, allowed: Iterable[str]) -> str:
     hint = f"did you mean {near[0]!r}? " if near else ""
     more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     return f"; {hint}allowed: {', '.join(names[:MOST_NAMES])}{more}" if names else ""
+
+
+def inert(text: str) -> str:
+    """`text` without what steers a terminal or a page: control characters, and those that turn the order of what follows (U+202E).
+
+    Lines and every kind of blank stay.
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c == "\n" or category(c) == "Zs" else "?" for c in text)
 
 
 def printable(value: object, limit: int = 80) -> str:

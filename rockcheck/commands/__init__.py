@@ -17,9 +17,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from rockcheck.scenes import History, InputError, named_scenes
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes.errors import inert, printable
 from rockcheck.scenes.progress import OnProgress, announcing
-from rockcheck.scenes.writing import json_text
+from rockcheck.scenes.recordings.sets import Odd
+from rockcheck.scenes.writing import json_text, made
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -92,11 +93,7 @@ class _Screen(Console):
     """A console whose text steers no terminal: paths, and names in files that somebody sent, may hold any characters."""
 
     def print(self, *objects: Any, **options: Any) -> None:
-        super().print(*(_harmless(one) if isinstance(one, str) else one for one in objects), **options)
-
-
-def _harmless(text: str) -> str:
-    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
+        super().print(*(inert(one) if isinstance(one, str) else one for one in objects), **options)
 
 
 def console() -> Console:
@@ -120,10 +117,12 @@ def tell_notes(history: History, of: str = "") -> None:
 
 
 def tell_left_out(names: Sequence[str], hint: str = "") -> None:
-    """Names the vertical components of a set of records, which are not played as if they were horizontal; `hint`: what plays them."""
-    if names:
-        said = f"vertical; {hint}" if hint else "vertical"
-        console().print(f"left out: {', '.join(names)} ({said})", style="yellow", soft_wrap=True)
+    """Names what of a set of records is not played: vertical components (`hint`: what plays them), and files that are no records."""
+    vertical = [name for name in names if not isinstance(name, Odd)]
+    said = f"vertical; {hint}" if hint else "vertical"
+    lines = [f"{', '.join(vertical)} ({said})"] if vertical else []
+    for line in [*lines, *(name for name in names if isinstance(name, Odd))]:
+        console().print(f"left out: {line}", style="yellow", soft_wrap=True)
 
 
 def answer(value: Any) -> None:
@@ -194,7 +193,7 @@ def save_picture(figure: Figure, path: Path) -> None:
     """Write a figure as PNG, and say so."""
     from rockcheck.reports.style import save
 
-    (written,) = save(figure, path.with_suffix(""), ("png",))
+    (written,) = save(figure, path.with_suffix(""), ("png",), named=True)
     console().print(f"picture: {written}", soft_wrap=True)
 
 
@@ -209,10 +208,11 @@ def report_file(text: str) -> str:
     return path
 
 
-def usable_folder(path: Path) -> Path:
-    """`path`, made if need be; raises `InputError` where it cannot be written."""
+def usable_folder(folder: Path, *parts: str) -> Path:
+    """A folder, or one within it, made if need be; raises `InputError` where it cannot be written, or lies behind a link in `folder`."""
+    path = folder.joinpath(*parts)
     try:
-        path.mkdir(parents=True, exist_ok=True)
+        made(folder, *parts)
     except OSError as error:
         raise InputError(f"{printable(path)}: cannot be used as a folder: {error.strerror}") from None
     if not os.access(path, os.W_OK | os.X_OK):

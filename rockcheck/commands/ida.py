@@ -64,7 +64,7 @@ def run(
     if not words:
         raise InputError("no records are given: name files, a folder of them, or a pattern", "--record")
     motions, left_out = motions_of(files_of(words), reading_of(unit, time_step, column, header_lines, decimal, component))
-    folder = usable_folder(usable_folder(out) / IDA)
+    folder = usable_folder(out, IDA)
     with progress("ida") as on_progress:
         found = analyse(
             load_scene(scene),

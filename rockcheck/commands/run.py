@@ -9,6 +9,9 @@ from typing import Annotated, Any
 
 import typer
 
+from rockcheck.scenes import InputError
+from rockcheck.scenes.errors import printable
+from rockcheck.scenes.recordings.sets import record_path
 from rockcheck.commands import (
     OUT,
     AllowCodeOption,
@@ -90,7 +93,7 @@ def run(
     given = {name: value for name, value in reading if value is not None}
     if not words and (given or vertical or scale != 1.0):
         raise InputError("is missing: a unit, a scale or another option of records is given", "--record")
-    files = tuple(str(Path(word).absolute()) for word in words)
+    files = tuple(str(record_path(word, Path()).absolute()) for word in words)
     sets = [RecordSet(files=files, scale=scale, vertical=vertical, **given)] if files else []
     suite = scene_suite(scene, chosen_models(models, settings or ()), records=sets, allow_code=allow_code or ())
     folder = usable_folder(out)

@@ -117,7 +117,7 @@ def run(
     motions, left_out = motions_of(files_of(words), Reading())
     tell_left_out(left_out)
     folder = usable_folder(out)
-    data = usable_folder(folder / SPECTRA)
+    data = usable_folder(folder, SPECTRA)
     formats = ("svg", "png", "pdf") if printed else ("svg",)
     screen = console()
     with contextlib.ExitStack() as stack:

@@ -82,7 +82,7 @@ def run(
     if history is not None and report:
         from rockcheck.reports.studies.trend import write_trend
 
-        console().print(f"trend: {write_trend(moments, usable_folder(folder / TREND))}", soft_wrap=True)
+        console().print(f"trend: {write_trend(moments, usable_folder(folder, TREND))}", soft_wrap=True)
     page = published(folder, jobs) if report else kept
     console().print(f"report: {page}", soft_wrap=True)
     answer(summary(finished) | {"report": page})

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from rockcheck.scenes import History, InputError, ModelFailure, Scene
+from rockcheck.scenes.base import MOST
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.execute.models import build_own, family, is_own
 from rockcheck.validation.execute.pool import Call, Pool
@@ -131,8 +132,8 @@ def _numerical(task: Task, history: History) -> dict[str, Any] | None:
 
 def _not_finite(history: History) -> str:
     for name, column in history.channels.items():
-        if column.dtype.kind == "f" and not np.all(np.isfinite(column)):
-            row = int(np.flatnonzero(~np.isfinite(column))[0])
+        if column.dtype.kind == "f" and not np.all(np.abs(column) <= MOST):  # NaN, too
+            row = int(np.flatnonzero(~(np.abs(column) <= MOST))[0])
             return f"{name} is {column[row]} at t = {history.channels['t'][row]:g} s"
     if len(history.channels["t"]) == 0:
         return "the history is empty"

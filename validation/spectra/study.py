@@ -22,7 +22,7 @@ from rockcheck.ebm import EventBasedModel, Spectrum, overturning_spectrum
 from rockcheck.ebm.horizon import other_law
 from rockcheck.ebm.spectrum import LEFT, RIGHT, TOLERANCE, Floats
 from rockcheck.scenes import Floor, InputError, Ricker, Scene, Wall
-from rockcheck.scenes.reading import read_arrays
+from rockcheck.scenes.reading import read_arrays, read_json, within
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.scenes.threads import threads
 from rockcheck.scenes.writing import table_text, write_whole
@@ -246,14 +246,14 @@ def stem(name: str, model: str) -> str:
 def read_index(folder: Path) -> SpectraIndex:
     """`spectra.json` of a folder; empty where there is none that this version can read."""
     try:
-        return SpectraIndex.model_validate_json((folder / "spectra.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return SpectraIndex.model_validate(read_json(within(folder, "spectra.json")))
+    except ValueError:
         return SpectraIndex()
 
 
 def read_spectrum(folder: Path, record: SpectrumRecord, scene: Scene) -> Spectrum:
     """A spectrum of a folder as it was saved, of this scene."""
-    data = read_arrays(folder / f"{record.name}.npz")
+    data = read_arrays(within(folder, f"{record.name}.npz"))
     return Spectrum(
         outcomes=data["outcomes"],
         frequency_ratios=data["frequency_ratios"],

@@ -11,6 +11,7 @@ import tomlkit
 
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.suite.results import Check, Run
 from rockcheck.validation.suite.suites import Suite
@@ -40,7 +41,7 @@ def accept(suite: Suite, run: Run, reason: str | None, *, write: bool = True) ->
 
 def _accept(suite: Suite, run: Run, reason: str | None, changes: list[str], refused: list[str], write: bool) -> None:
     path = suite.tolerances_path
-    document = tomlkit.parse(path.read_text(encoding="utf-8")) if path.exists() else tomlkit.document()
+    document = tomlkit.parse(read_text(path)) if path.exists() else tomlkit.document()
     tables: Any = document.setdefault("tolerances", tomlkit.table()) if path == suite.path else document
     before = len(changes)
     for cell, check in run.checks():

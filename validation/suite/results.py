@@ -12,16 +12,16 @@ Nothing here knows how a cell is simulated, compared or shown.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path, PurePath
 from typing import Any, Literal
 
 from pydantic import Field, ValidationError, field_validator
 
 from rockcheck.scenes import InputError, Scene
-from rockcheck.scenes.errors import from_validation, printable
-from rockcheck.scenes.reading import read_text
-from rockcheck.scenes.writing import write_whole
+from rockcheck.scenes.errors import from_validation, printable, suggestion
+from rockcheck.scenes.reading import read_json, within
+from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
 from rockcheck.validation.discrepancy.impact_laws import LawFollowed
 from rockcheck.validation.uncertainty.inputs import Inputs
@@ -284,8 +284,7 @@ class Run(Stored):
 
     def save(self, folder: Path) -> Path:
         """Write `run.json` and its schema into `folder` (made if need be), each whole or not at all; returns run.json's path."""
-        folder.mkdir(parents=True, exist_ok=True)
-        write_whole(folder / SCHEMA_FILE, json.dumps(schema(), indent=1, sort_keys=True) + "\n")
+        write_whole(made(folder) / SCHEMA_FILE, json.dumps(schema(), indent=1, sort_keys=True) + "\n")
         return write_whole(folder / RUN_FILE, _by_line(json.loads(self.model_dump_json())))
 
     @classmethod
@@ -294,18 +293,25 @@ class Run(Stored):
         path = Path(folder) / RUN_FILE
         if not path.exists():
             raise InputError(f"{printable(path)}: no finished run here")
-        text = read_text(path)
-        try:
-            data = json.loads(text)
-        except (ValueError, RecursionError) as error:
-            raise InputError(f"{printable(path)}: not a run written by rockcheck: {printable(error)}") from None
+        data = read_json(within(path.parent, RUN_FILE))
         if isinstance(data, dict) and data.get("format") != FORMAT:
             found = f"format {printable(data['format'])}; this version reads {FORMAT}" if "format" in data else "not the run of a suite"
             raise InputError(f"{printable(path)}: {found}")
         try:
-            return cls.model_validate(data)
+            run = cls.model_validate(data)
         except ValidationError as error:
             raise InputError(f"{printable(path)}: {from_validation(error)}") from None
+        for key, names, allowed in run._named():
+            if unknown := sorted(set(names) - set(allowed)):
+                raise InputError(f"{printable(path)}: {key}: {printable(unknown[0])!r} is not in the run{suggestion(unknown[0], allowed)}")
+        return run
+
+    def _named(self) -> Iterator[tuple[str, Iterable[str], Collection[str]]]:
+        """What names a part of the run, by its key, and the names that there are."""
+        ensembles = {one.name for one in self.ensembles}
+        yield "reference", [self.reference], self.models
+        yield "cells.model", (cell.model for cell in self.cells), self.models
+        yield "cells.scene", (cell.scene for cell in self.cells), {*self.scenes, *ensembles}
 
 
 def worst(verdicts: Iterator[Any] | list[Any]) -> Verdict:

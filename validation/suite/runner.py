@@ -19,7 +19,7 @@ from pydantic import field_validator
 
 from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.progress import OnProgress, unheard
-from rockcheck.scenes.writing import write_whole
+from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.discrepancy.compare import compare, describe, evaluate, too_short
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
 from rockcheck.validation.discrepancy.impact_laws import LawFollowed
@@ -272,8 +272,7 @@ def run_suite(
 def _fault(item: Planned, traceback: str, folder: Path) -> dict[str, Any]:
     """Keeps the traceback of an exception that no model may raise; returns what the cell says of it. In a user's own model it is that
     model's fault, not rockcheck's."""
-    (folder / FAULTS).mkdir(exist_ok=True)
-    path = write_whole(folder / FAULTS / f"{item.name}.txt", traceback)
+    path = write_whole(made(folder, FAULTS) / f"{item.name}.txt", traceback)
     return {"traceback": f"{FAULTS}/{path.name}", "unexpected": not is_own(item.variant.family_name)}
 
 

@@ -7,7 +7,7 @@ from collections.abc import Container, Iterator
 
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes.errors import inert, printable
 from rockcheck.scenes.writing import markdown_table
 from rockcheck.validation.suite.results import Cell, Check, Run, Strict
 from rockcheck.validation.suite.tables import (
@@ -41,8 +41,7 @@ def junit(run: Run) -> str:
             suite.add_testcase(_case("tolerances", fault, Failure(fault)))
         document.append(suite)
     document.update_statistics()
-    text = bytes(document.tostring()).decode()
-    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text) + "\n"  # XML knows no control characters
+    return inert(bytes(document.tostring()).decode()) + "\n"  # XML knows no control characters
 
 
 def _cases(cell: Cell, strict: Strict) -> Iterator[TestCase]:
