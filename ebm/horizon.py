@@ -9,7 +9,7 @@ from itertools import chain
 import numpy as np
 
 from rockcheck.ebm.core.rules import FLAT_LANDING, NAMES
-from rockcheck.ebm.model import EventBasedModel
+from rockcheck.ebm.model import EventBasedModel, ImpactLaw
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.scene import Scene
 
@@ -27,17 +27,17 @@ def predictability_horizon(
 
     The scene is played by `model` (default: the unilateral one at tolerance 1e-13) as it is and with a relative
     `perturbation` of either sign of its excitation and of its initial state; a rotation or velocity that is zero gets that
-    part of alpha, of alpha p and of R alpha p. The horizon is the last output time up to which all rotations stay within
-    `allowed` (alpha) of the undisturbed ones; the scene's duration where they always do.
+    part of alpha, alpha p or R alpha p. The horizon is the last output time up to which all rotations
+    stay within `allowed` (alpha) of the undisturbed ones; the scene's duration where they always do.
 
     With 1e-6 and 1e-3 it is the time in which the motion amplifies an error a thousandfold. Beyond it an error of 1e-4 alpha,
     as a good engine has, has grown to a tenth of the motion. How far two histories are apart then depends on the scene, not on
     the models. It is the ratio that matters: with 1e-7 and 1e-4 the horizon of El Centro is the same. Deterministic.
     The model's tolerance has to be well below the perturbation. Raises what `simulate` raises.
 
-    Where several contacts are struck at once, as when a block lands flush against a bouncing wall or flat on the floor while it
-    slides, the scene is played under the `other_laws` of impacts, too: histories mean the same only as long as they do not depend on
-    the law.
+    Where several contacts are struck at once, as when a block lands flush against a bouncing wall or
+    flat on the floor, the scene is played under the `other_laws` of impacts, too: histories mean the
+    same only as long as they do not depend on the law.
     """
     model = model or EventBasedModel(pivot="unilateral", tolerance=1e-13)
     played = model.simulate(scene)
@@ -53,30 +53,38 @@ def predictability_horizon(
 
 
 def may_fly(scene: Scene) -> bool:
-    """Whether the block can leave the floor, and so land flat: beside a wall, dropped, from a floor that bounces or falls away."""
-    return bool(scene.walls) or scene.initial_height > 0.0 or scene.floor.restitution > 0.0 or scene.vertical.kind != "rest"
+    """Whether the block can leave the floor, and so land flat."""
+    lifted = scene.initial_height > 0.0 or scene.vertical.kind != "rest"
+    return lifted or bool(scene.walls) or scene.floor.restitution > 0.0
 
 
-def other_laws(model: EventBasedModel, *, walls: bool, flat: bool) -> tuple[str, ...]:
-    """The laws of impacts under which a model's motion is to be the same, for it to be trusted: beside walls, and where it lands flat."""
-    if model.pivot != "unilateral":
-        return ()
-    laws = ("moreau", *(("floor-first",) if walls else ()), *(("leading-first", "trailing-first") if flat else ()))
+def other_laws(model: EventBasedModel, *, walls: bool, flat: bool) -> tuple[ImpactLaw, ...]:
+    """The laws of impacts under which a model's motion is to be the same, for it to be trusted.
+
+    `walls`: beside walls; `flat`: where it lands flat.
+    """
+    laws: list[ImpactLaw] = ["moreau"] if model.pivot == "unilateral" else []
+    if laws and walls:
+        laws.append("floor-first")
+    if laws and flat:
+        laws += ["leading-first", "trailing-first"]
     return tuple(law for law in laws if law != model.impacts)
 
 
 def _disturbed(scene: Scene, model: EventBasedModel, perturbation: float) -> Iterator[tuple[EventBasedModel, Scene]]:
-    """A base motion a little stronger or weaker; a start a little farther from rest or nearer to it, or a little off zero."""
-    alpha, p = scene.block.alpha, scene.frequency_parameter
-    units = {"initial_rotation": alpha, "initial_angular_velocity": alpha * p, "initial_velocity": scene.block.radius * alpha * p}
+    """A base motion a little stronger or weaker; a start farther from rest, nearer to it or off zero."""
+    alpha, rate = scene.block.alpha, scene.block.alpha * scene.frequency_parameter
+    speed = scene.block.radius * rate
+    units = {"initial_rotation": alpha, "initial_angular_velocity": rate, "initial_velocity": speed}
     given = {name: value for name in START if (value := getattr(scene, name)) != 0.0}
     for change in (-perturbation, perturbation):
         if scene.excitation.kind != "rest" or scene.vertical.kind != "rest":
             factor = 1.0 + change
             yield model, scene.replace(excitation=scene.excitation.scaled(factor), vertical=scene.vertical.scaled(factor))
         farther = {name: value + change * value for name, value in given.items()}
-        for start in (farther, *({name: change * unit} for name, unit in units.items() if name not in given)):
-            with suppress(InputError):  # it would be inside a wall, or slip where the model never does
+        zeros = [{name: change * unit} for name, unit in units.items() if name not in given]
+        for start in (farther, *zeros):
+            with suppress(InputError):  # inside a wall, or slip where the model never does
                 disturbed = scene.replace(**start)
                 model.check(disturbed)
                 yield model, disturbed

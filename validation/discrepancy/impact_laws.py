@@ -1,4 +1,4 @@
-"""Which law of impacts a model followed where a block landed flush against a bouncing wall, or flat on the floor while it slid.
+"""Which law of impacts a model followed where a block landed flush against a bouncing wall or flat.
 
 Rigid-body mechanics leaves several answers there (docs/theory.md, "Several impacts at one instant"). This names the one that a
 history took, without judging it.
@@ -7,20 +7,20 @@ history took, without judging it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.horizon import FLAT, may_fly
+from rockcheck.ebm.model import ImpactLaw
 from rockcheck.scenes import History, Scene
 from rockcheck.validation.discrepancy.figures import Stored
 
-Law = Literal["closed", "open", "floor-first", "moreau", "leading-first", "trailing-first"]
-#: The laws that part where a block lands flush against a wall, and where it lands flat; "moreau": both bottom corners at once.
-FLUSH_LAWS: tuple[Law, ...] = ("closed", "open", "floor-first")
-FLAT_LAWS: tuple[Law, ...] = ("moreau", "leading-first", "trailing-first")
+#: The laws that part where a block lands flush against a wall, and where it lands flat; "moreau":
+#: both bottom corners at once.
+FLUSH_LAWS: tuple[ImpactLaw, ...] = ("closed", "open", "floor-first")
+FLAT_LAWS: tuple[ImpactLaw, ...] = ("moreau", "leading-first", "trailing-first")
 #: How long (s) a history is looked at before and after such a landing.
 WINDOW = 0.1
 #: Rotations (alpha) nearer than this are one motion; laws whose motions stay nearer than TELLS are not distinguished.
@@ -39,7 +39,7 @@ class LawFollowed(Stored):
 
     t: float
     law: str
-    errors: dict[Law, float]
+    errors: dict[ImpactLaw, float]
     spread: float
 
     @property
@@ -58,7 +58,7 @@ class Landing(Stored):
     t: float
     start: int
     parts: int
-    branches: dict[Law, tuple[float, ...]]
+    branches: dict[ImpactLaw, tuple[float, ...]]
 
     def followed_by(self, history: History, scene: Scene) -> LawFollowed | None:
         """The law that a history of the scene followed; None where it ends before, or was on its own way before."""
@@ -69,12 +69,13 @@ class Landing(Stored):
         own = np.asarray(history.channels["theta"][self.start : self.start + rows], dtype=float) / scene.block.alpha
         motions = {law: np.array(motion[:rows]) for law, motion in self.branches.items()}
         errors = {law: _rms((own - motion)[first:]) for law, motion in motions.items()}
-        nearest: Law = min(errors, key=lambda law: errors[law])
+        nearest: ImpactLaw = min(errors, key=lambda law: errors[law])
         apart = {law: motions[law] - motions[nearest] for law in motions}
         others = [_rms(distance[first:]) for distance in apart.values() if np.max(np.abs(distance)) > TELLS]
         if not others or _rms((own - motions[nearest])[:first]) > NEAR * min(others):
             return None
-        alike = [law for law, distance in apart.items() if np.max(np.abs(distance)) <= TELLS]
+        known = (law for law in (*FLUSH_LAWS, *FLAT_LAWS) if law in apart)  # a store does not keep their order
+        alike = [law for law in known if np.max(np.abs(apart[law])) <= TELLS]
         law = " or ".join(alike) if errors[nearest] < NEAR * min(others) else "none"
         return LawFollowed(t=self.t, law=law, errors=errors, spread=min(others))
 
@@ -82,8 +83,8 @@ class Landing(Stored):
 def parting_landing(scene: Scene) -> Landing | None:
     """The first landing of a scene at which the laws part; None where there is no such landing.
 
-    Played by the unilateral event-based model at tolerance 1e-13, and under each law where a wall bounces or the block lands flat.
-    Raises what `simulate` raises.
+    Played by the unilateral event-based model at tolerance 1e-13: under the laws of the one kind
+    where a wall bounces, under those of the other where the block lands flat. Raises what `simulate` raises.
     """
     laws = [FLUSH_LAWS] if any(wall.restitution > 0.0 for wall in scene.walls) else []
     if may_fly(scene) and FLAT in _played(scene, "moreau").cost.rules:
@@ -92,7 +93,7 @@ def parting_landing(scene: Scene) -> Landing | None:
     return min(found, key=lambda landing: landing.t, default=None)
 
 
-def _parting(scene: Scene, laws: Sequence[Law]) -> Landing | None:
+def _parting(scene: Scene, laws: Sequence[ImpactLaw]) -> Landing | None:
     """The first landing at which these laws part."""
     motions = {law: np.asarray(_played(scene, law).channels["theta"]) / scene.block.alpha for law in laws}
     rows = min(len(motion) for motion in motions.values())
@@ -113,7 +114,7 @@ def law_followed(scene: Scene, history: History) -> LawFollowed | None:
     return None if landing is None else landing.followed_by(history, scene)
 
 
-def _played(scene: Scene, law: Law) -> History:
+def _played(scene: Scene, law: ImpactLaw) -> History:
     """The scene under one law."""
     return EventBasedModel(pivot="unilateral", tolerance=1e-13, impacts=law).simulate(scene)
 

@@ -150,7 +150,8 @@ def other_settings(panel: Panel, request: SpectrumRequest) -> list[dict[str, Any
 def play_panels(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, *, all_laws: bool = False) -> list[Spectrum]:
     """The spectra of the panels, in order; on a cluster all at once, here one after the other on all cores. Raises `InputError`.
 
-    With `all_laws` they are played under the other laws of impacts, too, where these can matter, and know the nodes at which they do.
+    With `all_laws` they are played under the other laws of impacts, too, where these can matter, and
+    know the nodes at which they do.
     """
 
     def played(panel: Panel, settings: Mapping[str, Any]) -> Spectrum:
@@ -180,7 +181,7 @@ def play_panels(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles,
 
 
 def differing(spectrum: Spectrum, others: Sequence[Spectrum]) -> NDArray[np.int64]:
-    """The nodes (i, j), a row each, that are decided and differ from one of the others that are."""
+    """The nodes (i, j), a row each, that are decided and differ in one of the others, decided, too."""
     differ = np.zeros(spectrum.outcomes.shape, dtype=bool)
     for other in others:
         own = spectrum.outcomes != other.outcomes

@@ -13,11 +13,12 @@ stage, the set A. In it the impulses p_j and the velocities u_j across the conta
   these is the branch "closed", the second "open", whatever e.
 - "floor-first": one contact after another, in the order of neighbouring trajectories: first the floor, then each wall corner when
   it would arrive had the wall stood a little farther off.
-- "leading-first", "trailing-first": as "moreau", but of two bottom corners that approach the floor together only one takes part, that
-  on the side to which the block slides or the other one. They are the limits of trajectories with a tilt to either side.
+- "leading-first", "trailing-first": as "moreau", but of two bottom corners that approach the floor
+  together only one takes part, that on the side to which the block slides or the other one. On a
+  floor that does not bounce they are the limits of trajectories with a tilt to either side.
 
-The first two differ where a block lands flush against a bouncing wall, the last two from these where it lands flat while it slides.
-No law that is right there follows from rigid-body mechanics.
+The first two differ where a block lands flush against a bouncing wall, the last two from these
+where it lands flat while it slides. No law that is right there follows from rigid-body mechanics.
 """
 
 from __future__ import annotations
@@ -28,7 +29,15 @@ import math
 import numpy as np
 
 from rockcheck.ebm.core.contacts import CLOSED, SLOW
-from rockcheck.ebm.core.motion import CLOSED_BRANCH, FLOOR_FIRST, LEADING_FIRST, MOREAU, OPEN_BRANCH, TRAILING_FIRST, side_of
+from rockcheck.ebm.core.motion import (
+    CLOSED_BRANCH,
+    FLOOR_FIRST,
+    LEADING_FIRST,
+    MOREAU,
+    OPEN_BRANCH,
+    TRAILING_FIRST,
+    side_of,
+)
 from rockcheck.ebm.core.series import NOISE, POSITION
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
@@ -227,11 +236,13 @@ def _moreau(law, touching, approach, restitution, rounding, taking):
 
 @inner_kernel
 def _one_corner(law, approach, slip, taking):
-    """Of two bottom corners that approach the floor together, only the one that the law puts first takes part.
+    """Of two bottom corners that approach the floor only the one that the law puts first takes part.
 
     F stands on the side of negative slip. Without slip neither leads, and both take part.
     """
-    if (law == LEADING_FIRST or law == TRAILING_FIRST) and max(approach[F], approach[E]) < -SLOW and abs(slip) >= SLOW:
+    if law != LEADING_FIRST and law != TRAILING_FIRST:
+        return
+    if max(approach[F], approach[E]) < -SLOW and abs(slip) >= SLOW:
         taking[E if (slip < 0.0) == (law == LEADING_FIRST) else F] = 0.0
 
 
