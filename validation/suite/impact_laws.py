@@ -44,7 +44,7 @@ def landing_of(store: Store, scene: Scene) -> Landing | None:
 def under_other_laws(scene: Scene, variant: ModelVariant) -> dict[str, History]:
     """What a reference does under the other laws, by law; those under which it fails, or has no law to choose, are left out."""
     model = None if is_own(variant.family_name) else build(variant.family_name, variant.settings)
-    found = {}
+    found: dict[str, History] = {}
     if isinstance(model, EventBasedModel):
         for law in other_laws(model, walls=bool(scene.walls), flat=True):
             with suppress(ModelFailure):
