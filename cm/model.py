@@ -199,6 +199,7 @@ class ContinuousModel(Frozen):
         memory = np.zeros((2 * len(kernels.SURFACES), len(kernels.COLUMNS)))
         memory[:, kernels.STRUCK] = math.inf
         memory[:, kernels.LAST_CLOSED] = -math.inf
+        memory[:, kernels.STIFFNESS] = k
         memory[:, kernels.DAMPING] = np.repeat(2.0 * math.sqrt(k) * np.array(parameters.damping_ratio), 2)
         for wall in scene.walls:
             if kinematics.wall_gap(scene, wall.side, x, tilt) < TOUCHING:

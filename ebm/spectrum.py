@@ -44,7 +44,7 @@ class Spectrum(Shown):
     `outcomes[i, j]` is -1 (overturned left, counterclockwise), 0 (safe) or +1 (right, clockwise) at `amplitude_ratios[i]`
     (a_p / (g tan alpha)) and `frequency_ratios[j]` (omega_p / p). `evaluations` counts the runs, fewer than nodes where only
     the boundary was refined. `undecided` lists the nodes (i, j) whose run failed: their outcome says 0, but `safe` excludes them.
-    `depends_on_law` lists the nodes whose outcome is another one under the other law of impacts; None where that was not looked at.
+    `depends_on_law` lists the nodes whose outcome is another one under another law of impacts; None where that was not looked at.
     """
 
     outcomes: NDArray[np.int8]

@@ -13,18 +13,21 @@ from pathlib import Path
 import numpy as np
 
 from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.horizon import other_laws
 from rockcheck.scenes import Scene
 from rockcheck.validation.suite.results import Run
 
-#: Largest difference of rotation (alpha) between the two laws at which a scene does not depend on them.
+#: Largest difference of rotation (alpha) between laws at which a scene does not depend on them.
 SAME = 1e-6
 
 
 def depends_on_law(scene: Scene) -> bool:
-    """Whether the reference's motion is another one under the other law of impacts."""
-    one, other = (EventBasedModel(pivot="unilateral", impacts=law).simulate(scene).channels["theta"] for law in ("moreau", "floor-first"))
-    rows = min(len(one), len(other))
-    return bool(np.max(np.abs(one[:rows] - other[:rows])) > SAME * scene.block.alpha)
+    """Whether the reference's motion is another one under another law of impacts."""
+    model = EventBasedModel(pivot="unilateral")
+    models = [model.model_copy(update={"impacts": law}) for law in other_laws(model, walls=True, flat=True)]
+    motions = [one.simulate(scene).channels["theta"] for one in (model, *models)]
+    rows = min(map(len, motions))
+    return bool(np.max(np.ptp([motion[:rows] for motion in motions], axis=0)) > SAME * scene.block.alpha)
 
 
 def main(folder: Path) -> None:

@@ -9,12 +9,11 @@ import numpy as np
 import typer
 from rich.table import Table
 
-from rockcheck.commands import answer, check_picture, console, save_picture
+from rockcheck.commands import answer, check_picture, console, save_picture, tell_left_out
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.recordings import UNITS, Reading, Recording, intensity, read_components
 from rockcheck.scenes.recordings.sets import Odd, files_of
-from rockcheck.commands import answer, check_picture, console, save_picture, tell_left_out
 
 UnitOption = Annotated[str | None, typer.Option("--unit", help=f"Unit of the accelerations: {', '.join(UNITS)}.")]
 TimeStepOption = Annotated[float | None, typer.Option("--time-step", help="Time step, s, where the file has no times.")]

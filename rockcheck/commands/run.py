@@ -9,9 +9,6 @@ from typing import Annotated, Any
 
 import typer
 
-from rockcheck.scenes import InputError
-from rockcheck.scenes.errors import printable
-from rockcheck.scenes.recordings.sets import record_path
 from rockcheck.commands import (
     OUT,
     AllowCodeOption,
@@ -40,6 +37,7 @@ from rockcheck.commands.record import (
 from rockcheck.commands.simulate import setting_of
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.recordings.sets import record_path
 from rockcheck.validation.execute import remote, workers
 from rockcheck.validation.execute.models import FAMILIES, family, is_own, not_installed
 from rockcheck.validation.suite.record_sets import RecordSet

@@ -193,10 +193,10 @@ def _spectra(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, da
     drawn: list[Future[float]] = []
     with threads(1) as drawing:
         with progress("spectra") as on_progress:
-            laws = sum(other_settings(panel, request) is not None for panel in panels)
+            laws = sum(len(other_settings(panel, request)) for panel in panels)
             tiles.count = Count(on_progress, nodes * (len(panels) + laws))
             for group in groups:
-                found = play_panels(group, request, tiles, both_laws=True)
+                found = play_panels(group, request, tiles, all_laws=True)
                 spectra += found
                 aside = sum(one.result() for one in drawn if one.done())
                 drawn.append(drawing.submit(_draw, group, found, request.model, data, formats))

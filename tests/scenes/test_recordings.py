@@ -18,7 +18,6 @@ from rockcheck.scenes.observation import scene_notes
 from rockcheck.scenes.recordings import Reading, intensity, read_components, read_record
 from rockcheck.scenes.recordings.recording import Recording
 from rockcheck.scenes.recordings.sets import _vertical_file, files_of, is_vertical, motions_of
-from rockcheck.commands.cli import main
 
 G = 9.80665
 STEP = 0.01

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel, Spectrum, overturning_spectrum
-from rockcheck.ebm.horizon import other_law
+from rockcheck.ebm.horizon import may_fly, other_laws
 from rockcheck.ebm.spectrum import LEFT, RIGHT, TOLERANCE, Floats
 from rockcheck.scenes import Floor, InputError, Ricker, Scene, Wall
 from rockcheck.scenes.reading import read_arrays, read_json, within
@@ -95,7 +95,7 @@ class SpectrumRecord(Stored):
     safe: float
     left: float
     right: float
-    #: How many nodes have another outcome under the other law of impacts; None where that was not looked at.
+    #: How many nodes have another outcome under another law of impacts; None where that was not looked at.
     depends_on_law: int | None = None
 
 
@@ -138,19 +138,20 @@ def axis(low: float, high: float, size: int, key: str) -> Floats:
     return np.linspace(low, high, size)
 
 
-def other_settings(panel: Panel, request: SpectrumRequest) -> dict[str, Any] | None:
-    """The model's settings with the other law of impacts; None where outcomes do not depend on it: beside no wall that bounces."""
+def other_settings(panel: Panel, request: SpectrumRequest) -> list[dict[str, Any]]:
+    """The model's settings with each other law of impacts on which outcomes may depend."""
     player = build(request.model, request.settings)
+    if not isinstance(player, EventBasedModel):
+        return []
     bounces = any(wall.restitution > 0.0 for wall in panel.scene.walls)
-    if not (bounces and isinstance(player, EventBasedModel) and player.pivot == "unilateral"):
-        return None
-    return {**request.settings, "impacts": other_law(player)}
+    return [{**request.settings, "impacts": law} for law in other_laws(player, walls=bounces, flat=may_fly(panel.scene))]
 
 
-def play_panels(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, *, both_laws: bool = False) -> list[Spectrum]:
+def play_panels(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, *, all_laws: bool = False) -> list[Spectrum]:
     """The spectra of the panels, in order; on a cluster all at once, here one after the other on all cores. Raises `InputError`.
 
-    With `both_laws` they are played under the other law of impacts, too, where that can matter, and know the nodes at which it does.
+    With `all_laws` they are played under the other laws of impacts, too, where these can matter, and
+    know the nodes at which they do.
     """
 
     def played(panel: Panel, settings: Mapping[str, Any]) -> Spectrum:
@@ -166,8 +167,8 @@ def play_panels(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles,
 
     def play(panel: Panel) -> Spectrum:
         spectrum = played(panel, request.settings)
-        settings = other_settings(panel, request) if both_laws else None
-        return spectrum if settings is None else replace(spectrum, depends_on_law=differing(spectrum, played(panel, settings)))
+        others = [played(panel, settings) for settings in (other_settings(panel, request) if all_laws else [])]
+        return replace(spectrum, depends_on_law=differing(spectrum, others)) if others else spectrum
 
     for panel in panels:
         check = getattr(build(request.model, request.settings), "check", None)
@@ -179,11 +180,14 @@ def play_panels(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles,
         return list(pool.map(play, panels))
 
 
-def differing(spectrum: Spectrum, other: Spectrum) -> NDArray[np.int64]:
-    """The nodes (i, j), a row each, that are decided in both and differ."""
-    differ = spectrum.outcomes != other.outcomes
-    for one in (spectrum, other):
-        differ[tuple(one.undecided.T)] = False
+def differing(spectrum: Spectrum, others: Sequence[Spectrum]) -> NDArray[np.int64]:
+    """The nodes (i, j), a row each, that are decided and differ in one of the others, decided, too."""
+    differ = np.zeros(spectrum.outcomes.shape, dtype=bool)
+    for other in others:
+        own = spectrum.outcomes != other.outcomes
+        for one in (spectrum, other):
+            own[tuple(one.undecided.T)] = False
+        differ |= own
     return np.argwhere(differ)
 
 

@@ -111,7 +111,7 @@ class Cell(Stored):
     path of its CSV relative to the run's folder. `read_back` is true where nothing that the cell depends on had changed.
     `figures` are all measures, judged or not; `checks` those with a tolerance or in need of one. `numerical` is the run's
     numerical uncertainty, where the suite asks for it, and `explanations` what it says of the differences.
-    `impact_law` is the law of impacts that the history followed at the scene's first flush landing, which nothing judges.
+    `impact_law` is the law of impacts that the history followed at the scene's first landing where laws part, which nothing judges.
     `overturned_at` is the time (s) at which the block lay, None for one that stays.
     `traceback` is the path of a file beside them: of an exception that no model may raise, which is `unexpected` where the
     model is one of rockcheck's own.

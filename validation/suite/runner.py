@@ -30,7 +30,7 @@ from rockcheck.validation.execute.models import is_own, not_installed
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store, name_of
 from rockcheck.validation.suite.confidence import explanations, inputs_of, key_of, numerical_of
 from rockcheck.validation.suite.ensembles import Ensemble
-from rockcheck.validation.suite.impact_laws import by_either, landing_of, under_the_other_law
+from rockcheck.validation.suite.impact_laws import by_any, landing_of, under_other_laws
 from rockcheck.validation.suite.results import Cell, CostRecord, EnsembleRecord, Run, Strict
 from rockcheck.validation.suite.suites import ModelVariant, Suite
 from rockcheck.validation.suite.tolerances import (
@@ -547,7 +547,7 @@ def _compute(
     for what in windowed:
         by_window.setdefault(what.window, []).append(what.measure)
     landing = landing_of(store, scene)
-    other = under_the_other_law(scene, reference.variant) if landing and reference else None
+    others = under_other_laws(scene, reference.variant) if landing and reference else {}
     for window, measures in by_window.items():
         until = horizon if window == HORIZON else float(window[:-1]) if window else None
         if yardstick is None:
@@ -556,8 +556,8 @@ def _compute(
         else:
             discrepancy = compare(yardstick, candidate, until=until, scene=scene, measures=measures)
             found, gaps[window] = discrepancy.figures, (discrepancy.gap, discrepancy.fall)
-            if other and landing and (until is None or until > landing.t):
-                found, own = by_either(discrepancy, *other, candidate, scene, until, measures)
+            if landing and (until is None or until > landing.t):
+                found, own = by_any(discrepancy, others, candidate, scene, until, measures)
                 gaps |= {str(Windowed(measure, window)): gap for measure, gap in own.items()}
         figures += [figure.model_copy(update={"window": window}) for figure in found] if window else found
     law = landing.followed_by(candidate, scene) if landing and yardstick is None else None

@@ -89,7 +89,7 @@ def _laws(run: Run, places: Container[str]) -> Iterator[str]:
     if not told:
         return
     models = [model for model in run.models if any(cell.model == model and cell.impact_law for cell in run.cells)]
-    yield from ("", "The law of impacts followed at the first landing flush against a bouncing wall (not judged):", "")
+    yield from ("", "The law of impacts followed at the first landing at which laws part (not judged):", "")
     found = {(cell.scene, cell.model): cell.impact_law.law for cell in run.cells if cell.impact_law}
     rows = ((_plain(scene), f"{t:.3f} s", *(found.get((scene, model), "") for model in models)) for scene, t in told.items())
     yield markdown_table(("scene", "landing", *map(_plain, models)), rows)
