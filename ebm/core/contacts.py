@@ -20,8 +20,13 @@ SLOW = 1e-9
 
 @inner_kernel
 def lower(b, z):
-    """The side of the lower corner, the pivot: that to which the block tips, or, upright, begins to tip."""
-    return side_of(b, z[THETA] if z[THETA] != 0.0 else z[W])
+    """The side of the lower corner, the pivot: that to which the block tips, or, upright, begins to tip; at rest the weaker one.
+
+    To rounding both corners of a block that stands are equally low. The weaker one, whose distance is the unit of length, is so to the
+    bit, and of a mirror image it is the mirror image.
+    """
+    sense = z[THETA] if z[THETA] != 0.0 else z[W]
+    return side_of(b, sense if sense != 0.0 else b.right.arm - b.left.arm)
 
 
 @inner_kernel

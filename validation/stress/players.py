@@ -170,10 +170,11 @@ def energy_without_source(scene: Scene, history: History) -> float:
     block stands, and where nothing but the base changes its velocity.
     """
     channels, block, gravity = history.channels, scene.block, scene.gravity
-    energy = kinematics.energy(block, gravity, *(channels[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")))
+    motion = [channels[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")]
+    energy = kinematics.energy(block, gravity, *motion)
+    _, right, up = kinematics.mass_motion(block, *motion)
     work, moved = np.zeros(len(energy)), np.zeros(len(energy))
-    for excitation, name in ((scene.excitation, "x_dot"), (scene.vertical, "y_dot")):
-        velocity = channels[name]
+    for excitation, velocity in ((scene.excitation, right), (scene.vertical, up)):
         impulse = -np.diff(_base_velocity(excitation, channels["t"]))
         part = 0.5 * (velocity[1:] + velocity[:-1]) * impulse
         work[1:] += np.cumsum(part)
