@@ -2,7 +2,8 @@
 
 A sample of all faults that the operators below can make, drawn with a seed: comparisons that include their limit or do not, signs,
 products for quotients, `and` for `or`, negated conditions, changed numbers. Each is planted in a copy of the packages, which is
-interpreted (NUMBA_DISABLE_JIT=1). Faults that survive are printed with file and line; those that nothing can notice are in EQUIVALENT.
+interpreted (NUMBA_DISABLE_JIT=1), but for the files in COMPILED. Faults that survive are printed with file and line; those that nothing
+can notice are in EQUIVALENT.
 Arguments: `--sample N` faults a file, `--seed N`, `--file NAME`, and after `--` what pytest is given too, such as `--deselect=FILE`.
 """
 
@@ -22,8 +23,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PARTS = ("scenes", "ebm", "cm", "engines", "validation", "reports")
 CLOSED = "tests/ebm/test_closed_forms.py::test_"
+UNCERTAINTY = "tests/validation/discrepancy/test_uncertainty.py"
 #: Where faults are planted, and the tests that should notice them, the quickest first.
 TARGETS = {
     "ebm/core/series.py": ["tests/ebm/core/test_core_parts.py"],
@@ -64,6 +65,33 @@ TARGETS = {
         "tests/ebm/test_edges.py",
     ],
     "ebm/core/march.py": ["tests/ebm/core/test_core_parts.py", "tests/ebm/test_edges.py"],
+    "scenes/block.py": ["tests/scenes/test_scene.py", "tests/ebm/test_loaded_blocks.py::test_pivots_of_a_block"],
+    "scenes/trust/inputs.py": ["tests/scenes/test_inputs.py", UNCERTAINTY, "-k", "inputs or scene_file or correlated or faults"],
+    "scenes/recordings/sets.py": ["tests/scenes/test_record_sets.py", "tests/scenes/test_recordings.py"],
+    "scenes/recordings/intensity.py": ["tests/scenes/test_recordings.py"],
+    "validation/uncertainty/verdict.py": [f"{UNCERTAINTY}::test_what_a_difference_says"],
+    "validation/uncertainty/numerical.py": [UNCERTAINTY, "-k", "index or order or step or interval_covers or own_error or peak_between"],
+    "validation/uncertainty/inputs.py": [
+        "tests/validation/discrepancy/test_propagation.py",
+        UNCERTAINTY,
+        "-k",
+        "propagation or sobol or refused",
+    ],
+    "validation/spectra/ida.py": ["tests/validation/studies/test_ida.py"],
+    "validation/spectra/fragility.py": [
+        "tests/validation/studies/test_spectra.py",
+        "-k",
+        "fragility or lognormal or curve or band or intensity",
+    ],
+    "ebm/horizon.py": ["tests/ebm/test_horizon.py"],
+}
+#: Files that are never compiled, whose tests play more motions than an interpreter can: what they call is compiled.
+COMPILED = {
+    "validation/uncertainty/numerical.py",
+    "validation/uncertainty/inputs.py",
+    "validation/spectra/ida.py",
+    "validation/spectra/fragility.py",
+    "ebm/horizon.py",
 }
 #: What hangs is noticed: after so long in the processor, or in twenty times that by the clock, which a busy machine does not reach.
 SECONDS = 180
@@ -171,16 +199,30 @@ def shown(node: ast.AST) -> str:
     return ast.unparse(node.test if isinstance(node, ast.If | ast.While) else node).replace("\n", " ")[:90]
 
 
+def compile_once(tree: Path) -> None:
+    """From now on what is compiled is kept under the hash of the plain sources, so that no fault compiles all anew."""
+    import numba
+
+    os.environ["NUMBA_DISABLE_JIT"] = "0"
+    numba.config.reload_config()
+    from rockcheck.scenes.compiled import _cache_folder
+
+    for part in ("ebm", "validation"):
+        _cache_folder(tree / "rockcheck" / part)
+
+
 def survives(tree: Path, name: str, source: str, arguments: list[str]) -> bool:
     """Whether all tests pass with this source; what hangs is noticed. In a process that begins with the libraries loaded."""
     path = tree / "rockcheck" / name
     plain = path.read_text(encoding="utf-8")
-    path.write_text(source, encoding="utf-8")
     child = os.fork()
     if child == 0:
         try:
             signal.setitimer(signal.ITIMER_PROF, SECONDS)
             signal.alarm(20 * SECONDS)
+            if name in COMPILED:
+                compile_once(tree)
+            path.write_text(source, encoding="utf-8")
             quiet = os.open(os.devnull, os.O_WRONLY)
             os.dup2(quiet, 1)
             os.dup2(quiet, 2)
@@ -212,8 +254,6 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder)
         shutil.copytree(ROOT / "rockcheck", tree / "rockcheck", ignore=shutil.ignore_patterns("__pycache__"))
-        for part in PARTS:
-            shutil.copytree(ROOT / part, tree / "rockcheck" / part, ignore=shutil.ignore_patterns("__pycache__"))
         sys.path.insert(0, folder)
         os.environ["PYTHONPATH"] = folder
         for library in ("numba", "pandas", "pydantic", "scipy.integrate", "scipy.stats"):

@@ -104,6 +104,16 @@ def test_every_import_is_a_declared_dependency(top):
             assert owners_of(name) & allowed, f"{path.relative_to(ROOT)} imports {name}, of {owners_of(name)}"
 
 
+def test_hints_name_packages_that_there_are():
+    """Nothing called rockcheck is released: who asks for it by name, or for an extra of it, may get a stranger's package."""
+    texts = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(path for top in FOLDERS.values() for path in (ROOT / top).rglob("*.py"))]
+    assert [str(path) for path in texts if re.search(r"pip install [^`\n]*rockcheck\[", path.read_text(encoding="utf-8"))] == []
+    for engine in (getattr(rockcheck, name) for name in rockcheck.engines.__all__):
+        if engine.module:
+            assert engine.package in names_of(one for extra in PROJECT["project"]["optional-dependencies"].values() for one in extra)
+            assert engine.package in owners_of(engine.module)
+
+
 def test_every_package_has_its_layer():
     """A folder that no layer names could import anything: `lint-imports` would not notice."""
     (layers,) = (one["layers"] for one in PROJECT["tool"]["importlinter"]["contracts"] if one["type"] == "layers")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -13,7 +14,7 @@ from rockcheck.scenes import InputError, load_scene
 from rockcheck.scenes.errors import unknown_name
 from rockcheck.scenes.recordings.sets import files_of, motions_of
 from rockcheck.scenes.writing import write_whole
-from rockcheck.validation.commands import OUT, JobsOption, OutOption, answer, console, progress, scene_names, tell_left_out, usable_folder
+from rockcheck.validation.commands import OUT, JobsOption, answer, console, out_option, progress, scene_names, tell_left_out, usable_folder
 from rockcheck.validation.commands.record import (
     ColumnOption,
     ComponentOption,
@@ -48,7 +49,7 @@ def run(
     header_lines: HeaderLinesOption = None,
     decimal: DecimalOption = None,
     component: ComponentOption = None,
-    out: OutOption = OUT,
+    out: Annotated[Path, out_option("ida/index.html")] = OUT,
     jobs: JobsOption = None,
 ) -> None:
     """Peak rotation against the intensity of records.
