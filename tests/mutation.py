@@ -69,7 +69,7 @@ TARGETS = {
     "scenes/trust/inputs.py": ["tests/scenes/test_inputs.py", UNCERTAINTY, "-k", "inputs or scene_file or correlated or faults"],
     "scenes/recordings/sets.py": ["tests/scenes/test_record_sets.py", "tests/scenes/test_recordings.py"],
     "scenes/recordings/intensity.py": ["tests/scenes/test_recordings.py"],
-    "validation/uncertainty/verdict.py": [f"{UNCERTAINTY}::test_what_a_difference_says"],
+    "validation/uncertainty/verdict.py": [UNCERTAINTY, "-k", "what_a_difference_says"],
     "validation/uncertainty/numerical.py": [UNCERTAINTY, "-k", "index or order or step or interval_covers or own_error or peak_between"],
     "validation/uncertainty/inputs.py": [
         "tests/validation/discrepancy/test_propagation.py",

@@ -321,12 +321,23 @@ def test_repeats_that_end_differently_have_no_mean():
         (0.03, 0.02, 0.01, 0.04, verdict.DATA),
         (0.10, 0.03, 0.04, 0.0, "not explained: model form or set-up, at least 0.05 alpha"),
         (0.10, None, 0.04, 0.0, verdict.NOT_CONVERGED),
+        (None, 0.02, 0.04, 0.0, verdict.NOT_CONVERGED),
+        (0.02, 0.02, 0.0, 0.0, verdict.NUMERICAL),  # at the limit it is within it
+        (0.04, 0.0, 0.04, 0.0, verdict.INPUTS),
+        (0.03, 0.02, 0.03, 0.03, verdict.INPUTS),
     ],
 )
 def test_what_a_difference_says(error, u_num, u_input, u_data, said):
     found = verdict.explain("theta_rms", "alpha", error, u_num, u_input, u_data)
     assert found.verdict == said
     assert found.explained == (said in (verdict.NUMERICAL, verdict.INPUTS, verdict.DATA))
+
+
+def test_what_a_difference_says_where_nothing_is_known_of_inputs_and_tests():
+    found = verdict.explain("theta_rms", "alpha", 0.1, 0.04)
+    assert (found.u_input, found.u_data, found.u_val) == (0.0, 0.0, 0.04)
+    assert found.verdict == "not explained: model form or set-up, at least 0.06 alpha"
+    assert verdict.Explanation(quantity="theta_rms", unit="alpha", error=0.1, u_num=0.04, verdict="").u_val == 0.04
 
 
 def test_bias_and_scatter_are_recovered_and_cover():
