@@ -68,7 +68,7 @@ TARGETS = {
     "scenes/block.py": ["tests/scenes/test_scene.py", "tests/ebm/test_loaded_blocks.py::test_pivots_of_a_block"],
     "scenes/trust/inputs.py": ["tests/scenes/test_inputs.py", UNCERTAINTY, "-k", "inputs or scene_file or correlated or faults"],
     "scenes/recordings/sets.py": ["tests/scenes/test_record_sets.py", "tests/scenes/test_recordings.py"],
-    "scenes/recordings/intensity.py": ["tests/scenes/test_recordings.py"],
+    "scenes/recordings/intensity.py": ["tests/scenes/test_recordings.py", "-k", "intensities or spectral or periods"],
     "validation/uncertainty/verdict.py": [UNCERTAINTY, "-k", "what_a_difference_says"],
     "validation/uncertainty/numerical.py": [UNCERTAINTY, "-k", "index or order or step or interval_covers or own_error or peak_between"],
     "validation/uncertainty/inputs.py": [
