@@ -147,6 +147,27 @@ def test_the_facade_has_every_public_name():
         rockcheck.Blok  # noqa: B018
 
 
+def test_the_facade_shows_what_is_public():
+    code = "import rockcheck; print(dir(rockcheck) == sorted(rockcheck.__all__))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "True"
+
+
+@pytest.mark.parametrize(
+    ("call", "key", "wanted"),
+    [
+        (lambda: rockcheck.compare(1, 2), "reference", "History"),
+        (lambda: rockcheck.EventBasedModel().simulate("fig5a"), "scene", "Scene"),
+        (lambda: rockcheck.ContinuousModel().simulate("fig5a"), "scene", "Scene"),
+        (lambda: rockcheck.MuJoCo().simulate("fig5a"), "scene", "Scene"),
+        (lambda: rockcheck.overturning_spectrum("fig5a", [1.0, 2.0], [1.0, 2.0]), "scene", "Scene"),
+        (lambda: rockcheck.predictability_horizon("fig5a"), "scene", "Scene"),
+    ],
+)
+def test_what_is_no_scene_or_history_is_named(call, key, wanted):
+    with pytest.raises(rockcheck.InputError, match=f"{key}: .* is not allowed: give a {wanted}"):
+        call()
+
+
 def test_importing_rockcheck_loads_nothing_heavy():
     code = "import sys, rockcheck; print(sorted({'numpy', 'numba', 'pandas', 'pydantic', 'mujoco'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
