@@ -12,13 +12,14 @@ from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
+from setuptools import find_packages
 
 import rockcheck
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-PACKAGES = PROJECT["tool"]["setuptools"]["packages"]
-FOLDERS = PROJECT["tool"]["setuptools"]["package-dir"]
+PACKAGES = find_packages(str(ROOT), **{key: PROJECT["tool"]["setuptools"]["packages"]["find"][key] for key in ["include"]})
+FOLDERS = {f"rockcheck.{link.name}": link.name for link in (ROOT / "rockcheck").iterdir() if link.is_symlink()} | {"rockcheck": "rockcheck"}
 
 
 def names_of(requirements: list[str]) -> set[str]:

@@ -11,6 +11,7 @@ import os
 import signal
 import threading
 import time
+import traceback
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -43,6 +44,36 @@ class Call:
     seconds: float = math.inf
     compiles: str = ""
     key: Any = None
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a task has no result, in one line. `refused`: the model or study refused its input.
+
+    `traceback` is that of an exception which no model may raise.
+    """
+
+    reason: str
+    refused: bool = False
+    traceback: str = ""
+
+
+def guarded(function: Callable[..., Any], *arguments: Any) -> Any:
+    """What the function returns; whatever goes wrong in it is a `Failure`."""
+    try:
+        return function(*arguments)
+    except (ModelFailure, InputError) as error:
+        return Failure(printable(error, 300), refused=isinstance(error, InputError))
+    except MemoryError:
+        return Failure("out of memory")
+    except Exception as error:  # a task of whatever kind must not end the run
+        reason = printable(f"{type(error).__name__}: {error}", 300)
+        return Failure(reason, traceback=traceback.format_exc())
+
+
+def cores() -> int:
+    """How many threads this process may use: one in a worker, else one a core."""
+    return 1 if os.environ.get("NUMBA_NUM_THREADS") == "1" else os.cpu_count() or 1
 
 
 @dataclass(frozen=True, eq=False)

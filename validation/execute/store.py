@@ -5,6 +5,7 @@
 | `histories/` | `.csv.gz` and `.events.csv.gz` (`scenes.History.save`); `.json`, the record with their hashes, is written last |
 | `comparisons/` | `.json`: the comparisons of a cell, peaks of an ensemble's batch, a horizon of predictability |
 | `tiles/` | `.json`: outcomes at some nodes of a spectrum |
+| `records/` | `.json`: what a task of a study gave |
 
 A name contains the hash of everything that the content depends on. So runs that share a folder can only ever write the same
 thing, and a reader never meets a half-written or outdated result. Each record holds the hash of its own name and content: one
@@ -32,6 +33,7 @@ from rockcheck.scenes.writing import write_whole
 HISTORIES = "histories"
 COMPARISONS = "comparisons"
 TILES = "tiles"
+RECORDS = "records"
 #: What a history's files are called after its name.
 TABLE = ".csv.gz"
 SUFFIXES = {TABLE, f".events{TABLE}"}

@@ -1,0 +1,145 @@
+"""A finding as a terminal's tables, CSV, Markdown and a page: each block is rendered from one description."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table as Grid
+
+from rockcheck.reports.drawers import figure_of, live_data
+from rockcheck.reports.show.words import number
+from rockcheck.reports.style import FORMATS, LOOKS, keep_drawn, looks
+from rockcheck.scenes.writing import json_text, markdown_table, table_text, write_whole
+from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Text, plain
+
+#: The sign of a verdict, beside its colour.
+SIGNS = {"pass": "✓", "changed": "△", "incomplete": "–", "fail": "✕", "error": "!", "": ""}
+#: The folder of a page's figures.
+FIGURES = "figures"
+#: Rows of a table that a terminal shows.
+MOST_ROWS = 40
+COLOURS = {"fail": "red", "error": "red", "changed": "yellow", "incomplete": "yellow"}
+
+
+def words(cell: Any, column: Column) -> str:
+    """A cell's value for people; a sign before it where it has a verdict."""
+    value = plain(cell)
+    shown = _value(value, column)
+    sign = SIGNS[cell.verdict] if isinstance(cell, Mark) else ""
+    return f"{sign} {shown}".strip()
+
+
+def _value(value: Any, column: Column) -> str:
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return ""
+    if column.kind == "model":
+        return LOOKS[value].label if value in LOOKS else str(value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if column.kind == "text" or not isinstance(value, int | float):
+        return str(value)
+    if column.kind == "percent":
+        return f"{100.0 * value:.{max(column.digits - 2, 0)}f} %"
+    return f"{value:,}".replace(",", "\u202f") if isinstance(value, int) else number(value, column.digits)
+
+
+def row_cells(row: Sequence[Any], columns: Sequence[Column]) -> list[dict[str, Any]]:
+    """The cells of a row for the page."""
+    return [_for_page(cell, column) for cell, column in zip(row, columns, strict=True)]
+
+
+def _for_page(cell: Any, column: Column) -> dict[str, Any]:
+    mark = cell if isinstance(cell, Mark) else Mark(cell)
+    numeric = column.kind in ("number", "percent")
+    return {
+        "words": words(cell, column),
+        "css": " ".join(filter(None, ["n" if numeric else column.kind, mark.verdict])),
+        "verdict": mark.verdict,
+        "tip": mark.words,
+        "link": mark.link,
+        "model": mark.value if column.kind == "model" else "",
+    }
+
+
+def show(found: Finding, screen: Console) -> None:
+    """The answer and the blocks that a terminal has room for."""
+    for block in found.blocks:
+        if isinstance(block, Table) and block.on == "all":
+            screen.print(_grid(block))
+            if len(block.rows) > MOST_ROWS:
+                screen.print(f"and {len(block.rows) - MOST_ROWS} more rows: {block.name}.csv")
+        elif isinstance(block, Text) and block.on == "all":
+            for line in (block.text, *block.items):
+                if line:
+                    screen.print(line, style=COLOURS.get(block.verdict, ""), soft_wrap=True)
+    for where, reason in found.failures.items():
+        screen.print(f"failed: {where}: {reason}", style="red", soft_wrap=True)
+    if not found.complete:
+        screen.print("not complete: the same command goes on where it ended", style="yellow")
+    screen.print(found.answer, style="bold", soft_wrap=True)
+
+
+def _grid(table: Table) -> Grid:
+    grid = Grid(box=None, pad_edge=False, title=table.title or None, title_justify="left")
+    for column in table.columns:
+        left = column.kind in ("text", "model")
+        grid.add_column(column.head, justify="left" if left else "right", overflow="fold")
+    for row in table.rows[:MOST_ROWS]:
+        grid.add_row(*(words(cell, column) for cell, column in zip(row, table.columns, strict=True)))
+    return grid
+
+
+def csv(table: Table) -> str:
+    """A table as CSV with all digits."""
+    rows = ([plain(cell) for cell in row] for row in table.rows)
+    return table_text([column.name for column in table.columns], rows)
+
+
+def markdown(found: Finding) -> str:
+    """The whole finding as Markdown."""
+    parts = [f"# {found.title}", found.answer, *filter(None, map(block_markdown, found.blocks))]
+    if found.failures:
+        parts += ["## Failed", "\n".join(f"- {where}: {why}" for where, why in found.failures.items())]
+    if found.made is not None:
+        about = {"made": found.made.created, **found.made.versions, **found.made.hardware}
+        parts.append(", ".join(f"{name} {value}" for name, value in about.items()))
+    return "\n\n".join(parts) + "\n"
+
+
+def block_markdown(block: Table | Plot | Text) -> str:
+    """A block as Markdown, as the documentation and `summary.md` have it."""
+    title = f"## {block.title}\n\n" if block.title else ""
+    if isinstance(block, Text):
+        return title + "\n\n".join(filter(None, [block.text, "\n".join(f"- {item}" for item in block.items)]))
+    if isinstance(block, Plot) or block.on == "file":
+        return ""
+    rows = [[words(cell, column) for cell, column in zip(row, block.columns, strict=True)] for row in block.rows]
+    note = f"\n\n{block.note}" if block.note else ""
+    return title + markdown_table([column.head for column in block.columns], rows) + note
+
+
+def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -> Path:
+    """Write `run.json`, a CSV a table, `summary.md`, the figures and `index.html`; returns the page."""
+    from rockcheck.reports.site import Site
+
+    write_whole(folder / "run.json", json_text(found.as_dict()) + "\n")
+    for table in found.tables():
+        write_whole(folder / f"{table.name}.csv", csv(table))
+    write_whole(folder / "summary.md", markdown(found))
+    plots = [block for block in found.blocks if isinstance(block, Plot)]
+    for plot in plots:
+        keep_drawn(folder / FIGURES / plot.name, json_text(asdict(plot)), partial(figure_of, plot), formats)
+    above = (("Report", "../index.html"),) if (folder.parent / "index.html").exists() else ()
+    site = Site(folder, f"rockcheck: {found.title}", above)
+    site.assets()
+    live = [live_data(plot) for plot in plots if plot.live]
+    if live:
+        text = json_text(live).replace("<", "\\u003c")
+        write_whole(folder / "curves.js", f"window.rockcheckCurves = {text};\n")
+    return site.page("index.html", "finding.html", found=found, live=bool(live), looks=looks(LOOKS), row_cells=row_cells, figures=FIGURES)

@@ -1,0 +1,141 @@
+"""How the plots of a finding are drawn: lines over axes, and by `DRAWERS` what needs a drawer of its own."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from typing import TYPE_CHECKING, Any
+
+from rockcheck.reports.style import LOOKS, PAGE, figure_style, log_scales
+from rockcheck.validation.finding import Axis, Panel, Plot, Series
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Drawers of other kinds of plots: module and function, which takes the plot and returns a figure.
+DRAWERS: dict[str, tuple[str, str]] = {}
+#: Colours by day and by night of series without a look, in their order; grey for "thin" ones.
+COLOURS = (("#0072b2", "#3d9fdc"), ("#d55e00", "#e8762a"), ("#009168", "#00b583"), ("#a87900", "#d19a10"), ("#bf5f92", "#d98ab4"))
+GREY = ("#9a9a9a", "#767c85")
+#: Panels beside each other.
+COLUMNS = 3
+STYLES: dict[str, dict[str, Any]] = {
+    "line": {"marker": "o", "markersize": 3.0},
+    "points": {"linestyle": "none", "marker": "o", "markersize": 3.0},
+    "dots": {"linestyle": (0, (0.7, 1.7)), "linewidth": 0.8},
+    "thin": {"linewidth": 0.5, "alpha": 0.6},
+    "marked": {"linestyle": (0, (4, 1.5)), "marker": "*", "markersize": 5.0},
+}
+
+
+def figure_of(plot: Plot) -> Figure:
+    """The figure of a plot."""
+    if plot.kind in DRAWERS:
+        module, name = DRAWERS[plot.kind]
+        drawn: Figure = getattr(importlib.import_module(module), name)(plot)
+        return drawn
+    return lines(plot)
+
+
+def lines(plot: Plot) -> Figure:
+    """A panel beside the other, on common axes, with one legend below."""
+    from matplotlib.figure import Figure
+
+    columns = min(COLUMNS, len(plot.panels))
+    rows = math.ceil(len(plot.panels) / columns)
+    with figure_style():
+        figure = Figure(figsize=(PAGE, (3.4 if rows == 1 else 2.1 * rows) + 0.4), layout="constrained")
+        grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        handles: dict[str, Any] = {}
+        for ax, panel in zip(grid.flat, plot.panels, strict=False):
+            _draw(ax, panel, handles)
+            ax.set_title(panel.title)
+            _scale(ax, plot.x, plot.y)
+        for ax in grid.flat[len(plot.panels) :]:
+            ax.set_axis_off()
+        for ax in grid[:, 0]:
+            ax.set_ylabel(plot.y.label)
+        for ax in grid[-1, :]:
+            ax.set_xlabel(plot.x.label)
+        if handles:
+            figure.legend(handles.values(), handles, loc="outside lower center", ncols=4)
+    return figure
+
+
+def _scale(ax: Axes, x: Axis, y: Axis) -> None:
+    for axis, scale, limit in ((x, ax.set_xscale, ax.set_xlim), (y, ax.set_yscale, ax.set_ylim)):
+        if axis.log:
+            scale("log")
+        if axis.limits is not None:
+            limit(*axis.limits)
+    if x.log or y.log:
+        log_scales(ax)
+
+
+def _draw(ax: Axes, panel: Panel, handles: dict[str, Any]) -> None:
+    for series, colour in zip(panel.series, colours(panel), strict=True):
+        if series.style == "level":
+            drawn = ax.axhline(_known(series.y[0]), color="#6e6e6e", linewidth=1.0, linestyle=(0, (6, 3)))
+        else:
+            if series.high:
+                low, high = ([_known(value) for value in values] for values in (series.low, series.high))
+                ax.fill_between(series.x, low, high, color=colour[0], alpha=0.15, linewidth=0)
+            look = STYLES[series.style] | ({"marker": LOOKS[series.look].marker} if series.look in LOOKS and series.style == "line" else {})
+            (drawn,) = ax.plot(series.x, [_known(value) for value in series.y], color=colour[0], **look)
+        if series.label and series.style != "thin":
+            handles.setdefault(series.label, drawn)
+
+
+def colours(panel: Panel) -> list[tuple[str, str]]:
+    """The colours of a panel's series, by day and by night; those of one label, as a line and its fit, share theirs."""
+    own: dict[str, tuple[str, str]] = {}
+    found = []
+    for series in panel.series:
+        if series.look in LOOKS:
+            found.append((LOOKS[series.look].light, LOOKS[series.look].dark))
+        elif series.style == "thin":
+            found.append(GREY)
+        else:
+            found.append(own.setdefault(series.label, COLOURS[len(own) % len(COLOURS)]))
+    return found
+
+
+def _known(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def live_data(plot: Plot) -> dict[str, Any]:
+    """What the page's script needs to draw a plot of one panel and to read it under the pointer."""
+    (panel,) = plot.panels
+    fits = {series.label: series for series in panel.series if series.style == "dots"}
+    curves = [
+        {
+            "label": series.label,
+            "values": _short(series.y),
+            "colour": colour,
+            "low": _short(series.low),
+            "high": _short(series.high),
+            "fit": _short(fits[series.label].y) if series.label in fits and series.style != "thin" else [],
+            "width": 0.7 if series.style == "thin" else 2.0,
+        }
+        for series, colour in zip(panel.series, colours(panel), strict=True)
+        if series.style != "dots"
+    ]
+    return {
+        "name": plot.name,
+        "across": plot.x.label,
+        "along": plot.y.label,
+        "intensities": list(panel.series[0].x),
+        "curves": curves,
+        "most": plot.y.limits[1] if plot.y.limits else None,
+        "single": any(series.style == "thin" for series in panel.series),
+        **(plot.data or {"per_unit": 0.0, "other_unit": "", "other_label": ""}),
+    }
+
+
+def _short(values: Any) -> list[float | None]:
+    return [None if value is None or not math.isfinite(value) else float(f"{value:.5g}") for value in values]
+
+
+__all__ = ["DRAWERS", "Series", "figure_of", "lines", "live_data"]

@@ -1,0 +1,211 @@
+"""What a study found, as data: a sentence, and blocks that a terminal, a page, Markdown and CSV show alike.
+
+A table is described once. `rockcheck.reports.document` renders it; nothing here draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, is_dataclass
+from typing import Any, ClassVar, Literal
+
+Verdict = Literal["", "pass", "changed", "incomplete", "fail", "error"]
+Cell = Any
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A cell with a verdict, which colours it, and words that explain it under the pointer."""
+
+    value: Any
+    verdict: Verdict = ""
+    words: str = ""
+    link: str = ""
+
+
+@dataclass(frozen=True)
+class Column:
+    """What a column means.
+
+    `name` heads it in CSV and JSON, `label` and `unit` for readers. `kind` says how a value is
+    shown: "number" with so many significant `digits`, "percent" (of a share), "text", or "model"
+    (a model's name, with its colour). Files keep all digits.
+    """
+
+    name: str
+    label: str = ""
+    unit: str = ""
+    kind: Literal["number", "percent", "text", "model"] = "number"
+    digits: int = 3
+    help: str = ""
+
+    @property
+    def head(self) -> str:
+        """The heading for readers: "step, s"."""
+        label = self.label or self.name.replace("_", " ")
+        return f"{label}, {self.unit}" if self.unit else label
+
+
+def text(name: str, label: str = "", **more: Any) -> Column:
+    """A column of words."""
+    return Column(name, label, kind="text", **more)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of cells in the order of the columns; None and NaN are empty cells.
+
+    `on` says where it is shown besides its CSV: everywhere, on the page and in Markdown only, or in
+    files only. `folded` tables are closed on the page until a reader opens them.
+    """
+
+    name: str
+    columns: Sequence[Column]
+    rows: Sequence[Sequence[Cell]]
+    title: str = ""
+    note: str = ""
+    on: Literal["all", "page", "file"] = "all"
+    folded: bool = False
+    block: ClassVar[str] = "table"
+
+    def records(self) -> list[dict[str, Any]]:
+        """The rows by the names of the columns, without marks."""
+        names = [column.name for column in self.columns]
+        return [dict(zip(names, map(plain, row), strict=True)) for row in self.rows]
+
+
+def plain(cell: Cell) -> Any:
+    """A cell's value without its mark."""
+    return cell.value if isinstance(cell, Mark) else cell
+
+
+def table_of(name: str, kind: type, records: Sequence[Any], **more: Any) -> Table:
+    """Records of one dataclass as a table for files, a column a field."""
+    fields = list(kind.__dataclass_fields__)  # type: ignore[attr-defined]
+    rows = [[getattr(record, key) for key in fields] for record in records]
+    return Table(name, [Column(key) for key in fields], rows, **{"on": "file", **more})
+
+
+@dataclass(frozen=True)
+class Series:
+    """One line of a panel. `low` and `high` bound a band around it; `look` names a model's colour.
+
+    `style`: a line, points only, dots (a fit), "thin" (one of many behind the others), or "level",
+    a horizontal line at the only `y`, for reference.
+    """
+
+    label: str
+    x: Sequence[float] = ()
+    y: Sequence[float | None] = ()
+    low: Sequence[float | None] = ()
+    high: Sequence[float | None] = ()
+    look: str = ""
+    style: Literal["line", "points", "dots", "thin", "level", "marked"] = "line"
+
+
+@dataclass(frozen=True)
+class Axis:
+    """An axis: what it shows, and its scale and limits."""
+
+    label: str
+    log: bool = False
+    limits: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Series over common axes."""
+
+    title: str
+    series: Sequence[Series]
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure. `kind` "lines" draws `panels`; any other is drawn from `data` by its drawer in
+    `rockcheck.reports.drawers`. A `live` one of one panel is read under the pointer on the page.
+    """
+
+    name: str
+    title: str = ""
+    kind: str = "lines"
+    panels: Sequence[Panel] = ()
+    x: Axis = Axis("")
+    y: Axis = Axis("")
+    note: str = ""
+    live: bool = False
+    data: Any = None
+    on: Literal["all", "page"] = "page"
+    folded: bool = False
+    block: ClassVar[str] = "plot"
+
+
+@dataclass(frozen=True)
+class Text:
+    """A paragraph, or a list of `items`; `verdict` colours it."""
+
+    text: str = ""
+    title: str = ""
+    items: Sequence[str] = ()
+    verdict: Verdict = ""
+    on: Literal["all", "page"] = "all"
+    folded: bool = False
+    block: ClassVar[str] = "text"
+
+
+Block = Table | Plot | Text
+
+
+@dataclass(frozen=True, kw_only=True)
+class Made:
+    """When it was made (UTC, ISO 8601), in how many processes and how long (s), with what, on what."""
+
+    created: str
+    jobs: int
+    wall_seconds: float
+    versions: Mapping[str, str]
+    hardware: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a study found.
+
+    `answer` is one sentence, `data` what `--json` says besides the tables. `exit_code` is the
+    command's: 0 where nothing is judged. `failures` give the reason by task; a run that was
+    interrupted, or had no time for all, is not `complete`.
+    """
+
+    name: str
+    title: str
+    answer: str
+    blocks: Sequence[Block] = ()
+    data: Mapping[str, Any] = field(default_factory=dict)
+    verdict: Verdict = ""
+    exit_code: int = 0
+    failures: Mapping[str, str] = field(default_factory=dict)
+    complete: bool = True
+    made: Made | None = None
+
+    def tables(self) -> Iterator[Table]:
+        """The tables among the blocks."""
+        return (block for block in self.blocks if isinstance(block, Table))
+
+    def table(self, name: str) -> Table:
+        """A table by its name."""
+        return next(table for table in self.tables() if table.name == name)
+
+    def as_dict(self, *, tables: bool = True) -> dict[str, Any]:
+        """For JSON: the study's own data first, then its tables by name, then what it was made with."""
+        data = {key: asdict(value) if is_dataclass(value) else value for key, value in self.data.items()}  # type: ignore[arg-type]
+        return {
+            "title": self.title,
+            "answer": self.answer,
+            "verdict": self.verdict,
+            "exit_code": self.exit_code,
+            **data,
+            **({"tables": {table.name: table.records() for table in self.tables()}} if tables else {}),
+            "failures": dict(self.failures),
+            "complete": self.complete,
+            "made": None if self.made is None else asdict(self.made),
+        }

@@ -1,0 +1,244 @@
+"""The shape of every study, and the only runner: tasks, play, gather.
+
+A study lists tasks, plays each of them anywhere, and gathers what was played into a `Finding`.
+All else is done here, once: results are read back and kept, tasks are played side by side, on a
+cluster or in this process, progress and an estimate are told, a task that fails is a failed task.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import time
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar, Literal, Protocol
+
+from pydantic import TypeAdapter
+
+from rockcheck.scenes import InputError
+from rockcheck.scenes.errors import printable
+from rockcheck.scenes.progress import OnProgress, announce, unheard
+from rockcheck.scenes.writing import write_whole
+from rockcheck.validation.execute import provenance
+from rockcheck.validation.execute.pool import Call, Ended, Failure, Pool, guarded
+from rockcheck.validation.execute.remote import Cluster
+from rockcheck.validation.execute.store import RECORDS, Store, name_of
+from rockcheck.validation.finding import Finding, Made
+
+FAULTS = "faults"
+#: An expected time (s) from which it is told before the work begins.
+LONG = 10.0
+
+
+@dataclass(frozen=True)
+class Task:
+    """One piece of a study's work: small, frozen, can be pickled.
+
+    Equal tasks are one task.
+    """
+
+    #: Wall time (s) that it may take, and that it takes as a rule.
+    seconds: ClassVar[float] = math.inf
+    expected: ClassVar[float] = 0.0
+    #: Names the code that it may have to compile; see `execute.pool.Call`.
+    compiles: ClassVar[str] = ""
+    #: In a worker; "here", since it has threads of its own (a cluster takes it all the same); or
+    #: "timed": in this process, with nothing beside it.
+    where: ClassVar[Literal["worker", "here", "timed"]] = "worker"
+    #: False: never read back, as a time that is to be measured anew.
+    kept: ClassVar[bool] = True
+
+    @property
+    def label(self) -> str:
+        """A few words for progress and failures."""
+        return ", ".join(str(value) for value in asdict(self).values() if isinstance(value, str | int | float))
+
+    def depends(self) -> Any:
+        """All that the result depends on, as JSON has it.
+
+        By default the fields, the code that its module can reach, and all libraries.
+        """
+        code = provenance.code_digest(type(self).__module__)
+        return {"task": asdict(self), "code": code, "versions": provenance.versions()}
+
+    @cached_property
+    def key(self) -> str:
+        """Hash of what it depends on."""
+        depends = [type(self).__qualname__, self.depends()]
+        return provenance.digest(json.dumps(depends, sort_keys=True, default=str))
+
+
+class Study(ABC):
+    """What a study is: `tasks`, `play` and `gather`.
+
+    `record` is the type of its results, a dataclass or a `Stored` model. `memory_mb` limits a
+    worker. `done` maps each task that has ended to its record, or to the `Failure` that it is.
+    """
+
+    name: str
+    record: Any
+    memory_mb: float | None = None
+    #: What its folder keeps; see `execute.store`.
+    kinds: tuple[str, ...] = (RECORDS,)
+
+    @abstractmethod
+    def tasks(self, done: Mapping[Any, Any]) -> Sequence[Any]:
+        """The tasks that are known once these are done: asked again whenever all have ended."""
+
+    @staticmethod
+    @abstractmethod
+    def play(task: Any) -> Any:
+        """The record of a task, in whatever process."""
+
+    @abstractmethod
+    def gather(self, done: Mapping[Any, Any]) -> Finding:
+        """What the records say; a task that there was no time for is missing."""
+
+    def find(self, store: Store, task: Task) -> Any:
+        """The kept record of a task, None where there is none that has the fields it must have."""
+        found = store.get_record(RECORDS, name_of(self.name, task.key))
+        try:
+            return None if found is None else self._adapter.validate_python(found["record"])
+        except (KeyError, ValueError):
+            return None
+
+    def keep(self, store: Store, task: Task, record: Any) -> None:
+        """Keep the record of a task."""
+        plain = {"record": self._adapter.dump_python(record, mode="json")}
+        store.put_record(RECORDS, name_of(self.name, task.key), plain)
+
+    @cached_property
+    def _adapter(self) -> TypeAdapter[Any]:
+        return TypeAdapter(self.record)
+
+
+class Workers(Protocol):
+    """Where tasks are played: `Pool`, or `Cluster`; a context."""
+
+    jobs: int
+
+    def run(self, waiting: deque[Call], *, until: float = math.inf) -> Iterator[Ended]:
+        """Runs the calls and yields each as it ends; more may be put into `waiting` meanwhile."""
+        ...  # pragma: no cover
+
+
+def run(
+    study: Study,
+    folder: Path,
+    *,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    force: bool = False,
+    minutes: float | None = None,
+    on_progress: OnProgress = unheard,
+) -> Finding:
+    """Play what is not up to date in `folder`, keep each record as it comes, and gather.
+
+    `jobs` processes (default: one a core), or the Dask cluster at `scheduler`. What has not begun
+    after `minutes` is left out. Ctrl-C ends the tasks, and what was played is gathered. Raises
+    `InputError` where the folder cannot be used or no cluster answers.
+    """
+    return _Run(study, folder, jobs or os.cpu_count() or 1, scheduler, force, on_progress).finding(minutes)
+
+
+class _Run:
+    """A study that is being played."""
+
+    def __init__(self, study: Study, folder: Path, jobs: int, scheduler: str | None, force: bool, heard: OnProgress) -> None:
+        self.study, self.folder, self.jobs, self.scheduler = study, folder, jobs, scheduler
+        self.force, self.heard = force, heard
+        self.began = time.monotonic()
+        try:
+            self.store = Store(folder, study.kinds)
+        except OSError as error:
+            raise InputError(f"{printable(folder)}: cannot be used as the output folder: {error.strerror}") from None
+        self.known: dict[Task, None] = {}
+        self.done: dict[Task, Any] = {}
+
+    def finding(self, minutes: float | None) -> Finding:
+        until = self.began + 60.0 * minutes if minutes else math.inf
+        complete = True
+        with ExitStack() as stack:
+            try:
+                self._play(stack, until)
+            except KeyboardInterrupt:
+                complete = False
+        found = self.study.gather(self.done)
+        self.store.prune()
+        failed = {task.label: one.reason for task, one in self.done.items() if isinstance(one, Failure)}
+        made = Made(
+            created=datetime.now(UTC).isoformat(timespec="seconds"),
+            jobs=self.jobs,
+            wall_seconds=time.monotonic() - self.began,
+            versions=provenance.versions(),
+            hardware=provenance.hardware(),
+        )
+        whole = complete and found.complete and len(self.done) == len(self.known)
+        return replace(found, failures={**failed, **found.failures}, complete=whole, made=made)
+
+    def _play(self, stack: ExitStack, until: float) -> None:
+        """Waves of tasks, until the study has no more."""
+        workers: Workers | None = None
+        while waiting := self._next():
+            self._estimate(waiting)
+            elsewhere = [task for task in waiting if self._elsewhere(task)]
+            for task in waiting:
+                if task not in elsewhere and time.monotonic() < until:
+                    self._end(task, guarded(self.study.play, task))
+            if not elsewhere:
+                continue
+            if workers is None:
+                workers = stack.enter_context(self._workers())
+            calls = (Call(guarded, (self.study.play, task), task.seconds, task.compiles, task) for task in elsewhere)
+            for ended in workers.run(deque(calls), until=until):
+                self._end(ended.call.key, Failure(ended.fault) if ended.error else ended.result)
+            if time.monotonic() >= until:
+                return
+
+    def _next(self) -> list[Task]:
+        """The tasks of the next wave that have to be played; the others are read back."""
+        while new := [task for task in dict.fromkeys(self.study.tasks(self.done)) if task not in self.known]:
+            self.known.update(dict.fromkeys(new))
+            for task in new:
+                if task.kept and not self.force and (record := self.study.find(self.store, task)) is not None:
+                    self.done[task] = record
+            self.heard(len(self.done), len(self.known), f"{len(self.done)} up to date")
+            if waiting := [task for task in new if task not in self.done]:
+                return waiting
+        return []
+
+    def _end(self, task: Task, result: Any) -> None:
+        self.done[task] = result
+        if isinstance(result, Failure):
+            if result.traceback:
+                (self.folder / FAULTS).mkdir(exist_ok=True)
+                path = self.folder / FAULTS / f"{name_of(self.study.name, task.key)}.txt"
+                write_whole(path, result.traceback)
+        elif task.kept:
+            self.study.keep(self.store, task, result)
+        self.heard(len(self.done), len(self.known), task.label)
+
+    def _elsewhere(self, task: Task) -> bool:
+        return task.where == "worker" or (task.where == "here" and self.scheduler is not None)
+
+    def _workers(self) -> Any:
+        return Cluster(self.scheduler, self.study.memory_mb) if self.scheduler else Pool(self.jobs, self.study.memory_mb)
+
+    def _estimate(self, waiting: Sequence[Task]) -> None:
+        """Says how long a wave will take where that is long."""
+        seconds = sum(task.expected / (self.jobs if task.where == "worker" else 1) for task in waiting)
+        if seconds >= LONG:
+            announce(f"{self.study.name}: {len(waiting)} tasks, about {words_of(seconds)}")
+
+
+def words_of(seconds: float) -> str:
+    """A time as people say it: 40 s, 5 min."""
+    return f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
