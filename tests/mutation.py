@@ -4,7 +4,7 @@ A sample of all faults that the operators below can make, drawn with a seed: com
 products for quotients, `and` for `or`, negated conditions, changed numbers. Each is planted in a copy of the packages, which is
 interpreted (NUMBA_DISABLE_JIT=1), but for the files in COMPILED. Faults that survive are printed with file and line; those that nothing
 can notice are in EQUIVALENT.
-Arguments: `--sample N` faults a file, `--seed N`, `--file NAME`, and after `--` what pytest is given too, such as `--deselect=FILE`.
+Arguments: `--sample N` faults a file, `--seed N`, `--file NAME` (repeatable), and after `--` what pytest is given too, such as `--deselect=FILE`.
 """
 
 from __future__ import annotations
@@ -199,16 +199,16 @@ def shown(node: ast.AST) -> str:
     return ast.unparse(node.test if isinstance(node, ast.If | ast.While) else node).replace("\n", " ")[:90]
 
 
-def compile_once(tree: Path) -> None:
-    """From now on what is compiled is kept under the hash of the plain sources, so that no fault compiles all anew."""
+def compile_once() -> None:
+    """From now on what is compiled is that of the plain sources here, so that no fault compiles all anew."""
     import numba
 
     os.environ["NUMBA_DISABLE_JIT"] = "0"
     numba.config.reload_config()
-    from rockcheck.scenes.compiled import _cache_folder
+    from rockcheck.scenes import compiled
 
-    for part in ("ebm", "validation"):
-        _cache_folder(tree / "rockcheck" / part)
+    kept = compiled._cache_folder
+    compiled._cache_folder = lambda package: kept(ROOT / package.name)  # type: ignore[assignment]
 
 
 def survives(tree: Path, name: str, source: str, arguments: list[str]) -> bool:
@@ -221,7 +221,7 @@ def survives(tree: Path, name: str, source: str, arguments: list[str]) -> bool:
             signal.setitimer(signal.ITIMER_PROF, SECONDS)
             signal.alarm(20 * SECONDS)
             if name in COMPILED:
-                compile_once(tree)
+                compile_once()
             path.write_text(source, encoding="utf-8")
             quiet = os.open(os.devnull, os.O_WRONLY)
             os.dup2(quiet, 1)
@@ -243,7 +243,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--sample", type=int, default=12)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--file", default="")
+    parser.add_argument("--file", action="append")
     parser.add_argument("pytest", nargs="*")
     asked = parser.parse_args()
     os.environ["NUMBA_DISABLE_JIT"] = "1"
@@ -259,7 +259,7 @@ def main() -> None:
         for library in ("numba", "pandas", "pydantic", "scipy.integrate", "scipy.stats"):
             importlib.import_module(library)  # once for all children
         for name, tests in TARGETS.items():
-            if asked.file not in name:
+            if asked.file and not any(part in name for part in asked.file):
                 continue
             source = (ROOT / name).read_text(encoding="utf-8")
             lines = source.splitlines()

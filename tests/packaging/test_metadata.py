@@ -109,7 +109,7 @@ def test_hints_name_packages_that_there_are():
     """Nothing called rockcheck is released: who asks for it by name, or for an extra of it, may get a stranger's package."""
     texts = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(path for top in FOLDERS.values() for path in (ROOT / top).rglob("*.py"))]
     assert [str(path) for path in texts if re.search(r"pip install [^`\n]*rockcheck\[", path.read_text(encoding="utf-8"))] == []
-    for engine in (getattr(rockcheck, name) for name in rockcheck.engines.__all__):
+    for engine in (getattr(rockcheck, name) for name in importlib.import_module("rockcheck.engines").__all__):
         if engine.module:
             assert engine.package in names_of(one for extra in PROJECT["project"]["optional-dependencies"].values() for one in extra)
             assert engine.package in owners_of(engine.module)
