@@ -4,7 +4,7 @@ A sample of all faults that the operators below can make, drawn with a seed: com
 products for quotients, `and` for `or`, negated conditions, changed numbers. Each is planted in a copy of the packages, which is
 interpreted (NUMBA_DISABLE_JIT=1), but for the files in COMPILED. Faults that survive are printed with file and line; those that nothing
 can notice are in EQUIVALENT.
-Arguments: `--sample N` faults a file, `--seed N`, `--file NAME` (repeatable), and after `--` what pytest is given too, such as `--deselect=FILE`.
+Arguments: `--sample N` faults a file, `--seed N`, `--file NAME` (repeatable), and after `--` what pytest is given, too.
 """
 
 from __future__ import annotations
@@ -199,16 +199,15 @@ def shown(node: ast.AST) -> str:
     return ast.unparse(node.test if isinstance(node, ast.If | ast.While) else node).replace("\n", " ")[:90]
 
 
-def compile_once() -> None:
-    """From now on what is compiled is that of the plain sources here, so that no fault compiles all anew."""
-    import numba
+class PlainCore:
+    """For pytest: what is compiled is that of the plain sources here, which no fault changes."""
 
-    os.environ["NUMBA_DISABLE_JIT"] = "0"
-    numba.config.reload_config()
-    from rockcheck.scenes import compiled
+    def pytest_configure(self) -> None:
+        """Before tests are imported, and with them what is compiled."""
+        from rockcheck.scenes import compiled
 
-    kept = compiled._cache_folder
-    compiled._cache_folder = lambda package: kept(ROOT / package.name)  # type: ignore[assignment]
+        kept = compiled._cache_folder
+        compiled._cache_folder = lambda package: kept(ROOT / package.name)  # type: ignore[assignment]
 
 
 def survives(tree: Path, name: str, source: str, arguments: list[str]) -> bool:
@@ -220,15 +219,16 @@ def survives(tree: Path, name: str, source: str, arguments: list[str]) -> bool:
         try:
             signal.setitimer(signal.ITIMER_PROF, SECONDS)
             signal.alarm(20 * SECONDS)
-            if name in COMPILED:
-                compile_once()
+            os.environ["NUMBA_DISABLE_JIT"] = str(int(name not in COMPILED))
+            sys.modules["numba"].config.reload_config()
             path.write_text(source, encoding="utf-8")
             quiet = os.open(os.devnull, os.O_WRONLY)
             os.dup2(quiet, 1)
             os.dup2(quiet, 2)
             import pytest
 
-            code = int(pytest.main(["-x", "-q", "-p", "no:cacheprovider", "-m", "not slow and not browser", *arguments]))
+            words = ["-x", "-q", "-p", "no:cacheprovider", "-m", "not slow and not browser", *arguments]
+            code = int(pytest.main(words, plugins=[PlainCore()] if name in COMPILED else []))
         except BaseException:
             code = 9
         finally:
@@ -246,7 +246,6 @@ def main() -> None:
     parser.add_argument("--file", action="append")
     parser.add_argument("pytest", nargs="*")
     asked = parser.parse_args()
-    os.environ["NUMBA_DISABLE_JIT"] = "1"
     os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
     sys.dont_write_bytecode = True
     os.chdir(ROOT)
