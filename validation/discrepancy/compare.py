@@ -98,8 +98,8 @@ def _same_block(one: Block | None, other: Block | None) -> bool:
     """Whether nothing is known against it, to the digits of a file that was written by hand."""
     if one is None or other is None:
         return True
-    sizes = [(block.half_width, block.half_height, *block.offset, block.gyration_squared) for block in (one, other)]
-    return bool(np.allclose(*sizes, rtol=1e-6, atol=1e-9 * one.radius))
+    first, second = ((block.half_width, block.half_height, *block.offset, block.gyration_squared) for block in (one, other))
+    return bool(np.allclose(first, second, rtol=1e-6, atol=1e-9 * one.radius))
 
 
 def _words(block: Block | None) -> str:
