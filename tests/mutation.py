@@ -70,7 +70,11 @@ TARGETS = {
     "scenes/recordings/sets.py": ["tests/scenes/test_record_sets.py", "tests/scenes/test_recordings.py"],
     "scenes/recordings/intensity.py": ["tests/scenes/test_recordings.py", "-k", "intensities or spectral or periods"],
     "validation/uncertainty/verdict.py": [UNCERTAINTY, "-k", "what_a_difference_says"],
-    "validation/uncertainty/numerical.py": [UNCERTAINTY, "-k", "index or order or step or interval_covers or own_error or peak_between"],
+    "validation/uncertainty/numerical.py": [
+        UNCERTAINTY,
+        "-k",
+        "index or order or step or tolerance or peak or interval_covers or own_error",
+    ],
     "validation/uncertainty/inputs.py": [
         "tests/validation/discrepancy/test_propagation.py",
         UNCERTAINTY,
@@ -98,6 +102,18 @@ SECONDS = 180
 #: Faults that change no result, by file, a part of the line (of a number: of the expression that it stands in), the text of the
 #: fault, and why.
 EQUIVALENT = {
+    (
+        "validation/uncertainty/numerical.py",
+        "(1.0, 2.0, ",
+        "1.0  ->  100.0",
+    ): "the finest run is the one at the model's own step: only the factors of the coarser ones are used",
+    (
+        "validation/uncertainty/numerical.py",
+        "largest <= ROUNDING",
+        "largest <= ROUNDING * scale  ->  largest < ROUNDING * scale",
+    ): "equal to the last bit",
+    ("ebm/horizon.py", "tolerance=1e-13", "1e-13  ->  1.0000000000000001e-11"): "still far below the perturbation",
+    ("validation/spectra/ida.py", "0.9 * _FITS", "len(medians) < 0.9 * _FITS  ->  len(medians) <= 0.9 * _FITS"): "one more fit of 200",
     ("ebm/core/settle.py", "[SETTLE, -1.0, -1.0", "1.0  ->  100.0"): "any time long before the first impact",
     ("ebm/core/series.py", "stack", "top + 2  ->  top - 2"): "the narrowest interval ends the search before the stack is full",
     ("ebm/core/series.py", "a[row, 0] + low", "a[row, 0] > floor  ->  a[row, 0] >= floor"): "a bound that saves the search, met or not",
@@ -239,7 +255,7 @@ def survives(tree: Path, name: str, source: str, arguments: list[str]) -> bool:
 
 
 def main() -> None:
-    """Plants, runs, counts; exit 1 where fewer than nine of ten are noticed."""
+    """Plants, runs, counts; exit 1 where fewer than 95 of 100 are noticed."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--sample", type=int, default=12)
     parser.add_argument("--seed", type=int, default=1)
@@ -281,7 +297,7 @@ def main() -> None:
             print(f"{name}: {noticed} of {judged} noticed ({len(listed.found)} possible)", flush=True)
             killed, total = killed + noticed, total + judged
     print(f"{killed} of {total} noticed, {100.0 * killed / max(total, 1):.0f} %")
-    sys.exit(killed < 0.9 * total)
+    sys.exit(killed < 0.95 * total)
 
 
 if __name__ == "__main__":

@@ -114,6 +114,46 @@ def test_it_refuses_where_the_order_says_nothing(factor, reason):
     assert found.u_num("peak_rotation") is None
 
 
+@dataclass(frozen=True)
+class Tolerant:
+    """A model with a tolerance: its rotation is sin t times one and the tolerance."""
+
+    tolerance: float = 1e-2
+
+    def finer(self):
+        return Tolerant(1e-2 * self.tolerance)
+
+    def simulate(self, scene):
+        return Made(lambda step: 1.0 + self.tolerance).simulate(scene)
+
+
+def test_of_a_tolerance_the_change_at_a_hundredth_of_it_counts():
+    """F = 1.25 times the change: of 0.5 alpha sin t by 0.0099 of it."""
+    found = numerical_uncertainty(Tolerant(), BOOKCASE)
+    change = 0.5 * 0.99e-2 * np.sin(BOOKCASE.output_times)
+    assert found.converged
+    assert found.u_num("theta_rms") == pytest.approx(1.25 * math.sqrt(np.mean(change**2)), rel=1e-9)
+    assert found.u_num("peak_rotation") == pytest.approx(1.25 * np.max(change), rel=1e-9)
+    assert found.u_num("outcome") == 0.0
+
+
+@dataclass(frozen=True)
+class Dented(Made):
+    """At the finest step the rows beside the highest lie a hundredth of alpha lower."""
+
+    def simulate(self, scene):
+        history = super().simulate(scene)
+        theta = history.channels["theta"].copy()
+        if self.step == 1e-3:
+            theta[np.argmax(np.abs(theta)) + np.array([-1, 1])] -= 0.01 * scene.block.alpha
+        return replace(history, channels={**history.channels, "theta": theta})
+
+
+def test_the_peak_may_lie_between_rows_of_the_run_itself():
+    """By an eighth of the second difference there, whatever the coarser runs look like."""
+    assert numerical_uncertainty(Dented(lambda step: 1.0), BOOKCASE).u_num("peak_rotation") == pytest.approx(0.02 / 8.0, rel=0.01)
+
+
 def test_small_changes_need_no_order_and_get_the_larger_factor():
     found = numerical_uncertainty(Made(lambda h: 1.0 + 1e-4 * math.cos(1e4 * h)), BOOKCASE)
     values = [0.5 * 1e-4 * math.cos(1e4 * h) for h in (1e-3, 2e-3, 4e-3)]
