@@ -14,6 +14,7 @@ from pydantic import model_validator
 from rockcheck.cm import contact
 from rockcheck.scenes import Event, History, InputError, ModelFailure, Scene, kinematics
 from rockcheck.scenes.base import Frozen, Positive
+from rockcheck.scenes.errors import check_kind
 from rockcheck.scenes.excitations import Record, Rest, Ricker, Sine
 from rockcheck.scenes.history import Cost
 from rockcheck.scenes.observation import observe
@@ -100,6 +101,7 @@ class ContinuousModel(Frozen):
         Raises `ModelFailure` where the motion gains energy out of nothing (far too long a step, absurd excitation) or asks for
         too many steps.
         """
+        check_kind(scene, Scene, "load_scene", "scene")
         began = time.perf_counter()
         from rockcheck.cm import kernels
         from rockcheck.scenes.threads import interruptible

@@ -11,7 +11,7 @@ from pydantic import Field, Strict
 
 from rockcheck.ebm.core.rules import NAMES
 from rockcheck.scenes.base import Frozen, Positive
-from rockcheck.scenes.errors import InputError, ModelFailure
+from rockcheck.scenes.errors import InputError, ModelFailure, check_kind
 from rockcheck.scenes.history import Cost, Event, History
 from rockcheck.scenes.observation import observe
 from rockcheck.scenes.scene import Scene
@@ -69,6 +69,7 @@ class EventBasedModel(Frozen):
 
     def check(self, scene: Scene) -> None:
         """Raises `InputError` where the scene asks for physics that this model excludes."""
+        check_kind(scene, Scene, "load_scene", "scene")
         if self.friction == "bouc-wen":
             self._check_bouc_wen(scene)
         if self.friction == "no-slip" and scene.initial_velocity != 0.0:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes.base import Shown
-from rockcheck.scenes.errors import InputError
+from rockcheck.scenes.errors import InputError, check_kind
 from rockcheck.scenes.excitations import Record
 from rockcheck.scenes.progress import Count, OnProgress, unheard
 from rockcheck.scenes.scene import Block, Scene
@@ -99,6 +99,7 @@ def overturning_spectrum(
     frequencies, amplitudes = _axis(frequency_ratios, "frequency_ratios"), _axis(amplitude_ratios, "amplitude_ratios")
     if len(frequencies) * len(amplitudes) > MOST_NODES:
         raise InputError(f"{len(frequencies)} x {len(amplitudes)} nodes are more than {MOST_NODES}", "frequency_ratios")
+    check_kind(scene, Scene, "load_scene", "scene")
     check_excitation(scene)
     if play is None:
         model = model or EventBasedModel(tolerance=TOLERANCE)

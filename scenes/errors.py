@@ -31,6 +31,12 @@ class ModelFailure(RuntimeError):
     """A model could not finish a scene (blow-up, unsupported physics, a cap reached); its cell fails, the run goes on."""
 
 
+def check_kind(value: object, kind: type, how: str, key: str) -> None:
+    """Raises `InputError` where the argument `key` is no `kind`; `how` says where one comes from."""
+    if not isinstance(value, kind):
+        raise InputError(f"{printable(repr(value))} is not allowed: give a {kind.__name__}, as from {how}", key)
+
+
 #: So many names a message lists.
 MOST_NAMES = 100
 

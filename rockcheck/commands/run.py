@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -120,7 +121,15 @@ def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, d
 
 
 def play_scene(suite: Suite, folder: Path, *, jobs: int | None, force: bool, scheduler: str | None, report: bool) -> None:
-    """Play a suite that judges nothing; a table, the report, and exit 3 where a model failed."""
+    """Play a suite that judges nothing; a table, the report, and exit 3 where a model failed.
+
+    Raises `InputError` where `folder` holds a judged run, whose pages and tables this one would overwrite.
+    """
+    before = None
+    with suppress(InputError):  # no run there, or none that can be read
+        before = Run.load(folder)
+    if before is not None and before.judged:
+        raise InputError(f"{printable(folder)} holds the judged run of suite {before.suite!r}: give another folder", "--out")
     finished = play(suite, folder, jobs, force, False, scheduler)
     kept = keep(finished, folder)
     screen = console()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rockcheck.validation.commands.cli import main
+from rockcheck.commands.cli import main
 
 SUITE = """
 reference = "still"

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from rockcheck.commands.cli import main
+from rockcheck.commands.publish import LOCK, keep
 from rockcheck.reports import write_site
 from rockcheck.scenes import InputError
-from rockcheck.validation.commands.cli import main
-from rockcheck.validation.commands.pages.publish import LOCK, keep
 from rockcheck.validation.execute.store import HISTORIES, Store
 from rockcheck.validation.suite.results import RUN_FILE, Run
 

@@ -367,6 +367,28 @@ def test_intensities_of_a_sine_are_its_closed_forms():
     assert intensity.spectral_acceleration(record, 0.01) == pytest.approx(amplitude / G, rel=0.01)
 
 
+def test_spectral_accelerations_are_those_of_the_straight_lines_between_samples():
+    """Samples four periods apart, or all motion in the last one: as of the same lines with samples 4000 times as dense."""
+    samples = np.array([0.0, 1.0, -0.5, 0.0])
+    dense = Recording(samples=np.interp(np.arange(12_001) / 4000, np.arange(4), samples), time_step=1e-3, unit="m/s2", form="CSV")
+    for period in (1.0, 2.5):
+        coarse = Recording(samples=samples, time_step=4.0, unit="m/s2", form="CSV")
+        expected = intensity.spectral_acceleration(dense, period)
+        assert intensity.spectral_acceleration(coarse, period) == pytest.approx(expected, rel=2e-3)
+    # A hat of a step's length is, to an oscillator of a far longer period, an impulse; the peak comes a quarter of a period later.
+    last = Recording(samples=np.array([0.0, 0.0, 1.0]), time_step=1e-2, unit="m/s2", form="CSV")
+    rate, damping = 2 * math.pi / 1.0, 0.05
+    peak = rate * 1e-2 * math.exp(-damping / math.sqrt(1 - damping**2) * math.acos(damping))
+    assert intensity.spectral_acceleration(last, 1.0) == pytest.approx(peak / G, rel=2e-3)
+
+
+def test_periods_of_a_spectrum_leave_no_wide_gap():
+    steps = np.divide(intensity.PERIODS[1:], intensity.PERIODS[:-1])
+    assert np.all((steps > 1.0) & (steps <= 2.0))
+    assert intensity.PERIODS[0] <= 0.1
+    assert intensity.PERIODS[-1] >= 4.0
+
+
 def test_the_command_shows_and_draws(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("a.AT2").write_bytes(at2("N-S"))

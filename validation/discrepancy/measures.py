@@ -462,14 +462,14 @@ def outcome_agrees(pair: Pair) -> tuple[float, str]:
 def iso_18571(pair: Pair) -> float:
     """ISO/TS 18571 overall rating of theta, 0 to 1 (corridor 0.4, phase 0.2, magnitude 0.2, slope 0.2), not rounded.
 
-    By the package objective-rating-metrics (extra "iso"), which takes the square of the samples in time and memory, does
+    By the package objective-rating-metrics, which takes the square of the samples in time and memory, does
     not look at their times and answers NaN where it has no answer; so both curves are put on one uniform grid of at most
     4,000 samples, and curves that are constant or shorter than 20 samples have no rating.
     """
     try:
         from objective_rating_metrics.rating import ISO18571
     except ImportError:
-        raise Unavailable('the extra "iso" is not installed') from None
+        raise Unavailable("needs the package objective-rating-metrics: pip install objective-rating-metrics") from None
     curves = pair.rocking
     if len(pair.time) < 20 or not all(np.all(np.isfinite(curve)) and np.ptp(curve) > 0.0 for curve in curves):
         raise Unavailable("too short, constant or not finite")

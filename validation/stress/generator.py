@@ -150,7 +150,9 @@ def _start(r: np.random.Generator, block: Block, unit: float, must_move: bool) -
     speed = radius / unit
     start: dict[str, Any] = {}
     if must_move or r.random() < 0.3:
-        start["initial_rotation"] = _edge(r, 0.05, (block.pivot("left").alpha, -block.pivot("right").alpha)) or alpha * float(r.uniform(-1.0, 1.0))
+        start["initial_rotation"] = _edge(r, 0.05, (block.pivot("left").alpha, -block.pivot("right").alpha)) or alpha * float(
+            r.uniform(-1.0, 1.0)
+        )
     if r.random() < 0.3:
         start["initial_angular_velocity"] = float(r.uniform(-1.5, 1.5)) * (alpha if r.random() < 0.5 else 1.0) / unit
     if r.random() < 0.2:

@@ -114,6 +114,46 @@ def test_it_refuses_where_the_order_says_nothing(factor, reason):
     assert found.u_num("peak_rotation") is None
 
 
+@dataclass(frozen=True)
+class Tolerant:
+    """A model with a tolerance: its rotation is sin t times one and the tolerance."""
+
+    tolerance: float = 1e-2
+
+    def finer(self):
+        return Tolerant(1e-2 * self.tolerance)
+
+    def simulate(self, scene):
+        return Made(lambda step: 1.0 + self.tolerance).simulate(scene)
+
+
+def test_of_a_tolerance_the_change_at_a_hundredth_of_it_counts():
+    """F = 1.25 times the change: of 0.5 alpha sin t by 0.0099 of it."""
+    found = numerical_uncertainty(Tolerant(), BOOKCASE)
+    change = 0.5 * 0.99e-2 * np.sin(BOOKCASE.output_times)
+    assert found.converged
+    assert found.u_num("theta_rms") == pytest.approx(1.25 * math.sqrt(np.mean(change**2)), rel=1e-9)
+    assert found.u_num("peak_rotation") == pytest.approx(1.25 * np.max(change), rel=1e-9)
+    assert found.u_num("outcome") == 0.0
+
+
+@dataclass(frozen=True)
+class Dented(Made):
+    """At the finest step the rows beside the highest lie a hundredth of alpha lower."""
+
+    def simulate(self, scene):
+        history = super().simulate(scene)
+        theta = history.channels["theta"].copy()
+        if self.step == 1e-3:
+            theta[np.argmax(np.abs(theta)) + np.array([-1, 1])] -= 0.01 * scene.block.alpha
+        return replace(history, channels={**history.channels, "theta": theta})
+
+
+def test_the_peak_may_lie_between_rows_of_the_run_itself():
+    """By an eighth of the second difference there, whatever the coarser runs look like."""
+    assert numerical_uncertainty(Dented(lambda step: 1.0), BOOKCASE).u_num("peak_rotation") == pytest.approx(0.02 / 8.0, rel=0.01)
+
+
 def test_small_changes_need_no_order_and_get_the_larger_factor():
     found = numerical_uncertainty(Made(lambda h: 1.0 + 1e-4 * math.cos(1e4 * h)), BOOKCASE)
     values = [0.5 * 1e-4 * math.cos(1e4 * h) for h in (1e-3, 2e-3, 4e-3)]
@@ -321,12 +361,23 @@ def test_repeats_that_end_differently_have_no_mean():
         (0.03, 0.02, 0.01, 0.04, verdict.DATA),
         (0.10, 0.03, 0.04, 0.0, "not explained: model form or set-up, at least 0.05 alpha"),
         (0.10, None, 0.04, 0.0, verdict.NOT_CONVERGED),
+        (None, 0.02, 0.04, 0.0, verdict.NOT_CONVERGED),
+        (0.02, 0.02, 0.0, 0.0, verdict.NUMERICAL),  # at the limit it is within it
+        (0.04, 0.0, 0.04, 0.0, verdict.INPUTS),
+        (0.03, 0.02, 0.03, 0.03, verdict.INPUTS),
     ],
 )
 def test_what_a_difference_says(error, u_num, u_input, u_data, said):
     found = verdict.explain("theta_rms", "alpha", error, u_num, u_input, u_data)
     assert found.verdict == said
     assert found.explained == (said in (verdict.NUMERICAL, verdict.INPUTS, verdict.DATA))
+
+
+def test_what_a_difference_says_where_nothing_is_known_of_inputs_and_tests():
+    found = verdict.explain("theta_rms", "alpha", 0.1, 0.04)
+    assert (found.u_input, found.u_data, found.u_val) == (0.0, 0.0, 0.04)
+    assert found.verdict == "not explained: model form or set-up, at least 0.06 alpha"
+    assert verdict.Explanation(quantity="theta_rms", unit="alpha", error=0.1, u_num=0.04, verdict="").u_val == 0.04
 
 
 def test_bias_and_scatter_are_recovered_and_cover():

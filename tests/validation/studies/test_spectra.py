@@ -23,7 +23,7 @@ from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.spectrum import node_scene
 from rockcheck.scenes import Block, InputError, Ricker, Scene, Wall, load_scene
 from rockcheck.scenes.progress import Count
-from rockcheck.scenes.recordings import Reading
+from rockcheck.scenes.recordings import Reading, Recording
 from rockcheck.scenes.recordings.sets import motions_of
 from rockcheck.validation.spectra import agreement, claims, fragility, refinement
 from rockcheck.validation.spectra import study as spectra
@@ -251,6 +251,7 @@ def test_ones_own_scene_and_fragility(tmp_path, capsys):
     assert main(["spectrum", *grid, "--fragility"]) == 0
     kept = json.loads((tmp_path / "out" / "spectra" / "fragility.json").read_text(encoding="utf-8"))
     assert [case["label"] for case in kept["cases"]] == ["with the wall", "without a wall"]
+    assert kept["format"] == 1
     page = (tmp_path / "out" / "spectra.html").read_text(encoding="utf-8")
     assert "bookcase" in page
     assert '<h2 id="fragility">' in page
@@ -708,6 +709,26 @@ def test_records_are_scaled_to_the_intensity(tmp_path, monkeypatch):
     assert {point[1] for point in case.points} <= {0.0, 0.5, 1.0}
     with pytest.raises(InputError, match="too few"):
         fragility.fragility(panel, request, motions("0.csv"), Tiles(tmp_path / "tiles"))
+
+
+def test_fragility_plays_each_motion_in_both_directions(tmp_path):
+    """Reversed, a symmetric block without a wall does the mirror image, so that one of two sides is the other's opposite."""
+    scene = paper_panels(8)[0].scene.replace(walls=())
+    request = SpectrumRequest(np.array([1.0, 3.0]), np.linspace(1.0, 6.0, 6))
+    tiles = Tiles(tmp_path / "tiles")
+    sides, failed = fragility._play_pulses(scene, request, tiles)
+    assert sides.shape == (fragility.PULSES, 2, 6)
+    assert not failed.any()
+    assert set(np.unique(sides)) == {-1, 0, 1}
+    np.testing.assert_array_equal(sides[:, 0], -sides[:, 1])
+    samples = 3.0 * np.sin(2.0 * 0.02 * np.arange(158))
+    recording = Recording(samples=samples, time_step=0.02, unit="m/s2", form="CSV")
+    sides, failed = fragility._play_records(scene, request, [("a", recording), ("b", recording)], tiles)
+    assert sides.shape == failed.shape == (2, 2, 6)
+    assert set(np.unique(sides)) >= {0}
+    assert sides.any()
+    np.testing.assert_array_equal(sides[:, 0], -sides[:, 1])
+    np.testing.assert_array_equal(sides[0], sides[1])
 
 
 def test_the_intensity_in_g_is_that_of_the_pivot_that_lifts_first(tmp_path):
