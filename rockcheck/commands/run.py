@@ -39,7 +39,6 @@ from rockcheck.commands.simulate import setting_of
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.recordings.sets import record_path
-from rockcheck.validation.execute import remote, workers
 from rockcheck.validation.execute.models import FAMILIES, family, is_own, not_installed
 from rockcheck.validation.suite.record_sets import RecordSet
 from rockcheck.validation.suite.results import Run, Strict
@@ -162,10 +161,9 @@ def play_scene(suite: Suite, folder: Path, *, jobs: int | None, force: bool, sch
 
 def play(suite: Suite, folder: Path, jobs: int | None, force: bool, strict: Strict, scheduler: str | None) -> Run:
     """Run a suite with a progress bar on stderr."""
-    where = workers.local if scheduler is None else remote.OnCluster(scheduler)
     compiles = ", a first run compiles" if any(not is_own(one.family_name) and one.family.compiled for one in suite.models.values()) else ""
     with progress(f"{suite.name}{compiles}") as on_progress:
-        return run_suite(suite, folder, jobs=jobs, force=force, strict=strict, play=where, on_progress=on_progress)
+        return run_suite(suite, folder, jobs=jobs, force=force, strict=strict, scheduler=scheduler, on_progress=on_progress)
 
 
 def published(folder: Path, jobs: int | None) -> Path:
