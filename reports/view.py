@@ -359,8 +359,9 @@ def _read(cells: Iterable[Cell], folder: Path) -> tuple[dict[str, History], dict
             missing[cell.model] = cell.reason or "no history"
             continue
         try:
+            path = within(folder, cell.history)
             within(folder, str(events_path(Path(cell.history))))
-            histories[cell.model] = History.load(within(folder, cell.history))
+            histories[cell.model] = History.load(path)
         except InputError as error:
             missing[cell.model] = str(error)
     return histories, missing

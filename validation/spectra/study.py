@@ -13,10 +13,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import StringConstraints
 
 from rockcheck.ebm import EventBasedModel, Spectrum, overturning_spectrum
 from rockcheck.ebm.horizon import may_fly, other_laws
@@ -46,6 +47,10 @@ SETTINGS: dict[str, dict[str, Any]] = {
 SPECTRA = "spectra"
 #: Results of the long studies of spectra, as they come with the package.
 KEPT = Path(str(resources.files("rockcheck.validation"))) / "data" / "spectra"
+
+
+#: A part of the name of a file: a list of spectra that somebody sent names none in another folder.
+FileName = Annotated[str, StringConstraints(pattern=r"^[^/\\\x00]+$")]
 
 
 @dataclass(frozen=True)
@@ -81,11 +86,11 @@ class SpectrumRequest:
 class SpectrumRecord(Stored):
     """A played spectrum in `spectra.json`; shares are of all nodes."""
 
-    name: str
+    name: FileName
     title: str
     figure: int | None
     scene: dict[str, Any]
-    model: str
+    model: FileName
     settings: dict[str, Any]
     frequency_ratios: tuple[float, ...]
     amplitude_ratios: tuple[float, ...]
