@@ -256,6 +256,23 @@ def test_energy_balance_is_exact_to_rounding():
         assert energy_error(model, fine, model.simulate(fine)) < 1e-11
 
 
+def test_the_spring_of_bouc_wens_friction_gives_energy_only_where_the_floors_push_changes():
+    """(9) keeps z, not energy: its force mu |P| z grows with P. What it gives is less than it can hold."""
+    shakes = SLIDES_AND_HITS.replace(walls=(), vertical=Sine(amplitude=6.0, period=0.15, cycles=27))
+    gains = {}
+    for name, scene in (("shaken", shakes), ("steady", shakes.replace(vertical=Rest()))):
+        for yields in (1e-2, 1e-3):
+            size = yields * scene.block.radius
+            model = EventBasedModel(friction="bouc-wen", yield_displacement=size, tolerance=1e-12)
+            history = model.simulate(audited(scene))
+            assert energy_error(model, audited(scene), history) < 1e-9
+            without = model.model_copy(update={"yield_displacement": 1e-30})  # as if it could hold nothing
+            gains[name, yields] = energy_error(without, audited(scene), history)
+    assert gains["steady", 1e-2] < 1e-9
+    assert gains["steady", 1e-3] < 1e-9
+    assert 1e-6 < gains["shaken", 1e-3] < 0.5 * gains["shaken", 1e-2]
+
+
 def test_energy_that_cannot_be_judged_is_not_said_to_hold(monkeypatch):
     """A history of too few rows, and one whose work is resolved nowhere: neither has an error of 0, and the run is counted."""
     model, short = EventBasedModel(), SLIDES_AND_HITS.replace(duration=0.2)
