@@ -73,7 +73,7 @@ TARGETS = {
     "validation/uncertainty/numerical.py": [
         UNCERTAINTY,
         "-k",
-        "index or order or step or tolerance or peak or interval_covers or own_error",
+        "index or order or step or tolerance or peak or small or interval_covers or own_error",
     ],
     "validation/uncertainty/inputs.py": [
         "tests/validation/discrepancy/test_propagation.py",

@@ -154,6 +154,15 @@ def test_the_peak_may_lie_between_rows_of_the_run_itself():
     assert numerical_uncertainty(Dented(lambda step: 1.0), BOOKCASE).u_num("peak_rotation") == pytest.approx(0.02 / 8.0, rel=0.01)
 
 
+def test_what_is_small_is_so_beside_the_block():
+    """Rotations are small in alpha, slips in alpha R, times in 1/p."""
+    from rockcheck.validation.uncertainty.numerical import _units
+
+    alpha, radius = math.atan2(0.397, 1.555), math.hypot(0.397, 1.555)
+    step_units = {"alpha": 1.0, "m": alpha * radius, "s": math.sqrt(4.0 * radius / (3.0 * 9.81))}
+    assert _units(BOOKCASE) == pytest.approx(step_units, rel=1e-12)
+
+
 def test_small_changes_need_no_order_and_get_the_larger_factor():
     found = numerical_uncertainty(Made(lambda h: 1.0 + 1e-4 * math.cos(1e4 * h)), BOOKCASE)
     values = [0.5 * 1e-4 * math.cos(1e4 * h) for h in (1e-3, 2e-3, 4e-3)]
