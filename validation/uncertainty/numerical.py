@@ -8,7 +8,7 @@ from that at h, d, is the largest of these, in units of alpha, alpha R and 1/p.
 | what the four runs say | verdict | u_num |
 |---|---|---|
 | they do not fall to the same side, or not all of them fall | not converged | none |
-| d(2h) <= d(3h) <= d(4h), order >= 0.5, d(2h) <= `LARGE` | converged | 1.25 times its largest change |
+| d(2h) <= d(3h) <= d(4h), order >= 0.5, d(2h) <= `LARGE` | converged | 1.25 largest changes |
 | else, and no d is above `LARGE` | converged | 3 times the largest d, in the figure's unit |
 | else | not converged: the histories part | none |
 
@@ -41,7 +41,7 @@ FACTORS = (1.0, 2.0, 3.0, 4.0)
 SAFETY, POOR_SAFETY = 1.25, 3.0
 #: From this order on the histories converge.
 LEAST_ORDER = 0.5
-#: Histories farther apart (rotations in alpha, slips in alpha R, times in 1/p) are not of one motion.
+#: Farther apart (rotations in alpha, slips in alpha R, times in 1/p) histories are not of one motion.
 LARGE = 0.1
 
 Verdict = Literal["converged", "not converged"]
@@ -77,8 +77,8 @@ class Quantity(Stored):
     """One figure of a run with its numerical uncertainty.
 
     `value` is the figure at the finest step; of `theta_rms`, a difference of histories, it is the
-    RMS change of theta from 2h to h. `order` is that of its changes, None where they do not grow with
-    the step. `u_num` is None where it could not be found; `reason` then says why.
+    RMS change of theta from 2h to h. `order` is that of its changes, None where they do not grow
+    with the step. `u_num` is None where it could not be found; `reason` then says why.
     """
 
     name: str
