@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,18 +10,38 @@ import numpy as np
 import typer
 from rich.table import Table
 
-from rockcheck.commands import answer, check_picture, console, save_picture
+from rockcheck.commands import answer, check_picture, console, save_picture, setting_of
 from rockcheck.scenes import InputError
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes.errors import printable, unknown_name
 from rockcheck.scenes.recordings import Reading, Recording, intensity, read_components
 from rockcheck.scenes.recordings.sets import files_of
 
-UnitOption = Annotated[str | None, typer.Option("--unit", help="Unit of the accelerations: g, m/s2, cm/s2, gal or mm/s2.")]
-TimeStepOption = Annotated[float | None, typer.Option("--time-step", help="Time step, s, where the file has no times.")]
-ColumnOption = Annotated[str | None, typer.Option("--column", help="Column of the accelerations: its number from 1, or its name.")]
-HeaderLinesOption = Annotated[int | None, typer.Option("--header-lines", help="Number of lines to skip at the top.")]
-DecimalOption = Annotated[str | None, typer.Option("--decimal", help="The decimal sign: . or ,")]
-ComponentOption = Annotated[str | None, typer.Option("--component", help="Which of several components: its number from 1, or its name.")]
+#: What a record file does not say of itself.
+KEYS = {
+    "unit": "of the accelerations: g, m/s2, cm/s2, gal or mm/s2",
+    "time_step": "s, where the file has no times",
+    "column": "of the accelerations: its number from 1, or its name",
+    "header_lines": "to skip at the top",
+    "decimal": "the decimal sign: . or ,",
+    "component": "which of several: its number from 1, or its name",
+}
+ReadOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--read",
+        metavar="KEY=VALUE",
+        help="How to read record files; repeatable. "
+        + "; ".join(f"{key}: {words}" for key, words in KEYS.items())
+        + ".",
+    ),
+]
+RecordsArgument = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="[RECORDS]...",
+        help='Record files, folders of them, or patterns such as "RSN1_H*.AT2".',
+    ),
+]
 
 #: Parts of the line that pictures a motion, and its marks from the smallest acceleration to the largest.
 _PARTS, _MARKS = 60, " ▁▂▃▄▅▆▇█"
@@ -28,20 +49,15 @@ _PARTS, _MARKS = 60, " ▁▂▃▄▅▆▇█"
 
 def run(
     files: Annotated[list[str], typer.Argument(help='Record files, folders of them, or patterns such as "RSN1_H*.AT2".')],
-    unit: UnitOption = None,
-    time_step: TimeStepOption = None,
-    column: ColumnOption = None,
-    header_lines: HeaderLinesOption = None,
-    decimal: DecimalOption = None,
-    component: ComponentOption = None,
+    read: ReadOption = None,
     plot: Annotated[Path | None, typer.Option("--plot", help="PNG to draw: acceleration, velocity and Sa(T).")] = None,
 ) -> None:
     """Show what files of recorded ground motions hold.
 
-    Reads PEER AT2, COSMOS and CSMIP V2, ESM, K-NET and KiK-net, CSV and columns of text; what a file does not say is an option.
+    Reads PEER AT2, COSMOS and CSMIP V2, ESM, K-NET and KiK-net, CSV and columns of text; what a file does not say is given by --read.
     """
     check_picture(plot)
-    reading = reading_of(unit, time_step, column, header_lines, decimal, component)
+    reading = reading_of(read)
     found: list[tuple[Path, Recording]] = []
     faults: list[InputError] = []
     for path in files_of(files):
@@ -61,13 +77,16 @@ def run(
         raise InputError(f"{faults[0]}{more}")
 
 
-def reading_of(
-    unit: str | None, time_step: float | None, column: str | None, header_lines: int | None, decimal: str | None, component: str | None
-) -> Reading:
-    """The options of a reader from those of a command; digits are a number, all else a name."""
-    given: dict[str, Any] = {"unit": unit, "time_step": time_step, "header_lines": header_lines, "decimal": decimal}
-    for name, word in (("column", column), ("component", component)):
-        given[name] = int(word) if word is not None and word.isascii() and word.isdecimal() and len(word) < 9 else word
+def reading_of(words: Sequence[str] | None) -> Reading:
+    """The options of a reader from `--read`. Raises `InputError`."""
+    given: dict[str, Any] = {}
+    for word in words or []:
+        key, value = setting_of(word, "--read")
+        if key not in KEYS:
+            raise InputError(str(unknown_name("key", key, KEYS)), "--read")
+        if key in given:
+            raise InputError(f"{key} is given twice: give one value", "--read")
+        given[key] = value
     return Reading(**given)
 
 

@@ -20,21 +20,13 @@ from rockcheck.commands import (
     model_names,
     progress,
     scene_names,
+    setting_of,
     tell_left_out,
     tell_missing,
     usable_folder,
 )
 from rockcheck.commands.publish import keep, publish
-from rockcheck.commands.record import (
-    ColumnOption,
-    ComponentOption,
-    DecimalOption,
-    HeaderLinesOption,
-    TimeStepOption,
-    UnitOption,
-    reading_of,
-)
-from rockcheck.commands.simulate import setting_of
+from rockcheck.commands.record import ReadOption, RecordsArgument, reading_of
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.execute import remote, workers
@@ -47,17 +39,11 @@ from rockcheck.validation.suite.tables import outcome_row, outcome_tables, verdi
 
 ALL = "all"
 ForceOption = Annotated[bool, typer.Option("--force", help="Run every cell, also those whose results are up to date.")]
-RecordOption = Annotated[
-    list[str] | None,
-    typer.Option("--record", help='Record files, a folder of them, or a pattern such as "RSN1_H*.AT2"; repeatable.'),
-]
-MoreRecords = Annotated[list[str] | None, typer.Argument(metavar="[RECORDS]...", help="More records, as a shell's own pattern gives them.")]
 
 
 def run(
     scene: Annotated[str, typer.Argument(help="A named scene or a .toml file.", autocompletion=scene_names)],
-    more: MoreRecords = None,
-    records: RecordOption = None,
+    records: RecordsArgument = None,
     models: Annotated[
         str, typer.Option("--models", help="all: those that are installed; or names, with commas between.", autocompletion=model_names)
     ] = ALL,
@@ -68,12 +54,7 @@ def run(
     vertical: Annotated[
         bool, typer.Option("--vertical", help="With the vertical component: of the same file, or of a file of the set that is named alike.")
     ] = False,
-    unit: UnitOption = None,
-    time_step: TimeStepOption = None,
-    column: ColumnOption = None,
-    header_lines: HeaderLinesOption = None,
-    decimal: DecimalOption = None,
-    component: ComponentOption = None,
+    read: ReadOption = None,
     out: OutOption = OUT,
     jobs: JobsOption = None,
     force: ForceOption = False,
@@ -85,12 +66,10 @@ def run(
 
     With records: once for each, in place of the scene's own excitation. A table and a report; nothing is judged, and no suite is needed.
     """
-    words = [*(records or []), *(more or [])]
-    reading = reading_of(unit, time_step, column, header_lines, decimal, component)
-    given = {name: value for name, value in reading if value is not None}
-    if not words and (given or vertical or scale != 1.0):
-        raise InputError("is missing: a unit, a scale or another option of records is given", "--record")
-    files = tuple(str(Path(word).absolute()) for word in words)
+    given = {name: value for name, value in reading_of(read) if value is not None}
+    if not records and (given or vertical or scale != 1.0):
+        raise InputError("are missing: --read, --scale or --vertical is given", "records")
+    files = tuple(str(Path(word).absolute()) for word in records or ())
     sets = [RecordSet(files=files, scale=scale, vertical=vertical, **given)] if files else []
     suite = scene_suite(scene, chosen_models(models, settings or ()), records=sets, allow_code=allow_code or ())
     folder = usable_folder(out)
