@@ -18,6 +18,7 @@ from rockcheck.commands import (
     tell_left_out,
 )
 from rockcheck.commands.record import ReadOption, RecordsArgument, reading_of
+from rockcheck.ebm.spectrum import Floats
 from rockcheck.scenes import InputError, load_scene
 from rockcheck.scenes.errors import printable, unknown_name
 from rockcheck.scenes.recordings.sets import files_of, motions_of
@@ -70,36 +71,34 @@ def run(
     Each record is scaled to every intensity and played in both directions by the event-based model:
     a curve a motion, their median and 16 to 84 % band, and fragility curves for peak rotations.
     """
-    from rockcheck.validation.studies.population.study import CAPACITIES, Ida, measure_of
+    from rockcheck.validation.studies.population.study import CAPACITIES, ida
 
     if model not in MODELS:
         raise InputError(str(unknown_name("model", model, MODELS)), "--model")
     if not records:
         raise InputError("are missing: name files, a folder of them, or a pattern", "records")
-    intensities = levels_of(levels)
-    measure_of(intensity)
+    values = levels_of(levels)
     motions, left_out = motions_of(files_of(records), reading_of(read))
-    study = Ida(
-        scene=load_scene(scene),
-        motions=motions,
-        left_out=left_out,
+    study = ida(
+        load_scene(scene),
+        motions,
+        values,
+        measure=intensity,
+        capacities=capacity or CAPACITIES,
         model=model,
-        intensities=intensities,
-        intensity=intensity,
-        capacities=tuple(capacity or CAPACITIES),
+        left_out=left_out,
     )
     tell_left_out(left_out)
     studied(study, out, jobs=jobs, scheduler=scheduler)
 
 
-def levels_of(text: str) -> np.ndarray:
+def levels_of(text: str) -> Floats:
     """The intensities that LOW:HIGH:COUNT means. Raises `InputError`."""
     try:
-        low, high, count = text.split(":")
-        least, largest, number = float(low), float(high), int(count)
+        low, high, count = map(float, text.split(":"))
     except ValueError:
-        least = largest = number = 0
-    if not (0.0 < least < largest < math.inf and 2 <= number <= MOST_LEVELS):
+        low = high = count = 0.0
+    if not (0.0 < low < high < math.inf and count in range(2, MOST_LEVELS + 1)):
         said = f"give LOW:HIGH:COUNT with 0 < LOW < HIGH and 2 to {MOST_LEVELS} of them"
         raise InputError(f"{printable(text)!r} is not allowed: {said}", "--levels")
-    return np.linspace(least, largest, number)
+    return np.linspace(low, high, int(count))

@@ -8,31 +8,23 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.table import Table
 
 from rockcheck.commands import answer, check_picture, console, save_picture, setting_of
 from rockcheck.scenes import InputError
-from rockcheck.scenes.errors import printable, unknown_name
+from rockcheck.scenes.errors import printable
 from rockcheck.scenes.recordings import Reading, Recording, intensity, read_components
 from rockcheck.scenes.recordings.sets import files_of
+from rockcheck.validation.finding import Finding, Table, Text, text
 
-#: What a record file does not say of itself.
-KEYS = {
-    "unit": "of the accelerations: g, m/s2, cm/s2, gal or mm/s2",
-    "time_step": "s, where the file has no times",
-    "column": "of the accelerations: its number from 1, or its name",
-    "header_lines": "to skip at the top",
-    "decimal": "the decimal sign: . or ,",
-    "component": "which of several: its number from 1, or its name",
-}
 ReadOption = Annotated[
     list[str] | None,
     typer.Option(
         "--read",
         metavar="KEY=VALUE",
-        help="How to read record files; repeatable. "
-        + "; ".join(f"{key}: {words}" for key, words in KEYS.items())
-        + ".",
+        help="What a file does not say of itself, or which part of it is wanted; repeatable. unit:"
+        " g, m/s2, cm/s2, gal or mm/s2; time_step, s; column: that of the accelerations, its number"
+        " from 1, or its name; header_lines to skip; decimal: . or ,; component: its number from 1,"
+        " or its name.",
     ),
 ]
 RecordsArgument = Annotated[
@@ -48,9 +40,14 @@ _PARTS, _MARKS = 60, " ▁▂▃▄▅▆▇█"
 
 
 def run(
-    files: Annotated[list[str], typer.Argument(help='Record files, folders of them, or patterns such as "RSN1_H*.AT2".')],
+    files: Annotated[
+        list[str],
+        typer.Argument(help='Record files, folders of them, or patterns such as "RSN1_H*.AT2".'),
+    ],
     read: ReadOption = None,
-    plot: Annotated[Path | None, typer.Option("--plot", help="PNG to draw: acceleration, velocity and Sa(T).")] = None,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="PNG to draw: acceleration, velocity and Sa(T).")
+    ] = None,
 ) -> None:
     """Show what files of recorded ground motions hold.
 
@@ -73,21 +70,17 @@ def run(
     if found:
         answer(values[0] if len(values) == 1 else {"records": values})
     if faults:
-        more = f"; {len(faults)} files of {len(faults) + len({path for path, _ in found})} are not read" if len(faults) > 1 else ""
+        more = (
+            f"; {len(faults)} files of {len(faults) + len({path for path, _ in found})} are not read"
+            if len(faults) > 1
+            else ""
+        )
         raise InputError(f"{faults[0]}{more}")
 
 
 def reading_of(words: Sequence[str] | None) -> Reading:
     """The options of a reader from `--read`. Raises `InputError`."""
-    given: dict[str, Any] = {}
-    for word in words or []:
-        key, value = setting_of(word, "--read")
-        if key not in KEYS:
-            raise InputError(str(unknown_name("key", key, KEYS)), "--read")
-        if key in given:
-            raise InputError(f"{key} is given twice: give one value", "--read")
-        given[key] = value
-    return Reading(**given)
+    return Reading(**dict(setting_of(word, "--read") for word in words or ()))
 
 
 def _values(path: Path, record: Recording) -> dict[str, Any]:
@@ -103,39 +96,58 @@ def _values(path: Path, record: Recording) -> dict[str, Any]:
         "pga_g": intensity.peak_acceleration(record),
         "pgv_m_s": intensity.peak_velocity(record),
         "arias_m_s": intensity.arias(record),
-        "sa_g": {f"{period:g}": intensity.spectral_acceleration(record, period) for period in intensity.PERIODS},
+        "sa_g": {
+            f"{period:g}": intensity.spectral_acceleration(record, period)
+            for period in intensity.PERIODS
+        },
         "notes": record.notes,
     }
 
 
 def _show(path: Path, record: Recording, value: dict[str, Any]) -> None:
-    out = console()
+    from rockcheck.reports.document import show
+
+    about = ("format", f"{value['format']}, unit {value['unit']}")
+    length = f"{value['samples']} every {value['step_s']:.6g} s, {value['duration_s']:.6g} s"
+    sa = ", ".join(f"{period} s: {sa:.3g} g" for period, sa in value["sa_g"].items())
+    rows = [
+        about,
+        ("samples", length),
+        ("PGA", f"{value['pga_g']:.4g} g"),
+        ("PGV", f"{value['pgv_m_s']:.4g} m/s"),
+        ("Arias", f"{value['arias_m_s']:.4g} m/s"),
+        ("Sa(T), 5 %", sa),
+        ("|a|", _picture(record)),
+        *(("note", printable(note, 200)) for note in record.notes),
+    ]
     title = f"{path}, {record.component}" if record.component else str(path)
-    out.print(title, style="bold", soft_wrap=True)
-    table = Table(box=None, pad_edge=False, show_header=False)
-    table.add_column("")
-    table.add_column("", overflow="fold")
-    table.add_row("format", f"{value['format']}, unit {value['unit']}")
-    table.add_row("samples", f"{value['samples']} every {value['step_s']:.6g} s, {value['duration_s']:.6g} s")
-    table.add_row("PGA", f"{value['pga_g']:.4g} g")
-    table.add_row("PGV", f"{value['pgv_m_s']:.4g} m/s")
-    table.add_row("Arias", f"{value['arias_m_s']:.4g} m/s")
-    table.add_row("Sa(T), 5 %", ", ".join(f"{period} s: {sa:.3g} g" for period, sa in value["sa_g"].items()))
-    table.add_row("|a|", _picture(record))
-    for note in record.notes:
-        table.add_row("note", printable(note, 200))
-    out.print(table)
+    table = Table("record", [text("record"), text("value", " ")], rows)
+    show(Finding("record", title, "", [Text(title), table]), console())
 
 
 def _picture(record: Recording) -> str:
     """The largest acceleration in each part of the motion, as bars."""
-    peaks = np.array([np.max(part) for part in np.array_split(np.abs(record.samples), min(_PARTS, len(record.samples)))])
+    peaks = np.array(
+        [
+            np.max(part)
+            for part in np.array_split(np.abs(record.samples), min(_PARTS, len(record.samples)))
+        ]
+    )
     largest = float(np.max(peaks))
-    levels = np.ceil(peaks / largest * (len(_MARKS) - 1)).astype(int) if largest > 0.0 else np.zeros(len(peaks), dtype=int)
+    levels = (
+        np.ceil(peaks / largest * (len(_MARKS) - 1)).astype(int)
+        if largest > 0.0
+        else np.zeros(len(peaks), dtype=int)
+    )
     return "".join(_MARKS[level] for level in levels)
 
 
 def _draw(found: list[tuple[Path, Recording]], plot: Path) -> None:
     from rockcheck.reports.show.drawing import recordings_figure
 
-    save_picture(recordings_figure([(f"{path.name} {record.component}".strip(), record) for path, record in found[:12]]), plot)
+    save_picture(
+        recordings_figure(
+            [(f"{path.name} {record.component}".strip(), record) for path, record in found[:12]]
+        ),
+        plot,
+    )

@@ -325,20 +325,12 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, words: int)
 
 def _fragility(panels: Sequence[Panel], request: SpectrumRequest, records: Sequence[str], read: Sequence[str], **how: Any) -> NoReturn:
     """Plays and tells the fragility of one's own scene, in a folder of its own."""
-    from rockcheck.validation.studies.population.study import Fragility
+    from rockcheck.validation.studies.population.study import fragility
 
     if len(panels) != 1:
         raise InputError("needs --scene", "--fragility")
     motions, left_out = motions_of(files_of(records), reading_of(read))
     tell_left_out(left_out)
     ends = float(request.frequencies[0]), float(request.frequencies[-1])
-    study = Fragility(
-        scene=panels[0].scene,
-        motions=motions,
-        left_out=left_out,
-        model=request.model,
-        settings=request.settings,
-        amplitudes=request.amplitudes,
-        frequencies=ends,
-    )
-    studied(study, **how)
+    which = {"model": request.model, "settings": request.settings, "left_out": left_out}
+    studied(fragility(panels[0].scene, motions, request.amplitudes, ends, **which), **how)

@@ -9,12 +9,9 @@ import typer
 from rockcheck.commands import answer, console, model_names, progress, scene_names, setting_of
 from rockcheck.scenes.files import load_uncertain_scene
 from rockcheck.validation.execute.models import FAMILIES, build
-from rockcheck.validation.finding import Finding
-from rockcheck.validation.uncertainty.inputs import SAMPLES, Inputs, propagate
-from rockcheck.validation.uncertainty.numerical import Numerical, numerical_uncertainty
-from rockcheck.validation.uncertainty.tables import inputs_blocks, numerical_blocks
-
-NOT_CONVERGED = 1
+from rockcheck.validation.uncertainty.inputs import SAMPLES, propagate
+from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
+from rockcheck.validation.uncertainty.tables import finding_of
 
 
 def run(
@@ -64,35 +61,3 @@ def run(
     show(found, console())
     answer(found.data)
     raise typer.Exit(found.exit_code)
-
-
-def finding_of(
-    scene: str, model: str, numerical: Numerical | None, inputs: Inputs | None
-) -> Finding:
-    """Both uncertainties; its data are what `--json` says."""
-    converged = numerical is not None and numerical.converged
-    said, quantities = "a model without step or tolerance; its numerical error is not known", []
-    if numerical is not None:
-        said = f"{'converged' if converged else 'not converged'}, by {numerical.method}"
-        quantities = [
-            {**q.model_dump(), "u_input": inputs.u_input(q.name) if inputs else None}
-            for q in numerical.quantities
-        ]
-    return Finding(
-        "uncertainty",
-        f"Uncertainty: {scene}",
-        f"{scene}, {model}: {said}",
-        [
-            *(numerical_blocks(numerical) if numerical else ()),
-            *(inputs_blocks(inputs) if inputs else ()),
-        ],
-        {
-            "scene": scene,
-            "model": model,
-            "converged": converged,
-            "method": numerical.method if numerical else "",
-            "quantities": quantities,
-            "inputs": inputs.model_dump() if inputs else None,
-        },
-        exit_code=0 if converged else NOT_CONVERGED,
-    )

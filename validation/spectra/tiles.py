@@ -27,7 +27,7 @@ from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.execute.store import TILES, Store
-from rockcheck.validation.uncertainty.population import ENOUGH, SETTLE, compiled, decided, side_of
+from rockcheck.validation.uncertainty.population import ENOUGH, SETTLE, compiled, play
 
 #: Nodes of a tile of the compiled event-based models.
 TILE = 10_000
@@ -165,13 +165,9 @@ def play_tile(scene: Scene, amplitudes: Floats, frequencies: Floats, model: str,
     player = build(model, settings)
     if compiled(player):
         return play_nodes(scene, amplitudes, frequencies, model=player, jobs=1), _code()
-    sides, failed = np.zeros(len(amplitudes), dtype=np.int8), np.zeros(len(amplitudes), dtype=bool)
-    for n, (a, f) in enumerate(zip(amplitudes, frequencies, strict=True)):
-        try:
-            sides[n] = side_of(decided(node_scene(scene, float(a), float(f)), player).outcome)
-        except ModelFailure:
-            failed[n] = True
-    return (sides, failed), _code()
+    scenes = [node_scene(scene, float(a), float(f)) for a, f in zip(amplitudes, frequencies, strict=True)]
+    runs = play(scenes, player)
+    return (np.array(runs.side, dtype=np.int8), np.array(runs.failed)), _code()
 
 
 def tile_key(scene: Scene, amplitudes: Floats, frequencies: Floats, model: str, settings: Mapping[str, Any]) -> str:

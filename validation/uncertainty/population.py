@@ -4,7 +4,7 @@ share of the runs is."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol, TypeGuard
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,36 +17,32 @@ from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.discrepancy.statistics import CONFIDENCE
 
 Floats = NDArray[np.float64]
-#: The figures of a run, by name, with their units.
-FIGURES = {"peak_rotation": "alpha"}
 #: Time (s) that a run goes on after the base's motion while its outcome is open; and the share of
 #: the energy of tipping over below which the outcome is decided: a hundredth is left to the model's
 #: own error.
 SETTLE, ENOUGH = 6.0, 0.99
 
 
-class Player(Protocol):
-    """A model."""
-
-    def simulate(self, scene: Scene) -> History:
-        """The motion of the scene."""
-        ...  # pragma: no cover
-
-
 class Runs(Stored):
     """What a model makes of scenes, one value a run.
 
     `side` is -1 overturned left, +1 right, 0 neither. `failed` runs say nothing, whatever the other
-    fields hold of them. `figures` are those of `FIGURES`; a block that falls passes 1 alpha.
+    fields hold of them. `figures` by name: peak_rotation (alpha).
     """
 
     side: tuple[int, ...]
     failed: tuple[bool, ...]
     figures: Mapping[str, tuple[float, ...]]
 
+    @property
+    def peaks(self) -> Floats:
+        """Peak rotations, alpha: infinite of a block that overturned, NaN where the run failed."""
+        peaks = np.where(self.side, np.inf, self.figures["peak_rotation"])
+        return np.where(self.failed, np.nan, peaks)
 
-def play(scenes: Sequence[Scene], player: Player) -> Runs:
-    """Play scenes until outcome and peak are certain, whatever their durations.
+
+def play(scenes: Sequence[Scene], player: Any) -> Runs:
+    """Play scenes with a model until outcome and peak are certain, whatever their durations.
 
     A run of the event-based model that fails is made once more at a hundredth of the tolerance.
     Raises `InputError` where the model cannot play one of them.
@@ -59,9 +55,8 @@ def play(scenes: Sequence[Scene], player: Player) -> Runs:
     else:
         rows = [_one(scene, player) for scene in scenes]
         side, peak, failed = (np.array(column) for column in zip(*rows, strict=True))
-    alpha = np.array([scene.block.alpha for scene in scenes])
-    figures = {"peak_rotation": tuple((peak / alpha).tolist())}
-    return Runs(side=tuple(side.tolist()), failed=tuple(failed.tolist()), figures=figures)
+    rotations = (peak / np.array([scene.block.alpha for scene in scenes])).tolist()
+    return Runs(side=side.tolist(), failed=failed.tolist(), figures={"peak_rotation": rotations})
 
 
 def _batch(
@@ -71,7 +66,7 @@ def _batch(
     return found.side, found.peak, found.failed
 
 
-def _one(scene: Scene, player: Player) -> tuple[int, float, bool]:
+def _one(scene: Scene, player: Any) -> tuple[int, float, bool]:
     try:
         history = decided(scene, player)
     except ModelFailure:
@@ -79,7 +74,7 @@ def _one(scene: Scene, player: Player) -> tuple[int, float, bool]:
     return side_of(history.outcome), history.peak_rotation, False
 
 
-def decided(scene: Scene, player: Player) -> History:
+def decided(scene: Scene, player: Any) -> History:
     """The history of a scene until its outcome is certain, whatever its duration.
 
     A block that has not tipped past its balance when the base comes to rest, and has too little

@@ -1,50 +1,65 @@
-"""What is known of a run's uncertainty, as tables."""
+"""What is known of a run's uncertainty, as a finding."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-from rockcheck.validation.finding import Block, Column, Table, Text, text
+from rockcheck.validation.finding import Block, Column, Finding, Table, Text, text
 from rockcheck.validation.uncertainty.inputs import Inputs
 from rockcheck.validation.uncertainty.numerical import Numerical
 
-DIGITS = 4
+#: Exit code where a run is not converged.
+NOT_CONVERGED = 1
 
 
-def numerical_blocks(found: Numerical) -> Iterator[Block]:
-    """Each figure with its numerical uncertainty, and why what is not converged is not."""
-    columns = [
-        text("quantity"),
-        Column("value", digits=DIGITS),
-        Column("u_num", "u_num", digits=DIGITS),
-        text("unit"),
-        Column("order", digits=2),
-        text("verdict"),
-    ]
-    rows = [[q.name, q.value, q.u_num, q.unit, q.order, q.verdict] for q in found.quantities]
-    yield Table("quantities", columns, rows)
-    yield Text(items=found.reasons)
-
-
-def inputs_blocks(found: Inputs) -> Iterator[Block]:
-    """The intervals of the figures, and which number matters most."""
-    columns = [
-        text("figure"),
-        *(Column(name, digits=DIGITS) for name in ("value", "low", "high")),
-        text("unit"),
-    ]
-    rows = [[f.name, f.value, f.low, f.high, f.unit] for f in (*found.figures, found.overturns)]
-    yield Text(
-        f"{found.samples} draws of {', '.join(found.names)}, played by {found.model};"
-        " 95 % of them between low and high"
-    )
-    yield Table("inputs", columns, rows)
-    if found.sensitivities:
-        columns = [
-            text("input", "what matters most for the peak"),
-            Column("alone", kind="percent", digits=2),
-            Column("with_others", kind="percent", digits=2),
+def finding_of(
+    scene: str, model: str, numerical: Numerical | None, inputs: Inputs | None
+) -> Finding:
+    """The numerical uncertainty of each figure, and what the spread of the inputs makes of it; its
+    data are what `--json` says."""
+    converged = numerical is not None and numerical.converged
+    said = "a model without step or tolerance; its numerical error is not known"
+    quantities, blocks = [], list[Block]()
+    if numerical is not None:
+        said = f"{'converged' if converged else 'not converged'}, by {numerical.method}"
+        quantities = [
+            {**q.model_dump(), "u_input": inputs.u_input(q.name) if inputs else None}
+            for q in numerical.quantities
         ]
-        rows = [[s.name, max(s.first, 0.0), max(s.total, 0.0)] for s in found.sensitivities]
-        yield Table("sensitivities", columns, rows)
-    yield Text(found.note)
+        names = ("value", "u_num", "order")
+        columns = [text("name", "quantity"), *(Column(name, name, digits=4) for name in names)]
+        columns += [text("unit"), text("verdict")]
+        rows = [[one[column.name] for column in columns] for one in quantities]
+        blocks += [Table("quantities", columns, rows), Text(items=numerical.reasons)]
+    if inputs is not None:
+        about = f"{inputs.samples} draws of {', '.join(inputs.names)}, played by {inputs.model}"
+        figures = [*inputs.figures, inputs.overturns]
+        shares = [[s.name, max(s.first, 0.0), max(s.total, 0.0)] for s in inputs.sensitivities]
+        heads = ("value", "low", "high")
+        blocks += [
+            Text(f"{about}; 95 % of them between low and high"),
+            Table(
+                "inputs",
+                [text("figure"), *(Column(name, digits=4) for name in heads), text("unit")],
+                [[one.name, one.value, one.low, one.high, one.unit] for one in figures],
+            ),
+            Table(
+                "sensitivities",
+                [
+                    text("input", "what matters most for the peak"),
+                    Column("alone", kind="percent", digits=2),
+                    Column("with_others", kind="percent", digits=2),
+                ],
+                shares,
+                on="all" if shares else "file",
+            ),
+            Text(inputs.note),
+        ]
+    data = {
+        "scene": scene,
+        "model": model,
+        "converged": converged,
+        "method": numerical.method if numerical else "",
+        "quantities": quantities,
+        "inputs": inputs.model_dump() if inputs else None,
+    }
+    answer, code = f"{scene}, {model}: {said}", 0 if converged else NOT_CONVERGED
+    return Finding("uncertainty", f"Uncertainty: {scene}", answer, blocks, data, exit_code=code)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,10 @@ from rockcheck.validation.finding import Axis, Block, Column, Panel, Plot, Serie
 from rockcheck.validation.uncertainty.population import wilson
 
 Floats = NDArray[np.float64]
+#: Shares of the motions whose peaks stay below the quantiles' curves.
+BAND = (0.16, 0.5, 0.84)
+#: The end of the axis of peaks (alpha).
+FALLEN = 1.25
 #: Sets of motions drawn anew for the interval of a fitted median.
 DRAWS = 200
 
@@ -50,15 +54,17 @@ def curve_of(
 
     With `draws` of the motions the fitted median has an interval.
     """
+    from scipy.special import ndtr
+
     hits, decided = (hit & ~failed).sum(axis=1), (~failed).sum(axis=1)  # (motion, intensity)
-    fit = fit_lognormal(intensities, hits.sum(axis=0), decided.sum(axis=0))
-    fitted = lognormal(intensities, *fit) if fit else np.full(len(intensities), np.nan)
-    median, dispersion = fit or (None, None)
-    low, high = _interval(intensities, hits, decided, draws) if fit and draws else (None, None)
-    points = np.column_stack([intensities, *_band(hits, decided), fitted])
-    rows = tuple(map(tuple, points.tolist()))
-    undecided = int(failed.sum())
-    return Curve(label, len(hit), undecided, median, dispersion, low, high, rows)
+    median, dispersion = fit = fit_lognormal(intensities, hits.sum(axis=0), decided.sum(axis=0))
+    fitted = np.full(len(intensities), np.nan)
+    between: tuple[float | None, float | None] = (None, None)
+    if median is not None and dispersion is not None:
+        fitted = ndtr(np.log(intensities / median) / dispersion)
+        between = _interval(intensities, hits, decided, draws)
+    points = np.column_stack([intensities, *_band(hits, decided), fitted]).tolist()
+    return Curve(label, len(hit), int(failed.sum()), *fit, *between, tuple(map(tuple, points)))
 
 
 def _band(hits: NDArray[np.int64], decided: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
@@ -85,27 +91,19 @@ def _interval(
     """The interval of the fitted median: of sets of motions drawn anew, where most have a fit."""
     sets = np.random.default_rng(2).integers(len(hits), size=(draws, len(hits)))
     fits = [
-        fit_lognormal(intensities, hits[rows].sum(axis=0), decided[rows].sum(axis=0))
+        fit_lognormal(intensities, hits[rows].sum(axis=0), decided[rows].sum(axis=0))[0]
         for rows in sets
     ]
-    medians = [fit[0] for fit in fits if fit]
-    if len(medians) < 0.9 * draws:
+    medians = [median for median in fits if median is not None]
+    if not medians or len(medians) < 0.9 * draws:
         return None, None
     low, high = np.quantile(medians, [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2])
     return float(low), float(high)
 
 
-def lognormal(intensities: Floats, median: float, dispersion: float) -> Floats:
-    """Probability Phi(ln(x/median)/dispersion)."""
-    from scipy.special import ndtr
-
-    p: Floats = ndtr(np.log(intensities / median) / dispersion)
-    return p
-
-
 def fit_lognormal(
     intensities: Floats, hits: NDArray[np.int64], runs: NDArray[np.int64]
-) -> tuple[float, float] | None:
+) -> tuple[float | None, float | None]:
     """Median and dispersion of the lognormal curve of the greatest likelihood (Baker 2015).
 
     `hits` counts the runs, of those that were decided, in which it happened at each intensity. None
@@ -115,7 +113,7 @@ def fit_lognormal(
     from scipy.special import log_ndtr
 
     if not 0 < hits.sum() < runs.sum():
-        return None
+        return None, None
     logarithm = np.log(intensities)
     centre = float(np.mean(logarithm))
 
@@ -127,7 +125,7 @@ def fit_lognormal(
     how = {"xatol": 1e-9, "fatol": 1e-9, "maxiter": 2000}
     level, slope = minimize(unlikelihood, [0.0, 1.0], method="Nelder-Mead", options=how).x
     if slope <= 0.0:
-        return None
+        return None, None
     return float(np.exp(centre - level / slope)), float(1.0 / slope)
 
 
@@ -136,28 +134,32 @@ def blocks_of(
 ) -> list[Block]:
     """The curves, drawn and as tables, over the intensity `across`; `other`: its axis in another
     unit, see `finding.Plot`."""
-    factor = other["per_unit"] if other else None
     columns = [
         text("case", "event"),
         Column("median", f"median {across.label}", across.unit),
-        *([Column(f"median_{other['other_unit']}", "median", other["other_unit"])] if other else []),
         Column("low", "95 % from"),
         Column("high", "to"),
         Column("dispersion", digits=2, help=f"standard deviation of ln({across.label})"),
         Column("motions", brief=False),
         Column("undecided", "undecided runs", brief=False),
     ]
-    rows = []
+    rows = [
+        [getattr(one, "label" if c.name == "case" else c.name) for c in columns] for one in curves
+    ]
+    if other:
+        columns.append(Column(f"median_{other['other_unit']}", "median", other["other_unit"]))
+        rows = [[*row, row[1] and row[1] * other["per_unit"]] for row in rows]
+    series = []
     for one in curves:
-        converted = [one.median and one.median * factor] if factor else []
-        sure = [one.low, one.high, one.dispersion, one.motions, one.undecided]
-        rows.append([one.label, one.median, *converted, *sure])
+        level, share, low, high, fit = zip(*one.points, strict=True)
+        series.append(Series(one.label, level, share, low, high, style="smooth"))
+        series += [Series(one.label, level, fit, style="dots")] if one.median else []
     names = ("intensity", "share", "band_low", "band_high", "lognormal_fit")
     return [
         Plot(
             "fragility",
             "Fragility",
-            panels=[Panel("", [series for one in curves for series in _series(one)])],
+            panels=[Panel("", series)],
             x=Axis(across.head),
             y=Axis("probability", limits=(0.0, 1.0)),
             note="Share of the runs, its 95 % band (Wilson's, with the motions as independent), and"
@@ -180,8 +182,55 @@ def blocks_of(
     ]
 
 
-def _series(curve: Curve) -> Iterator[Series]:
-    level, share, low, high, fit = zip(*curve.points, strict=True)
-    yield Series(curve.label, level, share, low, high, style="smooth")
-    if curve.median is not None:
-        yield Series(curve.label, level, fit, style="dots")
+def lines_of(motions: Sequence[str], peaks: Floats, levels: Floats, across: Column) -> list[Block]:
+    """Peaks (motion, direction, intensity) as a line a motion, and their quantiles: the smallest
+    peak that the share of the motions does not exceed. A line ends where the block falls."""
+    x, signs = levels.tolist(), (1, -1)
+    known = np.where(np.isfinite(peaks), peaks, None).tolist()
+    every = np.nanquantile(peaks.reshape(-1, len(x)), BAND, axis=0, method="inverted_cdf")
+    quantiles = np.where(np.isfinite(every), every, None)
+    names = ("direction", "intensity", "peak_rotation_alpha", "overturned")
+    lines = [
+        (name, sign, line)
+        for name, both in zip(motions, known, strict=True)
+        for sign, line in zip(signs, both, strict=True)
+    ]
+    series = [
+        *(
+            Series(name if sign > 0 else f"{name}, reversed", x, line, style="thin")
+            for name, sign, line in lines
+        ),
+        *(
+            Series(f"{100.0 * share:g} %", x, line, style="smooth")
+            for share, line in zip(BAND, quantiles.tolist(), strict=True)
+        ),
+    ]
+    fell = iter(np.isinf(peaks).ravel().tolist())
+    return [
+        Plot(
+            "lines",
+            f"Peak rotation against {across.label}",
+            panels=[Panel("", series)],
+            x=Axis(across.head),
+            y=Axis("peak |θ|/α", limits=(0.0, FALLEN)),
+            note="A grey line a motion; it ends where the block falls. Coloured: the peak that 16,"
+            " 50 and 84 % of the motions stay below.",
+            live=True,
+        ),
+        Table(
+            "lines",
+            [text("motion"), *map(Column, names)],
+            [
+                [name, sign, level, peak, int(next(fell))]
+                for name, sign, line in lines
+                for level, peak in zip(x, line, strict=True)
+            ],
+            on="file",
+        ),
+        Table(
+            "quantiles",
+            [Column("intensity"), *(Column(f"p{100.0 * share:g}") for share in BAND)],
+            [[level, *row] for level, row in zip(x, quantiles.T.tolist(), strict=True)],
+            on="file",
+        ),
+    ]
