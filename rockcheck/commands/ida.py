@@ -75,10 +75,8 @@ def run(
 
     if model not in MODELS:
         raise InputError(str(unknown_name("model", model, MODELS)), "--model")
-    if not records:
-        raise InputError("are missing: name files, a folder of them, or a pattern", "records")
     values = levels_of(levels)
-    motions, left_out = motions_of(files_of(records), reading_of(read))
+    motions, left_out = motions_of(files_of(records or ()), reading_of(read))
     study = ida(
         load_scene(scene),
         motions,
@@ -99,6 +97,6 @@ def levels_of(text: str) -> Floats:
     except ValueError:
         low = high = count = 0.0
     if not (0.0 < low < high < math.inf and count in range(2, MOST_LEVELS + 1)):
-        said = f"give LOW:HIGH:COUNT with 0 < LOW < HIGH and 2 to {MOST_LEVELS} of them"
-        raise InputError(f"{printable(text)!r} is not allowed: {said}", "--levels")
+        said = f"give LOW:HIGH:COUNT, 0 < LOW < HIGH, 2 to {MOST_LEVELS} of them, not {text!r}"
+        raise InputError(printable(said, 120), "--levels")
     return np.linspace(low, high, int(count))

@@ -107,16 +107,16 @@ def _values(path: Path, record: Recording) -> dict[str, Any]:
 def _show(path: Path, record: Recording, value: dict[str, Any]) -> None:
     from rockcheck.reports.document import show
 
-    about = ("format", f"{value['format']}, unit {value['unit']}")
-    length = f"{value['samples']} every {value['step_s']:.6g} s, {value['duration_s']:.6g} s"
-    sa = ", ".join(f"{period} s: {sa:.3g} g" for period, sa in value["sa_g"].items())
     rows = [
-        about,
-        ("samples", length),
+        ("format", f"{value['format']}, unit {value['unit']}"),
+        (
+            "samples",
+            f"{value['samples']} every {value['step_s']:.6g} s, {value['duration_s']:.6g} s",
+        ),
         ("PGA", f"{value['pga_g']:.4g} g"),
         ("PGV", f"{value['pgv_m_s']:.4g} m/s"),
         ("Arias", f"{value['arias_m_s']:.4g} m/s"),
-        ("Sa(T), 5 %", sa),
+        ("Sa(T), 5 %", ", ".join(f"{at} s: {sa:.3g} g" for at, sa in value["sa_g"].items())),
         ("|a|", _picture(record)),
         *(("note", printable(note, 200)) for note in record.notes),
     ]

@@ -332,5 +332,7 @@ def _fragility(panels: Sequence[Panel], request: SpectrumRequest, records: Seque
     motions, left_out = motions_of(files_of(records), reading_of(read))
     tell_left_out(left_out)
     ends = float(request.frequencies[0]), float(request.frequencies[-1])
-    which = {"model": request.model, "settings": request.settings, "left_out": left_out}
-    studied(fragility(panels[0].scene, motions, request.amplitudes, ends, **which), **how)
+    study = fragility(
+        panels[0].scene, motions, request.amplitudes, ends, model=request.model, settings=request.settings, left_out=left_out
+    )
+    studied(study, **how)

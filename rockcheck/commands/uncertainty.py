@@ -9,8 +9,8 @@ import typer
 from rockcheck.commands import answer, console, model_names, progress, scene_names, setting_of
 from rockcheck.scenes.files import load_uncertain_scene
 from rockcheck.validation.execute.models import FAMILIES, build
-from rockcheck.validation.uncertainty.inputs import SAMPLES, propagate
 from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
+from rockcheck.validation.uncertainty.population import SAMPLES, propagate
 from rockcheck.validation.uncertainty.tables import finding_of
 
 
@@ -56,7 +56,6 @@ def run(
         numerical = numerical_uncertainty(player, given.scene)
         tell(1, 2, "draws")
         inputs = propagate(given, samples=samples).inputs if given.spreads else None
-        tell(2, 2, "")
     found = finding_of(given.scene.name, model, numerical, inputs)
     show(found, console())
     answer(found.data)

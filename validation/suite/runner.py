@@ -34,8 +34,8 @@ from rockcheck.validation.suite.impact_laws import by_either, landing_of, under_
 from rockcheck.validation.suite.results import Cell, CostRecord, EnsembleRecord, Run
 from rockcheck.validation.suite.suites import ModelVariant, Suite
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Place, Windowed, judge
-from rockcheck.validation.uncertainty.inputs import Inputs
 from rockcheck.validation.uncertainty.numerical import Numerical
+from rockcheck.validation.uncertainty.population import Inputs
 
 FAULTS = "faults"
 #: Plays tasks somewhere: yields (index, result) as they end.

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from rockcheck.validation.finding import Block, Column, Finding, Table, Text, text
-from rockcheck.validation.uncertainty.inputs import Inputs
 from rockcheck.validation.uncertainty.numerical import Numerical
-
-#: Exit code where a run is not converged.
-NOT_CONVERGED = 1
+from rockcheck.validation.uncertainty.population import Inputs
 
 
 def finding_of(
@@ -31,15 +28,20 @@ def finding_of(
         blocks += [Table("quantities", columns, rows), Text(items=numerical.reasons)]
     if inputs is not None:
         about = f"{inputs.samples} draws of {', '.join(inputs.names)}, played by {inputs.model}"
-        figures = [*inputs.figures, inputs.overturns]
         shares = [[s.name, max(s.first, 0.0), max(s.total, 0.0)] for s in inputs.sensitivities]
-        heads = ("value", "low", "high")
         blocks += [
             Text(f"{about}; 95 % of them between low and high"),
             Table(
                 "inputs",
-                [text("figure"), *(Column(name, digits=4) for name in heads), text("unit")],
-                [[one.name, one.value, one.low, one.high, one.unit] for one in figures],
+                [
+                    text("figure"),
+                    *(Column(name, digits=4) for name in ("value", "low", "high")),
+                    text("unit"),
+                ],
+                [
+                    [one.name, one.value, one.low, one.high, one.unit]
+                    for one in (*inputs.figures, inputs.overturns)
+                ],
             ),
             Table(
                 "sensitivities",
@@ -53,13 +55,18 @@ def finding_of(
             ),
             Text(inputs.note),
         ]
-    data = {
-        "scene": scene,
-        "model": model,
-        "converged": converged,
-        "method": numerical.method if numerical else "",
-        "quantities": quantities,
-        "inputs": inputs.model_dump() if inputs else None,
-    }
-    answer, code = f"{scene}, {model}: {said}", 0 if converged else NOT_CONVERGED
-    return Finding("uncertainty", f"Uncertainty: {scene}", answer, blocks, data, exit_code=code)
+    return Finding(
+        "uncertainty",
+        f"Uncertainty: {scene}",
+        f"{scene}, {model}: {said}",
+        blocks,
+        {
+            "scene": scene,
+            "model": model,
+            "converged": converged,
+            "method": numerical.method if numerical else "",
+            "quantities": quantities,
+            "inputs": inputs.model_dump() if inputs else None,
+        },
+        exit_code=0 if converged else 1,
+    )
