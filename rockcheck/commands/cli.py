@@ -39,12 +39,14 @@ COMMANDS = {
     "ida": ("ida", "rockcheck ida shelf.toml records --intensity sa --period 0.5"),
     "benchmark": ("benchmark", "rockcheck benchmark --quick"),
     "conformance": ("conformance", "rockcheck conformance --engine mujoco --settings default"),
-    "calibrate": ("calibrate", "rockcheck calibrate --engine mujoco --restitution 0.5 --step 1e-3"),
     "stress": ("stress", "rockcheck stress --quick"),
     "report": ("report", "rockcheck report rockcheck-report"),
     "figure": ("figure", "rockcheck figure rockcheck-report fig4a -o fig4a.pdf"),
     "warm": ("warm", "rockcheck warm"),
 }
+
+#: Names that are gone, and what to call.
+GONE = {"calibrate": "conformance --tune E"}
 
 #: Commands that answer at once: nobody asks how long they took.
 AT_ONCE = ("scenes", "new", "record", "compare", "diff")
@@ -98,6 +100,8 @@ class _Loaded(Mapping[str, Any]):
     """The commands by name. Only that which is asked for is imported: half of them need the compiler, or what draws."""
 
     def __getitem__(self, name: str) -> Any:
+        if name in GONE:
+            raise InputError(f"is gone: call `rockcheck {GONE[name]}`", name)
         return _loaded(name)
 
     def __iter__(self) -> Iterator[str]:

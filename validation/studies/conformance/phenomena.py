@@ -1,6 +1,7 @@
 """The phenomena: tiny scenes, what is read off their histories, and what is certain about it.
 
-All figures are read off positions (t, x, y, theta), so that any simulator that writes those can be judged.
+All figures are read off positions (t, x, y, theta), so that any simulator that writes those can be
+judged.
 """
 
 from __future__ import annotations
@@ -29,10 +30,11 @@ HOUR = 3600.0  # s
 
 @dataclass(frozen=True)
 class Phenomenon:
-    """One card: `value` of the histories of its scenes should be `target`, and is allowed to be off by `limit`.
+    """One card: `value` of the histories of its scenes should be `target`, and is allowed to be off
+    by `limit`.
 
-    `means` is what a failure means for a user of the engine, `cure` what to look at. One with `judged` False is reported only.
-    `needs` names what an engine may declare to lack.
+    `means` is what a failure means for a user of the engine, `cure` what to look at. One with
+    `judged` False is reported only. `needs` names what an engine may declare to lack.
     """
 
     id: str
@@ -72,13 +74,24 @@ def _when(t: FloatArray, values: FloatArray, level: float) -> float:
     if not above.size:
         return math.nan
     i = int(above[0])
-    return float(t[i]) if i == 0 else float(np.interp(level, values[i - 1 : i + 1], t[i - 1 : i + 1]))
+    return (
+        float(t[i]) if i == 0 else float(np.interp(level, values[i - 1 : i + 1], t[i - 1 : i + 1]))
+    )
 
 
 # Sliding.
 
-SLIDE = Scene(name="slide", block=SQUAT, floor=Floor(friction=0.3), initial_velocity=1.5, duration=1.0)
-COAST = Scene(name="coast", block=SQUAT, floor=Floor(friction=0.0), initial_velocity=5.0, duration=10.0, output_step=0.05)
+SLIDE = Scene(
+    name="slide", block=SQUAT, floor=Floor(friction=0.3), initial_velocity=1.5, duration=1.0
+)
+COAST = Scene(
+    name="coast",
+    block=SQUAT,
+    floor=Floor(friction=0.0),
+    initial_velocity=5.0,
+    duration=10.0,
+    output_step=0.05,
+)
 RAMP_TIME = 4.0  # s: from nothing to two and a half times the cone
 CONE = Scene(
     name="cone",
@@ -88,7 +101,12 @@ CONE = Scene(
     duration=RAMP_TIME,
 )
 CREEP = Scene(
-    name="creep", block=SQUAT, floor=Floor(friction=0.4), excitation=_pushed([-0.36 * G, -0.36 * G], 10.0), duration=10.0, output_step=0.05
+    name="creep",
+    block=SQUAT,
+    floor=Floor(friction=0.4),
+    excitation=_pushed([-0.36 * G, -0.36 * G], 10.0),
+    duration=10.0,
+    output_step=0.05,
 )
 
 
@@ -99,7 +117,8 @@ def sliding_distance(found: Histories) -> float:
 
 
 def cone(found: Histories) -> float:
-    """The coefficient at which slip begins over mu: the base's acceleration grows by j t, so a free slip by j (t - t0)^3/6."""
+    """The coefficient at which slip begins over mu: the base's acceleration grows by j t, so a free
+    slip by j (t - t0)^3/6."""
     t, x = found["cone"].channels["t"], _column(found["cone"], "x")
     rate, slipped = G / RAMP_TIME, 0.01
     # Once slipping, friction stays mu g: x = j (t - t0)^3 / 6.
@@ -141,7 +160,15 @@ def _drop(e: float) -> Scene:
 def _hit(e: float) -> Scene:
     wall = Wall(side="left", gap=0.1003, restitution=e)
     floor = Floor(friction=0.0)
-    return Scene(name=f"wall, e {e:g}", block=SQUAT, floor=floor, walls=(wall,), initial_velocity=-1.0, duration=0.3, output_step=1e-3)
+    return Scene(
+        name=f"wall, e {e:g}",
+        block=SQUAT,
+        floor=floor,
+        walls=(wall,),
+        initial_velocity=-1.0,
+        duration=0.3,
+        output_step=1e-3,
+    )
 
 
 DROPS, HITS = (tuple(make(e) for e in RESTITUTIONS) for make in (_drop, _hit))
@@ -181,16 +208,35 @@ def no_bounce(found: Histories) -> float:
 
 # Rocking.
 
-UPLIFT = Scene(name="uplift", block=SLENDER, floor=Floor(friction=0.6), excitation=_pushed([0.0, 0.4 * G], RAMP_TIME), duration=RAMP_TIME)
+UPLIFT = Scene(
+    name="uplift",
+    block=SLENDER,
+    floor=Floor(friction=0.6),
+    excitation=_pushed([0.0, 0.4 * G], RAMP_TIME),
+    duration=RAMP_TIME,
+)
 TILT = 0.5 * SLENDER.alpha
-ROCK = Scene(name="rock", block=SLENDER, floor=Floor(friction=0.6), initial_rotation=TILT, duration=2.5, output_step=1e-3)
+ROCK = Scene(
+    name="rock",
+    block=SLENDER,
+    floor=Floor(friction=0.6),
+    initial_rotation=TILT,
+    duration=2.5,
+    output_step=1e-3,
+)
 #: Angular velocity from rest that just reaches the balance point.
 CRITICAL = math.sqrt(2.0 * (1.0 - math.cos(SLENDER.alpha))) * SLENDER.frequency_parameter
 
 
 def _flicked(name: str, part: float) -> Scene:
     spin = part * CRITICAL
-    return Scene(name=name, block=SLENDER, floor=Floor(friction=0.6), initial_angular_velocity=spin, duration=6.0)
+    return Scene(
+        name=name,
+        block=SLENDER,
+        floor=Floor(friction=0.6),
+        initial_angular_velocity=spin,
+        duration=6.0,
+    )
 
 
 TIP, RETURN = _flicked("tip", 1.03), _flicked("return", 0.97)
@@ -199,7 +245,8 @@ TIP, RETURN = _flicked("tip", 1.03), _flicked("return", 0.97)
 def uplift(found: Histories) -> float:
     """The acceleration of uplift over g tan(alpha).
 
-    From there theta'' = p^2 theta + K (t - t0) for small angles, K = 3 cos(alpha) j/(4 R): theta = K/p^2 (sinh(p s)/p - s).
+    From there theta'' = p^2 theta + K (t - t0) for small angles, K = 3 cos(alpha) j/(4 R): theta =
+    K/p^2 (sinh(p s)/p - s).
     """
     from scipy.optimize import brentq
 
@@ -215,7 +262,8 @@ def _first_impact(history: History) -> float:
 
 
 def housner(found: Histories) -> float:
-    """The ratio of angular velocities over the first impact, from the turning points, over 1 - 1.5 sin^2(alpha)."""
+    """The ratio of angular velocities over the first impact, from the turning points, over 1 - 1.5
+    sin^2(alpha)."""
     t, theta = found["rock"].channels["t"], _column(found["rock"], "theta")
     alpha = SLENDER.alpha
     swing = float(np.max(-theta[(t > _first_impact(found["rock"])) & (t < 2.2)]))
@@ -227,7 +275,9 @@ def period(found: Histories) -> float:
     """The quarter period over Housner's, without his small angles."""
     alpha, p = SLENDER.alpha, SLENDER.frequency_parameter
     nodes, weights = np.polynomial.legendre.leggauss(60)
-    root = 0.5 * math.sqrt(TILT) * (nodes + 1.0)  # theta = tilt - root^2 takes the singularity at the start away
+    root = (
+        0.5 * math.sqrt(TILT) * (nodes + 1.0)
+    )  # theta = tilt - root^2 takes the singularity at the start away
     speed = np.sqrt(2.0 * (np.cos(alpha - TILT) - np.cos(alpha - TILT + root**2))) * p
     quarter = 0.5 * math.sqrt(TILT) * float(np.sum(weights * 2.0 * root / speed))
     return _first_impact(found["rock"]) / quarter
@@ -261,12 +311,19 @@ LOOSE = Scene(name="loose", block=SQUAT, floor=Floor(friction=0.0), excitation=S
 LIGHT = ROCK.replace(name="light", gravity=0.5 * G)
 FALLING = ROCK.replace(name="falling base", vertical=_pushed([-0.5 * G, -0.5 * G], 2.5))
 FLUSH = Scene(
-    name="flush", block=SLENDER, floor=Floor(friction=0.6), initial_height=0.1, initial_velocity=1.0, duration=0.25, output_step=1e-3
+    name="flush",
+    block=SLENDER,
+    floor=Floor(friction=0.6),
+    initial_height=0.1,
+    initial_velocity=1.0,
+    duration=0.25,
+    output_step=1e-3,
 )
 
 
 def energy_gained(found: Histories) -> float:
-    """The largest rise of the energy above its lowest before, over its first, from differences of positions."""
+    """The largest rise of the energy above its lowest before, over its first, from differences of
+    positions."""
     history = found["tumble"]
     t, x, y, theta = (_column(history, name) for name in ("t", "x", "y", "theta"))
     rates = [np.diff(channel) / np.diff(t) for channel in (x, y, theta)]
@@ -286,13 +343,16 @@ def restlessness(found: Histories) -> float:
     """How far any corner strays from its place, mm."""
     history = found["rest"]
     x, y, theta = (_column(history, name) for name in ("x", "y", "theta"))
-    return 1e3 * float(np.max(np.abs(x) + np.abs(y - SLENDER.half_height) + SLENDER.radius * np.abs(theta)))
+    return 1e3 * float(
+        np.max(np.abs(x) + np.abs(y - SLENDER.half_height) + SLENDER.radius * np.abs(theta))
+    )
 
 
 def moving_base(found: Histories) -> float:
     """The larger of two errors, both shares.
 
-    How far a loose block leaves its place in space; how far the motion on a base that falls with g/2 is from that under g/2.
+    How far a loose block leaves its place in space; how far the motion on a base that falls with
+    g/2 is from that under g/2.
     """
     t, x = found["loose"].channels["t"], _column(found["loose"], "x")
     pulse = 2.0 * math.pi / SHAKE.period
@@ -304,7 +364,8 @@ def moving_base(found: Histories) -> float:
 
 
 def flush_landing(found: Histories) -> float:
-    """Angular velocity after a flat landing at 1.4 m/s that slips at 1 m/s, rad/s; 0 where both corners share the impulse evenly."""
+    """Angular velocity after a flat landing at 1.4 m/s that slips at 1 m/s, rad/s; 0 where both
+    corners share the impulse evenly."""
     t, theta = found["flush"].channels["t"], _column(found["flush"], "theta")
     lands = math.sqrt(2.0 * 0.1 / G)
     return float(np.interp(lands + 0.03, t, theta) - np.interp(lands + 0.01, t, theta)) / 0.02
@@ -314,99 +375,226 @@ COULOMB = "Coulomb 1785; momentum"
 NEWTON = "Newton's law of impact"
 HOUSNER = "Housner 1963"
 
-PHENOMENA: tuple[Phenomenon, ...] = (
+_ALL = (
     Phenomenon(
-        "RC-01", "sliding distance", (SLIDE,), sliding_distance, 1.0, 0.02, "of v²/(2 μ g)", COULOMB,
+        "RC-01",
+        "sliding distance",
+        (SLIDE,),
+        sliding_distance,
+        1.0,
+        0.02,
+        "of v²/(2 μ g)",
+        COULOMB,
         "What slides stops too early or too late.",
         "friction of both bodies, and how the engine combines them",
     ),
     Phenomenon(
-        "RC-02", "friction cone: where slip begins", (CONE,), cone, 1.0, 0.02, "of μ g", COULOMB,
+        "RC-02",
+        "friction cone: where slip begins",
+        (CONE,),
+        cone,
+        1.0,
+        0.02,
+        "of μ g",
+        COULOMB,
         "Things hold, or slip, at another slope than you set.",
         "combination of two frictions; pyramidal against elliptic cone",
     ),
     Phenomenon(
-        "RC-03", "static creep at 0.9 of the cone", (CREEP,), creep, 0.0, 1.0, "mm an hour", COULOMB,
+        "RC-03",
+        "static creep at 0.9 of the cone",
+        (CREEP,),
+        creep,
+        0.0,
+        1.0,
+        "mm an hour",
+        COULOMB,
         "What friction holds drifts away slowly.",
         "regularisation of friction: impratio and noslip in MuJoCo, stiction tolerance in Drake",
     ),
     Phenomenon(
-        "RC-04", "no lift while sliding", (SLIDE,), lift, 0.0, 0.1, "mm", "De Saxcé & Feng 1998: the cone is not associated",
+        "RC-04",
+        "no lift while sliding",
+        (SLIDE,),
+        lift,
+        0.0,
+        0.1,
+        "mm",
+        "De Saxcé & Feng 1998: the cone is not associated",
         "What slides flies: friction of later contacts is lost.",
         "a solver whose friction is not convex (associated), or a correction of the cone",
     ),
     Phenomenon(
-        "RC-05", "nothing slows what nothing holds", (COAST,), coasting, 1.0, 1e-5, "of v t", "Newton's first law",
+        "RC-05",
+        "nothing slows what nothing holds",
+        (COAST,),
+        coasting,
+        1.0,
+        1e-5,
+        "of v t",
+        "Newton's first law",
         "Hidden damping, or too few digits: long runs slow down.",
         "linear and angular damping 0; double precision",
     ),
     Phenomenon(
-        "RC-06", "rebound from the floor at e = 0.25 … 1", DROPS, floor_restitution, 0.0, 0.03, "in e", NEWTON,
+        "RC-06",
+        "rebound from the floor at e = 0.25 … 1",
+        DROPS,
+        floor_restitution,
+        0.0,
+        0.03,
+        "in e",
+        NEWTON,
         "Restitution is not what you set, or there is none.",
-        "rockcheck calibrate finds the engine's own parameters",
+        "rockcheck conformance --tune finds the engine's own parameters",
         needs="restitution",
     ),
     Phenomenon(
-        "RC-07", "rebound from a wall at e = 0.25 … 1", HITS, wall_restitution, 0.0, 0.03, "in e", NEWTON,
+        "RC-07",
+        "rebound from a wall at e = 0.25 … 1",
+        HITS,
+        wall_restitution,
+        0.0,
+        0.03,
+        "in e",
+        NEWTON,
         "Restitution is not what you set, or there is none.",
-        "rockcheck calibrate finds the engine's own parameters; thresholds of speed",
+        "rockcheck conformance --tune finds the engine's own parameters; thresholds of speed",
         needs="restitution",
     ),
     Phenomenon(
-        "RC-08", "no bounce at e = 0", (_drop(0.0), _hit(0.0)), no_bounce, 0.0, 0.03, "of the approach", NEWTON,
+        "RC-08",
+        "no bounce at e = 0",
+        (_drop(0.0), _hit(0.0)),
+        no_bounce,
+        0.0,
+        0.03,
+        "of the approach",
+        NEWTON,
         "Things hop that should stay where they land.",
         "correction of penetration apart from velocity; slop; damping of the contact",
     ),
     Phenomenon(
-        "RC-09", "uplift at g tan α", (UPLIFT,), uplift, 1.0, 0.02, "of g tan α", f"{HOUSNER}; moments about the corner",
+        "RC-09",
+        "uplift at g tan α",
+        (UPLIFT,),
+        uplift,
+        1.0,
+        0.02,
+        "of g tan α",
+        f"{HOUSNER}; moments about the corner",
         "A block starts to rock too early or too late.",
         "contact points at the very corners: margins, rounded edges, soft contacts",
     ),
     Phenomenon(
-        "RC-10", "Housner's ratio", (ROCK,), housner, 1.0, 0.01, "of 1 − 1.5 sin² α", HOUSNER,
+        "RC-10",
+        "Housner's ratio",
+        (ROCK,),
+        housner,
+        1.0,
+        0.01,
+        "of 1 − 1.5 sin² α",
+        HOUSNER,
         "Rocking dies too fast or too slowly.",
         "one step for an impact: stiffness and damping of the contact; corner contacts",
     ),
     Phenomenon(
-        "RC-11", "free-rocking period", (ROCK,), period, 1.0, 0.01, "of the quarter period", HOUSNER,
+        "RC-11",
+        "free-rocking period",
+        (ROCK,),
+        period,
+        1.0,
+        0.01,
+        "of the quarter period",
+        HOUSNER,
         "Amplification is found at another frequency.",
         "inertia of the block; contact points at the very corners; hidden damping",
     ),
     Phenomenon(
-        "RC-12", "what must tip, tips", (TIP,), tips, 1.0, 0.0, "1 if it does", "energy up to the balance point",
+        "RC-12",
+        "what must tip, tips",
+        (TIP,),
+        tips,
+        1.0,
+        0.0,
+        "1 if it does",
+        "energy up to the balance point",
         "A tower that falls is shown as safe.",
         "hidden damping; sleeping; rounded edges",
     ),
     Phenomenon(
-        "RC-13", "what must not tip, does not", (RETURN,), returns, 0.0, 0.0, "1 if it does", "energy up to the balance point",
+        "RC-13",
+        "what must not tip, does not",
+        (RETURN,),
+        returns,
+        0.0,
+        0.0,
+        "1 if it does",
+        "energy up to the balance point",
         "A tower that stands is shown as fallen.",
         "energy added by contacts; contact points inside of the corners",
     ),
     Phenomenon(
-        "RC-14", "energy never rises", (TUMBLE,), energy_gained, 0.0, 0.02, "of the first", "first law, e = 0 and a base at rest",
+        "RC-14",
+        "energy never rises",
+        (TUMBLE,),
+        energy_gained,
+        0.0,
+        0.02,
+        "of the first",
+        "first law, e = 0 and a base at rest",
         "Things jump, and stacks explode.",
         "correction of penetration apart from velocity; a shorter step",
     ),
     Phenomenon(
-        "RC-15", "mirror image", (TUMBLE, MIRRORED), asymmetry, 0.0, 0.01, "α", "symmetry",
+        "RC-15",
+        "mirror image",
+        (TUMBLE, MIRRORED),
+        asymmetry,
+        0.0,
+        0.01,
+        "α",
+        "symmetry",
         "Left and right differ: results depend on the order of bodies.",
         "more iterations of the solver; no random order",
     ),
     Phenomenon(
-        "RC-16", "rest stays rest", (REST,), restlessness, 0.0, 0.1, "mm", "statics",
+        "RC-16",
+        "rest stays rest",
+        (REST,),
+        restlessness,
+        0.0,
+        0.1,
+        "mm",
+        "statics",
         "What stands sinks, jitters or wanders.",
         "stiffer contacts; slop; correction of penetration",
     ),
     Phenomenon(
-        "RC-17", "the same from a moving base", (LOOSE, LIGHT, FALLING), moving_base, 0.0, 0.01, "of the way; α", "Galilei, d'Alembert",
+        "RC-17",
+        "the same from a moving base",
+        (LOOSE, LIGHT, FALLING),
+        moving_base,
+        0.0,
+        0.01,
+        "of the way; α",
+        "Galilei, d'Alembert",
         "A shaken floor is not an inertia force: earthquakes are wrong.",
         "how the base is driven: contacts have to see its velocity",
     ),
     Phenomenon(
-        "RC-18", "flush landing: which law", (FLUSH,), flush_landing, 0.0, math.inf, "rad/s", "several answers: not judged",
+        "RC-18",
+        "flush landing: which law",
+        (FLUSH,),
+        flush_landing,
+        0.0,
+        math.inf,
+        "rad/s",
+        "several answers: not judged",
         "Not a fault: two corners that land at one instant may share the impulse in several ways.",
         "nothing",
         judged=False,
     ),
-)  # fmt: skip
-SCENES: dict[str, Scene] = {scene.name: scene for phenomenon in PHENOMENA for scene in phenomenon.scenes}
+)
+PHENOMENA: dict[str, Phenomenon] = {phenomenon.id: phenomenon for phenomenon in _ALL}
+SCENES: dict[str, Scene] = {scene.name: scene for phenomenon in _ALL for scene in phenomenon.scenes}
