@@ -24,38 +24,6 @@ from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable, unknown_name
 from rockcheck.scenes.writing import write_whole
 
-EngineOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--engine",
-        help="A name or module:Class; repeatable (default: all installed).",
-        autocompletion=model_names,
-    ),
-]
-SettingsOption = Annotated[
-    Literal["best", "default", "both"] | None,
-    typer.Option("--settings", help="Set-up of the engines (default: best)."),
-]
-HistoriesOption = Annotated[
-    list[Path] | None,
-    typer.Option("--histories", help="Folder with an engine's own CSV, see --export; repeatable."),
-]
-ExportOption = Annotated[
-    Path | None,
-    typer.Option("--export", help="Write the scenes for another engine into a folder, and stop."),
-]
-TuneOption = Annotated[
-    float | None,
-    typer.Option("--tune", metavar="E", help="Find engines' own parameters for restitution E."),
-]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        help="A setting of the engines, such as time_step=1e-3; repeatable."
-        " With --tune: time_step, friction, penetration (m).",
-    ),
-]
 ENGINE_TOML = """\
 engine = "my engine"
 version = "1.0"
@@ -66,12 +34,42 @@ lacks = []  # or ["restitution"]
 
 
 def run(
-    engine: EngineOption = None,
-    settings: SettingsOption = None,
-    histories: HistoriesOption = None,
-    export: ExportOption = None,
-    tune: TuneOption = None,
-    sets: SetOption = None,
+    engine: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--engine",
+            help="A name or module:Class; repeatable (default: all installed).",
+            autocompletion=model_names,
+        ),
+    ] = None,
+    settings: Annotated[
+        Literal["best", "default", "both"] | None,
+        typer.Option("--settings", help="Set-up of the engines (default: best)."),
+    ] = None,
+    histories: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--histories", help="Folder with an engine's own CSV, see --export; repeatable."
+        ),
+    ] = None,
+    export: Annotated[
+        Path | None,
+        typer.Option(
+            "--export", help="Write the scenes for another engine into a folder, and stop."
+        ),
+    ] = None,
+    tune: Annotated[
+        float | None,
+        typer.Option("--tune", metavar="E", help="Find engines' own parameters for restitution E."),
+    ] = None,
+    sets: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="A setting of the engines, such as time_step=1e-3; repeatable."
+            " With --tune: time_step, friction, penetration (m).",
+        ),
+    ] = None,
     allow_code: AllowCodeOption = None,
     out: OutOption = OUT / "conformance",
     jobs: JobsOption = None,
@@ -84,30 +82,29 @@ def run(
     """
     from rockcheck.validation.execute import models
     from rockcheck.validation.studies.conformance.study import Conformance, named, written
-    from rockcheck.validation.studies.conformance.tuning import WANTED, Tuning
+    from rockcheck.validation.studies.conformance.tuning import WANTED, Tune, Tuning
 
     if export is not None:
         _export(usable_folder(export))
         return
-    given = dict(setting_of(text) for text in sets or [])
-    known = models.engine_names()
-    for name in engine or []:
-        if models.is_own(name) and tune is None:
-            models.check_allowed(name, allow_code or ())
-        elif name not in known:
-            allowed = f"give one of {', '.join(known)}" + ", or module:Class" * (tune is None)
-            raise InputError(f"{printable(name)!r} is not allowed: {allowed}", "--engine")
-        elif reason := models.not_installed(name):
-            raise InputError(reason, f"--engine {name}")
+    known, given = models.engine_names(), dict(setting_of(text) for text in sets or [])
     here = [] if histories else [name for name in known if not models.not_installed(name)]
     names = list(dict.fromkeys(engine or here))
+    for name in names:
+        models.check_allowed(name, allow_code or ())
+        if name not in known and (tune is not None or not models.is_own(name)):
+            allowed = f"give one of {', '.join(known)}" + ", or module:Class" * (tune is None)
+            raise InputError(f"{printable(name)!r} is not allowed: {allowed}", "--engine")
+        if reason := models.not_installed(name):
+            raise InputError(reason, f"--engine {name}")
     how = {"jobs": jobs, "scheduler": scheduler}
     if tune is not None:
         if settings or histories:
             raise InputError("goes with neither --settings nor --histories", "--tune")
-        if unknown := given.keys() - WANTED:
-            raise unknown_name("setting", min(unknown), WANTED)
-        studied(Tuning(tuple(names), tune, **given), out / "tuned", **how)
+        if unknown := given.keys() - (WANTED.keys() - {"restitution"}):
+            raise unknown_name("setting", min(unknown), WANTED.keys() - {"restitution"})
+        wanted = tuple(Tune(name, tune, **given) for name in names)
+        studied(Tuning(wanted), out / "tuned", **how)
     kinds = ("best", "default") if settings == "both" else (settings,)
     players = [named(name, kind, given) for name in names for kind in kinds]
     players += [written(folder) for folder in histories or []]
@@ -117,10 +114,10 @@ def run(
 def _export(folder: Path) -> None:
     from rockcheck.reports.scene_file import write_scene_file
     from rockcheck.validation.studies.conformance.phenomena import SCENES
-    from rockcheck.validation.studies.conformance.study import ABOUT, slug_of
+    from rockcheck.validation.studies.conformance.study import ABOUT
 
     for name, scene in SCENES.items():
-        write_scene_file(scene, folder, slug_of(name))
+        write_scene_file(scene, folder, name)
     if not (folder / ABOUT).exists():
         write_whole(folder / ABOUT, ENGINE_TOML)
     console().print(
@@ -129,4 +126,4 @@ def _export(folder: Path) -> None:
         f"  rockcheck conformance --histories {folder}",
         soft_wrap=True,
     )
-    answer({"folder": folder, "scenes": {name: f"{slug_of(name)}.toml" for name in SCENES}})
+    answer({"folder": folder, "scenes": {name: f"{name}.toml" for name in SCENES}})

@@ -31,7 +31,7 @@ from rockcheck.validation.finding import (
     Verdict,
     text,
 )
-from rockcheck.validation.studies.conformance.phenomena import PHENOMENA, SCENES
+from rockcheck.validation.studies.conformance.phenomena import PHENOMENA, SCENES, Motion
 from rockcheck.validation.study import Study, Task
 
 #: What a folder of histories says of itself, and how settings are called that nobody named.
@@ -40,20 +40,24 @@ ABOUT, AS_IT_COMES = "engine.toml", "as it comes"
 STEP, A_STEP = 1e-3, 1e-4
 #: A value that moved by more than this share of its limit has changed.
 SHARE = 0.1
-#: Verdicts, their words, and their colours.
-VERDICTS: dict[str, tuple[str, Verdict]] = {
-    "pass": ("conforms", "pass"),
-    "fail": ("fails", "fail"),
-    "lacks": ("has none", "incomplete"),
-    "reported": ("reported", ""),
-    "error": ("error", "error"),
+#: Verdicts, their words, their colours, and what they are for JUnit.
+VERDICTS: dict[str, tuple[str, Verdict, Any]] = {
+    "pass": ("conforms", "pass", None),
+    "fail": ("fails", "fail", Failed),
+    "lacks": ("has none", "incomplete", Skipped),
+    "reported": ("reported", "", Skipped),
+    "error": ("error", "error", Error),
 }
 
 
 #: A card, as JSON has it; the columns that say whose it is, and those of its rows.
 Card = dict[str, Any]
-HEAD = (Column("engine", kind="model"), text("version", brief=False), text("settings"))
-HEAD = (*HEAD, Column("step", unit="s", brief=False))
+HEAD = (
+    Column("engine", kind="model"),
+    text("version", brief=False),
+    text("settings"),
+    Column("step", unit="s", brief=False),
+)
 ROW = ("id", "name", "target", "value", "limit", "unit", "verdict", "reason")
 
 
@@ -83,14 +87,13 @@ def named(name: str, settings: str | None, given: Mapping[str, Any]) -> Player:
     built_by = {"time_step": STEP, **kind, **given}
     if not own:
         build(name, built_by)  # what is not usable is told before anything runs
-    words = [
+    more = (
         f"{key}={value}" for key, value in given.items() if key not in ("settings", "time_step")
-    ]
-    words = [str(built_by.get("settings", AS_IT_COMES)), *words]
+    )
     step = built_by["time_step"]
     return Player(
         name,
-        ", ".join(words),
+        ", ".join([str(built_by.get("settings", AS_IT_COMES)), *more]),
         step,
         name,
         built_by,
@@ -113,15 +116,10 @@ def written(folder: Path) -> Player:
         about.get("settings") or AS_IT_COMES,
         about.get("step"),
         "measured",
-        {"files": {name: str(folder / f"{slug_of(name)}.csv") for name in SCENES}},
+        {"files": {name: str(folder / f"{name}.csv") for name in SCENES}},
         about.get("version", ""),
         tuple(map(str, about.get("lacks", ()))),
     )
-
-
-def slug_of(scene: str) -> str:
-    """The name of a scene's files."""
-    return "".join(c if c.isalnum() or c == "." else "-" for c in scene).replace("--", "-")
 
 
 @dataclass(frozen=True)
@@ -178,18 +176,17 @@ class Conformance(Study):
         sys.path.extend(path for path in who.search if path not in sys.path)
         model: Any = build_own(who.model, who.given)
         version = who.version or str(getattr(model, "version", ""))
-        if what.needs in (who.lacks or (model.lacks() if hasattr(model, "lacks") else ())):
+        if what.needs in tuple(who.lacks or getattr(model, "lacks", tuple)()):
             reason = f"the engine has no {what.needs} with these settings"
             return Seen(None, "lacks", reason, version)
-        histories = {scene.name: model.simulate(scene) for scene in what.scenes}
+        histories = [model.simulate(scene) for scene in what.scenes]
         try:
-            value = what.value(histories)
+            value = float(what.value(*map(Motion, histories)))
         except (ValueError, IndexError) as error:  # what is asked for does not happen in the motion
             raise ModelFailure(printable(error, 200)) from None
-        verdict = what.verdict(value)
-        notes = dict.fromkeys(note for history in histories.values() for note in history.notes)
-        reason = what.means if verdict == "fail" else ""
-        return Seen(finite(value), verdict, reason, version, tuple(notes))
+        notes = dict.fromkeys(note for history in histories for note in history.notes)
+        shown = value if math.isfinite(value) else None
+        return Seen(shown, *what.judge(value), version, tuple(notes))
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """A card a player. Raises `InputError` where one cannot be built at all."""
@@ -211,25 +208,22 @@ class Conformance(Study):
         )
 
 
-def finite(value: float) -> float | None:
-    """A number as JSON has it."""
-    return value if math.isfinite(value) else None
-
-
 def _card(player: Player, found: Mapping[str, Seen | Failure]) -> Card:
     """The card of a player, as far as it was played."""
     faults = {one.reason for one in found.values() if isinstance(one, Failure) and one.refused}
     if len(faults) == 1 and all(one.reason in faults for one in found.values()):
         raise InputError(*faults)
-    seen = [one for one in found.values() if isinstance(one, Seen)]
+    seen = {
+        id: Seen(None, "error", one.reason, "") if isinstance(one, Failure) else one
+        for id, one in found.items()
+    }
     rows = []
-    for id, one in found.items():
-        what, value = PHENOMENA[id], None if isinstance(one, Failure) else one.value
-        verdict = "error" if isinstance(one, Failure) else one.verdict
-        row = (id, what.name, what.target, value, finite(what.limit), what.unit, verdict)
+    for id, one in seen.items():
+        what = PHENOMENA[id]
+        row = (id, what.name, what.target, one.value, what.limit, what.unit, one.verdict)
         rows.append(dict(zip(ROW, (*row, one.reason), strict=True)))
     counts = Counter(row["verdict"] for row in rows)
-    version = next((one.version for one in seen), player.version)
+    version = next(filter(None, (one.version for one in seen.values())), player.version)
     return {
         "engine": player.engine,
         "version": version,
@@ -238,7 +232,7 @@ def _card(player: Player, found: Mapping[str, Seen | Failure]) -> Card:
         "title": " ".join(filter(None, [player.engine, version])) + f", {player.settings}",
         "counts": {verdict: counts[verdict] for verdict in VERDICTS} | {"total": len(rows)},
         "phenomena": rows,
-        "notes": list(dict.fromkeys(note for one in seen for note in one.notes)),
+        "notes": list(dict.fromkeys(note for one in seen.values() for note in one.notes)),
     }
 
 
@@ -246,22 +240,19 @@ def _blocks(cards: Sequence[Card]) -> Iterator[Block]:
     about = [[card[column.name] for column in HEAD] for card in cards]
     yield Table(
         "engines",
-        [*HEAD, *(Column(key, words) for key, (words, _) in VERDICTS.items()), Column("total")],
+        [*HEAD, *(Column(key, words) for key, (words, *_) in VERDICTS.items()), Column("total")],
         [[*head, *card["counts"].values()] for head, card in zip(about, cards, strict=True)],
     )
     wrong = [
-        f"{card['title']}: {row['id']} {row['name']}: {_said(row)} Look at: {cure}."
+        f"{card['title']}: {row['id']} {row['name']}: {row['reason']}"
         for card in cards
         for row in card["phenomena"]
-        if row["verdict"] == "fail" and (cure := PHENOMENA[row["id"]].cure)
+        if row["verdict"] == "fail"
     ]
-    if wrong:
-        yield Text(title="What goes wrong", items=wrong)
     of = [{row["id"]: _mark(row) for row in card["phenomena"]} for card in cards]
     yield Table(
         "cards",
         [
-            text("id", "no."),
             text("phenomenon"),
             Column("target"),
             Column("limit"),
@@ -269,27 +260,25 @@ def _blocks(cards: Sequence[Card]) -> Iterator[Block]:
             *(Column(card["title"]) for card in cards),
         ],
         [
-            [id, one.name, one.target, finite(one.limit), one.unit, *(card.get(id) for card in of)]
+            [f"{id} {one.name}", one.target, one.limit, one.unit, *(card.get(id) for card in of)]
             for id, one in PHENOMENA.items()
         ],
         "Cards",
-        "A phenomenon is a tiny scene whose answer is closed or certain. It conforms where its value"
-        " is within the limit of the target. –: the engine says that it has none.",
+        "Tiny scenes whose answer is closed or certain. One conforms where its value is within the"
+        " limit of the target. –: the engine says that it has none.",
         on="page",
     )
-    notes = [f"{card['title']}: {note}" for card in cards for note in card["notes"]]
-    if notes:
-        yield Text(title="What the engines say", items=notes, on="page")
+    wrong += [f"{card['title']}: {note}" for card in cards for note in card["notes"]]
+    yield Text(title="What goes wrong", items=wrong or ["Nothing."])
     yield Table(
         "phenomena",
         [
-            text("id", "no."),
             text("phenomenon"),
             text("source", "target from"),
             text("means", "what a failure means"),
             text("cure", "what to look at"),
         ],
-        [[id, one.name, one.source, one.means, one.cure] for id, one in PHENOMENA.items()],
+        [[f"{id} {one.name}", one.source, one.means, one.cure] for id, one in PHENOMENA.items()],
         "The phenomena",
         on="page",
     )
@@ -303,16 +292,8 @@ def _blocks(cards: Sequence[Card]) -> Iterator[Block]:
 
 def _mark(row: Mapping[str, Any]) -> Mark:
     """A value with its verdict; with more digits where the limit needs them."""
-    words, verdict = VERDICTS[row["verdict"]]
-    tip = ": ".join(filter(None, [words, row["reason"]]))
-    return Mark(row["value"], verdict, tip, digits=6 if (row["limit"] or 1.0) < 1e-3 else 3)
-
-
-def _said(row: Mapping[str, Any]) -> str:
-    """What is wrong."""
-    value = "no value" if row["value"] is None else f"{row['value']:.4g}"
-    right = f"{row['target']:g} ± {row['limit'] or 0.0:g} {row['unit']} is right"
-    return f"{value}, {right}. {row['reason']}"
+    digits = 6 if (row["limit"] or 1.0) < 1e-3 else 3
+    return Mark(row["value"], VERDICTS[row["verdict"]][1], row["reason"], digits=digits)
 
 
 def junit(cards: Sequence[Card]) -> str:
@@ -321,11 +302,9 @@ def junit(cards: Sequence[Card]) -> str:
     for card in cards:
         suite = TestSuite(card["title"])
         for row in card["phenomena"]:
-            case = TestCase(f"{row['id']} {row['name']}", card["title"])
-            if row["verdict"] in ("fail", "error"):
-                case.result = [(Failed if row["verdict"] == "fail" else Error)(_said(row))]
-            elif row["verdict"] != "pass":
-                case.result = [Skipped(row["reason"] or "reported, not judged")]
+            case = TestCase(f"{row['id']} {row['name']}", suite.name)
+            kind = VERDICTS[row["verdict"]][2]
+            case.result = [kind(row["reason"])] if kind else []
             suite.add_testcase(case)
         document.add_testsuite(suite)
     return str(document.tostring(), "utf-8")
@@ -348,9 +327,8 @@ def changes(before: Path, after: Path) -> Finding:
         moved = None not in values and abs(values[1] - values[0]) > limit
         if verdicts[0] != verdicts[1] or moved:
             worse = verdicts[0] == "pass" and verdicts[1] in ("fail", "error", "absent")
-            marks = [verdicts[0], Mark(verdicts[1], "fail" if worse else "changed")]
-            versions = [was["version"], now["version"]]
-            rows.append([*key, known["name"], *versions, *marks, *values, worse])
+            versions = (one["version"] for one in (was, now))
+            rows.append([*key, known["name"], *versions, *verdicts, *values, worse])
     columns = [
         Column("engine", kind="model"),
         text("settings"),
@@ -378,16 +356,14 @@ def changes(before: Path, after: Path) -> Finding:
 def _read(path: Path) -> dict[tuple[str, str, str], dict[str, Any]]:
     """The rows of a finished study; raises `InputError` naming file and fault."""
     path = path / "run.json" if path.is_dir() else path
-    rows = {}
     try:
-        for card in json.loads(path.read_text(encoding="utf-8"))["cards"]:
-            for row in card["phenomena"]:
-                read = {key: str(row[key]) for key in ("id", "name", "verdict")}
-                read |= {key: row[key] and float(row[key]) for key in ("value", "limit")}
-                about = {key: str(card[key]) for key in ("engine", "settings", "version")}
-                rows[about["engine"], about["settings"], read["id"]] = read | about
+        return {
+            (row["engine"], row["settings"], row["id"]): row
+            | {name: row[name] and float(row[name]) for name in ("value", "limit")}
+            | {name: str(row[name]) for name in ("name", "version", "verdict")}
+            for row in json.loads(path.read_text(encoding="utf-8"))["tables"]["rows"]
+        }
     except OSError as error:
         raise InputError(f"{printable(path)}: cannot be read: {error.strerror}") from None
     except (ValueError, KeyError, TypeError, RecursionError):
         raise InputError(f"{printable(path)}: not what `rockcheck conformance` wrote") from None
-    return rows

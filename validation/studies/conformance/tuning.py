@@ -4,7 +4,7 @@ found by dropping a block and sliding it."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -25,68 +25,73 @@ FloatArray = NDArray[np.float64]
 #: How near the wanted restitution has to be, and a friction, of itself.
 NEAR = 2e-3
 SLIDING = 1.5  # m/s
+#: What may be wanted: least and most.
+WANTED = {
+    "restitution": (0.0, 1.0),
+    "friction": (1e-6, 1.3),
+    "time_step": (1e-6, 0.01),
+    "penetration": (0.0, math.inf),
+}
 
 
 @dataclass(frozen=True)
 class Knob:
-    """The parameter that sets an engine's restitution: its bounds at a step, and all parameters in
-    the engine's own words."""
+    """The parameter that sets an engine's restitution: its bounds, and all parameters in the
+    engine's own words, which `calibrate` fills in."""
 
     bounds: tuple[float, float]
-    words: Callable[[Mapping[str, float], float], dict[str, str]]
-    remark: str = ""
-
-
-def _mujoco(found: Mapping[str, float], step: float) -> dict[str, str]:
-    return {
-        "geom solref": f"{-found['erp'] / step**2:.6g} {-found['restitution'] / step:.6g}",
-        "geom solimp": "0.9999 0.9999 0.001 0.5 1",
-        "geom friction": f"{found['friction']:.4g} 0 0",
-        "option": f'timestep="{step:g}" integrator="Euler" cone="elliptic"',
-    }
-
-
-def _pybullet(found: Mapping[str, float], step: float) -> dict[str, str]:
-    return {
-        "changeDynamics(block)": "restitution=1, lateralFriction=1 (of two bodies they multiply)",
-        "changeDynamics(floor)": f"restitution={found['restitution']:.4g}, lateralFriction={found['friction']:.4g}",
-        "setPhysicsEngineParameter": "restitutionVelocityThreshold=0.2 (slower contacts do not bounce), contactERP=0.2",
-    }
-
-
-def _pymunk(found: Mapping[str, float], step: float) -> dict[str, str]:
-    return {
-        "block": "elasticity=1, friction=1 (of two shapes they multiply)",
-        "floor": f"elasticity={found['restitution']:.4g}, friction={found['friction']:.4g}",
-        "space": "collision_bias=0.0018 (0.9 ** 60 a second), collision_slop=0.1",
-    }
-
-
-def _dart(found: Mapping[str, float], step: float) -> dict[str, str]:
-    return {
-        "block": f"setRestitutionCoeff(1), setFrictionCoeff({found['friction']:.4g}) (restitutions multiply, the smaller friction counts)",
-        "floor": f"setRestitutionCoeff({found['restitution']:.4g}), setFrictionCoeff({found['friction']:.4g})",
-        "world": "contacts below 0.1 m/s do not bounce; the error reduction of 0.01 cannot be set from Python",
-    }
-
-
-def _drake(found: Mapping[str, float], step: float) -> dict[str, str]:
-    return {
-        "AddContactMaterial": f"dissipation={found['restitution']:.4g} s/m, point_stiffness={found['stiffness']:.4g} N/m a kg, each body",
-        "CoulombFriction": f"{found['friction']:.4g}, {found['friction']:.4g}",
-        "MultibodyPlant": f"time_step={step:g}, DiscreteContactApproximation.kTamsi",
-    }
+    words: Mapping[str, str]
 
 
 KNOBS: dict[str, Knob] = {
-    "mujoco": Knob((0.5, 2.2), _mujoco),
-    "pybullet": Knob((0.0, 1.2), _pybullet),
-    "pymunk": Knob((0.0, 1.2), _pymunk),
-    "dart": Knob((0.0, 1.0), _dart),
+    "mujoco": Knob(
+        (0.5, 2.2),
+        {
+            "geom solref": "{push:.6g} {damp:.6g}",
+            "geom solimp": "0.9999 0.9999 0.001 0.5 1",
+            "geom friction": "{friction:.4g} 0 0",
+            "option": 'timestep="{step:g}" integrator="Euler" cone="elliptic"',
+        },
+    ),
+    "pybullet": Knob(
+        (0.0, 1.2),
+        {
+            "changeDynamics(block)": "restitution=1, lateralFriction=1 (of two bodies they"
+            " multiply)",
+            "changeDynamics(floor)": "restitution={restitution:.4g},"
+            " lateralFriction={friction:.4g}",
+            "setPhysicsEngineParameter": "restitutionVelocityThreshold=0.2 (slower contacts do not"
+            " bounce), contactERP=0.2",
+        },
+    ),
+    "pymunk": Knob(
+        (0.0, 1.2),
+        {
+            "block": "elasticity=1, friction=1 (of two shapes they multiply)",
+            "floor": "elasticity={restitution:.4g}, friction={friction:.4g}",
+            "space": "collision_bias=0.0018 (0.9 ** 60 a second), collision_slop=0.1",
+        },
+    ),
+    "dart": Knob(
+        (0.0, 1.0),
+        {
+            "block": "setRestitutionCoeff(1), setFrictionCoeff({friction:.4g}) (restitutions"
+            " multiply, the smaller friction counts)",
+            "floor": "setRestitutionCoeff({restitution:.4g}), setFrictionCoeff({friction:.4g})",
+            "world": "contacts below 0.1 m/s do not bounce; the error reduction of 0.01 cannot be"
+            " set from Python",
+        },
+    ),
     "drake": Knob(
         (0.0, 20.0),
-        _drake,
-        "dissipation, not restitution: it holds for this speed of approach, 2 m/s, and this mass",
+        {
+            "AddContactMaterial": "dissipation={restitution:.4g} s/m, point_stiffness="
+            "{stiffness:.4g} N/m a kg, each body",
+            "CoulombFriction": "{friction:.4g}, {friction:.4g}",
+            "MultibodyPlant": "time_step={step:g}, DiscreteContactApproximation.kTamsi",
+            "remark": "dissipation, not restitution: it holds for this speed of approach, 2 m/s,"
+            " and this mass",
+        },
     ),
 }
 
@@ -103,11 +108,10 @@ class Calibration:
     friction: float
     penetration: float
     reached: bool
-    remark: str
 
 
 def calibrate(
-    engine: str, *, restitution: float, friction: float, step: float, penetration: float = math.inf
+    engine: str, *, restitution: float, friction: float, time_step: float, penetration: float
 ) -> Calibration:
     """The parameters with which a block dropped from 0.2 m rebounds, and one at 1.5 m/s slides, as
     wanted.
@@ -116,7 +120,7 @@ def calibrate(
     """
     from scipy.optimize import brentq
 
-    knob = KNOBS[engine]
+    knob, step = KNOBS[engine], time_step
     model: Any = build(engine, {"time_step": step, "settings": "default"})
     drop = Scene(
         name="drop", block=SQUAT, floor=Floor(friction=friction), initial_height=DROP, duration=0.65
@@ -128,21 +132,20 @@ def calibrate(
         initial_velocity=SLIDING,
         duration=SLIDING / (friction * G) + 0.3,
     )
-    fall = math.sqrt(2.0 * DROP / G)
 
-    def heights(setting: float) -> FloatArray:
-        return _played(model, drop, {"restitution": setting, "friction": friction}, step)
-
-    def bounced(setting: float) -> float:
-        states = heights(setting)
-        later = states[int((fall + 0.02) / step) :, 1]
-        return math.sqrt(max(float(np.max(later)) - SQUAT.half_height, 0.0) / DROP)
+    def dropped(setting: float) -> tuple[float, float]:
+        """The restitution seen, and the penetration, m."""
+        parameters = {"restitution": setting, "friction": friction}
+        heights = _played(model, drop, parameters, step)[:, 1] - SQUAT.half_height
+        later = heights[int((math.sqrt(2.0 * DROP / G) + 0.02) / step) :]
+        return math.sqrt(max(float(np.max(later)), 0.0) / DROP), -float(np.min(heights))
 
     low, high = knob.bounds
-    ends = bounced(low), bounced(high)
+    ends = dropped(low)[0], dropped(high)[0]
     if not min(ends) - NEAR <= restitution <= max(ends) + NEAR:
         raise InputError(
-            f"{restitution:g} cannot be reached by {engine} at a step of {step:g} s: {min(ends):.3g} to {max(ends):.3g} can",
+            f"{restitution:g} cannot be reached by {engine} at a step of {step:g} s:"
+            f" {min(ends):.3g} to {max(ends):.3g} can",
             "--tune",
         )
     found = (
@@ -154,7 +157,7 @@ def calibrate(
     )
     if math.isnan(found):
         found = brentq(
-            lambda setting: bounced(setting) - restitution, low, high, xtol=1e-5, rtol=1e-5
+            lambda setting: dropped(setting)[0] - restitution, low, high, xtol=1e-5, rtol=1e-5
         )
     asked = friction
     for _ in range(12):
@@ -163,17 +166,16 @@ def calibrate(
         if abs(slid - friction) <= NEAR * friction:
             break
         asked *= friction / slid
-    deep = SQUAT.half_height - float(np.min(heights(found)[:, 1]))
-    used = {"restitution": found, "friction": asked, **model.tuned(step)}
-    rebound = bounced(found)
+    rebound, deep = dropped(found)
+    used = {"step": step, "restitution": found, "friction": asked, **model.tuned(step)}
+    used |= {"push": -used.get("erp", 0.0) / step**2, "damp": -found / step}
+    words = {where: what.format_map(used) for where, what in knob.words.items()}
     near = (
         abs(rebound - restitution) <= 5.0 * NEAR
         and abs(slid - friction) <= 5.0 * NEAR * friction
         and deep <= penetration
     )
-    return Calibration(
-        engine, step, knob.words(used, step), rebound, slid, max(deep, 0.0), near, knob.remark
-    )
+    return Calibration(engine, step, words, rebound, slid, max(deep, 0.0), near)
 
 
 def _played(model: Any, scene: Scene, parameters: Mapping[str, float], step: float) -> FloatArray:
@@ -192,46 +194,38 @@ def _played(model: Any, scene: Scene, parameters: Mapping[str, float], step: flo
 
 @dataclass(frozen=True)
 class Tune(Task):
-    """What is wanted of an engine."""
+    """What is wanted of an engine: restitution, friction, and a penetration (m) that is not
+    exceeded, at a step (s)."""
 
     engine: str
-    restitution: float
-    friction: float
-    step: float
-    penetration: float
-
-    def depends(self) -> Any:
-        """Also the engine's code."""
-        return {**super().depends(), "engine": code_digest(home(self.engine))}
-
-
-#: What may be wanted: least and most.
-WANTED = {"friction": (1e-6, 1.3), "time_step": (1e-6, 0.01), "penetration": (0.0, math.inf)}
-
-
-@dataclass(frozen=True)
-class Tuning(Study):
-    """Engines, and what is wanted of them: restitution, friction, penetration (m) at a step (s)."""
-
-    engines: tuple[str, ...]
     restitution: float
     friction: float = 0.3
     time_step: float = 1e-3
     penetration: float = math.inf
-    name = "tuning"
-    record = Calibration
 
     def __post_init__(self) -> None:
-        for name, (least, most) in {"restitution": (0.0, 1.0), **WANTED}.items():
+        for name, (least, most) in WANTED.items():
             value = getattr(self, name)
             if not isinstance(value, int | float) or not least <= value <= most:
                 reason = f"{printable(value)} is not allowed: give {least:g} to {most:g}"
                 raise InputError(reason, "--tune" if name == "restitution" else f"--set {name}")
 
+    def depends(self) -> Any:
+        """Also the engine's code."""
+        return {**super().depends(), "home": code_digest(home(self.engine))}
+
+
+@dataclass(frozen=True)
+class Tuning(Study):
+    """What is wanted, engine by engine."""
+
+    wanted: tuple[Tune, ...]
+    name = "tuning"
+    record = Calibration
+
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Tune]:
-        """One an engine."""
-        wanted = (self.restitution, self.friction, self.time_step, self.penetration)
-        return [Tune(engine, *wanted, expected=1e-3 / self.time_step) for engine in self.engines]
+        """All at once."""
+        return self.wanted
 
     @staticmethod
     def play(task: Tune) -> Calibration:
@@ -240,35 +234,37 @@ class Tuning(Study):
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """Parameters, and what they reach. Raises `InputError` where no engine can."""
-        found = [one for one in done.values() if isinstance(one, Calibration)]
-        refused = [one for one in done.values() if isinstance(one, Failure) and one.refused]
-        if refused and not found:
-            raise InputError(refused[0].reason)
-        reached = sum(one.reached for one in found)
-        wanted = f"restitution {self.restitution:g} at friction {self.friction:g}"
+        ended = [done[task] for task in self.wanted if task in done]
+        found = [one for one in ended if isinstance(one, Calibration)]
+        for one in ended:
+            if isinstance(one, Failure) and one.refused and not found:
+                raise InputError(one.reason)
+        engine, reached = Column("engine", kind="model"), sum(one.reached for one in found)
         columns = [
+            engine,
+            Column("step", unit="s"),
             Column("restitution"),
             Column("friction"),
             Column("penetration", unit="m", digits=2),
-            Column("reached", kind="text"),
-            text("remark", brief=False),
+            text("reached"),
         ]
         rows = [
-            [one.engine, one.restitution, one.friction, one.penetration]
-            + [Mark(one.reached, "pass" if one.reached else "fail"), one.remark]
+            [
+                *(one.engine, one.step, one.restitution, one.friction, one.penetration),
+                Mark(one.reached, "pass" if one.reached else "fail"),
+            ]
             for one in found
         ]
         words = [[one.engine, *pair] for one in found for pair in one.parameters.items()]
-        engine = Column("engine", kind="model")
         return Finding(
             self.name,
             "Parameters for a wanted restitution",
-            f"{reached} of {len(self.engines)} engines reach {wanted}.",
+            f"{reached} of {len(self.wanted)} engines reach what is wanted.",
             [
                 Table("parameters", [engine, text("where"), text("what")], words, "Parameters"),
-                Table("reached", [engine, *columns], rows, f"Reached at {self.time_step:g} s"),
+                Table("reached", columns, rows, "Reached"),
             ],
             {"engines": {one.engine: asdict(one) for one in found}},
-            "pass" if reached == len(self.engines) else "fail",
-            int(reached < len(self.engines)),
+            "pass" if reached == len(self.wanted) else "fail",
+            int(reached < len(self.wanted)),
         )
