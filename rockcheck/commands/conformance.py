@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -97,7 +97,7 @@ def run(
             raise InputError(f"{printable(name)!r} is not allowed: {allowed}", "--engine")
         if reason := models.not_installed(name):
             raise InputError(reason, f"--engine {name}")
-    how = {"jobs": jobs, "scheduler": scheduler}
+    how: dict[str, Any] = {"jobs": jobs, "scheduler": scheduler}
     if tune is not None:
         if settings or histories:
             raise InputError("goes with neither --settings nor --histories", "--tune")

@@ -16,16 +16,15 @@ from junitparser import JUnitXml
 from rockcheck import engines
 from rockcheck.commands.cli import main
 from rockcheck.engines import MuJoCo
-from rockcheck.reports.document import publish
 from rockcheck.scenes import Floor, InputError, ModelFailure, Wall, load_scene
+from rockcheck.scenes.writing import json_text
 from rockcheck.validation.execute.models import engine_names, not_installed
 from rockcheck.validation.execute.pool import guarded
-from rockcheck.validation.finding import Made
 from rockcheck.validation.studies.conformance import study
 from rockcheck.validation.studies.conformance.phenomena import PHENOMENA, SCENES
 from rockcheck.validation.studies.conformance.study import Conformance, Player, changes, named
 
-RIGHT = MuJoCo(time_step=1e-3)
+RIGHT, CONVEX = MuJoCo(time_step=1e-3), MuJoCo(time_step=1e-3, cone_correction=False)
 PLANTED = Player("planted", "best", 1e-3, "planted:Planted", {}, "1")
 
 
@@ -67,10 +66,6 @@ def without_restitution(scene):
     return RIGHT.simulate(scene.replace(floor=Floor(friction=scene.floor.friction), walls=walls))
 
 
-def with_convex_cone(scene):
-    return MuJoCo(time_step=1e-3, cone_correction=False).simulate(scene)
-
-
 def with_friction_doubled(scene):
     floor = Floor(friction=2.0 * scene.floor.friction, restitution=scene.floor.restitution)
     return RIGHT.simulate(scene.replace(floor=floor))
@@ -102,20 +97,16 @@ class SinglePrecision(MuJoCo):
         return world
 
 
-def in_single_precision(scene):
-    return SinglePrecision(time_step=1e-3).simulate(scene)
-
-
 @pytest.mark.parametrize(
     ("play", "failing"),
     [
         (without_restitution, {"RC-06", "RC-07"}),
-        (with_convex_cone, {"RC-04"}),
+        (CONVEX.simulate, {"RC-04"}),
         (with_friction_doubled, {"RC-01", "RC-02"}),
         (with_creep, {"RC-03"}),
-        (in_single_precision, {"RC-05"}),
+        (SinglePrecision(time_step=1e-3).simulate, {"RC-05"}),
     ],
-    ids=lambda one: getattr(one, "__name__", ""),
+    ids=["no restitution", "convex cone", "double friction", "creep", "single precision"],
 )
 def test_a_planted_fault_fails_just_what_it_should(planted, play, failing):
     assert verdicts(planted(play), "fail", "error") == failing
@@ -174,15 +165,14 @@ def test_what_goes_wrong_in_a_scene_costs_what_needs_it(planted, histories):
     said["RC-05"] = "it blew up"
     assert rows.keys() == said.keys()
     assert all(words in rows[id]["reason"] for id, words in said.items())
+    (suite,) = JUnitXml.fromstring(found.files["junit.xml"].encode())
+    assert (suite.tests, suite.failures, suite.errors, suite.skipped) == (18, 0, 4, 1)
     assert found.exit_code == 1
 
 
 def test_what_changed_between_versions(right, tmp_path):
-    made = Made(
-        created="2026-01-01T00:00:00+00:00", jobs=1, wall_seconds=0, versions={}, hardware={}
-    )
-    publish(dataclasses.replace(right, made=made), tmp_path, formats=())
     path = tmp_path / "run.json"
+    path.write_text(json_text(right.as_dict()), encoding="utf-8")
     assert changes(tmp_path, path).table("changes").rows == []
     run = json.loads(path.read_text(encoding="utf-8"))
     rows = run["tables"]["rows"]
@@ -210,12 +200,6 @@ def test_what_is_no_finished_study_is_told(text, tmp_path):
         (tmp_path / "run.json").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=r"run.json: (not what|cannot be read)"):
         changes(tmp_path, tmp_path)
-
-
-def test_junit(planted):
-    found = planted(with_convex_cone)
-    (suite,) = JUnitXml.fromstring(found.files["junit.xml"].encode())
-    assert (suite.tests, suite.failures, suite.errors, suite.skipped) == (18, 1, 0, 1)
 
 
 def test_another_program_takes_part_by_files(histories, tmp_path, capsys):
@@ -248,6 +232,16 @@ def test_another_program_takes_part_by_files(histories, tmp_path, capsys):
         (["--histories", "nowhere"], "engine.toml: cannot be read"),
         (["--histories", "."], "engine.toml: colour"),
         (["--tune", "0.5", "--settings", "best"], "--tune: goes with neither"),
+        (
+            ["--tune", "0.5", "--engine", "ebm"],
+            "--engine: 'ebm' is not allowed: give one of mujoco",
+        ),
+        (["--tune", "2"], "--tune: 2.0 is not allowed"),
+        (["--tune", "nan"], "--tune: nan is not allowed"),
+        (["--tune", "0.5", "--set", "time_step=0"], "--set time_step: 0 is not allowed"),
+        (["--tune", "0.5", "--set", "friction=3"], "--set friction: 3 is not allowed"),
+        (["--tune", "0.5", "--set", "friction=red"], "--set friction: red is not allowed"),
+        (["--tune", "0.5", "--set", "step=1"], "'step'"),
     ],
 )
 def test_wrong_input_is_one_line(arguments, words, tmp_path, monkeypatch, capsys):
@@ -263,9 +257,10 @@ def test_code_of_ones_own_is_played_by_a_worker(tmp_path, monkeypatch, capsys):
     """A fault in it costs what needs it only; its settings are named; it is played once."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "halfway.py").write_text(
-        "from pathlib import Path\nfrom rockcheck.engines import MuJoCo\n\n\n"
+        "from pathlib import Path\nfrom typing import ClassVar\n"
+        "from rockcheck.engines import MuJoCo\n\n\n"
         "class Halfway(MuJoCo):\n"
-        "    version = '7'\n"
+        "    version: ClassVar[str] = '7'\n"
         "    def simulate(self, scene):\n"
         "        Path('played').open('a').write(scene.name + '\\n')\n"
         "        if scene.name == 'coast':\n"
@@ -273,8 +268,9 @@ def test_code_of_ones_own_is_played_by_a_worker(tmp_path, monkeypatch, capsys):
         "        return super().simulate(scene)\n",
         encoding="utf-8",
     )
-    own = ["--engine", "halfway:Halfway", "--allow-code", "halfway:Halfway", "--jobs", "1"]
-    assert main(["conformance", *own, "--set", "cone_correction=false", "--json"]) == 1
+    own = ["conformance", "--engine", "halfway:Halfway", "--allow-code", "halfway:Halfway"]
+    flawed = [*own, "--set", "cone_correction=false", "--jobs", "1"]
+    assert main([*flawed, "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     (card,) = found["cards"]
     assert (card["version"], card["settings"]) == ("7", "as it comes, cone_correction=False")
@@ -284,8 +280,7 @@ def test_code_of_ones_own_is_played_by_a_worker(tmp_path, monkeypatch, capsys):
         "halfway:Halfway, as it comes, cone_correction=False: RC-05"
     }
     (tmp_path / "played").unlink()
-    assert main(["conformance", *own, "--set", "cone_correction=false", "--quiet"]) == 1
+    assert main([*flawed, "--quiet"]) == 1
     assert (tmp_path / "played").read_text(encoding="utf-8") == "coast\n"
-    capsys.readouterr()
-    assert main(["conformance", *own, "--set", "colour=red"]) == 2
+    assert main([*own, "--set", "colour=red"]) == 2
     assert "colour" in capsys.readouterr().err

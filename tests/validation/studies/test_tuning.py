@@ -8,8 +8,9 @@ import mujoco
 import pytest
 
 from rockcheck.commands.cli import main
+from rockcheck.scenes import InputError
 from rockcheck.validation.execute.models import engine_names, not_installed
-from rockcheck.validation.studies.conformance.tuning import KNOBS, Tune, Tuning
+from rockcheck.validation.studies.conformance.tuning import KNOBS, Knob, Tune, Tuning
 
 HERE = [name for name in engine_names() if not not_installed(name)]
 
@@ -64,36 +65,7 @@ def test_the_command(tmp_path, capsys):
     assert (tmp_path / "tuned" / "index.html").is_file()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (
-            ["--engine", "ebm", "--tune", "0.5"],
-            "--engine: 'ebm' is not allowed: give one of mujoco",
-        ),
-        (["--tune", "2"], "--tune: 2 is not allowed"),
-        (["--tune", "nan"], "--tune: nan is not allowed"),
-        (["--tune", "0.5", "--set", "time_step=0"], "--set time_step: 0 is not allowed"),
-        (["--tune", "0.5", "--set", "friction=3"], "--set friction: 3 is not allowed"),
-        (["--tune", "0.5", "--set", "friction=red"], "--set friction: red is not allowed"),
-        (["--tune", "0.5", "--set", "step=1"], "'step'"),
-    ],
-)
-def test_wrong_input_is_one_line(arguments, words, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["conformance", *arguments]) == 2
-    error = capsys.readouterr().err
-    assert words in error
-    assert error.count("\n") == 1
-
-
-def test_what_cannot_be_reached_is_told(tmp_path, capsys):
-    words = ["conformance", "--engine", "dart", "--tune", "1", "--out", str(tmp_path)]
-    if not_installed("dart"):
-        pytest.skip("needs dart")
-    assert main([*words, "--set", "time_step=0.01"]) == 2
-    assert "cannot be reached by dart" in capsys.readouterr().err
-
-
-def test_every_engine_has_its_knob():
-    assert set(engine_names()) == set(KNOBS)
+def test_what_no_setting_reaches_is_told(monkeypatch):
+    monkeypatch.setitem(KNOBS, "mujoco", Knob((0.5, 0.6), {}))
+    with pytest.raises(InputError, match="cannot be reached by mujoco"):
+        tuned("mujoco", 0.9)
