@@ -15,7 +15,9 @@ from rockcheck.validation.suite.suites import load_suite
 
 def run(
     suite: SuiteArgument = None,
-    reason: Annotated[str | None, typer.Option("--reason", help="Why limits may be loosened; it is written into the file.")] = None,
+    reason: Annotated[
+        str | None, typer.Option("--reason", help="Why limits are loosened or figures moved; it is written into the file.")
+    ] = None,
     out: OutOption = OUT,
     jobs: JobsOption = None,
     force: ForceOption = False,
@@ -25,7 +27,8 @@ def run(
 ) -> None:
     """Make today's figures the expected ones.
 
-    They are written into the suite's tolerances, each change is shown. Limits are loosened only with --reason.
+    They are written into the suite's tolerances, each change is shown: new, tightened, loosened or
+    moved, the last two only with --reason.
     """
     name = suite or "paper"
     folder = usable_folder(out)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from rockcheck.commands import PlotOption, answer, check_picture, console, save_picture, scene_names, tell_notes
+from rockcheck.commands import PlotOption, answer, check_picture, console, save_picture, scene_names, tell_notes, told
 from rockcheck.scenes import load_scene
 from rockcheck.validation.discrepancy.compare import Discrepancy, compare
 from rockcheck.validation.discrepancy.figures import value_words
@@ -18,19 +18,23 @@ from rockcheck.validation.discrepancy.repeats import shifted, time_shift
 
 
 def run(
-    reference: Annotated[Path, typer.Argument(help="History of the reference, CSV.")],
-    candidate: Annotated[Path, typer.Argument(help="History of the candidate, CSV.")],
+    reference: Annotated[Path, typer.Argument(help="History of the reference, CSV; or a folder.")],
+    candidate: Annotated[Path, typer.Argument(help="History of the candidate, CSV; or a folder.")],
     offset: Annotated[float, typer.Option("--offset", help="Added to the candidate's times, s, to align a measured history.")] = 0.0,
     align: Annotated[bool, typer.Option("--align", help="Shift the candidate in time to where the rotations agree best.")] = False,
     until: Annotated[float | None, typer.Option("--until", help="End of the window, s (default: the whole common time).")] = None,
     scene: Annotated[str | None, typer.Option("--scene", help="Scene of both: its block and gravity.", autocompletion=scene_names)] = None,
     plot: PlotOption = None,
 ) -> None:
-    """Compare two histories, measure by measure.
+    """Compare two histories, measure by measure; or two folders of `rockcheck conformance`.
 
     Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg, time_ms, x_mm, ...).
     --plot draws both rotations and their difference.
     """
+    if reference.is_dir() and candidate.is_dir():
+        from rockcheck.validation.studies.conformance.study import changes
+
+        told(changes(reference, candidate))
     check_picture(plot)
     what = load_scene(scene) if scene else None
     given, other = read_measured(reference), read_measured(candidate, offset=offset)

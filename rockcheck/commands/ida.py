@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
 from rich.table import Table
 
-from rockcheck.commands import OUT, JobsOption, OutOption, answer, console, progress, scene_names, tell_left_out, usable_folder
+from rockcheck.commands import OUT, JobsOption, answer, console, out_option, progress, scene_names, tell_left_out, usable_folder
 from rockcheck.commands.record import (
     ColumnOption,
     ComponentOption,
@@ -48,7 +49,7 @@ def run(
     header_lines: HeaderLinesOption = None,
     decimal: DecimalOption = None,
     component: ComponentOption = None,
-    out: OutOption = OUT,
+    out: Annotated[Path, out_option("ida/index.html")] = OUT,
     jobs: JobsOption = None,
 ) -> None:
     """Peak rotation against the intensity of records.
@@ -64,7 +65,7 @@ def run(
     if not words:
         raise InputError("no records are given: name files, a folder of them, or a pattern", "--record")
     motions, left_out = motions_of(files_of(words), reading_of(unit, time_step, column, header_lines, decimal, component))
-    folder = usable_folder(usable_folder(out) / IDA)
+    folder = usable_folder(out, IDA)
     with progress("ida") as on_progress:
         found = analyse(
             load_scene(scene),

@@ -9,13 +9,13 @@ import numpy as np
 import typer
 from rich.table import Table
 
-from rockcheck.commands import answer, check_picture, console, save_picture
+from rockcheck.commands import answer, check_picture, console, save_picture, tell_left_out
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
-from rockcheck.scenes.recordings import Reading, Recording, intensity, read_components
-from rockcheck.scenes.recordings.sets import files_of
+from rockcheck.scenes.recordings import UNITS, Reading, Recording, intensity, read_components
+from rockcheck.scenes.recordings.sets import Odd, files_of
 
-UnitOption = Annotated[str | None, typer.Option("--unit", help="Unit of the accelerations: g, m/s2, cm/s2, gal or mm/s2.")]
+UnitOption = Annotated[str | None, typer.Option("--unit", help=f"Unit of the accelerations: {', '.join(UNITS)}.")]
 TimeStepOption = Annotated[float | None, typer.Option("--time-step", help="Time step, s, where the file has no times.")]
 ColumnOption = Annotated[str | None, typer.Option("--column", help="Column of the accelerations: its number from 1, or its name.")]
 HeaderLinesOption = Annotated[int | None, typer.Option("--header-lines", help="Number of lines to skip at the top.")]
@@ -43,12 +43,13 @@ def run(
     check_picture(plot)
     reading = reading_of(unit, time_step, column, header_lines, decimal, component)
     found: list[tuple[Path, Recording]] = []
-    faults: list[InputError] = []
-    for path in files_of(files):
+    faults: list[Odd] = []
+    asked = files_of(files)
+    for path in asked:
         try:
             found += [(path, one) for one in read_components(path, reading)]
         except InputError as error:
-            faults.append(error)
+            faults.append(Odd(error))
     values = [_values(path, record) for path, record in found]
     for (path, record), value in zip(found, values, strict=True):
         _show(path, record, value)
@@ -57,7 +58,8 @@ def run(
     if found:
         answer(values[0] if len(values) == 1 else {"records": values})
     if faults:
-        more = f"; {len(faults)} files of {len(faults) + len({path for path, _ in found})} are not read" if len(faults) > 1 else ""
+        tell_left_out(faults[1:])
+        more = f"; {len(faults)} files of {len(asked)} are not read" if len(faults) > 1 else ""
         raise InputError(f"{faults[0]}{more}")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -37,10 +38,10 @@ from rockcheck.commands.record import (
 from rockcheck.commands.simulate import setting_of
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
-from rockcheck.validation.execute import remote, workers
+from rockcheck.scenes.recordings.sets import record_path
 from rockcheck.validation.execute.models import FAMILIES, family, is_own, not_installed
 from rockcheck.validation.suite.record_sets import RecordSet
-from rockcheck.validation.suite.results import Run
+from rockcheck.validation.suite.results import Run, Strict
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import Suite, scene_suite
 from rockcheck.validation.suite.tables import outcome_row, outcome_tables, verdict_lines
@@ -90,7 +91,7 @@ def run(
     given = {name: value for name, value in reading if value is not None}
     if not words and (given or vertical or scale != 1.0):
         raise InputError("is missing: a unit, a scale or another option of records is given", "--record")
-    files = tuple(str(Path(word).absolute()) for word in words)
+    files = tuple(str(record_path(word, Path()).absolute()) for word in words)
     sets = [RecordSet(files=files, scale=scale, vertical=vertical, **given)] if files else []
     suite = scene_suite(scene, chosen_models(models, settings or ()), records=sets, allow_code=allow_code or ())
     folder = usable_folder(out)
@@ -119,7 +120,15 @@ def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, d
 
 
 def play_scene(suite: Suite, folder: Path, *, jobs: int | None, force: bool, scheduler: str | None, report: bool) -> None:
-    """Play a suite that judges nothing; a table, the report, and exit 3 where a model failed."""
+    """Play a suite that judges nothing; a table, the report, and exit 3 where a model failed.
+
+    Raises `InputError` where `folder` holds a judged run, whose pages and tables this one would overwrite.
+    """
+    before = None
+    with suppress(InputError):  # no run there, or none that can be read
+        before = Run.load(folder)
+    if before is not None and before.judged:
+        raise InputError(f"{printable(folder)} holds the judged run of suite {before.suite!r}: give another folder", "--out")
     finished = play(suite, folder, jobs, force, False, scheduler)
     kept = keep(finished, folder)
     screen = console()
@@ -150,12 +159,11 @@ def play_scene(suite: Suite, folder: Path, *, jobs: int | None, force: bool, sch
     raise typer.Exit(finished.exit_code)
 
 
-def play(suite: Suite, folder: Path, jobs: int | None, force: bool, strict: bool, scheduler: str | None) -> Run:
+def play(suite: Suite, folder: Path, jobs: int | None, force: bool, strict: Strict, scheduler: str | None) -> Run:
     """Run a suite with a progress bar on stderr."""
-    where = workers.local if scheduler is None else remote.OnCluster(scheduler)
     compiles = ", a first run compiles" if any(not is_own(one.family_name) and one.family.compiled for one in suite.models.values()) else ""
     with progress(f"{suite.name}{compiles}") as on_progress:
-        return run_suite(suite, folder, jobs=jobs, force=force, strict=strict, play=where, on_progress=on_progress)
+        return run_suite(suite, folder, jobs=jobs, force=force, strict=strict, scheduler=scheduler, on_progress=on_progress)
 
 
 def published(folder: Path, jobs: int | None) -> Path:

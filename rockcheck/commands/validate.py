@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from rich.console import Console
@@ -27,12 +27,13 @@ from rockcheck.commands.run import ForceOption, chosen_models, play, play_scene,
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.suite.changes import Moment, moment_of, remember, trends
-from rockcheck.validation.suite.results import Run
+from rockcheck.validation.suite.results import Run, Strict
 from rockcheck.validation.suite.suites import is_scene, load_suite, scene_suite
-from rockcheck.validation.suite.tables import not_shown, summary, verdict_lines, verdict_table
+from rockcheck.validation.suite.tables import improvements, not_shown, summary, verdict_lines, verdict_table
 
 #: The folder of the trend's page, and so many figures that moved are told.
 TREND, MOST_MOVED = "trend", 10
+Strictness = Literal["worse", "both"]
 SuiteArgument = Annotated[str | None, typer.Argument(help="A named suite or a .toml file (default: paper).", autocompletion=suite_names)]
 
 
@@ -42,7 +43,10 @@ def run(
     jobs: JobsOption = None,
     quick: Annotated[bool, typer.Option("--quick", help="The suite smoke: the smallest that means something.")] = False,
     force: ForceOption = False,
-    strict: Annotated[bool, typer.Option("--strict", help="Figures that changed beyond their drift band fail.")] = False,
+    strict: Annotated[
+        Strictness | None,
+        typer.Option("--strict", help="Figures that left their drift band for the worse fail; with `--strict both` better ones, too."),
+    ] = None,
     scheduler: SchedulerOption = None,
     allow_code: AllowCodeOption = None,
     history: Annotated[
@@ -67,7 +71,8 @@ def run(
         alone = scene_suite(suite, chosen_models())
         tell_missing()
         play_scene(alone, folder, jobs=jobs, force=force, scheduler=scheduler, report=report)
-    finished = play_suite(suite or ("smoke" if quick else "paper"), folder, jobs, force, strict, scheduler, allow_code)
+    how: Strict = "both" if strict == "both" else strict is not None
+    finished = play_suite(suite or ("smoke" if quick else "paper"), folder, jobs, force, how, scheduler, allow_code)
     kept = keep(finished, folder)
     show(finished, console())
     tell_faults(finished, folder)
@@ -77,7 +82,7 @@ def run(
     if history is not None and report:
         from rockcheck.reports.studies.trend import write_trend
 
-        console().print(f"trend: {write_trend(moments, usable_folder(folder / TREND))}", soft_wrap=True)
+        console().print(f"trend: {write_trend(moments, usable_folder(folder, TREND))}", soft_wrap=True)
     page = published(folder, jobs) if report else kept
     console().print(f"report: {page}", soft_wrap=True)
     answer(summary(finished) | {"report": page})
@@ -85,7 +90,7 @@ def run(
 
 
 def play_suite(
-    suite: str, folder: Path, jobs: int | None, force: bool, strict: bool, scheduler: str | None, allow_code: Sequence[str] | None
+    suite: str, folder: Path, jobs: int | None, force: bool, strict: Strict, scheduler: str | None, allow_code: Sequence[str] | None
 ) -> Run:
     """Run a suite with a progress bar on stderr."""
     loaded = load_suite(suite, allow_code=allow_code or ())
@@ -110,6 +115,11 @@ def show(finished: Run, out: Console) -> None:
         out.print(line)
     for line in verdict_lines(finished):
         out.print(line, style="red" if finished.exit_code else "yellow")
+    better = list(improvements(finished))
+    if better:
+        out.print("better than expected; `rockcheck accept` makes today's the expected ones:")
+    for line in better:
+        out.print(line, style="red" if finished.strict == "both" else "green")
     if finished.without_tolerance:
         out.print(f"{finished.without_tolerance} figures have no tolerance yet: `rockcheck accept` makes today's the expected ones")
     out.print(f"{finished.up_to_date} of {len(finished.cells)} simulations were up to date; {finished.wall_seconds:.1f} s")

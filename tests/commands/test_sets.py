@@ -235,3 +235,17 @@ def test_fragility_takes_the_same_sets(words):
     assert main(["spectrum", "--scene", "rack.toml", "--fragility", "--size", "3", *words]) == 0
     (case,) = json.loads(Path("rockcheck-report/spectra/fragility.json").read_text(encoding="utf-8"))["cases"]
     assert case["motions"] == 2
+
+
+@pytest.mark.parametrize("command", ["run", "ida"])
+def test_a_file_of_a_folder_that_is_no_record_is_named_and_left_out(told, command):
+    Path("records/README.txt").write_text("where they are from\n", encoding="utf-8")
+    rest = STILL if command == "run" else ("--levels", "2", "--json")
+    left_out = told(command, "rack.toml", "records", *rest)["left_out"]
+    assert left_out[0] == "RSN1_V.AT2"
+    assert "README.txt" in left_out[1]
+
+
+def test_a_shipped_record_shakes_a_scene_by_its_name(told):
+    found = told("run", "rack.toml", "elcentro_1940_ns.csv", *STILL)
+    assert [cell["scene"] for cell in found["cells"]] == ["rack, elcentro_1940_ns"]

@@ -39,7 +39,7 @@ def records(tmp_path):
     folder = tmp_path / "records"
     folder.mkdir()
     for n, (gain, rate) in enumerate(((1.0, 3.0), (2.5, 5.0), (0.3, 2.0)), 1):
-        rows = "\n".join(f"{0.02 * k:.2f},{gain * math.sin(rate * 0.02 * k) * math.exp(-0.2 * 0.02 * k):.9f}" for k in range(400))
+        rows = "\n".join(f"{0.02 * k:.2f},{gain * math.sin(rate * 0.02 * k) * math.exp(-0.2 * 0.02 * k):.9f}" for k in range(200))
         (folder / f"H{n}.csv").write_text(f"time_s,acceleration_m_s2\n{rows}\n", encoding="utf-8")
     return folder
 
@@ -99,6 +99,45 @@ def test_half_the_motions_stay_below_the_median(records):
             assert np.mean(peaks[:, level] < (math.inf if peak is None else peak)) < share
     overturned = next(one for one in found.capacities if one.limit == 1.0)
     assert [point[1] for point in overturned.curve.points] == pytest.approx(np.mean(peaks > 1.0, axis=0))
+
+
+def test_a_capacity_is_exceeded_not_met(records):
+    """Of a limit that is a motion's own peak, that motion stays within it."""
+    plain = ida.analyse(SCENE, motions(records), LEVELS)
+    assert [one.limit for one in plain.capacities] == sorted(ida.CAPACITIES)
+    assert max(ida.CAPACITIES) == 1.0
+    peaks = np.array([[math.inf if peak is None else peak for peak in line.peaks] for line in plain.lines])
+    limit = float(np.max(peaks[np.isfinite(peaks)]))
+    (found,) = ida.analyse(SCENE, motions(records), LEVELS, capacities=[limit]).capacities
+    assert [point[1] for point in found.curve.points] == np.mean(peaks > limit, axis=0).tolist()
+    assert np.sum(peaks == limit) == 1
+    assert found.curve.label == f"peak above {limit:g} α"
+    assert plain.capacities[-1].curve.label == "peak above α, or overturned"
+
+
+def test_a_fitted_median_lies_inside_its_interval(records):
+    """The interval is that of the sets of motions that could have been drawn; without a fit there is none."""
+    levels = np.linspace(0.1, 1.2, 12)
+    found = ida.analyse(SCENE, motions(records), levels, capacities=[0.3, 1e-6]).capacities
+    assert 0.1 < found[0].low < found[0].curve.median < found[0].high < 1.2
+    medians = []
+    exceeded = np.array([[[True] * 6, [True] * 6], [[False] * 3 + [True] * 3] * 2, [[False] * 5 + [True]] * 2])
+    made = ida._capacity(0.5, exceeded, LEVELS)
+    chance = np.random.default_rng(8)
+    for _ in range(400):
+        drawn = exceeded[chance.integers(3, size=3)]
+        fit = ida.fit_lognormal(LEVELS, drawn.sum(axis=(0, 1)), np.full(6, 6))
+        medians += [fit[0]] if fit else []
+    assert len(medians) < 0.98 * 400  # of three motions that are the first each time all exceed, and nothing fits
+    assert (made.low, made.high) == pytest.approx(tuple(np.quantile(medians, [0.025, 0.975])), rel=0.2)
+    assert ida._capacity(0.5, np.ones((3, 2, 6), dtype=bool), LEVELS).low is None
+
+
+def test_a_period_goes_with_sa_alone(records):
+    for measure, period in (("sa", None), ("pga", 0.5), ("pgv", 1.0)):
+        with pytest.raises(InputError, match="--period"):
+            ida.analyse(SCENE, motions(records), LEVELS, measure=measure, period=period)
+    assert ida.analyse(SCENE, motions(records), LEVELS, measure="sa", period=0.5).label == "Sa(0.5 s), 5 %"
 
 
 def test_files_folders_and_patterns_are_meant(records):

@@ -21,9 +21,9 @@ from rockcheck.cm import ContinuousModel
 from rockcheck.commands.cli import main
 from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.spectrum import node_scene
-from rockcheck.scenes import Block, InputError, Ricker, load_scene
+from rockcheck.scenes import Block, InputError, Ricker, Scene, Wall, load_scene
 from rockcheck.scenes.progress import Count
-from rockcheck.scenes.recordings import Reading
+from rockcheck.scenes.recordings import Reading, Recording
 from rockcheck.scenes.recordings.sets import motions_of
 from rockcheck.validation.spectra import agreement, claims, fragility, refinement
 from rockcheck.validation.spectra import study as spectra
@@ -251,6 +251,7 @@ def test_ones_own_scene_and_fragility(tmp_path, capsys):
     assert main(["spectrum", *grid, "--fragility"]) == 0
     kept = json.loads((tmp_path / "out" / "spectra" / "fragility.json").read_text(encoding="utf-8"))
     assert [case["label"] for case in kept["cases"]] == ["with the wall", "without a wall"]
+    assert kept["format"] == 1
     page = (tmp_path / "out" / "spectra.html").read_text(encoding="utf-8")
     assert "bookcase" in page
     assert '<h2 id="fragility">' in page
@@ -269,7 +270,7 @@ def test_nodes_that_depend_on_the_law_of_impacts_are_known(tmp_path, refine):
     request = SpectrumRequest(*OF_THE_LAW, model="ebm-unilateral", refine=refine)
     with Tiles(tmp_path, jobs=1) as tiles:
         (alone,) = play_panels([panel], request, tiles)
-        (found,) = play_panels([panel], request, tiles, both_laws=True)
+        (found,) = play_panels([panel], request, tiles, all_laws=True)
     assert alone.depends_on_law is None
     assert found.depends_on_law.tolist() == [[0, 1]]
     np.testing.assert_array_equal(found.outcomes, alone.outcomes)
@@ -279,20 +280,35 @@ def test_nodes_that_depend_on_the_law_of_impacts_are_known(tmp_path, refine):
         assert data["depends_on_law"].tolist() == [[0, 1]]
 
 
-@pytest.mark.parametrize(("name", "model"), [("gap-3-e-1", "ebm"), ("gap-3-e-0", "ebm-unilateral"), ("unobstructed", "ebm-unilateral")])
-def test_without_a_bouncing_wall_or_a_hop_no_second_law_is_played(tmp_path, name, model):
+@pytest.mark.parametrize(("name", "model"), [("gap-3-e-1", "ebm"), ("unobstructed", "ebm-unilateral")])
+def test_without_a_wall_or_a_hop_no_second_law_is_played(tmp_path, name, model):
     panel = next(panel for panel in paper_panels(6) if panel.name == f"figure-6-{name}")
     with Tiles(tmp_path, jobs=1) as tiles:
-        (found,) = play_panels([panel], SpectrumRequest(*OF_THE_LAW, model=model), tiles, both_laws=True)
+        (found,) = play_panels([panel], SpectrumRequest(*OF_THE_LAW, model=model), tiles, all_laws=True)
         assert tiles.played == 4
     assert found.depends_on_law is None
+
+
+@pytest.mark.parametrize(("restitutions", "laws"), [((), 3), ((0.0,), 3), ((0.5,), 4)])
+def test_nodes_whose_block_lands_flat_depend_on_the_law(tmp_path, restitutions, laws):
+    """A block that is dropped while it moves overturns where its trailing corner is first; the pulses are next to nothing."""
+    block = {"block": Block(half_width=0.3, half_height=1.0), "floor": {"friction": 0.9}}
+    block["walls"] = [Wall(side="right", gap=9.0, restitution=e) for e in restitutions]
+    start = {"initial_height": 0.05, "initial_velocity": -1.0, "duration": 1.0}
+    panel = Panel("dropped", "Dropped", Scene(name="dropped", excitation=Ricker(amplitude=1.0, period=1.0), **block, **start))
+    request = SpectrumRequest(np.array([50.0, 60.0]), np.array([1e-9, 2e-9]), model="ebm-unilateral")
+    with Tiles(tmp_path, jobs=1) as tiles:
+        (found,) = play_panels([panel], request, tiles, all_laws=True)
+        assert tiles.played == 4 * laws
+    assert found.outcomes.tolist() == [[0, 0], [0, 0]]
+    assert len(found.depends_on_law) == 4
 
 
 def test_an_undecided_node_does_not_depend_on_the_law():
     about = {"frequency_ratios": np.ones(1), "amplitude_ratios": np.ones(2), "evaluations": 2, "scene": None, "model": None}
     one = Spectrum(outcomes=np.array([[0], [1]], dtype=np.int8), undecided=np.array([[0, 0]]), **about)
     other = Spectrum(outcomes=np.array([[1], [0]], dtype=np.int8), undecided=np.empty((0, 2), dtype=np.int64), **about)
-    assert spectra.differing(one, other).tolist() == [[1, 0]]
+    assert spectra.differing(one, [other, one]).tolist() == spectra.differing(one, [one, other]).tolist() == [[1, 0]]
 
 
 def test_the_command_counts_and_marks_nodes_that_depend_on_the_law(tmp_path, capsys):
@@ -304,7 +320,7 @@ def test_the_command_counts_and_marks_nodes_that_depend_on_the_law(tmp_path, cap
     assert capsys.readouterr().out.splitlines()[1].split()[-1] == "1"
     page = (tmp_path / "out" / "spectra.html").read_text(encoding="utf-8")
     assert "depends on the impact law" in page
-    assert main(["spectrum", "--scene", "bookcase.toml", *grid]) == 0
+    assert main(["spectrum", "--scene", "bookcase.toml", *grid, "--pivot", "bilateral"]) == 0
     assert "impact law" not in capsys.readouterr().out
 
 
@@ -693,6 +709,26 @@ def test_records_are_scaled_to_the_intensity(tmp_path, monkeypatch):
     assert {point[1] for point in case.points} <= {0.0, 0.5, 1.0}
     with pytest.raises(InputError, match="too few"):
         fragility.fragility(panel, request, motions("0.csv"), Tiles(tmp_path / "tiles"))
+
+
+def test_fragility_plays_each_motion_in_both_directions(tmp_path):
+    """Reversed, a symmetric block without a wall does the mirror image, so that one of two sides is the other's opposite."""
+    scene = paper_panels(8)[0].scene.replace(walls=())
+    request = SpectrumRequest(np.array([1.0, 3.0]), np.linspace(1.0, 6.0, 6))
+    tiles = Tiles(tmp_path / "tiles")
+    sides, failed = fragility._play_pulses(scene, request, tiles)
+    assert sides.shape == (fragility.PULSES, 2, 6)
+    assert not failed.any()
+    assert set(np.unique(sides)) == {-1, 0, 1}
+    np.testing.assert_array_equal(sides[:, 0], -sides[:, 1])
+    samples = 3.0 * np.sin(2.0 * 0.02 * np.arange(158))
+    recording = Recording(samples=samples, time_step=0.02, unit="m/s2", form="CSV")
+    sides, failed = fragility._play_records(scene, request, [("a", recording), ("b", recording)], tiles)
+    assert sides.shape == failed.shape == (2, 2, 6)
+    assert set(np.unique(sides)) >= {0}
+    assert sides.any()
+    np.testing.assert_array_equal(sides[:, 0], -sides[:, 1])
+    np.testing.assert_array_equal(sides[0], sides[1])
 
 
 def test_the_intensity_in_g_is_that_of_the_pivot_that_lifts_first(tmp_path):

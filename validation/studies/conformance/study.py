@@ -3,7 +3,6 @@ each held against phenomena with a certain answer."""
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from collections import Counter
@@ -18,6 +17,7 @@ from junitparser import Failure as Failed
 from rockcheck.scenes import InputError, ModelFailure
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.files import read_toml
+from rockcheck.scenes.reading import read_json
 from rockcheck.validation.execute.models import build, build_own, family, is_own
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.execute.provenance import cell_key, version_of
@@ -356,14 +356,13 @@ def changes(before: Path, after: Path) -> Finding:
 def _read(path: Path) -> dict[tuple[str, str, str], dict[str, Any]]:
     """The rows of a finished study; raises `InputError` naming file and fault."""
     path = path / "run.json" if path.is_dir() else path
+    data = read_json(path)
     try:
         return {
             (row["engine"], row["settings"], row["id"]): row
             | {name: row[name] and float(row[name]) for name in ("value", "limit")}
             | {name: str(row[name]) for name in ("name", "version", "verdict")}
-            for row in json.loads(path.read_text(encoding="utf-8"))["tables"]["rows"]
+            for row in data["tables"]["rows"]
         }
-    except OSError as error:
-        raise InputError(f"{printable(path)}: cannot be read: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError, RecursionError):
+    except (ValueError, KeyError, TypeError):
         raise InputError(f"{printable(path)}: not what `rockcheck conformance` wrote") from None
