@@ -26,7 +26,7 @@ def run(
     scene: Annotated[str | None, typer.Option("--scene", help="Scene of both: its block and gravity.", autocompletion=scene_names)] = None,
     plot: PlotOption = None,
 ) -> None:
-    """Compare two histories, measure by measure; or two folders of `rockcheck conformance`.
+    """Compare two histories, or two conformance folders.
 
     Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg, time_ms, x_mm, ...).
     --plot draws both rotations and their difference.

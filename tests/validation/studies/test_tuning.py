@@ -39,10 +39,9 @@ def test_drake_bounces_by_its_dissipation_and_says_how_deep():
     assert not tuned("drake", 0.5, penetration=1e-3).reached
 
 
-def test_mujocos_parameters_do_it_in_a_model_of_ones_own():
-    """A sphere in a file that owes nothing to rockcheck but the two lines."""
-    found = tuned("mujoco", 0.5)
-    solref, solimp = found.parameters["geom solref"], found.parameters["geom solimp"]
+def test_mujocos_parameters_do_it_in_a_file_that_owes_nothing_else_to_rockcheck():
+    found = tuned("mujoco", 0.5).parameters
+    solref, solimp = found["geom solref"], found["geom solimp"]
     model = mujoco.MjModel.from_xml_string(f"""
 <mujoco><option timestep="0.001" integrator="Euler" cone="elliptic"/>
 <default><geom solref="{solref}" solimp="{solimp}"/></default>

@@ -269,7 +269,8 @@ def _blocks(cards: Sequence[Card]) -> Iterator[Block]:
         on="page",
     )
     wrong += [f"{card['title']}: {note}" for card in cards for note in card["notes"]]
-    yield Text(title="What goes wrong", items=wrong or ["Nothing."])
+    if wrong:
+        yield Text(title="What goes wrong", items=wrong)
     yield Table(
         "phenomena",
         [
