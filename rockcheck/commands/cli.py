@@ -35,7 +35,6 @@ COMMANDS = {
     "uncertainty": ("uncertainty", "rockcheck uncertainty fig5a --model mujoco --set time_step=1e-3"),
     "validate": ("validate", "rockcheck validate smoke --out rockcheck-report"),
     "accept": ("accept", 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"'),
-    "diff": ("diff", "rockcheck diff last-week rockcheck-report"),
     "spectrum": ("spectrum", "rockcheck spectrum --figure 8 --size 50 --refine"),
     "ida": ("ida", "rockcheck ida shelf.toml records --intensity sa --period 0.5"),
     "benchmark": ("benchmark", "rockcheck benchmark --quick"),
@@ -47,6 +46,7 @@ COMMANDS = {
 
 #: What to call in place of a command that is gone.
 GONE = {
+    "diff": "rockcheck compare RUN_A RUN_B",
     "figure": "rockcheck report DIR --scene NAME -o FILE",
     "convergence": "rockcheck benchmark convergence",
     "calibrate": "rockcheck conformance --tune E",
@@ -55,7 +55,7 @@ GONE = {
 HIDDEN = ("warm",)
 
 #: Commands that answer at once: nobody asks how long they took.
-AT_ONCE = ("scenes", "new", "record", "compare", "diff")
+AT_ONCE = ("scenes", "new", "record", "compare")
 
 #: Options whose value may be left out, with their values: it is then the first.
 BARE = {"--strict": ("worse", "both")}

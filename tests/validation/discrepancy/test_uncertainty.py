@@ -150,23 +150,6 @@ def test_of_a_tolerance_the_change_at_a_hundredth_of_it_counts():
     assert found.u_num("outcome") == 0.0
 
 
-@dataclass(frozen=True)
-class Dented(Made):
-    """At the finest step the rows beside the highest lie a hundredth of alpha lower."""
-
-    def simulate(self, scene):
-        history = super().simulate(scene)
-        theta = history.channels["theta"].copy()
-        if self.step == 1e-3:
-            theta[np.argmax(np.abs(theta)) + np.array([-1, 1])] -= 0.01 * scene.block.alpha
-        return replace(history, channels={**history.channels, "theta": theta})
-
-
-def test_the_peak_may_lie_between_rows_of_the_run_itself():
-    """By an eighth of the second difference there, whatever the coarser runs look like."""
-    assert numerical_uncertainty(Dented(lambda step: 1.0), BOOKCASE).u_num("peak_rotation") == pytest.approx(0.02 / 8.0, rel=0.01)
-
-
 def test_what_is_small_is_so_beside_the_block():
     """Rotations are small in alpha, slips in alpha R, times in 1/p."""
     from rockcheck.validation.uncertainty.numerical import _units

@@ -249,7 +249,18 @@ def _blocks(cards: Sequence[Card]) -> Iterator[Block]:
         for row in card["phenomena"]
         if row["verdict"] == "fail"
     ]
-    of = [{row["id"]: _mark(row) for row in card["phenomena"]} for card in cards]
+    of = [
+        {
+            row["id"]: Mark(
+                row["value"],
+                VERDICTS[row["verdict"]][1],
+                row["reason"],
+                digits=6 if (row["limit"] or 1.0) < 1e-3 else 3,
+            )
+            for row in card["phenomena"]
+        }
+        for card in cards
+    ]
     yield Table(
         "cards",
         [
@@ -289,12 +300,6 @@ def _blocks(cards: Sequence[Card]) -> Iterator[Block]:
         for row in card["phenomena"]
     ]
     yield Table("rows", [*HEAD, *map(Column, ROW)], rows, on="file")
-
-
-def _mark(row: Mapping[str, Any]) -> Mark:
-    """A value with its verdict; with more digits where the limit needs them."""
-    digits = 6 if (row["limit"] or 1.0) < 1e-3 else 3
-    return Mark(row["value"], VERDICTS[row["verdict"]][1], row["reason"], digits=digits)
 
 
 def junit(cards: Sequence[Card]) -> str:

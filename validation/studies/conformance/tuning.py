@@ -239,30 +239,37 @@ class Tuning(Study):
         for one in ended:
             if isinstance(one, Failure) and one.refused and not found:
                 raise InputError(one.reason)
-        engine, reached = Column("engine", kind="model"), sum(one.reached for one in found)
-        columns = [
-            engine,
-            Column("step", unit="s"),
-            Column("restitution"),
-            Column("friction"),
-            Column("penetration", unit="m", digits=2),
-            text("reached"),
-        ]
-        rows = [
-            [
-                *(one.engine, one.step, one.restitution, one.friction, one.penetration),
-                Mark(one.reached, "pass" if one.reached else "fail"),
-            ]
-            for one in found
-        ]
-        words = [[one.engine, *pair] for one in found for pair in one.parameters.items()]
+        reached = sum(one.reached for one in found)
         return Finding(
             self.name,
             "Parameters for a wanted restitution",
             f"{reached} of {len(self.wanted)} engines reach what is wanted.",
             [
-                Table("parameters", [engine, text("where"), text("what")], words, "Parameters"),
-                Table("reached", columns, rows, "Reached"),
+                Table(
+                    "parameters",
+                    [Column("engine", kind="model"), text("where"), text("what")],
+                    [[one.engine, *pair] for one in found for pair in one.parameters.items()],
+                    "Parameters",
+                ),
+                Table(
+                    "reached",
+                    [
+                        Column("engine", kind="model"),
+                        Column("step", unit="s"),
+                        Column("restitution"),
+                        Column("friction"),
+                        Column("penetration", unit="m", digits=2),
+                        text("reached"),
+                    ],
+                    [
+                        [
+                            *(one.engine, one.step, one.restitution, one.friction, one.penetration),
+                            Mark(one.reached, "pass" if one.reached else "fail"),
+                        ]
+                        for one in found
+                    ],
+                    "Reached",
+                ),
             ],
             {"engines": {one.engine: asdict(one) for one in found}},
             "pass" if reached == len(self.wanted) else "fail",
