@@ -23,13 +23,8 @@ SHOWN = 20
 
 
 def run(
-<<<<<<< HEAD
-    reference: Annotated[Path, typer.Argument(help="History of the reference, CSV; or a folder.")],
-    candidate: Annotated[Path, typer.Argument(help="History of the candidate, CSV; or a folder.")],
-=======
     reference: Annotated[Path, typer.Argument(metavar="A", help="History of the reference, CSV; or a finished run's folder.")],
     candidate: Annotated[Path, typer.Argument(metavar="B", help="History of the candidate, CSV; or a later run's folder.")],
->>>>>>> main
     offset: Annotated[float, typer.Option("--offset", help="Added to the candidate's times, s, to align a measured history.")] = 0.0,
     align: Annotated[bool, typer.Option("--align", help="Shift the candidate in time to where the rotations agree best.")] = False,
     until: Annotated[float | None, typer.Option("--until", help="End of the window, s (default: the whole common time).")] = None,
@@ -37,27 +32,21 @@ def run(
     plot: PlotOption = None,
     everything: Annotated[bool, typer.Option("--all", help=f"Of two runs: all figures that moved, not only {SHOWN}.")] = False,
 ) -> None:
-<<<<<<< HEAD
-    """Compare two histories, or two conformance folders.
-=======
     """Compare two histories, or two finished runs.
 
-    Two folders: what changed between runs of a suite, exit 1 where a verdict or a cell changed.
->>>>>>> main
+    Two folders: what changed between runs of a suite, or of `conformance`, exit 1 where a verdict or a cell changed.
 
     Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg, time_ms, x_mm, ...).
     --plot draws both rotations and their difference.
     """
-<<<<<<< HEAD
-    if reference.is_dir() and candidate.is_dir():
-        from rockcheck.validation.studies.conformance.study import changes
+    if reference.is_dir() or reference.suffix == ".json":
+        from rockcheck.validation.studies.conformance import study
 
-        told(changes(reference, candidate))
-=======
+        if study.wrote(reference):
+            told(study.changes(reference, candidate))
     if reference.is_dir() or candidate.is_dir():
         two_runs(reference, candidate, everything=everything)
         return
->>>>>>> main
     check_picture(plot)
     what = load_scene(scene) if scene else None
     given, other = read_measured(reference), read_measured(candidate, offset=offset)
@@ -115,8 +104,8 @@ def two_runs(before: Path, after: Path, *, everything: bool) -> None:
     versions = {name: pair for name, pair in versions.items() if pair[0] != pair[1]}
     screen = console()
     counts = {what: sum(change.what == what for change in found) for what in ("verdict", "cell", "outcome", "figure")}
-    told = ", ".join(f"{count} {what}{'s' if count > 1 else ''}" for what, count in counts.items() if count)
-    screen.print(f"{old.suite}: {f'{told} changed' if told else 'nothing changed'}", style="bold", soft_wrap=True)
+    words = ", ".join(f"{count} {what}{'s' if count > 1 else ''}" for what, count in counts.items() if count)
+    screen.print(f"{old.suite}: {f'{words} changed' if words else 'nothing changed'}", style="bold", soft_wrap=True)
     for name, (was, now) in versions.items():
         screen.print(f"{name} {was or 'absent'} -> {now or 'absent'}")
     shown = found if everything else [change for change in found if change.what != "figure"] + _figures(found)[:SHOWN]

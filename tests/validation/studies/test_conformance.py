@@ -181,6 +181,7 @@ def test_what_changed_between_versions(right, tmp_path):
     )
     assert (first["version_before"], first["version_after"], first["worse"]) == ("1", "2", True)
     assert (other["id"], other["worse"], found.exit_code) == ("RC-09", False, 1)
+    assert main(["compare", str(tmp_path), str(tmp_path / "newer.json"), "--quiet"]) == 1
     path.write_text('{"tables": {"rows": []}}', encoding="utf-8")
     gone = changes(tmp_path / "newer.json", path).table("changes").records()
     assert [row["verdict_after"] for row in gone] == ["absent"] * len(PHENOMENA)

@@ -316,6 +316,15 @@ def junit(cards: Sequence[Card]) -> str:
     return str(document.tostring(), "utf-8")
 
 
+def wrote(path: Path) -> bool:
+    """Whether that is a finished study, a folder or its `run.json`."""
+    try:
+        data = read_json(path / "run.json" if path.is_dir() else path)
+    except InputError:
+        return False
+    return isinstance(data, dict) and "cards" in data
+
+
 def changes(before: Path, after: Path) -> Finding:
     """What changed between two finished studies, each a folder or its `run.json`: every verdict,
     and every value that moved by more than `SHARE` of its limit. Cards meet by engine and settings.
