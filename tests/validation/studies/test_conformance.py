@@ -112,7 +112,7 @@ def test_an_engine_at_its_best_conforms(right):
 
 
 def test_the_engines_here_are_those_that_are_installed():
-    """`ROCKCHECK_ENGINES` names those that must be, so that none is skipped unseen."""
+    # `ROCKCHECK_ENGINES` names those that must be, so that none is skipped unseen.
     here = {name for name in engine_names() if not not_installed(name)}
     known = map(engines.__dict__.get, engines.__all__)
     assert here == {one.name for one in known if not one.module or find_spec(one.module)}
@@ -130,7 +130,7 @@ def test_the_engines_here_are_those_that_are_installed():
     ],
 )
 def test_an_engine_gets_a_card(name, settings, failing):
-    """What fails is known and listed in the documentation; the counts of verdicts add up."""
+    # What fails is known and listed in the documentation; the counts of verdicts add up.
     if reason := not_installed(name):
         pytest.skip(f"needs {name}: {reason}")
     found = played(named(name, settings, {}))
@@ -245,7 +245,7 @@ def test_wrong_input_is_one_line(arguments, words, tmp_path, monkeypatch, capsys
 
 
 def test_code_of_ones_own_is_played_by_a_worker(tmp_path, monkeypatch, capsys):
-    """A fault in it costs what needs it only; its settings are named; it is played once."""
+    # A fault in it costs what needs it only; its settings are named; it is played once.
     monkeypatch.chdir(tmp_path)
     (tmp_path / "halfway.py").write_text(
         "from pathlib import Path\nfrom typing import ClassVar\n"
