@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,8 @@ COLOURS = {"fail": "red", "error": "red", "changed": "yellow", "incomplete": "ye
 
 def words(cell: Any, column: Column, write: Callable[[float, int], str] = number) -> str:
     """A cell's value for people; a sign before it where it has a verdict."""
+    if isinstance(cell, Mark) and cell.digits:
+        column = replace(column, digits=cell.digits)
     shown = _value(plain(cell), column, write)
     sign = SIGNS[cell.verdict] if isinstance(cell, Mark) else ""
     return f"{sign} {shown}".strip()
@@ -140,9 +142,9 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
     from rockcheck.reports.site import Site
 
     write_whole(folder / "run.json", json_text(found.as_dict()) + "\n")
-    for table in found.tables():
-        write_whole(folder / f"{table.name}.csv", csv(table))
-    write_whole(folder / "summary.md", markdown(found))
+    tables = {f"{table.name}.csv": csv(table) for table in found.tables()}
+    for name, content in {**tables, **found.files, "summary.md": markdown(found)}.items():
+        write_whole(folder / name, content)
     plots = [block for block in found.blocks if isinstance(block, Plot)]
     for plot in plots:
         keep_drawn(folder / FIGURES / plot.name, json_text(asdict(plot)), partial(figure_of, plot), formats)
