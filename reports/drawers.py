@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Drawers of other kinds of plots: module and function, which takes the plot and returns a figure.
-DRAWERS: dict[str, tuple[str, str]] = {}
+DRAWERS: dict[str, tuple[str, str]] = {"stable-steps": ("rockcheck.reports.studies.stable_steps", "draw")}
 #: Colours by day and by night of series without a look, in their order; grey for "thin" ones.
 COLOURS = (
     ("#0072b2", "#3d9fdc"),

@@ -13,17 +13,17 @@ from rockcheck.commands.cli import main
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
 from rockcheck.scenes.scene import PAPER_BLOCK
-from rockcheck.validation.stress import invariants, players, study
-from rockcheck.validation.stress.exact import exact_scene
-from rockcheck.validation.stress.generator import ALPHA, FRICTION, RADIUS, random_scene
-from rockcheck.validation.stress.invariants import INVARIANTS, CheckedRun, audited, check_run, energy_error, similar
-from rockcheck.validation.stress.mechanics import BOOLE, arms, integrals, tilted_forces
-from rockcheck.validation.stress.players import PLAYERS, Approximate, energy_without_source
-from rockcheck.validation.stress.results import Stress
-from rockcheck.validation.stress.shrinking import shrink, write_scene
-from rockcheck.validation.stress.stability import SETUPS, fault_of, largest_stable, scene_at, stand_still
-from rockcheck.validation.stress.study import Chunk, chunks, play_some, run_stress
-from rockcheck.validation.stress.tables import invariants_markdown, summary_rows
+from rockcheck.validation.studies.stress import invariants, players, study
+from rockcheck.validation.studies.stress.exact import exact_scene
+from rockcheck.validation.studies.stress.generator import ALPHA, FRICTION, RADIUS, random_scene
+from rockcheck.validation.studies.stress.invariants import INVARIANTS, CheckedRun, audited, check_run, energy_error, similar
+from rockcheck.validation.studies.stress.mechanics import BOOLE, arms, integrals, tilted_forces
+from rockcheck.validation.studies.stress.players import PLAYERS, Approximate, energy_without_source
+from rockcheck.validation.studies.stress.results import Stress
+from rockcheck.validation.studies.stress.shrinking import shrink, write_scene
+from rockcheck.validation.studies.stress.stability import SETUPS, fault_of, largest_stable, scene_at, stand_still
+from rockcheck.validation.studies.stress.study import Chunk, chunks, play_some, run_stress
+from rockcheck.validation.studies.stress.tables import invariants_markdown, summary_rows
 
 SLIDES_AND_HITS = Scene(
     name="hits",
