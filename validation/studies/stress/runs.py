@@ -166,16 +166,17 @@ class Shrinking(Task):
     def play(self) -> str:
         """The file of the smallest scene that was found in time."""
         broken, name = self.broken, self.broken.invariant
-        bound = INVARIANTS[name].bound
-        least = broken.figure if name == "ends" else min(broken.figure, 100.0 * bound)
-        fault = broken.words.partition(":")[0]
+        most = math.inf if name == "ends" else 100.0 * INVARIANTS[name].bound
 
         def shows(scene: Scene) -> bool:
             played = checked(broken.model, scene, broken.seed, broken.number, name)
-            if name not in played.broken or not played.figures[name] >= least:
+            if name not in played.broken or not played.figures[name] >= min(broken.figure, most):
                 return False
             # A fault of the program: the same one.
-            return broken.figure < math.inf or played.failure.partition(":")[0] == fault
+            return (
+                broken.figure < math.inf
+                or played.failure.partition(":")[0] == broken.words.partition(":")[0]
+            )
 
         if not shows(broken.scene):
             return broken.text(broken.scene, "as it was found: it does not fail again")
@@ -191,14 +192,13 @@ class Shrinking(Task):
 def chunk(model: str, seed: int, first: int, count: int) -> Chunk:
     """These runs as a task; what it may take is far more than it does, and little enough for a hang to be found soon."""
     a_run = A_RUN if PLAYERS[model].event_based else AN_APPROXIMATE_RUN
-    expected = count * a_run / AMPLE
     return Chunk(
         model,
         seed,
         first,
         count,
         seconds=PATIENCE + count * a_run,
-        expected=expected,
+        expected=count * a_run / AMPLE,
         compiles=model,
     )
 

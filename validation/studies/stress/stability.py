@@ -61,13 +61,6 @@ class ModelSetup:
     alone: float = HOUR
     finest: float = STEPS[-1]
 
-    def built(self, scene: Scene, step: float) -> Any:
-        """The model with a step in s; the CM's contact is as stiff as the block's size asks for."""
-        settings = dict(self.settings) | {self.knob: step}
-        if self.family == "cm":
-            settings["penetration"] = 1e-7 * scene.block.radius
-        return build(self.family, settings)
-
 
 SETUPS = {
     line.label: line
@@ -135,8 +128,10 @@ def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
     """How a run of that step (sqrt(R/g)) breaks: "blows up", "sinks", "gains energy"; empty where it does not."""
     unit, radius = math.sqrt(scene.block.radius / scene.gravity), scene.block.radius
     scene = scene.replace(output_step=max(scene.output_step, step * unit))  # the CM ends a step at each row
+    # The CM's contact is as stiff as the block's size asks for.
+    stiff = {"penetration": 1e-7 * radius} if line.family == "cm" else {}
     try:
-        history = line.built(scene, step * unit).simulate(scene)
+        history = build(line.family, dict(line.settings) | {line.knob: step * unit} | stiff).simulate(scene)
     except ModelFailure as error:
         return "sinks" if "through the floor" in str(error) else "blows up"
     except InputError as error:

@@ -14,6 +14,7 @@ from rockcheck.validation.finding import Block, Column, Finding, Mark, Plot, Tab
 from rockcheck.validation.studies.stress.invariants import INVARIANTS, CheckedRun
 from rockcheck.validation.studies.stress.players import PLAYERS
 from rockcheck.validation.studies.stress.runs import (
+    MOST_FILES,
     Broken,
     Chunk,
     RunTotals,
@@ -58,10 +59,14 @@ class Stress(Study):
         gone = {(one.model, one.first) for one in lost if isinstance(one, Chunk) and one.count == 1}
         found = [one for totals in self._totals(done) for one in totals.shown]
         small = [one for one in found if (one.model, one.number) not in gone]
-        budget = SHRINKING_QUICK if self.quick else SHRINKING
-        budget = min(ONE_FAILURE * budget, budget / max(1, len(small)))
-        how: Any = {"seconds": budget + HANGING, "expected": 0.5 * budget}
-        return work + [Shrinking(one, budget, compiles=one.model, **how) for one in small]
+        share = min(ONE_FAILURE, 1.0 / max(1, len(small)))
+        budget = share * (SHRINKING_QUICK if self.quick else SHRINKING)
+        return work + [
+            Shrinking(
+                one, budget, seconds=budget + HANGING, expected=0.5 * budget, compiles=one.model
+            )
+            for one in small
+        ]
 
     def _chunks(self) -> list[Chunk]:
         """The runs, the slowest models first, so that all cores end together."""
@@ -77,11 +82,6 @@ class Stress(Study):
                 for first in range(0, count, most)
             ]
         return sorted(found, key=lambda one: PLAYERS[one.model].event_based)
-
-    @staticmethod
-    def play(task: Any) -> Any:
-        """What a task says of itself."""
-        return task.play()
 
     def _totals(self, done: Mapping[Any, Any]) -> list[RunTotals]:
         """What the models showed; a run whose process was lost does not end."""
@@ -99,6 +99,8 @@ class Stress(Study):
         totals = self._totals(done)
         small = {task.broken: one for task, one in done.items() if isinstance(one, str)}
         at = [done[place] for place in places(self.quick) if place in done]
+        stable = [one for one in at if isinstance(one, Stable)]
+        still = [one for one in at if isinstance(one, Still)]
         runs = sum(one.counts["runs"] for one in totals)
         broken = sum(len(one.failures) for one in totals if PLAYERS[one.model].event_based)
         said = f"failures of event-based models: {broken}"
@@ -107,8 +109,8 @@ class Stress(Study):
             "Stress: random scenes against what must always hold",
             f"seed {self.seed}: {runs:,} runs, {said if broken else 'no failure of an event-based model'}",
             [
-                *_maps([one for one in at if isinstance(one, Stable)]),
-                *_stood([one for one in at if isinstance(one, Still)]),
+                *(_maps(stable) if stable else ()),
+                *([_stood(still)] if still else ()),
                 *(_runs(totals) if totals else ()),
             ],
             data={
@@ -130,85 +132,91 @@ class Stress(Study):
 
 
 def _runs(totals: Sequence[RunTotals]) -> Iterator[Block]:
-    model = Column("model", kind="model")
-    columns = [
-        model,
-        text("plays", brief=False),
-        Column("runs"),
-        Column("broken", "broken runs"),
-        Column("events"),
-        Column("gaining", "energy gained in an impact", "runs"),
-        Column("largest_gain", "most gained", kind="percent"),
-        Column("horizons", "cut at the horizon"),
-        Column("cpu_seconds", "CPU", "s"),
-    ]
-    rows = [
+    yield Table(
+        "models",
         [
-            one.model,
-            PLAYERS[one.model].words,
-            one.counts["runs"],
-            len({failure.number for failure in one.failures}),
-            one.counts["events"],
-            one.counts["gaining"],
-            one.largest_gain,
-            one.counts["horizons"],
-            one.cpu_seconds,
-        ]
-        for one in totals
-    ]
-    note = (
+            text("model"),
+            text("plays", brief=False),
+            Column("runs"),
+            Column("broken", "broken runs"),
+            Column("events"),
+            Column("gaining", "gain energy"),
+            Column("largest_gain", "most", kind="percent"),
+            Column("horizons", "cut at horizon", brief=False),
+            Column("cpu_seconds", "CPU", "s"),
+        ],
+        [
+            [
+                one.model,
+                PLAYERS[one.model].words,
+                one.counts["runs"],
+                len({failure.number for failure in one.failures}),
+                one.counts["events"],
+                one.counts["gaining"],
+                one.largest_gain,
+                one.counts["horizons"],
+                one.cpu_seconds,
+            ]
+            for one in totals
+        ],
+        "Models",
         "Newton's restitution with friction, and the paper's cascade of impacts, can add energy:"
-        " such runs are counted here. Without restitution, or with the energy cap, an impact of the"
-        " unilateral model may not add any: that is an invariant."
+        " such runs, and what an impact added at most, are listed. Without restitution, or with the"
+        " energy cap, an impact of the unilateral model may not add any: that is an invariant.",
     )
-    yield Table("models", columns, rows, "Models", note)
-    rules = {one.model: one.rules.most_common() for one in totals}
-    rows = [[key, ", ".join(f"{name} {n:,}" for name, n in some)] for key, some in rules.items()]
-    yield Table("choices", [model, text("choices")], rows, "Modelling choices made")
-    columns = [
-        text("invariant"),
-        text("words", "what its figure is", brief=False),
-        Column("bound"),
-        Column("worst", digits=2),
-        text("run"),
-        Column("failures"),
-        Column("unjudged", "not judged"),
-        *(Column(one.model, digits=2, brief=False) for one in totals),
-    ]
-    note = (
+    yield Table(
+        "choices",
+        [text("model"), text("choices")],
+        [
+            [one.model, ", ".join(f"{name} {n:,}" for name, n in one.rules.most_common())]
+            for one in totals
+            if one.rules
+        ],
+        "Modelling choices made",
+    )
+    yield Table(
+        "invariants",
+        [
+            text("invariant"),
+            text("words", "what its figure is", brief=False),
+            Column("bound"),
+            Column("worst", digits=2),
+            text("run"),
+            Column("failures"),
+            Column("unjudged", "not judged"),
+            *(Column(one.model, digits=2, brief=False) for one in totals),
+        ],
+        [_worst(name, totals) for name in INVARIANTS],
+        "Invariants: worst figures",
         "Two histories of one scene are compared up to its horizon: where a relative disturbance of"
-        " its data by 1e-8 turns the block by 1e-6 rad. Energy is integrated in every tenth run."
+        " its data by 1e-8 turns the block by 1e-6 rad. Energy is integrated in every tenth run.",
     )
-    rows = [_worst(name, totals) for name in INVARIANTS]
-    yield Table("invariants", columns, rows, "Invariants: worst figures", note)
     failures = [failure for one in totals for failure in one.failures]
     yield table_of("failures", Broken, failures)
-    columns = [
-        model,
-        text("invariant"),
-        Column("run"),
-        Column("figure", digits=2),
-        text("scene"),
-        text("words", "reason"),
-    ]
-    rows = [
-        [
-            one.model,
-            one.invariant,
-            one.number,
-            one.figure,
-            Mark(one.name, link=f"failures/{one.name}"),
-            one.words,
-        ]
-        for some in totals
-        for one in some.shown
-    ]
     yield Table(
         "scenes",
-        columns,
-        rows,
+        [
+            text("model"),
+            text("invariant"),
+            Column("run"),
+            Column("figure", digits=2),
+            text("scene"),
+            text("words", "reason"),
+        ],
+        [
+            [
+                one.model,
+                one.invariant,
+                one.number,
+                one.figure,
+                Mark(one.name, link=f"failures/{one.name}"),
+                one.words,
+            ]
+            for some in totals
+            for one in some.shown
+        ],
         f"Failures: {len(failures)}",
-        "The first of each model and invariant.",
+        f"At most {MOST_FILES} of a model and an invariant, each with its smallest scene.",
     )
 
 
@@ -217,71 +225,74 @@ def _worst(name: str, totals: Sequence[RunTotals]) -> list[Any]:
     known = [(*one.worst[name], one.model) for one in totals if name in one.worst]
     worst, run, model = max(known, default=(None, "", ""))
     failed = [sum(failure.invariant == name for failure in one.failures) for one in totals]
-    cells = [
-        Mark(
-            one.worst.get(name, [None])[0],
-            "fail" if n else "",
-            f"{n} of {one.looked_at[name]} fail" if n else "",
-        )
-        for one, n in zip(totals, failed, strict=True)
+    return [
+        name,
+        INVARIANTS[name].words,
+        INVARIANTS[name].bound,
+        worst,
+        f"{model} {run}".strip(),
+        sum(failed),
+        sum(one.unjudged[name] for one in totals),
+        *(
+            Mark(
+                one.worst.get(name, [None])[0],
+                "fail" if n else "",
+                f"{n} of {one.looked_at[name]} fail" if n else "",
+            )
+            for one, n in zip(totals, failed, strict=True)
+        ),
     ]
-    unjudged = sum(one.unjudged[name] for one in totals)
-    about = INVARIANTS[name].words, INVARIANTS[name].bound
-    return [name, *about, worst, f"{model} {run}".strip(), sum(failed), unjudged, *cells]
 
 
 def _maps(found: Sequence[Stable]) -> Iterator[Block]:
     lines = list(dict.fromkeys(one.line for one in found))
     panels = []
-    for axis, words in AXIS_WORDS.items() if found else ():
+    for axis, words in AXIS_WORDS.items():
         of = {(one.line, one.value): one for one in found if one.axis == axis}
         values = list(dict.fromkeys(value for _, value in of))
         rows = [[of.get((line, value)) for value in values] for line in lines]
         panels.append([words, values, [[one and one.step for one in row] for row in rows]])
-        columns = [text("line", "model"), *(text(f"{value:g}") for value in values)]
-        said = [
-            [line, *(one and f"{one.step:g} {one.fault}".strip() for one in row)]
-            for line, row in zip(lines, rows, strict=True)
-        ]
         yield Table(
-            f"steps-{axis}", columns, said, f"Largest stable step, √(R/g), by {words}", folded=True
+            f"steps-{axis}",
+            [text("line", "model"), *(text(f"{value:g}") for value in values)],
+            [
+                [line, *(one and f"{one.step:g} {one.fault}".strip() for one in row)]
+                for line, row in zip(lines, rows, strict=True)
+            ],
+            f"Largest stable step, √(R/g), by {words}",
+            folded=True,
         )
-    note = (
-        "All finer steps that were tried are stable, too. The paper's shape of block beside a wall,"
-        " R 1.6 m, friction 0.3, restitution of the wall 0.5, pulse of 3 g tan α, one thing"
+    yield Plot(
+        "stable-steps",
+        "Where engines and the continuous model break: largest stable step, √(R/g)",
+        "stable-steps",
+        data={"tried": STEPS, "models": lines, "panels": panels},
+        note="All finer steps that were tried are stable, too. The paper's shape of block beside a"
+        " wall, R 1.6 m, friction 0.3, restitution of the wall 0.5, pulse of 3 g tan α, one thing"
         " changed. A run is stable if it does not blow up, no corner sinks deeper than 0.02 R and"
         " the distance of a step, and the energy gained without a source is below a tenth of all"
-        " work. “none”: not even the finest step is stable (3e-4, with adaptive steps 3e-3)."
+        " work. “none”: not even the finest step is stable (3e-4, with adaptive steps 3e-3).",
     )
-    data = {"tried": STEPS, "models": lines, "panels": panels}
-    if found:
-        yield Plot(
-            "stable-steps",
-            "Where engines and the continuous model break: largest stable step, √(R/g)",
-            "stable-steps",
-            data=data,
-            note=note,
-        )
-        yield table_of("stable-steps", Stable, found)
+    yield table_of("stable-steps", Stable, found)
 
 
-def _stood(found: Sequence[Still]) -> Iterator[Block]:
-    columns = [
-        text("case", "block"),
-        text("line", "model"),
-        Column("simulated", unit="s"),
-        Column("step", unit="s", digits=2),
-        *(Column(name, unit=unit, digits=1) for name, unit in MOVES.items()),
-        text("fault", " "),
-    ]
-    rows = [
-        [one.case, one.line, one.simulated, one.step, *map(one.moves.get, MOVES), one.fault]
-        for one in found
-    ]
-    note = (
+def _stood(found: Sequence[Still]) -> Table:
+    return Table(
+        "stand-still",
+        [
+            text("case", "block"),
+            text("line", "model"),
+            Column("simulated", unit="s"),
+            Column("step", unit="s", digits=2),
+            *(Column(name, unit=unit, digits=1) for name, unit in MOVES.items()),
+            text("fault", " "),
+        ],
+        [
+            [one.case, one.line, one.simulated, one.step, *map(one.moves.get, MOVES), one.fault]
+            for one in found
+        ],
+        "What should stand still",
         "The paper's block on friction 0.3: left alone, pushed by half of what would move it, or"
         " shaken at 1 Hz by 0.8 of it; the largest of each in the run, jitter the RMS speed of its"
-        " second half. A perfect model has zero everywhere."
+        " second half. A perfect model has zero everywhere.",
     )
-    if found:
-        yield Table("stand-still", columns, rows, "What should stand still", note)
