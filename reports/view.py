@@ -18,7 +18,7 @@ from rockcheck.scenes.history import events_path
 from rockcheck.scenes.reading import within
 from rockcheck.scenes.trust import experience
 from rockcheck.validation.suite.results import Cell, Run
-from rockcheck.validation.uncertainty.inputs import Inputs
+from rockcheck.validation.uncertainty.population import Inputs
 
 Array = NDArray[np.float64]
 #: A block that falls is drawn up to this rotation (alpha). Beyond 1 a block in free rocking does not come back.

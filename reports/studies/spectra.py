@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -13,7 +13,6 @@ import numpy as np
 from rockcheck.ebm.spectrum import Spectrum
 from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, axis_labels, draw
 from rockcheck.reports.site import PAGES, STUDIES, Site
-from rockcheck.reports.studies.curves import PGA, fragility_chart, write_charts
 from rockcheck.reports.studies.nodes import write_nodes
 from rockcheck.reports.style import FORMATS, LOOKS, PAGE, figure_style, keep_drawn
 from rockcheck.scenes import InputError, Scene
@@ -22,7 +21,6 @@ from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.spectra.findings import Finding, findings
-from rockcheck.validation.spectra.fragility import Fragility
 from rockcheck.validation.spectra.histories import KEPT_AN_AXIS, glimpses_path
 from rockcheck.validation.spectra.study import SpectrumRecord, paper_panels, read_spectrum
 from rockcheck.validation.suite.results import RUN_FILE
@@ -99,7 +97,7 @@ def _units(axes: Any, scene: Scene) -> None:
     hertz = scene.frequency_parameter / (2.0 * np.pi)
     pga_g = scene.gravity * scene.block.slope / GRAVITY_OF_RECORDS
     axes.secondary_xaxis("top", functions=(lambda x: x * hertz, lambda x: x / hertz)).set_xlabel("frequency of the pulse, Hz")
-    axes.secondary_yaxis("right", functions=(lambda y: y * pga_g, lambda y: y / pga_g)).set_ylabel(PGA)
+    axes.secondary_yaxis("right", functions=(lambda y: y * pga_g, lambda y: y / pga_g)).set_ylabel("peak acceleration, g")
 
 
 def _panel(axes: Any, spectrum: Spectrum, title: str) -> None:
@@ -217,29 +215,6 @@ def findings_figure(found: Sequence[Finding]) -> Figure:
     return figure
 
 
-def fragility_figure(fragility: Mapping[str, Any]) -> Figure:
-    """Probability of overturning against intensity: the share of the motions with its confidence band, and the lognormal fit, dotted."""
-    from matplotlib.figure import Figure
-
-    looks = (("#d55e00", ()), ("#0072b2", (5.0, 1.5)))
-    with figure_style():
-        figure = Figure(figsize=(PAGE / 1.4, 3.2), layout="constrained")
-        axes = figure.subplots()
-        for case, (colour, dash) in zip(fragility["cases"], looks, strict=False):
-            points = np.array(case["points"])
-            axes.fill_between(points[:, 0], points[:, 2], points[:, 3], color=colour, alpha=0.15, linewidth=0)
-            axes.plot(points[:, 0], points[:, 1], color=colour, linestyle=(0, dash) if dash else "-", label=case["label"])
-            axes.plot(points[:, 0], points[:, 4], color=colour, linestyle=(0, (0.7, 1.7)), linewidth=0.8)
-        axes.set_xlabel(fragility["intensity"])
-        if pga_g := fragility.get("pga_g"):
-            axes.secondary_xaxis("top", functions=(lambda x: x * pga_g, lambda x: x / pga_g)).set_xlabel(PGA)
-        axes.set_ylabel("probability of overturning")
-        axes.set_ylim(-0.02, 1.02)
-        axes.legend(loc="lower right")
-        axes.set_title(fragility["title"], fontsize=7.5)
-    return figure
-
-
 def _shown(panels: Sequence[Panel], spectra: Sequence[Spectrum]) -> list[object]:
     """All that a figure shows of spectra, as JSON can hold it."""
     return [
@@ -280,11 +255,6 @@ def draw_areas(panels: Sequence[Panel], spectra: Sequence[Spectrum], folder: Pat
     keep_drawn(folder / AREAS, areas, partial(areas_figure, spectra), formats)
 
 
-def draw_fragility(fragility: Mapping[str, Any], folder: Path, formats: Sequence[str] = ("svg",)) -> None:
-    """Draw the curves of fragility into `folder`, where they would show something else."""
-    keep_drawn(folder / "fragility", fragility, partial(fragility_figure, fragility), formats)
-
-
 def draw_maps(found: Agreement, panels: Sequence[Panel], folder: Path, formats: Sequence[str] = ("svg",)) -> None:
     """Draw the maps of all models into `folder`, where they would show something else."""
     keep_drawn(folder / MAPS, maps_shown(found, panels), partial(maps_figure, found, panels), formats)
@@ -306,7 +276,6 @@ def write_page(folder: Path) -> Path:
 
     data = folder / SPECTRA
     index = read_index(data)
-    found = {name: _read(data / f"{name}.json") for name in ("claims", "fragility")}
     figures = sorted({(record.figure, record.model) for record in index.spectra if record.figure}, key=lambda key: (key[0] or 0, key[1]))
     shown: list[dict[str, Any]] = [
         {
@@ -328,12 +297,7 @@ def write_page(folder: Path) -> Path:
         one["nodes"] = write_nodes(data, one["record"].name, [one["record"]])
     scripts = [f"{figure['file']}.nodes.js" for figure in shown if figure["nodes"]]
     scripts += [f"{one['record'].name}.nodes.js" for one in own if one["nodes"]]
-    if found["fragility"]:
-        curves = Fragility.model_validate(found["fragility"])
-        write_charts([fragility_chart("fragility", curves.intensity, curves.cases, curves.pga_g)], data / "fragility.curves.js")
-        scripts.append("fragility.curves.js")
-    heading = "Overturning spectra" if shown or own or not found["fragility"] else "Fragility: the probability of overturning"
-    site = Site(folder, f"rockcheck: {heading[0].lower()}{heading[1:]}", _links(folder))
+    site = Site(folder, "rockcheck: overturning spectra", _links(folder))
     site.assets()
     addresses = [PAGE_NAME] if (folder / RUN_FILE).exists() else ["index.html", PAGE_NAME]  # a folder has a page to open
     studies = _studies(data, bool(figures))
@@ -343,16 +307,14 @@ def write_page(folder: Path) -> Path:
             "spectra.html",
             figures=shown,
             own=own,
-            heading=heading,
             free=any(not record.scene.get("walls") for record in index.spectra),
             walled=any(record.scene.get("walls") for record in index.spectra),
             scripts=scripts,
             played=KEPT_AN_AXIS**2 if any(glimpses_path(data, record.name).exists() for record in index.spectra) else 0,
-            **found,
+            claims=_read(data / "claims.json"),
             **studies,
             findings=_findings(data, index.spectra),
             areas=(data / "safe-areas.svg").exists(),
-            fragility_drawn=(data / "fragility.svg").exists(),
             versions=provenance.versions(),
             formats=partial(_formats, data),
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-import tomllib
 from collections import deque
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,6 +20,7 @@ from rockcheck.commands import (
     report_file,
     save_picture,
     scene_names,
+    setting_of,
     tell_notes,
 )
 from rockcheck.scenes import History, InputError, ModelFailure, Scene, load_scene
@@ -104,14 +104,3 @@ def _played_apart(scene: Scene, model: str, settings: dict[str, Any]) -> History
         for suffix, content in result.files.items():
             (Path(folder) / f"history{suffix}").write_bytes(content)
         return History.load(Path(folder) / f"history{TABLE}")
-
-
-def setting_of(text: str) -> tuple[str, Any]:
-    """key=value, the value as in TOML; a bare word is a string."""
-    key, equals, value = text.partition("=")
-    if not equals or not key.isidentifier():
-        raise InputError(f"{printable(text)!r}: write key=value", "--set")
-    try:
-        return key, tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        return key, value

@@ -9,7 +9,7 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import Future
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import numpy as np
 import typer
@@ -25,16 +25,16 @@ from rockcheck.commands import (
     out_option,
     progress,
     scene_names,
+    studied,
     tell_left_out,
     usable_folder,
 )
-from rockcheck.commands.run import MoreRecords, RecordOption
+from rockcheck.commands.record import ReadOption, RecordsArgument, reading_of
 from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT
 from rockcheck.scenes import InputError, load_scene
 from rockcheck.scenes.errors import unknown_name
 from rockcheck.scenes.progress import Count
-from rockcheck.scenes.recordings import Reading, Recording
 from rockcheck.scenes.recordings.sets import files_of, motions_of
 from rockcheck.scenes.threads import threads
 from rockcheck.scenes.writing import table_text, write_whole
@@ -62,6 +62,7 @@ MOST_SIZE = 5000
 
 
 def run(
+    records: RecordsArgument = None,
     figure: Annotated[str | None, typer.Option("--figure", help="6, 7, 8, 9 or all: the paper's figures.")] = None,
     scene: Annotated[
         str | None,
@@ -89,8 +90,7 @@ def run(
     fragility: Annotated[
         bool, typer.Option("--fragility", help="Probability of overturning against intensity, with and without the wall.")
     ] = False,
-    records: RecordOption = None,
-    more: MoreRecords = None,
+    read: ReadOption = None,
     printed: Annotated[bool, typer.Option("--print", help="Write the figures as PDF and PNG, too.")] = False,
     out: Annotated[Path, out_option("spectra.html")] = OUT,
     jobs: JobsOption = None,
@@ -105,17 +105,17 @@ def run(
     --figure all                                    the paper's figures and claims
     --figure all --agreement 200                    against the other models
     --scene shelf.toml --amplitudes 1 6 --refine    your own block and pulse
-    --scene shelf.toml --fragility --record records/RSN1_H*.AT2
+    --scene shelf.toml --fragility records/RSN1_H*.AT2
     """
     panels = _panels(figure, scene)
     if pivot is None:  # beside a wall a block hops, which the bilateral pivot of the paper's figures forbids
         pivot = "unilateral" if model is None and scene is not None and panels[0].scene.walls else "bilateral"
     request = _request(size, frequencies, amplitudes, pivot, model, tolerance, refine)
-    words = [*(records or []), *(more or [])]
-    if words and not fragility:
-        raise InputError("needs --fragility", "--record")
-    motions, left_out = motions_of(files_of(words), Reading())
-    tell_left_out(left_out)
+    if (records or read) and not fragility:
+        raise InputError("need --fragility", "records")
+    if fragility:
+        how = {"out": out / "fragility", "jobs": jobs, "scheduler": scheduler, "force": force}
+        _fragility(panels, request, records or (), read or (), **how)
     folder = usable_folder(out)
     data = usable_folder(folder, SPECTRA)
     formats = ("svg", "png", "pdf") if printed else ("svg",)
@@ -127,9 +127,7 @@ def run(
 
             client = stack.enter_context(connected(scheduler))
         tiles = stack.enter_context(Tiles(data, jobs=jobs, client=client, force=force))
-        if fragility:
-            _fragility(panels, request, motions, tiles, data, formats, screen)
-        elif verify:
+        if verify:
             _verify(panels, request, tiles, data, screen)
         elif agreement is not None:
             _agreement(panels, request, agreement, tiles, data, formats, screen)
@@ -325,27 +323,16 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, words: int)
     return table
 
 
-def _fragility(
-    panels: Sequence[Panel],
-    request: SpectrumRequest,
-    records: Sequence[tuple[str, Recording]],
-    tiles: Tiles,
-    data: Path,
-    formats: Sequence[str],
-    screen: Console,
-) -> None:
-    from rockcheck.reports.studies.spectra import draw_fragility
-    from rockcheck.validation.spectra.fragility import PULSES, curves_table, fragility
+def _fragility(panels: Sequence[Panel], request: SpectrumRequest, records: Sequence[str], read: Sequence[str], **how: Any) -> NoReturn:
+    """Plays and tells the fragility of one's own scene, in a folder of its own."""
+    from rockcheck.validation.studies.population.study import fragility
 
     if len(panels) != 1:
         raise InputError("needs --scene", "--fragility")
-    motions = 2 * (len(records) or PULSES)
-    with progress("fragility") as on_progress:
-        tiles.count = Count(on_progress, motions * len(request.amplitudes) * (1 + bool(panels[0].scene.walls)))
-        found = fragility(panels[0], request, records, tiles)
-    write_whole(data / "fragility.json", found.model_dump_json(indent=1) + "\n")
-    write_whole(data / "fragility.csv", curves_table(found))
-    draw_fragility(found.model_dump(mode="json"), data, formats)
-    for case in found.cases:
-        fit = "no curve fits" if case.median is None else f"median {case.median:.3g}, dispersion {case.dispersion:.3g}"
-        screen.print(f"{case.label}: {case.motions} motions, {fit}")
+    motions, left_out = motions_of(files_of(records), reading_of(read))
+    tell_left_out(left_out)
+    ends = float(request.frequencies[0]), float(request.frequencies[-1])
+    study = fragility(
+        panels[0].scene, motions, request.amplitudes, ends, model=request.model, settings=request.settings, left_out=left_out
+    )
+    studied(study, **how)

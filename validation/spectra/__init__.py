@@ -1,1 +1,1 @@
-"""Overturning spectra of all models: tiles, the claims of the paper, agreement, fragility."""
+"""Overturning spectra of all models: tiles, the claims of the paper, agreement."""

@@ -17,7 +17,8 @@ from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import Model, build, not_installed
 from rockcheck.validation.spectra.claims import percent
 from rockcheck.validation.spectra.study import Panel, SpectrumRequest, play_panels
-from rockcheck.validation.spectra.tiles import CODES, SETTLE, UNDECIDED, Tiles
+from rockcheck.validation.spectra.tiles import CODES, UNDECIDED, Tiles
+from rockcheck.validation.uncertainty.population import SETTLE
 
 CANDIDATES = ("ebm-unilateral", "cm", "mujoco", "pybullet", "pymunk", "dart", "drake")
 #: The share of the nodes that a model plays, where it is not all. These engines draw no map: whether they, too, agree is told by fewer

@@ -31,7 +31,8 @@ from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build
 from rockcheck.validation.spectra.histories import glimpses, glimpses_path, kept, save_glimpses
-from rockcheck.validation.spectra.tiles import Tiles, compiled, tile_key
+from rockcheck.validation.spectra.tiles import Tiles, tile_key
+from rockcheck.validation.uncertainty.population import compiled
 
 FIGURES: dict[int, tuple[Literal["left", "right"], float]] = {6: ("left", 0.3), 7: ("left", 0.6), 8: ("right", 0.3), 9: ("right", 0.6)}
 GAPS, RESTITUTIONS = (0.003, 0.053, 0.103), (0.0, 1.0)

@@ -14,27 +14,25 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Lock
-from typing import Any, Self, TypeGuard
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.ebm import EventBasedModel, spectrum
+from rockcheck.ebm import spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, Floats, node_scene, play_nodes
-from rockcheck.scenes import InputError, ModelFailure, Scene, kinematics
+from rockcheck.scenes import InputError, ModelFailure, Scene
 from rockcheck.scenes.progress import Count
 from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.models import Model, build
+from rockcheck.validation.execute.models import build
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.execute.store import TILES, Store
+from rockcheck.validation.uncertainty.population import ENOUGH, SETTLE, compiled, play
 
 #: Nodes of a tile of the compiled event-based models.
 TILE = 10_000
 #: Nodes of a tile of a model that is simulated one by one, and how many of them a process takes at once.
 SLOW_TILE, NODES_A_CALL = 100, 5
-#: Time (s) that a run goes on after the base's motion while its outcome is open; and the share of the energy of tipping over
-#: below which the outcome is decided: a hundredth is left to the model's own error.
-SETTLE, ENOUGH = 6.0, 0.99
 #: Outcomes in text.
 CODES, UNDECIDED = {LEFT: "L", SAFE: ".", RIGHT: "R"}, "?"
 _SIDES = {code: side for side, code in CODES.items()}
@@ -167,40 +165,9 @@ def play_tile(scene: Scene, amplitudes: Floats, frequencies: Floats, model: str,
     player = build(model, settings)
     if compiled(player):
         return play_nodes(scene, amplitudes, frequencies, model=player, jobs=1), _code()
-    sides, failed = np.zeros(len(amplitudes), dtype=np.int8), np.zeros(len(amplitudes), dtype=bool)
-    for n, (a, f) in enumerate(zip(amplitudes, frequencies, strict=True)):
-        try:
-            sides[n] = _side(player, scene, float(a), float(f))
-        except ModelFailure:
-            failed[n] = True
-    return (sides, failed), _code()
-
-
-def _side(player: Model, scene: Scene, amplitude: float, frequency: float) -> int:
-    """The outcome at one node.
-
-    A block that has not tipped past its balance when the base comes to rest, and has too little energy left to do so, is safe.
-    Any other run is made again and goes on for `SETTLE` s; what then stands is safe.
-    """
-    for settle in (0.0, SETTLE):
-        node = node_scene(scene, amplitude, frequency, settle).replace(output_step=0.02)  # few rows: only the outcome is asked
-        history = player.simulate(node)
-        theta, y, *rates = (history.channels[name][-1] for name in ("theta", "y", "x_dot", "y_dot", "theta_dot"))
-        needed = node.gravity * (node.block.radius - node.block.weaker_pivot.height)
-        weak = kinematics.energy(node.block, node.gravity, y, theta, *rates) < ENOUGH * needed
-        if history.outcome.startswith("overturned") or (weak and abs(theta) < node.block.alpha):
-            break
-    return side_of(history.outcome)
-
-
-def compiled(player: Model) -> TypeGuard[EventBasedModel]:
-    """Whether the model plays whole batches compiled."""
-    return isinstance(player, EventBasedModel) and player.friction != "bouc-wen"
-
-
-def side_of(outcome: str) -> int:
-    """-1 overturned left, +1 overturned right, 0 otherwise."""
-    return {"overturned left": LEFT, "overturned right": RIGHT}.get(outcome, SAFE)
+    scenes = [node_scene(scene, float(a), float(f)) for a, f in zip(amplitudes, frequencies, strict=True)]
+    runs = play(scenes, player)
+    return (np.array(runs.side, dtype=np.int8), np.array(runs.failed)), _code()
 
 
 def tile_key(scene: Scene, amplitudes: Floats, frequencies: Floats, model: str, settings: Mapping[str, Any]) -> str:

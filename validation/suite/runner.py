@@ -44,8 +44,8 @@ from rockcheck.validation.suite.tolerances import (
     judge,
     judged_beside,
 )
-from rockcheck.validation.uncertainty.inputs import Inputs
 from rockcheck.validation.uncertainty.numerical import Numerical
+from rockcheck.validation.uncertainty.population import Inputs
 
 
 @dataclass(frozen=True)

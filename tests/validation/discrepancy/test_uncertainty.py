@@ -23,8 +23,8 @@ from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 from rockcheck.validation.suite.verdicts import junit, markdown
 from rockcheck.validation.uncertainty import verdict
-from rockcheck.validation.uncertainty.inputs import Inputs, Interval, propagate, sensitivities
 from rockcheck.validation.uncertainty.numerical import Numerical, Quantity, numerical_uncertainty
+from rockcheck.validation.uncertainty.population import Inputs, Interval, propagate, sensitivities
 
 BOOKCASE = Scene(
     name="bookcase",

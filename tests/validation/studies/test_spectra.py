@@ -21,11 +21,9 @@ from rockcheck.cm import ContinuousModel
 from rockcheck.commands.cli import main
 from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.spectrum import node_scene
-from rockcheck.scenes import Block, InputError, Ricker, Scene, Wall, load_scene
+from rockcheck.scenes import Block, Ricker, Scene, Wall
 from rockcheck.scenes.progress import Count
-from rockcheck.scenes.recordings import Reading, Recording
-from rockcheck.scenes.recordings.sets import motions_of
-from rockcheck.validation.spectra import agreement, claims, fragility, refinement
+from rockcheck.validation.spectra import agreement, claims, refinement
 from rockcheck.validation.spectra import study as spectra
 from rockcheck.validation.spectra import tiles as tiling
 from rockcheck.validation.spectra.study import Panel, SpectrumRequest, axis, paper_panels, play_panels
@@ -208,10 +206,11 @@ def test_a_cluster_that_loses_a_worker_gives_the_same(tmp_path, monkeypatch):
         (["--tolerance", "nan"], "--tolerance"),
         (["--scene", "gone.toml"], "gone.toml: cannot be read"),
         (["--scene", "still.toml"], "excitation.kind: 'rest' is not allowed"),
-        (["--record", "x.AT2"], "--record: needs --fragility"),
+        (["x.AT2"], "records: need --fragility"),
+        (["--read", "unit=g"], "records: need --fragility"),
         (["--fragility"], "--fragility: needs --scene"),
-        (["--fragility", "--scene", "bookcase.toml", "--record", "gone.AT2", "--record", "gone.AT2"], "gone.AT2"),
-        (["--fragility", "--scene", "bookcase.toml", "--record", str(EL_CENTRO)], "--record: 1 is too few"),
+        (["--fragility", "--scene", "bookcase.toml", "gone.AT2"], "gone.AT2"),
+        (["--fragility", "--scene", "bookcase.toml", str(EL_CENTRO)], "records: 1 is too few"),
         (["--agreement", "0"], "--agreement: 0 is not allowed"),
         (["--scheduler", "local:0"], "--scheduler"),
     ],
@@ -244,18 +243,14 @@ def test_the_command_writes_figures_data_and_page(tmp_path, capsys):
     assert "567 read back" in capsys.readouterr().out
 
 
-def test_ones_own_scene_and_fragility(tmp_path, capsys):
+def test_ones_own_scene_and_fragility(tmp_path):
     grid = ["--scene", "bookcase.toml", "--size", "10", "--amplitudes", "1", "6", "--out", "out"]
     assert main(["spectrum", *grid, "--refine", "--pivot", "unilateral"]) == 0
     assert (tmp_path / "out" / "spectra" / "bookcase--ebm-unilateral.svg").exists()
     assert main(["spectrum", *grid, "--fragility"]) == 0
-    kept = json.loads((tmp_path / "out" / "spectra" / "fragility.json").read_text(encoding="utf-8"))
-    assert [case["label"] for case in kept["cases"]] == ["with the wall", "without a wall"]
-    assert kept["format"] == 1
-    page = (tmp_path / "out" / "spectra.html").read_text(encoding="utf-8")
-    assert "bookcase" in page
-    assert '<h2 id="fragility">' in page
-    assert "motions" in capsys.readouterr().out
+    fits = json.loads((tmp_path / "out" / "fragility" / "run.json").read_text(encoding="utf-8"))["tables"]["fits"]
+    assert [fit["case"] for fit in fits] == ["with the wall", "without a wall"]
+    assert (tmp_path / "out" / "fragility" / "index.html").exists()
 
 
 # The law of impacts
@@ -632,134 +627,3 @@ def test_wrong_nodes_are_counted(tmp_path):
     full = play_panels(paper_panels(8)[:1], request, Tiles(tmp_path))[0]
     other = replace(full, outcomes=np.where(np.arange(33) == 3, 7, full.outcomes).astype(np.int8))
     assert refinement.compared("x", full, other).wrong == 33
-
-
-# Fragility
-
-
-def test_the_lognormal_curve_is_found_again():
-    intensities = np.linspace(0.5, 8.0, 60)
-    motions = 10**7
-    counts = np.round(motions * fragility.lognormal(intensities, 2.5, 0.4)).astype(np.int64)
-    median, dispersion = fragility.fit_lognormal(intensities, counts, np.full(len(counts), motions))
-    assert median == pytest.approx(2.5, rel=1e-4)
-    assert dispersion == pytest.approx(0.4, rel=1e-3)
-    assert fragility.fit_lognormal(intensities, np.zeros(60, dtype=np.int64), np.full(60, 10)) is None
-    assert fragility.fit_lognormal(intensities, np.full(60, 10), np.full(60, 10)) is None
-
-
-def test_a_curve_is_found_where_few_overturn():
-    counts = np.array([0] * 23 + [1, 1, 2, 4, 2, 1, 2, 1, 2, 2, 1, 4, 3, 5, 5, 5, 4])
-    intensities = np.linspace(0.02, 2.0, 40)
-    median, dispersion = fragility.fit_lognormal(intensities, counts, np.full(40, 12))
-    assert 1.9 < median < 2.4
-    assert 0.2 < dispersion < 0.5
-    assert fragility.fit_lognormal(intensities, counts[::-1], np.full(40, 12)) is None  # it falls
-
-
-def test_the_band_holds_the_binomial_spread():
-    overturned = np.zeros((100, 2, 3), dtype=bool)
-    overturned[:50, :, 1] = overturned[:, :, 2] = True  # directions alike: no more is known than from 100 runs
-    case = fragility.curve_of("made", overturned, np.zeros_like(overturned), np.array([1.0, 2.0, 3.0]))
-    (_, share, low, high, _) = case.points[1]
-    assert share == 0.5
-    assert low == pytest.approx(0.5 - 1.96 * 0.05, abs=0.015)  # the normal approximation of the binomial
-    assert high == pytest.approx(0.5 + 1.96 * 0.05, abs=0.015)
-    (_, share, low, high, _) = case.points[0]  # none of 100 motions: at most 3.7 %, Wilson's z^2/(n + z^2)
-    assert (share, low) == (0.0, 0.0)
-    assert high == pytest.approx(3.8415 / 103.8415, rel=1e-4)
-
-
-def test_the_band_covers_as_often_as_it_says():
-    """Motions with capacities of their own and directions that scatter about them; shares between 2 and 98 %.
-
-    Counts are whole numbers: nearer to 0 and 1 Wilson's interval may hold only 83 % (Brown, Cai and DasGupta 2001).
-    """
-    chance, intensities, median, dispersion = np.random.default_rng(3), np.geomspace(0.7, 3.3, 8), 1.5, 0.4
-    truth = fragility.lognormal(intensities, median, dispersion)
-    for motions, shared in ((10, 0.0), (20, 0.3), (50, 0.4)):
-        inside = np.zeros(len(intensities))
-        for _ in range(400):
-            alone = math.sqrt(dispersion**2 - shared**2) * chance.standard_normal((motions, 2))
-            capacity = median * np.exp(shared * chance.standard_normal((motions, 1)) + alone)
-            overturned = intensities > capacity[:, :, None]
-            points = np.array(fragility.curve_of("", overturned, np.zeros_like(overturned), intensities).points)
-            inside += (points[:, 2] <= truth) & (truth <= points[:, 3])
-        assert np.mean(inside) / 400 >= 0.94
-        assert np.min(inside) / 400 >= 0.9
-
-
-def test_records_are_scaled_to_the_intensity(tmp_path, monkeypatch):
-    for n, gain in enumerate((1.0, 4.0)):
-        rows = "\n".join(f"{0.02 * k},{gain * math.sin(0.3 * k):.6f}" for k in range(80))
-        (tmp_path / f"{n}.csv").write_text(f"time_s,acceleration_m_s2\n{rows}\n", encoding="utf-8")
-    request = SpectrumRequest(np.array([1.0, 2.0]), np.linspace(0.5, 12.0, 8))
-    panel = Panel("case", "case", paper_panels(8)[0].scene)
-
-    def motions(*names):
-        return motions_of([tmp_path / name for name in names], Reading())[0]
-
-    found = fragility.fragility(panel, request, motions("0.csv", "1.csv"), Tiles(tmp_path / "tiles"))
-    (case,) = found.cases
-    assert (case.motions, case.undecided) == (2, 0)
-    block = panel.scene.block
-    assert found.pga_g == pytest.approx(block.half_width / block.half_height * 9.81 / 9.80665)
-
-    # The two records differ only in their size, which the intensity takes out: both directions of each overturn together.
-    assert {point[1] for point in case.points} <= {0.0, 0.5, 1.0}
-    with pytest.raises(InputError, match="too few"):
-        fragility.fragility(panel, request, motions("0.csv"), Tiles(tmp_path / "tiles"))
-
-
-def test_fragility_plays_each_motion_in_both_directions(tmp_path):
-    """Reversed, a symmetric block without a wall does the mirror image, so that one of two sides is the other's opposite."""
-    scene = paper_panels(8)[0].scene.replace(walls=())
-    request = SpectrumRequest(np.array([1.0, 3.0]), np.linspace(1.0, 6.0, 6))
-    tiles = Tiles(tmp_path / "tiles")
-    sides, failed = fragility._play_pulses(scene, request, tiles)
-    assert sides.shape == (fragility.PULSES, 2, 6)
-    assert not failed.any()
-    assert set(np.unique(sides)) == {-1, 0, 1}
-    np.testing.assert_array_equal(sides[:, 0], -sides[:, 1])
-    samples = 3.0 * np.sin(2.0 * 0.02 * np.arange(158))
-    recording = Recording(samples=samples, time_step=0.02, unit="m/s2", form="CSV")
-    sides, failed = fragility._play_records(scene, request, [("a", recording), ("b", recording)], tiles)
-    assert sides.shape == failed.shape == (2, 2, 6)
-    assert set(np.unique(sides)) >= {0}
-    assert sides.any()
-    np.testing.assert_array_equal(sides[:, 0], -sides[:, 1])
-    np.testing.assert_array_equal(sides[0], sides[1])
-
-
-def test_the_intensity_in_g_is_that_of_the_pivot_that_lifts_first(tmp_path):
-    """Of a block whose mass lies to the right and low: its right corner, nearer to the mass's centre."""
-    block = Block(half_width=0.3, half_height=1.0, centre_of_mass=(0.1, -0.2))
-    scene = load_scene("loaded").replace(block=block)
-    request = SpectrumRequest(np.array([1.0, 2.0]), np.array([0.5, 1.0]))
-    found = fragility.fragility(Panel("case", "case", scene), request, (), Tiles(tmp_path / "tiles"))
-    assert found.pga_g == pytest.approx((0.3 - 0.1) / (1.0 - 0.2) * scene.gravity / 9.80665)
-
-
-def test_a_fragility_curve_never_counts_a_failed_run_as_safe():
-    """Of four motions in both directions: what failed is in no share, no band and no fit."""
-    intensities = np.array([1.0, 2.0, 3.0])
-    overturned = np.zeros((4, 2, 3), dtype=bool)
-    overturned[:, :, 2] = True
-    overturned[:2, :, 1] = True
-    failed = np.zeros_like(overturned)
-    plain = fragility.curve_of("made", overturned, failed, intensities)
-    failed[2:, :, 1] = True  # all that did not overturn at 2: now nothing is known to be safe there
-    failed[0, 0, 2] = True
-    curve = fragility.curve_of("made", overturned, failed, intensities)
-    assert [point[1] for point in plain.points] == [0.0, 0.5, 1.0]
-    assert [point[1] for point in curve.points] == [0.0, 1.0, 1.0]
-    assert curve.points[1][2:4] == (pytest.approx(2 / (2 + 3.8415), rel=1e-4), 1.0)  # both motions, and nothing else is known
-    assert curve.undecided == 5
-    assert curve.median < plain.median
-    failed[:, :, 1] = True
-    nowhere = fragility.curve_of("made", overturned, failed, intensities)
-    assert math.isnan(nowhere.points[1][1])
-    assert [nowhere.points[n][1] for n in (0, 2)] == [0.0, 1.0]
-    assert nowhere.median is not None
-    failed[:] = True
-    assert fragility.curve_of("made", overturned, failed, intensities).median is None
