@@ -16,13 +16,15 @@ from rich.table import Table as Grid
 from rockcheck.reports.drawers import figure_of, live_data
 from rockcheck.reports.show.words import number
 from rockcheck.reports.style import FORMATS, LOOKS, keep_drawn, looks
-from rockcheck.scenes.writing import json_text, markdown_table, table_text, write_whole
+from rockcheck.scenes.writing import json_text, made, markdown_table, table_text, write_whole
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Text, plain
 
 #: The sign of a verdict, beside its colour.
 SIGNS = {"pass": "✓", "changed": "△", "incomplete": "–", "fail": "✕", "error": "!", "": ""}
 #: The folder of a page's figures.
 FIGURES = "figures"
+#: The folder of the scenes that show a failure.
+FAILING = "failures"
 #: Rows of a table that a terminal shows.
 MOST_ROWS = 40
 COLOURS = {"fail": "red", "error": "red", "changed": "yellow", "incomplete": "yellow"}
@@ -137,14 +139,17 @@ def block_markdown(block: Table | Plot | Text) -> str:
 
 
 def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -> Path:
-    """Write `run.json`, a CSV a table, `summary.md`, the figures and `index.html`; returns the
-    page."""
+    """Write `run.json`, a CSV a table, `summary.md`, the figures, the scenes of failures and
+    `index.html`; returns the page."""
     from rockcheck.reports.site import Site
 
     write_whole(folder / "run.json", json_text(found.as_dict()) + "\n")
     tables = {f"{table.name}.csv": csv(table) for table in found.tables()}
+    for old in (folder / FAILING).glob("*.toml"):
+        old.unlink()
     for name, content in {**tables, **found.files, "summary.md": markdown(found)}.items():
-        write_whole(folder / name, content)
+        *parts, last = name.split("/")
+        write_whole(made(folder, *parts) / last, content)
     plots = [block for block in found.blocks if isinstance(block, Plot)]
     for plot in plots:
         keep_drawn(folder / FIGURES / plot.name, json_text(asdict(plot)), partial(figure_of, plot), formats)

@@ -183,7 +183,7 @@ class Finding:
     `answer` is one sentence, `data` what `--json` says besides the tables. `exit_code` is the
     command's: 0 where nothing is judged. `failures` give the reason by task; a run that was
     interrupted, or had no time for all, is not `complete`. `files` are further files by name, such
-    as JUnit's, and their content.
+    as JUnit's or `failures/NAME.toml`, and their content.
     """
 
     name: str

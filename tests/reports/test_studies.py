@@ -18,7 +18,7 @@ from rockcheck.reports.studies.stress import write_stress
 from rockcheck.reports.style import save
 from rockcheck.validation.execute.pool import Failure as Lost
 from rockcheck.validation.spectra import study as spectra
-from rockcheck.validation.stress.results import Failure, RunTotals, Stress
+from rockcheck.validation.studies.stress.results import Failure, RunTotals, Stress
 from rockcheck.validation.studies.work_precision.runs import BenchmarkRun, Play
 from rockcheck.validation.studies.work_precision.savings import Saving
 from rockcheck.validation.studies.work_precision.study import Measure, Measured, WorkPrecision
