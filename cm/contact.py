@@ -68,6 +68,15 @@ def effective_mass(k_n: float, k_t: float, k_c: float, normal: float, tangential
     return 1.0 / (k_n + math.copysign(friction, shear) * k_c)
 
 
+def shared_mass(own: float, other: float, coupling: float, ratio: float) -> float:
+    """Share of the block's mass that a corner brings to an impact that it shares with another one, without friction.
+
+    The other corner arrives `ratio` times as fast. A unit impulse at a corner changes its own velocity by `own` (by `other` at
+    that one) and the other corner's by `coupling`. Negative where the other corner's impact throws this one off.
+    """
+    return (other - coupling * ratio) / (own * other - coupling * coupling)
+
+
 def damping_ratio_of_paper(restitution: float) -> float:
     """Damping ratio xi for a restitution by the paper's (33), -ln e/sqrt(pi^2 + ln^2 e), 1 at e = 0.
 

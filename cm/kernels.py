@@ -48,10 +48,11 @@ effective_mass = kernel(contact.effective_mass)
 felt_share = kernel(contact.felt_share)
 friction_force = kernel(contact.friction_force)
 normal_forces = kernel(contact.normal_forces)
+shared_mass = kernel(contact.shared_mass)
 
 SURFACES = LEFT_WALL, RIGHT_WALL, FLOOR = 0, 1, 2
 #: Columns of a contact's memory; contact 2 i + j is corner j (on walls the lower, on the floor the left one is 0) at surface i.
-COLUMNS = CLOSED, DAMPING, FORCE, LAST_CLOSED, STRUCK, IMPULSE = 0, 1, 2, 3, 4, 5
+COLUMNS = CLOSED, DAMPING, FORCE, LAST_CLOSED, STRUCK, IMPULSE, STIFFNESS = 0, 1, 2, 3, 4, 5, 6
 #: Columns of the floor's friction: force, the spring's stretch, whether it slips, whether it slipped a step ago.
 SHEAR, STRETCH, SLIPS, SLIPPED = 0, 1, 2, 3
 #: A contact that was open for longer than this (s) strikes when it closes, and its impulse is gathered for as long.
@@ -132,12 +133,14 @@ def with_forces(memory: Floats, friction: Floats, inverse: float, surface: int, 
 @kernel
 def closes(
     memory: Floats, parameters: Parameters, inverse: float, surface: int, corner: int, rx: float, ry: float, mobility: float,
-    coupling: float, rate: float, slip: float, other_gap: float, other_rate: float, t: float,
+    other: float, coupling: float, rate: float, slip: float, other_gap: float, other_rate: float, t: float,
 ) -> float:  # fmt: skip
-    """A contact closes at `t`: choose its damping, begin a strike if it was open for long. Returns the step that it asks for.
+    """A contact closes at `t`: choose spring and damper, begin a strike if it was open for long. Returns the step that it asks for.
 
-    The corner arrives at `rate` < 0 and slides at `slip`. When the other corner of the surface arrives within the contact's
-    own time, the two share the block's mass as their speeds say.
+    The corner arrives at `rate` < 0 and slides at `slip`; `other` is the mobility of the surface's other corner. When that one
+    arrives within the contact's own time, the two share the block's mass as their speeds say. Where the mass lies nearer to one
+    of them, equal springs would turn the block, and neither corner would leave with the scene's restitution: there each spring
+    is as stiff as its share is large.
     """
     one = 2 * surface + corner
     contact_time = 1.0 / math.sqrt(parameters.stiffness)
@@ -148,7 +151,13 @@ def closes(
         memory[one, STRUCK] = t
         memory[one, IMPULSE] = 0.0
     if parameters.calibrated:
-        if other_rate < 0.1 * rate and other_gap < -other_rate * contact_time:
+        left, right, bottom, top = parameters.reach
+        spring = 1.0
+        both = other_rate < 0.1 * rate and other_gap < -other_rate * contact_time
+        mass = shared_mass(mobility, other, coupling, other_rate / rate)
+        if both and (left != right if surface == FLOOR else bottom != top) and mass > 0.0:
+            spring = 2.0 * mass
+        elif both:
             mass = 1.0 / (mobility + coupling * min(1.0, other_rate / rate))
         elif surface == FLOOR:
             mass = effective_mass(
@@ -156,7 +165,8 @@ def closes(
             )
         else:
             mass = 1.0 / mobility
-        memory[one, DAMPING] = 2.0 * parameters.damping_ratio[surface] * math.sqrt(mass) / contact_time
+        memory[one, STIFFNESS] = spring * parameters.stiffness
+        memory[one, DAMPING] = 2.0 * parameters.damping_ratio[surface] * math.sqrt(spring * mass) / contact_time
     return min(FINE * contact_time, FINE_DAMPER / (memory[one, DAMPING] * mobility + 1e-300))
 
 
@@ -228,13 +238,14 @@ def press(
         if closed1:
             if memory[one, CLOSED] == 0.0:
                 slip = v[0] - v[2] * ay
-                fine = closes(memory, parameters, inverse, surface, 0, ax, ay, k11, k12, rate1, slip, gap2, rate2, t)
-            f1, d1 = response(k, memory[one, DAMPING], k11, gap1, before1, rate1, step, ahead)
+                fine = closes(memory, parameters, inverse, surface, 0, ax, ay, k11, k22, k12, rate1, slip, gap2, rate2, t)
+            f1, d1 = response(memory[one, STIFFNESS], memory[one, DAMPING], k11, gap1, before1, rate1, step, ahead)
         if closed2:
             if memory[two, CLOSED] == 0.0:
                 slip = v[0] - v[2] * by
-                fine = min(fine, closes(memory, parameters, inverse, surface, 1, bx, by, k22, k12, rate2, slip, gap1, rate1, t))
-            f2, d2 = response(k, memory[two, DAMPING], k22, gap2, before2, rate2, step, ahead)
+                asked = closes(memory, parameters, inverse, surface, 1, bx, by, k22, k11, k12, rate2, slip, gap1, rate1, t)
+                fine = min(fine, asked)
+            f2, d2 = response(memory[two, STIFFNESS], memory[two, DAMPING], k22, gap2, before2, rate2, step, ahead)
         if surface != FLOOR:
             force1, force2 = normal_forces(f1, f2, d1, d2, k11, k12, k12, k22)
         else:

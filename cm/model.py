@@ -14,6 +14,7 @@ from pydantic import model_validator
 from rockcheck.cm import contact
 from rockcheck.scenes import Event, History, InputError, ModelFailure, Scene, kinematics
 from rockcheck.scenes.base import Frozen, Positive
+from rockcheck.scenes.errors import check_kind
 from rockcheck.scenes.excitations import Record, Rest, Ricker, Sine
 from rockcheck.scenes.history import Cost
 from rockcheck.scenes.observation import observe
@@ -100,6 +101,7 @@ class ContinuousModel(Frozen):
         Raises `ModelFailure` where the motion gains energy out of nothing (far too long a step, absurd excitation) or asks for
         too many steps.
         """
+        check_kind(scene, Scene, "load_scene", "scene")
         began = time.perf_counter()
         from rockcheck.cm import kernels
         from rockcheck.scenes.threads import interruptible
@@ -199,6 +201,7 @@ class ContinuousModel(Frozen):
         memory = np.zeros((2 * len(kernels.SURFACES), len(kernels.COLUMNS)))
         memory[:, kernels.STRUCK] = math.inf
         memory[:, kernels.LAST_CLOSED] = -math.inf
+        memory[:, kernels.STIFFNESS] = k
         memory[:, kernels.DAMPING] = np.repeat(2.0 * math.sqrt(k) * np.array(parameters.damping_ratio), 2)
         for wall in scene.walls:
             if kinematics.wall_gap(scene, wall.side, x, tilt) < TOUCHING:

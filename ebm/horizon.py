@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from typing import Literal
+from itertools import chain
 
 import numpy as np
 
-from rockcheck.ebm.model import EventBasedModel
+from rockcheck.ebm.core.rules import FLAT_LANDING, NAMES
+from rockcheck.ebm.model import EventBasedModel, ImpactLaw
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.scene import Scene
 
 #: The relative disturbance, and the separation (alpha) up to which two histories still count as the same.
 PERTURBATION, ALLOWED = 1e-6, 1e-3
 START = ("initial_rotation", "initial_angular_velocity", "initial_velocity", "initial_height")
+#: The choice, as `History.cost.rules` counts it, at which the laws of one bottom corner before the other part.
+FLAT = NAMES[FLAT_LANDING]
 
 
 def predictability_horizon(
@@ -23,40 +26,65 @@ def predictability_horizon(
     """Time in s up to which two histories of this scene can be compared point by point.
 
     The scene is played by `model` (default: the unilateral one at tolerance 1e-13) as it is and with a relative
-    `perturbation` of either sign of its excitation and of its initial state. The horizon is the last output time up to
-    which all rotations stay within `allowed` (alpha) of the undisturbed ones; the scene's duration where they always do.
+    `perturbation` of either sign of its excitation and of its initial state; a rotation or velocity that is zero gets that
+    part of alpha, alpha p or R alpha p. The horizon is the last output time up to which all rotations
+    stay within `allowed` (alpha) of the undisturbed ones; the scene's duration where they always do.
 
     With 1e-6 and 1e-3 it is the time in which the motion amplifies an error a thousandfold. Beyond it an error of 1e-4 alpha,
     as a good engine has, has grown to a tenth of the motion. How far two histories are apart then depends on the scene, not on
     the models. It is the ratio that matters: with 1e-7 and 1e-4 the horizon of El Centro is the same. Deterministic.
     The model's tolerance has to be well below the perturbation. Raises what `simulate` raises.
 
-    A scene with a wall is played once more under the other law of impacts: where several contacts are struck at once, as when a
-    block lands flush against a bouncing wall, histories mean the same only as long as they do not depend on the law.
+    Where several contacts are struck at once, as when a block lands flush against a bouncing wall or
+    flat on the floor, the scene is played under the `other_laws` of impacts, too: histories mean the
+    same only as long as they do not depend on the law.
     """
     model = model or EventBasedModel(pivot="unilateral", tolerance=1e-13)
-    undisturbed = model.simulate(scene).channels["theta"]
+    played = model.simulate(scene)
+    undisturbed = played.channels["theta"]
     rows = len(undisturbed)
-    for other, disturbed in _disturbed(scene, model, perturbation):
+    laws = other_laws(model, walls=bool(scene.walls), flat=FLAT in played.cost.rules)
+    others = ((model.model_copy(update={"impacts": law}), scene) for law in laws)
+    for other, disturbed in chain(others, _disturbed(scene, model, perturbation)):
         theta = other.simulate(disturbed).channels["theta"][:rows]
         apart = np.abs(theta - undisturbed[: len(theta)]) > allowed * scene.block.alpha
         rows = int(np.argmax(apart)) if apart.any() else rows
     return scene.duration if rows == len(undisturbed) else float(scene.output_times[max(rows - 1, 1)])
 
 
-def other_law(model: EventBasedModel) -> Literal["moreau", "floor-first"]:
-    """The law of impacts under which an event-based model's motion is to be the same, for it to be trusted."""
-    return "floor-first" if model.impacts == "moreau" else "moreau"
+def may_fly(scene: Scene) -> bool:
+    """Whether the block can leave the floor, and so land flat."""
+    lifted = scene.initial_height > 0.0 or scene.vertical.kind != "rest"
+    return lifted or bool(scene.walls) or scene.floor.restitution > 0.0
+
+
+def other_laws(model: EventBasedModel, *, walls: bool, flat: bool) -> tuple[ImpactLaw, ...]:
+    """The laws of impacts under which a model's motion is to be the same, for it to be trusted.
+
+    `walls`: beside walls; `flat`: where it lands flat.
+    """
+    laws: list[ImpactLaw] = ["moreau"] if model.pivot == "unilateral" else []
+    if laws and walls:
+        laws.append("floor-first")
+    if laws and flat:
+        laws += ["leading-first", "trailing-first"]
+    return tuple(law for law in laws if law != model.impacts)
 
 
 def _disturbed(scene: Scene, model: EventBasedModel, perturbation: float) -> Iterator[tuple[EventBasedModel, Scene]]:
-    """The other law of impacts; a base motion a little stronger or weaker; a start a little farther from or nearer to rest."""
-    if model.pivot == "unilateral" and scene.walls:
-        yield model.model_copy(update={"impacts": other_law(model)}), scene
-    start = {name: value for name in START if (value := getattr(scene, name)) != 0.0}
-    for factor in (1.0 - perturbation, 1.0 + perturbation):
+    """A base motion a little stronger or weaker; a start farther from rest, nearer to it or off zero."""
+    alpha, rate = scene.block.alpha, scene.block.alpha * scene.frequency_parameter
+    speed = scene.block.radius * rate
+    units = {"initial_rotation": alpha, "initial_angular_velocity": rate, "initial_velocity": speed}
+    given = {name: value for name in START if (value := getattr(scene, name)) != 0.0}
+    for change in (-perturbation, perturbation):
         if scene.excitation.kind != "rest" or scene.vertical.kind != "rest":
+            factor = 1.0 + change
             yield model, scene.replace(excitation=scene.excitation.scaled(factor), vertical=scene.vertical.scaled(factor))
-        if start:
-            with suppress(InputError):  # farther from rest would be inside a wall
-                yield model, scene.replace(**{name: factor * value for name, value in start.items()})
+        farther = {name: value + change * value for name, value in given.items()}
+        zeros = [{name: change * unit} for name, unit in units.items() if name not in given]
+        for start in (farther, *zeros):
+            with suppress(InputError):  # inside a wall, or slip where the model never does
+                disturbed = scene.replace(**start)
+                model.check(disturbed)
+                yield model, disturbed

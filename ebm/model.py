@@ -11,7 +11,7 @@ from pydantic import Field, Strict
 
 from rockcheck.ebm.core.rules import NAMES
 from rockcheck.scenes.base import Frozen, Positive
-from rockcheck.scenes.errors import InputError, ModelFailure
+from rockcheck.scenes.errors import InputError, ModelFailure, check_kind
 from rockcheck.scenes.history import Cost, Event, History
 from rockcheck.scenes.observation import observe
 from rockcheck.scenes.scene import Scene
@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 FINEST = 1e-15
 
 
+#: The laws of impacts at several contacts at once (see ebm.core.laws.contact_impacts).
+ImpactLaw = Literal["moreau", "closed", "open", "floor-first", "leading-first", "trailing-first"]
+
+
 class EventBasedModel(Frozen):
     """The paper's Event-Based Model and its extensions.
 
@@ -35,7 +39,8 @@ class EventBasedModel(Frozen):
     regularisation (9) with the `yield_displacement` u_y in m, "no-slip" is Housner's block. `impacts` (unilateral) is the law of
     impacts at several contacts at once: "moreau" strikes all that touch together, "floor-first" one after another; they differ
     where a block lands flush against a bouncing wall. ("closed" and "open" are the two branches that "moreau" takes there.)
-    `energy_cap` (unilateral) lowers
+    "leading-first" and "trailing-first" strike one bottom corner before the other where a block lands
+    flat while it slides. `energy_cap` (unilateral) lowers
     the restitution of an impact that would add kinetic energy to the largest that does not. `estimate_error` runs the scene
     again at tolerance/100 and puts the largest change of theta/alpha into `cost.error_estimate`. A run that reaches
     `most_steps` or `most_events` is a `ModelFailure`.
@@ -44,7 +49,7 @@ class EventBasedModel(Frozen):
     tolerance: Annotated[float, Strict(), Field(ge=FINEST, le=1e-2)] = 1e-10
     pivot: Literal["bilateral", "unilateral"] = "bilateral"
     friction: Literal["coulomb", "bouc-wen", "no-slip"] = "coulomb"
-    impacts: Literal["moreau", "closed", "open", "floor-first"] = "moreau"
+    impacts: ImpactLaw = "moreau"
     energy_cap: bool = False
     yield_displacement: Positive = 1e-5
     estimate_error: bool = False
@@ -64,6 +69,7 @@ class EventBasedModel(Frozen):
 
     def check(self, scene: Scene) -> None:
         """Raises `InputError` where the scene asks for physics that this model excludes."""
+        check_kind(scene, Scene, "load_scene", "scene")
         if self.friction == "bouc-wen":
             self._check_bouc_wen(scene)
         if self.friction == "no-slip" and scene.initial_velocity != 0.0:

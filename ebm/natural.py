@@ -60,11 +60,11 @@ def side_of(block: Block, side: Literal["left", "right"]) -> Side:
         arm, sine, cosine = math.sin(alpha), math.sin(2.0 * alpha), math.cos(2.0 * alpha)
         return Side(alpha, 1.0, arm, alpha, 1.0, sine, cosine, sine, cosine, 0.75)
     pivot, other, unit = block.pivot(side), block.pivot("right" if side == "left" else "left"), block.radius
-    top, square = 2.0 * block.half_height - pivot.height, pivot.radius**2
+    top, square, radius = 2.0 * block.half_height - pivot.height, pivot.radius**2, pivot.radius / unit
     return Side(
         alpha=pivot.alpha,
-        radius=pivot.radius / unit,
-        arm=pivot.radius * math.sin(pivot.alpha) / unit,
+        radius=radius,
+        arm=radius * math.sin(pivot.alpha),  # as gaps have it: flush with a wall they are 0 to the bit
         top_alpha=math.atan2(pivot.arm, top),
         top_radius=math.hypot(pivot.arm, top) / unit,
         tip_sin=pivot.arm * (pivot.height + top) / square,

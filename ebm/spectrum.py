@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes.base import Shown
-from rockcheck.scenes.errors import InputError
+from rockcheck.scenes.errors import InputError, check_kind
 from rockcheck.scenes.excitations import Record
 from rockcheck.scenes.progress import Count, OnProgress, unheard
 from rockcheck.scenes.scene import Block, Scene
@@ -44,7 +44,7 @@ class Spectrum(Shown):
     `outcomes[i, j]` is -1 (overturned left, counterclockwise), 0 (safe) or +1 (right, clockwise) at `amplitude_ratios[i]`
     (a_p / (g tan alpha)) and `frequency_ratios[j]` (omega_p / p). `evaluations` counts the runs, fewer than nodes where only
     the boundary was refined. `undecided` lists the nodes (i, j) whose run failed: their outcome says 0, but `safe` excludes them.
-    `depends_on_law` lists the nodes whose outcome is another one under the other law of impacts; None where that was not looked at.
+    `depends_on_law` lists the nodes whose outcome is another one under another law of impacts; None where that was not looked at.
     """
 
     outcomes: NDArray[np.int8]
@@ -99,6 +99,7 @@ def overturning_spectrum(
     frequencies, amplitudes = _axis(frequency_ratios, "frequency_ratios"), _axis(amplitude_ratios, "amplitude_ratios")
     if len(frequencies) * len(amplitudes) > MOST_NODES:
         raise InputError(f"{len(frequencies)} x {len(amplitudes)} nodes are more than {MOST_NODES}", "frequency_ratios")
+    check_kind(scene, Scene, "load_scene", "scene")
     check_excitation(scene)
     if play is None:
         model = model or EventBasedModel(tolerance=TOLERANCE)

@@ -26,7 +26,7 @@ class Dart(Engine):
 
     name: ClassVar[str] = "dart"
     module: ClassVar[str] = "dartpy"
-    extra: ClassVar[str] = "dart"
+    package: ClassVar[str] = "dartpy"
 
     def rigid_world(self, scene: Scene) -> World:
         """The scene as DART holds it, in units in which even slow contacts bounce."""

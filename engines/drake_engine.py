@@ -30,7 +30,7 @@ class Drake(Engine):
 
     name: ClassVar[str] = "drake"
     module: ClassVar[str] = "pydrake"
-    extra: ClassVar[str] = "drake"
+    package: ClassVar[str] = "drake"
     bounces_with: ClassVar[tuple[str, ...]] = ()
     fixed_because: ClassVar[str] = "Drake's discrete plant keeps the step it was made with"
 

@@ -22,7 +22,7 @@ from rockcheck.engines.marching import Marched, at_output_times, in_units_of, ma
 from rockcheck.engines.world import World
 from rockcheck.scenes import Cost, Floor, History, InputError, Scene, kinematics
 from rockcheck.scenes.base import Frozen, Positive
-from rockcheck.scenes.errors import NotInstalled, printable
+from rockcheck.scenes.errors import NotInstalled, check_kind, printable
 from rockcheck.scenes.observation import observe
 
 MOST_STEPS = 5_000_000
@@ -42,9 +42,9 @@ class Engine(Frozen):
     """
 
     name: ClassVar[str]
-    #: The module that it needs, and the extra of rockcheck that installs it; "" where it comes with rockcheck.
+    #: The module that it needs, and the package that holds it, as pip knows it; "" where it comes with rockcheck.
     module: ClassVar[str] = ""
-    extra: ClassVar[str] = ""
+    package: ClassVar[str] = ""
     #: Why its steps cannot vary; "" where they can.
     fixed_because: ClassVar[str] = ""
     #: The settings in which contacts have Newton's coefficient of restitution.
@@ -127,7 +127,8 @@ class Engine(Frozen):
         events do not end.
         """
         if not self.installed():
-            raise NotInstalled(f"the engine {self.name} is not installed: pip install 'rockcheck[{self.extra}]'", self.name)
+            raise NotInstalled(f"the engine {self.name} is not installed: pip install {self.package}", self.name)
+        check_kind(scene, Scene, "load_scene", "scene")
         step = self.largest_step if self.time_step == "adaptive" else self.time_step
         if scene.duration / step > MOST_STEPS:
             key = "largest_step" if self.time_step == "adaptive" else "time_step"

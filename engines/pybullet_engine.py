@@ -28,7 +28,7 @@ class PyBullet(Engine):
 
     name: ClassVar[str] = "pybullet"
     module: ClassVar[str] = "pybullet"
-    extra: ClassVar[str] = "pybullet"
+    package: ClassVar[str] = "pybullet"
 
     def rigid_world(self, scene: Scene) -> World:
         """The scene as PyBullet holds it: point contacts of the corners."""

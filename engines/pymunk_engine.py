@@ -24,7 +24,7 @@ class Pymunk(Engine):
 
     name: ClassVar[str] = "pymunk"
     module: ClassVar[str] = "pymunk"
-    extra: ClassVar[str] = "pymunk"
+    package: ClassVar[str] = "pymunk"
 
     def rigid_world(self, scene: Scene) -> World:
         """The scene as pymunk holds it, with a converged solver."""

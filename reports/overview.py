@@ -17,6 +17,7 @@ from rockcheck.scenes.trust.experience import Trust, known
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.suite.experience import FEWEST, bias_and_scatter, pairs_of
 from rockcheck.validation.suite.results import Cell, Check, Run
+from rockcheck.validation.suite.tolerances import MEASURES, apart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -119,8 +120,9 @@ def _moved(check: Check) -> bool:
     """Whether a figure left its drift band; without one, its limit."""
     value, expected = check.figure.value, check.expected
     if check.drift is None or value is None or expected is None:
-        return check.verdict != "pass"
-    return abs(value - expected) > check.drift
+        return check.weighs != "pass"
+    measure = MEASURES.get(check.figure.measure)
+    return apart(value, expected, check.floor, (measure.ideal if measure else None) or 0.0) > check.drift
 
 
 def entry(run: Run, scene: str, model: str) -> Entry | None:

@@ -25,13 +25,14 @@ from rockcheck.reports.scene_file import write_scene_file
 from rockcheck.reports.style import FORMATS, LOOKS, SPARE, looks, save
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
 from rockcheck.scenes import InputError
-from rockcheck.scenes.errors import printable, unknown_name
+from rockcheck.scenes.errors import inert, printable, unknown_name
 from rockcheck.scenes.progress import OnProgress, unheard
-from rockcheck.scenes.writing import write_whole
+from rockcheck.scenes.reading import MOST_BYTES, head_of
+from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.execute.pool import Call, Pool
-from rockcheck.validation.suite.results import Run
+from rockcheck.validation.suite.results import SEVERITY, Run
 from rockcheck.validation.suite.tables import shown
 
 DATA = Path(str(resources.files("rockcheck.reports"))) / "data"
@@ -54,6 +55,8 @@ PRINTED, FEW = 25, 40
 #: What a verdict is called and the sign that goes with its colour.
 VERDICTS = {
     "pass": ("within tolerance", "✓"),
+    "better": ("better", "✓"),
+    "not defined": ("not defined here", "–"),
     "incomplete": ("not installed", "–"),
     "changed": ("changed", "△"),
     "fail": ("out of tolerance", "✕"),
@@ -73,13 +76,11 @@ class Site:
         """Write the page `address` (relative to the folder, with slashes) from a template of `data/templates/`."""
         root = "../" * address.count("/")
         text = _environment().get_template(template).render(site=self, root=root, address=address, **context)
-        path = self.folder / address
-        path.parent.mkdir(parents=True, exist_ok=True)
-        return write_whole(path, text)
+        return write_whole(made(self.folder, *address.split("/")[:-1]) / Path(address).name, text)
 
     def assets(self) -> None:
         """Write style sheets, scripts and the plotting library, once for all pages."""
-        target = _made(self.folder / PAGES / "assets")
+        target = made(self.folder, PAGES, "assets")
         for source in sorted((DATA / "assets").iterdir()):
             write_whole(target / source.name, source.read_bytes())
         for source in sorted((DATA / "vendor").glob("*/*")):
@@ -119,12 +120,12 @@ def write_figure(folder: Path, name: str, path: Path, against: str | None = None
     if isinstance(view, EnsembleView):
         if against is not None:
             raise InputError("an ensemble's figure shows differences from its reference", "--against")
-        return save(distributions_figure(view), path.with_suffix(""), [kind])[0]
+        return save(distributions_figure(view), path.with_suffix(""), [kind], named=True)[0]
     if against is not None and against not in view.histories:
         raise unknown_name("model with a history of this scene", against, view.histories)
     if not view.histories:
         raise InputError(f"{printable(name)}: no model has a history of it: {'; '.join(view.missing.values())}")
-    return save(histories_figure(view, against), path.with_suffix(""), [kind])[0]
+    return save(histories_figure(view, against), path.with_suffix(""), [kind], named=True)[0]
 
 
 def write_site(folder: Path, *, jobs: int = 1, afresh: bool = True, wanted: Sequence[str] = (), on_progress: OnProgress = unheard) -> Path:
@@ -192,10 +193,9 @@ class _Pages:
             (self.folder / PAGES / old).unlink(missing_ok=True)
 
     def _write_scene(self, view: SceneView, stamp: str) -> None:
-        pages = self.folder / PAGES
-        write_figures(view, _made(pages / "figures"))
-        write_whole(_made(pages / "data") / f"{view.slug}.js", script(view))
-        files = write_scene_file(view.scene, _made(pages / "scene-files"), view.slug)
+        write_figures(view, made(self.folder, PAGES, "figures"))
+        write_whole(made(self.folder, PAGES, "data") / f"{view.slug}.js", script(view))
+        files = write_scene_file(view.scene, made(self.folder, PAGES, "scene-files"), view.slug)
         names = [one.name for one in self.views.values() if isinstance(one, SceneView)]
         place = names.index(view.name)
         beside = {
@@ -205,9 +205,8 @@ class _Pages:
         self._page(view, stamp, "scene.html", files=files, **beside)
 
     def _write_ensemble(self, view: EnsembleView, stamp: str) -> None:
-        pages = self.folder / PAGES
-        write_ensemble_figures(view, _made(pages / "figures"))
-        write_whole(_made(pages / "data") / f"{view.slug}.csv", view.table())
+        write_ensemble_figures(view, made(self.folder, PAGES, "figures"))
+        write_whole(made(self.folder, PAGES, "data") / f"{view.slug}.csv", view.table())
         self._page(view, stamp, "ensemble.html", columns=STATISTICS_SHOWN)
 
     def _page(self, view: View, stamp: str, template: str, **context: Any) -> None:
@@ -220,7 +219,7 @@ class _Pages:
         worst, times = tables.worst_first(self.run), tables.run_times(self.run)
         summaries = {model: FAMILIES[model].summary for model in self.run.models if model in FAMILIES}
         told: dict[str, Any] = {"scenes": scenes, "ensembles": ensembles, "worst": worst, "times": times, "summaries": summaries}
-        told |= write_overview(self.run, _made(self.folder / PAGES / "figures"), self.views)
+        told |= write_overview(self.run, made(self.folder, PAGES, "figures"), self.views)
         self.site.page(INDEX, "index.html", **told, **_common(self.run))
 
     def stamp(self, view: View) -> str:
@@ -266,18 +265,13 @@ def _appearance() -> str:
 
 def _stamp_of(page: Path) -> str:
     """The stamp that a page names, empty where there is no such page."""
-    if not page.is_file():
-        return ""
-    with page.open(encoding="utf-8") as stream:
-        found = re.search(r'<meta name="rockcheck-stamp" content="(\w+)">', stream.read(2000))
+    found = re.search(r'<meta name="rockcheck-stamp" content="(\w+)">', head_of(page, 2000))
     return found[1] if found else ""
 
 
 def _belongings(page: Path) -> set[str]:
     """The files of a scene's page, relative to the folder of pages."""
-    if not page.is_file():
-        return set()
-    found = re.findall(r'(?:href|src)="((?:figures|data|scene-files)/[A-Za-z0-9._-]+)"', page.read_text(encoding="utf-8"))
+    found = re.findall(r'(?:href|src)="((?:figures|data|scene-files)/[A-Za-z0-9._-]+)"', head_of(page, MOST_BYTES))
     return {*found, f"figures/{page.stem}-small.svg"}
 
 
@@ -290,11 +284,6 @@ def _common(run: Run) -> dict[str, Any]:
     }
 
 
-def _made(folder: Path) -> Path:
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
-
-
 def model_styles() -> str:
     """A style sheet with a class `look-<key>` for each look of a model that sets its colour, by day and by night."""
     rows = (f".look-{look.key} {{ --look: light-dark({look.light}, {look.dark}); }}" for look in (*LOOKS.values(), *SPARE))
@@ -305,7 +294,12 @@ def model_styles() -> str:
 def _environment() -> Environment:
     """The templates with what they call. Kept, since compiling a page's templates takes longer than drawing its figures."""
     environment = Environment(
-        loader=FileSystemLoader(DATA / "templates"), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(DATA / "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=lambda value: inert(value) if type(value) is str else value,
     )
     for filter in (words.number, words.unit, words.duration, words.moment, words.ratio, words.window, words.dash_array, words.readable):
         environment.filters[filter.__name__] = filter
@@ -323,5 +317,5 @@ def _environment() -> Environment:
         outcome_of,
     ):
         environment.globals[function.__name__] = function
-    environment.globals |= {"VERDICTS": VERDICTS, "finite": math.isfinite}
+    environment.globals |= {"VERDICTS": VERDICTS, "SEVERITY": SEVERITY, "finite": math.isfinite}
     return environment

@@ -18,7 +18,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rockcheck.scenes.writing import write_whole
+from rockcheck.scenes.reading import head_of
+from rockcheck.scenes.writing import made, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -145,12 +146,11 @@ def power_of_ten(value: float) -> str:
     return f"{value:g}" if -1 <= exponent <= 3 else "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
-def save(figure: Figure, stem: Path, formats: Iterable[str] = FORMATS, *, stamp: str = "") -> list[Path]:
+def save(figure: Figure, stem: Path, formats: Iterable[str] = FORMATS, *, stamp: str = "", named: bool = False) -> list[Path]:
     """Write a figure as `<stem>.svg`, `.png` and `.pdf`; the same figure gives the same bytes, for no date is written.
 
-    `stamp` says what an SVG shows, see `stamp_of`.
+    `stamp` says what an SVG shows, see `stamp_of`; `named` that the user chose these very files.
     """
-    stem.parent.mkdir(parents=True, exist_ok=True)
     undated: dict[str, dict[str, Any]] = {
         "svg": {"Date": None, "Creator": "rockcheck"} | ({"Identifier": stamp} if stamp else {}),
         "pdf": {"CreationDate": None, "Creator": "rockcheck"},
@@ -159,10 +159,10 @@ def save(figure: Figure, stem: Path, formats: Iterable[str] = FORMATS, *, stamp:
     written = []
     with figure_style():
         for kind in formats:
-            path = stem.with_name(f"{stem.name}.{kind}")
+            path = made(stem.parent) / f"{stem.name}.{kind}"
             content = io.BytesIO()
             figure.savefig(content, format=kind, metadata=undated[kind])
-            written.append(write_whole(path, content.getvalue()))
+            written.append(write_whole(path, content.getvalue(), named=named))
     return written
 
 
@@ -199,8 +199,5 @@ def _short_hash(content: bytes) -> str:
 
 def stamp_in(path: Path) -> str:
     """The stamp that an SVG names near its beginning, empty where there is none."""
-    if not path.is_file():
-        return ""
-    with path.open(encoding="utf-8", errors="replace") as stream:
-        _, mark, rest = stream.read(4000).partition("<dc:identifier>")
+    _, mark, rest = head_of(path, 4000).partition("<dc:identifier>")
     return rest.partition("<")[0] if mark else ""

@@ -21,7 +21,7 @@ def worst_first(run: Run) -> list[tuple[Cell, Check | None]]:
     A figure that has no tolerance yet is not out of one; the page counts these.
     """
     failed: list[tuple[Cell, Check | None]] = [(cell, None) for cell in run.cells if cell.status != "done"]
-    checks = [(cell, check) for cell, check in run.checks() if check.words not in ("pass", "no tolerance yet")]
+    checks = [(cell, check) for cell, check in run.checks() if check.weighs != "pass" and check.words != "no tolerance yet"]
     return failed + sorted(checks, key=lambda pair: (pair[1].verdict != "fail", -overrun(pair[1])))
 
 

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.scenes import History, InputError, Scene, kinematics
+from rockcheck.scenes.history import events_path
+from rockcheck.scenes.reading import within
 from rockcheck.scenes.trust import experience
 from rockcheck.validation.suite.results import Cell, Run
 from rockcheck.validation.uncertainty.population import Inputs
@@ -356,10 +358,9 @@ def _read(cells: Iterable[Cell], folder: Path) -> tuple[dict[str, History], dict
         if cell.status != "done" or cell.history is None:
             missing[cell.model] = cell.reason or "no history"
             continue
-        path = folder / cell.history
         try:
-            if not path.resolve().is_relative_to(folder.resolve()):
-                raise InputError("its history lies outside the run's folder")
+            path = within(folder, cell.history)
+            within(folder, str(events_path(Path(cell.history))))
             histories[cell.model] = History.load(path)
         except InputError as error:
             missing[cell.model] = str(error)

@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import pytest
 
@@ -34,11 +34,11 @@ def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., Cell]:
     """`rockcheck_check(scene, model=..., suite=None, strict=False)`: runs that cell and its references, fails the test out of tolerance.
 
     Returns the finished `validation.suite.results.Cell`, whose figures a test may look at. With `strict` a figure that left its
-    drift band fails too. A model that is not installed fails.
+    drift band for the worse fails too, with `strict="both"` a better one. A model that is not installed fails.
     """
     config = request.config
 
-    def check(scene: str, *, model: str, suite: str | Path | None = None, strict: bool = False) -> Cell:
+    def check(scene: str, *, model: str, suite: str | Path | None = None, strict: bool | Literal["both"] = False) -> Cell:
         from rockcheck.validation.suite.runner import run_suite
         from rockcheck.validation.suite.suites import load_suite, named_suites
         from rockcheck.validation.suite.tables import cell_lines
@@ -50,10 +50,10 @@ def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., Cell]:
         run = run_suite(loaded.only(scene, model), config.cache.mkdir("rockcheck"), strict=strict)
         cell = run.cell(scene, model)
         assert cell is not None
-        wrong = [line for line in cell_lines(cell) if strict or cell.verdict != "changed"]
+        wrong = list(cell_lines(cell, strict))
         if wrong:
             pytest.fail("\n".join(wrong), pytrace=False)
-        if not cell.checks:
+        if all(check.verdict == "not defined" for check in cell.checks):
             pytest.fail(f"{scene}, {model}: nothing is judged: the suite has no tolerance for it", pytrace=False)
         return cell
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, ValidationError
 
@@ -45,6 +45,10 @@ class Frozen(BaseModel):
             super().__init__(**data)
         except ValidationError as error:
             raise from_validation(error, type(self).model_fields) from None
+
+    def replace(self, **change: object) -> Self:
+        """A copy with some fields changed, validated like any other; all other fields stay."""
+        return type(self)(**{name: getattr(self, name) for name in type(self).model_fields} | change)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -162,15 +162,14 @@ class Block(Frozen):
     def mirrored(self) -> Block:
         """The same block with left and right exchanged."""
         x, z = self.offset
-        return self if self.centre_of_mass is None else self.model_copy(update={"centre_of_mass": (-x, z)})
+        return self if self.centre_of_mass is None else self.replace(centre_of_mass=(-x, z))
 
     def scaled(self, factor: float) -> Block:
         """The block with all lengths `factor` times as long, and the same mass."""
         inertia = self.moment_of_inertia
-        return Block(
+        return self.replace(
             half_width=self.half_width * factor,
             half_height=self.half_height * factor,
-            mass=self.mass,
             centre_of_mass=None if self.centre_of_mass is None else (self.offset[0] * factor, self.offset[1] * factor),
             moment_of_inertia=None if inertia is None else inertia * factor * factor,
         )

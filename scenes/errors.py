@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import PurePath
+from unicodedata import category
 
 from pydantic import ValidationError
 
@@ -30,6 +31,12 @@ class ModelFailure(RuntimeError):
     """A model could not finish a scene (blow-up, unsupported physics, a cap reached); its cell fails, the run goes on."""
 
 
+def check_kind(value: object, kind: type, how: str, key: str) -> None:
+    """Raises `InputError` where the argument `key` is no `kind`; `how` says where one comes from."""
+    if not isinstance(value, kind):
+        raise InputError(f"{printable(repr(value))} is not allowed: give a {kind.__name__}, as from {how}", key)
+
+
 #: So many names a message lists.
 MOST_NAMES = 100
 
@@ -46,6 +53,16 @@ def suggestion(name: str, allowed: Iterable[str]) -> str:
     hint = f"did you mean {near[0]!r}? " if near else ""
     more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     return f"; {hint}allowed: {', '.join(names[:MOST_NAMES])}{more}" if names else ""
+
+
+def inert(text: str) -> str:
+    """`text` without what steers a terminal or a page: control characters, and those that turn the order of what follows (U+202E).
+
+    Lines and every kind of blank stay.
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c == "\n" or category(c) == "Zs" else "?" for c in text)
 
 
 def printable(value: object, limit: int = 80) -> str:

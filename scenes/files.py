@@ -11,6 +11,7 @@ from typing import Any
 
 from rockcheck.scenes.errors import InputError, printable, unknown_name
 from rockcheck.scenes.reading import read_text
+from rockcheck.scenes.recordings.sets import record_path
 from rockcheck.scenes.scene import Scene
 from rockcheck.scenes.trust.inputs import UncertainScene, split, uncertain_scene
 
@@ -67,13 +68,8 @@ def scene_from(data: dict[str, Any], *, folder: Path, default_name: str) -> Scen
     for key in ("excitation", "vertical"):
         table = data.get(key)
         if isinstance(table, dict) and isinstance(table.get("file"), str):
-            data[key] = {**table, "file": _record_path(table["file"], folder)}
+            data[key] = {**table, "file": record_path(table["file"], folder)}
     return Scene(**data)
-
-
-def _record_path(name: str, folder: Path) -> Path:
-    beside, shipped = folder / name, DATA / "records" / name
-    return shipped if not beside.exists() and Path(name).name == name and shipped.exists() else beside
 
 
 #: Largest TOML file, bytes.

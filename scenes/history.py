@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.scenes.base import Shown
+from rockcheck.scenes.base import LEAST, MOST, Shown
 from rockcheck.scenes.block import Block
 from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.reading import read_table
 from rockcheck.scenes.trust.experience import Expected, expected, known
-from rockcheck.scenes.writing import columns_text, json_text, write_together
+from rockcheck.scenes.writing import columns_text, json_text, write_together, write_whole
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -182,18 +182,19 @@ class History(Shown):
         check_format(path)
         about = self._about()
         if path.suffix.lower() in (".json", ".mat"):
-            write_together({path: (_json if path.suffix.lower() == ".json" else _mat)(about, self.channels, self._event_columns())})
+            form = _json if path.suffix.lower() == ".json" else _mat
+            write_whole(path, form(about, self.channels, self._event_columns()), named=True)
             return
         if path.suffix.lower() == ".parquet":
             attrs = {ABOUT: json.loads(json.dumps(about, default=str))}
-            write_together({events_path(path): _parquet(self.events, {}), path: _parquet(self.frame, attrs)})
+            write_together({events_path(path): _parquet(self.events, {}), path: _parquet(self.frame, attrs)}, named=True)
             return
         table, beside = self._tables(about)
         contents = {path: table}
         if path.is_file() or not path.exists():  # beside /dev/stdout there is nothing to be written
             contents = {events_path(path): beside, **contents}
         packed = path.suffix.lower() == ".gz"
-        write_together({one: _packed(text) if packed else text for one, text in contents.items()})
+        write_together({one: _packed(text) if packed else text for one, text in contents.items()}, named=True)
 
     def packed(self) -> dict[str, bytes]:
         """The two files that `save` writes for a name ending in ".csv.gz", by their endings: ".csv.gz", ".events.csv.gz"."""
@@ -352,8 +353,8 @@ def _size(about: Mapping[str, Any], key: str, shown: str) -> float | None:
     value = about.get(key)
     if value is None:
         return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < math.inf:
-        raise InputError(f"{printable(value)} is not allowed: give a positive length in m", f"{shown}: {key}")
+    if isinstance(value, bool) or not isinstance(value, int | float) or not LEAST <= value <= MOST:
+        raise InputError(f"{printable(value)} is not allowed: give a length of {LEAST:g} to {MOST:g} m", f"{shown}: {key}")
     return float(value)
 
 
@@ -408,9 +409,10 @@ def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]
             values = pd.to_numeric(frame[name]).to_numpy(dtype=float)
         except (TypeError, ValueError):
             raise InputError(f"{shown}: column {name!r} is not numeric") from None
-        bad = np.flatnonzero(~np.isfinite(values))
+        bad = np.flatnonzero(~(np.abs(values) <= MOST))
         if bad.size:
-            raise InputError(f"{shown}: column {name!r}, row {bad[0] + 1}: {values[bad[0]]} is not finite")
+            why = f"larger than {MOST:g}" if np.isfinite(values[bad[0]]) else "not finite"
+            raise InputError(f"{shown}: column {name!r}, row {bad[0] + 1}: {values[bad[0]]} is {why}")
         channels[name] = values
     if np.any(np.diff(channels["t"]) <= 0.0):
         raise InputError(f"{shown}: column 't' does not increase")

@@ -58,10 +58,17 @@ def _moved(block: Block, states: Any, sense: float) -> Any:
     return np.stack([x + right, y + up, theta, x_dot - w * up, y_dot + w * right, w], axis=-1)
 
 
+def mass_motion(block: Block, y: Any, theta: Any, x_dot: Any, y_dot: Any, theta_dot: Any) -> tuple[Any, Any, Any]:
+    """Height and velocity (up; right, up) of the mass's centre, from those of the box's centre."""
+    if block.centre_of_mass is None:
+        return y, x_dot, y_dot
+    state = np.stack(np.broadcast_arrays(0.0, y, theta, x_dot, y_dot, theta_dot), axis=-1)
+    _, y, _, x_dot, y_dot, _ = np.moveaxis(of_mass(block, state), -1, 0)
+    return y, x_dot, y_dot
+
+
 def energy(block: Block, gravity: float, y: Any, theta: Any, x_dot: Any, y_dot: Any, theta_dot: Any) -> Any:
     """Kinetic plus potential energy per unit mass in the base's frame, zero for the block standing still, J/kg."""
-    if block.centre_of_mass is not None:
-        state = np.stack(np.broadcast_arrays(0.0, y, theta, x_dot, y_dot, theta_dot), axis=-1)
-        _, y, _, x_dot, y_dot, _ = np.moveaxis(of_mass(block, state), -1, 0)
+    y, x_dot, y_dot = mass_motion(block, y, theta, x_dot, y_dot, theta_dot)
     height = block.weaker_pivot.height
     return 0.5 * (x_dot**2 + y_dot**2 + block.gyration_squared * theta_dot**2) + gravity * (y - height)

@@ -13,6 +13,8 @@ from rockcheck.scenes import kinematics
 from rockcheck.scenes.history import Cost, Event, History, block_fields, outcome_of
 from rockcheck.scenes.scene import Scene
 
+#: A block that is larger is told, m: as a rule a file gives mm.
+LARGE = 100.0
 STATE = ("x", "y", "theta", "x_dot", "y_dot", "theta_dot")
 
 
@@ -61,6 +63,9 @@ def observe(
 def scene_notes(scene: Scene) -> tuple[str, ...]:
     """What a reader of any history of this scene should know."""
     said: list[str] = []
+    size = 2.0 * max(scene.block.half_width, scene.block.half_height)
+    if size > LARGE:
+        said.append(f"the block is {size:g} m large: lengths are in m, not mm")
     for which, excitation in (("horizontal", scene.excitation), ("vertical", scene.vertical)):
         if excitation.kind != "record":
             continue

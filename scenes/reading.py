@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import io
+import json
 import os
 import re
 import stat
@@ -14,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, cast
 
-from rockcheck.scenes.errors import InputError, printable
+from rockcheck.scenes.errors import InputError, inert, printable
 
 if TYPE_CHECKING:
     import numpy as np
@@ -28,14 +29,26 @@ MOST_TABLE_BYTES = 1_500_000_000
 MOST_COLUMNS, MOST_LINE = 1000, 1_000_000
 
 
-def open_regular(path: Path, most: int) -> IO[bytes]:
+def within(folder: Path, *parts: str) -> Path:
+    """The path of what a folder holds that somebody may have sent. Raises `InputError` where it leads out of the folder, as by a link."""
+    path = folder.joinpath(*parts)
+    if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder)):
+        raise InputError(f"{printable(path)}: cannot be read: lies outside the run's folder")
+    return path
+
+
+def open_regular(path: Path, most: int = MOST_BYTES) -> IO[bytes]:
     """A regular file of at most `most` bytes, open for reading.
 
-    Raises `InputError` for anything else, such as a pipe or a device, which may have no end or wait for ever.
+    Raises `InputError` for anything else, such as a pipe or a device, which may have no end or wait for ever, and does not open it.
     """
     shown = printable(path)
     try:
+        if not stat.S_ISREG(os.stat(path).st_mode):
+            raise InputError(f"{shown}: cannot be read: not a file")
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    except InputError:
+        raise
     except (OSError, ValueError) as error:  # a path that holds a null character is a ValueError
         raise InputError(f"{shown}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
     about = os.fstat(handle)
@@ -45,12 +58,8 @@ def open_regular(path: Path, most: int) -> IO[bytes]:
     raise InputError(f"{shown}: larger than {most} bytes" if stat.S_ISREG(about.st_mode) else f"{shown}: cannot be read: not a file")
 
 
-def read_text(path: Path, most: int = MOST_BYTES, *, latin: bool = False) -> str:
-    """The text of a file without a byte-order mark. Raises `InputError` where it is no file, too large or not UTF-8.
-
-    With `latin` a file that is not UTF-8 is read as UTF-16 if it has that byte-order mark, else as Latin-1 if it has no control
-    characters.
-    """
+def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
+    """The content of a file. Raises `InputError` where it is no file, or too large."""
     with open_regular(path, most) as stream:
         try:
             content = stream.read(most + 1)
@@ -58,6 +67,43 @@ def read_text(path: Path, most: int = MOST_BYTES, *, latin: bool = False) -> str
             raise InputError(f"{printable(path)}: cannot be read: {error.strerror}") from None
     if len(content) > most:  # it has grown
         raise InputError(f"{printable(path)}: larger than {most} bytes")
+    return content
+
+
+def head_of(path: Path, most: int) -> str:
+    """The first `most` bytes of a text file; empty where there is none."""
+    try:
+        with open_regular(path) as stream:
+            return stream.read(most).decode(errors="replace")
+    except (InputError, OSError):
+        return ""
+
+
+def read_json(path: Path, most: int = MOST_BYTES) -> Any:
+    """The value of a JSON file, its texts `inert`. Raises `InputError` where it is no such file."""
+    text = read_text(path, most)
+    try:
+        value = json.loads(text)
+        return value if text.isascii() and "\\" not in text else _inert(value)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{printable(path)}: not JSON: {printable(error)}") from None
+
+
+def _inert(value: Any) -> Any:
+    if isinstance(value, str):
+        return inert(value)
+    if isinstance(value, dict):
+        return {inert(key): _inert(item) for key, item in value.items()}
+    return [_inert(item) for item in value] if isinstance(value, list) else value
+
+
+def read_text(path: Path, most: int = MOST_BYTES, *, latin: bool = False) -> str:
+    """The text of a file without a byte-order mark. Raises `InputError` where it is no file, too large or not UTF-8.
+
+    With `latin` a file that is not UTF-8 is read as UTF-16 if it has that byte-order mark, else as Latin-1 if it has no control
+    characters.
+    """
+    content = read_bytes(path, most)
     try:
         text = content.decode("utf-16") if latin and _NOT_UTF8.match(content) else content.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -146,13 +146,9 @@ class Scene(Shown, Frozen):
         swap: dict[str, Literal["left", "right"]] = {"left": "right", "right": "left"}
         return self.replace(
             block=self.block.mirrored(),
-            walls=tuple(Wall(side=swap[w.side], gap=w.gap, restitution=w.restitution) for w in self.walls),
+            walls=tuple(wall.replace(side=swap[wall.side]) for wall in self.walls),
             excitation=self.excitation.scaled(-1.0),
             initial_rotation=-self.initial_rotation,
             initial_angular_velocity=-self.initial_angular_velocity,
             initial_velocity=-self.initial_velocity,
         )
-
-    def replace(self, **change: object) -> Scene:
-        """A copy with some fields changed, validated like any scene."""
-        return Scene(**{name: getattr(self, name) for name in type(self).model_fields} | change)

@@ -8,7 +8,7 @@ import json
 import math
 import operator
 import os
-import stat
+import re
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
@@ -16,25 +16,44 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from rockcheck.scenes.errors import InputError, inert, printable
 
-def write_whole(path: Path, content: str | bytes) -> Path:
-    """Write a file so that a reader sees the old content or the new, never a part. See `write_together`."""
-    write_together({path: content})
+
+def made(folder: Path, *parts: str) -> Path:
+    """A folder of results, made if need be, or one within it. Raises `InputError` for a part that is a link."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for part in parts:
+        folder = no_link(folder / part)
+        folder.mkdir(exist_ok=True)
+    return folder
+
+
+def no_link(path: Path) -> Path:
+    """`path`; raises `InputError` where it is a link, through which something outside of a folder of results would be written."""
+    if path.is_symlink():
+        raise InputError(f"{printable(path)}: a link; results are not written through it: remove it")
     return path
 
 
-def write_together(contents: Mapping[Path, str | bytes]) -> None:
+def write_whole(path: Path, content: str | bytes, *, named: bool = False) -> Path:
+    """Write a file so that a reader sees the old content or the new, never a part. See `write_together`."""
+    write_together({path: content}, named=named)
+    return path
+
+
+def write_together(contents: Mapping[Path, str | bytes], *, named: bool = False) -> None:
     """Write files, text as UTF-8, so that all of them are new or all of them are as they were.
 
-    What is no regular file, such as /dev/stdout, is written as it is; a link stays one. Raises `OSError` that names the file.
+    A link, a pipe or a device that stands in the way is replaced: whoever sent a folder may have put it there. Only where the user
+    `named` this very file is it written as it is, such as /dev/stdout, and a link stays one. Raises `OSError` that names the file.
     """
     finished: list[tuple[str, Path]] = []
     with ExitStack() as leavings:
         for path, content in contents.items():
             try:
                 data = content.encode() if isinstance(content, str) else content
-                target, there = _target(path)
-                if there and not stat.S_ISREG(there) and not stat.S_ISDIR(there):
+                target = Path(os.path.realpath(path)) if named and path.is_symlink() else path
+                if named and path.exists() and not path.is_file() and not path.is_dir():
                     path.write_bytes(data)
                     continue
                 handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:60]}.", suffix=".part")
@@ -42,7 +61,7 @@ def write_together(contents: Mapping[Path, str | bytes]) -> None:
                 with os.fdopen(handle, "wb") as stream:
                     stream.write(data)
                 os.chmod(temporary, 0o644)
-                if stat.S_ISDIR(there):
+                if target.is_dir() and not target.is_symlink():
                     raise IsADirectoryError(21, "Is a directory")
                 finished.append((temporary, target))
             except OSError as error:
@@ -53,17 +72,6 @@ def write_together(contents: Mapping[Path, str | bytes]) -> None:
             except OSError as error:
                 raise _named(error, target) from None
         leavings.pop_all()
-
-
-def _target(path: Path) -> tuple[Path, int]:
-    """The file that a path leads to, and its mode; 0 where it is not there yet."""
-    try:
-        there = os.lstat(path).st_mode
-    except FileNotFoundError:
-        return path, 0
-    if not stat.S_ISLNK(there):
-        return path, there
-    return Path(os.path.realpath(path)), os.stat(path).st_mode if path.exists() else 0
 
 
 def write_new(path: Path, content: str) -> Path:
@@ -86,6 +94,10 @@ def _named(error: OSError, path: Path) -> OSError:
     return OSError(error.errno, error.strerror or str(error), str(path))
 
 
+#: How a cell begins that a spreadsheet would take for a formula; a number, or a sign alone, is none.
+_FORMULA = re.compile(r"[=@＝＠](?!\Z)|[-+－＋](?!(?:inf|nan|\d*+\.?+\d*+(?:[eE][-+]?\d++)?)\Z)")
+
+
 def table_text(columns: Sequence[str], rows: Iterable[Sequence[object]], *, digits: int | None = None) -> str:
     """A table as CSV; floats with all their digits, or with so many significant ones. None and NaN are empty cells."""
     return _csv(columns, ([_cell(value, digits) for value in row] for row in rows))
@@ -93,20 +105,34 @@ def table_text(columns: Sequence[str], rows: Iterable[Sequence[object]], *, digi
 
 def columns_text(columns: Mapping[str, Sequence[object]]) -> str:
     """Columns of one length as CSV, floats with all their digits; NaN are empty cells."""
-    # A value is looked at for itself only in a column that holds a NaN, the one value that does not equal itself.
-    listed = [[_cell(v, None) for v in values] if any(map(operator.ne, values, values)) else values for values in columns.values()]
-    return _csv(list(columns), zip(*listed, strict=True))
+    return _csv(list(columns), zip(*map(_cells, columns.values()), strict=True))
+
+
+def _cells(values: Sequence[object]) -> Sequence[object]:
+    """A column's cells. Numbers are looked at one by one only where there is a NaN, the one value that does not equal itself."""
+    if len(values) and isinstance(values[0], str):
+        shown = {value: _cell(value, None) for value in set(values)}
+        return [shown[value] for value in values]
+    return [_cell(value, None) for value in values] if any(map(operator.ne, values, values)) else values
 
 
 def _csv(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
+    writer.writerow(map(_text, columns))
     writer.writerows(rows)
     return text.getvalue()
 
 
+def _text(text: str) -> str:
+    """Text as a cell that a spreadsheet shows: a formula has an apostrophe before it."""
+    text = inert(text)
+    return f"'{text}" if _FORMULA.match(text) else text
+
+
 def _cell(value: object, digits: int | None) -> object:
+    if isinstance(value, str):
+        return _text(value)
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
     return f"{value:.{digits}g}" if digits is not None and isinstance(value, float) else value

@@ -2,8 +2,9 @@
 
 A sample of all faults that the operators below can make, drawn with a seed: comparisons that include their limit or do not, signs,
 products for quotients, `and` for `or`, negated conditions, changed numbers. Each is planted in a copy of the packages, which is
-interpreted (NUMBA_DISABLE_JIT=1). Faults that survive are printed with file and line; those that nothing can notice are in EQUIVALENT.
-Arguments: `--sample N` faults a file, `--seed N`, `--file NAME`, and after `--` what pytest is given too, such as `--deselect=FILE`.
+interpreted (NUMBA_DISABLE_JIT=1), but for the files in COMPILED. Faults that survive are printed with file and line; those that nothing
+can notice are in EQUIVALENT.
+Arguments: `--sample N` faults a file, `--seed N`, `--file NAME` (repeatable), and after `--` what pytest is given, too.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PARTS = ("scenes", "ebm", "cm", "engines", "validation", "reports")
 CLOSED = "tests/ebm/test_closed_forms.py::test_"
+POPULATION = "tests/validation/studies/test_population.py"
+UNCERTAINTY = "tests/validation/discrepancy/test_uncertainty.py"
 #: Where faults are planted, and the tests that should notice them, the quickest first.
 TARGETS = {
     "ebm/core/series.py": ["tests/ebm/core/test_core_parts.py"],
@@ -64,12 +66,50 @@ TARGETS = {
         "tests/ebm/test_edges.py",
     ],
     "ebm/core/march.py": ["tests/ebm/core/test_core_parts.py", "tests/ebm/test_edges.py"],
+    "scenes/block.py": ["tests/scenes/test_scene.py", "tests/ebm/test_loaded_blocks.py::test_pivots_of_a_block"],
+    "scenes/trust/inputs.py": ["tests/scenes/test_inputs.py", UNCERTAINTY, "-k", "inputs or scene_file or correlated or faults"],
+    "scenes/recordings/sets.py": ["tests/scenes/test_record_sets.py", "tests/scenes/test_recordings.py"],
+    "scenes/recordings/intensity.py": ["tests/scenes/test_recordings.py", "-k", "intensities or spectral or periods"],
+    "validation/uncertainty/verdict.py": [UNCERTAINTY, "-k", "what_a_difference_says"],
+    "validation/uncertainty/numerical.py": [
+        UNCERTAINTY,
+        "-k",
+        "index or order or step or tolerance or peak or small or interval_covers or own_error",
+    ],
+    "validation/uncertainty/population.py": [
+        "tests/validation/discrepancy/test_propagation.py",
+        POPULATION,
+        UNCERTAINTY,
+        "-k",
+        "propagation or sobol or refused or population",
+    ],
+    "validation/studies/population/study.py": [POPULATION],
+    "ebm/horizon.py": ["tests/ebm/test_horizon.py"],
+}
+#: Files that are never compiled, whose tests play more motions than an interpreter can: what they call is compiled.
+COMPILED = {
+    "validation/uncertainty/numerical.py",
+    "validation/uncertainty/population.py",
+    "validation/studies/population/study.py",
+    "ebm/horizon.py",
 }
 #: What hangs is noticed: after so long in the processor, or in twenty times that by the clock, which a busy machine does not reach.
 SECONDS = 180
 #: Faults that change no result, by file, a part of the line (of a number: of the expression that it stands in), the text of the
 #: fault, and why.
 EQUIVALENT = {
+    (
+        "validation/uncertainty/numerical.py",
+        "(1.0, 2.0, ",
+        "1.0  ->  100.0",
+    ): "the finest run is the one at the model's own step: only the factors of the coarser ones are used",
+    (
+        "validation/uncertainty/numerical.py",
+        "largest <= ROUNDING",
+        "largest <= ROUNDING * scale  ->  largest < ROUNDING * scale",
+    ): "equal to the last bit",
+    ("ebm/horizon.py", "tolerance=1e-13", "1e-13  ->  1.0000000000000001e-11"): "still far below the perturbation",
+    ("validation/uncertainty/population.py", "0.9 * draws", "len(known) >= 0.9 * draws  ->  len(known) > 0.9 * draws"): "one more fit of 200",
     ("ebm/core/settle.py", "[SETTLE, -1.0, -1.0", "1.0  ->  100.0"): "any time long before the first impact",
     ("ebm/core/series.py", "stack", "top + 2  ->  top - 2"): "the narrowest interval ends the search before the stack is full",
     ("ebm/core/series.py", "a[row, 0] + low", "a[row, 0] > floor  ->  a[row, 0] >= floor"): "a bound that saves the search, met or not",
@@ -171,22 +211,36 @@ def shown(node: ast.AST) -> str:
     return ast.unparse(node.test if isinstance(node, ast.If | ast.While) else node).replace("\n", " ")[:90]
 
 
+class PlainCore:
+    """For pytest: what is compiled is that of the plain sources here, which no fault changes."""
+
+    def pytest_configure(self) -> None:
+        """Before tests are imported, and with them what is compiled."""
+        from rockcheck.scenes import compiled
+
+        kept = compiled._cache_folder
+        compiled._cache_folder = lambda package: kept(ROOT / package.name)  # type: ignore[assignment]
+
+
 def survives(tree: Path, name: str, source: str, arguments: list[str]) -> bool:
     """Whether all tests pass with this source; what hangs is noticed. In a process that begins with the libraries loaded."""
     path = tree / "rockcheck" / name
     plain = path.read_text(encoding="utf-8")
-    path.write_text(source, encoding="utf-8")
     child = os.fork()
     if child == 0:
         try:
             signal.setitimer(signal.ITIMER_PROF, SECONDS)
             signal.alarm(20 * SECONDS)
+            os.environ["NUMBA_DISABLE_JIT"] = str(int(name not in COMPILED))
+            sys.modules["numba"].config.reload_config()
+            path.write_text(source, encoding="utf-8")
             quiet = os.open(os.devnull, os.O_WRONLY)
             os.dup2(quiet, 1)
             os.dup2(quiet, 2)
             import pytest
 
-            code = int(pytest.main(["-x", "-q", "-p", "no:cacheprovider", "-m", "not slow and not browser", *arguments]))
+            words = ["-x", "-q", "-p", "no:cacheprovider", "-m", "not slow and not browser", *arguments]
+            code = int(pytest.main(words, plugins=[PlainCore()] if name in COMPILED else []))
         except BaseException:
             code = 9
         finally:
@@ -197,14 +251,13 @@ def survives(tree: Path, name: str, source: str, arguments: list[str]) -> bool:
 
 
 def main() -> None:
-    """Plants, runs, counts; exit 1 where fewer than nine of ten are noticed."""
+    """Plants, runs, counts; exit 1 where fewer than 95 of 100 are noticed."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--sample", type=int, default=12)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--file", default="")
+    parser.add_argument("--file", action="append")
     parser.add_argument("pytest", nargs="*")
     asked = parser.parse_args()
-    os.environ["NUMBA_DISABLE_JIT"] = "1"
     os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
     sys.dont_write_bytecode = True
     os.chdir(ROOT)
@@ -212,14 +265,12 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder)
         shutil.copytree(ROOT / "rockcheck", tree / "rockcheck", ignore=shutil.ignore_patterns("__pycache__"))
-        for part in PARTS:
-            shutil.copytree(ROOT / part, tree / "rockcheck" / part, ignore=shutil.ignore_patterns("__pycache__"))
         sys.path.insert(0, folder)
         os.environ["PYTHONPATH"] = folder
         for library in ("numba", "pandas", "pydantic", "scipy.integrate", "scipy.stats"):
             importlib.import_module(library)  # once for all children
         for name, tests in TARGETS.items():
-            if asked.file not in name:
+            if asked.file and not any(part in name for part in asked.file):
                 continue
             source = (ROOT / name).read_text(encoding="utf-8")
             lines = source.splitlines()
@@ -242,7 +293,7 @@ def main() -> None:
             print(f"{name}: {noticed} of {judged} noticed ({len(listed.found)} possible)", flush=True)
             killed, total = killed + noticed, total + judged
     print(f"{killed} of {total} noticed, {100.0 * killed / max(total, 1):.0f} %")
-    sys.exit(killed < 0.9 * total)
+    sys.exit(killed < 0.95 * total)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ from rockcheck.ebm.batch import Packed, pack_pulses, run_batch
 from rockcheck.scenes import Floor, Ricker, Scene
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.scenes.writing import markdown_table
-from rockcheck.validation.bench.ebm import grid, right_hand_side_seconds
+from rockcheck.validation.studies.work_precision.ebm import grid, right_hand_side_seconds
 
 Floats = NDArray[np.float64]
 NODES, ROUNDS, TOLERANCES, REFERENCE = 100, 3, (1e-6, 1e-8, 1e-10), 1e-14

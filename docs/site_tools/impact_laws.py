@@ -1,7 +1,8 @@
-"""Makes the table and the figure of docs/impact_laws.md: which law of impacts each engine follows at flush landings.
+"""Makes the tables and the figure of docs/impact_laws.md: which law of impacts each engine follows at landings where laws part.
 
-`python docs/site_tools/impact_laws.py [LANDINGS]` plays them (160 take half an hour) and writes both. The landings are drawn with a
-seed: a random block stands flush against a wall that bounces and comes back to it, most of them from a tilt, one in eight after a pulse.
+`python docs/site_tools/impact_laws.py flush|flat [LANDINGS]` plays them (160 flush ones take half an hour) and writes their table,
+with the flush ones the figure, too. The landings are drawn with a seed. Flush: a random block stands flush against a wall that
+bounces and comes back to it, most of them from a tilt, one in eight after a pulse. Flat: a random block is dropped while it moves.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import math
 import re
 import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,12 +22,13 @@ from rockcheck.cm import ContinuousModel
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Ricker, Scene, Wall
 from rockcheck.scenes.writing import markdown_table
-from rockcheck.validation.discrepancy.impact_laws import TELLS, FlushLanding, LawFollowed, flush_landing
+from rockcheck.validation.discrepancy.impact_laws import TELLS, Landing, LawFollowed, parting_landing
 from rockcheck.validation.execute.models import Model
 
 LANDINGS, SEED, PULSED = 160, 1, 8
 DOCS = Path(__file__).parents[1]
 COLUMNS = ("closed", "closed or open", "open", "floor-first", "none")
+FLAT_COLUMNS = ("moreau", "moreau or leading-first", "leading-first", "trailing-first", "none")
 COLOURS = {"closed": "#0072b2", "closed or open": "#56b4e9", "open": "#e69f00", "floor-first": "#009e73", "none": "#999999"}
 #: The landing that is drawn, and who is drawn beside the laws.
 EXAMPLE, DRAWN = 3, {"mujoco adaptive": "#d55e00", "dart 1e-05": "#cc79a7", "cm": "#000000"}
@@ -40,8 +42,7 @@ class Row:
     found: Sequence[LawFollowed | None]
     default: Sequence[LawFollowed | None]
 
-    @property
-    def words(self) -> Iterator[str]:
+    def words(self, columns: Sequence[str]) -> Iterator[str]:
         """The row of the table."""
         told = [one for one in self.found if one is not None]
         counts = Counter(one.law for one in told)
@@ -52,7 +53,7 @@ class Row:
             if one is not None and usual is not None and set(one.law.split(" or ")) & set(usual.law.split(" or "))
         ]
         yield f"`{self.model}`"
-        yield from (str(counts[law] or "") for law in COLUMNS)
+        yield from (str(counts[law] or "") for law in columns)
         yield f"`{np.median(errors):.0e} ({min(errors):.0e} … {max(errors):.0e})`" if errors else ""
         yield f"{sum(error < TELLS for error in alike)}/{len(alike)}"
 
@@ -78,12 +79,40 @@ def landing(number: int) -> Scene:
         period = 2.0 * math.pi / (scene.frequency_parameter * r.uniform(3.0, 6.0))
         pulse = Ricker(amplitude=9.81 * math.tan(alpha) * r.uniform(1.5, 4.0), period=period)
         scene = scene.replace(excitation=pulse, initial_rotation=0.0, initial_angular_velocity=0.0)
-    found = flush_landing(scene)
+    found = parting_landing(scene)
     by_rule = found and found.followed_by(EventBasedModel(pivot="unilateral", impacts="floor-first").simulate(scene), scene)
     if found is None or by_rule is None or by_rule.law != "floor-first":
         return landing(number + 1000 * PULSED)  # it fell, never came back, or tells little: another one of its kind
+    return _as_long_as(scene, found)
+
+
+def flat_landing(number: int) -> Scene:
+    """A block, floor and drop at random; it lands flat while it slides."""
+    r = np.random.default_rng([SEED, number])
+    alpha = r.uniform(0.1, 0.4)
+    scene = Scene(
+        name=f"landing {number}",
+        block=Block(half_width=math.sin(alpha), half_height=math.cos(alpha)),  # R = 1 m
+        floor=Floor(friction=float(r.uniform(0.2, 1.0))),
+        initial_height=float(r.uniform(0.005, 0.05)),
+        initial_velocity=float(r.choice([-1.0, 1.0]) * r.uniform(0.2, 2.0)),
+        duration=0.5,
+        output_step=0.002,
+    )
+    found = parting_landing(scene)
+    return flat_landing(number + 1000) if found is None else _as_long_as(scene, found)
+
+
+def _as_long_as(scene: Scene, found: Landing) -> Scene:
     told = scene.output_step * (found.start + max(len(motion) for motion in found.branches.values()))
     return scene.replace(duration=min(scene.duration, told))
+
+
+#: The kinds of landings, and the columns of their tables.
+KINDS: dict[str, tuple[Callable[[int], Scene], Sequence[str]]] = {
+    "flush": (landing, COLUMNS),
+    "flat": (flat_landing, FLAT_COLUMNS),
+}
 
 
 def models() -> dict[str, Model]:
@@ -100,7 +129,7 @@ def models() -> dict[str, Model]:
 
 def played(scenes: Sequence[Scene]) -> Iterator[Row]:
     """The rows, one after the other."""
-    landings = [where for scene in scenes if (where := flush_landing(scene))]
+    landings = [where for scene in scenes if (where := parting_landing(scene))]
 
     def followed(model: Model) -> list[LawFollowed | None]:
         return [_followed(where, scene, model) for where, scene in zip(landings, scenes, strict=True)]
@@ -110,7 +139,7 @@ def played(scenes: Sequence[Scene]) -> Iterator[Row]:
         yield Row(words, followed(model), default)
 
 
-def _followed(where: FlushLanding, scene: Scene, model: Model) -> LawFollowed | None:
+def _followed(where: Landing, scene: Scene, model: Model) -> LawFollowed | None:
     try:
         return where.followed_by(model.simulate(scene), scene)
     except (InputError, ModelFailure) as error:
@@ -125,7 +154,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     figure = Figure(figsize=(8.0, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
     scene = landing(EXAMPLE)
-    where = flush_landing(scene)
+    where = parting_landing(scene)
     assert where is not None
     milliseconds = 1e3 * (scene.output_times - where.t)
     for law, rotation in where.branches.items():
@@ -156,25 +185,28 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     figure.savefig(path, dpi=130)
 
 
-def publish(rows: Sequence[Row]) -> None:
+def publish(kind: str, rows: Sequence[Row]) -> None:
     """Write the table into the page, and the figure beside it."""
-    head = ("model", *COLUMNS, "α off it: median (range)", "as the default")
-    table = markdown_table(head, [tuple(row.words) for row in rows])
+    columns = KINDS[kind][1]
+    head = ("model", *columns, "α off it: median (range)", "as the default")
+    table = markdown_table(head, [tuple(row.words(columns)) for row in rows])
     page = DOCS / "impact_laws.md"
     text = page.read_text(encoding="utf-8")
-    page.write_text(re.sub(r"(<!-- table -->\n).*?(\n<!-- end -->)", rf"\g<1>\n{table}\n\2", text, flags=re.S), encoding="utf-8")
-    draw(rows, DOCS / "images" / "impact-laws.png")
+    place = rf"(<!-- {kind} -->\n).*?(\n<!-- end -->)"
+    page.write_text(re.sub(place, rf"\g<1>\n{table}\n\2", text, flags=re.S), encoding="utf-8")
+    if kind == "flush":
+        draw(rows, DOCS / "images" / "impact-laws.png")
 
 
-def main() -> None:
+def main(kind: str, landings: str = str(LANDINGS)) -> None:
     """Plays, and writes what was found."""
-    scenes = [landing(number) for number in range(int(sys.argv[1]) if len(sys.argv) > 1 else LANDINGS)]
+    drawn, columns = KINDS[kind]
     rows = []
-    for row in played(scenes):
+    for row in played([drawn(number) for number in range(int(landings))]):
         rows.append(row)
-        print(*row.words, sep="; ", file=sys.stderr, flush=True)
-    publish(rows)
+        print(*row.words(columns), sep="; ", file=sys.stderr, flush=True)
+    publish(kind, rows)
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])

@@ -20,8 +20,13 @@ SLOW = 1e-9
 
 @inner_kernel
 def lower(b, z):
-    """The side of the lower corner, the pivot: that to which the block tips, or, upright, begins to tip."""
-    return side_of(b, z[THETA] if z[THETA] != 0.0 else z[W])
+    """The side of the lower corner, the pivot: that to which the block tips, or begins to tip.
+
+    Upright and at rest both are equally low, to rounding. It is the weaker one then: its distance is
+    the unit of length, so its height is right to the bit, and a mirror image has the mirrored corner.
+    """
+    sense = z[THETA] if z[THETA] != 0.0 else z[W]
+    return side_of(b, sense if sense != 0.0 else b.right.arm - b.left.arm)
 
 
 @inner_kernel

@@ -34,8 +34,8 @@ from rockcheck.ebm.core.series import WIDTH, slope, value
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 #: The laws of impacts at several contacts (see ebm.core.laws.contact_impacts).
-LAWS = ("moreau", "closed", "open", "floor-first")
-MOREAU, CLOSED_BRANCH, OPEN_BRANCH, FLOOR_FIRST = range(4)
+LAWS = ("moreau", "closed", "open", "floor-first", "leading-first", "trailing-first")
+MOREAU, CLOSED_BRANCH, OPEN_BRANCH, FLOOR_FIRST, LEADING_FIRST, TRAILING_FIRST = range(6)
 
 
 class Side(NamedTuple):

@@ -27,7 +27,10 @@ GRAZES = 8
 LANDS_ALONG = 9
 #: Bouc-Wen: beyond Painleve's limit on a wall the motion goes on with the pull.
 PULLS = 10
-RULES = 11
+#: Both bottom corners strike the floor at once: they share the impact, unless the law of impacts
+#: names the one that is first.
+FLAT_LANDING = 11
+RULES = 12
 
 NAMES = (
     "hangs flat",
@@ -41,4 +44,5 @@ NAMES = (
     "grazes",
     "lands along a wall",
     "pulls beyond Painleve",
+    "flat landing",
 )

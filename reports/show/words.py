@@ -10,6 +10,7 @@ import numpy as np
 
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, Spectrum
 from rockcheck.scenes import Block, History, Record, Rest, Ricker, Scene, Sine
+from rockcheck.scenes.errors import inert
 from rockcheck.validation.discrepancy import Discrepancy
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -31,13 +32,13 @@ def html_table(caption: str, rows: Iterable[Sequence[object]], head: Sequence[ob
 
     def line(row: Sequence[object], first: str, other: str) -> str:
         tags = [first, *[other] * (len(row) - 1)]
-        texts = (f'<{tag} style="text-align: left">{escape(str(cell))}</{tag[:2]}>' for cell, tag in zip(row, tags, strict=True))
+        texts = (f'<{tag} style="text-align: left">{escape(inert(str(cell)))}</{tag[:2]}>' for cell, tag in zip(row, tags, strict=True))
         return f"<tr>{''.join(texts)}</tr>"
 
     column, row_name = 'th scope="col"', 'th scope="row"'
     lines = [line(head, column, column)] if head else []
     lines += [line(row, "td" if head else row_name, "td") for row in rows]
-    return f'<table><caption style="text-align: left"><b>{escape(caption)}</b></caption>{"".join(lines)}</table>'
+    return f'<table><caption style="text-align: left"><b>{escape(inert(caption))}</b></caption>{"".join(lines)}</table>'
 
 
 def excitation_words(excitation: Rest | Ricker | Sine | Record) -> str:

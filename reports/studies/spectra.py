@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Sequence
 from functools import partial
 from hashlib import sha256
@@ -16,7 +15,8 @@ from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, axis_labels, draw
 from rockcheck.reports.site import PAGES, STUDIES, Site
 from rockcheck.reports.studies.nodes import write_nodes
 from rockcheck.reports.style import FORMATS, LOOKS, PAGE, figure_style, keep_drawn
-from rockcheck.scenes import Scene
+from rockcheck.scenes import InputError, Scene
+from rockcheck.scenes.reading import read_json, within
 from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.discrepancy.figures import Stored
@@ -367,8 +367,8 @@ def _studies(data: Path, papers: bool) -> dict[str, Any]:
 
 def _stored(folder: Path, name: str, kind: type[Stored]) -> Any:
     try:
-        return kind.model_validate_json((folder / f"{name}.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return kind.model_validate(read_json(within(folder, f"{name}.json")))
+    except ValueError:
         return None
 
 
@@ -391,6 +391,6 @@ def _links(folder: Path) -> tuple[tuple[str, str], ...]:
 
 def _read(path: Path) -> Any:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return read_json(within(path.parent, path.name))
+    except InputError:
         return None

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rockcheck.reports.studies.page import write_study
 from rockcheck.reports.style import PAGE, figure_style, save
+from rockcheck.scenes.writing import made
 from rockcheck.validation.stress.invariants import INVARIANTS
 from rockcheck.validation.stress.players import PLAYERS
 from rockcheck.validation.stress.results import Stress
@@ -23,7 +24,7 @@ MAPS = "stable-steps"
 def write_stress(found: Stress, folder: Path) -> Path:
     """Writes `index.html` into the folder of a stress run; returns the page."""
     if found.stability is not None:
-        save(stability_figure(found.stability), folder / "figures" / MAPS)
+        save(stability_figure(found.stability), made(folder, "figures") / MAPS)
     return write_study(
         found,
         folder,

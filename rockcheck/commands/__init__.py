@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import tempfile
+import threading
 import time
 import tomllib
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
@@ -18,9 +20,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from rockcheck.scenes import History, InputError, named_scenes
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes.errors import inert, printable
 from rockcheck.scenes.progress import OnProgress, announcing
-from rockcheck.scenes.writing import json_text
+from rockcheck.scenes.recordings.sets import Odd
+from rockcheck.scenes.writing import json_text, made
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,7 +33,13 @@ if TYPE_CHECKING:
 
 OUT = Path("rockcheck-report")
 
-OutOption = Annotated[Path, typer.Option("--out", help="Folder to write; the page to open is index.html in it.")]
+
+def out_option(page: str = "index.html") -> Any:
+    """--out, of a command that writes this page."""
+    return typer.Option("--out", help=f"Folder to write; the page to open is {page} in it.")
+
+
+OutOption = Annotated[Path, out_option()]
 JobsOption = Annotated[int | None, typer.Option("--jobs", min=1, help="Worker processes (default: one a core).")]
 SchedulerOption = Annotated[
     str | None, typer.Option("--scheduler", help="Run on a Dask cluster instead: its address, or local:N for N local workers.")
@@ -93,11 +102,7 @@ class _Screen(Console):
     """A console whose text steers no terminal: paths, and names in files that somebody sent, may hold any characters."""
 
     def print(self, *objects: Any, **options: Any) -> None:
-        super().print(*(_harmless(one) if isinstance(one, str) else one for one in objects), **options)
-
-
-def _harmless(text: str) -> str:
-    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
+        super().print(*(inert(one) if isinstance(one, str) else one for one in objects), **options)
 
 
 def console() -> Console:
@@ -121,10 +126,12 @@ def tell_notes(history: History, of: str = "") -> None:
 
 
 def tell_left_out(names: Sequence[str], hint: str = "") -> None:
-    """Names the vertical components of a set of records, which are not played as if they were horizontal; `hint`: what plays them."""
-    if names:
-        said = f"vertical; {hint}" if hint else "vertical"
-        console().print(f"left out: {', '.join(names)} ({said})", style="yellow", soft_wrap=True)
+    """Names what of a set of records is not played: vertical components (`hint`: what plays them), and files that are no records."""
+    vertical = [name for name in names if not isinstance(name, Odd)]
+    said = f"vertical; {hint}" if hint else "vertical"
+    lines = [f"{', '.join(vertical)} ({said})"] if vertical else []
+    for line in [*lines, *(name for name in names if isinstance(name, Odd))]:
+        console().print(f"left out: {line}", style="yellow", soft_wrap=True)
 
 
 def answer(value: Any) -> None:
@@ -135,9 +142,63 @@ def answer(value: Any) -> None:
 
 @contextmanager
 def progress(title: str) -> Iterator[OnProgress]:
-    """A bar on stderr with the time left, on a terminal only."""
+    """How far the work is and the time left, on stderr: a bar on a terminal, elsewhere lines; nothing where a command is quiet."""
     screen = Console(stderr=True)
-    shown = screen.is_terminal and _voice.get() == "tables"
+    if _voice.get() == "tables" and screen.is_terminal:
+        with _bar(title, screen) as on_progress:
+            yield on_progress
+        return
+    lines, over = _Lines(title), threading.Event()
+    if _voice.get() != "quiet":
+        threading.Thread(target=lines.watch, args=[over], daemon=True).start()
+    try:
+        yield lines.on_progress
+    finally:
+        over.set()
+
+
+#: Between two lines on a long work, s; and when the first one comes, if the work will then last longer than that.
+EVERY, EARLY = 10.0, 2.0
+
+
+class _Lines:
+    """Lines on how far the work is, for a log or whoever reads no terminal; none on a work of a few seconds."""
+
+    def __init__(self, title: str) -> None:
+        self.title, self.began = title, time.monotonic()
+        self.first: tuple[float, float] | None = None  # when something was told for the first time, and how much was done then
+        self.done, self.total, self.what = 0.0, 0.0, ""
+
+    def on_progress(self, done: float, total: float, what: str = "") -> None:
+        """An `OnProgress`."""
+        self.first = self.first or (time.monotonic(), done)
+        self.done, self.total, self.what = done, total, what
+
+    def left(self) -> float:
+        """Expected time left, s; infinite where nothing is done yet."""
+        when, before = self.first or (0.0, self.done)
+        gone = self.done - before
+        return (time.monotonic() - when) * (self.total - self.done) / gone if gone > 0.0 else math.inf
+
+    def watch(self, over: threading.Event) -> None:
+        """Writes the lines until it is `over`."""
+        if not over.wait(EARLY) and EVERY < self.left() < math.inf:
+            self.say()
+        while not over.wait(EVERY):
+            self.say()
+
+    def say(self) -> None:
+        """Writes one line."""
+        left = self.left()
+        seconds, words = (left, "left") if left < math.inf else (time.monotonic() - self.began, "so far")
+        parts = f"{self.done:.0f} of {self.total:.0f}, " if self.total else ""
+        what = f" ({printable(self.what, 60)})" if self.what else ""
+        told = f"{self.title}: {parts}{int(seconds) // 60}:{int(seconds) % 60:02d} {words}{what}"
+        print(f"rockcheck: {told}", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def _bar(title: str, screen: Console) -> Iterator[OnProgress]:
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(20),
@@ -147,9 +208,8 @@ def progress(title: str) -> Iterator[OnProgress]:
         TextColumn("left"),
         console=screen,
         transient=True,
-        disable=not shown,
     )
-    with bar if shown else nullcontext():  # older versions of rich end a bar that is not shown with an empty line
+    with bar:
         task = bar.add_task(title, total=None)
 
         def on_progress(done: float, total: float, what: str = "") -> None:
@@ -206,7 +266,7 @@ def save_picture(figure: Figure, path: Path) -> None:
     """Write a figure as PNG, and say so."""
     from rockcheck.reports.style import save
 
-    (written,) = save(figure, path.with_suffix(""), ("png",))
+    (written,) = save(figure, path.with_suffix(""), ("png",), named=True)
     console().print(f"picture: {written}", soft_wrap=True)
 
 
@@ -221,10 +281,11 @@ def report_file(text: str) -> str:
     return path
 
 
-def usable_folder(path: Path) -> Path:
-    """`path`, made if need be; raises `InputError` where it cannot be written."""
+def usable_folder(folder: Path, *parts: str) -> Path:
+    """A folder, or one within it, made if need be; raises `InputError` where it cannot be written, or lies behind a link in `folder`."""
+    path = folder.joinpath(*parts)
     try:
-        path.mkdir(parents=True, exist_ok=True)
+        made(folder, *parts)
     except OSError as error:
         raise InputError(f"{printable(path)}: cannot be used as a folder: {error.strerror}") from None
     if not os.access(path, os.W_OK | os.X_OK):

@@ -6,31 +6,34 @@ from typing import Annotated
 
 import typer
 
-from rockcheck.commands import OUT, AllowCodeOption, JobsOption, OutOption, SchedulerOption, answer, console, usable_folder
-from rockcheck.commands.run import ForceOption, tell_faults
-from rockcheck.commands.validate import SuiteArgument, play_suite
+from rockcheck.commands import OUT, AllowCodeOption, JobsOption, OutOption, SchedulerOption, answer, console, tell_left_out, usable_folder
+from rockcheck.commands.validate import SuiteArgument, play, tell_faults
 from rockcheck.validation.suite.acceptance import accept
 from rockcheck.validation.suite.suites import load_suite
 
 
 def run(
     suite: SuiteArgument = None,
-    reason: Annotated[str | None, typer.Option("--reason", help="Why limits may be loosened; it is written into the file.")] = None,
+    reason: Annotated[
+        str | None, typer.Option("--reason", help="Why limits are loosened or figures moved; it is written into the file.")
+    ] = None,
     out: OutOption = OUT,
     jobs: JobsOption = None,
-    force: ForceOption = False,
     scheduler: SchedulerOption = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Show the changes, write none.")] = False,
     allow_code: AllowCodeOption = None,
 ) -> None:
     """Make today's figures the expected ones.
 
-    They are written into the suite's tolerances, each change is shown. Limits are loosened only with --reason.
+    They are written into the suite's tolerances, each change is shown: new, tightened, loosened or
+    moved, the last two only with --reason.
     """
     name = suite or "paper"
     folder = usable_folder(out)
-    finished = play_suite(name, folder, jobs, force, False, scheduler, allow_code)
-    changes, refused = accept(load_suite(name, allow_code=allow_code or ()), finished, reason, write=not dry_run)
+    loaded = load_suite(name, allow_code=allow_code or ())
+    tell_left_out(loaded.left_out)
+    finished = play(loaded, folder, jobs, False, False, scheduler)
+    changes, refused = accept(loaded, finished, reason, write=not dry_run)
     screen = console()
     for line in changes:
         screen.print(line, soft_wrap=True)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from rockcheck.commands import answer, console, model_names
+from rockcheck.commands import answer, console, model_names, progress
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 
@@ -36,7 +36,8 @@ def run(
         if not (0.0 if name == "restitution" else 1e-6) <= value <= most:
             raise InputError(f"{value:g} is not allowed: give at most {most:g}", f"--{name}")
     limit = {} if penetration is None else {"penetration": penetration}
-    found = calibrate(engine, restitution=restitution, friction=friction, step=step, **limit)
+    with progress("calibrate"):
+        found = calibrate(engine, restitution=restitution, friction=friction, step=step, **limit)
     table = Table(box=None, pad_edge=False, show_header=False)
     for where, what in found.parameters.items():
         table.add_row(where, what)

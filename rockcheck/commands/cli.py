@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import inspect
+import itertools
 import os
 import sys
 import time
@@ -29,25 +30,35 @@ COMMANDS = {
     "new": ("new", "rockcheck new bookcase.toml"),
     "record": ("record", "rockcheck record station.V2 --read component=1 --plot station.png"),
     "simulate": ("simulate", "rockcheck simulate fig5a --model mujoco --set time_step=1e-3 -o mujoco.csv"),
-    "run": ("run", "rockcheck run fig5a --models ebm,cm,mujoco"),
     "compare": ("compare", "rockcheck compare ebm.csv mujoco.csv --until 8"),
     "uncertainty": ("uncertainty", "rockcheck uncertainty fig5a --model mujoco --set time_step=1e-3"),
     "validate": ("validate", "rockcheck validate smoke --out rockcheck-report"),
     "accept": ("accept", 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"'),
-    "diff": ("diff", "rockcheck diff last-week rockcheck-report"),
     "spectrum": ("spectrum", "rockcheck spectrum --figure 8 --size 50 --refine"),
     "ida": ("ida", "rockcheck ida shelf.toml records --intensity sa:0.5"),
     "benchmark": ("benchmark", "rockcheck benchmark --quick"),
     "conformance": ("conformance", "rockcheck conformance --engine mujoco --settings default"),
     "calibrate": ("calibrate", "rockcheck calibrate --engine mujoco --restitution 0.5 --step 1e-3"),
     "stress": ("stress", "rockcheck stress --quick"),
-    "report": ("report", "rockcheck report rockcheck-report"),
-    "figure": ("figure", "rockcheck figure rockcheck-report fig4a -o fig4a.pdf"),
+    "report": ("report", "rockcheck report rockcheck-report --scene fig4a -o fig4a.pdf"),
     "warm": ("warm", "rockcheck warm"),
 }
 
+#: What to call in place of a command that is gone.
+GONE = {
+    "run": "rockcheck validate SCENE",
+    "diff": "rockcheck compare RUN_A RUN_B",
+    "figure": "rockcheck report DIR --scene NAME -o FILE",
+    "convergence": "rockcheck benchmark convergence",
+}
+#: Commands that are not listed.
+HIDDEN = ("warm",)
+
 #: Commands that answer at once: nobody asks how long they took.
-AT_ONCE = ("scenes", "new", "record", "compare", "diff")
+AT_ONCE = ("scenes", "new", "record", "compare")
+
+#: Options whose value may be left out, with their values: it is then the first.
+BARE = {"--strict": ("worse", "both")}
 
 #: Exit code of a run that Ctrl-C ended.
 INTERRUPTED = 130
@@ -82,10 +93,21 @@ def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
     return command
 
 
+def _with_value(word: str, after: str) -> str:
+    """An argument, with the value of its option where that is left out."""
+    values = BARE.get(word)
+    return f"{word}={values[0]}" if values and after not in values else word
+
+
 class _EachOnce(typer.core.TyperCommand):
-    """A command whose options may be given once, but for those that gather several values: the last would silently win."""
+    """A command whose options may be given once, but for those that gather several values: the last would silently win.
+
+    An option of `BARE` may be given without its value.
+    """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        if any(name in BARE for parameter in self.params for name in parameter.opts):
+            args = [_with_value(*pair) for pair in itertools.pairwise([*args, ""])]
         _, _, order = self.make_parser(ctx).parse_args(args=list(args))
         for option in order:
             single = isinstance(option, typer.core.TyperOption) and not (option.multiple or option.is_flag or option.count)
@@ -120,6 +142,14 @@ class _Commands(typer.core.TyperGroup):
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
         self.commands = cast(Any, _Loaded())
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return [name for name in COMMANDS if name not in HIDDEN]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        if cmd_name in GONE:
+            raise InputError(f"the command {cmd_name} is gone: {GONE[cmd_name]}")
+        return super().get_command(ctx, cmd_name)
 
 
 app = typer.Typer(

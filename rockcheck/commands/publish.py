@@ -15,7 +15,7 @@ from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.reading import read_text
-from rockcheck.scenes.writing import write_whole
+from rockcheck.scenes.writing import no_link, write_whole
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.tables import checks_csv, figures_csv
 from rockcheck.validation.suite.verdicts import junit, markdown
@@ -28,7 +28,7 @@ SILENT, PATIENCE = 2.0, 600.0
 @contextmanager
 def _turn(folder: Path) -> Iterator[None]:
     """Within this block no other run writes into `folder`. A run that waits says for which one, and gives up after `PATIENCE` s."""
-    lock = FileLock(folder / LOCK)
+    lock = FileLock(no_link(folder / LOCK))
     try:
         lock.acquire(timeout=SILENT)
     except Timeout:

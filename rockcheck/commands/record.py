@@ -9,11 +9,11 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from rockcheck.commands import answer, check_picture, console, save_picture, setting_of
+from rockcheck.commands import answer, check_picture, console, save_picture, setting_of, tell_left_out
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
-from rockcheck.scenes.recordings import Reading, Recording, intensity, read_components
-from rockcheck.scenes.recordings.sets import files_of
+from rockcheck.scenes.recordings import UNITS, Reading, Recording, intensity, read_components
+from rockcheck.scenes.recordings.sets import Odd, files_of
 from rockcheck.validation.finding import Finding, Table, Text, text
 
 ReadOption = Annotated[
@@ -22,7 +22,7 @@ ReadOption = Annotated[
         "--read",
         metavar="KEY=VALUE",
         help="What a file does not say of itself, or which part of it is wanted; repeatable. unit:"
-        " g, m/s2, cm/s2, gal or mm/s2; time_step, s; column: that of the accelerations, its number"
+        f" {', '.join(UNITS)}; time_step, s; column: that of the accelerations, its number"
         " from 1, or its name; header_lines to skip; decimal: . or ,; component: its number from 1,"
         " or its name.",
     ),
@@ -56,12 +56,13 @@ def run(
     check_picture(plot)
     reading = reading_of(read)
     found: list[tuple[Path, Recording]] = []
-    faults: list[InputError] = []
-    for path in files_of(files):
+    faults: list[Odd] = []
+    asked = files_of(files)
+    for path in asked:
         try:
             found += [(path, one) for one in read_components(path, reading)]
         except InputError as error:
-            faults.append(error)
+            faults.append(Odd(error))
     values = [_values(path, record) for path, record in found]
     for (path, record), value in zip(found, values, strict=True):
         _show(path, record, value)
@@ -70,11 +71,8 @@ def run(
     if found:
         answer(values[0] if len(values) == 1 else {"records": values})
     if faults:
-        more = (
-            f"; {len(faults)} files of {len(faults) + len({path for path, _ in found})} are not read"
-            if len(faults) > 1
-            else ""
-        )
+        tell_left_out(faults[1:])
+        more = f"; {len(faults)} files of {len(asked)} are not read" if len(faults) > 1 else ""
         raise InputError(f"{faults[0]}{more}")
 
 

@@ -19,10 +19,10 @@ from rich.table import Table
 from rockcheck.commands import (
     OUT,
     JobsOption,
-    OutOption,
     SchedulerOption,
     answer,
     console,
+    out_option,
     progress,
     scene_names,
     studied,
@@ -92,7 +92,7 @@ def run(
     ] = False,
     read: ReadOption = None,
     printed: Annotated[bool, typer.Option("--print", help="Write the figures as PDF and PNG, too.")] = False,
-    out: OutOption = OUT,
+    out: Annotated[Path, out_option("spectra.html")] = OUT,
     jobs: JobsOption = None,
     scheduler: SchedulerOption = None,
     force: Annotated[bool, typer.Option("--force", help="Run everything again, also what is up to date.")] = False,
@@ -117,7 +117,7 @@ def run(
         how = {"out": out / "fragility", "jobs": jobs, "scheduler": scheduler, "force": force}
         _fragility(panels, request, records or (), read or (), **how)
     folder = usable_folder(out)
-    data = usable_folder(folder / SPECTRA)
+    data = usable_folder(folder, SPECTRA)
     formats = ("svg", "png", "pdf") if printed else ("svg",)
     screen = console()
     with contextlib.ExitStack() as stack:
@@ -191,10 +191,10 @@ def _spectra(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, da
     drawn: list[Future[float]] = []
     with threads(1) as drawing:
         with progress("spectra") as on_progress:
-            laws = sum(other_settings(panel, request) is not None for panel in panels)
+            laws = sum(len(other_settings(panel, request)) for panel in panels)
             tiles.count = Count(on_progress, nodes * (len(panels) + laws))
             for group in groups:
-                found = play_panels(group, request, tiles, both_laws=True)
+                found = play_panels(group, request, tiles, all_laws=True)
                 spectra += found
                 aside = sum(one.result() for one in drawn if one.done())
                 drawn.append(drawing.submit(_draw, group, found, request.model, data, formats))

@@ -28,7 +28,7 @@ from rockcheck.scenes.recordings.recording import (
 
 AT2_HEADER = re.compile(rf"NPTS\s*+=\s*+(\d++)\s*+(?:,\s*+)?DT\s*+=\s*+({NUMBER})", re.IGNORECASE)
 AT2_HEADER_PLAIN = re.compile(rf"^\s*+(\d++)\s++({NUMBER})\s++NPTS\s*+(?:,\s*+)?DT", re.IGNORECASE)
-_UNITS_G = re.compile(r"UNITS?\s++(?:(?:OF|IN|ARE|:)\s*+)?\(?G(?:'?S)?\b", re.IGNORECASE)
+_UNITS = re.compile(r"UNITS?(?:\s++|\s*+:\s*+)(?:(?:OF|IN|ARE|:)\s*+)?\(?([A-Z0-9^*'²]++(?:\s*+/\s*+[A-Z0-9^*²]++)*+)", re.IGNORECASE)
 _ESM_LINE = re.compile(r"([A-Z][A-Z0-9_^/]*+)\s*+:(.*+)")
 _KNET_SCALE = re.compile(rf"({NUMBER})\s*+\(gal\)\s*+/\s*+({NUMBER})", re.IGNORECASE)
 _KNET_RATE = re.compile(rf"({NUMBER})\s*+(?:Hz)?", re.IGNORECASE)
@@ -44,13 +44,13 @@ def read_at2(path: Path, lines: list[str], reading: Reading) -> Recording:
             break
     if header is None or match is None:
         raise fault(path, "no header line with NPTS and DT within the first 20 lines")
-    stated = "g" if any(_UNITS_G.search(line) for line in lines[: header + 1]) else ""
+    stated = next(filter(None, (known_unit(word) for line in lines[: header + 1] for word in _UNITS.findall(line))), "")
     if not stated and reading.unit is None:
-        raise fault(path, f"no header line that states UNITS OF G; give the unit: {option('unit', 'cm/s2')}")
+        raise fault(path, f"no header line that states UNITS OF G or another; give the unit: {option('unit', 'cm/s2')}")
     unit = settled_unit(path, stated, reading)
     count = checked_count(path, header + 1, "NPTS", match[1])
     step = settled_step(path, checked_step(path, header + 1, "DT", match[2]), reading)
-    values = numbers(path, enumerate(lines[header + 1 :], header + 2))
+    values = numbers(path, enumerate(lines[header + 1 :], header + 2), count)
     if len(values) != count:
         raise fault(path, f"NPTS says {count}, the file has {len(values)} samples", header + 1)
     return Recording(samples=np.array(values) * UNITS[unit], time_step=step, unit=unit, form="PEER AT2", component=_at2_component(lines))

@@ -47,7 +47,6 @@ def spectral_acceleration(record: Recording, period: float, damping: float = 0.0
     from scipy.signal import cont2discrete, lfilter
 
     rate = 2.0 * math.pi / period
-    end = record.time_step * (len(record.samples) - 1)
     parts = max(math.ceil(_STEPS * record.time_step / period), 1)
     parts = max(min(parts, _MOST_STEPS // len(record.samples)), 1)
     step = record.time_step / parts
@@ -55,5 +54,5 @@ def spectral_acceleration(record: Recording, period: float, damping: float = 0.0
     ground = np.interp(step * np.arange(count), record.time_step * np.arange(len(record.samples)), record.samples)
     tail = np.zeros(min(math.ceil(period / step), _MOST_STEPS))
     above, below, _ = cont2discrete(([rate * rate], [1.0, 2.0 * damping * rate, rate * rate]), step, method="foh")
-    response = lfilter(np.ravel(above), below, np.concatenate([ground, tail]) if end > 0.0 else ground)
+    response = lfilter(np.ravel(above), below, np.concatenate([ground, tail]))
     return float(np.max(np.abs(response))) / GRAVITY_OF_RECORDS

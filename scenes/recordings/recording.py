@@ -19,21 +19,16 @@ from rockcheck.scenes.errors import InputError, printable
 GRAVITY_OF_RECORDS = 9.80665  # m/s^2, the unit "g" of record files (standard gravity)
 MOST_SAMPLES = 10_000_000
 
-Unit = Literal["g", "m/s2", "cm/s2", "gal", "mm/s2"]
+Unit = Literal["g", "m/s2", "cm/s2", "gal", "mm/s2", "ft/s2"]
 #: m/s^2 in each unit that a record may have.
-UNITS: dict[str, float] = {"g": GRAVITY_OF_RECORDS, "m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "mm/s2": 0.001}
+UNITS: dict[str, float] = {"g": GRAVITY_OF_RECORDS, "m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "mm/s2": 0.001, "ft/s2": 0.3048}
 
 # Whatever repeats is possessive: what does not match ends after one pass, however long the line.
 NUMBER = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eEdD][-+]?\d++)?"
 _NUMBER = re.compile(NUMBER)
 _EXPONENT = str.maketrans("dD", "ee")
-_SPELLINGS = {
-    "g": r"g(?:'?s)?",
-    "m/s2": r"m/s/s|m/s(?:\^|\*\*)?2|m/sec/sec|m/sec(?:\^|\*\*)?2",
-    "cm/s2": r"cm/s/s|cm/s(?:\^|\*\*)?2|cm/sec/sec|cm/sec(?:\^|\*\*)?2",
-    "gal": r"gals?",
-    "mm/s2": r"mm/s/s|mm/s(?:\^|\*\*)?2|mm/sec/sec|mm/sec(?:\^|\*\*)?2",
-}
+_PER_SECOND_SQUARED = r"/s(?:ec)?(?:/s(?:ec)?|(?:\^|\*\*)?2)"
+_SPELLINGS = {unit: unit.replace("/s2", _PER_SECOND_SQUARED) for unit in UNITS} | {"g": r"g(?:'?s)?", "gal": r"gals?"}
 _SPELT = {unit: re.compile(pattern, re.IGNORECASE) for unit, pattern in _SPELLINGS.items()}
 
 Word = Annotated[str, StringConstraints(min_length=1, max_length=100)]
@@ -108,9 +103,22 @@ def is_number(word: str) -> bool:
     return _NUMBER.fullmatch(word) is not None
 
 
-def numbers(path: Path, lines: Iterable[tuple[int, str]]) -> list[float]:
-    """All numbers of numbered lines, between blanks."""
-    return [number(path, n, word) for n, line in lines for word in line.split()]
+def numbers(path: Path, lines: Iterable[tuple[int, str]], count: int = 0) -> list[float]:
+    """All numbers of numbered lines, between blanks; where some have run together and there are `count`, in columns of one width."""
+    rows = [(n, line.rstrip()) for n, line in lines if not line.isspace() and line]
+    cells = [(n, word) for n, line in rows for word in line.split()]
+    if count and not all(is_number(word) for _, word in cells):
+        cells = _columns(rows, count) or cells
+    return [number(path, n, word) for n, word in cells]
+
+
+def _columns(rows: list[tuple[int, str]], count: int) -> list[tuple[int, str]]:
+    """The cells of so many numbers in columns of one width, as Fortran writes them; [] where the lines are not cut so."""
+    width, rest = divmod(sum(len(line) for _, line in rows), count)
+    uneven = len({len(line) for _, line in rows[:-1]}) > 1 or any(len(line) % width for _, line in rows if width)
+    if rest or uneven or not width:
+        return []
+    return [(n, line[k : k + width].strip()) for n, line in rows for k in range(0, len(line), width)]
 
 
 def known_unit(text: str) -> str:

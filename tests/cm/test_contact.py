@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
@@ -14,6 +15,7 @@ from rockcheck.cm.contact import (
     least_restitution,
     normal_forces,
     restitution_of,
+    shared_mass,
 )
 
 
@@ -126,3 +128,12 @@ def test_effective_mass_is_the_impulse_of_the_rigid_impact(mu, k_c):
 def test_effective_mass_of_a_corner_that_slides_on():
     assert effective_mass(1.2, 3.8, 0.7, -1.0, 50.0, 0.3, 0.5) == pytest.approx(1.0 / (1.2 - 0.3 * 0.7))
     assert effective_mass(1.2, 3.8, 0.7, -1.0, -50.0, 0.3, 0.5) == pytest.approx(1.0 / (1.2 + 0.3 * 0.7))
+
+
+def test_two_corners_share_the_mass_as_the_impulses_of_the_rigid_impact():
+    mobility, speeds = np.array([[5.6, -1.5], [-1.5, 2.3]]), np.array([-0.6, -0.4])
+    impulses = np.linalg.solve(mobility, -speeds)
+    ratio = speeds[1] / speeds[0]
+    assert shared_mass(5.6, 2.3, -1.5, ratio) == pytest.approx(-impulses[0] / speeds[0])
+    assert shared_mass(2.3, 5.6, -1.5, 1.0 / ratio) == pytest.approx(-impulses[1] / speeds[1])
+    assert shared_mass(2.3, 5.6, 1.5, 10.0) < 0.0

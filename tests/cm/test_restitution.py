@@ -2,11 +2,13 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from rockcheck.cm import ContinuousModel, measured_restitution
 from rockcheck.cm.contact import damping_ratio_of_paper, restitution_of
-from rockcheck.scenes import Floor, InputError, Scene, Wall
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import Block, Floor, InputError, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 RESTITUTIONS = [0.0, 0.25, 0.5, 0.75, 1.0]
@@ -68,3 +70,30 @@ def test_paper_rule_misses_as_its_formula_says(e):
 def test_scene_without_an_impact_has_no_restitution():
     with pytest.raises(InputError, match="strikes"):
         measured_restitution(ContinuousModel(), scene())
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("e", RESTITUTIONS)
+def test_both_corners_of_a_side_leave_as_asked_wherever_the_mass_lies(e, side):
+    """A side that strikes a wall flat leaves as flat, whatever the stiffness: unlike springs do not turn the block."""
+    block = Block(half_width=0.3, half_height=1.0, centre_of_mass=(0.0, 0.3))
+    toward = -0.6 if side == "left" else 0.6
+    strikes = scene(wall=e, gap=0.02, side=side, friction=0.2, block=block, initial_velocity=toward, duration=0.1)
+    history = ContinuousModel(penetration=1e-10).simulate(strikes)
+    speed = math.sqrt(0.6**2 - 2.0 * 0.2 * 9.81 * 0.02)
+    assert np.max(np.abs(history.channels["theta_dot"])) < 1e-4
+    if e:
+        struck = next(event.t for event in history.event_list if event.kind == "wall impact")
+        row = math.ceil(struck / strikes.output_step) + 1
+        left = abs(history.channels["x_dot"][row]) + 0.2 * 9.81 * (row * strikes.output_step - struck)
+        assert left == pytest.approx(e * speed, rel=1e-3)
+
+
+def test_a_loaded_block_moves_beside_a_bouncing_wall_as_the_rigid_one():
+    """Its mass lies to one side, so that the flush impact turns it over the floor; equal springs gave 0.1045 alpha."""
+    block = Block(half_width=0.3, half_height=1.0, centre_of_mass=(0.1, 0.3))
+    loaded = scene(wall=0.6, gap=0.02, friction=0.2, block=block, initial_velocity=-0.6, duration=2.0)
+    rigid, soft = (model.simulate(loaded) for model in (EventBasedModel(pivot="unilateral"), ContinuousModel()))
+    assert soft.peak_rotation == pytest.approx(rigid.peak_rotation, rel=1e-3)
+    apart = (soft.channels["theta"] - rigid.channels["theta"]) / block.alpha
+    assert np.sqrt(np.mean(apart**2)) < 1e-4

@@ -97,6 +97,38 @@ def test_compare_two_histories(capsys):
     assert max(map(len, out.splitlines())) <= 80
 
 
+def test_histories_of_two_blocks_are_not_compared_unless_a_scene_says_how(capsys):
+    for name, width in (("one", "0.4"), ("same", "0.4000000001"), ("other", "0.5")):
+        write(f"{name}.toml", SCENE.replace("0.4", width))
+        assert main(["simulate", f"{name}.toml", "--model", *STILL, "-o", f"{name}.csv", "-q"]) == 0
+    assert main(["compare", "one.csv", "same.csv", "-q"]) == 0
+    assert main(["compare", "one.csv", "other.csv"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("rockcheck: scene: ")
+    assert "half_width = 0.4," in said
+    assert "half_width = 0.5," in said
+    assert main(["compare", "one.csv", "other.csv", "--scene", "one.toml", "-q"]) == 0
+    write("plain.csv", "t,theta\n" + "".join(f"{0.005 * k},0\n" for k in range(41)))  # of a block that nothing is known of
+    assert main(["compare", "one.csv", "plain.csv", "-q"]) == 0
+
+
+def test_a_run_without_a_verdict_overwrites_none_with_one(capsys):
+    suite = 'reference = "still"\n[models.still]\nmodel = "faulty:Still"\n[[scene]]\nname = "short"\n'
+    write("suite.toml", suite + SCENE)
+    write("scene.toml", SCENE)
+    alone = ["run", "scene.toml", "--models", STILL[0], *STILL[1:], "--jobs", "1", "-q"]
+    assert main(alone) == 0
+    assert main(alone) == 0  # over what nobody judged
+    assert main(["validate", "suite.toml", *STILL[1:], "--jobs", "1", "-q"]) == 1  # no tolerance
+    before = {path: path.read_bytes() for path in Path("rockcheck-report").glob("*.*")}
+    assert Path("rockcheck-report/index.html") in before
+    capsys.readouterr()
+    assert main(alone) == 2
+    assert capsys.readouterr().err.startswith("rockcheck: --out: rockcheck-report holds the judged run of suite 'suite'")
+    assert {path: path.read_bytes() for path in Path("rockcheck-report").glob("*.*")} == before
+    assert main([*alone, "--out", "other"]) == 0
+
+
 def test_validate_keeps_the_run_before_it_tells(capsys):
     suite = """
 reference = "still"
@@ -132,5 +164,6 @@ floor = { friction = 0.5 }
     assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1"]) == 0
     assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1", "--strict"]) == 1
     assert "verdict: changed" in capsys.readouterr().out
-    assert main(["accept", "mine.toml", "--allow-code", "faulty:Still", "--jobs", "1"]) == 0
+    assert main(["accept", "mine.toml", "--allow-code", "faulty:Still", "--jobs", "1"]) == 1
+    assert main(["accept", "mine.toml", "--allow-code", "faulty:Still", "--jobs", "1", "--reason", "it leans more"]) == 0
     assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1", "--strict"]) == 0

@@ -222,8 +222,24 @@ def test_slips_are_named(capsys, words, said):
 
 
 @pytest.mark.parametrize("words", [("records/RSN1_H*.AT2",), ("records/RSN1_H1.AT2", "records/RSN1_H2.AT2", "records/RSN1_V.AT2")])
-@pytest.mark.parametrize("command", ["ida rack.toml --levels 1:2:2", "spectrum --scene rack.toml --fragility --size 3"])
+@pytest.mark.parametrize(
+    "command", [("ida", "rack.toml", "--levels", "1:2:2"), ("spectrum", "--scene", "rack.toml", "--fragility", "--size", "3")]
+)
 def test_populations_take_the_same_sets(told, command, words):
-    found = told(*command.split(), *words, "--json")
+    found = told(*command, *words, "--json")
     assert [one["motion"] for one in found["tables"]["motions"]] == ["RSN1_H1.AT2", "RSN1_H2.AT2"]
     assert found["left_out"] == list(words[2:3] and ["RSN1_V.AT2"])
+
+
+@pytest.mark.parametrize("command", ["validate", "ida"])
+def test_a_file_of_a_folder_that_is_no_record_is_named_and_left_out(told, command):
+    Path("records/README.txt").write_text("where they are from\n", encoding="utf-8")
+    rest = STILL if command == "validate" else ("--levels", "0.1:1:2", "--json")
+    left_out = told(command, "rack.toml", "records", *rest)["left_out"]
+    assert left_out[0] == "RSN1_V.AT2"
+    assert "README.txt" in left_out[1]
+
+
+def test_a_shipped_record_shakes_a_scene_by_its_name(told):
+    found = told("run", "rack.toml", "elcentro_1940_ns.csv", *STILL)
+    assert [cell["scene"] for cell in found["cells"]] == ["rack, elcentro_1940_ns"]

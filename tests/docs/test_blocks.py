@@ -29,7 +29,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 CHECK = "<!-- check\n"
 LANGUAGES = {"python", "bash", "toml", "csv", "yaml", "text"}
 #: Commands that take minutes, and the form of them that takes less, where there is one.
-LONG = {"benchmark": "--quick", "convergence": "--quick", "spectrum": "", "validate": "", "stress": "--quick"}
+LONG = {"benchmark": "--quick", "spectrum": "", "validate": "", "stress": "--quick"}
 
 
 @dataclass(frozen=True)

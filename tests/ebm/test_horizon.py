@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.ebm.horizon import predictability_horizon
-from rockcheck.scenes import Floor, InputError, Scene, Sine, Wall, load_scene
+from rockcheck.ebm.horizon import START, _disturbed, predictability_horizon
+from rockcheck.scenes import Block, Floor, InputError, Ricker, Scene, Sine, Wall, load_scene
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 
@@ -47,15 +47,46 @@ def test_a_record_parts_from_its_disturbed_self_just_after_the_horizon() -> None
     assert_parts_after(horizon, scene, EventBasedModel(pivot="unilateral", tolerance=1e-13))
 
 
+def test_a_vertical_motion_is_disturbed_with_the_horizontal_one() -> None:
+    """Disturbed by the record alone this block would part 0.14 s later."""
+    scene = load_scene("fig4a").replace(vertical=Sine(amplitude=4.0, period=0.4, cycles=80), duration=6.0)
+    assert_parts_after(predictability_horizon(scene), scene, EventBasedModel(pivot="unilateral", tolerance=1e-13))
+
+
 def assert_parts_after(horizon: float, scene: Scene, model: EventBasedModel) -> None:
     """Base motions a millionth stronger and weaker turn the block by 1e-3 alpha otherwise just after the horizon, and not before."""
     plain = model.simulate(scene).channels
     apart = np.zeros_like(plain["t"])
     for factor in (1 - 1e-6, 1 + 1e-6):
-        disturbed = model.simulate(scene.replace(excitation=scene.excitation.scaled(factor))).channels["theta"]
+        both = {"excitation": scene.excitation.scaled(factor), "vertical": scene.vertical.scaled(factor)}
+        disturbed = model.simulate(scene.replace(**both)).channels["theta"]
         apart = np.maximum(apart, np.abs(disturbed - plain["theta"]) / scene.block.alpha)
     inside = plain["t"] <= horizon + 1e-9
     assert apart[inside].max() <= 1e-3 < apart[~inside][0]
+
+
+def test_rows_far_apart_leave_one_that_can_be_compared() -> None:
+    """By the first row at 4 s the histories have parted: the horizon is that row, not the start, where there is nothing to compare."""
+    scene = balanced(output_step=4.0)
+    assert predictability_horizon(scene) == 4.0
+    assert predictability_horizon(scene.replace(duration=12.0)) == 4.0
+
+
+def test_what_is_played_beside_the_scene() -> None:
+    """Only what can make a difference: the other law where a block may hop beside a wall, motions and starts that there are."""
+    free, bilateral = EventBasedModel(pivot="unilateral"), EventBasedModel(pivot="bilateral")
+    beside = balanced(initial_rotation=0.0, walls=[Wall(side="left", gap=0.1, restitution=0.5)])
+    (law,) = _disturbed(beside, free, 1e-6)
+    assert law == (free.model_copy(update={"impacts": "floor-first"}), beside)
+    assert [*_disturbed(beside, bilateral, 1e-6)] == []
+    assert [*_disturbed(balanced(initial_rotation=0.0), free, 1e-6)] == []
+    assert [one.initial_rotation for _, one in _disturbed(balanced(initial_rotation=0.1), free, 1e-6)] == [
+        0.1 * (1 - 1e-6),
+        0.1 * (1 + 1e-6),
+    ]
+    shaken = balanced(initial_rotation=0.0, excitation=Sine(amplitude=5.0, period=2.0, cycles=5))
+    assert [one.excitation.amplitude for _, one in _disturbed(shaken, free, 1e-6)] == [5.0 * (1 - 1e-6), 5.0 * (1 + 1e-6)]
+    assert len([*_disturbed(shaken.replace(initial_rotation=0.1), free, 1e-6)]) == 4
 
 
 def test_a_start_against_a_wall_is_disturbed_away_from_it() -> None:
@@ -91,3 +122,44 @@ def test_it_ends_where_the_laws_of_impacts_part(side: str, sign: float, restitut
         assert found > first + 0.1
     else:
         assert first - scene.output_step <= found <= first + 0.02
+
+
+def dropped(**change: object) -> Scene:
+    """A block that lands flat at 0.1 s."""
+    block = Block(half_width=0.3, half_height=1.0)
+    start = {"block": block, "floor": Floor(friction=0.9), "initial_rotation": 0.0, "initial_height": 0.05}
+    return balanced(**start | {"duration": 3.0} | change)
+
+
+@pytest.mark.parametrize("law", ["moreau", "leading-first", "trailing-first"])
+def test_it_ends_where_a_block_lands_flat_while_it_slides(law: str) -> None:
+    """The laws part there, whichever the model follows, even where no start is near enough to zero to tell."""
+    model = EventBasedModel(pivot="unilateral", tolerance=1e-13, impacts=law)
+    landing = math.sqrt(2.0 * 0.05 / 9.81)
+    scene = dropped(initial_velocity=-1.0)
+    assert landing <= predictability_horizon(scene, model) <= landing + 0.01
+    struck = Scene(  # by a wall, and thrown up
+        name="struck",
+        block=Block(half_width=0.6257529044558684, half_height=1.450050869104316),
+        floor=Floor(friction=0.9321670161858135),
+        walls=[Wall(side="right", gap=0.016955975821364672)],
+        excitation=Ricker(amplitude=14.520221522782801, period=0.6777755218716803),
+        duration=3.6,
+    )
+    assert 1.84 < predictability_horizon(struck, model) < 1.86
+
+
+def test_it_ends_where_a_block_lands_flat_without_slip() -> None:
+    """No law tells then; a rotation and a rate of zero that are disturbed do."""
+    landing = math.sqrt(2.0 * 0.05 / 9.81)
+    assert landing <= predictability_horizon(dropped()) <= landing + 0.01
+
+
+def test_what_is_zero_at_the_start_is_disturbed_to_either_side() -> None:
+    scene, model = balanced(initial_rotation=0.0), EventBasedModel(pivot="unilateral")
+    starts = [[getattr(one, name) for name in START] for _, one in _disturbed(scene, model, 1e-6)]
+    alpha, p = PAPER_BLOCK.alpha, scene.frequency_parameter
+    for column, unit in enumerate((alpha, alpha * p, PAPER_BLOCK.radius * alpha * p, 0.0)):
+        assert (min(start[column] for start in starts), max(start[column] for start in starts)) == (-1e-6 * unit, 1e-6 * unit)
+    held = EventBasedModel(friction="no-slip")
+    assert all(one.initial_velocity == 0.0 for _, one in _disturbed(scene, held, 1e-6))

@@ -105,6 +105,16 @@ def test_every_import_is_a_declared_dependency(top):
             assert owners_of(name) & allowed, f"{path.relative_to(ROOT)} imports {name}, of {owners_of(name)}"
 
 
+def test_hints_name_packages_that_there_are():
+    """Nothing called rockcheck is released: who asks for it by name, or for an extra of it, may get a stranger's package."""
+    texts = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(path for top in FOLDERS.values() for path in (ROOT / top).rglob("*.py"))]
+    assert [str(path) for path in texts if re.search(r"pip install [^`\n]*rockcheck\[", path.read_text(encoding="utf-8"))] == []
+    for engine in (getattr(rockcheck, name) for name in importlib.import_module("rockcheck.engines").__all__):
+        if engine.module:
+            assert engine.package in names_of(one for extra in PROJECT["project"]["optional-dependencies"].values() for one in extra)
+            assert engine.package in owners_of(engine.module)
+
+
 def test_every_package_has_its_layer():
     """A folder that no layer names could import anything: `lint-imports` would not notice."""
     (layers,) = (one["layers"] for one in PROJECT["tool"]["importlinter"]["contracts"] if one["type"] == "layers")
@@ -112,7 +122,8 @@ def test_every_package_has_its_layer():
     parents = {name.rpartition(".")[0] for name in named}
     left_out = {name for name in PACKAGES if not any(name == one or name.startswith(f"{one}.") for one in named) and name not in parents}
     assert left_out == set()
-    assert named <= set(PACKAGES)
+    modules = {name for name in named if ROOT.joinpath(*name.split(".")).with_suffix(".py").is_file()}
+    assert named <= {*PACKAGES, *modules}
 
 
 @pytest.mark.parametrize("requirement", sorted(names_of(PROJECT["project"]["dependencies"])))
@@ -136,6 +147,27 @@ def test_the_facade_has_every_public_name():
     assert rockcheck.__version__ == PROJECT["project"]["version"]
     with pytest.raises(AttributeError, match="no attribute 'Blok'"):
         rockcheck.Blok  # noqa: B018
+
+
+def test_the_facade_shows_what_is_public():
+    code = "import rockcheck; print(dir(rockcheck) == sorted(rockcheck.__all__))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "True"
+
+
+@pytest.mark.parametrize(
+    ("call", "key", "wanted"),
+    [
+        (lambda: rockcheck.compare(1, 2), "reference", "History"),
+        (lambda: rockcheck.EventBasedModel().simulate("fig5a"), "scene", "Scene"),
+        (lambda: rockcheck.ContinuousModel().simulate("fig5a"), "scene", "Scene"),
+        (lambda: rockcheck.MuJoCo().simulate("fig5a"), "scene", "Scene"),
+        (lambda: rockcheck.overturning_spectrum("fig5a", [1.0, 2.0], [1.0, 2.0]), "scene", "Scene"),
+        (lambda: rockcheck.predictability_horizon("fig5a"), "scene", "Scene"),
+    ],
+)
+def test_what_is_no_scene_or_history_is_named(call, key, wanted):
+    with pytest.raises(rockcheck.InputError, match=f"{key}: .* is not allowed: give a {wanted}"):
+        call()
 
 
 def test_importing_rockcheck_loads_nothing_heavy():

@@ -507,23 +507,23 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(tmp_path: Path,
     assert not list((tmp_path / PAGES / "figures").glob("free.*"))
     assert (tmp_path / PAGES / "figures" / "free-small.svg").exists()
     assert len(list((tmp_path / PAGES / "figures").glob("beside-a-wall.*"))) == 3
-    assert "rockcheck figure DIR free -o free.pdf" in (tmp_path / PAGES / "free.html").read_text(encoding="utf-8")
+    assert "rockcheck report DIR --scene free -o free.pdf" in (tmp_path / PAGES / "free.html").read_text(encoding="utf-8")
     for ending, begins in ((".svg", b"<?xml"), (".png", b"\x89PNG"), (".pdf", b"%PDF")):
-        assert main(["figure", str(tmp_path), "free", "-o", str(tmp_path / f"one{ending}")]) == 0
+        assert main(["report", str(tmp_path), "--scene", "free", "-o", str(tmp_path / f"one{ending}")]) == 0
         assert (tmp_path / f"one{ending}").read_bytes().startswith(begins)
     assert (tmp_path / "one.svg").read_bytes() == drawn
-    assert main(["figure", str(tmp_path), "crowd", "-o", str(tmp_path / "crowd.svg")]) == 0
-    assert main(["figure", str(tmp_path), "free", "--against", "ebm", "-o", str(tmp_path / "other.svg")]) == 0
+    assert main(["report", str(tmp_path), "--scene", "crowd", "-o", str(tmp_path / "crowd.svg")]) == 0
+    assert main(["report", str(tmp_path), "--scene", "free", "--against", "ebm", "-o", str(tmp_path / "other.svg")]) == 0
     assert (tmp_path / "other.svg").read_bytes() != drawn
     capsys.readouterr()
     for words, said in (
-        (["nowhere"], "unknown scene of the run 'nowhere'; allowed: Free, beside a wall, crowd, free"),
-        (["free", "-o", "free.gif"], "free.gif: a figure is written as .svg, .png, .pdf, not as '.gif'"),
-        (["free", "-o", "none/free.svg"], "--output: none: no such folder"),
-        (["free", "--against", "drake"], "unknown model with a history of this scene 'drake'"),
-        (["crowd", "--against", "ebm"], "--against: an ensemble's figure shows differences from its reference"),
+        (["--scene", "nowhere", "-o", "one.pdf"], "unknown scene of the run 'nowhere'; allowed: Free, beside a wall, crowd, free"),
+        (["--scene", "free", "-o", "free.gif"], "free.gif: a figure is written as .svg, .png, .pdf, not as '.gif'"),
+        (["--scene", "free", "-o", "none/free.svg"], "--output: none: no such folder"),
+        (["--scene", "free", "-o", "one.pdf", "--against", "drake"], "unknown model with a history of this scene 'drake'"),
+        (["--scene", "crowd", "-o", "one.pdf", "--against", "ebm"], "--against: an ensemble's figure shows differences from its reference"),
     ):
-        assert main(["figure", str(tmp_path), *words]) == 2
+        assert main(["report", str(tmp_path), *words]) == 2
         assert said in capsys.readouterr().err
 
 

@@ -12,17 +12,16 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 
 from rockcheck.ebm import Spectrum
-from rockcheck.reports.studies.benchmark import write_benchmark
-from rockcheck.reports.studies.convergence import write_convergence
+from rockcheck.reports.document import publish
 from rockcheck.reports.studies.spectra import paper_figure, write_page
 from rockcheck.reports.studies.stress import write_stress
 from rockcheck.reports.style import save
-from rockcheck.validation.bench import convergence
-from rockcheck.validation.bench import models as benchmark_models
-from rockcheck.validation.bench import study as benchmark
-from rockcheck.validation.bench.skipping import Saving
+from rockcheck.validation.execute.pool import Failure as Lost
 from rockcheck.validation.spectra import study as spectra
 from rockcheck.validation.stress.results import Failure, RunTotals, Stress
+from rockcheck.validation.studies.work_precision.runs import BenchmarkRun, Play
+from rockcheck.validation.studies.work_precision.savings import Saving
+from rockcheck.validation.studies.work_precision.study import Measure, Measured, WorkPrecision
 
 pytestmark = pytest.mark.browser
 
@@ -41,34 +40,18 @@ PHONE = {"viewport": {"width": 390, "height": 800}}
 
 def benchmark_page(folder: Path) -> Path:
     lines = (("ebm", 1e-6, 1e-6, 1e-5), ("ebm", 1e-8, 1e-8, 2e-5), ("cm", 1e-5, 1e-3, 1e-3), ("cm", 1e-6, 1e-4, 3e-3))
-    samples = [
-        benchmark_models.BenchmarkRun(family, member, line, value, 3.0, error, 2.0 * error, error, 0.1 * error, cpu, cpu, 0.1, 1000)
-        for family in ("free", "wall 53 mm e 0")
+    done: dict[object, object] = {
+        Play(family, member, line, value): Measured(
+            run=BenchmarkRun(family, member, line, value, 3.0, error, 2.0 * error, error, 0.1 * error, 0.1, 1e-3, cpu, cpu, 0.1, 1000)
+        )
+        for family in ("free", "wall 53 mm e 0", "long 53 mm e 0.5", "short 3 mm e 0")
         for member in range(3)
         for line, value, error, cpu in lines
-    ]
-    failed = benchmark_models.BenchmarkRun("free", 0, "pybullet", 1e-2, 3.0, failure="it blew up")
-    models = benchmark_models.evaluated([*samples, failed], [("free", 0, "mujoco", 1e-4)])
-    savings = (Saving("cm", "wall", "ms", 2.0, 1.0),)
-    return write_benchmark(benchmark.Benchmark(suite="benchmark all", models=models, savings=savings, **MADE), folder)
-
-
-def benchmark_page_without_time(folder: Path) -> Path:
-    models = benchmark_models.evaluated([], [("free", 0, "ebm", 1e-4)])
-    return write_benchmark(benchmark.Benchmark(suite="benchmark models", models=models, **MADE), folder)
-
-
-def convergence_page(folder: Path) -> Path:
-    names = ("long 53 mm e 0.5", "short 3 mm e 0")
-    cases = [convergence.StudyScene(name, 5.0, 0.1, {"ebm-unilateral": "at rest", "ebm": "overturned left"}) for name in names]
-    plays = [
-        convergence.SweepRun(name, model, 10.0**-n, 10.0**-n, 10.0 ** (1 - n), 0.1, 1.0)
-        for name in names
-        for model in ("mujoco", "pybullet", "cm")
-        for n in (3, 4)
-    ]
-    failed = convergence.SweepRun(names[0], "pybullet", 1e-5, failure="it blew up")
-    return write_convergence(convergence.evaluated(cases, [*plays, failed], quick=True), folder)
+        if line == "cm" or not family.startswith(("long", "short"))
+    }
+    done[Play("free", 0, "pybullet", 1e-2)] = Lost("it blew up")
+    done[Measure("saving", "made")] = Measured(saved=(Saving("cm", "wall", "ms", 2.0, 1.0),))
+    return publish(WorkPrecision().gather(done), folder)
 
 
 def stress_page(folder: Path) -> Path:
@@ -96,9 +79,7 @@ def spectra_page(folder: Path) -> Path:
 
 
 STUDIES = {
-    "benchmark": (benchmark_page, "Run time against error"),
-    "benchmark-without-time": (benchmark_page_without_time, "before any model had been played"),
-    "convergence": (convergence_page, "What does not converge"),
+    "benchmark": (benchmark_page, "What does not converge"),
     "stress": (stress_page, "no mode is consistent"),
     "spectra": (spectra_page, "Fig. 8"),
 }

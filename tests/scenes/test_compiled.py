@@ -245,9 +245,11 @@ def test_the_wait_for_compiled_code_can_be_interrupted(tmp_path):
 
 
 _SLOW = """
-import os, sys
+import os, signal, sys
 from rockcheck.scenes.compiled import kernel
 from rockcheck.scenes.threads import interruptible, threads
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs, and all that they start, ignore Ctrl-C
 
 @kernel
 def spin(count):

@@ -247,3 +247,15 @@ def test_columns_as_csv_have_all_digits_and_no_word_for_what_is_not_a_number():
     columns = {"a": [0.1 + 0.2, math.nan, -0.0], "b": ["x, y", "", "z"], "c": [1e-300, 1.0, math.inf]}
     assert columns_text(columns) == 'a,b,c\n0.30000000000000004,"x, y",1e-300\n,,1.0\n-0.0,z,inf\n'
     assert columns_text(columns) == pd.DataFrame(columns).to_csv(index=False, lineterminator="\n")
+
+
+@pytest.mark.parametrize("value", ["1e200", "-1e31", "inf"])
+@pytest.mark.parametrize("column", ["t", "theta", "x", "half_width"])
+def test_what_is_too_large_to_square_is_bad_input(tmp_path, column, value):
+    """Not warnings of the arithmetic later on."""
+    about = json.dumps({"half_width": float(value)}).replace('"', '""') if column == "half_width" else "{}"
+    cells = {"t": "1", "theta": "0", "x": "0", column: value}
+    path = tmp_path / "h.csv"
+    path.write_text(f't,theta,x,rockcheck_history\n-1e300,0,0,"{about}"\n'.replace("-1e300", "-2") + "{t},{theta},{x},-\n".format(**cells))
+    with pytest.raises(InputError, match=column):
+        History.load(path)

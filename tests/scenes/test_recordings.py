@@ -17,7 +17,7 @@ from rockcheck.scenes import InputError, Record, load_scene
 from rockcheck.scenes.observation import scene_notes
 from rockcheck.scenes.recordings import Reading, intensity, read_components, read_record
 from rockcheck.scenes.recordings.recording import Recording
-from rockcheck.scenes.recordings.sets import _vertical_file, is_vertical
+from rockcheck.scenes.recordings.sets import _vertical_file, files_of, is_vertical, motions_of
 
 G = 9.80665
 STEP = 0.01
@@ -367,6 +367,28 @@ def test_intensities_of_a_sine_are_its_closed_forms():
     assert intensity.spectral_acceleration(record, 0.01) == pytest.approx(amplitude / G, rel=0.01)
 
 
+def test_spectral_accelerations_are_those_of_the_straight_lines_between_samples():
+    """Samples four periods apart, or all motion in the last one: as of the same lines with samples 4000 times as dense."""
+    samples = np.array([0.0, 1.0, -0.5, 0.0])
+    dense = Recording(samples=np.interp(np.arange(12_001) / 4000, np.arange(4), samples), time_step=1e-3, unit="m/s2", form="CSV")
+    for period in (1.0, 2.5):
+        coarse = Recording(samples=samples, time_step=4.0, unit="m/s2", form="CSV")
+        expected = intensity.spectral_acceleration(dense, period)
+        assert intensity.spectral_acceleration(coarse, period) == pytest.approx(expected, rel=2e-3)
+    # A hat of a step's length is, to an oscillator of a far longer period, an impulse; the peak comes a quarter of a period later.
+    last = Recording(samples=np.array([0.0, 0.0, 1.0]), time_step=1e-2, unit="m/s2", form="CSV")
+    rate, damping = 2 * math.pi / 1.0, 0.05
+    peak = rate * 1e-2 * math.exp(-damping / math.sqrt(1 - damping**2) * math.acos(damping))
+    assert intensity.spectral_acceleration(last, 1.0) == pytest.approx(peak / G, rel=2e-3)
+
+
+def test_periods_of_a_spectrum_leave_no_wide_gap():
+    steps = np.divide(intensity.PERIODS[1:], intensity.PERIODS[:-1])
+    assert np.all((steps > 1.0) & (steps <= 2.0))
+    assert intensity.PERIODS[0] <= 0.1
+    assert intensity.PERIODS[-1] >= 4.0
+
+
 def test_the_command_shows_and_draws(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("a.AT2").write_bytes(at2("N-S"))
@@ -429,3 +451,85 @@ def test_which_component_is_vertical(name, form, component, vertical):
 def test_which_file_has_the_vertical_component(name, others, vertical):
     paths = [Path(other) for other in others]
     assert _vertical_file(Path(name), paths) == (None if vertical is None else paths[vertical])
+
+
+def run_together(across: int, count: int, width: int, form: str, unit: str = "G") -> tuple[str, NDArray[np.float64]]:
+    """A PEER file in Fortran's columns without a blank between them, and its numbers as they are printed."""
+    values = np.random.default_rng(3).uniform(1.0, 9.0, count) * np.where(np.arange(count) % 3, 1.0, -1.0) * 1e-2
+    words = [format(value, form)[-width:].rjust(width) for value in values]
+    lines = ["".join(words[k : k + across]) for k in range(0, count, across)]
+    head = f"PEER\nA, 1/1/2000, B, 180\nACCELERATION TIME SERIES IN UNITS OF {unit}\nNPTS= {count}, DT= .01 SEC\n"
+    return head + "\n".join(lines) + "\n", np.array([float(word) for word in words])
+
+
+@pytest.mark.parametrize("count", [1, 4, 5, 6, 23, 25])
+@pytest.mark.parametrize(("across", "width", "form"), [(5, 11, ".5E"), (5, 12, ".5E"), (8, 8, ".5f"), (1, 11, ".5E")])
+def test_columns_of_fortran_may_run_together(tmp_path, across, width, form, count):
+    """E-011.19 is the end of one number and the beginning of the next."""
+    text, values = run_together(across, count, width, form)
+    (tmp_path / "a.AT2").write_text(text)
+    np.testing.assert_array_equal(read_record(tmp_path / "a.AT2").samples, values * G)
+
+
+@pytest.mark.parametrize("change", [lambda text: text[:-3] + "\n", lambda text: text.replace("E-0", "E0", 1), lambda text: text + " 1.0\n"])
+def test_columns_that_are_not_as_the_header_says_are_a_fault(tmp_path, change):
+    (tmp_path / "a.AT2").write_text(change(run_together(5, 23, 11, ".5E")[0]))
+    with pytest.raises(InputError, match="not a finite number"):
+        read_record(tmp_path / "a.AT2")
+
+
+SPELT = {
+    "cm/s2": ["CM/S/S", "CM/SEC/SEC", "CM/S^2", "cm/sec2", "(CM/S**2)", "CM / S / S"],
+    "ft/s2": ["FT/S/S", "ft/s2", "FT/SEC**2"],
+    "m/s2": ["M/S/S", "M/SEC/SEC"],
+    "g": ["G", "g", "G'S", "(G)"],
+    "gal": ["GAL", "gals"],
+}
+
+
+@pytest.mark.parametrize(("unit", "word"), [(unit, word) for unit, words in SPELT.items() for word in words])
+def test_the_header_states_the_unit(tmp_path, unit, word):
+    (tmp_path / "a.AT2").write_text(f"A\nACCELERATION TIME SERIES IN UNITS OF {word}\nNPTS= 2, DT= .01 SEC\n 1.0 2.0\n")
+    found = read_record(tmp_path / "a.AT2")
+    assert found.unit == unit
+    np.testing.assert_allclose(found.samples, np.array([1.0, 2.0]) * {"g": G, "cm/s2": 0.01, "gal": 0.01, "ft/s2": 0.3048}.get(unit, 1.0))
+
+
+def test_feet_are_a_unit_of_tables_too(tmp_path):
+    (tmp_path / "a.csv").write_text("time_s,acceleration_ft_s2\n0,1\n0.01,2\n")
+    np.testing.assert_allclose(read_record(tmp_path / "a.csv").samples, [0.3048, 0.6096])
+
+
+@pytest.mark.parametrize("word", ["CM/S", "CM", "INCHES"])
+def test_a_header_of_velocities_is_no_record(tmp_path, word):
+    (tmp_path / "a.AT2").write_text(f"A\nTIME SERIES IN UNITS OF {word}\nNPTS= 2, DT= .01 SEC\n 1.0 2.0\n")
+    with pytest.raises(InputError, match="UNITS OF G"):
+        read_record(tmp_path / "a.AT2")
+
+
+def test_a_folder_of_mixed_files_is_read_and_the_odd_one_named(tmp_path):
+    """What is named itself must be a record."""
+    (tmp_path / "1.AT2").write_bytes(at2("N-S"))
+    (tmp_path / "2.txt").write_text("a page of notes\n")
+    (tmp_path / "3.V2").write_bytes(cosmos("E-W"))
+    for words in ([tmp_path], [tmp_path / "[1-3].*"]):
+        motions, left_out = motions_of(files_of(words), Reading())
+        assert [name for name, _ in motions] == ["1.AT2", "3.V2"]
+        assert len(left_out) == 1
+        assert "2.txt" in left_out[0]
+    with pytest.raises(InputError, match=r"2\.txt"):
+        motions_of(files_of([tmp_path, tmp_path / "2.txt"]), Reading())
+    (tmp_path / "1.AT2").unlink()
+    (tmp_path / "3.V2").unlink()
+    with pytest.raises(InputError, match=r"2\.txt"):
+        motions_of(files_of([tmp_path]), Reading())
+
+
+def test_a_shipped_record_is_found_by_name_as_in_a_scene(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["record", "elcentro_1940_ns.csv", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["format"] == "CSV"
+    (tmp_path / "elcentro_1940_ns.csv").write_text("time_s,acceleration_g\n0,1\n0.01,2\n")
+    assert main(["record", "elcentro_1940_ns.csv", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["samples"] == 2
+    assert main(["record", "nowhere/elcentro_1940_ns.csv"]) == 2

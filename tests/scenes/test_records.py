@@ -67,7 +67,7 @@ def test_at2_scaled(tmp_path):
         (NAMED.format(npts=0, dt=0.01), "line 4: NPTS 0 is not in 1..10000000"),
         (NAMED.format(npts="9" * 40, dt=0.01) + "0.1", "line 4: NPTS 9"),
         (NAMED.format(npts=2, dt=0.01).replace(" IN UNITS OF G", "") + "0.1 0.2", "no header line that states UNITS OF G"),
-        (NAMED.format(npts=2, dt=0.01).replace("UNITS OF G", "UNITS OF CM/S2") + "0.1 0.2", "no header line that states UNITS OF G"),
+        (NAMED.format(npts=2, dt=0.01).replace("UNITS OF G", "UNITS OF CM/S") + "0.1 0.2", "no header line that states UNITS OF G"),
         ("0.1 0.2\n0.3\n", "no header line with NPTS and DT within the first 20 lines"),
         ("", "no header line with NPTS and DT"),
     ],

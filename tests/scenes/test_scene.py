@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from rockcheck.scenes.observation import scene_notes
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 GOOD = {
@@ -151,6 +152,48 @@ def test_a_loaded_block_scaled_and_mirrored():
         assert mirrored.block.pivot(other) == one
     assert mirrored.mirrored() == scene(block=LOADED, initial_rotation=-0.02)
     assert (LOADED.slope, LOADED.alpha) == (pytest.approx(0.3 / 0.8), LOADED.pivot("right").alpha)
+
+
+def least_jam(block):
+    """The least friction at which a slipping corner can jam: where some tilt leaves no push of the floor an effect (Painleve).
+
+    A push N lifts the corner by (1/m + x (x - mu z)/I) N, with x and z the corner's distances from the mass's centre; all tilts.
+    """
+    tilts = np.linspace(0.0, math.pi / 2, 100_001)
+    found = []
+    for side in ("left", "right"):
+        radius = block.pivot(side).radius
+        x, z = radius * np.sin(tilts), radius * np.cos(tilts)
+        with np.errstate(divide="ignore"):
+            found.append(np.min((block.gyration_squared + x * x) / (x * z)))
+    return min(found)
+
+
+@pytest.mark.parametrize("centre", [(0.0, 0.0), (0.1, -0.2), (-0.15, 0.3)])
+@pytest.mark.parametrize("inertia", [None, 0.05, 0.6])
+def test_less_friction_than_painleves_jams_neither_corner(centre, inertia):
+    block = Block(**BOX, centre_of_mass=centre, moment_of_inertia=inertia)
+    assert block.least_painleve_friction == pytest.approx(least_jam(block), rel=1e-6)
+
+
+def test_the_moment_of_inertia_is_at_most_that_of_mass_in_the_corners():
+    """0.4^2 + 1^2 - 0.1^2 - 0.2^2 = 1.11 m^2 with the centre at (0.1, -0.2)."""
+    assert Block(**BOX, mass=2.0, centre_of_mass=(0.1, -0.2), moment_of_inertia=2.0 * (1.11 - 1e-15)).gyration_squared < 1.11
+    bound = 0.4 * 0.4 + 1.0 - 0.1 * 0.1 - 0.2 * 0.2
+    assert Block(**BOX, centre_of_mass=(0.1, -0.2), moment_of_inertia=bound).gyration_squared == bound
+    for excess in (1e-9, 0.05):
+        with pytest.raises(InputError, match="moment_of_inertia"):
+            Block(**BOX, centre_of_mass=(0.1, -0.2), moment_of_inertia=bound * (1.0 + excess))
+    for centre in ((0.4, 0.0), (0.0, -1.0)):  # on the box's surface
+        with pytest.raises(InputError, match="centre_of_mass"):
+            Block(**BOX, centre_of_mass=centre)
+
+
+def test_a_block_as_large_as_a_hill_is_told():
+    """200 mm that are written as 200."""
+    for size, told in ((0.2, False), (30.0, False), (200.0, True)):
+        large = scene(block=Block(half_width=size / 4, half_height=size), walls=[])
+        assert any("m, not mm" in note for note in scene_notes(large)) == told
 
 
 def test_the_centres_of_mass_and_box():

@@ -1,6 +1,6 @@
 """Coverage-guided fuzzing of one reader: `python tests/stress/fuzz.py scene_toml -runs=100000`.
 
-libFuzzer (through atheris: `pip install 'rockcheck[fuzz]'`) breeds inputs that reach new lines of the readers, from a valid one and
+libFuzzer (through atheris: `pip install atheris`) breeds inputs that reach new lines of the readers, from a valid one and
 from the nasty words of `test_hostile_input`. An input that is answered with neither a result nor one clear line, takes longer than
 10 s or more than 1 GiB of memory ends the run with an error and is written to the working directory; options after the reader's name
 are libFuzzer's.

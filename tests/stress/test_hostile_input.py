@@ -207,7 +207,7 @@ WORDS = (
     "a" * 5000,
 )
 #: Commands that would run for minutes, were their arguments ever right.
-LONG = {"validate", "accept", "spectrum", "benchmark", "convergence", "stress"}
+LONG = {"validate", "accept", "spectrum", "benchmark", "stress"}
 
 
 #: Between the words of a command line in an input.

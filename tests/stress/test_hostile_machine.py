@@ -136,7 +136,7 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
     assert not leavings(tmp_path)
 
 
-@pytest.mark.parametrize("command", ["stress", "validate", "benchmark", "convergence"])
+@pytest.mark.parametrize("command", ["stress", "validate", "benchmark"])
 def test_folder_that_cannot_be_written(tmp_path, capsys, command):
     """Said before anything is computed."""
     file = tmp_path / "file"

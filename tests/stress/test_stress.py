@@ -11,13 +11,13 @@ import pytest
 
 from rockcheck.commands.cli import main
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
+from rockcheck.scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.stress import invariants, players, study
 from rockcheck.validation.stress.exact import exact_scene
 from rockcheck.validation.stress.generator import ALPHA, FRICTION, RADIUS, random_scene
 from rockcheck.validation.stress.invariants import INVARIANTS, CheckedRun, audited, check_run, energy_error, similar
-from rockcheck.validation.stress.mechanics import BOOLE, integrals, tilted_forces
+from rockcheck.validation.stress.mechanics import BOOLE, arms, integrals, tilted_forces
 from rockcheck.validation.stress.players import PLAYERS, Approximate, energy_without_source
 from rockcheck.validation.stress.results import Stress
 from rockcheck.validation.stress.shrinking import shrink, write_scene
@@ -25,7 +25,6 @@ from rockcheck.validation.stress.stability import SETUPS, fault_of, largest_stab
 from rockcheck.validation.stress.study import Chunk, chunks, play_some, run_stress
 from rockcheck.validation.stress.tables import invariants_markdown, summary_rows
 
-ALPHA_PAPER = 0.25
 SLIDES_AND_HITS = Scene(
     name="hits",
     block=PAPER_BLOCK,
@@ -47,7 +46,7 @@ def test_scenes_cover_what_a_user_could_write():
     """The corners of the ranges are reached, and every kind of excitation, wall and start occurs."""
     scenes = [random_scene(1, n) for n in range(2000)]
     alphas, radii, friction = (
-        np.array(one) for one in zip(*((s.block.alpha, s.block.radius, s.floor.friction) for s in scenes), strict=True)
+        np.array(one) for one in zip(*((s.block.box_angle, s.block.half_diagonal, s.floor.friction) for s in scenes), strict=True)
     )
     for values, (low, high) in ((alphas, ALPHA), (radii, RADIUS)):
         assert low * (1 - 1e-9) <= values.min() < 2.0 * low
@@ -71,16 +70,96 @@ def test_scenes_cover_what_a_user_could_write():
             assert kind != "bouc-wen" or scene.floor.static_friction is None
 
 
+@pytest.mark.parametrize("make", [random_scene, exact_scene])
+def test_a_third_of_the_blocks_are_asymmetric(make):
+    """To either side, with a moment of inertia of their own or without, some with a load in the middle."""
+    scenes = [make(1, n) for n in range(1500)]
+    off = np.array([scene.block.offset[0] for scene in scenes])
+    assert 0.3 < np.mean(off != 0.0) < 0.37
+    assert 0.4 < np.mean(off[off != 0.0] > 0.0) < 0.6
+    bear = [scene.block for scene in scenes if not scene.block.homogeneous]
+    assert 0.4 < np.mean([block.moment_of_inertia is None for block in bear]) < 0.6
+    assert any(block.offset[0] == 0.0 != block.offset[1] for block in bear)
+    assert any(block.offset[1] == 0.0 != block.offset[0] for block in bear)
+    tilts = [(scene.initial_rotation, scene.block) for scene in scenes if not scene.block.homogeneous and scene.initial_rotation]
+    balanced = [tilt for tilt, block in tilts if abs(tilt) == block.pivot("left" if tilt > 0.0 else "right").alpha]
+    assert min(balanced) < 0.0 < max(balanced)
+
+
+LOADED = SLIDES_AND_HITS.replace(
+    block=Block(half_width=0.4, half_height=1.2, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.4), floor=Floor(friction=0.25)
+)
+
+
+@pytest.mark.parametrize("label", ["ebm", "ebm-unilateral", "ebm no-slip", "ebm-bouc-wen"])
+def test_a_loaded_block_keeps_all_invariants(label):
+    """It slides, rocks and hits the wall. The base works on its mass's centre, its contacts are the box's."""
+    scene = LOADED
+    played = PLAYERS[label].check(scene, 1, 0)  # run 0 is audited
+    assert played.broken == []
+    assert played.events > 3
+    assert {"energy", "mirror", "similarity", "tolerance"} <= played.figures.keys()
+
+
+def test_similar_and_disturbed_blocks_bear_the_same_load():
+    (x, z), block = LOADED.block.offset, LOADED.block
+    other = similar(LOADED, 3).block
+    k = other.half_width / block.half_width
+    assert other.offset == pytest.approx((k * x, k * z))
+    assert other.moment_of_inertia == pytest.approx(k * k * block.moment_of_inertia)
+    changed = [scene.block for scene in invariants._disturbed(LOADED, 1)]
+    assert len(changed) == invariants.DISTURBED
+    for one in changed:
+        for new, old in ((one.offset[0], x), (one.offset[1], z), (one.moment_of_inertia, block.moment_of_inertia)):
+            assert 0.0 < abs(new / old - 1.0) <= 1.01 * invariants.DISTURBANCE
+    full = LOADED.replace(block=block.replace(moment_of_inertia=0.4**2 + 1.2**2 - x * x - z * z))  # as much as there can be
+    assert 0 < len(list(invariants._disturbed(full, 1))) < invariants.DISTURBED
+
+
+def test_a_load_is_dropped_only_if_it_does_not_matter():
+    """Shrinking tries a block without its load, or with it in the middle, and none that may not be."""
+    big = LOADED.replace(block=LOADED.block.scaled(30.0))
+    asymmetric, _ = shrink(big, lambda scene: scene.block.offset[0] > 0.0)
+    assert asymmetric.block.offset[0] > 0.0 == asymmetric.block.offset[1]
+    assert asymmetric.block.moment_of_inertia is None
+    assert 0.5 < asymmetric.block.radius < 2.0
+    plain, _ = shrink(big, lambda scene: True)
+    assert plain.block.homogeneous
+    edge = LOADED.block.replace(half_width=0.94, centre_of_mass=(0.93, 0.0), moment_of_inertia=0.4)
+    rounded, _ = shrink(LOADED.replace(block=edge), lambda scene: scene.block.moment_of_inertia is not None)
+    assert rounded.block == Block(**rounded.block.model_dump())
+
+
+def test_forces_of_an_asymmetric_block():
+    """Tilted to either side: LEAN, whose wall takes the moment of weight and base, and ROCK."""
+    block = LOADED.block
+    on, off, still = np.array([True]), np.array([False]), np.zeros(1, dtype=np.int8)
+    for sign, side in ((1.0, "left"), (-1.0, "right")):
+        pivot, phi, u = block.pivot(side), 0.1, 0.2
+        s, c = pivot.radius * math.sin(pivot.alpha - phi), pivot.radius * math.cos(pivot.alpha - phi)
+        top = 2.0 * block.half_height * math.cos(phi)  # of the top corner over the floor
+        at = arms(block, np.array([sign]), np.array([phi]))
+        leans = tilted_forces(at, 0.3, np.zeros(1), np.array([u]), np.ones(1), (on, on, off), still)
+        assert leans.tip[0] == pytest.approx((u * c - s) / top, rel=1e-13)
+        assert leans.normal[0] == pytest.approx(1.0, rel=1e-13)
+        falls = tilted_forces(at, 0.3, np.zeros(1), np.array([u]), np.ones(1), (on, off, off), still)
+        spin = (u * c - s) / (block.gyration_squared + pivot.radius**2)
+        assert falls.normal[0] == pytest.approx(1.0 + s * spin, rel=1e-13)
+        assert falls.friction[0] == pytest.approx(u - c * spin, rel=1e-13)
+
+
 def test_forces_of_housners_block():
     """ROCK: (3), and a block that stands on its corner without speed presses with what lifts its centroid."""
     phi, u = np.array([0.1]), np.array([0.2])
     on, off = np.array([True]), np.array([False])
-    forces = tilted_forces(ALPHA_PAPER, 0.3, phi, np.zeros(1), u, np.ones(1), (on, off, off), np.zeros(1, dtype=np.int8))
-    s, c = math.sin(ALPHA_PAPER - 0.1), math.cos(ALPHA_PAPER - 0.1)
+    alpha = PAPER_BLOCK.alpha
+    at = arms(PAPER_BLOCK, np.ones(1), phi)
+    forces = tilted_forces(at, 0.3, np.zeros(1), u, np.ones(1), (on, off, off), np.zeros(1, dtype=np.int8))
+    s, c = math.sin(alpha - 0.1), math.cos(alpha - 0.1)
     spin = 0.75 * (0.2 * c - s)
     assert forces.normal[0] == pytest.approx(1.0 + s * spin, rel=1e-13)
     assert forces.friction[0] == pytest.approx(0.2 - c * spin, rel=1e-13)
-    slips = tilted_forces(ALPHA_PAPER, 0.3, phi, np.zeros(1), u, np.ones(1), (on, off, off), np.ones(1, dtype=np.int8))
+    slips = tilted_forces(at, 0.3, np.zeros(1), u, np.ones(1), (on, off, off), np.ones(1, dtype=np.int8))
     eta = 0.3
     assert slips.normal[0] == pytest.approx(1.0 / (1.0 + 3.0 * s * s + 3.0 * eta * s * c), rel=1e-13)
     assert slips.friction[0] == pytest.approx(-0.3 * slips.normal[0], rel=1e-13)
@@ -175,6 +254,23 @@ def test_energy_balance_is_exact_to_rounding():
         fine = audited(scene)
         model = EventBasedModel(tolerance=1e-13)
         assert energy_error(model, fine, model.simulate(fine)) < 1e-11
+
+
+def test_the_spring_of_bouc_wens_friction_gives_energy_only_where_the_floors_push_changes():
+    """(9) keeps z, not energy: its force mu |P| z grows with P. What it gives is less than it can hold."""
+    shakes = SLIDES_AND_HITS.replace(walls=(), vertical=Sine(amplitude=6.0, period=0.15, cycles=27))
+    gains = {}
+    for name, scene in (("shaken", shakes), ("steady", shakes.replace(vertical=Rest()))):
+        for yields in (1e-2, 1e-3):
+            size = yields * scene.block.radius
+            model = EventBasedModel(friction="bouc-wen", yield_displacement=size, tolerance=1e-12)
+            history = model.simulate(audited(scene))
+            assert energy_error(model, audited(scene), history) < 1e-9
+            without = model.model_copy(update={"yield_displacement": 1e-30})  # as if it could hold nothing
+            gains[name, yields] = energy_error(without, audited(scene), history)
+    assert gains["steady", 1e-2] < 1e-9
+    assert gains["steady", 1e-3] < 1e-9
+    assert 1e-6 < gains["shaken", 1e-3] < 0.5 * gains["shaken", 1e-2]
 
 
 def test_energy_that_cannot_be_judged_is_not_said_to_hold(monkeypatch):
@@ -322,6 +418,10 @@ def test_work_of_the_base_on_a_block_that_stands_or_flies():
     assert abs(energy_without_source(scene, slides)) < 1e-14
     faster = dataclasses.replace(slides, channels={**slides.channels, "x_dot": 1.1 * slides.channels["x_dot"]})
     assert energy_without_source(scene, faster) > 1e-5
+    drops = scene.replace(block=LOADED.block, initial_height=2.0, initial_angular_velocity=1.0)  # and turns about the load
+    flies = EventBasedModel(pivot="unilateral").simulate(drops)
+    assert set(flies.channels["mode"]) == {"flight"}
+    assert abs(energy_without_source(drops, flies)) < 1e-13
 
 
 def test_of_an_engine_that_gains_energy_half_the_step_is_told(monkeypatch):

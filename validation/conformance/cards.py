@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -13,6 +12,7 @@ from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
 from rockcheck.scenes import History, InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.reading import read_json
 from rockcheck.validation.conformance.phenomena import PHENOMENA, SCENES, Phenomenon
 
 VERDICTS = {
@@ -124,10 +124,9 @@ def _plain(value: Any) -> Any:
 def read_cards(path: Path) -> list[Card]:
     """The cards of a file that `as_json` was written to; raises `InputError` naming file and fault."""
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-        return [_card(one) for one in data["cards"]]
-    except OSError as error:
-        raise InputError(f"{printable(path)}: cannot be read: {error.strerror}") from None
+        return [_card(one) for one in read_json(path)["cards"]]
+    except InputError:
+        raise
     except (ValueError, KeyError, TypeError, RecursionError):
         raise InputError(f"{printable(path)}: no cards that `rockcheck conformance` wrote") from None
 

@@ -8,8 +8,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from rockcheck.scenes import History, InputError, Scene
+import numpy as np
+
+from rockcheck.scenes import Block, History, InputError, Scene
 from rockcheck.scenes.base import Shown
+from rockcheck.scenes.errors import check_kind
 from rockcheck.validation.discrepancy import closed_forms as _closed_forms  # noqa: F401 - registers them
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, TURNS, Measure, Pair, Unavailable, WindowedHistory
@@ -69,9 +72,13 @@ def compare(
     """Compare two histories over their common time, up to `until` (s), by the `measures` of `validation.discrepancy.measures`.
 
     By default by all but those that are `on_request`. The candidate is interpolated linearly onto the reference's times.
-    `scene` adds its gravity (9.81 m/s^2 otherwise). A measure that cannot be computed is NaN and says why. Raises
-    `InputError` if the histories have no time in common.
+    `scene` adds its gravity (9.81 m/s^2 otherwise), and is the one both are measured by. A measure that cannot be computed is
+    NaN and says why. Raises `InputError` if the histories have no time in common, or, without a `scene`, two different blocks.
     """
+    for key, history in (("reference", reference), ("candidate", candidate)):
+        check_kind(history, History, "simulate or History.load", key)
+    if scene is None and not _same_block(reference.block, candidate.block):
+        raise InputError(f"is needed: the histories are of two blocks, {_words(reference.block)} and {_words(candidate.block)}", "scene")
     if until is not None and not until > 0.0:
         raise InputError(f"{until:g} is not allowed: give a positive time in s", "until")
     pair = Pair(reference, candidate, scene, math.inf if until is None else until)
@@ -85,6 +92,18 @@ def compare(
     )
     gap, fall = _gap(pair, until)
     return Discrepancy(reference.model, candidate.model, figures, pair.start, pair.end, gap, fall, histories=(reference, candidate))
+
+
+def _same_block(one: Block | None, other: Block | None) -> bool:
+    """Whether nothing is known against it, to the digits of a file that was written by hand."""
+    if one is None or other is None:
+        return True
+    first, second = ((block.half_width, block.half_height, *block.offset, block.gyration_squared) for block in (one, other))
+    return bool(np.allclose(first, second, rtol=1e-6, atol=1e-9 * one.radius))
+
+
+def _words(block: Block | None) -> str:
+    return "" if block is None else ", ".join(f"{name} = {value}" for name, value in block.model_dump().items() if value is not None)
 
 
 def describe(

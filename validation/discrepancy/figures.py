@@ -6,6 +6,9 @@ from pydantic import ConfigDict
 
 from rockcheck.scenes.base import Frozen
 
+#: How the note begins of a figure that asks nothing here, as a ratio to nothing does.
+NOT_DEFINED = "not defined here"
+
 
 class Stored(Frozen):
     """A value of `run.json`; a float that is not finite is written as null."""
@@ -46,6 +49,11 @@ class Figure(Stored):
     window: str = ""
     until: float | None = None
     note: str = ""
+
+    @property
+    def undefined(self) -> bool:
+        """Whether the measure asks nothing here, so that nothing is judged; its note says why."""
+        return self.value is None and self.note.startswith(NOT_DEFINED)
 
     @property
     def of_a_fall(self) -> bool:

@@ -1,4 +1,4 @@
-"""Which law of impacts a model followed where a block landed flush against a bouncing wall.
+"""Which law of impacts a model followed where a block landed flush against a bouncing wall or flat.
 
 Rigid-body mechanics leaves several answers there (docs/theory.md, "Several impacts at one instant"). This names the one that a
 history took, without judging it.
@@ -6,15 +6,21 @@ history took, without judging it.
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.horizon import FLAT, may_fly
+from rockcheck.ebm.model import ImpactLaw
 from rockcheck.scenes import History, Scene
 from rockcheck.validation.discrepancy.figures import Stored
 
-Law = Literal["closed", "open", "floor-first"]
+#: The laws that part where a block lands flush against a wall, and where it lands flat; "moreau":
+#: both bottom corners at once.
+FLUSH_LAWS: tuple[ImpactLaw, ...] = ("closed", "open", "floor-first")
+FLAT_LAWS: tuple[ImpactLaw, ...] = ("moreau", "leading-first", "trailing-first")
 #: How long (s) a history is looked at before and after such a landing.
 WINDOW = 0.1
 #: Rotations (alpha) nearer than this are one motion; laws whose motions stay nearer than TELLS are not distinguished.
@@ -26,14 +32,14 @@ NEAR = 0.25
 class LawFollowed(Stored):
     """What a history did after the first landing at which the laws part, at `t` s.
 
-    `law` is the nearest one, or "closed or open" where these two cannot be told apart there, or "none" where the history is
+    `law` is the nearest one, or "closed or open" where such two cannot be told apart there, or "none" where the history is
     farther from it than a quarter of the `spread`, its distance to the next law. `errors` are the history's distances from all
     of them: RMS of the rotation up to WINDOW after the laws have parted, alpha.
     """
 
     t: float
     law: str
-    errors: dict[Law, float]
+    errors: dict[ImpactLaw, float]
     spread: float
 
     @property
@@ -42,7 +48,7 @@ class LawFollowed(Stored):
         return min(self.errors.values())
 
 
-class FlushLanding(Stored):
+class Landing(Stored):
     """The first landing of a scene at which the laws of impacts part.
 
     `branches` are the rotations (alpha) under each law in the output rows from `start` on. Up to the row `parts`, the one
@@ -52,7 +58,7 @@ class FlushLanding(Stored):
     t: float
     start: int
     parts: int
-    branches: dict[Law, tuple[float, ...]]
+    branches: dict[ImpactLaw, tuple[float, ...]]
 
     def followed_by(self, history: History, scene: Scene) -> LawFollowed | None:
         """The law that a history of the scene followed; None where it ends before, or was on its own way before."""
@@ -63,25 +69,33 @@ class FlushLanding(Stored):
         own = np.asarray(history.channels["theta"][self.start : self.start + rows], dtype=float) / scene.block.alpha
         motions = {law: np.array(motion[:rows]) for law, motion in self.branches.items()}
         errors = {law: _rms((own - motion)[first:]) for law, motion in motions.items()}
-        nearest: Law = min(errors, key=lambda law: errors[law])
+        nearest: ImpactLaw = min(errors, key=lambda law: errors[law])
         apart = {law: motions[law] - motions[nearest] for law in motions}
         others = [_rms(distance[first:]) for distance in apart.values() if np.max(np.abs(distance)) > TELLS]
         if not others or _rms((own - motions[nearest])[:first]) > NEAR * min(others):
             return None
-        alike = [law for law, distance in apart.items() if np.max(np.abs(distance)) <= TELLS]
+        known = (law for law in (*FLUSH_LAWS, *FLAT_LAWS) if law in apart)  # a store does not keep their order
+        alike = [law for law in known if np.max(np.abs(apart[law])) <= TELLS]
         law = " or ".join(alike) if errors[nearest] < NEAR * min(others) else "none"
         return LawFollowed(t=self.t, law=law, errors=errors, spread=min(others))
 
 
-def flush_landing(scene: Scene) -> FlushLanding | None:
+def parting_landing(scene: Scene) -> Landing | None:
     """The first landing of a scene at which the laws part; None where there is no such landing.
 
-    Played by the unilateral event-based model at tolerance 1e-13 under each law, only where a wall bounces. Raises what
-    `simulate` raises.
+    Played by the unilateral event-based model at tolerance 1e-13: under the laws of the one kind
+    where a wall bounces, under those of the other where the block lands flat. Raises what `simulate` raises.
     """
-    if not any(wall.restitution > 0.0 for wall in scene.walls):
-        return None
-    motions = {law: _rotation(scene, law) for law in get_args(Law)}
+    laws = [FLUSH_LAWS] if any(wall.restitution > 0.0 for wall in scene.walls) else []
+    if may_fly(scene) and FLAT in _played(scene, "moreau").cost.rules:
+        laws.append(FLAT_LAWS)
+    found = [landing for some in laws if (landing := _parting(scene, some)) is not None]
+    return min(found, key=lambda landing: landing.t, default=None)
+
+
+def _parting(scene: Scene, laws: Sequence[ImpactLaw]) -> Landing | None:
+    """The first landing at which these laws part."""
+    motions = {law: np.asarray(_played(scene, law).channels["theta"]) / scene.block.alpha for law in laws}
     rows = min(len(motion) for motion in motions.values())
     apart = np.ptp([motion[:rows] for motion in motions.values()], axis=0)
     if not (apart > TELLS).any():
@@ -91,21 +105,18 @@ def flush_landing(scene: Scene) -> FlushLanding | None:
     window = max(2, round(WINDOW / scene.output_step))
     start = max(0, parts - window)
     branches = {law: tuple(motion[start : told + window].tolist()) for law, motion in motions.items()}
-    return FlushLanding(t=float(scene.output_times[parts - 1]), start=start, parts=parts, branches=branches)
+    return Landing(t=float(scene.output_times[parts - 1]), start=start, parts=parts, branches=branches)
 
 
 def law_followed(scene: Scene, history: History) -> LawFollowed | None:
     """The law that a history of this scene followed; None where no landing tells laws apart, or the history parted or ended before."""
-    landing = flush_landing(scene)
+    landing = parting_landing(scene)
     return None if landing is None else landing.followed_by(history, scene)
 
 
-def _rotation(scene: Scene, law: Law) -> NDArray[np.float64]:
-    """theta/alpha under one law."""
-    from rockcheck.ebm import EventBasedModel
-
-    model = EventBasedModel(pivot="unilateral", tolerance=1e-13, impacts=law)
-    return np.asarray(model.simulate(scene).channels["theta"]) / scene.block.alpha
+def _played(scene: Scene, law: ImpactLaw) -> History:
+    """The scene under one law."""
+    return EventBasedModel(pivot="unilateral", tolerance=1e-13, impacts=law).simulate(scene)
 
 
 def _rms(values: NDArray[np.float64]) -> float:

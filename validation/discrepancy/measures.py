@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.scenes import Block, Event, History, Scene, kinematics
+from rockcheck.validation.discrepancy.figures import NOT_DEFINED
 
 Array = NDArray[np.float64]
 Value = float | tuple[float, str]
@@ -34,6 +35,13 @@ TURNS = ("overturned left", "overturned right")
 
 class Unavailable(Exception):
     """The measure cannot be computed from these histories; the message says what is missing."""
+
+
+class Undefined(Unavailable):
+    """The measure asks nothing of these histories, as a ratio to nothing: no pass and no fail."""
+
+    def __init__(self, why: str) -> None:
+        super().__init__(f"{NOT_DEFINED}: {why}")
 
 
 @dataclass(frozen=True)
@@ -56,8 +64,15 @@ class Measure:
     exact: bool = False
     #: 1 for yes, 0 for no: neither near a limit nor far from it.
     yes_no: bool = False
-    #: Changes below this mean nothing (in the measure's unit); 0 for what is counted.
+    #: Changes below this mean nothing (in the measure's unit); 0 for what is counted. The least floor.
     resolution: float = 1e-6
+
+    @property
+    def role(self) -> Literal["error", "quantity", "count"]:
+        """What its values are: an error has a perfect value, and the nearer to it the better."""
+        if self.ideal is not None or self.sense == "at least":
+            return "error"
+        return "quantity" if self.resolution else "count"
 
     @property
     def formula(self) -> str:
@@ -90,6 +105,16 @@ def difference(label: str, unit: str, **settings: Any) -> Definition:
 def figure(label: str, unit: str, **settings: Any) -> Definition:
     """Register a function of one `WindowedHistory` as a figure; without an ideal value, so held against an expected one."""
     return register(FIGURES, label, unit, **{"ideal": None, **settings})
+
+
+def between_rows(unit: str, frequency_parameter: float, gravity: float, step: float) -> float:
+    """What rows `step` (s) apart cannot tell from nothing: how far a free block is from a chord.
+
+    Of an angle (p h)^2/8, in alpha; of a length g h^2/8, in m; of a time h, in s. Other units have
+    no such floor.
+    """
+    share = step**2 / 8.0
+    return {"angle": frequency_parameter**2 * share, "m": gravity * share, "s": step}.get(unit, 0.0)
 
 
 @dataclass(frozen=True)
@@ -194,11 +219,27 @@ class Pair:
         return reference / scale, candidate / scale
 
     @cached_property
+    def known(self) -> WindowedHistory:
+        """The one of the two whose block is known."""
+        return WindowedHistory(self.reference if self.reference.alpha is not None else self.candidate, self.scene)
+
+    @property
+    def rocking(self) -> tuple[Array, Array]:
+        """`theta` where there is something to have a ratio to: the reference's peak is no nothing."""
+        floor = DIFFERENCES["theta_peak"].resolution
+        if self.alpha is not None and len(self.time) > 1:
+            g, step = self.known.gravity, float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
+            floor = max(floor, between_rows("angle", self.known.block.weaker_pivot.frequency_parameter(g), g, step))
+        if np.max(np.abs(self.theta[0])) <= floor:
+            raise Undefined("the reference does not rotate")
+        return self.theta
+
+    @cached_property
     def energies(self) -> tuple[Array, Array]:
         """Energy per unit mass of both, J/kg."""
         columns = [self.channels(name) for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")]
-        known = WindowedHistory(self.reference if self.reference.alpha is not None else self.candidate, self.scene)
-        first, second = (np.asarray(kinematics.energy(known.block, known.gravity, *(c[k] for c in columns))) for k in (0, 1))
+        block, gravity = self.known.block, self.known.gravity
+        first, second = (np.asarray(kinematics.energy(block, gravity, *(c[k] for c in columns))) for k in (0, 1))
         return first, second
 
     def mean(self, values: Array) -> float:
@@ -352,9 +393,7 @@ def sprague_geers_c(pair: Pair) -> float:
 @difference("ratio of peak rotations", "1", ideal=1.0)
 def peak_ratio(pair: Pair) -> float:
     """max |c| / max |r| of theta."""
-    reference, candidate = (float(np.max(np.abs(column))) for column in pair.theta)
-    if reference == 0.0:
-        raise Unavailable("the reference does not rotate")
+    reference, candidate = (float(np.max(np.abs(column))) for column in pair.rocking)
     return candidate / reference
 
 
@@ -368,8 +407,7 @@ def theta_hausdorff(pair: Pair) -> float:
     """
     if pair.alpha is None:
         raise Unavailable("the block's size is not known")
-    known = WindowedHistory(pair.reference if pair.reference.alpha is not None else pair.candidate, pair.scene)
-    p = known.block.weaker_pivot.frequency_parameter(known.gravity)
+    p = pair.known.block.weaker_pivot.frequency_parameter(pair.known.gravity)
     first, second = (np.column_stack([p * pair.time, column]) for column in pair.theta)
     if not (np.all(np.isfinite(first)) and np.all(np.isfinite(second))):
         return math.nan
@@ -424,15 +462,15 @@ def outcome_agrees(pair: Pair) -> tuple[float, str]:
 def iso_18571(pair: Pair) -> float:
     """ISO/TS 18571 overall rating of theta, 0 to 1 (corridor 0.4, phase 0.2, magnitude 0.2, slope 0.2), not rounded.
 
-    By the package objective-rating-metrics (extra "iso"), which takes the square of the samples in time and memory, does
+    By the package objective-rating-metrics, which takes the square of the samples in time and memory, does
     not look at their times and answers NaN where it has no answer; so both curves are put on one uniform grid of at most
     4,000 samples, and curves that are constant or shorter than 20 samples have no rating.
     """
     try:
         from objective_rating_metrics.rating import ISO18571
     except ImportError:
-        raise Unavailable('the extra "iso" is not installed') from None
-    curves = pair.theta
+        raise Unavailable("needs the package objective-rating-metrics: pip install objective-rating-metrics") from None
+    curves = pair.rocking
     if len(pair.time) < 20 or not all(np.all(np.isfinite(curve)) and np.ptp(curve) > 0.0 for curve in curves):
         raise Unavailable("too short, constant or not finite")
     grid = np.linspace(pair.time[0], pair.time[-1], min(len(pair.time), ISO_MOST_SAMPLES))
@@ -446,11 +484,9 @@ def _largest(columns: tuple[Array, Array]) -> float:
 
 
 def _sprague_geers(pair: Pair) -> tuple[float, float]:
-    reference, candidate = pair.theta
+    reference, candidate = pair.rocking
     rr, cc, rc = (pair.mean(product) for product in (reference**2, candidate**2, reference * candidate))
-    if rr == 0.0 and cc == 0.0:
-        return 0.0, 0.0
-    if rr == 0.0 or cc == 0.0:
+    if cc == 0.0:
         raise Unavailable("only one of the two rotates")
     cosine = rc / math.sqrt(rr * cc)
     return math.sqrt(cc / rr) - 1.0, math.acos(max(-1.0, min(1.0, cosine))) / math.pi if math.isfinite(cosine) else math.nan
@@ -526,7 +562,7 @@ def wall_impacts(motion: WindowedHistory) -> float:
     return _strong_count(motion, "wall impact")
 
 
-@figure("highest hop", "m", ideal=0.0)
+@figure("highest hop", "m")
 def highest_hop(motion: WindowedHistory) -> float:
     """Largest height of the lowest corner above the floor, m; 0 for a model without free flight."""
     return float(np.maximum(_extreme(motion, np.max), 0.0))

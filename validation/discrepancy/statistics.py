@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.validation.discrepancy.measures import Measure, register
+from rockcheck.validation.discrepancy.measures import Measure, Undefined, register
 
 Array = NDArray[np.float64]
 #: Peaks below this (alpha) have no ratio worth a logarithm.
@@ -46,7 +46,10 @@ class Samples:
     def log_ratios(self) -> Array:
         """ln(c/r) of the peaks where neither falls and both rock."""
         r, c = self.reference, self.candidate
-        usable = ~r.fallen & ~c.fallen & (r.peaks > SMALLEST_PEAK) & (c.peaks > SMALLEST_PEAK)
+        rocks, too = (~sample.fallen & (sample.peaks > SMALLEST_PEAK) for sample in (r, c))
+        if np.sum(rocks) < 2:
+            raise Undefined("fewer than two scenes in which the reference rocks and does not fall")
+        usable = rocks & too
         return np.log(c.peaks[usable] / r.peaks[usable])
 
 

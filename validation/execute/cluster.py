@@ -19,7 +19,7 @@ def connected(address: str) -> Iterator[Any]:
     try:
         from distributed import Client, LocalCluster
     except ImportError:
-        raise InputError("needs the package distributed: pip install 'rockcheck[cluster]'", "--scheduler") from None
+        raise InputError("needs the package distributed: pip install distributed", "--scheduler") from None
     if address.startswith("local:"):
         count = address.removeprefix("local:")
         if not count.isdecimal() or not 1 <= int(count) <= 256:

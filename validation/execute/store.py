@@ -27,8 +27,8 @@ from typing import Any
 
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.history import History
-from rockcheck.scenes.reading import read_text
-from rockcheck.scenes.writing import write_whole
+from rockcheck.scenes.reading import read_bytes, read_json, within
+from rockcheck.scenes.writing import made, write_whole
 
 HISTORIES = "histories"
 COMPARISONS = "comparisons"
@@ -58,7 +58,7 @@ class Store:
 
     def __post_init__(self) -> None:
         for kind in self.kinds:
-            (self.folder / kind).mkdir(parents=True, exist_ok=True)
+            made(self.folder, kind)
 
     def history(self, name: str) -> Path:
         """Path of a history's CSV."""
@@ -76,7 +76,11 @@ class Store:
     def load(self, name: str) -> History:
         """The history of that name: from memory where it was put or loaded lately, else from its file. Raises `InputError`."""
         found = self._recent.get(name)
-        return self._remember(name, History.load(self.history(name)) if found is None else found)
+        if found is None:
+            for suffix in SUFFIXES:
+                within(self.folder, HISTORIES, f"{name}{suffix}")
+            found = History.load(self.history(name))
+        return self._remember(name, found)
 
     def _remember(self, name: str, history: History) -> History:
         self._recent[name] = history
@@ -88,16 +92,15 @@ class Store:
     def get(self, name: str) -> dict[str, Any] | None:
         """The record of a history whose files are whole, else None."""
         base = self.folder / HISTORIES
-        record = _read(base / f"{name}.json")
+        record = self.get_record(HISTORIES, name)
         files = record.pop("files", None) if record else None
         if record is None or not isinstance(files, dict) or TABLE not in files or not files.keys() <= SUFFIXES:
             return None
-        for suffix, expected in files.items():
-            path = base / f"{name}{suffix}"
-            if not path.is_file() or _hash(path.read_bytes()) != expected:
-                return None
-        _touch(base / f"{name}.json")
-        return record
+        try:
+            whole = all(_hash(read_bytes(within(base, f"{name}{suffix}"))) == expected for suffix, expected in files.items())
+        except InputError:
+            return None
+        return record if whole else None
 
     def put_record(self, kind: str, name: str, content: Mapping[str, Any]) -> None:
         """Keep a result that is one record, such as a cell's figures."""
@@ -105,23 +108,27 @@ class Store:
 
     def get_record(self, kind: str, name: str) -> dict[str, Any] | None:
         """A result that is one record, or None."""
-        path = self.folder / kind / f"{name}.json"
-        found = _read(path)
-        if found is not None:
-            _touch(path)
-        return found
+        try:
+            path = within(self.folder, kind, f"{name}.json")
+            found = read_json(path)
+            content, seal = found["content"], found["sha256"]
+            whole = isinstance(content, dict) and seal == _seal(name, content)
+        except (InputError, KeyError, TypeError, ValueError, RecursionError):
+            return None
+        if whole:
+            with contextlib.suppress(OSError):  # a read-only store can still be read
+                path.touch()
+        return content if whole else None
 
     def prune(self, now: float | None = None) -> None:
         """Remove results that no run has used for two weeks, and the leavings of killed runs after a day."""
         now = time.time() if now is None else now
         for path in [*(path for kind in self.kinds for path in (self.folder / kind).iterdir()), *self.folder.glob(".*.part")]:
             record = path if path.suffix in (".json", ".part") else path.with_name(re.sub(r"(\.events)?\.csv(\.gz)?$", ".json", path.name))
-            used = record if record.exists() else path
-            try:
-                if now - used.stat().st_mtime > (86400.0 if path.suffix == ".part" else KEEP):
+            used = record if record.is_file() else path
+            with contextlib.suppress(OSError):  # another run was quicker, or it is a folder, which is nothing of ours
+                if now - used.lstat().st_mtime > (86400.0 if path.suffix == ".part" else KEEP):
                     path.unlink()
-            except FileNotFoundError:
-                continue  # another run was quicker
 
 
 def _sealed(name: str, content: Mapping[str, Any]) -> str:
@@ -131,24 +138,6 @@ def _sealed(name: str, content: Mapping[str, Any]) -> str:
 
 def _seal(name: str, content: Mapping[str, Any]) -> str:
     return _hash(json.dumps([name, content], sort_keys=True).encode())
-
-
-def _read(path: Path) -> dict[str, Any] | None:
-    """The content of a record that is whole, else None."""
-    if not path.exists():
-        return None
-    try:
-        found = json.loads(read_text(path))
-        content, seal = found["content"], found["sha256"]
-        whole = isinstance(content, dict) and seal == _seal(path.stem, content)
-    except (InputError, KeyError, TypeError, ValueError, RecursionError):
-        return None
-    return content if whole else None
-
-
-def _touch(path: Path) -> None:
-    with contextlib.suppress(OSError):  # a read-only store can still be read
-        path.touch()
 
 
 def _hash(content: bytes) -> str:

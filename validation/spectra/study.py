@@ -13,16 +13,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import StringConstraints
 
 from rockcheck.ebm import EventBasedModel, Spectrum, overturning_spectrum
-from rockcheck.ebm.horizon import other_law
+from rockcheck.ebm.horizon import may_fly, other_laws
 from rockcheck.ebm.spectrum import LEFT, RIGHT, TOLERANCE, Floats
 from rockcheck.scenes import Floor, InputError, Ricker, Scene, Wall
-from rockcheck.scenes.reading import read_arrays
+from rockcheck.scenes.reading import read_arrays, read_json, within
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.scenes.threads import threads
 from rockcheck.scenes.writing import table_text, write_whole
@@ -47,6 +48,10 @@ SETTINGS: dict[str, dict[str, Any]] = {
 SPECTRA = "spectra"
 #: Results of the long studies of spectra, as they come with the package.
 KEPT = Path(str(resources.files("rockcheck.validation"))) / "data" / "spectra"
+
+
+#: A part of the name of a file: a list of spectra that somebody sent names none in another folder.
+FileName = Annotated[str, StringConstraints(pattern=r"^[^/\\\x00]+$")]
 
 
 @dataclass(frozen=True)
@@ -82,11 +87,11 @@ class SpectrumRequest:
 class SpectrumRecord(Stored):
     """A played spectrum in `spectra.json`; shares are of all nodes."""
 
-    name: str
+    name: FileName
     title: str
     figure: int | None
     scene: dict[str, Any]
-    model: str
+    model: FileName
     settings: dict[str, Any]
     frequency_ratios: tuple[float, ...]
     amplitude_ratios: tuple[float, ...]
@@ -96,7 +101,7 @@ class SpectrumRecord(Stored):
     safe: float
     left: float
     right: float
-    #: How many nodes have another outcome under the other law of impacts; None where that was not looked at.
+    #: How many nodes have another outcome under another law of impacts; None where that was not looked at.
     depends_on_law: int | None = None
 
 
@@ -139,19 +144,20 @@ def axis(low: float, high: float, size: int, key: str) -> Floats:
     return np.linspace(low, high, size)
 
 
-def other_settings(panel: Panel, request: SpectrumRequest) -> dict[str, Any] | None:
-    """The model's settings with the other law of impacts; None where outcomes do not depend on it: beside no wall that bounces."""
+def other_settings(panel: Panel, request: SpectrumRequest) -> list[dict[str, Any]]:
+    """The model's settings with each other law of impacts on which outcomes may depend."""
     player = build(request.model, request.settings)
+    if not isinstance(player, EventBasedModel):
+        return []
     bounces = any(wall.restitution > 0.0 for wall in panel.scene.walls)
-    if not (bounces and isinstance(player, EventBasedModel) and player.pivot == "unilateral"):
-        return None
-    return {**request.settings, "impacts": other_law(player)}
+    return [{**request.settings, "impacts": law} for law in other_laws(player, walls=bounces, flat=may_fly(panel.scene))]
 
 
-def play_panels(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, *, both_laws: bool = False) -> list[Spectrum]:
+def play_panels(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles, *, all_laws: bool = False) -> list[Spectrum]:
     """The spectra of the panels, in order; on a cluster all at once, here one after the other on all cores. Raises `InputError`.
 
-    With `both_laws` they are played under the other law of impacts, too, where that can matter, and know the nodes at which it does.
+    With `all_laws` they are played under the other laws of impacts, too, where these can matter, and
+    know the nodes at which they do.
     """
 
     def played(panel: Panel, settings: Mapping[str, Any]) -> Spectrum:
@@ -167,8 +173,8 @@ def play_panels(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles,
 
     def play(panel: Panel) -> Spectrum:
         spectrum = played(panel, request.settings)
-        settings = other_settings(panel, request) if both_laws else None
-        return spectrum if settings is None else replace(spectrum, depends_on_law=differing(spectrum, played(panel, settings)))
+        others = [played(panel, settings) for settings in (other_settings(panel, request) if all_laws else [])]
+        return replace(spectrum, depends_on_law=differing(spectrum, others)) if others else spectrum
 
     for panel in panels:
         check = getattr(build(request.model, request.settings), "check", None)
@@ -180,11 +186,14 @@ def play_panels(panels: Sequence[Panel], request: SpectrumRequest, tiles: Tiles,
         return list(pool.map(play, panels))
 
 
-def differing(spectrum: Spectrum, other: Spectrum) -> NDArray[np.int64]:
-    """The nodes (i, j), a row each, that are decided in both and differ."""
-    differ = spectrum.outcomes != other.outcomes
-    for one in (spectrum, other):
-        differ[tuple(one.undecided.T)] = False
+def differing(spectrum: Spectrum, others: Sequence[Spectrum]) -> NDArray[np.int64]:
+    """The nodes (i, j), a row each, that are decided and differ in one of the others, decided, too."""
+    differ = np.zeros(spectrum.outcomes.shape, dtype=bool)
+    for other in others:
+        own = spectrum.outcomes != other.outcomes
+        for one in (spectrum, other):
+            own[tuple(one.undecided.T)] = False
+        differ |= own
     return np.argwhere(differ)
 
 
@@ -247,14 +256,14 @@ def stem(name: str, model: str) -> str:
 def read_index(folder: Path) -> SpectraIndex:
     """`spectra.json` of a folder; empty where there is none that this version can read."""
     try:
-        return SpectraIndex.model_validate_json((folder / "spectra.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return SpectraIndex.model_validate(read_json(within(folder, "spectra.json")))
+    except ValueError:
         return SpectraIndex()
 
 
 def read_spectrum(folder: Path, record: SpectrumRecord, scene: Scene) -> Spectrum:
     """A spectrum of a folder as it was saved, of this scene."""
-    data = read_arrays(folder / f"{record.name}.npz")
+    data = read_arrays(within(folder, f"{record.name}.npz"))
     return Spectrum(
         outcomes=data["outcomes"],
         frequency_ratios=data["frequency_ratios"],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
@@ -16,6 +17,10 @@ Kind = Literal["bilateral", "unilateral", "bouc-wen", "no-slip"]
 #: Ranges: slenderness (rad), half diagonal (m), friction, amplitude over uplift's, period over the block's, step of records (s).
 ALPHA, RADIUS, FRICTION = (0.02, 1.2), (1e-3, 1e3), (0.0, 1.333)
 AMPLITUDE, PERIOD, RECORD_STEP = (0.1, 100.0), (0.05, 50.0), (1e-4, 0.1)
+#: Share of blocks that bear a load, and of loads that stand in the middle: a third of all is asymmetric.
+#: A load's place, of the half sides, and its moment of inertia, of the largest possible at that place.
+LOADED, MIDDLE = 0.37, 0.1
+OFF_CENTRE, INERTIA = (0.01, 0.8), (0.05, 1.0)
 #: Longest run, sqrt(R/g), and most samples of a record, so that a hundred thousand runs stay affordable.
 LONGEST, MOST_SAMPLES = 15.0, 300
 #: Rows of a history.
@@ -31,21 +36,24 @@ def random_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
     radius = _log(r, *RADIUS)
     gravity = 9.81 if r.random() < 0.8 else _log(r, 1.0, 30.0)
     block = Block(half_width=radius * math.sin(alpha), half_height=radius * math.cos(alpha))
-    unit = math.sqrt(radius / gravity)
-    edge = _edge(r, 0.05, (0.0, FRICTION[1], math.tan(min(alpha, 0.9))))
-    mu = float(r.uniform(*FRICTION)) if edge is None else edge
-    mu_s = min(mu * float(r.uniform(1.0, 1.5)), FRICTION[1]) if r.random() < 0.3 else mu
+    chance = np.random.default_rng([seed, number, 2])
+    block = loaded(block, chance, lambda: float(chance.uniform(*OFF_CENTRE)), lambda: float(chance.uniform(*INERTIA)))
+    unit = math.sqrt(block.radius / gravity)
+    most = most_friction(block)
+    edge = _edge(r, 0.05, (0.0, most, min(block.slope, most)))
+    mu = most / FRICTION[1] * float(r.uniform(*FRICTION)) if edge is None else edge
+    mu_s = min(mu * float(r.uniform(1.0, 1.5)), most) if r.random() < 0.3 else mu
     bounce = 0.0 if r.random() < 0.5 else float(r.uniform(0.0, 0.999))
     walls = _walls(r, radius)
-    uplift = gravity * min(math.tan(alpha), max(mu, 0.05))
-    own_period = 2.0 * math.pi * unit / math.sqrt(0.75)
+    uplift = gravity * min(block.slope, max(mu, 0.05))
+    own_period = 2.0 * math.pi / block.weaker_pivot.frequency_parameter(gravity)
     excitation = _excitation(r, uplift, own_period)
     vertical: Excitation = Rest()
     if r.random() < 0.3:
         vertical = _excitation(r, gravity * 0.3, own_period) if r.random() < 0.5 else _excitation(r, gravity * 0.03, own_period)
     lasts = max(excitation.quiet_after, vertical.quiet_after) + unit * float(r.uniform(1.0, 20.0))
     duration = min(lasts, unit * LONGEST * float(r.uniform(0.1, 1.0)) ** 2 + unit)
-    start = _start(r, alpha, radius, unit, excitation.kind == "rest")
+    start = _start(r, block, unit, excitation.kind == "rest")
     if kind != "unilateral":
         bounce = 0.0
         start.pop("initial_height", None)
@@ -69,6 +77,25 @@ def random_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
     except InputError:  # it would start inside a wall: let it stand
         start.pop("initial_rotation", None)
         return Scene(**settings, **start)
+
+
+def loaded(block: Block, r: np.random.Generator, place: Callable[[], float], inertia: Callable[[], float]) -> Block:
+    """The block, in a share `LOADED` of the draws with a load.
+
+    `place` draws how far the mass's centre is off, of the half sides; its height is off in half of the
+    draws. In half of them the moment of inertia is given, too: `inertia` draws it, of the largest possible.
+    """
+    if r.random() >= LOADED:
+        return block
+    x, z = (float(r.choice([-1.0, 1.0])) * side * place() for side in (block.half_width, block.half_height))
+    centre = (0.0 if r.random() < MIDDLE else x, 0.0 if r.random() < 0.5 else z)
+    own = inertia() * (block.half_diagonal**2 - centre[0] ** 2 - centre[1] ** 2) if r.random() < 0.5 else None
+    return block.replace(centre_of_mass=centre, moment_of_inertia=own)
+
+
+def most_friction(block: Block) -> float:
+    """As much as a scene may have, but for a little: with more a slipping pivot may jam."""
+    return FRICTION[1] if block.homogeneous else min(FRICTION[1], 0.999 * block.least_painleve_friction)
 
 
 def _log(r: np.random.Generator, low: float, high: float) -> float:
@@ -119,11 +146,13 @@ def _samples(r: np.random.Generator, amplitude: float) -> NDArray[np.float64]:
     return np.where(r.random(count) < 0.1, amplitude * r.standard_normal(count) * 3.0, 0.0)
 
 
-def _start(r: np.random.Generator, alpha: float, radius: float, unit: float, must_move: bool) -> dict[str, Any]:
+def _start(r: np.random.Generator, block: Block, unit: float, must_move: bool) -> dict[str, Any]:
+    alpha, radius = block.alpha, block.radius
     speed = radius / unit
     start: dict[str, Any] = {}
     if must_move or r.random() < 0.3:
-        start["initial_rotation"] = _edge(r, 0.05, (alpha, -alpha)) or alpha * float(r.uniform(-1.0, 1.0))
+        balance = block.pivot("left").alpha, -block.pivot("right").alpha
+        start["initial_rotation"] = _edge(r, 0.05, balance) or alpha * float(r.uniform(-1.0, 1.0))
     if r.random() < 0.3:
         start["initial_angular_velocity"] = float(r.uniform(-1.5, 1.5)) * (alpha if r.random() < 0.5 else 1.0) / unit
     if r.random() < 0.2:

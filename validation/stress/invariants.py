@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Block, History, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
-from rockcheck.validation.stress.mechanics import BOOLE, GROUP, integrals, tilted_forces
+from rockcheck.scenes import History, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, kinematics
+from rockcheck.validation.stress.mechanics import BOOLE, GROUP, arms, integrals, tilted_forces
 
 Floats = NDArray[np.float64]
 
@@ -251,13 +251,16 @@ def _force_conditions(
     w = channels["theta_dot"] * unit
     slip = channels["slip_rate"] * unit / scene.block.radius
     scale = 1.0 + np.abs(u) + np.abs(g) + w * w
-    mu_s, slope = scene.floor.mu_s, math.tan(scene.block.alpha)
+    mu_s = scene.floor.mu_s
     excess = tension = 0.0
     left, right = _touches(gaps, len(theta))
     unilateral = model.pivot == "unilateral"
 
     rest = clear & (mode == "rest") & ~left & ~right
-    limit = slope if model.friction == "no-slip" else min(slope, max(mu_s, 1e-9))
+    pivots = scene.block.pivot("left"), scene.block.pivot("right")
+    # A base that accelerates to the right tips the block to the left.
+    tips = np.where(u > 0.0, *(pivot.arm / pivot.height for pivot in pivots))
+    limit = tips if model.friction == "no-slip" else np.minimum(tips, max(mu_s, 1e-9))
     excess = max(excess, float(np.max(((np.abs(u) - limit * np.abs(g)) / scale)[rest], initial=0.0)))
     flat = clear & np.isin(mode, ("rest", "slide"))
     if unilateral:
@@ -279,9 +282,8 @@ def _force_conditions(
     # condition is broken only where it is broken for that long before and after.
     for moment in (0.0, -NEAR, NEAR):
         turned = np.abs(theta)[tilted] + moment * (sign * w)[tilted]
-        forces = tilted_forces(
-            scene.block.alpha, scene.floor.friction, turned, (sign * w)[tilted], (sign * u)[tilted], g[tilted], touching, direction
-        )
+        at = arms(scene.block, sign[tilted], turned)
+        forces = tilted_forces(at, scene.floor.friction, (sign * w)[tilted], (sign * u)[tilted], g[tilted], touching, direction)
         over = np.minimum(over, (np.abs(forces.friction) - mu_s * np.abs(forces.normal)) / scale[tilted])
         floor = -forces.normal if unilateral else -math.inf
         pulls = np.minimum(pulls, np.maximum(np.maximum(-forces.tip, -forces.far), floor) / scale[tilted])
@@ -302,12 +304,13 @@ def energy_error(model: EventBasedModel, scene: Scene, history: History) -> floa
         return None
     unit = math.sqrt(radius / gravity)
     t = channels["t"]
-    motion = (channels[c] for c in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
+    motion = [channels[c] for c in ("y", "theta", "x_dot", "y_dot", "theta_dot")]
     energy = kinematics.energy(scene.block, gravity, *motion) / (gravity * radius)
+    _, right, up = kinematics.mass_motion(scene.block, *motion)
     u = scene.excitation.acceleration(t) / gravity
     vg = scene.vertical.acceleration(t) / gravity
     speed = radius / unit
-    power = -(u * channels["x_dot"] + vg * channels["y_dot"]) / speed
+    power = -(u * right + vg * up) / speed
     if model.friction != "bouc-wen":
         power = power + _friction_power(scene, history, u, 1.0 + vg)
     whole, quiet = _whole_groups(scene, history)
@@ -323,7 +326,7 @@ def energy_error(model: EventBasedModel, scene: Scene, history: History) -> floa
     # Checked in the groups before and after, too: the difference of the two rules says nothing where it changes its sign.
     whole &= np.maximum(doubt, np.maximum(np.append(doubt[1:], 0.0), np.append(0.0, doubt[:-1]))) < RESOLVED
     if model.friction == "bouc-wen":
-        rise = np.abs(np.diff(channels["y_dot"])) / speed / step  # per row; with gravity it is the floor's force
+        rise = np.abs(np.diff(up)) / speed / step  # per row; with gravity it is the floor's force
         force = 2.0 + np.max(np.abs(vg)) + rise[: len(work) * GROUP].reshape(-1, GROUP).max(axis=1)
         held = scene.floor.friction * model.yield_displacement / radius * force
         return float(np.max((off - held / size)[whole], initial=0.0)) if whole.any() else None
@@ -359,9 +362,8 @@ def _friction_power(scene: Scene, history: History, u: Floats, g: Floats) -> Flo
         ladder = mode == "ladder"
         tip, far = np.where(sign > 0, left, right) & ladder, np.where(sign > 0, right, left) & ladder
         forces = tilted_forces(
-            scene.block.alpha,
+            arms(scene.block, sign[tilted], np.abs(theta)[tilted]),
             mu,
-            np.abs(theta)[tilted],
             (sign * w)[tilted],
             (sign * u)[tilted],
             g[tilted],
@@ -417,8 +419,8 @@ def similar(scene: Scene, seed: int) -> Scene:
     root = math.sqrt(k)
 
     return scene.replace(
-        block=Block(half_width=k * scene.block.half_width, half_height=k * scene.block.half_height),
-        walls=tuple(Wall(side=wall.side, gap=k * wall.gap, restitution=wall.restitution) for wall in scene.walls),
+        block=scene.block.scaled(k),
+        walls=tuple(wall.replace(gap=k * wall.gap) for wall in scene.walls),
         excitation=scene.excitation.stretched(root),
         vertical=scene.vertical.stretched(root),
         duration=root * scene.duration,
@@ -477,7 +479,7 @@ class _Horizon:
 def _amplified(scene: Scene, history: History) -> Floats:
     """The logarithm, by each row, of how much sliding friction has amplified a small difference of the rotation rate.
 
-    With P = N/D a slipping pivot has theta'' = -3 (s + k c) N/D, in which N falls with w^2: near Painleve's limit, where D is small,
+    With P = N/D a slipping pivot has theta'' = -(s + k c)/I N/D, in which N falls with w^2: near Painleve's limit, where D is small,
     a difference of w grows or decays faster than all else. A disturbance of the scene's data may have decayed before, and then does not
     show this growth; a rounding error of the moment grows all the same. So the sum starts anew wherever it is negative.
     """
@@ -488,15 +490,15 @@ def _amplified(scene: Scene, history: History) -> Floats:
     slides = (channels["mode"] == "slide-rock") & (theta != 0.0) & (np.abs(slip) > SLIPS)
     rate = np.zeros(len(theta))
     if slides.any():
-        alpha, phi = scene.block.alpha, np.abs(theta)[slides]
+        at = arms(scene.block, sign[slides], np.abs(theta)[slides])
         u = (sign * scene.excitation.acceleration(channels["t"]) / scene.gravity)[slides]
         g = 1.0 + scene.vertical.acceleration(channels["t"])[slides] / scene.gravity
-        on, off = np.ones(len(phi), dtype=bool), np.zeros(len(phi), dtype=bool)
+        on, off = np.ones(len(g), dtype=bool), np.zeros(len(g), dtype=bool)
         direction = np.sign(sign * slip).astype(np.int8)[slides]
         turns = []
         for change in (step, -step):
-            forces = tilted_forces(alpha, scene.floor.friction, phi, (sign * w)[slides] + change, u, g, (on, off, off), direction)
-            turns.append(3.0 * (np.cos(alpha - phi) * forces.friction - np.sin(alpha - phi) * forces.normal))
+            forces = tilted_forces(at, scene.floor.friction, (sign * w)[slides] + change, u, g, (on, off, off), direction)
+            turns.append(at.spin * (at.pivot[1] * forces.friction - at.pivot[0] * forces.normal))
         rate[slides] = (turns[0] - turns[1]) / (2.0 * step)
     grown = np.zeros(len(theta))
     for k in range(1, len(theta)):
@@ -527,22 +529,26 @@ def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
     def stronger(excitation: Rest | Ricker | Sine | Record) -> Rest | Ricker | Sine | Record:
         return excitation if excitation.kind == "rest" else excitation.scaled(by(1.0))
 
+    block, floor = scene.block, scene.floor
     for _ in range(DISTURBED):
-        floor = scene.floor
         kinetic = by(floor.friction)
         static = None if floor.static_friction is None else max(by(floor.static_friction), kinetic)
-        friction = (("friction", kinetic), ("static_friction", static), ("restitution", min(by(floor.restitution), 1.0)))
-        change: dict[str, object] = {
-            "block": Block(half_width=by(scene.block.half_width), half_height=scene.block.half_height),
-            "floor": floor.model_copy(update={name: value for name, value in friction if value is not None}),
-            "walls": tuple(Wall(side=w.side, gap=by(w.gap), restitution=min(by(w.restitution), 1.0)) for w in scene.walls),
-            "excitation": stronger(scene.excitation),
-            "vertical": stronger(scene.vertical),
-        }
-        change |= {name: by(getattr(scene, name)) for name in ("initial_angular_velocity", "initial_velocity", "initial_height")}
-        for rotation in (by(scene.initial_rotation), scene.initial_rotation * (1.0 - DISTURBANCE)):
+        bounce = min(by(floor.restitution), 1.0)
+        with suppress(InputError):  # a value at its limit is past it now
+            change: dict[str, object] = {
+                "block": block.replace(
+                    half_width=by(block.half_width),
+                    centre_of_mass=block.centre_of_mass and tuple(map(by, block.offset)),
+                    moment_of_inertia=block.moment_of_inertia and by(block.moment_of_inertia),
+                ),
+                "floor": floor.replace(friction=kinetic, static_friction=static, restitution=bounce),
+                "walls": tuple(wall.replace(gap=by(wall.gap), restitution=min(by(wall.restitution), 1.0)) for wall in scene.walls),
+                "excitation": stronger(scene.excitation),
+                "vertical": stronger(scene.vertical),
+            }
+            change |= {name: by(getattr(scene, name)) for name in ("initial_angular_velocity", "initial_velocity", "initial_height")}
+            tilt = by(scene.initial_rotation)
             try:
-                yield scene.replace(**change, initial_rotation=rotation)
-            except InputError:
-                continue
-            break
+                yield scene.replace(**change, initial_rotation=tilt)
+            except InputError:  # it would start inside a wall
+                yield scene.replace(**change, initial_rotation=scene.initial_rotation * (1.0 - DISTURBANCE))

@@ -1,10 +1,12 @@
 """Newton-Euler for a block with given contacts, solved by other means than in `ebm`: its histories are checked against it.
 
-Natural units: lengths in R, accelerations in g, unit mass, moment of inertia 1/3. As in `ebm.core.motion`, a tilted block is seen in
-the frame of its pivot, which is then the lower-left corner: with S = sign theta, phi = |theta|, s, c = sin, cos(alpha - phi),
-s', c' = sin, cos(alpha + phi). Four contact forces can act: P and Q of the floor on the pivot, N of the wall that the top corner
-touches, M of the wall that the lifted bottom corner touches. The gap of each contact, its row J (xi, y, phi) and the part of its
-acceleration that the velocities alone give:
+Natural units: lengths in R, accelerations in g, unit mass; xi and y are those of the mass's centre. As
+in `ebm.core.motion`, a tilted block is seen in the frame of its pivot, which is then the lower-left
+corner: with S = sign theta and phi = |theta|, that corner is s to the left of the mass's centre and c
+below it (`Arms`). The top corner is s' to the left and c' above, the lifted bottom corner s' to the right
+and c' below. Four contact forces can act: P and Q of the floor on the pivot, N of the wall that the top
+corner touches, M of the wall that the lifted bottom corner touches. The gap of each contact, its row
+J (xi, y, phi) and the part of its acceleration that the velocities alone give:
 
     P  y - c             (0, 1, -s)      c w^2
     Q  xi - s            (1, 0, c)       s w^2
@@ -18,6 +20,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from rockcheck.scenes import Block
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -33,24 +37,49 @@ class Forces:
     far: Floats
 
 
+@dataclass(frozen=True)
+class Arms:
+    """Where three corners are from the mass's centre, one value a row, and 1/I."""
+
+    pivot: tuple[Floats, Floats]
+    tip: tuple[Floats, Floats]
+    far: tuple[Floats, Floats]
+    spin: float
+
+
+def arms(block: Block, sign: Floats, phi: Floats) -> Arms:
+    """The arms of a block whose rotation has the sign `sign` and the size `phi`."""
+    unit, left, right = block.radius, block.pivot("left"), block.pivot("right")
+    near = np.where(sign > 0.0, left.arm, right.arm) / unit
+    other = (left.arm + right.arm) / unit - near
+    low, top = left.height / unit, (2.0 * block.half_height - left.height) / unit
+    sine, cosine = np.sin(phi), np.cos(phi)
+    return Arms(
+        pivot=(near * cosine - low * sine, near * sine + low * cosine),
+        tip=(near * cosine + top * sine, top * cosine - near * sine),
+        far=(other * cosine + low * sine, low * cosine - other * sine),
+        spin=unit**2 / block.gyration_squared,
+    )
+
+
 def tilted_forces(
-    alpha: float, mu: float, phi: Floats, w: Floats, u: Floats, g: Floats, touching: tuple[Mask, Mask, Mask], slip: NDArray[np.int8]
+    at: Arms, mu: float, w: Floats, u: Floats, g: Floats, touching: tuple[Mask, Mask, Mask], slip: NDArray[np.int8]
 ) -> Forces:
     """Forces of a tilted block.
 
-    `phi`, `w`: rotation and rate; `u`, `g`: base acceleration and gravity felt, all in the pivot's frame. `touching`: pivot on the
+    `w`: rate of rotation; `u`, `g`: base acceleration and gravity felt, all in the pivot's frame. `touching`: pivot on the
     floor, top corner on its wall, bottom corner on its wall. `slip`: direction in which the pivot slips, 0 where it sticks. A slipping
     pivot has Q = -mu d |P|: where P would pull, the sign of its friction turns with it. Near Painleve's limit both signs of P can
     solve this; it is then the pull that is returned where only with it the walls push.
     """
-    s, c, sp, cp = np.sin(alpha - phi), np.cos(alpha - phi), np.sin(alpha + phi), np.cos(alpha + phi)
-    zero, one = np.zeros_like(phi), np.ones_like(phi)
-    rows = np.stack([_triple(zero, one, -s), _triple(one, zero, c), _triple(one, zero, -cp), _triple(-one, zero, -cp)], axis=1)
-    bias = np.stack([c, s, sp, sp], axis=1) * (w * w)[:, None]
+    (s, c), (tip_s, tip_c), (far_s, far_c) = at.pivot, at.tip, at.far
+    zero, one = np.zeros_like(w), np.ones_like(w)
+    rows = np.stack([_triple(zero, one, -s), _triple(one, zero, c), _triple(one, zero, -tip_c), _triple(-one, zero, -far_c)], axis=1)
+    bias = np.stack([c, s, tip_s, far_s], axis=1) * (w * w)[:, None]
     floor, tip, far = touching
     closed = np.stack([floor, floor & (slip == 0), tip, far], axis=1)
     # J M^-1 J^T lambda = -(J a0 + bias), with an open contact's row replaced by "no force".
-    inverse_mass = np.array([1.0, 1.0, 3.0])
+    inverse_mass = np.array([1.0, 1.0, at.spin])
     matrix = np.einsum("nik,k,njk->nij", rows, inverse_mass, rows)
     free = _triple(-u, -g, zero)
     right = -(np.einsum("nik,nk->ni", rows, free) + bias)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.model import ImpactLaw
 from rockcheck.scenes import History, InputError, ModelFailure, Record, Scene, kinematics
 from rockcheck.scenes.excitations import Excitation
 from rockcheck.validation.execute.models import build
@@ -59,7 +60,7 @@ class EventBased(Player):
     """A variant of the event-based model."""
 
     friction: Literal["coulomb", "bouc-wen", "no-slip"] = "coulomb"
-    impacts: Literal["moreau", "floor-first"] = "moreau"
+    impacts: ImpactLaw = "moreau"
     #: Whether its scenes are those at which rounding decides.
     exact: bool = False
 
@@ -169,10 +170,11 @@ def energy_without_source(scene: Scene, history: History) -> float:
     block stands, and where nothing but the base changes its velocity.
     """
     channels, block, gravity = history.channels, scene.block, scene.gravity
-    energy = kinematics.energy(block, gravity, *(channels[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")))
+    motion = [channels[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")]
+    energy = kinematics.energy(block, gravity, *motion)
+    _, right, up = kinematics.mass_motion(block, *motion)
     work, moved = np.zeros(len(energy)), np.zeros(len(energy))
-    for excitation, name in ((scene.excitation, "x_dot"), (scene.vertical, "y_dot")):
-        velocity = channels[name]
+    for excitation, velocity in ((scene.excitation, right), (scene.vertical, up)):
         impulse = -np.diff(_base_velocity(excitation, channels["t"]))
         part = 0.5 * (velocity[1:] + velocity[:-1]) * impulse
         work[1:] += np.cumsum(part)
@@ -202,6 +204,8 @@ PLAYERS: dict[str, Player] = {
         EventBased("ebm-unilateral", "unilateral", 100_000, 1000, "a floor that can only push; every other run with the energy cap"),
         EventBased("ebm-bouc-wen", "bouc-wen", 100_000, 300, "regularised friction, which yields within R/1000", "bouc-wen"),
         EventBased("ebm-unilateral floor-first", "unilateral", 20_000, 200, "one contact after another", impacts="floor-first"),
+        EventBased("ebm-unilateral leading-first", "unilateral", 20_000, 100, "lands flat on one corner", impacts="leading-first"),
+        EventBased("ebm-unilateral trailing-first", "unilateral", 20_000, 100, "on the other one", impacts="trailing-first"),
         EventBased("ebm exact", "bilateral", 20_000, 200, "scenes at which rounding decides", exact=True),
         EventBased("ebm no-slip exact", "no-slip", 20_000, 200, "scenes at which rounding decides", "no-slip", exact=True),
         EventBased("ebm-unilateral exact", "unilateral", 20_000, 200, "scenes at which rounding decides", exact=True),

@@ -10,7 +10,7 @@ from typing import Any
 
 import tomlkit
 
-from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Scene
+from rockcheck.scenes import InputError, Record, Rest, Scene
 from rockcheck.scenes.writing import write_whole
 
 Shows = Callable[[Scene], bool]
@@ -50,14 +50,19 @@ def simplifications(scene: Scene) -> Iterator[Scene]:
     """Valid scenes that are simpler in one respect, the greatest simplification first."""
     for change in _changes(scene):
         try:
-            simpler = scene.replace(**change)
+            simpler = scene.replace(**{key: _changed(getattr(scene, key), value) for key, value in change.items()})
         except InputError:
             continue
         if simpler != scene:
             yield simpler
 
 
+def _changed(part: Any, change: Any) -> Any:
+    return part.replace(**change) if isinstance(change, dict) else change
+
+
 def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
+    """New values of the scene's fields; a dictionary has new values of fields of that part of it."""
     yield from _without(scene)
     yield from _plainer_contacts(scene)
     unit = math.sqrt(scene.block.radius / scene.gravity)
@@ -68,17 +73,17 @@ def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
         excitation = getattr(scene, key)
         if isinstance(excitation, Record):
             for samples in _shorter(excitation.unscaled):
-                yield {key: excitation.model_copy(update={"unscaled": samples})}
+                yield {key: {"unscaled": samples}}
     radius = scene.block.radius
     if not 0.5 < radius < 2.0:  # rounding would change it again
-        yield {"block": Block(half_width=scene.block.half_width / radius, half_height=scene.block.half_height / radius)}
+        yield {"block": scene.block.scaled(1.0 / radius)}
     if scene.gravity != 9.81:
         yield {"gravity": 9.81}
     yield from _rounded(scene)
 
 
 def _without(scene: Scene) -> Iterator[dict[str, Any]]:
-    """A base motion, a wall or a part of the initial state less."""
+    """A base motion, a wall, a part of the initial state or of what a load does less."""
     for key in ("vertical", "excitation"):
         if getattr(scene, key).kind != "rest":
             yield {key: Rest()}
@@ -87,18 +92,22 @@ def _without(scene: Scene) -> Iterator[dict[str, Any]]:
     for key in ("initial_height", "initial_velocity", "initial_angular_velocity", "initial_rotation"):
         if getattr(scene, key) != 0.0:
             yield {key: 0.0}
+    x, z = scene.block.offset
+    yield {"block": {"centre_of_mass": None, "moment_of_inertia": None}}
+    yield {"block": {"moment_of_inertia": None}}
+    yield from ({"block": {"centre_of_mass": centre}} for centre in ((0.0, z), (x, 0.0)))
 
 
 def _plainer_contacts(scene: Scene) -> Iterator[dict[str, Any]]:
     """No restitution, one coefficient of friction, no gap."""
     floor = scene.floor
     if floor.restitution > 0.0:
-        yield {"floor": Floor(friction=floor.friction, static_friction=floor.static_friction)}
+        yield {"floor": {"restitution": 0.0}}
     if floor.static_friction is not None:
-        yield {"floor": Floor(friction=floor.friction, restitution=floor.restitution)}
+        yield {"floor": {"static_friction": None}}
     for n, wall in enumerate(scene.walls):
         for change in ({"restitution": 0.0}, {"gap": 0.0}):
-            yield {"walls": (*scene.walls[:n], wall.model_copy(update=change), *scene.walls[n + 1 :])}
+            yield {"walls": (*scene.walls[:n], wall.replace(**change), *scene.walls[n + 1 :])}
 
 
 def _shorter(samples: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
@@ -121,13 +130,13 @@ def _rounded(scene: Scene) -> Iterator[dict[str, Any]]:
             part = getattr(scene, key)
             for name, value in part:
                 if isinstance(value, float):
-                    yield {key: part.model_copy(update={name: _digits(value, digits)})}
+                    yield {key: {name: _digits(value, digits)}}
                 elif isinstance(value, tuple) and len(value) <= 8:
-                    yield {key: part.model_copy(update={name: tuple(_digits(one, digits) for one in value)})}
+                    yield {key: {name: tuple(_digits(one, digits) for one in value)}}
         for n, wall in enumerate(scene.walls):
             for name in ("gap", "restitution"):
                 change = {name: _digits(getattr(wall, name), digits)}
-                yield {"walls": (*scene.walls[:n], wall.model_copy(update=change), *scene.walls[n + 1 :])}
+                yield {"walls": (*scene.walls[:n], wall.replace(**change), *scene.walls[n + 1 :])}
 
 
 def _digits(value: float, digits: int) -> float:

@@ -14,6 +14,7 @@ from typing import Literal
 from rockcheck.scenes import Scene
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import OnProgress, unheard
+from rockcheck.scenes.writing import made
 from rockcheck.validation.execute.models import FAMILIES, not_installed
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.execute.study import header
@@ -221,8 +222,7 @@ def _lost(chunk: Chunk, fault: str) -> RunTotals:
 
 def write_failures(batches: dict[str, RunTotals], folder: Path) -> dict[str, RunTotals]:
     """Writes the scenes of the first failures of each model and invariant, as they are, to `failures/`; the batches name them."""
-    place = folder / "failures"
-    place.mkdir(exist_ok=True)
+    place = made(folder, "failures")
     for old in place.glob("*.toml"):
         old.unlink()
     kept = {}

@@ -11,10 +11,11 @@ import tomlkit
 
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.suite.results import Check, Run
 from rockcheck.validation.suite.suites import Suite
-from rockcheck.validation.suite.tolerances import OWN_FIGURES, Tolerance, Windowed, judge
+from rockcheck.validation.suite.tolerances import MEASURES, OWN_FIGURES, Tolerance, Windowed, judge
 
 #: Of a new line: limit and drift band, as shares of a difference from the perfect value, and of a cell's own figure.
 ROOM, DRIFT = 2.0, 0.2
@@ -26,9 +27,10 @@ LEAST_LIMIT, LEAST_DRIFT, LEAST_SHARE = 10.0, 1.0, 0.01
 def accept(suite: Suite, run: Run, reason: str | None, *, write: bool = True) -> tuple[list[str], list[str]]:
     """Write the figures of `run` into the tolerance file of `suite`.
 
-    Returns the changes and what was refused, a line each. A limit that the figure is outside of is loosened only with a
-    `reason`, which goes into the file; a check without a figure, and a line that would not pass now, is always refused. A limit is
-    never tightened. Without `write` the file stays as it is.
+    Returns the changes and what was refused, a line each. A change is new, tightened (to what is
+    better), loosened (a wider limit) or moved (another expected value); the last two need a `reason`,
+    which goes into the file. A check without a figure, and a line that would not pass now, is always
+    refused; a figure that is not defined asks for no line. Without `write` the file stays as it is.
     """
     changes: list[str] = []
     refused: list[str] = []
@@ -39,13 +41,15 @@ def accept(suite: Suite, run: Run, reason: str | None, *, write: bool = True) ->
 
 def _accept(suite: Suite, run: Run, reason: str | None, changes: list[str], refused: list[str], write: bool) -> None:
     path = suite.tolerances_path
-    document = tomlkit.parse(path.read_text(encoding="utf-8")) if path.exists() else tomlkit.document()
+    document = tomlkit.parse(read_text(path)) if path.exists() else tomlkit.document()
     tables: Any = document.setdefault("tolerances", tomlkit.table()) if path == suite.path else document
     before = len(changes)
     for cell, check in run.checks():
         if cell.scene not in suite.scenes and cell.scene not in suite.ensembles:
             continue
         figure = check.figure
+        if check.verdict == "not defined":
+            continue
         against, key = figure.against or OWN_FIGURES, str(Windowed(figure.measure, figure.window))
         where = f"[{cell.scene}.{cell.model}.{against}] {key}"
         line = _accepted(check, reason)
@@ -55,7 +59,7 @@ def _accept(suite: Suite, run: Run, reason: str | None, changes: list[str], refu
         old = None if check.limit is None else {"expected": check.expected, "limit": check.limit, "drift": check.drift, "why": check.why}
         if line != old:
             table = _table(tables, (cell.scene, cell.model, against))
-            changes.append(f"{where}: {_shown(old)} -> {_shown(line)}")
+            changes.append(f"{where}: {_named(check, line)}: {_shown(old)} -> {_shown(line)}")
             entry = tomlkit.inline_table()
             entry.update(line)
             table[key] = entry
@@ -68,36 +72,49 @@ def _accept(suite: Suite, run: Run, reason: str | None, changes: list[str], refu
 
 def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
     """The new line of a check, or why there is none."""
-    value = check.figure.value
-    if value is None:
-        return check.reason
-    measure = Windowed.parse(check.figure.measure).definition
-    at_least = measure.sense == "at least"
-    if check.gap:
-        return check.gap
-    outside = check.limit is not None and (value < check.limit if at_least else abs(value - (check.ideal or 0.0)) > check.limit)
-    if check.verdict == "fail" and check.limit is not None and not outside:
-        return check.reason  # such as a window that was not compared whole
-    if outside and not reason:
-        return f"{check.reason}; loosening a limit needs --reason"
-    own = measure.ideal is None
-    size = abs(value) if own else abs(value - (measure.ideal or 0.0))
-    limit, why = check.limit, check.why
-    if limit is None or outside:
-        room = max((OWN_ROOM if own else ROOM) * size, LEAST_LIMIT * measure.resolution)
-        limit = _round(0.9 * value, down=True) if at_least else _round(room)
-        if measure.yes_no:
-            limit = size  # 0: must be yes; 1: need not be
-        why = reason or "first accepted figure"
-    drift = check.drift
-    if drift is None:
-        drift = _round(max((OWN_DRIFT if own else DRIFT) * size, LEAST_SHARE * limit, LEAST_DRIFT * measure.resolution))
-        if measure.yes_no:
-            drift = 0.0
+    value, new = check.figure.value, check.limit is None
+    if value is None or not math.isfinite(value) or check.gap:
+        return check.gap or check.reason
+    outside = check.verdict == "fail" and not new
+    worse = outside or check.verdict == "changed"
+    if worse and not reason:
+        return f"{check.reason}; {'loosening a limit' if outside else 'moving what is expected'} needs --reason"
+    measure = MEASURES[check.figure.measure]
+    limit, drift = _room(check, value)
+    tighter = check.verdict == "better" and measure.role == "error"
+    stricter = max if measure.sense == "at least" else min
+    if check.limit is not None and not outside:
+        limit = stricter(check.limit, limit) if tighter else check.limit
+    if check.drift is not None:
+        drift = min(check.drift, drift) if tighter else check.drift
+    why = (reason or "first accepted figure") if new else (reason if worse and reason else check.why)
     expected = value if check.verdict != "pass" or check.expected is None else check.expected
     line: dict[str, Any] = {"expected": _short(expected), "limit": limit, "drift": drift, "why": why}
-    again = judge(check.figure, Tolerance(**line), kind=check.kind, measure=measure)
+    again = judge(check.figure, Tolerance(**line), kind=check.kind, measure=measure, floor=check.floor)
     return line if again.verdict == "pass" else again.reason
+
+
+def _room(check: Check, value: float) -> tuple[float, float]:
+    """Limit and drift band of a first line for the figure."""
+    measure = MEASURES[check.figure.measure]
+    own = measure.ideal is None
+    size = abs(value - (measure.ideal or 0.0))
+    if measure.yes_no:
+        return size, 0.0  # 0: must be yes; 1: need not be
+    limit = _round(max((OWN_ROOM if own else ROOM) * size, LEAST_LIMIT * measure.resolution))
+    if measure.sense == "at least":
+        limit = _round(0.9 * value, down=True)
+    return limit, _round(max((OWN_DRIFT if own else DRIFT) * size, LEAST_SHARE * limit, LEAST_DRIFT * measure.resolution))
+
+
+def _named(check: Check, line: Mapping[str, Any]) -> str:
+    """What becomes of a check's line."""
+    if check.limit is None:
+        return "new"
+    at_least = MEASURES[check.figure.measure].sense == "at least"
+    if line["limit"] < check.limit if at_least else line["limit"] > check.limit:
+        return "loosened"
+    return "tightened" if check.weighs == "pass" else "moved"
 
 
 def _table(tables: MutableMapping[str, Any], path: tuple[str, ...]) -> Any:

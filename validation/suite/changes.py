@@ -1,4 +1,4 @@
-"""What changed: between two finished runs of a suite (`rockcheck diff`), and over many (`rockcheck validate --history FILE`).
+"""What changed: between two finished runs of a suite (`rockcheck compare`), and over many (`rockcheck validate --history FILE`).
 
 A history of runs is a file of JSON lines, one a run: `Moment`.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import shutil
 import subprocess
 from collections.abc import Iterator, Mapping, Sequence
@@ -85,7 +86,7 @@ def _of_cell(old: Cell, new: Cell) -> Iterator[Change]:
             yield Change(**place, what="verdict", name=name, before=was, after=now)
     figures = [{_key(figure): figure for figure in cell.figures} for cell in (old, new)]
     for name, one, other in _pairs(*figures):
-        if one and other and not (one.of_a_fall or other.of_a_fall) and _moved(one, other):
+        if one and other and not (one.of_a_fall or other.of_a_fall) and _moved(one.measure, one.value, other.value):
             yield Change(**place, what="figure", name=name, before=one.value, after=other.value)
 
 
@@ -98,12 +99,13 @@ def _key(figure: Figure) -> str:
     return f"{figure.measure}{'@' if figure.window else ''}{figure.window}{against}"
 
 
-def _moved(one: Figure, other: Figure) -> bool:
-    if one.value is None or other.value is None:
-        return one.value is not other.value
-    measure = MEASURES.get(one.measure)
+def _moved(name: str, was: float | None, now: float | None) -> bool:
+    """Whether a measure's value has moved, by more than rounding and its resolution."""
+    if was is None or now is None:
+        return was is not now
+    measure = MEASURES.get(name)
     least = measure.resolution if measure else 0.0
-    return abs(other.value - one.value) > max(least, ROUNDING * max(abs(one.value), abs(other.value)))
+    return abs(now - was) > max(least, ROUNDING * max(abs(was), abs(now)))
 
 
 class Moment(Stored):
@@ -130,7 +132,7 @@ def moment_of(run: Run, folder: Path) -> Moment:
         verdict=run.words,
         wall_seconds=run.wall_seconds,
         figures={name: None if check.figure.of_a_fall else check.figure.value for name, check in names},
-        not_passed=tuple(name for name, check in names if check.verdict != "pass"),
+        not_passed=tuple(name for name, check in names if check.weighs != "pass"),
     )
 
 
@@ -189,10 +191,8 @@ class Trend(Stored):
         """Whether the last value differs from the one before."""
         if len(self.values) < 2:
             return False
-        was, now = self.values[-2:]
-        if was is None or now is None:
-            return was is not now
-        return abs(now - was) > ROUNDING * max(abs(was), abs(now))
+        check = self.name.rpartition(": ")[2]
+        return _moved(re.split("[@ ]", check)[0], *self.values[-2:])
 
 
 def trends(moments: Sequence[Moment]) -> list[Trend]:

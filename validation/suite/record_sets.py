@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, StringConstraints
 
 from rockcheck.scenes import InputError, Record
 from rockcheck.scenes.base import Finite
@@ -29,6 +29,7 @@ from rockcheck.scenes.trust.inputs import UncertainScene, uncertain_scene
 
 #: Longest name of a scene, and of the part of it that is the record's.
 _LONGEST, _LONGEST_RECORD = 100, 60
+_Path = Annotated[str, StringConstraints(min_length=1, max_length=4096)]
 
 
 class RecordSet(Reading):
@@ -37,7 +38,7 @@ class RecordSet(Reading):
     With `vertical` the base also moves up and down, as the same file says, or one of the set that is named alike.
     """
 
-    files: Annotated[tuple[Word, ...], Field(min_length=1)]
+    files: Annotated[tuple[_Path, ...], Field(min_length=1)]
     scale: Finite = 1.0
     vertical: bool = False
     scenes: tuple[Word, ...] = ()
@@ -62,7 +63,7 @@ def under_records(
         for name in given.scenes:
             if name not in scenes:
                 raise InputError(str(unknown_name("scene", name, scenes)), "records.scenes")
-        files = files_of([folder / word for word in given.files])
+        files = files_of(given.files, folder)
         motions, vertical = motions_of(files, given.reading)
         upward = verticals_of(files, given.reading) if given.vertical else {}
         left_out += [] if given.vertical else vertical

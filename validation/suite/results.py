@@ -12,16 +12,16 @@ Nothing here knows how a cell is simulated, compared or shown.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path, PurePath
 from typing import Any, Literal
 
 from pydantic import Field, ValidationError, field_validator
 
 from rockcheck.scenes import InputError, Scene
-from rockcheck.scenes.errors import from_validation, printable
-from rockcheck.scenes.reading import read_text
-from rockcheck.scenes.writing import write_whole
+from rockcheck.scenes.errors import from_validation, printable, suggestion
+from rockcheck.scenes.reading import read_json, within
+from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
 from rockcheck.validation.discrepancy.impact_laws import LawFollowed
 from rockcheck.validation.uncertainty.numerical import Numerical
@@ -34,10 +34,14 @@ FORMAT = 1
 #: Exit code of a fault of rockcheck's own, EX_SOFTWARE of sysexits: no verdict has it.
 FAULT = 70
 
-#: Verdict on one check: inside the limit; inside, but outside the drift band; outside the limit or not to be judged.
-CheckVerdict = Literal["pass", "changed", "fail"]
+#: Verdict on one check: as expected; nearer to what is perfect; a ratio to nothing; inside the
+#: limit, but outside the drift band; outside the limit or not to be judged. See `tolerances`.
+CheckVerdict = Literal["pass", "better", "not defined", "changed", "fail"]
 #: Verdict on a cell or a run: the worst of its checks, "incomplete" where a model is not installed, or "error" where one failed.
 Verdict = Literal["pass", "incomplete", "changed", "fail", "error"]
+#: What fails beside what is out of a limit: nothing; what changed and a model that is not
+#: installed; "both": what got better, too.
+Strict = bool | Literal["both"]
 SEVERITY: tuple[Verdict, ...] = ("pass", "incomplete", "changed", "fail", "error")
 #: "numerical": two solutions of the same equations. "model form": the reference forbids free flight, the candidate does not.
 #: "measured": one of the two was measured. "exact": against a closed form. "absolute": a figure of the cell itself against
@@ -49,8 +53,10 @@ class Check(Stored):
     """A figure with the tolerance that it was held against.
 
     The figure's distance from `ideal` (0 for differences, 1 for ratios, `expected` for absolute figures) may be at most
-    `limit`; a value further than `drift` from `expected` is "changed". `limit` is None where no tolerance is written down,
-    which never passes. `reason` says why a check did not pass, one line; `gap` what part of the window could not be compared.
+    `limit`; a value further than `drift` from `expected` is "better" or "changed". `limit` is None
+    where no tolerance is written down, which never passes. `reason` says why a check is no plain
+    pass, one line; `gap` what part of the window could not be compared. A value below `floor` means
+    nothing; `beside` is the reference's figure, where that says which value is better.
     """
 
     figure: Figure
@@ -63,6 +69,18 @@ class Check(Stored):
     drift: float | None = None
     why: str = ""
     gap: str = ""
+    floor: float = 0.0
+    beside: float | None = None
+
+    @property
+    def weighs(self) -> Literal["pass", "changed", "fail"]:
+        """What the verdict makes of the cell's."""
+        return "pass" if self.verdict == "better" or self.verdict == "not defined" else self.verdict
+
+    def fails(self, strict: Strict) -> bool:
+        """Whether the check is out of tolerance for a run that is so strict."""
+        fails = ("fail", "changed", "better") if strict == "both" else ("fail", "changed")
+        return self.verdict in (fails if strict else ("fail",))
 
     @property
     def words(self) -> str:
@@ -93,7 +111,7 @@ class Cell(Stored):
     path of its CSV relative to the run's folder. `read_back` is true where nothing that the cell depends on had changed.
     `figures` are all measures, judged or not; `checks` those with a tolerance or in need of one. `numerical` is the run's
     numerical uncertainty, where the suite asks for it, and `explanations` what it says of the differences.
-    `impact_law` is the law of impacts that the history followed at the scene's first flush landing, which nothing judges.
+    `impact_law` is the law of impacts that the history followed at the scene's first landing where laws part, which nothing judges.
     `overturned_at` is the time (s) at which the block lay, None for one that stays.
     `traceback` is the path of a file beside them: of an exception that no model may raise, which is `unexpected` where the
     model is one of rockcheck's own.
@@ -141,7 +159,7 @@ class Cell(Stored):
         """The worst of the cell's checks; "error" if the model failed, "incomplete" if it is not installed."""
         if self.status != "done":
             return "error" if self.status == "failed" else "incomplete"
-        return worst(check.verdict for check in self.checks)
+        return worst(check.weighs for check in self.checks)
 
     @property
     def words(self) -> str:
@@ -188,7 +206,7 @@ class Run(Stored):
     versions: dict[str, str] = Field(default_factory=dict)
     hardware: dict[str, str] = Field(default_factory=dict)
     wall_seconds: float = 0.0
-    strict: bool = False
+    strict: Strict = False
     #: False where nothing was to be judged, as by `rockcheck run`.
     judged: bool = True
     tolerances_file: str = ""
@@ -202,7 +220,8 @@ class Run(Stored):
     def verdict(self) -> Verdict:
         """The worst cell's verdict. At least "fail" where there are faults, or where checks were asked for and none was made."""
         found = worst([cell.verdict for cell in self.cells] + (["fail"] if self.faults else []))
-        return found if not self.judged or any(cell.checks for cell in self.cells) else worst([found, "fail"])
+        judged = any(check.verdict != "not defined" for _, check in self.checks())
+        return found if judged or not self.judged else worst([found, "fail"])
 
     @property
     def words(self) -> str:
@@ -215,10 +234,13 @@ class Run(Stored):
 
     @property
     def exit_code(self) -> int:
-        """0 pass, 1 out of tolerance (under `strict` also changed or incomplete), 3 a model failed, `FAULT` where unexpectedly."""
+        """0 pass, 1 out of tolerance (`strict`: see `Strict`), 3 a model failed, else `FAULT`."""
         if any(cell.unexpected for cell in self.cells):
             return FAULT
-        return {"pass": 0, "incomplete": int(self.strict), "changed": int(self.strict), "fail": 1, "error": 3}[self.verdict]
+        if self.verdict == "error":
+            return 3
+        incomplete = bool(self.strict) and any(cell.status == "absent" for cell in self.cells)
+        return int(incomplete or self.verdict == "fail" or any(check.fails(self.strict) for _, check in self.checks()))
 
     @property
     def up_to_date(self) -> int:
@@ -248,7 +270,7 @@ class Run(Stored):
     @property
     def without_tolerance(self) -> int:
         """How many figures are asked for but have no tolerance yet, which none of them passes."""
-        return sum(check.limit is None for _, check in self.checks())
+        return sum(check.limit is None and check.verdict != "not defined" for _, check in self.checks())
 
     def checks(self) -> Iterator[tuple[Cell, Check]]:
         """All checks with their cells."""
@@ -262,8 +284,7 @@ class Run(Stored):
 
     def save(self, folder: Path) -> Path:
         """Write `run.json` and its schema into `folder` (made if need be), each whole or not at all; returns run.json's path."""
-        folder.mkdir(parents=True, exist_ok=True)
-        write_whole(folder / SCHEMA_FILE, json.dumps(schema(), indent=1, sort_keys=True) + "\n")
+        write_whole(made(folder) / SCHEMA_FILE, json.dumps(schema(), indent=1, sort_keys=True) + "\n")
         return write_whole(folder / RUN_FILE, _by_line(json.loads(self.model_dump_json())))
 
     @classmethod
@@ -272,18 +293,25 @@ class Run(Stored):
         path = Path(folder) / RUN_FILE
         if not path.exists():
             raise InputError(f"{printable(path)}: no finished run here")
-        text = read_text(path)
-        try:
-            data = json.loads(text)
-        except (ValueError, RecursionError) as error:
-            raise InputError(f"{printable(path)}: not a run written by rockcheck: {printable(error)}") from None
+        data = read_json(within(path.parent, RUN_FILE))
         if isinstance(data, dict) and data.get("format") != FORMAT:
             found = f"format {printable(data['format'])}; this version reads {FORMAT}" if "format" in data else "not the run of a suite"
             raise InputError(f"{printable(path)}: {found}")
         try:
-            return cls.model_validate(data)
+            run = cls.model_validate(data)
         except ValidationError as error:
             raise InputError(f"{printable(path)}: {from_validation(error)}") from None
+        for key, names, allowed in run._named():
+            if unknown := sorted(set(names) - set(allowed)):
+                raise InputError(f"{printable(path)}: {key}: {printable(unknown[0])!r} is not in the run{suggestion(unknown[0], allowed)}")
+        return run
+
+    def _named(self) -> Iterator[tuple[str, Iterable[str], Collection[str]]]:
+        """What names a part of the run, by its key, and the names that there are."""
+        ensembles = {one.name for one in self.ensembles}
+        yield "reference", [self.reference], self.models
+        yield "cells.model", (cell.model for cell in self.cells), self.models
+        yield "cells.scene", (cell.scene for cell in self.cells), {*self.scenes, *ensembles}
 
 
 def worst(verdicts: Iterator[Any] | list[Any]) -> Verdict:

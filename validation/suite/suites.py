@@ -5,7 +5,7 @@ A suite is a TOML file that a user can write:
     description = "my shelf on my record"
     reference = "ebm-unilateral"                 # judges numerical differences
     model_form = "ebm"                           # optional: shown beside it, with a band of its own
-    print_figures = true                         # each scene's figure for a paper (SVG, PNG, PDF); without it `rockcheck figure` draws one
+    print_figures = true                         # each scene's figure for a paper (SVG, PNG, PDF); without it `rockcheck report` draws one
     scenes = ["fig4a", "shelf.toml"]             # names, or scene files beside this one
 
     [models.ebm-unilateral]
@@ -153,7 +153,7 @@ class Suite:
     ensembles: Mapping[str, tuple[Ensemble, Scene]] = field(default_factory=dict)
     #: The suites that this one joins.
     included: tuple[Suite, ...] = ()
-    #: Whether the numerical error of each cell is asked for (two coarser runs a cell), and scenes with uncertain numbers, by name.
+    #: Whether the numerical error of each cell is asked for (three coarser runs a cell), and scenes with uncertain numbers, by name.
     uncertainty: bool = False
     uncertain: Mapping[str, UncertainScene] = field(default_factory=dict)
     #: Vertical components of its records, which are not played, and whether anything is judged.

@@ -11,8 +11,8 @@ from rich.text import Text
 
 from rockcheck.scenes.writing import table_text
 from rockcheck.validation.discrepancy.figures import Figure, value_words
-from rockcheck.validation.suite.results import SEVERITY, Cell, Check, Run, worst
-from rockcheck.validation.suite.tolerances import HORIZON, MEASURES
+from rockcheck.validation.suite.results import SEVERITY, Cell, Check, Run, Strict, worst
+from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, apart
 
 #: The most scenes that tables and pages show one by one.
 MOST_SHOWN = 200
@@ -129,6 +129,7 @@ def summary(run: Run) -> dict[str, Any]:
             for cell in run.cells
         ],
         "reasons": list(verdict_lines(run)),
+        "better": list(improvements(run)),
     }
 
 
@@ -140,17 +141,25 @@ def verdict_lines(run: Run) -> Iterator[str]:
     for cell in run.cells:
         if cell.status != "absent":
             yield from cell_lines(cell)
-    if run.judged and not any(cell.checks or cell.status != "done" for cell in run.cells):
-        yield "nothing was judged: the suite requires no measure and has no tolerance"
+    if run.judged and not any(cell.status != "done" or any(c.verdict != "not defined" for c in cell.checks) for cell in run.cells):
+        yield "nothing was judged: no measure that is defined here is required or has a tolerance"
 
 
-def cell_lines(cell: Cell) -> Iterator[str]:
-    """Why a cell is not a pass, a line each."""
+def improvements(run: Run) -> Iterator[str]:
+    """The figures that are better than was expected, a line each."""
+    yield from (f"{place(cell)}: {title(check)}: {check.reason}" for cell, check in run.checks() if check.verdict == "better")
+
+
+def cell_lines(cell: Cell, strict: Strict = True) -> Iterator[str]:
+    """Why a cell is not a pass for a run that is so strict, a line each."""
     if cell.status != "done":
-        yield f"{cell.scene}, {cell.model}: {cell.reason}"
-    for check in cell.checks:
-        if check.verdict != "pass":
-            yield f"{cell.scene}, {cell.model}: {title(check)}: {check.reason}"
+        yield f"{place(cell)}: {cell.reason}"
+    yield from (f"{place(cell)}: {title(check)}: {check.reason}" for check in cell.checks if check.fails(strict))
+
+
+def place(cell: Cell) -> str:
+    """The cell's scene and model."""
+    return f"{cell.scene}, {cell.model}"
 
 
 def title(check: Check) -> str:
@@ -165,15 +174,22 @@ def windowed(check: Check) -> str:
 
 
 def used(check: Check) -> float:
-    """Share of its limit that a check uses up, 0 to 1 within it; infinite where it cannot be judged."""
+    """Share of its limit that a check uses up, 0 to 1 within it; infinite where it cannot be judged.
+
+    0 where nothing is asked, and where the limit lies around a value that is no longer wanted.
+    """
     value, limit = check.figure.value, check.limit
+    if check.verdict == "not defined" or (check.verdict == "better" and check.beside is not None):
+        return 0.0
     if check.verdict == "fail" or value is None or limit is None:
         return math.inf
     if asks(check):
         return 0.0
     if check.ideal is None:  # an "at least" measure: what is there of what is needed
         return limit / value if value > 0.0 else 0.0
-    return abs(value - check.ideal) / limit if limit > 0.0 else 0.0
+    measure = MEASURES.get(check.figure.measure)
+    floor = 0.0 if measure is None or measure.role == "error" else check.floor
+    return apart(value, check.ideal, floor) / limit if limit > 0.0 else 0.0
 
 
 def percent(check: Check) -> str:

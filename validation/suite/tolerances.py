@@ -14,8 +14,22 @@ what a scene's own line leaves out:
     "theta_rms@8s" = { why = "first-order step error" }
 
 `@` bounds the window: seconds, or `@horizon`. `limit` bounds the distance from the perfect value (from `expected`
-for figures of the cell itself; for "at least" measures the value itself). Within the limit, but further than `drift` from
-`expected`, is *changed*. All in the measure's unit.
+for figures of the cell itself; for "at least" measures the value itself). All in the measure's
+unit.
+
+What a figure is judged by depends on its measure's role:
+
+| role | distance within `limit` | better, where it moved by more than `drift` |
+|---|---|---|
+| error (has a perfect value) | from the perfect value | that distance fell by more than it |
+| quantity | from `expected`, beyond its floor | it came nearer to the reference's by more |
+| count | from `expected` | as a quantity |
+
+A figure has moved by what it and `expected` differ beyond their floor (`floor_of`), so two values
+below it are the same: nothing. The limit of an error holds as it is written. What moved is
+*better*, else *changed*; better passes, a quantity or count beyond its limit too. A quantity has a
+better only where the reference solves the same equations and is itself as expected (`runner`).
+A ratio to nothing is *not defined*.
 """
 
 from __future__ import annotations
@@ -27,13 +41,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rockcheck.scenes import InputError
+from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.base import Finite, Frozen, NonNegative
 from rockcheck.scenes.errors import printable, unknown_name
 from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, Measure
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, Measure, between_rows
 from rockcheck.validation.discrepancy.statistics import STATISTICS
 from rockcheck.validation.suite.results import Check, CheckVerdict, Kind
+from rockcheck.validation.uncertainty.numerical import Numerical
 
 MEASURES: Mapping[str, Measure] = ChainMap(DIFFERENCES, FIGURES, STATISTICS)
 #: The third name of a table that is not a reference model.
@@ -41,6 +56,8 @@ OWN_FIGURES = "figures"
 HORIZON = "horizon"
 #: The first name of a table that holds for every scene.
 EVERY = "*"
+#: The quantity whose numerical uncertainty stands for that of others in its unit.
+STANDS_FOR = {"angle": "theta_rms", "m": "last_slip", "s": "end_time"}
 
 
 @dataclass(frozen=True, order=True)
@@ -152,39 +169,123 @@ def _lines(tables: Mapping[str, Any], depth: int, above: tuple[str, ...] = ()) -
             raise InputError(f"{printable('.'.join(path))}: must be tables [scene.model.reference]")
 
 
-def judge(figure: Figure, tolerance: Tolerance | None, *, kind: Kind, measure: Measure, gap: str = "") -> Check:
-    """The verdict on a figure. What is missing, not finite or not compared over the whole window never passes."""
+def floor_of(measure: Measure, scene: Scene, numerical: Numerical | None) -> float:
+    """The size below which a figure of a cell means nothing, in the measure's unit; 0 of a count.
+
+    The largest of the measure's resolution, the run's numerical uncertainty where it is known, and,
+    of a quantity, what the rows cannot tell from nothing. An error is read at the rows' own times.
+    """
+    if not measure.resolution:
+        return 0.0
+    known = [numerical.u_num(name) for name in (measure.name, STANDS_FOR.get(measure.unit, ""))] if numerical else []
+    p, step = scene.frequency_parameter, scene.output_step
+    rows = between_rows(measure.unit, p, scene.gravity, step) if measure.role == "quantity" else 0.0
+    return max(measure.resolution, rows, next((u for u in known if u is not None), 0.0))
+
+
+def judge(
+    figure: Figure,
+    tolerance: Tolerance | None,
+    *,
+    kind: Kind,
+    measure: Measure,
+    gap: str = "",
+    floor: float | None = None,
+    beside: float | None = None,
+) -> Check:
+    """The verdict on a figure. What is missing, not finite or not wholly compared never passes.
+
+    `floor` is the figure's (None: its measure's resolution), `beside` the reference's same figure,
+    where that is a yardstick.
+    """
     given = tolerance or Tolerance(limit=0.0)
-    ideal = measure.ideal if measure.sense == "at least" or measure.ideal is not None else given.expected
+    least = measure.resolution if floor is None else floor
     value = figure.value
     verdict: CheckVerdict = "fail"
-    reason = ""
-    if value is None or not math.isfinite(value):
+    if figure.undefined:
+        verdict, reason = "not defined", figure.note
+    elif value is None or not math.isfinite(value):
         reason = figure.note or "not a number"
-    elif gap:
-        reason = gap
-    elif tolerance is None:
-        reason = "no tolerance yet"
-    elif measure.sense == "at least" and not value >= tolerance.limit:
-        reason = f"{value:.4g} is below the limit {tolerance.limit:.4g}"
-    elif measure.sense == "at most" and (ideal is None or not abs(value - ideal) <= tolerance.limit):
-        away = "" if not ideal else f" from {ideal:.6g}"
-        reason = f"{value:.4g} is more than {tolerance.limit:.4g}{away}" if tolerance.limit else f"{value:.6g}, not {ideal:.6g}"
-        if not tolerance.limit and figure.note:
-            reason += f" ({figure.note})"
-    elif tolerance.expected is not None and tolerance.drift is not None and not abs(value - tolerance.expected) <= tolerance.drift:
-        verdict, reason = "changed", f"{value:.6g} was {tolerance.expected:.6g} (drift allowed {tolerance.drift:.2g})"
+    elif gap or tolerance is None:
+        reason = gap or "no tolerance yet"
     else:
-        verdict = "pass"
+        verdict, reason = _verdict(figure, value, tolerance, measure, least, _perfect(measure, kind, beside))
     return Check(
         figure=figure,
         kind=kind,
         verdict=verdict,
         reason=reason,
-        ideal=ideal,
+        ideal=measure.ideal if measure.role == "error" else given.expected,
         expected=given.expected,
         limit=None if tolerance is None else tolerance.limit,
         drift=given.drift,
         why=given.why,
         gap=gap,
+        floor=least,
+        beside=beside,
     )
+
+
+def judged_beside(check: Check, beside: float | None) -> Check:
+    """The same check with the reference's figure as a yardstick, where there are both."""
+    if check.limit is None or beside is None:
+        return check
+    line = Tolerance(limit=check.limit, expected=check.expected, drift=check.drift, why=check.why)
+    measure = MEASURES[check.figure.measure]
+    return judge(check.figure, line, kind=check.kind, measure=measure, gap=check.gap, floor=check.floor, beside=beside)
+
+
+def _perfect(measure: Measure, kind: Kind, beside: float | None) -> float | None:
+    """The value that a better one is nearer to; None for another model form, no yardstick."""
+    if kind == "model form":
+        return None
+    return math.inf if measure.sense == "at least" else measure.ideal if measure.role == "error" else beside
+
+
+def _verdict(
+    figure: Figure, value: float, line: Tolerance, measure: Measure, floor: float, perfect: float | None
+) -> tuple[CheckVerdict, str]:
+    """The table at the top of this module; and why the figure is no plain pass."""
+    expected, drift = line.expected, math.inf if line.drift is None else line.drift
+    moved = 0.0 if expected is None else apart(value, expected, floor, measure.ideal or 0.0)
+    outside = _outside(figure, value, line, measure, moved)
+    if outside and measure.role == "error":
+        return "fail", outside
+    if expected is None or not (outside or moved > drift):
+        return "pass", ""
+    if _nearer(value, expected, perfect) > (line.drift or 0.0):
+        return "better", f"{value:.6g} was {expected:.6g}" + (f", nearer to {perfect:.6g}" if perfect and perfect < math.inf else "")
+    return ("fail", outside) if outside else ("changed", f"{value:.6g} was {expected:.6g} (drift allowed {drift:.2g})")
+
+
+def _nearer(value: float, expected: float, perfect: float | None) -> float:
+    """By how much a value is nearer to a perfect one than the expected is; 0 where there is none."""
+    if perfect is None or math.isinf(perfect):
+        return 0.0 if perfect is None else value - expected
+    return abs(expected - perfect) - abs(value - perfect)
+
+
+def _outside(figure: Figure, value: float, line: Tolerance, measure: Measure, moved: float) -> str:
+    """How a figure is beyond its limit, empty where not; `moved` is its distance from expected."""
+    limit = line.limit
+    if measure.sense == "at least":
+        return "" if value >= limit else f"{value:.4g} is below the limit {limit:.4g}"
+    ideal = measure.ideal if measure.role == "error" else line.expected
+    away = math.inf if ideal is None else abs(value - ideal) if measure.role == "error" else moved
+    if away <= limit:
+        return ""
+    if limit:
+        return f"{value:.4g} is more than {limit:.4g}" + (f" from {ideal:.6g}" if ideal else "")
+    return f"{value:.6g}, not {ideal:.6g}" + (f" ({figure.note})" if figure.note else "")
+
+
+def apart(value: float, expected: float, floor: float, zero: float = 0.0) -> float:
+    """The distance of two values by what each has beyond a `floor` on either side of `zero`."""
+    one, other = value - zero, expected - zero
+    if min(abs(one), abs(other)) > floor and one * other > 0.0:
+        return abs(value - expected)
+    return abs(_beyond(one, floor) - _beyond(other, floor))
+
+
+def _beyond(size: float, floor: float) -> float:
+    return math.copysign(max(abs(size) - floor, 0.0), size)

@@ -7,10 +7,19 @@ from collections.abc import Container, Iterator
 
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes.errors import inert, printable
 from rockcheck.scenes.writing import markdown_table
-from rockcheck.validation.suite.results import Cell, Check, Run
-from rockcheck.validation.suite.tables import MOST_SHOWN, not_shown, share, shown, title, used, verdict_lines
+from rockcheck.validation.suite.results import Cell, Check, Run, Strict
+from rockcheck.validation.suite.tables import (
+    MOST_SHOWN,
+    improvements,
+    not_shown,
+    share,
+    shown,
+    title,
+    used,
+    verdict_lines,
+)
 
 MARKS = {"pass": "✅", "incomplete": "⚪", "changed": "🟡", "fail": "❌", "error": "💥"}
 
@@ -18,7 +27,8 @@ MARKS = {"pass": "✅", "incomplete": "⚪", "changed": "🟡", "fail": "❌", "
 def junit(run: Run) -> str:
     """JUnit XML: a test suite a scene, a test case a check and one for each cell's run, which is an error where it failed.
 
-    A figure that changed within its limit, and a model that is not installed, are failures only in a strict run.
+    A figure that changed within its limit, and a model that is not installed, are failures only in a
+    strict run, one that is better in a run that is strict both ways. What is not defined is skipped.
     """
     document = JUnitXml(f"rockcheck {run.suite}")
     for scene, cells in run.by_scene().items():
@@ -31,11 +41,10 @@ def junit(run: Run) -> str:
             suite.add_testcase(_case("tolerances", fault, Failure(fault)))
         document.append(suite)
     document.update_statistics()
-    text = bytes(document.tostring()).decode()
-    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text) + "\n"  # XML knows no control characters
+    return inert(bytes(document.tostring()).decode()) + "\n"  # XML knows no control characters
 
 
-def _cases(cell: Cell, strict: bool) -> Iterator[TestCase]:
+def _cases(cell: Cell, strict: Strict) -> Iterator[TestCase]:
     place = f"{cell.scene}.{cell.model}"
     missing = Failure(cell.reason) if strict else Skipped(cell.reason)
     ran = _case(place, "runs", {"failed": Error(cell.reason), "absent": missing}.get(cell.status))
@@ -44,8 +53,8 @@ def _cases(cell: Cell, strict: bool) -> Iterator[TestCase]:
     if cell.numerical is not None:
         yield _case(place, "converged", None if cell.numerical.converged else Skipped("; ".join(cell.numerical.reasons)))
     for check in cell.checks:
-        failed = check.verdict == "fail" or (strict and check.verdict == "changed")
-        yield _case(place, title(check), Failure(check.reason, check.verdict) if failed else None)
+        failure = Failure(check.reason, check.verdict) if check.fails(strict) else None
+        yield _case(place, title(check), Skipped(check.reason) if check.verdict == "not defined" else failure)
 
 
 def _case(place: str, name: str, result: Failure | Error | Skipped | None) -> TestCase:
@@ -63,10 +72,10 @@ def markdown(run: Run) -> str:
         f"{len(run.cells)} simulations, {run.up_to_date} up to date, {sum(1 for _ in run.checks())} checks, {run.wall_seconds:.1f} s.",
         "",
     ]
-    reasons = list(verdict_lines(run))
-    if reasons:
-        more = [f"- and {len(reasons) - MOST_SHOWN} more, in junit.xml"] if len(reasons) > MOST_SHOWN else []
-        lines += [*(f"- {_plain(reason)}" for reason in reasons[:MOST_SHOWN]), *more, ""]
+    for heading, found in (("", list(verdict_lines(run))), ("Better than expected:", list(improvements(run)))):
+        more = [f"- and {len(found) - MOST_SHOWN} more, in junit.xml"] if len(found) > MOST_SHOWN else []
+        lines += [heading, ""] if heading and found else []
+        lines += [*(f"- {_plain(one)}" for one in found[:MOST_SHOWN]), *more, ""] if found else []
     cells, places = run.by_scene(), shown(run)
     rows = ((_plain(scene), *(_entry(cells[scene].get(model), run.judged) for model in run.models)) for scene in places)
     table = markdown_table(("scene", *map(_plain, run.models)), rows)
@@ -80,7 +89,7 @@ def _laws(run: Run, places: Container[str]) -> Iterator[str]:
     if not told:
         return
     models = [model for model in run.models if any(cell.model == model and cell.impact_law for cell in run.cells)]
-    yield from ("", "The law of impacts followed at the first landing flush against a bouncing wall (not judged):", "")
+    yield from ("", "The law of impacts followed at the first landing at which laws part (not judged):", "")
     found = {(cell.scene, cell.model): cell.impact_law.law for cell in run.cells if cell.impact_law}
     rows = ((_plain(scene), f"{t:.3f} s", *(found.get((scene, model), "") for model in models)) for scene, t in told.items())
     yield markdown_table(("scene", "landing", *map(_plain, models)), rows)

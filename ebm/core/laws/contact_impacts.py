@@ -13,8 +13,12 @@ stage, the set A. In it the impulses p_j and the velocities u_j across the conta
   these is the branch "closed", the second "open", whatever e.
 - "floor-first": one contact after another, in the order of neighbouring trajectories: first the floor, then each wall corner when
   it would arrive had the wall stood a little farther off.
+- "leading-first", "trailing-first": as "moreau", but of two bottom corners that approach the floor
+  together only one takes part, that on the side to which the block slides or the other one. On a
+  floor that does not bounce they are the limits of trajectories with a tilt to either side.
 
-The two differ where a block lands flush against a bouncing wall; no law that is right there follows from rigid-body mechanics.
+The first two differ where a block lands flush against a bouncing wall, the last two from these
+where it lands flat while it slides. No law that is right there follows from rigid-body mechanics.
 """
 
 from __future__ import annotations
@@ -24,8 +28,16 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.core.contacts import CLOSED
-from rockcheck.ebm.core.motion import CLOSED_BRANCH, FLOOR_FIRST, MOREAU, side_of
+from rockcheck.ebm.core.contacts import CLOSED, SLOW
+from rockcheck.ebm.core.motion import (
+    CLOSED_BRANCH,
+    FLOOR_FIRST,
+    LEADING_FIRST,
+    MOREAU,
+    OPEN_BRANCH,
+    TRAILING_FIRST,
+    side_of,
+)
 from rockcheck.ebm.core.series import NOISE, POSITION
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
@@ -218,8 +230,20 @@ def _strike(rows, spin, taking, target, mu_s, mu_k, v, after, impulse, system):
 def _moreau(law, touching, approach, restitution, rounding, taking):
     """Whatever touches takes part; at an elastic wall only the corners that approach."""
     for j in range(CONTACTS):
-        rests = law == CLOSED_BRANCH or (law == MOREAU and restitution[j] < 1.0)
+        rests = law != OPEN_BRANCH and (law == CLOSED_BRANCH or restitution[j] < 1.0)
         taking[j] = 1.0 if touching[j] != 0.0 and (j <= E or approach[j] < -rounding or rests) else 0.0
+
+
+@inner_kernel
+def _one_corner(law, approach, slip, taking):
+    """Of two bottom corners that approach the floor only the one that the law puts first takes part.
+
+    F stands on the side of negative slip. Without slip neither leads, and both take part.
+    """
+    if law != LEADING_FIRST and law != TRAILING_FIRST:
+        return
+    if max(approach[F], approach[E]) < -SLOW and abs(slip) >= SLOW:
+        taking[E if (slip < 0.0) == (law == LEADING_FIRST) else F] = 0.0
 
 
 @inner_kernel
@@ -274,10 +298,12 @@ def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, t
         if not closes:
             _close(rows, b.spin, touching, resting, v, system)
             return found
-        if b.law == FLOOR_FIRST and not plastic:
+        law = MOREAU if plastic else b.law
+        if law == FLOOR_FIRST:
             _floor_first(touching, approach, stage, rounding, ahead, taking)
         else:
-            _moreau(MOREAU if plastic else b.law, touching, approach, restitution, rounding, taking)
+            _moreau(law, touching, approach, restitution, rounding, taking)
+            _one_corner(law, approach, _dot(rows[_TANGENT], v), taking)
         for j in range(CONTACTS):
             target[j] = -restitution[j] * approach[j] if taking[j] != 0.0 and approach[j] < -resting else 0.0
         before = kinetic_energy(b.spin, v)

@@ -39,7 +39,15 @@ from rockcheck.ebm.core.laws.contact_impacts import (
 )
 from rockcheck.ebm.core.modes import tips_first
 from rockcheck.ebm.core.motion import FAMILY, FAR, FLAT, FLOOR, HEIGHT, OFF, PULL, STICK, THETA, TILT, TIP, VX, VY, S, W, X, side_of
-from rockcheck.ebm.core.rules import ENDLESS_STAGES, FLUSH_LANDING, LANDS_ALONG, LEAST_CONTRADICTION, SETTLES, WEDGED
+from rockcheck.ebm.core.rules import (
+    ENDLESS_STAGES,
+    FLAT_LANDING,
+    FLUSH_LANDING,
+    LANDS_ALONG,
+    LEAST_CONTRADICTION,
+    SETTLES,
+    WEDGED,
+)
 from rockcheck.ebm.core.series import NOISE, POSITION
 from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
@@ -219,6 +227,8 @@ def _strike_all(b, m, z, gh, t, resting, impulse, gains, rules, work):
     touching[F], touching[TIP_TOP], touching[FAR_BOTTOM] = floor, tip, far
     touching[E], touching[TIP_BOTTOM], touching[FAR_TOP] = flat and floor, flat and tip, flat and far
     v[0], v[1], v[2] = sign * z[VX], z[VY], sign * z[W]
+    slower = v[1] + max(side_of(b, -sign).arm * v[2], -side_of(b, sign).arm * v[2])
+    rules[FLAT_LANDING] += flat and floor and slower < -SLOW
     e_tip = b.e_left if sign > 0 else b.e_right
     e_far = b.e_right if sign > 0 else b.e_left
     if tip and far:

@@ -1,16 +1,16 @@
-"""Which law of impacts a history followed at a flush landing."""
+"""Which law of impacts a history followed at a flush landing, or at a flat one."""
 
 from __future__ import annotations
 
 import pytest
 
 from rockcheck import engines
+from rockcheck.cm import ContinuousModel
 from rockcheck.ebm import EventBasedModel
 from rockcheck.engines import stepping
 from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
-from rockcheck.validation.discrepancy.impact_laws import flush_landing as flush_landing_of
-from rockcheck.validation.discrepancy.impact_laws import law_followed
+from rockcheck.validation.discrepancy.impact_laws import law_followed, parting_landing
 
 
 def flush_landing(restitution: float, side: str = "left") -> Scene:
@@ -122,7 +122,65 @@ def test_a_history_that_parted_before_the_landing_tells_nothing() -> None:
 
 def test_a_history_that_ends_before_the_landing_tells_nothing() -> None:
     scene = flush_landing(0.5)
-    landing = flush_landing_of(scene)
+    landing = parting_landing(scene)
     assert landing is not None
     short = EventBasedModel(pivot="unilateral").simulate(scene.replace(duration=landing.t - 0.05))
     assert landing.followed_by(short, scene) is None
+
+
+def flat_landing(**change: object) -> Scene:
+    """A block that is dropped upright while it moves to the left: its left corner leads."""
+    scene = Scene(
+        name="flat",
+        block=Block(half_width=0.3, half_height=1.0),
+        floor=Floor(friction=0.9),
+        initial_height=0.05,
+        initial_velocity=-1.0,
+        duration=3.0,
+    )
+    return scene.replace(**change)
+
+
+@pytest.mark.parametrize(("tilt", "law"), [(1e-9, "leading-first"), (-1e-9, "trailing-first")])
+@pytest.mark.parametrize("speed", [-1.0, 1.0])
+def test_a_tilt_that_is_next_to_nothing_says_which_corner_is_first(tilt: float, law: str, speed: float) -> None:
+    """Tilted to the side to which it slides a block lands on its leading corner; the laws are the limits of such landings."""
+    scene = flat_landing(initial_velocity=speed)
+    tilted = EventBasedModel(pivot="unilateral").simulate(scene.replace(initial_rotation=-speed * tilt))
+    found = law_followed(scene, tilted)
+    assert found is not None
+    assert law in found.law.split(" or ")
+    assert found.errors[law] < 1e-7 < found.spread
+    untilted = EventBasedModel(pivot="unilateral", impacts=law).simulate(scene)
+    assert untilted.outcome == tilted.outcome
+    assert untilted.peak_rotation == pytest.approx(tilted.peak_rotation, abs=1e-6)
+    assert untilted.outcome.startswith("overturned") == (law == "trailing-first")
+
+
+def test_a_flat_landing_is_told_from_one_without_slip_and_one_that_tips() -> None:
+    still = flat_landing(initial_velocity=0.0)
+    assert EventBasedModel(pivot="unilateral").simulate(still).cost.rules["flat landing"] == 1
+    tilted = flat_landing(initial_rotation=0.01)
+    assert "flat landing" not in EventBasedModel(pivot="unilateral").simulate(tilted).cost.rules
+    for scene in (still, tilted):
+        assert parting_landing(scene) is None
+
+
+def test_a_block_that_a_wall_has_struck_lands_flat() -> None:
+    """The continuous model tells that this landing has several answers: it follows another one as its springs grow stiffer."""
+    scene = Scene(
+        name="struck",
+        block=Block(half_width=0.6257529044558684, half_height=1.450050869104316),
+        floor=Floor(friction=0.9321670161858135),
+        walls=[Wall(side="right", gap=0.016955975821364672)],
+        excitation=Ricker(amplitude=14.520221522782801, period=0.6777755218716803),
+        duration=2.0,
+    )
+    landing = parting_landing(scene)
+    assert landing is not None
+    assert landing.t == pytest.approx(1.8439, abs=scene.output_step)
+    soft, stiff = (landing.followed_by(ContinuousModel(penetration=depth).simulate(scene), scene) for depth in (1e-8, 1e-10))
+    assert soft is not None
+    assert stiff is not None
+    assert soft.law == "moreau or leading-first"
+    assert stiff.law != soft.law

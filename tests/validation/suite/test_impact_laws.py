@@ -1,4 +1,4 @@
-"""The law of impacts in a suite: named where a landing tells, never judged; outcomes and peaks by the nearer law."""
+"""The law of impacts in a suite: named where a landing tells, never judged; outcomes and peaks by the nearest law."""
 
 from __future__ import annotations
 
@@ -10,22 +10,25 @@ import pytest
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Scene
 from rockcheck.validation.discrepancy.compare import compare
-from rockcheck.validation.execute import workers
 from rockcheck.validation.execute.store import COMPARISONS, Store
-from rockcheck.validation.suite.impact_laws import by_either, landing_of, under_the_other_law
+from rockcheck.validation.suite.impact_laws import by_any, landing_of, under_other_laws
 from rockcheck.validation.suite.results import Cell, Run
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import ModelVariant, load_suite
 from rockcheck.validation.suite.tables import summary
 from rockcheck.validation.suite.verdicts import markdown
 
-# Under "moreau" the first block stays and under "floor-first" it falls; the second stands beside no wall that bounces.
+# Under "moreau" the first block stays and under "floor-first" it falls; the second stands beside no wall
+# that bounces; the last one lands flat, and overturns where its trailing corner is first.
 SUITE = """
 reference = "ebm-unilateral"
 [models.ebm-unilateral]
 [models.floor-first]
 model = "ebm-unilateral"
 impacts = "floor-first"
+[models.trailing-first]
+model = "ebm-unilateral"
+impacts = "trailing-first"
 [models.mujoco]
 time_step = "adaptive"
 [require]
@@ -45,9 +48,20 @@ initial_rotation = -0.07
 block = { half_width = 0.397, half_height = 1.555 }
 floor = { friction = 0.5 }
 walls = [{ side = "left", gap = 0.0, restitution = 0.0 }]
+[[scene]]
+name = "flat"
+duration = 3.0
+initial_height = 0.05
+initial_velocity = -1.0
+block = { half_width = 0.3, half_height = 1.0 }
+floor = { friction = 0.9 }
 [tolerances."*".floor-first.ebm-unilateral]
 outcome_agrees = { expected = 1.0, limit = 0.0, drift = 0.0, why = "the nearer of two laws" }
 peak_ratio = { expected = 1.0, limit = 1e-6, drift = 1e-6, why = "the nearer of two laws" }
+"theta_rms@horizon" = { expected = 0.0, limit = 1e-3, drift = 1e-3, why = "before the laws part" }
+[tolerances."*".trailing-first.ebm-unilateral]
+outcome_agrees = { expected = 1.0, limit = 0.0, drift = 0.0, why = "the nearer of some laws" }
+peak_ratio = { expected = 1.0, limit = 1e-6, drift = 1e-6, why = "the nearer of some laws" }
 "theta_rms@horizon" = { expected = 0.0, limit = 1e-3, drift = 1e-3, why = "before the laws part" }
 """
 
@@ -65,7 +79,7 @@ def suite_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def run(suite_file: Path) -> Run:
-    return run_suite(load_suite(suite_file), suite_file.parent / "out", jobs=1, play=lambda tasks, **_: enumerate(map(workers.play, tasks)))
+    return run_suite(load_suite(suite_file), suite_file.parent / "out", jobs=0)
 
 
 def cell_of(run: Run, scene: str, model: str) -> Cell:
@@ -79,13 +93,14 @@ def test_the_law_that_each_model_followed_is_in_its_cell(run: Run) -> None:
     assert {model: law.law for model, law in laws.items() if law} == {
         "ebm-unilateral": "open",
         "floor-first": "floor-first",
+        "trailing-first": "open",
         "mujoco": "closed",
     }
     assert len({law.t for law in laws.values() if law}) == 1
     assert all(cell.impact_law is None for cell in run.of_scene("plastic"))
 
 
-def test_outcomes_and_peaks_are_judged_by_the_nearer_law(run: Run) -> None:
+def test_outcomes_and_peaks_are_judged_by_the_nearest_law(run: Run) -> None:
     """The two laws end differently, and yet both are right; the histories are held against each other only up to where they part."""
     cell = cell_of(run, "of the law", "floor-first")
     assert cell_of(run, "of the law", "ebm-unilateral").outcome != cell.outcome
@@ -102,6 +117,24 @@ def test_outcomes_and_peaks_are_judged_by_the_nearer_law(run: Run) -> None:
     assert abs(horizon - cell.impact_law.t) < 0.05
 
 
+def test_a_block_that_lands_flat_is_judged_by_the_nearest_law(run: Run) -> None:
+    """The third variant overturns, the reference does not: both are right, and the table says which law each followed."""
+    cell = cell_of(run, "flat", "trailing-first")
+    assert cell.outcome == "overturned left"
+    assert cell_of(run, "flat", "ebm-unilateral").outcome == "moving"
+    assert {check.figure.measure: check.verdict for check in cell.checks} == dict.fromkeys(
+        ("outcome_agrees", "peak_ratio", "theta_rms"), "pass"
+    )
+    assert all(check.figure.note.endswith('impacts = "trailing-first"') for check in cell.checks if check.figure.until is None)
+    horizon = next(check.figure.until for check in cell.checks if check.figure.measure == "theta_rms")
+    laws = {model: law.law for model in run.models if (law := cell_of(run, "flat", model).impact_law)}
+    assert laws["trailing-first"] == "trailing-first"
+    assert laws["ebm-unilateral"] == laws["mujoco"] == "moreau or leading-first"
+    assert cell.impact_law is not None
+    assert horizon is not None
+    assert abs(horizon - cell.impact_law.t) < 0.02
+
+
 def test_where_no_landing_tells_one_law_judges(run: Run) -> None:
     for cell in run.of_scene("plastic"):
         assert all("impacts = " not in figure.note for figure in cell.figures)
@@ -110,7 +143,7 @@ def test_where_no_landing_tells_one_law_judges(run: Run) -> None:
 def test_the_summary_names_the_laws_and_nothing_depends_on_them(run: Run, tmp_path: Path) -> None:
     table = markdown(run).split("not judged")[1]
     assert "of the law" in table
-    assert "open | floor-first | closed" in " ".join(table.split())
+    assert "open | floor-first | open | closed" in " ".join(table.split())
     assert "plastic" not in table
     laws = {(one["scene"], one["model"]): one["impact_law"] for one in summary(run)["cells"]}
     assert laws["of the law", "mujoco"] == "closed"
@@ -128,7 +161,7 @@ def test_a_landing_is_kept_and_what_was_kept_is_not_trusted(suite_file: Path, tm
     assert first is not None
     (kept,) = (tmp_path / COMPARISONS).iterdir()
     with monkeypatch.context() as patched:
-        patched.setattr("rockcheck.validation.suite.impact_laws.flush_landing", lambda scene: None)
+        patched.setattr("rockcheck.validation.suite.impact_laws.parting_landing", lambda scene: None)
         assert landing_of(store, scene) == first
     store.put_record(COMPARISONS, kept.stem, {"landing": {"t": 1.0}})
     assert landing_of(store, scene) == first
@@ -137,15 +170,21 @@ def test_a_landing_is_kept_and_what_was_kept_is_not_trusted(suite_file: Path, tm
 def test_only_a_reference_with_a_law_to_choose_has_another(suite_file: Path) -> None:
     suite = load_suite(suite_file)
     scene = suite.scenes["of the law"]
-    found = [under_the_other_law(scene, suite.models[name]) for name in ("ebm-unilateral", "floor-first", "mujoco")]
-    assert [one and one[0] for one in found] == ["floor-first", "moreau", None]
-    assert under_the_other_law(scene, ModelVariant("paper", "ebm", {})) is None
+    flat = ["leading-first", "trailing-first"]
+    for name, laws in {
+        "ebm-unilateral": ["floor-first", *flat],
+        "floor-first": ["moreau", *flat],
+        "mujoco": [],
+    }.items():
+        assert list(under_other_laws(scene, suite.models[name])) == laws
+    assert under_other_laws(scene, ModelVariant("paper", "ebm", {})) == {}
 
 
 def test_the_reference_itself_counts_where_it_is_nearer(suite_file: Path) -> None:
     scene = load_suite(suite_file).scenes["of the law"]
     one, other = (EventBasedModel(pivot="unilateral", impacts=law).simulate(scene) for law in ("moreau", "floor-first"))
-    figures, gaps = by_either(compare(one, one, scene=scene), "floor-first", other, one, scene, None, ["outcome_agrees", "peak_ratio"])
+    others = {"floor-first": other}
+    figures, gaps = by_any(compare(one, one, scene=scene), others, one, scene, None, ["outcome_agrees", "peak_ratio"])
     assert gaps == {}
     assert {figure.measure: figure.value for figure in figures if figure.measure in ("outcome_agrees", "peak_ratio")} == {
         "outcome_agrees": 1.0,

@@ -35,7 +35,7 @@ def verdict(value, line=LINE, measure="theta_rms", **more):
         (1.0e-3, "pass"),
         (1.09e-3, "pass"),
         (1.2e-3, "changed"),
-        (0.5e-3, "changed"),
+        (0.5e-3, "better"),
         (2.0e-3, "changed"),
         (2.1e-3, "fail"),
         (-2.1e-3, "fail"),
@@ -116,13 +116,17 @@ def test_accept_leaves_what_passes(tolerance_file):
     assert tolerance_file.read_text() == FILE
 
 
-def test_accept_moves_the_expected_figure_and_keeps_the_limit(tolerance_file):
+def test_accept_moves_the_expected_figure_only_with_a_reason_and_keeps_the_limit(tolerance_file):
     changes, refused = accepted(tolerance_file, made_run(check(1.5e-3)))
+    assert changes == []
+    assert "--reason" in refused[0]
+    assert tolerance_file.read_text() == FILE
+    changes, refused = accepted(tolerance_file, made_run(check(1.5e-3)), "another step")
     assert refused == []
-    assert changes == ["[s.m.r] theta_rms: expected 0.001, limit 0.002, drift 0.0001 -> expected 0.0015, limit 0.002, drift 0.0001"]
+    assert changes == ["[s.m.r] theta_rms: moved: expected 0.001, limit 0.002, drift 0.0001 -> expected 0.0015, limit 0.002, drift 0.0001"]
     text = tolerance_file.read_text()
     assert text.startswith("# by hand\n\n[s.m.r]\n# the main one\n")
-    assert tomllib.loads(text)["s"]["m"]["r"]["theta_rms"] == {"expected": 0.0015, "limit": 0.002, "drift": 0.0001, "why": "a test"}
+    assert tomllib.loads(text)["s"]["m"]["r"]["theta_rms"] == {"expected": 0.0015, "limit": 0.002, "drift": 0.0001, "why": "another step"}
 
 
 def test_accept_loosens_only_with_a_reason(tolerance_file):

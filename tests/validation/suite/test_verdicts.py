@@ -78,7 +78,8 @@ def test_a_cell_that_has_not_converged_is_skipped_with_its_reason():
     """A case of its own, beside the run's: green where the run has converged, none where nothing was asked for."""
 
     def found(*quantities: Quantity) -> Cell:
-        return cell("a", "m", check(0.25)).model_copy(update={"numerical": Numerical(method="steps h, 2h and 4h", quantities=quantities)})
+        numerical = Numerical(method="steps h, 2h, 3h and 4h", quantities=quantities)
+        return cell("a", "m", check(0.25)).model_copy(update={"numerical": numerical})
 
     sure = Quantity(name="theta_peak", unit="alpha", value=0.5, verdict="converged")
     unsure = Quantity(name="outcome", unit="", value="right", verdict="not converged", reason="the outcome changes: right, right, stands")
@@ -126,7 +127,7 @@ def test_the_summary_names_what_is_not_a_pass():
         (0.375, "pass"),
         (0.125, "pass"),
         (0.3750001, "changed"),
-        (0.1249999, "changed"),
+        (0.1249999, "better"),
         (0.5, "changed"),
         (0.5000001, "fail"),
         (-0.5, "changed"),

@@ -417,7 +417,8 @@ def _converged(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
         columns,
         rows,
         "What engines and CM converge to beside a wall",
-        f"As the step falls they tend to the model whose floor can only push. Against the paper's model the error ends at the difference in form, {form:.1e} alpha.",
+        "As the step falls they tend to the model whose floor can only push. Against the paper's"
+        f" model the error ends at the difference in form, {form:.1e} alpha.",
     )
     yield _over_step(samples, levels, form)
     yield Text(title="What does not converge", items=exceptions or ["Nothing."])

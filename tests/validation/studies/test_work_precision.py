@@ -1,0 +1,281 @@
+"""The benchmark: orders of convergence and error levels of every model at two settings (never times), and its arithmetic."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from rockcheck.commands.cli import main
+from rockcheck.reports.document import publish
+from rockcheck.reports.style import power_of_ten
+from rockcheck.validation.execute.models import not_installed
+from rockcheck.validation.execute.pool import Failure
+from rockcheck.validation.studies.work_precision import runs, savings
+from rockcheck.validation.studies.work_precision.ebm import CASES, LEVEL, at_level, batch_size, batch_times
+from rockcheck.validation.studies.work_precision.runs import (
+    LINES,
+    BenchmarkRun,
+    Play,
+    Point,
+    cost_at,
+    error_at,
+    exceptions_of,
+    levels_of,
+    order_of,
+    orders_of,
+    play,
+    points_of,
+)
+from rockcheck.validation.studies.work_precision.scenes import (
+    DURATION,
+    FAMILIES,
+    GAPS,
+    MEMBERS,
+    PULSES,
+    RESTITUTIONS,
+    WALLS,
+    prepared,
+)
+from rockcheck.validation.studies.work_precision.study import Measure, Measured, WorkPrecision
+
+SOME = (1, 4, 7)
+TWO_WALLS = ("long 53 mm e 0.5", "short 3 mm e 0")
+
+
+def measure(family: str, member: int, line: str, value: float) -> BenchmarkRun:
+    return play(Play(family, member, line, value, 1))
+
+
+def order_and_errors(family: str, line: str, coarse: float, fine: float) -> tuple[float, float, float]:
+    """Order between two settings and the median errors at them, alpha, of three members."""
+    found = points_of([measure(family, k, line, value) for k in SOME for value in (coarse, fine)])
+    first, second = (point.rms for point in found)
+    return math.log(first / second) / math.log(coarse / fine), first, second
+
+
+@pytest.mark.parametrize(
+    ("family", "line", "coarse", "fine", "order", "level"),
+    [
+        ("free", "ebm", 1e-6, 1e-10, 0.9, 1e-9),
+        ("slip a", "ebm", 1e-6, 1e-10, 0.9, 2e-9),
+        ("wall 53 mm e 0.5", "ebm-unilateral", 1e-6, 1e-10, 0.8, 2e-8),
+        ("fig5a", "ebm-unilateral", 1e-4, 1e-10, 0.5, 1e-7),
+        ("pulse a", "ebm-bouc-wen", 1e-4, 1e-5, 0.3, 2e-3),
+        ("free", "cm", 1e-6, 1e-8, 0.9, 1e-6),
+        ("slip a", "cm", 1e-6, 1e-8, 0.6, 2e-4),
+        ("wall 53 mm e 0", "cm", 1e-5, 1e-7, 0.35, 1e-4),
+        ("wall 53 mm e 0.5", "cm", 1e-6, 1e-8, 0.35, 5e-4),
+        ("free", "mujoco", 1e-3, 1e-4, 0.4, 8e-4),
+        ("slip a", "mujoco", 1e-3, 1e-4, 0.6, 1e-3),
+        ("wall 53 mm e 0.5", "mujoco", 1e-2, 1e-4, 0.7, 2e-3),
+        ("free", "pybullet", 1e-3, 1e-4, 0.4, 8e-4),
+        ("slip a", "pybullet", 1e-3, 1e-4, 0.6, 1e-3),
+        ("wall 53 mm e 0.5", "pybullet", 1e-2, 1e-4, 0.7, 2e-3),
+    ],
+)
+def test_every_model_converges_to_its_limit(family: str, line: str, coarse: float, fine: float, order: float, level: float) -> None:
+    found, _, error = order_and_errors(family, line, coarse, fine)
+    assert found > order
+    assert error < level
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
+@pytest.mark.parametrize("family", ["pulse b", "slip b", "wall 3 mm e 0.5", "wall 53 mm e 0"])
+def test_adaptive_engines_are_within_a_twenty_thousandth_of_alpha(engine: str, family: str) -> None:
+    """At steps of at most 4 ms, which cost less than fixed ones of 1 ms."""
+    samples = [measure(family, k, f"{engine} adaptive", 4e-3) for k in SOME]
+    assert points_of(samples)[0].rms < 5e-5
+    assert all(sample.steps < 450 * sample.horizon for sample in samples)
+
+
+def test_mujocos_default_contact_does_not_converge_beside_a_wall() -> None:
+    """Its error has reached a tenth of alpha and stays there as the step falls."""
+    order, _, error = order_and_errors("wall 53 mm e 0.5", "mujoco default", 1e-3, 2e-4)
+    assert abs(order) < 0.3
+    assert error > 0.02
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_members_stay_up_and_end_at_their_horizon(family: str) -> None:
+    """A member that fell would be compared over its fall only; without wall the two limits are one model."""
+    for k in range(MEMBERS):
+        ready = prepared(family, k)
+        assert 1.5 < ready.horizon <= 8.0
+        assert ready.scene.duration == ready.horizon
+        for reference in ready.references.values():
+            assert not reference.outcome.startswith("overturned")
+        assert (ready.model_form > 1e-3) if ready.scene.walls else (ready.model_form < 1e-12)
+
+
+def point(value: float, rms: float, cpu: float) -> Point:
+    return Point("free", "mujoco", value, 10, 0, rms, rms, rms, rms, rms, 0.0, cpu, cpu, 0.0, 1.0)
+
+
+def test_the_order_is_the_slope_between_rounding_and_nonsense() -> None:
+    line = [point(1e-1, 0.9, 1.0), point(1e-2, 3e-2, 1.0), point(1e-3, 3e-4, 1.0), point(1e-4, 1e-14, 1.0)]
+    assert order_of(line) == pytest.approx(2.0)
+    assert math.isnan(order_of(line[:2]))
+
+
+def test_the_cost_of_a_level_is_interpolated_between_logarithms() -> None:
+    line = [point(1e-2, 1e-2, 1.0), point(1e-3, 1e-4, 16.0)]
+    assert cost_at(line) == (pytest.approx(4.0), False)
+    assert cost_at(line[1:]) == (16.0, True)
+    assert math.isnan(cost_at(line[:1])[0])
+    worse = point(1e-4, 1e-5, 3.0)
+    assert cost_at([*line, worse]) == (3.0, False)
+
+
+def test_the_error_of_adaptive_steps_is_told_at_the_cost_of_fixed_ones() -> None:
+    line = [point(4e-3, 1e-2, 1.0), point(1e-3, 1e-4, 16.0)]
+    assert error_at(line, 4.0) == pytest.approx(1e-3)
+    assert math.isnan(error_at(line, 17.0))
+    some = [sample(k, 5e-3) for k in range(10)]
+    for value, rms, cpu in ((2e-3, 1e-3, 0.15), (1e-3, 1e-5, 0.6)):
+        some += [BenchmarkRun("pulse a", k, "mujoco adaptive", value, 3.0, rms=rms * (1 + k % 3), cpu=cpu) for k in range(3)]
+    everything = {row.line: row for row in runs.pooled(some) if row.kind == "all" and row.value == 1e-3}
+    assert everything["mujoco"].at_the_cost == pytest.approx(2e-4)
+    assert everything["mujoco adaptive"].rms_worst == pytest.approx(3e-5)
+
+
+def sample(member: int, rms: float, **change: object) -> BenchmarkRun:
+    return BenchmarkRun("free", member, "mujoco", 1e-3, 3.0, rms=rms, cpu=0.3, wall=0.6, set_up=0.1, steps=3000, **change)  # type: ignore[arg-type]
+
+
+def test_failed_runs_count_as_infinitely_wrong() -> None:
+    good = [sample(k, 1e-3 * (k + 1)) for k in range(4)]
+    bad = [BenchmarkRun("free", k, "mujoco", 1e-3, 3.0, failure="it blew up") for k in range(4, 10)]
+    (row,) = points_of([*good, *bad])
+    assert (row.runs, row.failed, row.rms, row.rms_10) == (10, 6, math.inf, pytest.approx(1.5e-3))
+    assert row.cpu == pytest.approx(0.1)
+
+
+def test_quantiles_are_those_of_the_sample() -> None:
+    (row,) = points_of([sample(k, 1e-3 * (k + 1)) for k in range(10)])
+    assert (row.rms, row.rms_10, row.rms_90) == pytest.approx((5.5e-3, 1.5e-3, 9.5e-3))
+
+
+def test_every_member_meets_every_setting_once_and_only_the_finest_steps_are_not_timed() -> None:
+    tasks = [task for task in WorkPrecision("models").tasks({}) if isinstance(task, Play)]
+    lines = [line for line in LINES.values() if not not_installed(line.model)]
+    assert len(set(tasks)) == len(tasks) == MEMBERS * len(FAMILIES) * sum(len(line.values) for line in lines)
+    for task in tasks:
+        fine = LINES[task.line].knob == "time_step" and task.value < 1e-4
+        assert (task.where == "worker") is fine
+
+
+def test_who_has_no_restitution_plays_the_scenes_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = "rockcheck.validation.studies.work_precision.study.not_installed"
+    monkeypatch.setattr(module, lambda model: "")
+    tasks = [task for task in WorkPrecision("convergence").tasks({}) if isinstance(task, Play)]
+    played = {line: {task.family for task in tasks if task.line == line} for line in ("drake", "mujoco")}
+    assert played["drake"] == {name for name in WALLS if not name.endswith("e 0.5")}
+    assert played["mujoco"] == set(WALLS)
+    assert len(WALLS) == len(PULSES) * len(GAPS) * len(RESTITUTIONS) == 18
+
+
+@pytest.mark.parametrize("name", WALLS)
+def test_every_pulse_hits_the_wall_and_leaves_the_unilateral_block_standing(name: str) -> None:
+    ready = prepared(name, 0)
+    assert not ready.references["ebm-unilateral"].outcome.startswith("overturned")
+    assert ready.model_form > 1e-3, "without a wall hit the two references are one model"
+    assert 3.0 < ready.horizon <= DURATION
+
+
+@pytest.mark.parametrize("scene", TWO_WALLS)
+@pytest.mark.parametrize("model", [line.label for line in LINES.values() if line.converge])
+def test_errors_fall_against_the_unilateral_model_and_stall_against_the_papers(model: str, scene: str) -> None:
+    if not_installed(model) or (model == "drake" and scene.endswith("e 0.5")):
+        return
+    coarse, fine = (measure(scene, 0, model, value) for value in LINES[model].converge[:2])
+    form = prepared(scene, 0).model_form
+    assert coarse.step == pytest.approx(1e-3, rel=0.2)
+    assert fine.step == pytest.approx(1e-4, rel=0.1)
+    assert coarse.rms > 5.0 * fine.rms
+    assert fine.rms < 2e-4
+    assert fine.against_ebm == pytest.approx(form, rel=0.05)
+    assert coarse.against_ebm == pytest.approx(form, rel=0.15)
+
+
+def made(*errors: float, model: str = "mujoco", scene: str = TWO_WALLS[0]) -> list[BenchmarkRun]:
+    """Runs with these errors against the unilateral model, steps falling tenfold from 1e-3."""
+    steps = [10.0 ** -(3 + n) for n in range(len(errors))]
+    return [
+        BenchmarkRun(scene, 0, model, step, 5.0, rms=error, against_ebm=0.1, step=step) for step, error in zip(steps, errors, strict=True)
+    ]
+
+
+def test_levels_and_orders_of_known_errors() -> None:
+    found = [*made(1e-2, 1e-3, 1e-4), *made(4e-2, 4e-4, 4e-6, scene=TWO_WALLS[1])]
+    levels = [level for level in levels_of(found) if level.reference == "ebm-unilateral"]
+    orders = {(order.reference, order.scene): order.order for order in orders_of(found, levels_of(found))}
+    assert [level.median for level in levels] == pytest.approx([2.5e-2, 7e-4, 5.2e-5])
+    assert [level.within for level in levels] == [0, 2, 2]
+    assert orders["ebm-unilateral", TWO_WALLS[0]] == pytest.approx(1.0)
+    assert orders["ebm-unilateral", TWO_WALLS[1]] == pytest.approx(2.0)
+    assert orders["ebm", ""] == pytest.approx(0.0, abs=1e-12)
+    assert not list(exceptions_of(found, orders_of(found, levels_of(found))))
+
+
+def test_what_does_not_converge_is_named_not_dropped() -> None:
+    stalled, far = made(5e-4, 4e-4, 4e-4), made(1.0, 1e-1, 1e-2, scene=TWO_WALLS[1])
+    found = [*stalled, *far, *made(1e-8, 1e-8, model="cm")]
+    named = list(exceptions_of(found, orders_of(found, levels_of(found))))
+    assert [line.partition(":")[0] for line in named] == [f"{scene}, mujoco" for scene in TWO_WALLS]
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_batches_are_as_good_as_their_tolerance(case: object) -> None:
+    """Errors fall with the tolerance, outcomes agree, none fails, and the cheapest good tolerance is found."""
+    name: str = case.name  # type: ignore[attr-defined]
+    rows = batch_times(name, 6)
+    by_tolerance = {row.tolerance: row for row in rows}
+    assert by_tolerance[1e-10].error_95 < 2e-8
+    assert by_tolerance[1e-12].error_95 < 1e-9
+    assert by_tolerance[1e-12].error_95 < 0.1 * max(by_tolerance[1e-6].error_95, 1e-12)
+    assert all(row.failed == 0 for row in rows)
+    assert all(row.wrong == 0 for row in rows if row.tolerance <= 1e-8)
+    best = at_level(rows, name)
+    assert best is not None
+    assert best.error_95 <= LEVEL
+
+
+def test_the_finding_holds_every_table(tmp_path: Path) -> None:
+    settings = (("ebm", 1e-4), ("ebm", 1e-8), ("cm", 1e-5), ("cm", 1e-6), ("mujoco", 1e-2))
+    tasks = [Play(family, k, *one, 1) for family in ("free", "wall 53 mm e 0") for k in SOME for one in settings]
+    tasks += [Play(scene, 0, "cm", value, 1) for scene in TWO_WALLS for value in (1e-6, 1e-8)]
+    done: dict[object, object] = {task: Measured(run=play(task)) for task in tasks}
+    done[Play("free", 0, "pybullet", 1e-2)] = Failure("it blew up <fast>")
+    done[Measure("batch", "friction")] = Measured(times=tuple(batch_times("friction", 6)))
+    done[Measure("size", "3", 20)] = Measured(size=batch_size(20, 3))
+    done[Measure("saving", "made")] = Measured(saved=(savings.Saving("cm", "wall", "ms", 2.0, 1.0),))
+    found = WorkPrecision().gather(done)
+    for name in ("runs", "work-precision", "orders-and-ratios", "levels", "batch-times", "batch-sizes", "savings"):
+        assert found.table(name).rows, name
+    assert found.table("batch-sizes").records()[0]["runs"] == 20
+    lost = [row for row in found.table("runs").records() if row["line"] == "pybullet"]
+    assert [row["failure"] for row in lost] == ["it blew up <fast>"]
+    publish(found, tmp_path, formats=("svg",))
+    for name in ("without-a-wall", "beside-a-wall", "error-over-step", "batches"):
+        assert (tmp_path / "figures" / f"{name}.svg").stat().st_size > 1000
+
+
+def test_axis_labels() -> None:
+    assert [power_of_ten(10.0**k) for k in (-12, -1, 0, 3, 4)] == ["10⁻¹²", "0.1", "1", "1000", "10⁴"]
+
+
+def test_an_unknown_part_is_refused_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["benchmark", "modles"]) == 2
+    assert "did you mean 'models'" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_nothing_that_is_skipped_changes_the_motion() -> None:
+    """Every saving but those that a scene may need (a sliding pivot's cone, a strong pulse's slip)."""
+    found = [one for name, kind in savings.KINDS.items() if name != "batches" for one in kind()]
+    needed = {"cone correction", "friction limit"}
+    for saving in found:
+        reference = 2e-2 if saving.thing in needed or saving.model == "pybullet" else 1e-5
+        assert not saving.change > reference, saving
+        assert saving.cost_with > 0.0 < saving.cost_without
+    assert {"ebm", "cm", "mujoco", "pybullet"} <= {saving.model for saving in found}
