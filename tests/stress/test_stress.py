@@ -156,7 +156,7 @@ def test_a_failure_is_shown_with_its_smallest_scene(tmp_path, monkeypatch):
     assert f'href="failures/{file.name}"' in page
     assert main(["simulate", str(file), "--model", "ebm", "-o", str(tmp_path / "o.csv")]) == 0
     monkeypatch.setattr(type(PLAYERS["ebm"]), "check", None)  # all is read back
-    assert run(study, tmp_path, jobs=0).scenes == found.scenes
+    assert run(study, tmp_path, jobs=0).files == found.files
 
 
 def test_failures_of_the_program_and_of_engines():
@@ -173,7 +173,7 @@ def test_failures_of_the_program_and_of_engines():
     found = study.gather(done)
     assert found.exit_code == 1
     assert found.table("failures").records()[0]["words"] == "it hangs"
-    assert "not shrunk" in found.scenes["ebm-ends-1-7.toml"]
+    assert "not shrunk" in found.files["failures/ebm-ends-1-7.toml"]
 
 
 def test_where_an_engine_breaks_is_found():
