@@ -176,7 +176,8 @@ class Finding:
 
     `answer` is one sentence, `data` what `--json` says besides the tables. `exit_code` is the
     command's: 0 where nothing is judged. `failures` give the reason by task; a run that was
-    interrupted, or had no time for all, is not `complete`.
+    interrupted, or had no time for all, is not `complete`. `files` are further files by name, such
+    as JUnit's, and their content.
     """
 
     name: str
@@ -189,6 +190,7 @@ class Finding:
     failures: Mapping[str, str] = field(default_factory=dict)
     complete: bool = True
     made: Made | None = None
+    files: Mapping[str, str | bytes] = field(default_factory=dict)
 
     def tables(self) -> Iterator[Table]:
         """The tables among the blocks."""

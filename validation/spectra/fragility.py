@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.ebm.spectrum import SAFE, Floats
-from rockcheck.scenes import InputError, Record, Scene
-from rockcheck.scenes.recordings import Recording
-from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
-from rockcheck.scenes.writing import table_text
+from rockcheck.ebm.spectrum import Floats
 from rockcheck.validation.discrepancy.figures import Stored
-from rockcheck.validation.spectra.study import Panel, SpectrumRequest
-from rockcheck.validation.spectra.tiles import Tiles
 
 #: Frequencies of the set of pulses.
 PULSES = 50
@@ -37,76 +29,6 @@ class FragilityCurve(Stored):
     median: float | None
     dispersion: float | None
     points: tuple[tuple[float, float, float, float, float], ...]
-
-
-class Fragility(Stored):
-    """`fragility.json`; `pga_g` is the peak acceleration (g) of a motion of intensity 1, None in files of older versions."""
-
-    format: int = 1
-    title: str
-    about: str
-    intensity: str
-    pga_g: float | None = None
-    cases: tuple[FragilityCurve, ...]
-
-
-def fragility(panel: Panel, request: SpectrumRequest, records: Sequence[tuple[str, Recording]], tiles: Tiles) -> Fragility:
-    """The curves of a scene for a set of named records, or, without any, for pulses of the scene's kind over the frequencies asked.
-
-    Each motion is played in both directions at every intensity: its peak acceleration over g tan(alpha), the amplitudes
-    asked. Raises `InputError` for a set of fewer than `FEWEST`.
-    """
-    scene = panel.scene
-    walls = [("with the wall", scene)] if scene.walls else []
-    cases = []
-    if 0 < len(records) < FEWEST:
-        raise InputError(f"{len(records)} is too few: give at least {FEWEST} records", "--record")
-    for label, case in [*walls, ("without a wall", scene.replace(walls=()))]:
-        sides, failed = _play_records(case, request, records, tiles) if records else _play_pulses(case, request, tiles)
-        cases.append(curve_of(label, sides != SAFE, failed, request.amplitudes))
-    motions = f"{len(records)} records" if records else f"{PULSES} pulses"
-    about = (
-        f"{motions}, each in both directions. Lines: share of the runs that overturn the block; bands: its {CONFIDENCE:.0%} interval"
-        f" (Wilson), with the {'records' if records else 'pulses'} as independent; dots: the lognormal curve of the greatest likelihood."
-    )
-    if undecided := sum(case.undecided for case in cases):
-        about += f" {undecided} runs failed: they count neither as overturned nor as safe."
-    return Fragility(
-        title=f"{panel.title}, {motions}",
-        about=about,
-        intensity="peak acceleration / (g tan α)",
-        pga_g=scene.gravity * scene.block.slope / GRAVITY_OF_RECORDS,
-        cases=tuple(cases),
-    )
-
-
-Runs = tuple[NDArray[np.int8], NDArray[np.bool_]]
-
-
-def _play_pulses(scene: Scene, request: SpectrumRequest, tiles: Tiles) -> Runs:
-    """Sides and failures (pulse, direction, intensity)."""
-    if scene.excitation.kind not in ("ricker", "sine"):
-        raise InputError("is needed: the scene's excitation is no pulse", "--record")
-    frequencies = np.geomspace(request.frequencies[0], request.frequencies[-1], PULSES)
-    f, sign, a = np.meshgrid(frequencies, [1.0, -1.0], request.amplitudes, indexing="ij")
-    sides, failed = tiles.play(scene, (sign * a).ravel(), f.ravel(), model=request.model, settings=request.settings)
-    return sides.reshape(a.shape), failed.reshape(a.shape)
-
-
-def _play_records(scene: Scene, request: SpectrumRequest, records: Sequence[tuple[str, Recording]], tiles: Tiles) -> Runs:
-    """Sides and failures (record, direction, intensity)."""
-    found = []
-    for name, recording in records:
-        record = Record.from_samples(recording.samples, recording.time_step)
-        peak = float(np.max(np.abs(record.samples)))
-        if peak == 0.0:
-            raise InputError(f"{name}: a record without motion has no intensity", "--record")
-        scales = request.amplitudes * scene.gravity * scene.block.slope / peak
-        both = np.concatenate([scales, -scales])
-        played = tiles.play(scene.replace(excitation=record), both, np.ones(len(both)), model=request.model, settings=request.settings)
-        found.append([runs.reshape(2, len(scales)) for runs in played])
-    sides, failed = zip(*found, strict=True)
-    return np.array(sides), np.array(failed)
 
 
 def curve_of(label: str, overturned: NDArray[np.bool_], failed: NDArray[np.bool_], intensities: Floats) -> FragilityCurve:
@@ -175,9 +97,3 @@ def fit_lognormal(intensities: Floats, overturned: NDArray[np.int64], runs: NDAr
     if slope <= 0.0:
         return None
     return float(np.exp(centre - level / slope)), float(1.0 / slope)
-
-
-def curves_table(found: Fragility) -> str:
-    """The curves as CSV."""
-    columns = ("case", "intensity", "share_overturned", "band_low", "band_high", "lognormal_fit")
-    return table_text(columns, ((case.label, *point) for case in found.cases for point in case.points))

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import Spectrum
-from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, node_scene
+from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE
 from rockcheck.scenes import Scene
 from rockcheck.validation.discrepancy.figures import Stored
-from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.models import Model, build
-from rockcheck.validation.spectra.study import AMPLITUDES, FIGURES, GAPS, RESTITUTIONS, SpectrumRequest, paper_panels
-from rockcheck.validation.spectra.tiles import Tiles, tile_key
+from rockcheck.validation.paper.panels import AMPLITUDES, FIGURES, GAPS, RESTITUTIONS
 
 ClaimVerdict = Literal["holds", "holds in part", "does not hold"]
 #: A change of the safe area of less than this share of the nodes is no change: a band one node wide along the boundary.
@@ -33,8 +28,8 @@ GENERALLY = 0.75
 SIGNIFICANTLY = 0.1
 #: "Greatly": by at least this share of the unobstructed safe area.
 GREATLY = 0.25
-#: End of the scan at omega_p/p = 6, beyond the spectra's own range.
-HIGHEST_SCANNED = 20.0
+#: The amplitudes that are scanned, beyond the spectra's own range, and at which omega_p/p.
+SCANNED, SCANNED_AT = np.arange(AMPLITUDES[0], 20.005, 0.01), 6.0
 #: Where the paper says it: the paragraphs of its section 5 on the wall, on all parameters and on each, and of its conclusions.
 WALL, PARAMETERS, EACH, CONCLUSIONS = (
     "section 5, 3rd paragraph",
@@ -70,28 +65,6 @@ class Claim(Stored):
     rows: tuple[Row, ...]
 
 
-class Claims(Stored):
-    """`claims.json`."""
-
-    format: int = 1
-    grid: str
-    model: str
-    claims: tuple[Claim, ...]
-
-
-@dataclass(frozen=True)
-class ExtraRuns:
-    """What the claims need beyond the 28 spectra.
-
-    `least_amplitudes`: the lowest overturning a_p/(g tan alpha) at omega_p/p = 6, mu = 0.3, by (gap, e) of a right wall, None
-    without one; infinite where none up to `HIGHEST_SCANNED` overturns. `one_impact`: by friction, the nodes around `ONE_IMPACT`
-    at which the free block overturns clockwise after exactly one floor impact.
-    """
-
-    least_amplitudes: Mapping[tuple[float, float] | None, float]
-    one_impact: Mapping[float, NDArray[np.bool_]]
-
-
 class Paper:
     """The 28 spectra by wall, friction, gap and restitution."""
 
@@ -117,8 +90,17 @@ class Paper:
         return float(np.mean(spectrum.safe[:, self.frequencies > above]))
 
 
-def check_claims(spectra: Sequence[Spectrum], extra: ExtraRuns) -> tuple[Claim, ...]:
-    """The claims, judged by the 28 spectra on one grid and a closer look at one frequency."""
+def check_claims(
+    spectra: Sequence[Spectrum],
+    least: Mapping[tuple[float, float] | None, float],
+    one_impact: Mapping[float, NDArray[np.bool_]],
+) -> tuple[Claim, ...]:
+    """The claims, judged by the 28 spectra on one grid, and by what they need beyond these.
+
+    `least`: the lowest overturning a_p/(g tan alpha) of `SCANNED` by (gap, e) of a right wall, None
+    without one; infinite where none overturns. `one_impact`: by friction, the nodes of
+    `near_one_impact` at which the free block overturns after exactly one floor impact.
+    """
     paper = Paper(spectra)
     return (
         _lower_friction(paper),
@@ -129,52 +111,34 @@ def check_claims(spectra: Sequence[Spectrum], extra: ExtraRuns) -> tuple[Claim, 
         _side_and_friction(paper),
         _left_wall(paper),
         _left_wall_high_frequency(paper),
-        _one_impact(paper, extra),
+        _one_impact(paper, one_impact),
         _right_wall_no_guarantee(paper),
         _right_wall_depends(paper),
         _right_wall_near(paper),
-        _right_wall_far(extra.least_amplitudes),
+        _right_wall_far(least),
         _restitution_rules(paper),
         _high_friction_benefit(paper),
         _likelier_side(paper),
     )
 
 
-def extra_runs(spectra: Sequence[Spectrum], tiles: Tiles, request: SpectrumRequest) -> ExtraRuns:
-    """Plays what the claims need beyond the 28 spectra, by the model asked."""
-    amplitudes = np.arange(AMPLITUDES[0], HIGHEST_SCANNED + 0.005, 0.01)
-    least: dict[tuple[float, float] | None, float] = {}
-    for panel in paper_panels(8):
-        if panel.wall is None or panel.wall.gap == GAPS[-1]:
-            sides, _ = tiles.play(panel.scene, amplitudes, np.full(len(amplitudes), 6.0), model=request.model, settings=request.settings)
-            key = (panel.wall.gap, panel.wall.restitution) if panel.wall else None
-            least[key] = float(amplitudes[np.argmax(sides != SAFE)]) if (sides != SAFE).any() else math.inf
-    free = [spectrum for spectrum in spectra if not spectrum.scene.walls]
-    return ExtraRuns(least, {one.scene.floor.friction: _with_one_impact(one, tiles, request) for one in free})
+def wall_of(scene: Scene) -> tuple[float, float] | None:
+    """Gap and restitution of the wall, None without one."""
+    return (scene.walls[0].gap, scene.walls[0].restitution) if scene.walls else None
 
 
-def _with_one_impact(spectrum: Spectrum, tiles: Tiles, request: SpectrumRequest) -> NDArray[np.bool_]:
-    """The nodes at omega_p/p from `ONE_IMPACT` to one more that overturn clockwise after exactly one floor impact."""
-    near = (spectrum.frequency_ratios >= ONE_IMPACT[0]) & (spectrum.frequency_ratios <= ONE_IMPACT[1] + 1.0)
-    nodes = np.argwhere((spectrum.outcomes == RIGHT) & near)
-    amplitudes, frequencies = spectrum.amplitude_ratios[nodes[:, 0]], spectrum.frequency_ratios[nodes[:, 1]]
-
-    def find() -> dict[str, Any]:
-        model = build(request.model, request.settings)
-        return {"one": [_impacts(model, spectrum.scene, a, f) == 1 for a, f in zip(amplitudes, frequencies, strict=True)]}
-
-    key = tile_key(spectrum.scene, amplitudes, frequencies, request.model, request.settings)
-    one = tiles.remembered(f"{key}--one-impact-{provenance.code_digest(__name__)}", find)["one"]
-    found = np.zeros(spectrum.outcomes.shape, dtype=bool)
-    found[tuple(nodes[np.array(one, dtype=bool)].T)] = True
-    return found
+def is_scanned(scene: Scene) -> bool:
+    """Whether it is one of the scenes whose lowest overturning amplitude is looked for."""
+    if scene.floor.friction != 0.3:
+        return False
+    return not scene.walls or (scene.walls[0].side, scene.walls[0].gap) == ("right", GAPS[-1])
 
 
-def _impacts(model: Model, scene: Scene, amplitude: float, frequency: float) -> int:
-    """Floor impacts until the outcome at a node is decided."""
-    node = node_scene(scene, float(amplitude), float(frequency))
-    history = model.simulate(node.replace(output_step=node.duration))
-    return sum(event.kind == "floor impact" for event in history.event_list)
+def near_one_impact(spectrum: Spectrum) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The nodes (i, j) at omega_p/p from `ONE_IMPACT` to one more that overturn clockwise."""
+    f = spectrum.frequency_ratios
+    near = (f >= ONE_IMPACT[0]) & (f <= ONE_IMPACT[1] + 1.0)
+    return np.nonzero((spectrum.outcomes == RIGHT) & near)  # type: ignore[return-value]
 
 
 def _pairs(paper: Paper, pairs: Sequence[tuple[str, Spectrum, Spectrum]]) -> tuple[Row, ...]:
@@ -412,9 +376,9 @@ def _left_wall_high_frequency(paper: Paper) -> Claim:
     )
 
 
-def _one_impact(paper: Paper, extra: ExtraRuns) -> Claim:
+def _one_impact(paper: Paper, tongues: Mapping[float, NDArray[np.bool_]]) -> Claim:
     rows, shares = [], []
-    for mu, tongue in sorted(extra.one_impact.items()):
+    for mu, tongue in sorted(tongues.items()):
         safe = paper.walled["left", mu, GAPS[0], 0.0].safe
         for low, high in (ONE_IMPACT, (ONE_IMPACT[1], ONE_IMPACT[1] + 1.0)):
             there = tongue & ((paper.frequencies >= low) & (paper.frequencies <= high))

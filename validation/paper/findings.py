@@ -11,13 +11,10 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import SAFE
-from rockcheck.scenes.reading import read_arrays
-from rockcheck.validation.spectra.claims import Paper, Row, percent
-from rockcheck.validation.spectra.study import FIGURES, GAPS, KEPT, RESTITUTIONS, paper_panels
+from rockcheck.validation.paper.claims import Paper, Row, percent
+from rockcheck.validation.paper.panels import FIGURES, GAPS, RESTITUTIONS
 
 Mask = NDArray[np.bool_]
-#: The outcomes of the 28 spectra as they come with the package, 100 x 100 nodes.
-KEPT_GRIDS = KEPT / "grids.npz"
 
 
 @dataclass(frozen=True)
@@ -41,24 +38,6 @@ class Finding:
     rows: tuple[Row, ...]
     frequencies: NDArray[np.float64]
     amplitudes: NDArray[np.float64]
-
-
-def kept_spectra() -> list[Spectrum]:
-    """The paper's 28 spectra as they come with the package (`rockcheck spectrum --figure all` plays them anew)."""
-    data = read_arrays(KEPT_GRIDS)
-    return [
-        Spectrum(
-            outcomes=data[panel.name],
-            frequency_ratios=data["frequency_ratios"],
-            amplitude_ratios=data["amplitude_ratios"],
-            evaluations=data[panel.name].size,
-            undecided=data[f"{panel.name}.undecided"],
-            scene=panel.scene,
-            model=None,
-        )
-        for number in FIGURES
-        for panel in paper_panels(number)
-    ]
 
 
 def findings(spectra: Sequence[Spectrum]) -> tuple[Finding, ...]:
