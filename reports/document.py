@@ -143,7 +143,7 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
     tables = {f"{table.name}.csv": csv(table) for table in found.tables()}
     for name, content in {**tables, **found.files, "summary.md": markdown(found)}.items():
         write_whole(folder / name, content)
-    plots = [block for block in found.blocks if isinstance(block, Plot)]
+    plots = list(found.plots())
     figures = made(folder, FIGURES)
     for plot in plots:
         keep_drawn(figures / plot.name, json_text(asdict(plot)), partial(figure_of, plot), formats)

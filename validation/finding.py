@@ -196,6 +196,10 @@ class Finding:
         """The tables among the blocks."""
         return (block for block in self.blocks if isinstance(block, Table))
 
+    def plots(self) -> Iterator[Plot]:
+        """The plots among the blocks."""
+        return (block for block in self.blocks if isinstance(block, Plot))
+
     def table(self, name: str) -> Table:
         """A table by its name."""
         return next(table for table in self.tables() if table.name == name)

@@ -100,6 +100,7 @@ def figure(plot: Plot) -> Figure:
     panels = data["panels"]
     rows = max(panel["place"][0] + panel["place"][1] for panel in panels)
     columns = 1 + max(panel["place"][2] for panel in panels)
+    horizontal, vertical = axis_labels(data["record"])
     with figure_style():
         width = PAGE if len(panels) > 1 else PAGE / 1.6
         figure = Figure(figsize=(width, data["height"]), layout="constrained")
@@ -112,16 +113,16 @@ def figure(plot: Plot) -> Figure:
             _paint(axes, letters, x, y, free=panel["free"], law=panel.get("law", ()))
             axes.set_title(panel["title"], fontsize=7.0)
             axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-            axes.tick_params(labelbottom=row + high == rows or not column, labelleft=not column)
+            # Beside a panel without a wall, two rows high, the column next to it is named, too.
+            below, beside = row + high == rows or column < high - 1, column < high
+            axes.tick_params(labelbottom=below, labelleft=beside, labelsize=6.5)
             axes.locator_params(integer=True)
             axes.spines[["top", "right"]].set_visible(True)
-            if not column and (model := panel.get("row")):
-                axes.set_ylabel(LOOKS[model].label.replace(", ", ",\n"))
+            of = LOOKS[panel["row"]].label.replace(", ", ",\n") if "row" in panel else vertical
+            axes.set_xlabel(horizontal if below else "", fontsize=7.0)
+            axes.set_ylabel(of if beside else "", fontsize=7.0)
         if len(panels) == 1 and data["pulse"]:
             _units(axes, data)
-        horizontal, vertical = axis_labels(data["record"])
-        figure.supxlabel(horizontal, fontsize=7.5)
-        figure.supylabel(vertical, fontsize=7.5)
         _legend(figure, data)
         figure.suptitle(plot.title, fontsize=9, x=0.01, ha="left")
     return figure

@@ -36,7 +36,7 @@ COMMANDS = {
     "validate": ("validate", "rockcheck validate smoke --out rockcheck-report"),
     "accept": ("accept", 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"'),
     "diff": ("diff", "rockcheck diff last-week rockcheck-report"),
-    "spectrum": ("spectrum", "rockcheck spectrum --figure 8 --size 50 --refine"),
+    "spectrum": ("spectrum", "rockcheck spectrum fig8 --size 50 --refine"),
     "ida": ("ida", "rockcheck ida shelf.toml records --intensity sa --period 0.5"),
     "benchmark": ("benchmark", "rockcheck benchmark --quick"),
     "conformance": ("conformance", "rockcheck conformance --engine mujoco --settings default"),

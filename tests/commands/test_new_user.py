@@ -90,13 +90,3 @@ def test_a_folder_of_24_files_in_eight_formats_shakes_the_rack(type_):
     for component in ("N-S", "E-W"):
         peaks = [line["peaks"][0] for line in lines if component in line["record"] and line["direction"] == 1]
         assert peaks == pytest.approx([peaks[0]] * 8, abs=5e-3)
-
-
-def test_a_fragility_beside_a_wall_of_ones_own_lets_the_block_hop(type_):
-    type_("new rack.toml")
-    found = {}
-    for pivot in ("", "--pivot unilateral", "--pivot bilateral"):
-        type_(f"spectrum --scene rack.toml --fragility --size 4 --amplitudes 1 6 --force {pivot}")
-        found[pivot] = json.loads(Path("rockcheck-report/spectra/fragility.json").read_text(encoding="utf-8"))["cases"]
-    assert found[""] == found["--pivot unilateral"]
-    assert found[""][0] != found["--pivot bilateral"][0]  # beside the wall

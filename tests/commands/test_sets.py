@@ -228,15 +228,6 @@ def test_slips_are_named(capsys, words, said):
     assert err.count("\n") == 1
 
 
-@pytest.mark.parametrize(
-    "words", [("--record", "records/RSN1_H*.AT2"), ("--record", "records/RSN1_H1.AT2", "records/RSN1_H2.AT2", "records/RSN1_V.AT2")]
-)
-def test_fragility_takes_the_same_sets(words):
-    assert main(["spectrum", "--scene", "rack.toml", "--fragility", "--size", "3", *words]) == 0
-    (case,) = json.loads(Path("rockcheck-report/spectra/fragility.json").read_text(encoding="utf-8"))["cases"]
-    assert case["motions"] == 2
-
-
 @pytest.mark.parametrize("command", ["run", "ida"])
 def test_a_file_of_a_folder_that_is_no_record_is_named_and_left_out(told, command):
     Path("records/README.txt").write_text("where they are from\n", encoding="utf-8")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,41 +12,44 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright import sync_api as playwright
 
-from rockcheck.ebm import Spectrum
+from rockcheck.reports.document import publish
 from rockcheck.reports.show.spectrum import COLOURS
 from rockcheck.reports.studies.ida import write_ida
-from rockcheck.reports.studies.spectra import own_figure, paper_figure, write_page
-from rockcheck.reports.style import save
-from rockcheck.validation.spectra.fragility import Fragility, curve_of
+from rockcheck.validation.finding import Made
+from rockcheck.validation.paper.panels import Panel, paper_panels
+from rockcheck.validation.spectra.fragility import curve_of
 from rockcheck.validation.spectra.ida import Capacity, Ida, Line
-from rockcheck.validation.spectra.study import SPECTRA, Panel, SpectrumRequest, paper_panels
-from rockcheck.validation.spectra.study import save as save_spectra
+from rockcheck.validation.studies.spectrum.grids import Request
+from rockcheck.validation.studies.spectrum.study import Spectra
+from rockcheck.validation.studies.spectrum.tiles import Played
 
 pytestmark = pytest.mark.browser
 SIZE = 20
 FREQUENCIES, AMPLITUDES = np.linspace(0.5, 8.0, SIZE), np.linspace(1.0, 12.0, SIZE)
 
 
+def written(study: Spectra, folder: Path, letters: str) -> Path:
+    """The page of a study whose outcomes are made up; its histories are the model's own."""
+    done = {
+        task: Played(letters) if task.what == "outcomes" else study.play(task) for task in study.tasks({})
+    }
+    made = Made(created="2031-01-02T00:00:00+00:00", jobs=1, wall_seconds=1.0, versions={}, hardware={})
+    return publish(replace(study.gather(done), made=made), folder, formats=("svg",))
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Fig. 8 made up: safe up to the sixth amplitude, overturned right from there on; its histories are the model's own."""
+    """Fig. 8 made up: safe up to the sixth amplitude, overturned right from there on."""
     path = tmp_path_factory.mktemp("spectra")
-    (path / SPECTRA).mkdir()
-    outcomes = np.zeros((SIZE, SIZE), dtype=np.int8)
-    outcomes[6:] = 1
-    panels = paper_panels(8)
-    grid = {"outcomes": outcomes, "frequency_ratios": FREQUENCIES, "amplitude_ratios": AMPLITUDES, "undecided": np.array([[0, 0]])}
-    spectra = [Spectrum(**grid, evaluations=SIZE**2, scene=panel.scene, model=None) for panel in panels]
-    save_spectra(panels, spectra, SpectrumRequest(FREQUENCIES, AMPLITUDES), path / SPECTRA)
-    save(paper_figure(panels, spectra), path / SPECTRA / "figure-8")
-    write_page(path)
+    letters = "U" + "S" * (6 * SIZE - 1) + "R" * (SIZE - 6) * SIZE
+    written(Spectra(paper_panels(8), Request(SIZE)), path, letters)
     return path
 
 
 @pytest.fixture
 def page(visitor: Callable[..., playwright.Page], folder: Path) -> playwright.Page:
     page = visitor(folder, viewport={"width": 1280, "height": 900})
-    page.goto((folder / "spectra.html").as_uri())
+    page.goto((folder / "index.html").as_uri())
     return page
 
 
@@ -86,15 +90,9 @@ def test_pointing_at_a_node_names_it_in_every_panel(page: playwright.Page) -> No
 
 
 def test_ones_own_block_is_told_in_hertz_and_g(visitor: Callable[..., playwright.Page], tmp_path: Path) -> None:
-    (tmp_path / SPECTRA).mkdir()
     panel = Panel("shelf", "shelf", paper_panels(8)[1].scene)
-    grid = {"outcomes": np.zeros((SIZE, SIZE), dtype=np.int8), "undecided": np.zeros((0, 2), dtype=np.int64)}
-    grid |= {"frequency_ratios": FREQUENCIES, "amplitude_ratios": AMPLITUDES}
-    spectrum = Spectrum(**grid, evaluations=SIZE**2, scene=panel.scene, model=None)
-    save_spectra([panel], [spectrum], SpectrumRequest(FREQUENCIES, AMPLITUDES), tmp_path / SPECTRA)
-    save(own_figure(panel, spectrum), tmp_path / SPECTRA / "shelf")
     page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
-    page.goto(write_page(tmp_path).as_uri())
+    page.goto(written(Spectra((panel,), Request(SIZE)), tmp_path, "S" * SIZE**2).as_uri())
     assert page.locator(".key.outcomes span").all_inner_texts() == ["safe", "overturned", "undecided"]  # it is beside a wall
     page.evaluate("Object.values(rockcheckFigures)[0].point([4, 7])")
     said = page.locator("output.node").inner_text()
@@ -133,17 +131,6 @@ def test_keys_do_what_the_mouse_does(page: playwright.Page) -> None:
     playwright.expect(page.locator(".played")).to_be_visible()
 
 
-def fragility_page(folder: Path) -> Path:
-    (folder / SPECTRA).mkdir()
-    level = np.linspace(0.5, 5.0, 10)
-    fell = np.random.default_rng(1).random((20, 2, 1)) < np.linspace(0.0, 1.0, 10)
-    cases = tuple(curve_of(label, fell, np.zeros_like(fell), level) for label in ("with the wall", "without a wall"))
-    found = Fragility(title="shelf, 20 records", about="made up", intensity="peak acceleration / (g tan α)", pga_g=0.2, cases=cases)
-    (folder / SPECTRA / "fragility.json").write_text(found.model_dump_json(), encoding="utf-8")
-    (folder / SPECTRA / "fragility.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"/>', encoding="utf-8")
-    return write_page(folder)
-
-
 def ida_page(folder: Path) -> Path:
     level = np.linspace(0.1, 1.0, 10)
     fell = np.random.default_rng(1).random((4, 2, 1)) < np.linspace(0.0, 1.0, 10)
@@ -160,23 +147,6 @@ def ida_page(folder: Path) -> Path:
     return write_ida(found, folder)
 
 
-def test_fragility_has_its_own_page_and_is_read_under_the_pointer(visitor: Callable[..., playwright.Page], tmp_path: Path) -> None:
-    page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
-    page.goto(fragility_page(tmp_path).as_uri())
-    assert page.title() == "Fragility: the probability of overturning · rockcheck: fragility: the probability of overturning"
-    assert page.locator("h1").inner_text() == "Fragility: the probability of overturning"
-    assert page.locator(".key span").all_inner_texts() == ["with the wall", "without a wall"]
-    assert "median, peak acceleration / (g tan α)" in page.locator("table thead").inner_text()
-    page.locator("[data-curves] .u-over").hover()
-    said = page.locator("[data-curves] output").inner_text()
-    across, in_g = re.fullmatch(r"peak acceleration / \(g tan α\) ([\d.]+) \(([\d.]+) g\): with the wall 0\..*", said, re.DOTALL).groups()
-    assert float(in_g) == pytest.approx(0.2 * float(across), rel=0.01)
-    assert "median, peak acceleration in g" in page.locator("table thead").inner_text()
-    first = page.locator("table tbody tr").first.locator("td")
-    assert float(first.nth(1).inner_text()) == pytest.approx(0.2 * float(first.nth(0).inner_text()), rel=0.01)
-    assert page.evaluate("rockcheckCharts.fragility.axes.map(axis => [axis.scale, axis.label])")[2] == ["x", "peak acceleration, g"]
-
-
 def test_the_lines_of_an_ida_are_named_under_the_pointer(visitor: Callable[..., playwright.Page], tmp_path: Path) -> None:
     page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
     page.goto(ida_page(tmp_path).as_uri())
@@ -189,9 +159,9 @@ def test_the_lines_of_an_ida_are_named_under_the_pointer(visitor: Callable[..., 
 
 @pytest.mark.long
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("what", ["spectra", "fragility", "ida"])
+@pytest.mark.parametrize("what", ["spectra", "ida"])
 def test_accessible(visitor: Callable[..., playwright.Page], folder: Path, tmp_path: Path, what: str, scheme: str) -> None:
-    address = folder / "spectra.html" if what == "spectra" else {"fragility": fragility_page, "ida": ida_page}[what](tmp_path)
+    address = folder / "index.html" if what == "spectra" else ida_page(tmp_path)
     page = visitor(address.parent, color_scheme=scheme, bypass_csp=True, viewport={"width": 1280, "height": 900})
     page.goto(address.as_uri())
     if what == "spectra":
@@ -205,5 +175,5 @@ def test_accessible(visitor: Callable[..., playwright.Page], folder: Path, tmp_p
 
 def test_a_phone_needs_no_sideways_scrolling(visitor: Callable[..., playwright.Page], folder: Path) -> None:
     page = visitor(folder, viewport={"width": 390, "height": 800})
-    page.goto((folder / "spectra.html").as_uri())
+    page.goto((folder / "index.html").as_uri())
     assert page.evaluate("document.documentElement.scrollWidth") == 390

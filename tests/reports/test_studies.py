@@ -7,17 +7,12 @@ from collections import Counter
 from pathlib import Path
 from types import MappingProxyType
 
-import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
-from rockcheck.ebm import Spectrum
 from rockcheck.reports.document import publish
-from rockcheck.reports.studies.spectra import paper_figure, write_page
 from rockcheck.reports.studies.stress import write_stress
-from rockcheck.reports.style import save
 from rockcheck.validation.execute.pool import Failure as Lost
-from rockcheck.validation.spectra import study as spectra
 from rockcheck.validation.stress.results import Failure, RunTotals, Stress
 from rockcheck.validation.studies.work_precision.runs import BenchmarkRun, Play
 from rockcheck.validation.studies.work_precision.savings import Saving
@@ -66,22 +61,9 @@ def stress_page(folder: Path) -> Path:
     return write_stress(Stress(suite="stress", seed=1, complete=True, batches=batches, **MADE), folder)
 
 
-def spectra_page(folder: Path) -> Path:
-    panels, data, axes = spectra.paper_panels(8), folder / spectra.SPECTRA, (np.linspace(0.5, 8.0, 12), np.linspace(1.0, 12.0, 12))
-    data.mkdir()
-    outcomes = np.zeros((12, 12), dtype=np.int8)
-    outcomes[6:] = 1
-    about = {"frequency_ratios": axes[0], "amplitude_ratios": axes[1], "evaluations": 144, "undecided": np.zeros((0, 2), dtype=np.int64)}
-    found = [Spectrum(outcomes=outcomes, scene=panel.scene, model=None, **about) for panel in panels]
-    spectra.save(panels, found, spectra.SpectrumRequest(*axes), data)
-    save(paper_figure(panels, found), data / "figure-8")
-    return write_page(folder)
-
-
 STUDIES = {
     "benchmark": (benchmark_page, "What does not converge"),
     "stress": (stress_page, "no mode is consistent"),
-    "spectra": (spectra_page, "Fig. 8"),
 }
 
 
