@@ -59,7 +59,7 @@ def draw(spectrum: Spectrum, axes: Any) -> None:
     """
     letters = np.array(["L", "S", "R"])[spectrum.outcomes - LEFT]
     letters[tuple(spectrum.undecided.T)] = "U"
-    law = [] if spectrum.depends_on_law is None else spectrum.depends_on_law
+    law: Any = [] if spectrum.depends_on_law is None else spectrum.depends_on_law
     axis = spectrum.frequency_ratios, spectrum.amplitude_ratios
     _paint(axes, letters, *axis, free=not spectrum.scene.walls, law=law)
     horizontal, vertical = axis_labels(spectrum.scene.excitation.kind == "record")

@@ -69,9 +69,7 @@ def run(
     ] = None,
     settings: Annotated[
         list[str] | None,
-        typer.Option(
-            "--set", help="A setting of the model, such as tolerance=1e-10; repeatable."
-        ),
+        typer.Option("--set", help="A setting of the model, such as tolerance=1e-10; repeatable."),
     ] = None,
     refine: Annotated[
         bool, typer.Option("--refine", help="Run only what lies near a boundary.")
@@ -113,7 +111,9 @@ def run(
     request = Request(size, frequencies, amplitudes, name, given, refine)
     if agreement is not None:
         if name != "ebm":
-            raise InputError("cannot be given together with --model: all are compared", "--agreement")
+            raise InputError(
+                "cannot be given together with --model: all are compared", "--agreement"
+            )
         if not 2 <= agreement <= size**2:
             said = f"{agreement} is not allowed: give 2 up to the number of the spectrum's nodes"
             raise InputError(said, "--agreement")

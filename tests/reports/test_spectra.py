@@ -13,10 +13,16 @@ from rockcheck.reports.document import block_markdown
 from rockcheck.reports.drawers import figure_of, scripts_of
 from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, draw
 from rockcheck.scenes.reading import read_json
-from rockcheck.validation.paper.blocks import beyond
-from rockcheck.validation.paper.findings import findings
+from rockcheck.validation.paper.measures import Paper
 from rockcheck.validation.paper.panels import KEPT, kept_spectra, paper_panels
-from rockcheck.validation.studies.spectrum.agreement import CANDIDATES, PLAYED_SHARE, Agreement, blocks, mapped
+from rockcheck.validation.paper.sentences import beyond, findings_of
+from rockcheck.validation.studies.spectrum.agreement import (
+    CANDIDATES,
+    PLAYED_SHARE,
+    Agreement,
+    blocks,
+    mapped,
+)
 from rockcheck.validation.studies.spectrum.grids import Request
 from rockcheck.validation.studies.spectrum.study import Spectra
 from rockcheck.validation.studies.spectrum.tiles import Played
@@ -48,7 +54,10 @@ def plot_of(*figures, letter="R"):
 def test_the_papers_colours():
     from matplotlib.figure import Figure
 
-    for panel, clockwise in ((paper_panels(8)[0], COLOURS["clockwise"]), (paper_panels(8)[1], COLOURS["overturned"])):
+    for panel, clockwise in (
+        (paper_panels(8)[0], COLOURS["clockwise"]),
+        (paper_panels(8)[1], COLOURS["overturned"]),
+    ):
         axes = Figure().subplots()
         draw(made(panel), axes)
         (mesh,) = axes.collections
@@ -61,7 +70,9 @@ def test_the_papers_colours():
 
 def test_a_figure_has_the_papers_panels():
     figure = figure_of(plot_of(9))
-    assert [axes.get_title(loc="left") for axes in figure.axes] == [panel.title for panel in paper_panels(9)]
+    assert [axes.get_title(loc="left") for axes in figure.axes] == [
+        panel.title for panel in paper_panels(9)
+    ]
     assert figure.get_suptitle() == "Fig. 9: Wall on the right, μ = 0.6"
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.texts] == [
@@ -108,10 +119,11 @@ def test_the_documentation_shows_the_kept_study():
 
 
 def test_a_map_of_each_finding():
-    found = findings(kept_spectra())
-    _, plot, rows = beyond(found)
+    paper = Paper(kept_spectra())
+    found = findings_of(paper)
+    _, plot, rows = beyond(paper, found)
     for panel, one in zip(plot.data["panels"], found, strict=True):
-        assert panel["outcomes"].count("G") == one.gained.sum()
-        assert panel["outcomes"].count("X") == one.lost.sum()
+        assert panel["outcomes"].count("G") == one.shown.gained.sum()
+        assert panel["outcomes"].count("X") == one.shown.lost.sum()
     assert len(figure_of(plot).axes) == 3
-    assert len(rows.rows) == sum(len(one.rows) for one in found)
+    assert len(rows.rows) == sum(len(one.shown.rows) for one in found)

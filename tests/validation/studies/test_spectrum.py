@@ -1,4 +1,5 @@
-"""Spectra as a study: tiles that are kept, the law of impacts, refinement, the other models, the command."""
+"""Spectra as a study: tiles that are kept, the law of impacts, refinement, the other models, the
+command."""
 
 from __future__ import annotations
 
@@ -41,7 +42,9 @@ def in_an_empty_folder(tmp_path, monkeypatch):
 
 def outcomes(found):
     """The grids of a finding's files, by name."""
-    files = {name: io.BytesIO(content) for name, content in found.files.items() if name.endswith("npz")}
+    files = {
+        name: io.BytesIO(content) for name, content in found.files.items() if name.endswith("npz")
+    }
     return {name.removesuffix(".npz"): dict(np.load(content)) for name, content in files.items()}
 
 
@@ -88,7 +91,13 @@ def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
     assert not stopped.complete
     assert outcomes(stopped) == {}
     resumed = run(study, tmp_path / "a", jobs=1)
-    assert runs == [20, 20, 20, 20, 4]  # two tiles, the one that was killed, then only that and the last one
+    assert runs == [
+        20,
+        20,
+        20,
+        20,
+        4,
+    ]  # two tiles, the one that was killed, then only that and the last one
     assert resumed.complete
     monkeypatch.setattr(tiles, "play_nodes", plain)
     (whole,) = outcomes(run(study, tmp_path / "b", jobs=1)).values()
@@ -186,7 +195,9 @@ def test_motions_are_the_model_s_own_and_good_enough_to_be_looked_at(tmp_path):
 
 def test_a_refined_spectrum_is_the_whole_one_with_fewer_runs(tmp_path):
     panels = (panel_of("figure-8-gap-53-e-0"), panel_of("figure-7-unobstructed"))
-    full, refined = (run(Spectra(panels, Request(64, refine=refine)), tmp_path) for refine in (False, True))
+    full, refined = (
+        run(Spectra(panels, Request(64, refine=refine)), tmp_path) for refine in (False, True)
+    )
     for name, mine in outcomes(full).items():
         np.testing.assert_array_equal(outcomes(refined)[name]["outcomes"], mine["outcomes"])
     runs = [row["runs"] for row in refined.table("spectra").records()]
@@ -196,8 +207,12 @@ def test_a_refined_spectrum_is_the_whole_one_with_fewer_runs(tmp_path):
 
 @pytest.mark.slow
 def test_refinement_misses_hairs_only(tmp_path):
-    panels = tuple(p for p in paper_panels() if p.name.endswith(("unobstructed", "53-e-1", "3-e-0")))
-    full, refined = (outcomes(run(Spectra(panels, Request(256, refine=r)), tmp_path)) for r in (False, True))
+    panels = tuple(
+        p for p in paper_panels() if p.name.endswith(("unobstructed", "53-e-1", "3-e-0"))
+    )
+    full, refined = (
+        outcomes(run(Spectra(panels, Request(256, refine=r)), tmp_path)) for r in (False, True)
+    )
     wrong = Counter()
     for name, mine in full.items():
         wrong[name] = int(np.sum(mine["outcomes"] != refined[name]["outcomes"]))
@@ -207,7 +222,8 @@ def test_refinement_misses_hairs_only(tmp_path):
 
 # The law of impacts
 
-#: A node of the spectrum beside a wall at 3 mm, e = 1, that falls under one law and stands under the other, between two that do not.
+#: A node of the spectrum beside a wall at 3 mm, e = 1, that falls under one law and stands under
+#: the other, between two that do not.
 OF_THE_LAW = [5.0, np.linspace(0.5, 8.0, 100)[73]], [6.0, 8.0]
 
 
@@ -217,11 +233,15 @@ def test_nodes_that_depend_on_the_law_of_impacts_are_known(tmp_path, refine):
     found = run(Spectra((panel_of("figure-6-gap-3-e-1"),), request), tmp_path, jobs=1)
     (row,) = found.table("spectra").records()
     assert row["depends_on_law"] == 1
-    assert outcomes(found)["figure-6-gap-3-e-1--ebm-unilateral"]["depends_on_law"].tolist() == [[0, 1]]
+    assert outcomes(found)["figure-6-gap-3-e-1--ebm-unilateral"]["depends_on_law"].tolist() == [
+        [0, 1]
+    ]
     assert next(found.plots()).data["panels"][0]["law"] == [[0, 1]]
 
 
-@pytest.mark.parametrize(("name", "model"), [("gap-3-e-1", "ebm"), ("unobstructed", "ebm-unilateral")])
+@pytest.mark.parametrize(
+    ("name", "model"), [("gap-3-e-1", "ebm"), ("unobstructed", "ebm-unilateral")]
+)
 def test_without_a_wall_or_a_hop_no_second_law_is_played(name, model):
     panel = panel_of(f"figure-6-{name}")
     asked = Spectra((panel,), on_grid(*OF_THE_LAW, model=model)).tasks({})
@@ -245,10 +265,24 @@ def test_nodes_whose_block_lands_flat_depend_on_the_law(tmp_path, restitutions, 
 
 
 def test_an_undecided_node_does_not_depend_on_the_law():
-    about = {"frequency_ratios": np.ones(1), "amplitude_ratios": np.ones(2), "evaluations": 2, "scene": None, "model": None}
-    one = Spectrum(outcomes=np.array([[0], [1]], dtype=np.int8), undecided=np.array([[0, 0]]), **about)
-    other = Spectrum(outcomes=np.array([[1], [0]], dtype=np.int8), undecided=np.empty((0, 2), dtype=np.int64), **about)
-    assert differing(one, [other, one]).tolist() == differing(one, [one, other]).tolist() == [[1, 0]]
+    about = {
+        "frequency_ratios": np.ones(1),
+        "amplitude_ratios": np.ones(2),
+        "evaluations": 2,
+        "scene": None,
+        "model": None,
+    }
+    one = Spectrum(
+        outcomes=np.array([[0], [1]], dtype=np.int8), undecided=np.array([[0, 0]]), **about
+    )
+    other = Spectrum(
+        outcomes=np.array([[1], [0]], dtype=np.int8),
+        undecided=np.empty((0, 2), dtype=np.int64),
+        **about,
+    )
+    assert (
+        differing(one, [other, one]).tolist() == differing(one, [one, other]).tolist() == [[1, 0]]
+    )
 
 
 # The other models
@@ -291,7 +325,9 @@ class Answers(Book):
         for task in tasks:
             seen = self.played.setdefault((task.scene.name, task.model), [])
             nodes = list(zip(task.amplitudes, task.frequencies, strict=True))
-            records.append(Played("".join(self.letter(task, len(seen) + n) for n in range(len(nodes)))))
+            records.append(
+                Played("".join(self.letter(task, len(seen) + n) for n in range(len(nodes))))
+            )
             seen += nodes
         return records
 
@@ -305,8 +341,8 @@ def test_agreement_counts_equal_outcomes(monkeypatch):
     spectrum = made(panel, grid, 20)
 
     def letter(task, number):
-        """Of the CM's nodes the first is wrong, near the boundary, and the last of 40 has failed, away
-        from it."""
+        """Of the CM's nodes the first is wrong, near the boundary, and the last of 40 has failed,
+        away from it."""
         n = number if number < 40 else number - 40
         right = "R" if task.frequencies[n % len(task.frequencies)] < 4.2 else "S"
         if task.model != "cm" or number not in (0, 39, 40):
@@ -345,9 +381,17 @@ def test_slow_engines_play_fewer_nodes_and_only_contacts_that_they_have(monkeypa
     spectra = {panel: made(panel, grid, 20) for panel in map(panel_of, (flat, bouncing))}
     book = Answers(lambda *_: "S")
     found = agreement.agree(book, spectra, Request(20), 40)
-    counted = {name: [(s.near, s.nodes) for s in found.shares if (s.spectrum, s.model) == name] for name in book.played}
+    counted = {
+        name: [(s.near, s.nodes) for s in found.shares if (s.spectrum, s.model) == name]
+        for name in book.played
+    }
     assert counted[flat, "cm"] == [(True, 20), (False, 20)]
-    assert counted[flat, "dart"] == counted[flat, "drake"] == counted[bouncing, "dart"] == [(True, 4), (False, 4)]
+    assert (
+        counted[flat, "dart"]
+        == counted[flat, "drake"]
+        == counted[bouncing, "dart"]
+        == [(True, 4), (False, 4)]
+    )
     played = {name: set(nodes) for name, nodes in book.played.items()}
     assert played[flat, "dart"] == played[flat, "drake"] < played[flat, "cm"]
     assert (bouncing, "drake") not in played
@@ -395,7 +439,9 @@ def test_the_command_writes_figures_data_and_page(tmp_path, capsys):
     told = json.loads(capsys.readouterr().out)
     folder = tmp_path / "out"
     kinds = {"svg", "png", "pdf", "nodes.js", "histories.js"}
-    assert {f"figure-8.{kind}" for kind in kinds} == {path.name for path in (folder / "figures").iterdir()}
+    assert {f"figure-8.{kind}" for kind in kinds} == {
+        path.name for path in (folder / "figures").iterdir()
+    }
     with np.load(folder / "figure-8-gap-3-e-0.npz") as data:
         grid = data["outcomes"]
         settings = json.loads(str(data["settings"]))
@@ -410,10 +456,18 @@ def test_the_command_writes_figures_data_and_page(tmp_path, capsys):
     assert {row["runs"] for row in rows} == {81}
 
 
-@pytest.mark.parametrize(("wall", "words", "model"), [(True, [], "ebm-unilateral"), (False, [], "ebm"), (True, ["--model", "ebm"], "ebm")])
+@pytest.mark.parametrize(
+    ("wall", "words", "model"),
+    [(True, [], "ebm-unilateral"), (False, [], "ebm"), (True, ["--model", "ebm"], "ebm")],
+)
 def test_beside_a_wall_of_ones_own_the_block_may_hop(tmp_path, capsys, wall, words, model):
-    (tmp_path / "mine.toml").write_text(SCENE if wall else SCENE.replace("walls", "#"), encoding="utf-8")
-    assert main(["spectrum", "mine.toml", "--size", "3", "--refine", "--out", "out", "--json", *words]) == 0
+    (tmp_path / "mine.toml").write_text(
+        SCENE if wall else SCENE.replace("walls", "#"), encoding="utf-8"
+    )
+    assert (
+        main(["spectrum", "mine.toml", "--size", "3", "--refine", "--out", "out", "--json", *words])
+        == 0
+    )
     told = json.loads(capsys.readouterr().out)
     assert told["model"] == model
     stem = "mine" if model == "ebm" else "mine--ebm-unilateral"
@@ -424,7 +478,10 @@ def test_beside_a_wall_of_ones_own_the_block_may_hop(tmp_path, capsys, wall, wor
 def test_the_command_compares_models(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(agreement, "CANDIDATES", ("ebm-unilateral",))
     monkeypatch.setattr(agreement, "MAP_SIZE", 5)
-    assert main(["spectrum", "fig8", "--size", "12", "--out", "out", "--agreement", "6", "--json"]) == 0
+    assert (
+        main(["spectrum", "fig8", "--size", "12", "--out", "out", "--agreement", "6", "--json"])
+        == 0
+    )
     told = json.loads(capsys.readouterr().out)
     (row,) = told["tables"]["agreement"]
     assert row["model"] == "ebm-unilateral"

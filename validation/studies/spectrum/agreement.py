@@ -208,9 +208,7 @@ def mapped(panels: Sequence[Panel]) -> list[Panel]:
     return [p for p in panels if p.figure == (MAPPED if MAPPED in figures else figures[0])]
 
 
-def _maps(
-    book: Book, panels: Sequence[Panel], requests: Mapping[str, Request]
-) -> Iterator[Map]:
+def _maps(book: Book, panels: Sequence[Panel], requests: Mapping[str, Request]) -> Iterator[Map]:
     played = {
         model: [book.spectrum(panel, _coarse(one)) for panel in mapped(panels)]
         for model, one in requests.items()
@@ -224,7 +222,9 @@ def _maps(
             model=model,
             nodes=sum(mine.outcomes.size for _, mine, _ in both if mine),
             equal=sum(
-                int(np.sum(mine.outcomes == true.outcomes)) for _, mine, true in both if mine and true
+                int(np.sum(mine.outcomes == true.outcomes))
+                for _, mine, true in both
+                if mine and true
             ),
             outcomes={
                 panel.name: tuple(map("".join, letters_of(mine.outcomes, mine.undecided)))

@@ -77,12 +77,12 @@ class Request:
     @property
     def frequencies(self) -> Floats:
         """omega_p/p of the nodes."""
-        return self._axes[0]  # type: ignore[attr-defined,no-any-return]
+        return self._axes[0]  # type: ignore[attr-defined]
 
     @property
     def amplitudes(self) -> Floats:
         """a_p/(g tan alpha) of the nodes."""
-        return self._axes[1]  # type: ignore[attr-defined,no-any-return]
+        return self._axes[1]  # type: ignore[attr-defined]
 
     def other_laws(self, scene: Scene) -> list[dict[str, Any]]:
         """The settings with each other law of impacts on which outcomes may depend."""

@@ -19,9 +19,8 @@ from rockcheck.scenes.reading import read_json
 from rockcheck.scenes.writing import table_text
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build
-from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Text, text
-from rockcheck.validation.paper import blocks as paper
-from rockcheck.validation.paper import claims
+from rockcheck.validation.finding import Block, Column, Finding, Mark, Plot, Table, Text, text
+from rockcheck.validation.paper import measures, sentences
 from rockcheck.validation.paper.panels import GAPS, KEPT, Panel, paper_panels, title_of
 from rockcheck.validation.studies.spectrum import agreement, tiles
 from rockcheck.validation.studies.spectrum.grids import Book, Request, differing
@@ -74,19 +73,23 @@ class Spectra(Study):
         found = self._found(Book(done))
         panels, spectra = list(found.spectra), list(found.spectra.values())
         nodes = sum(one.outcomes.size for one in spectra)
-        answer = f"{len(spectra)} spectra: {nodes} nodes, {sum(s.evaluations for s in spectra)} runs."
+        answer = (
+            f"{len(spectra)} spectra: {nodes} nodes, {sum(s.evaluations for s in spectra)} runs."
+        )
         if len(self.panels) == len(spectra) == 1:
             answer = f"{100.0 * spectra[0].safe_area:.2f} % of {nodes} nodes are safe."
-        blocks = [Text(ABOUT, on="page"), *self._figures(found), self._shares(found.spectra)]
+        blocks: list[Block] = [Text(ABOUT, on="page"), *self._figures(found)]
+        blocks.append(self._shares(found.spectra))
         if any(one.depends_on_law is not None for one in spectra):
             blocks.append(Text(LAWS, on="page"))
-        if found.claims:
-            tally = Counter(claim.verdict for claim in found.claims)
+        if found.paper:
+            claims = sentences.claims_of(found.paper)
+            tally = Counter(claim.verdict for claim in claims)
             answer = (
                 f"Of {tally.total()} sentences of the paper {tally['holds']} hold,"
                 f" {tally['holds in part']} hold in part, {tally['does not hold']} do not."
             )
-            blocks += paper.blocks(found.claims, spectra)
+            blocks += sentences.blocks(found.paper, claims)
         compared = found.agreement
         if self._papers and not self.compared:
             compared = agreement.Agreement.model_validate(read_json(KEPT / "agreement.json"))
@@ -126,9 +129,7 @@ class Spectra(Study):
         """All that can be said by what is played; what is asked for beyond that is in the book."""
         request, found = self.request, _Found()
         how = request.model, request.settings
-        i, j = (
-            axis.ravel() for axis in np.meshgrid(*[_spread(request.size)] * 2, indexing="ij")
-        )
+        i, j = (axis.ravel() for axis in np.meshgrid(*[_spread(request.size)] * 2, indexing="ij"))
         fast = tiles.compiled(build(*how))
         for panel in self.panels:
             one = book.spectrum(panel, request)
@@ -143,25 +144,25 @@ class Spectra(Study):
                 found.spectra[panel] = replace(one, depends_on_law=law)
         if len(found.spectra) == len(self.panels):
             if self._papers:
-                found.claims = self._claims(book, list(found.spectra.values()))
+                found.paper = self._paper(book, list(found.spectra.values()))
             if self.compared:
                 found.agreement = agreement.agree(book, found.spectra, request, self.compared)
         return found
 
-    def _claims(self, book: Book, spectra: Sequence[Spectrum]) -> tuple[claims.Claim, ...]:
-        """The paper's sentences; they need more than the 28 spectra."""
+    def _paper(self, book: Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
+        """The 28 spectra and what the paper's sentences need beyond them."""
         request = self.request
         how = request.model, request.settings
         least, one_impact = {}, {}
-        for scene in (one.scene for one in spectra if claims.is_scanned(one.scene)):
-            scan = claims.SCANNED, np.full(len(claims.SCANNED), claims.SCANNED_AT)
+        for scene in (one.scene for one in spectra if measures.is_scanned(one.scene)):
+            scan = measures.SCANNED, np.full(len(measures.SCANNED), measures.SCANNED_AT)
             if (outcomes := book.outcomes(scene, *scan, *how)) is not None:
                 falls = outcomes[0] != SAFE
-                least[claims.wall_of(scene)] = (
-                    float(claims.SCANNED[np.argmax(falls)]) if falls.any() else np.inf
+                least[measures.wall_of(scene)] = (
+                    float(measures.SCANNED[np.argmax(falls)]) if falls.any() else np.inf
                 )
         for one in (one for one in spectra if not one.scene.walls):
-            i, j = claims.near_one_impact(one)
+            i, j = measures.near_one_impact(one)
             tasks = tiles.nodes_of(
                 one.scene, request.amplitudes[i], request.frequencies[j], *how, "one impact"
             )
@@ -169,7 +170,7 @@ class Spectra(Study):
                 mask = np.zeros(one.outcomes.shape, dtype=bool)
                 mask[i, j] = [letter == "Y" for record in records for letter in record.letters]
                 one_impact[one.scene.floor.friction] = mask
-        return () if book.wanted else claims.check_claims(spectra, least, one_impact)
+        return None if book.wanted else measures.Paper(spectra, least, one_impact)
 
     def _shares(self, spectra: Mapping[Panel, Spectrum]) -> Table:
         laws = any(one.depends_on_law is not None for one in spectra.values())
@@ -177,8 +178,11 @@ class Spectra(Study):
         for panel, one in spectra.items():
             law = one.depends_on_law
             stem = self._stem(panel)
-            row = [panel.name, panel.title, panel.figure]
-            row += [one.safe_area, *(float(np.mean(one.outcomes == side)) for side in (LEFT, RIGHT))]
+            row: list[Any] = [panel.name, panel.title, panel.figure]
+            row += [
+                one.safe_area,
+                *(float(np.mean(one.outcomes == side)) for side in (LEFT, RIGHT)),
+            ]
             row += [len(one.undecided), *([None if law is None else len(law)] if laws else [])]
             files = [Mark(kind.upper(), link=f"{stem}.{kind}") for kind in ("csv", "npz")]
             rows.append([*row, one.evaluations, *files])
@@ -230,7 +234,11 @@ class Spectra(Study):
         block = panel.scene.block
         place = [0, 4, 0]
         if panel.figure is not None:
-            place = [0 if wall.restitution == 0.0 else 2, 2, 1 + GAPS.index(wall.gap)] if wall else [1, 2, 0]
+            place = (
+                [0 if wall.restitution == 0.0 else 2, 2, 1 + GAPS.index(wall.gap)]
+                if wall
+                else [1, 2, 0]
+            )
         law = one.depends_on_law
         return {
             "title": panel.title,
@@ -238,7 +246,10 @@ class Spectra(Study):
             "outcomes": "".join(tiles.letters_of(one.outcomes, one.undecided).ravel()),
             "law": [] if law is None else law.tolist(),
             "place": place,
-            "nodes": [[int(spread[n // len(spread)]), int(spread[n % len(spread)])] for n in motions.played],
+            "nodes": [
+                [int(spread[n // len(spread)]), int(spread[n % len(spread)])]
+                for n in motions.played
+            ],
             "motions": {
                 "block": [block.half_width, block.half_height],
                 "alpha": block.alpha,
@@ -274,7 +285,7 @@ class _Found:
 
     spectra: dict[Panel, Spectrum] = field(default_factory=dict)
     motions: dict[Panel, tiles.Played] = field(default_factory=dict)
-    claims: tuple[claims.Claim, ...] = ()
+    paper: measures.Paper | None = None
     agreement: agreement.Agreement | None = None
 
 
@@ -300,7 +311,7 @@ def _pulse(panel: Panel, request: Request) -> dict[str, list[float]] | None:
 
 def _npz(spectrum: Spectrum, about: str) -> bytes:
     content = io.BytesIO()
-    law = spectrum.depends_on_law
+    law: Any = spectrum.depends_on_law
     np.savez_compressed(
         content,
         outcomes=spectrum.outcomes,

@@ -89,9 +89,14 @@ def nodes_of(
     one = A_MOTION if what == "motions" else A_NODE if fast else A_SLOW_NODE
     found = []
     for first in range(0, len(amplitudes), max(size, 1)):
-        a, f = (np.ascontiguousarray(axis[first : first + size]) for axis in (amplitudes, frequencies))
+        a, f = (
+            np.ascontiguousarray(axis[first : first + size]) for axis in (amplitudes, frequencies)
+        )
         key = provenance.digest(base + a.tobytes().hex() + f.tobytes().hex())
-        how_played: dict[str, Any] = {"where": "here" if fast else "worker", "expected": one * len(a)}
+        how_played: dict[str, Any] = {
+            "where": "here" if fast else "worker",
+            "expected": one * len(a),
+        }
         found.append(Nodes(key, what, scene, a, f, model, settings, **how_played))
     return found
 
