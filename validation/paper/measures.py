@@ -70,7 +70,10 @@ class Paper:
         self.frequencies, self.amplitudes = spectra[0].frequency_ratios, spectra[0].amplitude_ratios
         self.least, self.tongues = least or {}, tongues or {}
         nodes = spectra[0].outcomes.shape
-        self.outcomes, self.alone = np.zeros((*SIZES, *nodes), np.int8), np.zeros((2, *nodes), np.int8)
+        self.outcomes, self.alone = (
+            np.zeros((*SIZES, *nodes), np.int8),
+            np.zeros((2, *nodes), np.int8),
+        )
         self.safe, self.safe_alone = self.outcomes != 0, self.alone != 0
         for one in spectra:
             mu = AXES["friction"].index(one.scene.floor.friction)
@@ -132,7 +135,9 @@ def _pair(paper: Paper, what: str, safer: Mask, other: Mask) -> Row:
     opposite = "nowhere the opposite"
     if len(i):
         opposite = f"the opposite at {share(len(i) / safer.size)} of the nodes,"
-        opposite += f" ω_p/p {f.min():.1f} to {f.max():.1f}, amplitude {a.min():.1f} to {a.max():.1f}"
+        opposite += (
+            f" ω_p/p {f.min():.1f} to {f.max():.1f}, amplitude {a.min():.1f} to {a.max():.1f}"
+        )
     value = f"safe area {share(safer)} against {share(other)}; {opposite}"
     return Row(what, value, bool(safer.mean() > other.mean()))
 
@@ -154,7 +159,8 @@ def against_none(
             if values != values | {name: part[name] for name in AXES if name in part}:
                 continue
             wall, none = (
-                float(np.mean(safe[:, high])) for safe in (paper.safe[place], paper.safe_alone[place[1]])
+                float(np.mean(safe[:, high]))
+                for safe in (paper.safe[place], paper.safe_alone[place[1]])
             )
             holds = None
             for name, sign in (("below", 1.0), ("beyond", -1.0)):
@@ -234,7 +240,9 @@ def turns(paper: Paper, side: str, axes: Sequence[str]) -> Measured:
         two = list(combinations(np.moveaxis(gains, list(AXES).index(axis) - 1, 0), 2))
         both = [np.stack(pair) for pair in two]
         turn = sum(int(((one.min(0) < -SMALL) & (one.max(0) > SMALL)).sum()) for one in both)
-        value = f"turns a benefit into harm, or back, in {turn} of {sum(o[0].size for o in both)} pairs"
+        value = (
+            f"turns a benefit into harm, or back, in {turn} of {sum(o[0].size for o in both)} pairs"
+        )
         rows.append(Row(f"{axis} alone", value, turn > 0))
     return rows, {"turns": "; ".join(f"{row.what} {row.value}" for row in rows).capitalize()}
 
@@ -258,7 +266,13 @@ def restitution_rules(paper: Paper) -> Measured:
         by_gap = np.max([np.mean(a != b, axis=(-2, -1)) for a, b in combinations(safe, 2)])
         by_e = np.max(np.mean(safe[:, 0] != safe[:, 1], axis=(-2, -1)))
         value = f"the safe region differs at up to {share(by_gap)} of the nodes between gaps,"
-        rows.append(Row(f"{side} wall, μ 0.6", f"{value} at up to {share(by_e)} between e", bool(by_gap < by_e)))
+        rows.append(
+            Row(
+                f"{side} wall, μ 0.6",
+                f"{value} at up to {share(by_e)} between e",
+                bool(by_gap < by_e),
+            )
+        )
         most.append((by_gap, by_e))
     gaps, e = map(share, np.max(most, axis=0))
     return rows, {"gaps": gaps, "e": e}
@@ -299,7 +313,9 @@ def _lowest(paper: Paper, mu: float, outcomes: NDArray[np.int8]) -> Row:
     lead = np.cumsum(np.where(clockwise, 1, -1))
     count = int(np.argmax(lead)) + 1
     end = paper.frequencies[some[count - 1]]
-    value = f"clockwise at {np.sum(clockwise[:count])} of {count} frequencies, up to ω_p/p of {end:.1f}"
+    value = (
+        f"clockwise at {np.sum(clockwise[:count])} of {count} frequencies, up to ω_p/p of {end:.1f}"
+    )
     return Row(f"μ {mu:g}, the lowest overturning", value, bool(lead[count - 1] > 0))
 
 
@@ -350,7 +366,9 @@ def _case(place: Place) -> str:
 
 def exchange(paper: Paper) -> Shown:
     """The wall that changes the safe area least, and what it changes."""
-    alone, falls_alone = (mask[None, :, None, None] for mask in (paper.safe_alone, paper.falls_alone))
+    alone, falls_alone = (
+        mask[None, :, None, None] for mask in (paper.safe_alone, paper.falls_alone)
+    )
     saved, lost = paper.safe & falls_alone, paper.falls & alone
     counts = {place: (int(saved[place].sum()), int(lost[place].sum())) for place in WALLS}
     place = min(counts, key=lambda one: abs(counts[one][0] - counts[one][1]))
@@ -360,7 +378,10 @@ def exchange(paper: Paper) -> Shown:
         saved[place],
         lost[place],
         paper.safe[place] & ~saved[place],
-        [Row(_case(one), f"saves at {m} nodes, overturns at {n}") for one, (m, n) in counts.items()],
+        [
+            Row(_case(one), f"saves at {m} nodes, overturns at {n}")
+            for one, (m, n) in counts.items()
+        ],
         {
             "with_wall": share(paper.safe[place]),
             "without": share(paper.safe_alone[place[1]]),

@@ -75,7 +75,13 @@ def claims_of(paper: Paper) -> list[Claim]:
 
 
 def _judged(
-    paper: Paper, *, measure: str, finding: str, criterion: str, generally: bool = False, **more: Any
+    paper: Paper,
+    *,
+    measure: str,
+    finding: str,
+    criterion: str,
+    generally: bool = False,
+    **more: Any,
 ) -> Claim:
     """A sentence holds where all rows do, or, of what is said to be so generally, most of them."""
     about = {name: more.pop(name) for name in ("name", "sentence", "place", "figures")}
@@ -131,7 +137,9 @@ def blocks(paper: Paper, claims: Sequence[Claim]) -> Iterator[Block]:
     title = "What the paper says of them, checked"
     yield Table("claims", list(columns.values()), rows, title, note)
     yield _areas(paper)
-    yield _rows("claim-figures", "The figures behind each verdict", {c.name: c.rows for c in claims})
+    yield _rows(
+        "claim-figures", "The figures behind each verdict", {c.name: c.rows for c in claims}
+    )
     yield from beyond(paper, findings_of(paper))
 
 
