@@ -6,6 +6,9 @@ LOCKED := $(if $(UNLOCKED),,$(CI))
 LOCK := .ci/requirements.txt
 VENV := .venv
 BIN := $(VENV)/bin
+# What installs: the machine's uv, or one that pip fetches into the virtual environment.
+UV := $(shell command -v uv 2>/dev/null)
+INSTALL := $(or $(UV),$(BIN)/uv) pip install --quiet --python $(BIN)/python
 
 .PHONY: install validate test test-change test-all nightly coverage mutation lint format docs gallery wheel lock clean
 
@@ -24,7 +27,7 @@ test-all: $(VENV)/.ready ## also the slow ones
 	$(BIN)/python -m pytest -q
 
 nightly: $(VENV)/.ready ## what is too long for each change; NIGHTLY_QUICK=1 for a short form; the results go to docs/nightly.json
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[audit,fuzz,drake,parquet]'
+	$(INSTALL) --editable '.[audit,fuzz,drake,parquet]'
 	$(BIN)/python .ci/nightly.py
 
 # The core is compiled, and its lines are then not seen: the second run interprets it, on fewer tests.
@@ -62,8 +65,7 @@ wheel: ## build the wheel, install it into a clean environment, and validate wit
 	PYTHON=$(PYTHON) .ci/wheel
 
 lock: $(VENV)/.ready ## the lock file anew, from what pyproject.toml allows today
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
-	echo 'setuptools>=77' | $(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes --no-annotate \
+	echo 'setuptools>=77' | $(or $(UV),$(BIN)/uv) pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes --no-annotate \
 		--no-emit-index-url --no-header --extra test --extra docs --extra lint --output-file $(LOCK) pyproject.toml -
 
 clean:
@@ -74,7 +76,8 @@ $(VENV)/.ready: pyproject.toml $(if $(LOCKED),$(LOCK))
 	@$(PYTHON) -c 'import sys; v = sys.version_info; print("Python", ".".join(map(str, v[:3])), "from $(PYTHON)" + ("" if v < (3, 12) else "; PyBullet has wheels for Python 3.11 only and is left out here (make PYTHON=python3.11)"))'
 	@test -d rockcheck/scenes || { echo "rockcheck/scenes is no link to scenes/: git config core.symlinks true, then check out again"; exit 1; }
 	$(PYTHON) -m venv --clear $(VENV)
-	$(if $(LOCKED),$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement $(LOCK))
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check $(if $(LOCKED),--no-deps --no-build-isolation --editable .,--editable '.[test,docs,lint]')
+	$(if $(UV),,$(BIN)/python -m pip install --quiet --disable-pip-version-check uv)
+	$(if $(LOCKED),$(INSTALL) --require-hashes --requirement $(LOCK))
+	$(INSTALL) $(if $(LOCKED),--no-deps --no-build-isolation --editable .,--editable '.[test,docs,lint]')
 	$(BIN)/rockcheck warm
 	touch $@

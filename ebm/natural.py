@@ -64,7 +64,7 @@ def side_of(block: Block, side: Literal["left", "right"]) -> Side:
     return Side(
         alpha=pivot.alpha,
         radius=radius,
-        arm=radius * math.sin(pivot.alpha),  # as gaps have it: of a block that stands flush with a wall they are zero to the bit
+        arm=radius * math.sin(pivot.alpha),  # as gaps have it: flush with a wall they are 0 to the bit
         top_alpha=math.atan2(pivot.arm, top),
         top_radius=math.hypot(pivot.arm, top) / unit,
         tip_sin=pivot.arm * (pivot.height + top) / square,

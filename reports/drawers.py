@@ -34,6 +34,7 @@ GREY = ("#9a9a9a", "#767c85")
 COLUMNS = 3
 STYLES: dict[str, dict[str, Any]] = {
     "line": {"marker": "o", "markersize": 3.0},
+    "smooth": {},
     "points": {"linestyle": "none", "marker": "o", "markersize": 3.0},
     "dots": {"linestyle": (0, (0.7, 1.7)), "linewidth": 0.8},
     "thin": {"linewidth": 0.5, "alpha": 0.6},
@@ -69,10 +70,14 @@ def lines(plot: Plot) -> Figure:
         figure = Figure(figsize=(PAGE, (3.4 if rows == 1 else 2.1 * rows) + 0.4), layout="constrained")
         grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         handles: dict[str, Any] = {}
+        per = plot.data["per_unit"] if plot.data else 1.0
         for ax, panel in zip(grid.flat, plot.panels, strict=False):
             _draw(ax, panel, handles)
             ax.set_title(panel.title)
             _scale(ax, plot.x, plot.y)
+            if plot.data:
+                above = ax.secondary_xaxis("top", functions=(lambda x: x * per, lambda x: x / per))
+                above.set_xlabel(plot.data["other_label"])
         for ax in grid.flat[len(plot.panels) :]:
             ax.set_axis_off()
         for ax in grid[:, 0]:

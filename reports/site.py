@@ -97,6 +97,7 @@ STUDIES = (
     ("Conformance", "conformance/index.html"),
     ("Overturning spectra", "spectrum/index.html"),
     ("Incremental dynamic analysis", "ida/index.html"),
+    ("Fragility", "fragility/index.html"),
     ("Trend", "trend/index.html"),
 )
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rockcheck.scenes.reading import head_of
-from rockcheck.scenes.writing import write_whole
+from rockcheck.scenes.writing import made, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -159,7 +159,7 @@ def save(figure: Figure, stem: Path, formats: Iterable[str] = FORMATS, *, stamp:
     written = []
     with figure_style():
         for kind in formats:
-            path = stem.with_name(f"{stem.name}.{kind}")
+            path = made(stem.parent) / f"{stem.name}.{kind}"
             content = io.BytesIO()
             figure.savefig(content, format=kind, metadata=undated[kind])
             written.append(write_whole(path, content.getvalue(), named=named))

@@ -18,7 +18,7 @@ from rockcheck.scenes.history import events_path
 from rockcheck.scenes.reading import within
 from rockcheck.scenes.trust import experience
 from rockcheck.validation.suite.results import Cell, Run
-from rockcheck.validation.uncertainty.inputs import Inputs
+from rockcheck.validation.uncertainty.population import Inputs
 
 Array = NDArray[np.float64]
 #: A block that falls is drawn up to this rotation (alpha). Beyond 1 a block in free rocking does not come back.
@@ -359,8 +359,9 @@ def _read(cells: Iterable[Cell], folder: Path) -> tuple[dict[str, History], dict
             missing[cell.model] = cell.reason or "no history"
             continue
         try:
+            path = within(folder, cell.history)
             within(folder, str(events_path(Path(cell.history))))
-            histories[cell.model] = History.load(within(folder, cell.history))
+            histories[cell.model] = History.load(path)
         except InputError as error:
             missing[cell.model] = str(error)
     return histories, missing

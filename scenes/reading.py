@@ -33,7 +33,7 @@ def within(folder: Path, *parts: str) -> Path:
     """The path of what a folder holds that somebody may have sent. Raises `InputError` where it leads out of the folder, as by a link."""
     path = folder.joinpath(*parts)
     if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder)):
-        raise InputError(f"{printable(path)}: cannot be read: lies outside the folder")
+        raise InputError(f"{printable(path)}: cannot be read: lies outside the run's folder")
     return path
 
 

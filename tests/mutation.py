@@ -73,7 +73,7 @@ TARGETS = {
     "validation/uncertainty/numerical.py": [
         UNCERTAINTY,
         "-k",
-        "index or order or step or tolerance or peak or interval_covers or own_error",
+        "index or order or step or tolerance or peak or small or interval_covers or own_error",
     ],
     "validation/uncertainty/inputs.py": [
         "tests/validation/discrepancy/test_propagation.py",
@@ -81,20 +81,14 @@ TARGETS = {
         "-k",
         "propagation or sobol or refused",
     ],
-    "validation/spectra/ida.py": ["tests/validation/studies/test_ida.py"],
-    "validation/spectra/fragility.py": [
-        "tests/validation/studies/test_spectra.py",
-        "-k",
-        "fragility or lognormal or curve or band or intensity",
-    ],
+    "validation/uncertainty/population.py": ["tests/validation/studies/test_population.py"],
     "ebm/horizon.py": ["tests/ebm/test_horizon.py"],
 }
 #: Files that are never compiled, whose tests play more motions than an interpreter can: what they call is compiled.
 COMPILED = {
     "validation/uncertainty/numerical.py",
     "validation/uncertainty/inputs.py",
-    "validation/spectra/ida.py",
-    "validation/spectra/fragility.py",
+    "validation/uncertainty/population.py",
     "ebm/horizon.py",
 }
 #: What hangs is noticed: after so long in the processor, or in twenty times that by the clock, which a busy machine does not reach.

@@ -92,8 +92,8 @@ def table_of(name: str, kind: type, records: Sequence[Any], **more: Any) -> Tabl
 class Series:
     """One line of a panel. `low` and `high` bound a band around it; `look` names a model's colour.
 
-    `style`: a line, points only, dots (a fit), "thin" (one of many behind the others), or "level",
-    a horizontal line at the only `y`, for reference.
+    `style`: a line, "smooth" (without marks), points only, dots (a fit), "thin" (one of many behind
+    the others), or "level", a horizontal line at the only `y`, for reference.
     """
 
     label: str
@@ -102,7 +102,7 @@ class Series:
     low: Sequence[float | None] = ()
     high: Sequence[float | None] = ()
     look: str = ""
-    style: Literal["line", "points", "dots", "thin", "level", "marked"] = "line"
+    style: Literal["line", "smooth", "points", "dots", "thin", "level", "marked"] = "line"
 
 
 @dataclass(frozen=True)
@@ -126,6 +126,8 @@ class Panel:
 class Plot:
     """A figure. `kind` "lines" draws `panels`; any other is drawn from `data` by its drawer in
     `rockcheck.reports.drawers`. A `live` one of one panel is read under the pointer on the page.
+    `data` of "lines" gives their x axis in another unit, too: `per_unit`, `other_unit`,
+    `other_label`.
     """
 
     name: str

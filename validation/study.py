@@ -51,16 +51,12 @@ class Task:
     seconds: float = field(default=math.inf, kw_only=True, compare=False, repr=False)
     expected: float = field(default=0.0, kw_only=True, compare=False, repr=False)
     compiles: str = field(default="", kw_only=True, compare=False, repr=False)
-    where: Literal["worker", "here", "timed"] = field(
-        default="worker", kw_only=True, compare=False, repr=False
-    )
+    where: Literal["worker", "here", "timed"] = field(default="worker", kw_only=True, compare=False, repr=False)
 
     @property
     def label(self) -> str:
         """A few words for progress and failures."""
-        return ", ".join(
-            f"{v:g}" if isinstance(v, float) else str(v) for v in self.fields().values()
-        )
+        return ", ".join(f"{v:g}" if isinstance(v, float) else str(v) for v in self.fields().values())
 
     def fields(self) -> dict[str, Any]:
         """What it is: the fields that count."""
@@ -107,9 +103,13 @@ class Study(ABC):
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """What the records say; a task that there was no time for is missing."""
 
+    def file(self, task: Task) -> str:
+        """The name of what is kept of a task."""
+        return name_of(self.name, task.key)
+
     def find(self, store: Store, task: Task) -> Any:
         """The kept record of a task, None where there is none that has the fields it must have."""
-        found = store.get_record(RECORDS, name_of(self.name, task.key))
+        found = store.get_record(RECORDS, self.file(task))
         try:
             return None if found is None else self._adapter.validate_python(found["record"])
         except (KeyError, ValueError):
@@ -118,7 +118,7 @@ class Study(ABC):
     def keep(self, store: Store, task: Task, record: Any) -> None:
         """Keep the record of a task."""
         plain = {"record": self._adapter.dump_python(record, mode="json")}
-        store.put_record(RECORDS, name_of(self.name, task.key), plain)
+        store.put_record(RECORDS, self.file(task), plain)
 
     @cached_property
     def _adapter(self) -> TypeAdapter[Any]:
@@ -147,13 +147,11 @@ def run(
 ) -> Finding:
     """Play what is not up to date in `folder`, keep each record as it comes, and gather.
 
-    `jobs` processes (default: one a core), or the Dask cluster at `scheduler`. What has not begun
+    `jobs` processes (default: one a core; 0: in this one), or the Dask cluster at `scheduler`. What has not begun
     after `minutes` is left out. Ctrl-C ends the tasks, and what was played is gathered. Raises
     `InputError` where the folder cannot be used or no cluster answers.
     """
-    return _Run(study, folder, jobs or os.cpu_count() or 1, scheduler, force, on_progress).finding(
-        minutes
-    )
+    return _Run(study, folder, os.cpu_count() or 1 if jobs is None else jobs, scheduler, force, on_progress).finding(minutes)
 
 
 class _Run:
@@ -174,9 +172,7 @@ class _Run:
         try:
             self.store = Store(folder, study.kinds)
         except OSError as error:
-            raise InputError(
-                f"{printable(folder)}: cannot be used as the output folder: {error.strerror}"
-            ) from None
+            raise InputError(f"{printable(folder)}: cannot be used as the output folder: {error.strerror}") from None
         self.known: dict[Task, None] = {}
         self.done: dict[Task, Any] = {}
 
@@ -190,9 +186,7 @@ class _Run:
                 complete = False
         found = self.study.gather(self.done)
         self.store.prune()
-        failed = {
-            task.label: one.reason for task, one in self.done.items() if isinstance(one, Failure)
-        }
+        failed = {task.label: one.reason for task, one in self.done.items() if isinstance(one, Failure)}
         about = Made(
             created=datetime.now(UTC).isoformat(timespec="seconds"),
             jobs=self.jobs,
@@ -216,10 +210,7 @@ class _Run:
                 continue
             if workers is None:
                 workers = stack.enter_context(self._workers())
-            calls = (
-                Call(guarded, (self.study.play, task), task.seconds, task.compiles, task)
-                for task in elsewhere
-            )
+            calls = (Call(guarded, (self.study.play, task), task.seconds, task.compiles, task) for task in elsewhere)
             for ended in workers.run(deque(calls), until=until):
                 self._end(ended.call.key, Failure(ended.fault) if ended.error else ended.result)
             if time.monotonic() >= until:
@@ -227,9 +218,7 @@ class _Run:
 
     def _next(self) -> list[Task]:
         """The tasks of the next wave that have to be played; the others are read back."""
-        while new := [
-            task for task in dict.fromkeys(self.study.tasks(self.done)) if task not in self.known
-        ]:
+        while new := [task for task in dict.fromkeys(self.study.tasks(self.done)) if task not in self.known]:
             self.known.update(dict.fromkeys(new))
             for task in new:
                 if not self.force and (record := self.study.find(self.store, task)) is not None:
@@ -243,27 +232,23 @@ class _Run:
         self.done[task] = result
         if isinstance(result, Failure):
             if result.traceback:
-                path = made(self.folder, FAULTS) / f"{name_of(self.study.name, task.key)}.txt"
+                path = made(self.folder, FAULTS) / f"{self.study.file(task)}.txt"
                 write_whole(path, result.traceback)
         else:
             self.study.keep(self.store, task, result)
         self.heard(len(self.done), len(self.known), task.label)
 
     def _elsewhere(self, task: Task) -> bool:
-        return task.where == "worker" or (task.where == "here" and self.scheduler is not None)
+        if self.scheduler is not None:
+            return task.where != "timed"
+        return task.where == "worker" and self.jobs > 0
 
     def _workers(self) -> Any:
-        return (
-            Cluster(self.scheduler, self.study.memory_mb)
-            if self.scheduler
-            else Pool(self.jobs, self.study.memory_mb)
-        )
+        return Cluster(self.scheduler, self.study.memory_mb) if self.scheduler else Pool(self.jobs, self.study.memory_mb)
 
     def _estimate(self, waiting: Sequence[Task]) -> None:
         """Says how long a wave will take where that is long."""
-        seconds = sum(
-            task.expected / (self.jobs if task.where == "worker" else 1) for task in waiting
-        )
+        seconds = sum(task.expected / (max(1, self.jobs) if task.where == "worker" else 1) for task in waiting)
         if seconds >= LONG:
             announce(f"{self.study.name}: {len(waiting)} tasks, about {words_of(seconds)}")
 

@@ -39,7 +39,7 @@ from rockcheck.ebm.core.guards import (
     first_event,
     guard,
 )
-from rockcheck.ebm.core.modes import code_of, hangs_flat, slacken, tips_first
+from rockcheck.ebm.core.modes import SLACK, code_of, hangs_flat, slacken, tips_first
 from rockcheck.ebm.core.motion import (
     COS,
     FAMILY,
@@ -296,7 +296,7 @@ def _tip(b, gh, gv, r, first, zeta, free, yield_displacement, a):
     for sense in (first, -first):
         m[:] = 0
         m[FAMILY], m[S], m[SLIP] = TILT, sense, 1 if sense * v > 0.0 else -1
-        _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, -1, r.rules, a)
+        _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, -1, r.memory[SLACK], r.rules, a)
         grows = leading(a, PHI, _LOOK, NOISE[POSITION], AHEAD)
         if not r.tried[code_of(m)] and (grows > 0 or (grows == 0 and free)):
             return True
@@ -320,7 +320,7 @@ def _begin(b, gh, gv, r, zeta, yield_displacement, a):
     sense = 1 if (z[THETA] if z[THETA] != 0.0 else z[W]) > 0.0 else -1
     m[:] = 0
     m[FAMILY], m[S], m[SLIP] = TILT, sense, 1 if sense * v > 0.0 else -1
-    _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, -1, r.rules, a)
+    _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, -1, r.memory[SLACK], r.rules, a)
     return zeta
 
 
@@ -340,10 +340,11 @@ def _wedged_series(b, m, z, zeta, gh, gv, t, order, reach, a):
 
 
 @inner_kernel
-def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, which, rules, a):
+def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, which, slack, rules, a):
     """Lets the corners of a tilting block rest on the touched walls that would push them. Sets with more walls are tried first.
 
-    A push that `which` has just ended (-1: none) does not go on where anything else fits, however near to zero it still is.
+    A push that `which` has just ended (-1: none) does not go on where anything else fits, however near to zero it still is. `slack`
+    multiplies what counts as noise: at one instant it doubles with each further event.
     """
     ended = m[PULL] if which == G_PUSH else 0
     lets_go = 1 if which == G_TIP_PUSH else (2 if which == G_FAR_PUSH else 0)
@@ -365,24 +366,24 @@ def _close_walls(b, m, z, zeta, yield_displacement, gh, gv, t, which, rules, a):
             rules[LEAST_CONTRADICTION] += 1
             if ended != 0:
                 m[PULL] = -ended  # in turn, until the slack allows one
-        if attempt == 4 or (aimed and _walls_hold(b, m, touched, a)):
+        if attempt == 4 or (aimed and _walls_hold(b, m, touched, slack, a)):
             if walls == 3:
                 stop(z)
             return
 
 
 @inner_kernel
-def _walls_hold(b, m, touched, a):
+def _walls_hold(b, m, touched, slack, a):
     """Whether the mode's walls push, and the block leaves all other walls that it touches."""
     for which in range(2):
         if m[TIP if which == 0 else FAR] != 0:
-            if leading(a, NA if which == 0 else NB, _LOOK - 2, NOISE[FORCE], AHEAD) < 0:
+            if leading(a, NA if which == 0 else NB, _LOOK - 2, slack * NOISE[FORCE], AHEAD) < 0:
                 return False
         elif touched >> which & 1:
             fill_guards(b, m, 0.0, a)
             guard(G_TIP_GAP if which == 0 else G_FAR_GAP, _LOOK, a)
             a[GUARD, 0] = a[GUARD, 1] = 0.0  # it is closed: its acceleration decides
-            if leading(a, GUARD, _LOOK, NOISE[POSITION], AHEAD) < 0:
+            if leading(a, GUARD, _LOOK, slack * NOISE[POSITION], AHEAD) < 0:
                 return False
     return True
 
@@ -524,7 +525,7 @@ def follow(b, gh, gv, r, which, before, yields, log, a):
         r.rules[HANGS] += hangs_flat(m)
     elif m[FAMILY] == TILT:  # the push of the floor or of a wall ends
         kind = -1 if which == G_PUSH else RELEASE
-        _close_walls(b, m, z, r.now[ZETA], yields, gh, gv, t, which, r.rules, a)
+        _close_walls(b, m, z, r.now[ZETA], yields, gh, gv, t, which, r.memory[SLACK], r.rules, a)
     elif which >= G_UPLIFT_PLUS and m[FLOOR] == SLIPPING:
         kind = _tip_sliding(b, gh, gv, r, yields, a)
     else:  # the cone, uplift from rest, or a wall that lets go of a standing block

@@ -20,10 +20,10 @@ SLOW = 1e-9
 
 @inner_kernel
 def lower(b, z):
-    """The side of the lower corner, the pivot: that to which the block tips, or, upright, begins to tip; at rest the weaker one.
+    """The side of the lower corner, the pivot: that to which the block tips, or begins to tip.
 
-    To rounding both corners of a block that stands are equally low. The weaker one, whose distance is the unit of length, is so to the
-    bit, and of a mirror image it is the mirror image.
+    Upright and at rest both are equally low, to rounding. It is the weaker one then: its distance is
+    the unit of length, so its height is right to the bit, and a mirror image has the mirrored corner.
     """
     sense = z[THETA] if z[THETA] != 0.0 else z[W]
     return side_of(b, sense if sense != 0.0 else b.right.arm - b.left.arm)

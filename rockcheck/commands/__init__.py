@@ -8,6 +8,7 @@ import sys
 import tempfile
 import threading
 import time
+import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -238,6 +239,17 @@ def told(found: Finding, folder: Path, *, report: bool = True) -> NoReturn:
     if not found.complete and not found.exit_code:
         raise KeyboardInterrupt
     raise typer.Exit(found.exit_code)
+
+
+def setting_of(text: str, option: str = "--set") -> tuple[str, Any]:
+    """key=value, the value as in TOML; a bare word is a string."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.isidentifier():
+        raise InputError(f"{printable(text)!r}: write key=value", option)
+    try:
+        return key, tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key, value
 
 
 def check_picture(path: Path | None) -> None:

@@ -6,9 +6,8 @@ from typing import Annotated
 
 import typer
 
-from rockcheck.commands import OUT, AllowCodeOption, JobsOption, OutOption, SchedulerOption, answer, console, usable_folder
-from rockcheck.commands.run import ForceOption, tell_faults
-from rockcheck.commands.validate import SuiteArgument, play_suite
+from rockcheck.commands import OUT, AllowCodeOption, JobsOption, OutOption, SchedulerOption, answer, console, tell_left_out, usable_folder
+from rockcheck.commands.validate import SuiteArgument, play, tell_faults
 from rockcheck.validation.suite.acceptance import accept
 from rockcheck.validation.suite.suites import load_suite
 
@@ -20,7 +19,6 @@ def run(
     ] = None,
     out: OutOption = OUT,
     jobs: JobsOption = None,
-    force: ForceOption = False,
     scheduler: SchedulerOption = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Show the changes, write none.")] = False,
     allow_code: AllowCodeOption = None,
@@ -32,8 +30,10 @@ def run(
     """
     name = suite or "paper"
     folder = usable_folder(out)
-    finished = play_suite(name, folder, jobs, force, False, scheduler, allow_code)
-    changes, refused = accept(load_suite(name, allow_code=allow_code or ()), finished, reason, write=not dry_run)
+    loaded = load_suite(name, allow_code=allow_code or ())
+    tell_left_out(loaded.left_out)
+    finished = play(loaded, folder, jobs, False, False, scheduler)
+    changes, refused = accept(loaded, finished, reason, write=not dry_run)
     screen = console()
     for line in changes:
         screen.print(line, soft_wrap=True)

@@ -28,16 +28,14 @@ from rockcheck.validation.suite.results import FAULT
 COMMANDS = {
     "scenes": ("scenes", "rockcheck scenes"),
     "new": ("new", "rockcheck new bookcase.toml"),
-    "record": ("record", "rockcheck record station.V2 --component 1 --plot station.png"),
+    "record": ("record", "rockcheck record station.V2 --read component=1 --plot station.png"),
     "simulate": ("simulate", "rockcheck simulate fig5a --model mujoco --set time_step=1e-3 -o mujoco.csv"),
-    "run": ("run", "rockcheck run fig5a --models ebm,cm,mujoco"),
     "compare": ("compare", "rockcheck compare ebm.csv mujoco.csv --until 8"),
     "uncertainty": ("uncertainty", "rockcheck uncertainty fig5a --model mujoco --set time_step=1e-3"),
     "validate": ("validate", "rockcheck validate smoke --out rockcheck-report"),
     "accept": ("accept", 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"'),
-    "diff": ("diff", "rockcheck diff last-week rockcheck-report"),
     "spectrum": ("spectrum", "rockcheck spectrum fig8 --size 50 --refine"),
-    "ida": ("ida", "rockcheck ida shelf.toml records --intensity sa --period 0.5"),
+    "ida": ("ida", "rockcheck ida shelf.toml records --intensity sa:0.5"),
     "benchmark": ("benchmark", "rockcheck benchmark --quick"),
     "conformance": ("conformance", "rockcheck conformance --engine mujoco --settings default"),
     "calibrate": ("calibrate", "rockcheck calibrate --engine mujoco --restitution 0.5 --step 1e-3"),
@@ -48,6 +46,8 @@ COMMANDS = {
 
 #: What to call in place of a command that is gone.
 GONE = {
+    "run": "rockcheck validate SCENE",
+    "diff": "rockcheck compare RUN_A RUN_B",
     "figure": "rockcheck report DIR --scene NAME -o FILE",
     "convergence": "rockcheck benchmark convergence",
 }
@@ -55,7 +55,7 @@ GONE = {
 HIDDEN = ("warm",)
 
 #: Commands that answer at once: nobody asks how long they took.
-AT_ONCE = ("scenes", "new", "record", "compare", "diff")
+AT_ONCE = ("scenes", "new", "record", "compare")
 
 #: Options whose value may be left out, with their values: it is then the first.
 BARE = {"--strict": ("worse", "both")}

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import tempfile
-import tomllib
+from collections import deque
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,6 +20,7 @@ from rockcheck.commands import (
     report_file,
     save_picture,
     scene_names,
+    setting_of,
     tell_notes,
 )
 from rockcheck.scenes import History, InputError, ModelFailure, Scene, load_scene
@@ -29,6 +29,7 @@ from rockcheck.scenes.history import check_format
 from rockcheck.scenes.progress import listening
 from rockcheck.validation.execute import workers
 from rockcheck.validation.execute.models import FAMILIES, build, check_allowed, family, is_own
+from rockcheck.validation.execute.pool import Call, Failure, Pool, guarded
 from rockcheck.validation.execute.store import TABLE, name_of
 
 #: The model that plays where none is named: the fair reference for engines.
@@ -91,24 +92,15 @@ def run(
 def _played_apart(scene: Scene, model: str, settings: dict[str, Any]) -> History:
     """The history by a model of the user's own, whose code is imported by a process of its own."""
     task = workers.Task(label=model, family=model, settings=settings, search_path=(str(Path.cwd()),), scene=scene)
-    ((_, result),) = workers.local([task], jobs=1, seconds=[math.inf], memory_mb=None)
-    if result.bad_input:
-        raise InputError(result.failure)
-    if result.failure:
+    with Pool(1) as pool:
+        (ended,) = pool.run(deque([Call(guarded, (workers.play, task))]))
+    result = Failure(ended.fault) if ended.error else ended.result
+    if isinstance(result, Failure):
+        if result.refused:
+            raise InputError(result.reason)
         where = f"; its traceback: {report_file(result.traceback)}" if result.traceback else ""
-        raise ModelFailure(f"{result.failure}{where}")
+        raise ModelFailure(f"{result.reason}{where}")
     with tempfile.TemporaryDirectory() as folder:
         for suffix, content in result.files.items():
             (Path(folder) / f"history{suffix}").write_bytes(content)
         return History.load(Path(folder) / f"history{TABLE}")
-
-
-def setting_of(text: str) -> tuple[str, Any]:
-    """key=value, the value as in TOML; a bare word is a string."""
-    key, equals, value = text.partition("=")
-    if not equals or not key.isidentifier():
-        raise InputError(f"{printable(text)!r}: write key=value", "--set")
-    try:
-        return key, tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        return key, value

@@ -18,6 +18,7 @@ from rockcheck.commands import (
 )
 from rockcheck.commands.simulate import setting_of
 from rockcheck.scenes import InputError, load_scene
+from rockcheck.validation.execute.store import name_of
 from rockcheck.validation.paper.panels import (
     AMPLITUDES,
     FIGURES,
@@ -103,7 +104,7 @@ def run(
         panels = paper_panels(*PAPER[what])
     else:
         scene = load_scene(what)
-        panels = (Panel(scene.name.replace(" ", "-"), scene.name, scene),)
+        panels = (Panel(name_of(scene.name.replace(" ", "-")), scene.name, scene),)
     # Beside a wall a block hops, which the pivot of the paper's figures forbids.
     hops = what not in PAPER and panels[0].wall is not None
     given = dict(setting_of(one) for one in settings or [])

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 from rich.console import Console
@@ -17,32 +19,66 @@ from rockcheck.commands import (
     SchedulerOption,
     answer,
     console,
+    model_names,
+    progress,
+    setting_of,
     suite_names,
     tell_left_out,
     tell_missing,
     usable_folder,
 )
-from rockcheck.commands.publish import keep
-from rockcheck.commands.run import ForceOption, chosen_models, play, play_scene, published, tell_faults
+from rockcheck.commands.publish import keep, publish
+from rockcheck.commands.record import ReadOption
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.recordings import Reading
+from rockcheck.scenes.recordings.sets import record_path
+from rockcheck.validation.execute.models import FAMILIES, family, is_own, not_installed
 from rockcheck.validation.suite.changes import Moment, moment_of, remember, trends
+from rockcheck.validation.suite.record_sets import RecordSet
 from rockcheck.validation.suite.results import Run, Strict
-from rockcheck.validation.suite.suites import is_scene, load_suite, scene_suite
-from rockcheck.validation.suite.tables import improvements, not_shown, summary, verdict_lines, verdict_table
+from rockcheck.validation.suite.runner import run_suite
+from rockcheck.validation.suite.suites import Suite, is_scene, load_suite, scene_suite
+from rockcheck.validation.suite.tables import (
+    improvements,
+    not_shown,
+    outcome_row,
+    outcome_tables,
+    summary,
+    verdict_lines,
+    verdict_table,
+)
 
 #: The folder of the trend's page, and so many figures that moved are told.
 TREND, MOST_MOVED = "trend", 10
 Strictness = Literal["worse", "both"]
-SuiteArgument = Annotated[str | None, typer.Argument(help="A named suite or a .toml file (default: paper).", autocompletion=suite_names)]
+ALL = "all"
+SuiteArgument = Annotated[
+    str | None,
+    typer.Argument(metavar="[SUITE]", help="A named suite or a .toml file (default: paper).", autocompletion=suite_names),
+]
+WhatArgument = Annotated[
+    str | None,
+    typer.Argument(metavar="[SUITE or SCENE]", help="Named, or a .toml file (default: suite paper).", autocompletion=suite_names),
+]
 
 
 def run(
-    suite: SuiteArgument = None,
+    what: WhatArgument = None,
+    models: Annotated[
+        str, typer.Option("--models", help="Of a scene: all that are installed, or names with commas between.", autocompletion=model_names)
+    ] = ALL,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", help="Of a scene: a model's setting, such as mujoco.time_step=1e-3; repeatable.")
+    ] = None,
+    records: Annotated[
+        list[str] | None,
+        typer.Option("--records", help="Of a scene: files, folders or patterns, each played in place of its excitation; repeatable."),
+    ] = None,
+    read: ReadOption = None,
     out: OutOption = OUT,
     jobs: JobsOption = None,
-    quick: Annotated[bool, typer.Option("--quick", help="The suite smoke: the smallest that means something.")] = False,
-    force: ForceOption = False,
+    force: Annotated[bool, typer.Option("--force", help="Run every cell, also those whose results are up to date.")] = False,
     strict: Annotated[
         Strictness | None,
         typer.Option("--strict", help="Figures that left their drift band for the worse fail; with `--strict both` better ones, too."),
@@ -57,22 +93,27 @@ def run(
     """Run a suite, compare, judge, write the report.
 
     Every model on every scene; cells whose results are up to date are read back. A scene in place of a suite is played by all models,
-    as by `rockcheck run`, and nothing is judged.
+    perhaps under records, and nothing is judged. --read also takes scale=1.2 and vertical=true for its records.
 
     Exit 0: within tolerance. 1: out of tolerance. 2: bad input. 3: a model failed. 70: a fault of rockcheck itself.
     """
-    if quick and suite not in (None, "smoke"):
-        raise InputError(f"cannot be given together with the suite {suite!r}", "--quick")
-    folder = usable_folder(out)
-    if suite is not None and is_scene(suite):
+    if what is not None and is_scene(what):
         if strict:
-            raise InputError(f"{printable(suite)} is a scene, and nothing of it is judged: give a suite", "--strict")
-        console().print(f"{suite} is a scene: all models play it, nothing is judged (as `rockcheck run {suite}`)", soft_wrap=True)
-        alone = scene_suite(suite, chosen_models())
-        tell_missing()
-        play_scene(alone, folder, jobs=jobs, force=force, scheduler=scheduler, report=report)
+            raise InputError(f"{printable(what)} is a scene, and nothing of it is judged: give a suite", "--strict")
+        sets = _record_sets(records or (), read or ())
+        suite = scene_suite(what, chosen_models(models, settings or ()), records=sets, allow_code=allow_code or ())
+        folder = usable_folder(out)
+        if models == ALL:
+            tell_missing()
+        play_scene(suite, folder, jobs=jobs, force=force, scheduler=scheduler, report=report)
+    for name, given in (("--models", models != ALL), ("--set", settings), ("--records", records), ("--read", read)):
+        if given:
+            raise InputError("is for a scene: a suite says which models play what", name)
+    folder = usable_folder(out)
     how: Strict = "both" if strict == "both" else strict is not None
-    finished = play_suite(suite or ("smoke" if quick else "paper"), folder, jobs, force, how, scheduler, allow_code)
+    loaded = load_suite(what or "paper", allow_code=allow_code or ())
+    tell_left_out(loaded.left_out)
+    finished = play(loaded, folder, jobs, force, how, scheduler)
     kept = keep(finished, folder)
     show(finished, console())
     tell_faults(finished, folder)
@@ -89,13 +130,99 @@ def run(
     raise typer.Exit(finished.exit_code)
 
 
-def play_suite(
-    suite: str, folder: Path, jobs: int | None, force: bool, strict: Strict, scheduler: str | None, allow_code: Sequence[str] | None
-) -> Run:
+def _record_sets(records: Sequence[str], read: Sequence[str]) -> list[RecordSet]:
+    """The records, and how they are read. Raises `InputError`."""
+    given = dict(setting_of(word, "--read") for word in read)
+    if not records:
+        if given:
+            raise InputError("needs --records", "--read")
+        return []
+    scale, vertical = given.pop("scale", 1.0), given.pop("vertical", False)
+    reading = {name: value for name, value in Reading(**given) if value is not None}
+    files = tuple(str(record_path(word, Path()).absolute()) for word in records)
+    return [RecordSet(files=files, scale=scale, vertical=vertical, **reading)]
+
+
+def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
+    """The models by name, each with its settings; of all, those that are installed. Raises `InputError` for an unknown one."""
+    if names == ALL:
+        found: dict[str, dict[str, Any]] = {name: {} for name in FAMILIES if name != "measured" and not not_installed(name)}
+    else:
+        found = {name.strip(): {} for name in names.split(",") if name.strip()}
+        for name in found:
+            family(name)
+        if not found or "measured" in found:
+            raise InputError(f"{printable(names)!r} is not allowed: models that play, with commas between, or all", "--models")
+    for text in settings:
+        model, dot, rest = text.partition(".")
+        if not dot or model not in found:
+            raise InputError(f"{printable(text)!r}: write MODEL.key=value, with MODEL one of {', '.join(found)}", "--set")
+        key, value = setting_of(rest)
+        found[model][key] = value
+    return found
+
+
+def play_scene(suite: Suite, folder: Path, *, jobs: int | None, force: bool, scheduler: str | None, report: bool) -> None:
+    """Play a suite that judges nothing; a table, the report, and exit 3 where a model failed.
+
+    Raises `InputError` where `folder` holds a judged run, whose pages and tables this one would overwrite.
+    """
+    before = None
+    with suppress(InputError):  # no run there, or none that can be read
+        before = Run.load(folder)
+    if before is not None and before.judged:
+        raise InputError(f"{printable(folder)} holds the judged run of suite {before.suite!r}: give another folder", "--out")
+    finished = play(suite, folder, jobs, force, False, scheduler)
+    kept = keep(finished, folder)
+    screen = console()
+    tell_left_out(suite.left_out, "--read vertical=true plays such a component together with the horizontal ones")
+    for name, table in outcome_tables(finished):
+        screen.print(name, style="bold", soft_wrap=True)
+        screen.print(table)
+    screen.print(
+        "peak: largest rotation; apart: RMS difference from the reference, to the horizon of predictability; in alpha", soft_wrap=True
+    )
+    for line in verdict_lines(finished):
+        screen.print(line, style="red" if finished.exit_code else "yellow", soft_wrap=True)
+    tell_faults(finished, folder)
+    page = published(folder, jobs) if report else kept
+    screen.print(f"report: {page}", soft_wrap=True)
+    answer(
+        {
+            "suite": finished.suite,
+            "judged": False,
+            "reference": finished.reference,
+            "exit_code": finished.exit_code,
+            "cells": [outcome_row(cell, finished.reference) for cell in finished.cells],
+            "left_out": suite.left_out,
+            "reasons": list(verdict_lines(finished)),
+            "report": page,
+        }
+    )
+    raise typer.Exit(finished.exit_code)
+
+
+def play(suite: Suite, folder: Path, jobs: int | None, force: bool, strict: Strict, scheduler: str | None) -> Run:
     """Run a suite with a progress bar on stderr."""
-    loaded = load_suite(suite, allow_code=allow_code or ())
-    tell_left_out(loaded.left_out)
-    return play(loaded, folder, jobs, force, strict, scheduler)
+    compiles = ", a first run compiles" if any(not is_own(one.family_name) and one.family.compiled for one in suite.models.values()) else ""
+    with progress(f"{suite.name}{compiles}") as on_progress:
+        return run_suite(suite, folder, jobs=jobs, force=force, strict=strict, scheduler=scheduler, on_progress=on_progress)
+
+
+def published(folder: Path, jobs: int | None) -> Path:
+    """The pages of the run that was kept in `folder`, with a progress bar; returns the page to open."""
+    with progress("pages") as on_progress:
+        return publish(folder, jobs=jobs, on_progress=on_progress)
+
+
+def tell_faults(finished: Run, folder: Path) -> None:
+    """A line on stderr for each exception that no model may raise: of rockcheck's own models to report, of one's own to mend."""
+    for cell in finished.cells:
+        if not cell.traceback:
+            continue
+        where, path = f"{cell.scene}, {cell.model}: {cell.reason}", folder / cell.traceback
+        said = f"a fault of rockcheck itself, {where}: please report it with {path}" if cell.unexpected else f"{where}: traceback in {path}"
+        print(printable(f"rockcheck: {said}", 1400), file=sys.stderr)
 
 
 def tell_trend(moments: Sequence[Moment], path: Path) -> None:

@@ -84,7 +84,7 @@ def fault(path: Path, said: str, line: int | None = None) -> InputError:
 def option(name: str, value: str | float) -> str:
     """How an option is given, on the command line and in a scene file."""
     in_file = value if not isinstance(value, str) else f'"{value}"'
-    return f"--{name.replace('_', '-')} {value} (in a scene file: {name} = {in_file})"
+    return f"--read {name}={value} (in a scene file: {name} = {in_file})"
 
 
 def number(path: Path, line: int, word: str) -> float:

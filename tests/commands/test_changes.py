@@ -1,4 +1,4 @@
-"""What changed: `rockcheck diff` between two finished runs, and `validate --history` over many."""
+"""What changed: `rockcheck compare` between two finished runs, and `validate --history` over many."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def diff(capsys):
 
     def asked(a: str, b: str) -> tuple[int, list[dict]]:
         capsys.readouterr()
-        code = main(["diff", a, b, "--json"])
+        code = main(["compare", a, b, "--json"])
         told = json.loads(capsys.readouterr().out)
         assert told["exit_code"] == code
         return code, told["changes"]
@@ -61,7 +61,7 @@ def diff(capsys):
 def test_the_same_run_has_no_change(diff, capsys):
     ran("b", 0.001)
     assert diff("a", "b") == (0, [])
-    assert main(["diff", "a", "b"]) == 0
+    assert main(["compare", "a", "b"]) == 0
     assert capsys.readouterr().out == "mine: nothing changed\n"
 
 
@@ -86,7 +86,7 @@ def test_a_verdict_that_changes_is_exit_1_and_comes_first(diff, capsys):
         ("short", "near", "theta_peak against still", "pass", "fail"),
     ]
     assert [change["what"] for change in changes[:3]] == ["verdict"] * 3
-    assert main(["diff", "a", "b"]) == 1
+    assert main(["compare", "a", "b"]) == 1
     out = capsys.readouterr().out
     assert out.startswith("mine: 3 verdicts, ")
     assert max(map(len, out.splitlines())) <= 80
@@ -107,9 +107,9 @@ def test_runs_of_two_suites_are_not_compared(capsys):
     run = Run.load("a")
     Path("b").mkdir()
     run.model_copy(update={"suite": "other"}).save(Path("b"))
-    assert main(["diff", "a", "b"]) == 2
+    assert main(["compare", "a", "b"]) == 2
     assert capsys.readouterr().err == "rockcheck: the runs are of two suites, mine and other\n"
-    assert main(["diff", "a", "none"]) == 2
+    assert main(["compare", "a", "none"]) == 2
     assert "no finished run here" in capsys.readouterr().err
 
 

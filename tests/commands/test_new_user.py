@@ -56,7 +56,7 @@ def test_from_a_v2_record_to_a_report_and_a_curve_in_four_commands(type_):
     understood = type_("record station.V2")
     assert [f"PGA         {peak} g" in understood for peak in (0.31, 0.27, 0.15)] == [True] * 3
 
-    told = type_("run rack.toml --record station.V2 --models ebm,ebm-unilateral,cm,mujoco --set mujoco.time_step=1e-3")
+    told = type_("run rack.toml station.V2 --models ebm,ebm-unilateral,cm,mujoco --set mujoco.time_step=1e-3")
     assert "left out: station.V2 up (vertical" in told
     assert "report: rockcheck-report/index.html\n" in told
     run = Run.load("rockcheck-report")
@@ -66,7 +66,7 @@ def test_from_a_v2_record_to_a_report_and_a_curve_in_four_commands(type_):
     for place in run.places:
         assert (Path("rockcheck-report") / "pages" / f"{place.replace(', ', '-').replace(' ', '-')}.html").exists()
 
-    told = type_("ida rack.toml station.V2 --levels 8")
+    told = type_("ida rack.toml station.V2 --levels 0.05:2:8")
     assert "report: rockcheck-report/ida/index.html\n" in told
     rows = list(csv.DictReader(Path("rockcheck-report/ida/ida.csv").read_text(encoding="utf-8").splitlines()))
     assert len(rows) == 2 * 2 * 8  # components, directions, intensities
@@ -78,15 +78,15 @@ def test_a_folder_of_24_files_in_eight_formats_shakes_the_rack(type_):
     Path("records").mkdir()
     assert len(made.folder_of_records(Path("records"))) == 24
     type_("new rack.toml")
-    told = json.loads(type_("ida rack.toml records --levels 3 --range 0.1 0.6 --json"))
+    told = json.loads(type_("ida rack.toml records --levels 0.1:0.6:3 --json"))
     assert len(told["left_out"]) == 8
     assert all("U-D" in name for name in told["left_out"])
-    lines = json.loads(Path("rockcheck-report/ida/ida.json").read_text(encoding="utf-8"))["lines"]
-    assert len(lines) == 16 * 2
-    for line in lines:
-        (peak,) = (abs(peak) for name, peak in made.PEAKS.items() if name in line["record"])
-        assert line["own"] == pytest.approx(peak, abs=3e-4), line["record"]
+    assert len(told["tables"]["motions"]) == 16
+    for record in told["tables"]["motions"]:
+        (peak,) = (abs(peak) for name, peak in made.PEAKS.items() if name in record["motion"])
+        assert record["own"] == pytest.approx(peak, abs=3e-4), record["motion"]
+    least = [row for row in told["tables"]["ida"] if row["direction"] == 1 and row["intensity"] == 0.1]
     # Every format holds one motion, so that the block does the same under all of them (K-NET's takes out its mean).
     for component in ("N-S", "E-W"):
-        peaks = [line["peaks"][0] for line in lines if component in line["record"] and line["direction"] == 1]
+        peaks = [row["peak_rotation_alpha"] for row in least if component in row["record"]]
         assert peaks == pytest.approx([peaks[0]] * 8, abs=5e-3)

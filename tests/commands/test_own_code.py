@@ -168,11 +168,7 @@ def test_a_fault_of_a_model_leaves_its_traceback(folder, monkeypatch):
 _BROKEN = """
 import os, sys
 from rockcheck.commands import cli, validate
-from rockcheck.validation.execute import workers
 from rockcheck.cm import ContinuousModel
-def here(tasks, **limits):
-    return enumerate(map(workers.play, tasks))
-workers.local = here
 if os.environ["BROKEN"]:
     def simulate(self, scene):
         raise AttributeError("broken")

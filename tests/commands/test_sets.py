@@ -61,10 +61,9 @@ def told(capsys):
 @pytest.mark.parametrize(
     "words",
     [
-        ("--record", "records/RSN1_H*.AT2"),  # quoted, or a shell that finds no such file
-        ("--record", "records/RSN1_H1.AT2", "records/RSN1_H2.AT2"),  # as a shell gives a pattern
-        ("--record", "records/RSN1_H1.AT2", "--record", "records/RSN1_H2.AT2"),
-        ("--record", "records"),
+        ("records/RSN1_H*.AT2",),  # quoted, or a shell that finds no such file
+        ("records/RSN1_H1.AT2", "records/RSN1_H2.AT2"),  # as a shell gives a pattern
+        ("records",),
         ("records/RSN1_*.AT2",),
     ],
 )
@@ -89,7 +88,7 @@ def test_a_chosen_component_is_played_though_it_is_vertical(told):
     rows = "".join(f"{0.02 * n:.2f},{a:.6f}\n" for n, a in enumerate(motion(0.3)))
     Path("up.csv").write_text("time_s,acceleration_g\n" + rows, encoding="utf-8")
     assert main(["run", "rack.toml", "up.csv", *STILL]) == 2
-    assert [c["scene"] for c in told("run", "rack.toml", "up.csv", "--column", "acceleration_g", *STILL)["cells"]] == ["rack, up"]
+    assert [c["scene"] for c in told("run", "rack.toml", "up.csv", "--read", "column=acceleration_g", *STILL)["cells"]] == ["rack, up"]
 
 
 def test_the_vertical_component_of_a_file_goes_with_its_others(told, capsys):
@@ -130,12 +129,6 @@ def test_a_scene_that_there_is_not_is_the_only_line(capsys, monkeypatch):
     said = capsys.readouterr()
     assert said.out == ""
     assert said.err.count("\n") == 1
-
-
-def test_records_of_an_analysis_may_be_an_option_as_elsewhere(told):
-    found = told("ida", "rack.toml", "--record", "records/RSN1_H*.AT2", "--levels", "2", "--jobs", "1", "--json")
-    assert found["left_out"] == []
-    assert len(Path(found["table"]).read_text(encoding="utf-8").splitlines()) == 1 + 2 * 2 * 2  # records, directions, intensities
 
 
 def test_all_models_are_those_that_are_installed(told):
@@ -213,8 +206,8 @@ def test_a_suite_has_tables_of_records():
             "--set: 'cm.tolerance=1': write MODEL.key=value, with MODEL one of ebm",
         ),
         (("run", "rack.toml", "--models", "ebm", "--set", "ebm.tol=1"), "ebm.tol: unknown key"),
-        (("run", "rack.toml", "--unit", "g"), "--record: is missing"),
-        (("run", "rack.toml", "--record", "records/X*.AT2"), "X*.AT2: no such files"),
+        (("run", "rack.toml", "--read", "unit=g"), "records: are missing"),
+        (("run", "rack.toml", "records/X*.AT2"), "X*.AT2: no such files"),
         (("run", "rakc.toml"), "rakc.toml: cannot be read"),
         (("run", "rack.toml", "records/RSN1_V.AT2"), "RSN1_V.AT2: a vertical component, and no horizontal one is given"),
         (("validate", "wrong.toml"), "records.scenes: unknown scene 'rakk'; did you mean 'rack'"),
@@ -228,10 +221,17 @@ def test_slips_are_named(capsys, words, said):
     assert err.count("\n") == 1
 
 
-@pytest.mark.parametrize("command", ["run", "ida"])
+@pytest.mark.parametrize("words", [("records/RSN1_H*.AT2",), ("records/RSN1_H1.AT2", "records/RSN1_H2.AT2", "records/RSN1_V.AT2")])
+def test_a_population_takes_the_same_sets(told, words):
+    found = told("ida", "rack.toml", "--levels", "1:2:2", *words, "--json")
+    assert [one["motion"] for one in found["tables"]["motions"]] == ["RSN1_H1.AT2", "RSN1_H2.AT2"]
+    assert found["left_out"] == list(words[2:3] and ["RSN1_V.AT2"])
+
+
+@pytest.mark.parametrize("command", ["validate", "ida"])
 def test_a_file_of_a_folder_that_is_no_record_is_named_and_left_out(told, command):
     Path("records/README.txt").write_text("where they are from\n", encoding="utf-8")
-    rest = STILL if command == "run" else ("--levels", "2", "--json")
+    rest = STILL if command == "validate" else ("--levels", "0.1:1:2", "--json")
     left_out = told(command, "rack.toml", "records", *rest)["left_out"]
     assert left_out[0] == "RSN1_V.AT2"
     assert "README.txt" in left_out[1]

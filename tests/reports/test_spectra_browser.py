@@ -15,14 +15,13 @@ from playwright import sync_api as playwright
 
 from rockcheck.reports.document import publish
 from rockcheck.reports.show.spectrum import COLOURS
-from rockcheck.reports.studies.ida import write_ida
-from rockcheck.validation.finding import Made
+from rockcheck.validation.finding import Block, Column, Finding, Made
 from rockcheck.validation.paper.panels import Panel, paper_panels
-from rockcheck.validation.spectra.fragility import curve_of
-from rockcheck.validation.spectra.ida import Capacity, Ida, Line
+from rockcheck.validation.studies.population.study import blocks_of, lines_of
 from rockcheck.validation.studies.spectrum.grids import Request
 from rockcheck.validation.studies.spectrum.study import Spectra
 from rockcheck.validation.studies.spectrum.tiles import Played
+from rockcheck.validation.uncertainty.population import curve_of
 
 pytestmark = pytest.mark.browser
 SIZE = 20
@@ -157,36 +156,46 @@ def test_keys_do_what_the_mouse_does(page: playwright.Page) -> None:
     playwright.expect(page.locator(".played")).to_be_visible()
 
 
+def page_of(folder: Path, blocks: list[Block]) -> Path:
+    made = Made(created="2026-11-24T00:00:00+00:00", jobs=1, wall_seconds=1.0, versions={}, hardware={})
+    return publish(Finding("made", "Made up", "20 records.", blocks, made=made), folder, formats=("svg",))
+
+
+def fragility_page(folder: Path) -> Path:
+    level = np.linspace(0.5, 5.0, 10)
+    fell = np.random.default_rng(1).random((20, 2, 1)) < np.linspace(0.0, 1.0, 10)
+    curves = [curve_of(label, fell, np.zeros_like(fell), level) for label in ("with the wall", "without a wall")]
+    other = {"per_unit": 0.2, "other_unit": "g", "other_label": "peak acceleration, g"}
+    return page_of(folder, blocks_of(curves, Column("intensity", "peak acceleration / (g tan α)"), other))
+
+
 def ida_page(folder: Path) -> Path:
     level = np.linspace(0.1, 1.0, 10)
-    fell = np.random.default_rng(1).random((4, 2, 1)) < np.linspace(0.0, 1.0, 10)
-    curve = curve_of("peak above α, or overturned", fell, np.zeros_like(fell), level)
-    lines = tuple(
-        Line(
-            record=f"r{k}",
-            direction=1,
-            own=0.3,
-            peaks=tuple(None if 0.2 * (k + 1) * x > 0.7 else 0.2 * (k + 1) * x for x in level),
-        )
-        for k in range(4)
-    )
-    quantiles = {"0.16": lines[0].peaks, "0.5": lines[1].peaks, "0.84": lines[3].peaks}
-    found = Ida(
-        scene="shelf", model="ebm", measure="pga", label="PGA", unit="g", intensities=tuple(level), lines=lines, quantiles=quantiles,
-        capacities=(Capacity(limit=1.0, curve=curve, low=0.4, high=0.6),),
-    )  # fmt: skip
-    return write_ida(found, folder)
+    peaks = 0.2 * np.arange(1, 5)[:, None, None] * level * np.ones((4, 2, 1))
+    peaks[peaks > 0.7] = np.inf
+    return page_of(folder, lines_of([f"r{k}" for k in range(4)], peaks, level, Column("intensity", "PGA", "g")))
 
 
-def test_the_lines_of_an_ida_are_named_under_the_pointer(
-    visitor: Callable[..., playwright.Page], tmp_path: Path
-) -> None:
+def test_fragility_is_read_under_the_pointer(visitor: Callable[..., playwright.Page], tmp_path: Path) -> None:
+    page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
+    page.goto(fragility_page(tmp_path).as_uri())
+    assert page.locator(".key span").all_inner_texts() == ["with the wall", "without a wall"]
+    page.locator("[data-curves] .u-over").hover()
+    said = page.locator("[data-curves] output").inner_text()
+    across, in_g = re.fullmatch(r"peak acceleration / \(g tan α\) ([\d.]+) \(([\d.]+) g\): with the wall 0\..*", said, re.DOTALL).groups()
+    assert float(in_g) == pytest.approx(0.2 * float(across), rel=0.01)
+    cells = page.locator("table tbody tr").first.locator("td")
+    assert float(cells.last.inner_text()) == pytest.approx(0.2 * float(cells.first.inner_text()), rel=0.01)
+    assert page.evaluate("rockcheckCharts.fragility.axes.map(axis => [axis.scale, axis.label])")[2] == ["x", "peak acceleration, g"]
+
+
+def test_the_lines_of_an_ida_are_named_under_the_pointer(visitor: Callable[..., playwright.Page], tmp_path: Path) -> None:
     page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
     page.goto(ida_page(tmp_path).as_uri())
     page.locator('[data-curves="lines"] .u-over').hover(position={"x": 500, "y": 200})
     said = page.locator('[data-curves="lines"] output').inner_text()
-    assert said.startswith("PGA (g) ")
-    assert any(f"r{k} 0." in said for k in range(4))
+    assert said.startswith("PGA, g ")
+    assert any(f"r{k} 0." in said or f"r{k}, reversed 0." in said for k in range(4))
     assert "50 % " in said
 
 

@@ -213,11 +213,11 @@ def test_several_components_in_one_file(write, names, tmp_path, capsys):
     assert [one.component for one in found] == names
     for one, component in zip(found, PEAKS, strict=True):
         np.testing.assert_allclose(one.samples, motion(component), atol=1.01e-7)
-    with pytest.raises(InputError, match=r"3 components, 1 '360 .eg', .* give one: --component 1 \(in a scene file: component = 1\)"):
+    with pytest.raises(InputError, match=r"3 components, 1 '360 .eg', .* give one: --read component=1 \(in a scene file: component = 1\)"):
         Record.from_file(path)
     assert Record.from_file(path, component=2).peak == pytest.approx(0.27, abs=1e-7)
     assert Record.from_file(path, component=names[2]).peak == pytest.approx(0.15, abs=1e-7)
-    assert main(["record", str(path), "--component", names[1], "--json"]) == 0
+    assert main(["record", str(path), "--read", f"component={names[1]}", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert (said["component"], said["unit"], said["samples"]) == (names[1], "cm/s2", 401)
     assert said["duration_s"] == pytest.approx(4.0)
@@ -288,16 +288,16 @@ def test_tables(text, options, samples, step, tmp_path):
 @pytest.mark.parametrize(
     ("text", "options", "said"),
     [
-        ("0 1\n0.5 2\n", {}, 'the unit of acceleration is not stated; give it: --unit g (in a scene file: unit = "g")'),
-        ("1\n2\n", {"unit": "g"}, "no column of times; give the time step: --time-step 0.01 (in a scene file: time_step = 0.01)"),
-        ("1 2 3\n4 5 6\n", {"unit": "g"}, "3 columns; give that of the accelerations: --column 2 (in a scene file: column = 2)"),
+        ("0 1\n0.5 2\n", {}, 'the unit of acceleration is not stated; give it: --read unit=g (in a scene file: unit = "g")'),
+        ("1\n2\n", {"unit": "g"}, "no column of times; give the time step: --read time_step=0.01 (in a scene file: time_step = 0.01)"),
+        ("1 2 3\n4 5 6\n", {"unit": "g"}, "3 columns; give that of the accelerations: --read column=2 (in a scene file: column = 2)"),
         ("1 2 3\n4 5 6\n", {"column": 4}, "no single column 4; there are 1 to 3"),
         (
             "words\nand more of them\n",
             {"unit": "g"},
-            "no line of numbers within the first 200; give the lines to leave out: --header-lines",
+            "no line of numbers within the first 200; give the lines to leave out: --read header_lines",
         ),
-        ("0,5\n1,5\n", {"unit": "g"}, "a comma between columns or before the decimals? --decimal ,"),
+        ("0,5\n1,5\n", {"unit": "g"}, "a comma between columns or before the decimals? --read decimal=,"),
         ("time_s,acceleration_g\n0,1\n1,1\n", {"unit": "gal"}, "the file states the unit g, not gal"),
         ("0 1\n0.5\n", {"unit": "g"}, "line 2: 1 fields where the first line has 2"),
         ("0 1\n1 2\n", {"component": 1}, "a table has columns; give the option column"),
@@ -327,7 +327,7 @@ def test_times_are_judged_by_their_digits(rate, decimals, tmp_path):
     if 10.0**-decimals <= 0.5 / rate or rate in (100, 200):
         assert read_record(path).time_step == pytest.approx(1 / rate, rel=1e-12)
     else:
-        with pytest.raises(InputError, match=r"is off the uniform step .*; times of 0.01 s may hide it: --time-step"):
+        with pytest.raises(InputError, match=r"is off the uniform step .*; times of 0.01 s may hide it: --read time_step"):
             read_record(path)
         assert read_record(path, Reading(time_step=1 / rate)).time_step == 1 / rate
 

@@ -121,7 +121,7 @@ HEAD = "time_s,acceleration_g\n"
         ("", "empty"),
         ("# only a remark\n", "empty"),
         ("x,acceleration_g\n0,0\n1,0\n", "line 1: columns 'x, acceleration_g'; name them time_s and exactly one of"),
-        ("time_s,acceleration\n0,0\n1,0\n", "the unit of acceleration is not stated; give it: --unit g (in a scene file: unit"),
+        ("time_s,acceleration\n0,0\n1,0\n", "the unit of acceleration is not stated; give it: --read unit=g (in a scene file: unit"),
         ("# r\ntime_s,acceleration_g,acceleration_m_s2\n0,0,0\n1,0,0\n", "line 2: columns"),
         (HEAD + "0,0\n", "1 sample(s); at least 2"),
         (HEAD + "0,0\n0.1,nan\n", "line 3: 'nan' is not a finite number"),
@@ -144,7 +144,7 @@ def test_csv_faults(text, said, tmp_path):
 
 def test_files_that_cannot_be_read(tmp_path):
     assert "cannot be read: No such file" in fault_of(tmp_path / "nowhere.AT2")
-    assert "3 columns; give that of the accelerations: --column 2" in fault_of(written(tmp_path, "1 2 3", "motion.txt"))
+    assert "3 columns; give that of the accelerations: --read column=2" in fault_of(written(tmp_path, "1 2 3", "motion.txt"))
     binary = tmp_path / "motion.csv"
     binary.write_bytes(bytes(range(256)))
     assert "not a text file" in fault_of(binary)

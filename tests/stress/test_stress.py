@@ -72,7 +72,7 @@ def test_scenes_cover_what_a_user_could_write():
 
 @pytest.mark.parametrize("make", [random_scene, exact_scene])
 def test_a_third_of_the_blocks_are_asymmetric(make):
-    """To either side, with a moment of inertia of their own or without, some with the load in the middle, all within their friction."""
+    """To either side, with a moment of inertia of their own or without, some with a load in the middle."""
     scenes = [make(1, n) for n in range(1500)]
     off = np.array([scene.block.offset[0] for scene in scenes])
     assert 0.3 < np.mean(off != 0.0) < 0.37
@@ -93,7 +93,7 @@ LOADED = SLIDES_AND_HITS.replace(
 
 @pytest.mark.parametrize("label", ["ebm", "ebm-unilateral", "ebm no-slip", "ebm-bouc-wen"])
 def test_a_loaded_block_keeps_all_invariants(label):
-    """Slides, rocks on both corners and hits the wall; the base works on its mass's centre, its contacts are those of its box."""
+    """It slides, rocks and hits the wall. The base works on its mass's centre, its contacts are the box's."""
     scene = LOADED
     played = PLAYERS[label].check(scene, 1, 0)  # run 0 is audited
     assert played.broken == []
@@ -117,7 +117,7 @@ def test_similar_and_disturbed_blocks_bear_the_same_load():
 
 
 def test_a_load_is_dropped_only_if_it_does_not_matter():
-    """Shrinking tries a block without its load, or with it in the middle; a number that no block may have is not tried."""
+    """Shrinking tries a block without its load, or with it in the middle, and none that may not be."""
     big = LOADED.replace(block=LOADED.block.scaled(30.0))
     asymmetric, _ = shrink(big, lambda scene: scene.block.offset[0] > 0.0)
     assert asymmetric.block.offset[0] > 0.0 == asymmetric.block.offset[1]
@@ -131,7 +131,7 @@ def test_a_load_is_dropped_only_if_it_does_not_matter():
 
 
 def test_forces_of_an_asymmetric_block():
-    """On either corner at rest in the air, LEAN: the wall takes the moment of weight and base acceleration about that corner."""
+    """Tilted to either side: LEAN, whose wall takes the moment of weight and base, and ROCK."""
     block = LOADED.block
     on, off, still = np.array([True]), np.array([False]), np.zeros(1, dtype=np.int8)
     for sign, side in ((1.0, "left"), (-1.0, "right")):
@@ -254,6 +254,23 @@ def test_energy_balance_is_exact_to_rounding():
         fine = audited(scene)
         model = EventBasedModel(tolerance=1e-13)
         assert energy_error(model, fine, model.simulate(fine)) < 1e-11
+
+
+def test_the_spring_of_bouc_wens_friction_gives_energy_only_where_the_floors_push_changes():
+    """(9) keeps z, not energy: its force mu |P| z grows with P. What it gives is less than it can hold."""
+    shakes = SLIDES_AND_HITS.replace(walls=(), vertical=Sine(amplitude=6.0, period=0.15, cycles=27))
+    gains = {}
+    for name, scene in (("shaken", shakes), ("steady", shakes.replace(vertical=Rest()))):
+        for yields in (1e-2, 1e-3):
+            size = yields * scene.block.radius
+            model = EventBasedModel(friction="bouc-wen", yield_displacement=size, tolerance=1e-12)
+            history = model.simulate(audited(scene))
+            assert energy_error(model, audited(scene), history) < 1e-9
+            without = model.model_copy(update={"yield_displacement": 1e-30})  # as if it could hold nothing
+            gains[name, yields] = energy_error(without, audited(scene), history)
+    assert gains["steady", 1e-2] < 1e-9
+    assert gains["steady", 1e-3] < 1e-9
+    assert 1e-6 < gains["shaken", 1e-3] < 0.5 * gains["shaken", 1e-2]
 
 
 def test_energy_that_cannot_be_judged_is_not_said_to_hold(monkeypatch):

@@ -16,14 +16,13 @@ import threading
 import time
 import uuid
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import IO, Any, Self
 
 from rockcheck.scenes import ModelFailure
 from rockcheck.validation.execute.cluster import connected
 from rockcheck.validation.execute.pool import COMPILING, ONE_THREAD, Call, Ended, Failure, death, prepare
-from rockcheck.validation.execute.workers import BatchTask, Task, TaskResult, compiled_by, play
 
 #: What a process that has closed its streams may take to end, s.
 PATIENCE = 10.0
@@ -31,24 +30,6 @@ PATIENCE = 10.0
 STARTING = 120.0
 #: What a process says once it waits for its first task.
 READY = b"ready\n"
-
-
-class OnCluster:
-    """Plays a suite's tasks on the Dask cluster at an address; a `validation.suite.runner.Executor`."""
-
-    def __init__(self, address: str) -> None:
-        self.address = address
-
-    def __call__(
-        self, tasks: Sequence[Task | BatchTask], *, jobs: int, seconds: Sequence[float], memory_mb: float
-    ) -> Iterator[tuple[int, TaskResult]]:
-        """Yields (index, result) as they end; the cluster's size, not `jobs`, says how many run at once."""
-        if not tasks:
-            return
-        calls = (Call(play, (task,), seconds[n], compiled_by(task), n) for n, task in enumerate(tasks))
-        with Cluster(self.address, memory_mb) as cluster:
-            for ended in cluster.run(deque(calls)):
-                yield ended.call.key, TaskResult(failure=ended.fault) if ended.error else ended.result
 
 
 @dataclass(eq=False)

@@ -19,7 +19,7 @@ GRAVITIES = (9.81, 10.0, 1.0)
 FRICTIONS = (0.0, 0.1, 0.2, 0.25, 0.3, 0.5, 0.6, 0.75, 1.0, 1.2)
 RESTITUTIONS = (0.0, 0.0, 0.25, 0.5, 0.75, 1.0, 0.9999999)
 STEPS = (0.01, 0.02, 0.1, 0.25)
-#: Places of a load, of the half sides, and its moment of inertia, of the largest that there can be.
+#: Places of a load, of the half sides, and its moment of inertia, of the largest possible.
 PLACES, INERTIAS = (0.125, 0.25, 0.5, 0.75), (0.125, 0.25, 0.5, 1.0)
 #: Starts as powers of ten: noise, small, large. Share of long runs, and their length, s.
 SIZES = (-300, -20, -13, -12, -11, -10, -9, -8, -6, -3, -1, 0, 1, 3)

@@ -17,8 +17,8 @@ Kind = Literal["bilateral", "unilateral", "bouc-wen", "no-slip"]
 #: Ranges: slenderness (rad), half diagonal (m), friction, amplitude over uplift's, period over the block's, step of records (s).
 ALPHA, RADIUS, FRICTION = (0.02, 1.2), (1e-3, 1e3), (0.0, 1.333)
 AMPLITUDE, PERIOD, RECORD_STEP = (0.1, 100.0), (0.05, 50.0), (1e-4, 0.1)
-#: Share of blocks that bear a load: asymmetric, unless the load stands in the middle (one in ten). Its place, of the half sides, and
-#: its moment of inertia, of the largest that there can be with that place.
+#: Share of blocks that bear a load, and of loads that stand in the middle: a third of all is asymmetric.
+#: A load's place, of the half sides, and its moment of inertia, of the largest possible at that place.
 LOADED, MIDDLE = 0.37, 0.1
 OFF_CENTRE, INERTIA = (0.01, 0.8), (0.05, 1.0)
 #: Longest run, sqrt(R/g), and most samples of a record, so that a hundred thousand runs stay affordable.
@@ -80,9 +80,10 @@ def random_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
 
 
 def loaded(block: Block, r: np.random.Generator, place: Callable[[], float], inertia: Callable[[], float]) -> Block:
-    """The block, in a share `LOADED` of the draws with a load: off the middle, off its height in half of them, of an inertia of its own.
+    """The block, in a share `LOADED` of the draws with a load.
 
-    `place` draws how far the mass's centre is off, of the half sides, and `inertia` its moment, of the largest possible.
+    `place` draws how far the mass's centre is off, of the half sides; its height is off in half of the
+    draws. In half of them the moment of inertia is given, too: `inertia` draws it, of the largest possible.
     """
     if r.random() >= LOADED:
         return block
@@ -150,9 +151,8 @@ def _start(r: np.random.Generator, block: Block, unit: float, must_move: bool) -
     speed = radius / unit
     start: dict[str, Any] = {}
     if must_move or r.random() < 0.3:
-        start["initial_rotation"] = _edge(r, 0.05, (block.pivot("left").alpha, -block.pivot("right").alpha)) or alpha * float(
-            r.uniform(-1.0, 1.0)
-        )
+        balance = block.pivot("left").alpha, -block.pivot("right").alpha
+        start["initial_rotation"] = _edge(r, 0.05, balance) or alpha * float(r.uniform(-1.0, 1.0))
     if r.random() < 0.3:
         start["initial_angular_velocity"] = float(r.uniform(-1.5, 1.5)) * (alpha if r.random() < 0.5 else 1.0) / unit
     if r.random() < 0.2:

@@ -257,7 +257,8 @@ def _force_conditions(
     unilateral = model.pivot == "unilateral"
 
     rest = clear & (mode == "rest") & ~left & ~right
-    pivots = scene.block.pivot("left"), scene.block.pivot("right")  # a base that accelerates to the right tips to the left
+    pivots = scene.block.pivot("left"), scene.block.pivot("right")
+    # A base that accelerates to the right tips the block to the left.
     tips = np.where(u > 0.0, *(pivot.arm / pivot.height for pivot in pivots))
     limit = tips if model.friction == "no-slip" else np.minimum(tips, max(mu_s, 1e-9))
     excess = max(excess, float(np.max(((np.abs(u) - limit * np.abs(g)) / scale)[rest], initial=0.0)))

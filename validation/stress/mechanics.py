@@ -1,11 +1,12 @@
 """Newton-Euler for a block with given contacts, solved by other means than in `ebm`: its histories are checked against it.
 
-Natural units: lengths in R, accelerations in g, unit mass; xi and y are those of the mass's centre. As in `ebm.core.motion`, a
-tilted block is seen in the frame of its pivot, which is then the lower-left corner: with S = sign theta and phi = |theta|, that corner
-is s to the left of the mass's centre and c below it (`Arms`). The top corner is s' to the left and c' above, the lifted bottom
-corner s' to the right and c' below. Four contact forces can act: P and Q of the floor on the pivot, N of the wall that the top corner touches,
-M of the wall that the lifted bottom corner touches. The gap of each contact, its row J (xi, y, phi) and the part of its acceleration
-that the velocities alone give:
+Natural units: lengths in R, accelerations in g, unit mass; xi and y are those of the mass's centre. As
+in `ebm.core.motion`, a tilted block is seen in the frame of its pivot, which is then the lower-left
+corner: with S = sign theta and phi = |theta|, that corner is s to the left of the mass's centre and c
+below it (`Arms`). The top corner is s' to the left and c' above, the lifted bottom corner s' to the right
+and c' below. Four contact forces can act: P and Q of the floor on the pivot, N of the wall that the top
+corner touches, M of the wall that the lifted bottom corner touches. The gap of each contact, its row
+J (xi, y, phi) and the part of its acceleration that the velocities alone give:
 
     P  y - c             (0, 1, -s)      c w^2
     Q  xi - s            (1, 0, c)       s w^2
@@ -38,7 +39,7 @@ class Forces:
 
 @dataclass(frozen=True)
 class Arms:
-    """Where three corners are from the mass's centre, one value a row, and 1/I: any block, whichever of its corners is the pivot."""
+    """Where three corners are from the mass's centre, one value a row, and 1/I."""
 
     pivot: tuple[Floats, Floats]
     tip: tuple[Floats, Floats]

@@ -50,12 +50,15 @@ def simplifications(scene: Scene) -> Iterator[Scene]:
     """Valid scenes that are simpler in one respect, the greatest simplification first."""
     for change in _changes(scene):
         try:
-            parts = {key: getattr(scene, key).replace(**value) if isinstance(value, dict) else value for key, value in change.items()}
-            simpler = scene.replace(**parts)
+            simpler = scene.replace(**{key: _changed(getattr(scene, key), value) for key, value in change.items()})
         except InputError:
             continue
         if simpler != scene:
             yield simpler
+
+
+def _changed(part: Any, change: Any) -> Any:
+    return part.replace(**change) if isinstance(change, dict) else change
 
 
 def _changes(scene: Scene) -> Iterator[dict[str, Any]]:

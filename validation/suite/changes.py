@@ -1,4 +1,4 @@
-"""What changed: between two finished runs of a suite (`rockcheck diff`), and over many (`rockcheck validate --history FILE`).
+"""What changed: between two finished runs of a suite (`rockcheck compare`), and over many (`rockcheck validate --history FILE`).
 
 A history of runs is a file of JSON lines, one a run: `Moment`.
 """

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import time
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from itertools import groupby
 from pathlib import Path
@@ -26,8 +24,11 @@ from rockcheck.validation.discrepancy.impact_laws import LawFollowed
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.execute import provenance, workers
-from rockcheck.validation.execute.models import is_own, not_installed
+from rockcheck.validation.execute.models import family, is_own, not_installed
+from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store, name_of
+from rockcheck.validation.finding import Finding
+from rockcheck.validation.study import FAULTS, Study, Task, run
 from rockcheck.validation.suite.confidence import explanations, inputs_of, key_of, numerical_of
 from rockcheck.validation.suite.ensembles import Ensemble
 from rockcheck.validation.suite.impact_laws import by_any, landing_of, under_other_laws
@@ -43,21 +44,18 @@ from rockcheck.validation.suite.tolerances import (
     judge,
     judged_beside,
 )
-from rockcheck.validation.uncertainty.inputs import Inputs
 from rockcheck.validation.uncertainty.numerical import Numerical
-
-FAULTS = "faults"
-#: Plays tasks somewhere: yields (index, result) as they end.
-Executor = Callable[..., Iterator[tuple[int, workers.TaskResult]]]
+from rockcheck.validation.uncertainty.population import Inputs
 
 
-@dataclass(frozen=True, eq=False)
-class PlannedCell:
-    """A cell of the suite before it is played: scene, model, and the key of all that it depends on."""
+@dataclass(frozen=True)
+class PlannedCell(Task):
+    """A cell of the suite: scene, model, and the key of all that it depends on."""
 
-    scene: Scene
-    variant: ModelVariant
+    scene: Scene = field(compare=False)
+    variant: ModelVariant = field(compare=False)
     key: str
+    uncertainty: bool = field(default=False, compare=False)
 
     @property
     def place(self) -> str:
@@ -67,17 +65,27 @@ class PlannedCell:
     @property
     def name(self) -> str:
         """Name of its files."""
-        return name_of(self.scene.name, self.variant.label, self.key)
+        return name_of(self.place, self.variant.label, self.key)
+
+    @property
+    def label(self) -> str:
+        """Scene and model."""
+        return f"{self.place}, {self.variant.label}"
+
+    @property
+    def work(self) -> workers.Task | workers.BatchTask:
+        """What a worker needs to know."""
+        return workers.Task(scene=self.scene, uncertainty=self.uncertainty, **_model(self.variant))
 
 
-@dataclass(frozen=True, eq=False)
-class PlannedBatch:
-    """Some scenes of an ensemble, for one model, before they are played."""
+@dataclass(frozen=True)
+class PlannedBatch(Task):
+    """Some scenes of an ensemble, for one model."""
 
-    ensemble: Ensemble
-    base: Scene
-    variant: ModelVariant
-    numbers: range
+    ensemble: Ensemble = field(compare=False)
+    base: Scene = field(compare=False)
+    variant: ModelVariant = field(compare=False)
+    numbers: range = field(compare=False)
     key: str
 
     @property
@@ -88,7 +96,27 @@ class PlannedBatch:
     @property
     def name(self) -> str:
         """Name of its file."""
-        return name_of(self.ensemble.name, self.variant.label, f"{self.numbers.start}", self.key)
+        return name_of(self.place, self.variant.label, f"{self.numbers.start}", self.key)
+
+    @property
+    def label(self) -> str:
+        """Ensemble, model and scenes."""
+        return f"{self.place}, {self.variant.label}, from {self.numbers.start}"
+
+    @property
+    def work(self) -> workers.Task | workers.BatchTask:
+        """What a worker needs to know."""
+        scenes = tuple(self.ensemble.drawn(self.base, n) for n in self.numbers)
+        return workers.BatchTask(scenes=scenes, **_model(self.variant))
+
+
+def _model(variant: ModelVariant) -> dict[str, Any]:
+    return {
+        "label": variant.label,
+        "family": variant.family_name,
+        "settings": dict(variant.settings),
+        "search_path": variant.search_path,
+    }
 
 
 Planned = PlannedCell | PlannedBatch
@@ -162,14 +190,6 @@ class CellComparisons(Stored):
     of: dict[str, ComparisonRecord]
 
 
-def _is(kind: type[Stored], found: Mapping[str, Any] | None) -> bool:
-    """Whether what was read back has the fields that it must have."""
-    try:
-        return found is not None and bool(kind.model_validate(found))
-    except ValueError:
-        return False
-
-
 def run_suite(
     suite: Suite,
     folder: Path,
@@ -177,137 +197,178 @@ def run_suite(
     jobs: int | None = None,
     force: bool = False,
     strict: Strict = False,
-    play: Executor = workers.local,
+    scheduler: str | None = None,
     on_progress: OnProgress = unheard,
 ) -> Run:
-    """Play, compare and judge every cell of a suite; results are kept in `folder` and read back while up to date.
+    """Play, compare and judge every cell of a suite; see `validation.study.run`.
 
-    A cell that fails is a failed cell of the run, never an exception. Raises `InputError` where `folder` cannot be used.
+    A cell that fails is a failed cell of the run, never an exception. Raises `InputError` where `folder` cannot be used, and
+    `KeyboardInterrupt` once what was played is kept.
     """
-    began = time.perf_counter()
-    try:
-        store = Store(folder)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be used as the output folder: {error.strerror}") from None
-    planned_cells = [
-        PlannedCell(scene, variant, _key(scene, replace(variant, settings={**variant.settings, **key_of(_asks(suite, scene))})))
-        for scene, variant in suite.cells()
-    ]
-    batches = [batch for found in suite.ensemble_cells() for batch in _batches(*found)]
-    items: list[Planned] = [*planned_cells, *batches]
-    records: dict[Planned, dict[str, Any]] = {}
-    failures: dict[Planned, str] = {}
-    faults: dict[tuple[str, str], dict[str, Any]] = {}
-    if not force:
-        for item in items:
-            found = store.get(item.name) if isinstance(item, PlannedCell) else store.get_record(COMPARISONS, item.name)
-            if _is(CellRecord if isinstance(item, PlannedCell) else BatchRecord, found):
-                records[item] = found or {}
-    read_back = set(records)
-    failures |= {item: missing for item in items if (missing := not_installed(item.variant.family_name))}
-    waiting = [item for item in items if item not in records and item not in failures]
-    on_progress(len(records), len(items), f"{len(records)} up to date")
-    limits = [suite.suite_of(item.place).limits for item in waiting]
-    by_place = {(planned.scene.name, planned.variant.label): planned for planned in planned_cells}
-    compared: dict[PlannedCell, Cell] = {}
-    by_scene = {scene: list(of) for scene, of in groupby(planned_cells, key=lambda planned: planned.scene.name)}
-    for index, result in play(
-        [_task(item, suite) for item in waiting],
-        jobs=jobs or os.cpu_count() or 1,
-        seconds=[limit.seconds for limit in limits],
-        memory_mb=max((limit.memory_mb for limit in limits), default=0.0),
-    ):
-        item = waiting[index]
-        if result.traceback:
-            faults[item.place, item.variant.label] = _fault(item, result.traceback, folder)
-        if result.failure:
-            failures[item] = result.failure
-        elif result.traceback:
-            records[item] = result.record  # some scenes of a batch: not to be read back
+    study = SuiteStudy(suite, folder)
+    found = run(study, folder, jobs=jobs, force=force, scheduler=scheduler, on_progress=on_progress)
+    if not found.complete:
+        raise KeyboardInterrupt
+    finished: Run = found.data["run"]
+    seconds = found.made.wall_seconds if found.made else 0.0
+    return finished.model_copy(update={"strict": strict, "wall_seconds": seconds})
+
+
+class SuiteStudy(Study):
+    """A suite: tasks are its cells and its ensembles' batches. Results are kept and read back in `folder`."""
+
+    name = "suite"
+    kinds = (HISTORIES, COMPARISONS)
+
+    def __init__(self, suite: Suite, folder: Path) -> None:
+        self.suite = suite
+        try:
+            self.store = Store(folder)
+        except OSError as error:
+            raise InputError(f"{folder}: cannot be used as the output folder: {error.strerror}") from None
+        limits = [suite.suite_of(name).limits for name in (*suite.scenes, *suite.ensembles)]
+        self.memory_mb = max((limit.memory_mb for limit in limits), default=None)
+        self.cells = [self._planned(scene, variant) for scene, variant in suite.cells()]
+        self.batches = [batch for found in suite.ensemble_cells() for batch in self._batches(*found)]
+        self.read_back: set[Planned] = set()
+        self.records: dict[Planned, dict[str, Any]] = {}
+        self.failures: dict[Planned, str] = {}
+        self.traces: set[Planned] = set()
+        self.compared: dict[PlannedCell, Cell] = {}
+        self.by_place = {(cell.place, cell.variant.label): cell for cell in self.cells}
+        self.by_scene = {scene: list(of) for scene, of in groupby(self.cells, key=lambda cell: cell.place)}
+        self.items: list[Planned] = [*self.cells, *self.batches]
+        for item in self.items:
+            if missing := not_installed(item.variant.family_name):
+                self.failures[item] = missing
+
+    def _planned(self, scene: Scene, variant: ModelVariant) -> PlannedCell:
+        own = self.suite.suite_of(scene.name)
+        keyed = replace(variant, settings={**variant.settings, **key_of(own.uncertainty)})
+        return PlannedCell(scene, variant, _key(scene, keyed), own.uncertainty, **self._how(scene.name, variant))
+
+    def _how(self, place: str, variant: ModelVariant) -> dict[str, Any]:
+        kind = family(variant.family_name)
+        return {"seconds": self.suite.suite_of(place).limits.seconds, "compiles": kind.module if kind.compiled else ""}
+
+    def _batches(self, ensemble: Ensemble, base: Scene, variant: ModelVariant) -> Iterator[PlannedBatch]:
+        """An ensemble in batches. A batch's key covers how its scenes are drawn, so it can be looked up without drawing them."""
+        drawing = {
+            "ensemble": ensemble.model_dump(mode="json", exclude={"count", "batch", "description"}),
+            "code": provenance.code_digest("rockcheck.validation.suite.ensembles"),
+        }
+        for start in range(0, ensemble.count, ensemble.batch):
+            numbers = range(start, min(start + ensemble.batch, ensemble.count))
+            settings = {**variant.settings, "drawn": {**drawing, "numbers": [numbers.start, numbers.stop]}}
+            key = _key(base, replace(variant, settings=settings))
+            yield PlannedBatch(ensemble, base, variant, numbers, key, **self._how(ensemble.name, variant))
+
+    def tasks(self, done: Mapping[Any, Any]) -> Sequence[Planned]:
+        """All cells and batches of models that are installed."""
+        return in_order([item for item in self.items if item in done or item not in self.failures])
+
+    @staticmethod
+    def play(task: Planned) -> workers.Played:
+        """The history, or the peaks of a batch."""
+        return workers.play(task.work)
+
+    def file(self, task: Any) -> str:
+        """As the files of the cell are named."""
+        return str(task.name)
+
+    def find(self, store: Store, task: Any) -> workers.Played | None:
+        """A cell's record where its history is whole, a batch's."""
+        cell = isinstance(task, PlannedCell)
+        found = self.store.get(task.name) if cell else self.store.get_record(COMPARISONS, task.name)
+        with suppress(ValueError):  # what is kept is not trusted to have the fields that it must have
+            if found is not None and (CellRecord if cell else BatchRecord).model_validate(found):
+                self.read_back.add(task)
+                self.records[task] = found
+                return workers.Played(found)
+        return None
+
+    def keep(self, store: Store, task: Any, record: workers.Played) -> None:
+        """Keep a history or a batch, and compare its scene where that is the last of it: while others play."""
+        self.records[task] = record.record
+        if record.traceback:  # some scenes of a batch: not to be read back
+            self.traces.add(task)
+            write_whole(made(self.store.folder, FAULTS) / f"{task.name}.txt", record.traceback)
+        elif isinstance(task, PlannedCell):
+            self.store.put(task.name, record.files, record.record, record.history)
+            self._compare(task.place)
         else:
-            records[item] = result.record
-            if isinstance(item, PlannedCell):
-                store.put(item.name, result.files, result.record, result.history)
-            else:
-                store.put_record(COMPARISONS, item.name, result.record)
-        on_progress(len(records) + len(failures), len(items), f"{item.place}, {item.variant.label}")
-        of_scene = by_scene.get(item.place, [])
-        if all(planned in records or planned in failures for planned in of_scene):  # compared while others play
-            for planned in of_scene:
-                compared[planned] = _cell(suite, planned, by_place, records, failures, store, planned in read_back)
-    inputs = {name: inputs_of(store, given) for name, given in suite.uncertain.items()}
-    cells = [
-        compared.get(planned) or _cell(suite, planned, by_place, records, failures, store, planned in read_back)
-        for planned in planned_cells
-    ]
-    ensembles, ensemble_cells = _ensembles(suite, batches, records, failures, read_back)
-    beside = {name: list(of) for name, of in groupby(cells, key=lambda cell: cell.scene)}
-    cells = [_judged_beside(suite, cell, beside[cell.scene]) for cell in cells]
-    cells = [_explained(suite, cell, beside[cell.scene], by_place, records, inputs.get(cell.scene)) for cell in cells] + ensemble_cells
-    cells = [cell.model_copy(update=faults.get((cell.scene, cell.model), {})) for cell in cells]
-    store.prune()
-    return Run(
-        suite=suite.name,
-        description=suite.description,
-        created=datetime.now(UTC).isoformat(timespec="seconds"),
-        reference=suite.reference,
-        model_form=suite.model_form,
-        scenes={name: scene.model_dump(mode="json") for name, scene in suite.scenes.items()},
-        models=tuple(suite.models),
-        cells=tuple(cells),
-        ensembles=tuple(ensembles),
-        inputs=inputs,
-        printed=tuple(name for name in suite.scenes if suite.suite_of(name).print_figures),
-        faults=_without_cell(suite, {(cell.scene, cell.model) for cell in cells}),
-        measures=tuple(MeasureRecord(name=m.name, label=m.label, unit=m.unit, formula=m.formula) for m in MEASURES.values()),
-        versions=provenance.versions(),
-        hardware=provenance.hardware(),
-        wall_seconds=time.perf_counter() - began,
-        strict=strict,
-        judged=suite.judged,
-        tolerances_file=str(suite.tolerances_path),
-    )
+            self.store.put_record(COMPARISONS, task.name, record.record)
+
+    def _compare(self, scene: str) -> None:
+        """The cells of a scene, once all are there."""
+        cells = self.by_scene[scene]
+        if all(cell in self.records or cell in self.failures for cell in cells):
+            for cell in cells:
+                self.compared.setdefault(cell, self._cell(cell))
+
+    def gather(self, done: Mapping[Any, Any]) -> Finding:
+        """The run, as the data of a finding."""
+        suite = self.suite
+        for task, result in done.items():
+            if isinstance(result, Failure):
+                self.failures[task] = result.reason
+                if result.traceback:
+                    self.traces.add(task)
+        if any(item not in done and item not in self.failures for item in self.items):
+            return Finding(self.name, suite.name, "interrupted", complete=False)
+        for scene in self.by_scene:
+            self._compare(scene)
+        inputs = {name: inputs_of(self.store, given) for name, given in suite.uncertain.items()}
+        cells = [self.compared[planned] for planned in self.cells]
+        beside = {name: list(of) for name, of in groupby(cells, key=lambda cell: cell.scene)}
+        cells = [_judged_beside(suite, cell, beside[cell.scene]) for cell in cells]
+        cells = [_explained(suite, cell, beside[cell.scene], self.by_place, self.records, inputs.get(cell.scene)) for cell in cells]
+        ensembles, ensemble_cells = _ensembles(suite, self.batches, self.records, self.failures, self.read_back)
+        faults = {(task.place, task.variant.label): _fault(task) for task in self.traces}
+        cells = [cell.model_copy(update=faults.get((cell.scene, cell.model), {})) for cell in (*cells, *ensemble_cells)]
+        finished = Run(
+            suite=suite.name,
+            description=suite.description,
+            created=datetime.now(UTC).isoformat(timespec="seconds"),
+            reference=suite.reference,
+            model_form=suite.model_form,
+            scenes={name: scene.model_dump(mode="json") for name, scene in suite.scenes.items()},
+            models=tuple(suite.models),
+            cells=tuple(cells),
+            ensembles=tuple(ensembles),
+            inputs=inputs,
+            printed=tuple(name for name in suite.scenes if suite.suite_of(name).print_figures),
+            faults=_without_cell(suite, {(cell.scene, cell.model) for cell in cells}),
+            measures=tuple(MeasureRecord(name=m.name, label=m.label, unit=m.unit, formula=m.formula) for m in MEASURES.values()),
+            versions=provenance.versions(),
+            hardware=provenance.hardware(),
+            judged=suite.judged,
+            tolerances_file=str(suite.tolerances_path),
+        )
+        return Finding(self.name, suite.name, finished.words, data={"run": finished}, exit_code=finished.exit_code)
+
+    def _cell(self, planned: PlannedCell) -> Cell:
+        return _cell(self.suite, planned, self.by_place, self.records, self.failures, self.store, planned in self.read_back)
 
 
-def _fault(item: Planned, traceback: str, folder: Path) -> dict[str, Any]:
-    """Keeps the traceback of an exception that no model may raise; returns what the cell says of it. In a user's own model it is that
-    model's fault, not rockcheck's."""
-    path = write_whole(made(folder, FAULTS) / f"{item.name}.txt", traceback)
-    return {"traceback": f"{FAULTS}/{path.name}", "unexpected": not is_own(item.variant.family_name)}
+def in_order(items: Sequence[Planned]) -> list[Planned]:
+    """The order in which cells begin.
+
+    One of each package that compiles goes first, since the others of it wait for that one; then what is not compiled, which takes
+    longest; the quick rest fills the processes up to the end.
+    """
+    first = {item.compiles: n for n, item in reversed(list(enumerate(items)))}
+    turn = [1 if not item.compiles else 0 if first[item.compiles] == n else 2 for n, item in enumerate(items)]
+    return [items[n] for n in sorted(range(len(items)), key=turn.__getitem__)]
+
+
+def _fault(item: Any) -> dict[str, Any]:
+    """What a cell says of an exception that no model may raise. In a user's own model it is that model's fault, not rockcheck's."""
+    return {"traceback": f"{FAULTS}/{item.name}.txt", "unexpected": not is_own(item.variant.family_name)}
 
 
 def _key(scene: Scene, variant: ModelVariant) -> str:
     return provenance.cell_key(scene, variant.family_name, variant.settings, variant.search_path)
-
-
-def _batches(ensemble: Ensemble, base: Scene, variant: ModelVariant) -> Iterator[PlannedBatch]:
-    """An ensemble in batches. A batch's key covers how its scenes are drawn, so it can be looked up without drawing them."""
-    drawing = {
-        "ensemble": ensemble.model_dump(mode="json", exclude={"count", "batch", "description"}),
-        "code": provenance.code_digest("rockcheck.validation.suite.ensembles"),
-    }
-    for start in range(0, ensemble.count, ensemble.batch):
-        numbers = range(start, min(start + ensemble.batch, ensemble.count))
-        settings = {**variant.settings, "drawn": {**drawing, "numbers": [numbers.start, numbers.stop]}}
-        yield PlannedBatch(ensemble, base, variant, numbers, _key(base, replace(variant, settings=settings)))
-
-
-def _asks(suite: Suite, scene: Scene) -> bool:
-    """Whether the suite that a scene comes from asks for numerical uncertainties."""
-    return suite.suite_of(scene.name).uncertainty
-
-
-def _task(item: Planned, suite: Suite) -> workers.Task | workers.BatchTask:
-    variant = item.variant
-    model: dict[str, Any] = {
-        "label": variant.label,
-        "family": variant.family_name,
-        "settings": dict(variant.settings),
-        "search_path": variant.search_path,
-    }
-    if isinstance(item, PlannedCell):
-        return workers.Task(scene=item.scene, uncertainty=_asks(suite, item.scene), **model)
-    return workers.BatchTask(scenes=tuple(item.ensemble.drawn(item.base, n) for n in item.numbers), **model)
 
 
 def _ensembles(

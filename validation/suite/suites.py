@@ -153,7 +153,7 @@ class Suite:
     ensembles: Mapping[str, tuple[Ensemble, Scene]] = field(default_factory=dict)
     #: The suites that this one joins.
     included: tuple[Suite, ...] = ()
-    #: Whether the numerical error of each cell is asked for (two coarser runs a cell), and scenes with uncertain numbers, by name.
+    #: Whether the numerical error of each cell is asked for (three coarser runs a cell), and scenes with uncertain numbers, by name.
     uncertainty: bool = False
     uncertain: Mapping[str, UncertainScene] = field(default_factory=dict)
     #: Vertical components of its records, which are not played, and whether anything is judged.

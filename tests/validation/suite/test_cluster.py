@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from rockcheck.scenes import InputError
-from rockcheck.validation.execute.remote import OnCluster
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 
@@ -42,7 +41,7 @@ floor = {{ friction = 0.5 }}
         encoding="utf-8",
     )
     suite = load_suite(path, allow_code=OWN)
-    run = run_suite(suite, tmp_path / "out", play=OnCluster("local:2"))
+    run = run_suite(suite, tmp_path / "out", scheduler="local:2")
     reasons = {cell.model: cell.reason for cell in run.cells}
     assert reasons == {
         "Still": "",
@@ -59,4 +58,4 @@ floor = {{ friction = 0.5 }}
 def test_an_unusable_address_is_bad_input(tmp_path, address):
     suite = load_suite("smoke")
     with pytest.raises(InputError, match="--scheduler"):
-        run_suite(suite, tmp_path / "out", play=OnCluster(address))
+        run_suite(suite, tmp_path / "out", scheduler=address)

@@ -12,7 +12,6 @@ import pytest
 
 from rockcheck.scenes import InputError
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
-from rockcheck.validation.execute import workers
 from rockcheck.validation.suite.acceptance import accept
 from rockcheck.validation.suite.ensembles import Distribution
 from rockcheck.validation.suite.runner import run_suite
@@ -58,10 +57,6 @@ def suite_file(tmp_path, monkeypatch):
     path = tmp_path / "mine.toml"
     path.write_text(SUITE, encoding="utf-8")
     return path
-
-
-def in_this_process(tasks, **limits):
-    return enumerate(map(workers.play, tasks))
 
 
 def test_scenes_are_drawn_alike_whatever_the_count(suite_file):
@@ -120,7 +115,7 @@ def test_statistics_of_known_samples():
 
 
 def test_an_ensemble_is_judged_and_read_back(suite_file, tmp_path):
-    run = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", play=in_this_process)
+    run = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", jobs=0)
     near, broken = run.cell("crowd", "near"), run.cell("crowd", "broken")
     assert [check.verdict for check in near.checks] == ["pass", "pass"]
     assert near.outcome == "0 of 10 overturned"
@@ -128,7 +123,7 @@ def test_an_ensemble_is_judged_and_read_back(suite_file, tmp_path):
     assert broken.status == "failed"
     assert broken.reason == "10 of 10 scenes failed; the first: more than 10 events"
     assert run.exit_code == 3
-    again = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", play=in_this_process)
+    again = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", jobs=0)
     assert [cell.read_back for cell in again.cells] == [True, True, True]
     assert again.cells == tuple(cell.model_copy(update={"read_back": True}) for cell in run.cells)
     run.save(tmp_path / "out")
@@ -137,14 +132,14 @@ def test_an_ensemble_is_judged_and_read_back(suite_file, tmp_path):
 
 def test_accept_writes_what_an_ensemble_is_judged_by(suite_file, tmp_path):
     suite_file.write_text(SUITE.partition("[tolerances")[0], encoding="utf-8")
-    first = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", play=in_this_process)
+    first = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", jobs=0)
     assert first.cell("crowd", "near").verdict == "fail"
     changes, refused = accept(load_suite(suite_file, allow_code=OWN), first, None)
     assert [change.partition(":")[0] for change in changes] == [
         f"[crowd.near.still] {measure}" for measure in ("ks_distance", "overturning_accuracy")
     ]
     assert not refused
-    again = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", play=in_this_process)
+    again = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", jobs=0)
     assert [check.verdict for check in again.cell("crowd", "near").checks] == ["pass", "pass"]
 
 

@@ -10,7 +10,6 @@ import pytest
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Scene
 from rockcheck.validation.discrepancy.compare import compare
-from rockcheck.validation.execute import workers
 from rockcheck.validation.execute.store import COMPARISONS, Store
 from rockcheck.validation.suite.impact_laws import by_any, landing_of, under_other_laws
 from rockcheck.validation.suite.results import Cell, Run
@@ -80,7 +79,7 @@ def suite_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def run(suite_file: Path) -> Run:
-    return run_suite(load_suite(suite_file), suite_file.parent / "out", jobs=1, play=lambda tasks, **_: enumerate(map(workers.play, tasks)))
+    return run_suite(load_suite(suite_file), suite_file.parent / "out", jobs=0)
 
 
 def cell_of(run: Run, scene: str, model: str) -> Cell:

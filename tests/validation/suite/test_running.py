@@ -15,12 +15,12 @@ from xml.etree import ElementTree
 
 import pytest
 
-from rockcheck.scenes import load_scene
-from rockcheck.validation.execute import provenance, workers
+from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.execute.pool import Call, Pool
+from rockcheck.validation.study import Task
 from rockcheck.validation.suite.results import Run
-from rockcheck.validation.suite.runner import Executor, run_suite
+from rockcheck.validation.suite.runner import in_order, run_suite
 from rockcheck.validation.suite.suites import load_suite
 from rockcheck.validation.suite.tables import verdict_lines
 from rockcheck.validation.suite.verdicts import junit
@@ -60,15 +60,10 @@ def run(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", list(sys.path))
     monkeypatch.delitem(sys.modules, "faulty", raising=False)
 
-    def run(path: Path, play: Executor = in_this_process, **options: object) -> Run:
-        return run_suite(load_suite(path, allow_code=OWN), tmp_path / "out", jobs=2, play=play, **options)
+    def run(path: Path, jobs: int = 0, **options: object) -> Run:
+        return run_suite(load_suite(path, allow_code=OWN), tmp_path / "out", jobs=jobs, **options)
 
     return run
-
-
-def in_this_process(tasks, **limits):
-    """Cells that cannot go wrong need no worker."""
-    return enumerate(map(workers.play, tasks))
 
 
 def test_figures_are_the_same_from_memory_and_from_files(tmp_path):
@@ -85,7 +80,7 @@ def test_figures_are_the_same_from_memory_and_from_files(tmp_path):
 def test_every_kind_of_failure_fails_its_cell_alone(tmp_path, run):
     faults = {name: f'model = "faulty:{name}"' for name in ("Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")}
     path = write_suite(tmp_path, {**faults, "again": 'model = "faulty:Still"'}, FINE.format(model="again"), seconds=15.0)
-    done = run(path, play=workers.local)
+    done = run(path, jobs=2)
     reasons = {cell.model: cell.reason for cell in done.cells}
     assert reasons["Segfault"] == "crashed: SIGSEGV"
     assert reasons["Hang"] == "did not end within 15 s"
@@ -253,7 +248,7 @@ def test_only_calls_that_compile_wait_for_each_other(tmp_path):
 
 
 def test_what_takes_longest_begins_before_the_quick_rest():
-    scene = load_scene("fig4a")
-    families = ("mujoco", "ebm", "ebm-unilateral", "cm", "pybullet", "cm")
-    tasks = [workers.Task(label=name, family=name, settings={}, scene=scene) for name in families]
-    assert [families[n] for n in workers.in_order(tasks)] == ["ebm", "cm", "mujoco", "pybullet", "ebm-unilateral", "cm"]
+    compiles = ("", "ebm", "ebm", "cm", "", "cm")
+    tasks = [Task(compiles=one) for one in compiles]
+    begun = [next(n for n, task in enumerate(tasks) if task is one) for one in in_order(tasks)]
+    assert begun == [1, 3, 0, 4, 2, 5]

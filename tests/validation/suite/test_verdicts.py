@@ -78,7 +78,8 @@ def test_a_cell_that_has_not_converged_is_skipped_with_its_reason():
     """A case of its own, beside the run's: green where the run has converged, none where nothing was asked for."""
 
     def found(*quantities: Quantity) -> Cell:
-        return cell("a", "m", check(0.25)).model_copy(update={"numerical": Numerical(method="steps h, 2h and 4h", quantities=quantities)})
+        numerical = Numerical(method="steps h, 2h, 3h and 4h", quantities=quantities)
+        return cell("a", "m", check(0.25)).model_copy(update={"numerical": numerical})
 
     sure = Quantity(name="theta_peak", unit="alpha", value=0.5, verdict="converged")
     unsure = Quantity(name="outcome", unit="", value="right", verdict="not converged", reason="the outcome changes: right, right, stands")

@@ -20,7 +20,8 @@ from rockcheck.validation.execute.models import build, not_installed
 from rockcheck.validation.finding import Block, Column, Plot, Table, Text, text
 from rockcheck.validation.paper.panels import Panel
 from rockcheck.validation.studies.spectrum.grids import Book, Request
-from rockcheck.validation.studies.spectrum.tiles import SETTLE, letters_of
+from rockcheck.validation.studies.spectrum.tiles import letters_of
+from rockcheck.validation.uncertainty.population import SETTLE
 
 CANDIDATES = ("ebm-unilateral", "cm", "mujoco", "pybullet", "pymunk", "dart", "drake")
 #: The share of the nodes that a model plays, where it is not all. These engines draw no map:

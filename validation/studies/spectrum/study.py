@@ -25,6 +25,7 @@ from rockcheck.validation.paper.panels import GAPS, KEPT, Panel, paper_panels, t
 from rockcheck.validation.studies.spectrum import agreement, tiles
 from rockcheck.validation.studies.spectrum.grids import Book, Request, differing
 from rockcheck.validation.study import Study
+from rockcheck.validation.uncertainty.population import compiled
 
 #: Nodes an axis whose histories are kept, both ends of the axis among them.
 KEPT_AN_AXIS = 16
@@ -130,7 +131,7 @@ class Spectra(Study):
         request, found = self.request, _Found()
         how = request.model, request.settings
         i, j = (axis.ravel() for axis in np.meshgrid(*[_spread(request.size)] * 2, indexing="ij"))
-        fast = tiles.compiled(build(*how))
+        fast = compiled(build(*how))
         for panel in self.panels:
             one = book.spectrum(panel, request)
             laws = [book.spectrum(panel, request, law) for law in request.other_laws(panel.scene)]

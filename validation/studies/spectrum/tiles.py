@@ -5,29 +5,26 @@ from __future__ import annotations
 import base64
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeGuard
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, Floats, node_scene, play_motions, play_nodes
 from rockcheck.ebm.spectrum import Nodes as Outcomes
-from rockcheck.scenes import ModelFailure, Scene, kinematics
+from rockcheck.scenes import Scene
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import Model, build
 from rockcheck.validation.execute.pool import cores
 from rockcheck.validation.study import Task
+from rockcheck.validation.uncertainty import population
+from rockcheck.validation.uncertainty.population import compiled
 
 What = Literal["outcomes", "motions", "one impact"]
 #: Nodes of a tile of the compiled event-based models, and of a model that is simulated one by one.
 TILE, SLOW_TILE = 10_000, 20
 #: What a node takes as a rule, s: compiled, simulated, and its motion.
 A_NODE, A_SLOW_NODE, A_MOTION = 4e-5, 0.1, 2e-4
-#: Time (s) that a run goes on after the base's motion while its outcome is open; and the share of
-#: the energy of tipping over below which the outcome is decided: a hundredth is left to the model's
-#: own error.
-SETTLE, ENOUGH = 6.0, 0.99
 #: Outcomes in text, by their code from `LEFT` on; and where the run failed.
 LETTERS, UNDECIDED = "LSR", "U"
 #: A history is played in so many equal parts, and thinned until straight lines between the rows
@@ -83,7 +80,7 @@ def nodes_of(
     """The tasks that play nodes (1-D arrays of one length) of a spectrum, in order."""
     fast = compiled(build(model, settings))
     neutral = scene.replace(name="tile", description="", duration=1.0, output_step=0.02)
-    how = provenance.code_digest(__name__) if fast else f"{SETTLE} {ENOUGH}"
+    how = provenance.code_digest(__name__) if fast else f"{population.SETTLE} {population.ENOUGH}"
     base = provenance.cell_key(neutral, model, settings) + what + how
     size = len(amplitudes) if what != "outcomes" else TILE if fast else SLOW_TILE
     one = A_MOTION if what == "motions" else A_NODE if fast else A_SLOW_NODE
@@ -109,10 +106,12 @@ def play(task: Nodes) -> Played:
     nodes = list(zip(task.amplitudes.tolist(), task.frequencies.tolist(), strict=True))
     if task.what == "one impact":
         return Played("".join("NY"[_impacts(player, task.scene, *node) == 1] for node in nodes))
-    if not compiled(player):
-        return Played("".join(_letter(player, task.scene, *node) for node in nodes))
-    where = task.scene, task.amplitudes, task.frequencies
-    sides, failed = play_nodes(*where, model=player, jobs=cores())
+    if compiled(player):
+        where = task.scene, task.amplitudes, task.frequencies
+        sides, failed = play_nodes(*where, model=player, jobs=cores())
+    else:
+        runs = population.play([node_scene(task.scene, *node) for node in nodes], player)
+        sides, failed = np.array(runs.side), np.array(runs.failed)
     letters = np.where(failed, UNDECIDED, np.array(list(LETTERS))[sides - LEFT])
     return Played("".join(letters))
 
@@ -131,31 +130,6 @@ def letters_of(sides: NDArray[np.int8], undecided: NDArray[np.int64]) -> NDArray
     letters = np.array(list(LETTERS))[sides - LEFT]
     letters[tuple(undecided.T)] = UNDECIDED
     return letters
-
-
-def _letter(player: Model, scene: Scene, amplitude: float, frequency: float) -> str:
-    """The outcome at one node.
-
-    A block that has not tipped past its balance when the base comes to rest, and has too little
-    energy left to do so, is safe. Any other run is made again and goes on for `SETTLE` s; what then
-    stands is safe.
-    """
-    for settle in (0.0, SETTLE):
-        # Few rows: only the outcome is asked.
-        node = node_scene(scene, amplitude, frequency, settle).replace(output_step=0.02)
-        try:
-            history = player.simulate(node)
-        except ModelFailure:
-            return UNDECIDED
-        theta, y, *rates = (
-            history.channels[name][-1] for name in ("theta", "y", "x_dot", "y_dot", "theta_dot")
-        )
-        needed = node.gravity * (node.block.radius - node.block.weaker_pivot.height)
-        energy = kinematics.energy(node.block, node.gravity, y, theta, *rates)
-        weak = energy < ENOUGH * needed and abs(theta) < node.block.alpha
-        if weak or history.outcome.startswith("overturned"):
-            break
-    return {"overturned left": "L", "overturned right": "R"}.get(history.outcome, "S")
 
 
 def _impacts(player: Model, scene: Scene, amplitude: float, frequency: float) -> int:
@@ -181,8 +155,3 @@ def _motions(task: Nodes, player: Any) -> Played:
     ends = np.cumsum([len(rows) for rows in kept], dtype=int).tolist()
     content = np.concatenate(kept).astype("<f4").tobytes() if kept else b""
     return Played("", tuple(played), tuple(ends), base64.b64encode(content).decode("ascii"))
-
-
-def compiled(player: Model) -> TypeGuard[EventBasedModel]:
-    """Whether the model plays whole batches compiled."""
-    return isinstance(player, EventBasedModel) and player.friction != "bouc-wen"

@@ -1,0 +1,65 @@
+"""A made-up study that workers can import: it squares numbers, and fails at some."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rockcheck.scenes import ModelFailure
+from rockcheck.validation.finding import Column, Finding, Table
+from rockcheck.validation.study import Study, Task
+
+
+@dataclass(frozen=True)
+class Square(Task):
+    """A number to be squared; each time that it is, a line is added to a file."""
+
+    value: float
+    log: str
+
+    def depends(self) -> Any:
+        return self.value
+
+
+@dataclass(frozen=True)
+class Squared:
+    """The record."""
+
+    value: float
+    process: int
+
+
+class Squares(Study):
+    """Squares numbers; what is above 100 is squared in a second wave."""
+
+    name = "squares"
+    record = Squared
+
+    def __init__(self, values: Sequence[float], log: Path, **how: Any) -> None:
+        self.first = [Square(value, str(log), **how) for value in values]
+
+    def tasks(self, done: Mapping[Any, Any]) -> Sequence[Square]:
+        larger = [one.value for one in done.values() if isinstance(one, Squared) and 100.0 < one.value < 1e6]
+        return [*self.first, *(Square(value, self.first[0].log) for value in larger)]
+
+    @staticmethod
+    def play(task: Square) -> Squared:
+        with Path(task.log).open("a") as file:
+            file.write(f"{task.value:g}\n")
+        if task.value == 13.0:
+            raise ModelFailure("no square of 13")
+        if task.value == 14.0:
+            raise ZeroDivisionError("a bug")
+        if task.value == 15.0:
+            os._exit(3)
+        if task.value == 16.0:
+            raise KeyboardInterrupt
+        return Squared(task.value**2, os.getpid())
+
+    def gather(self, done: Mapping[Any, Any]) -> Finding:
+        rows = [[task.value, one.value] for task, one in done.items() if isinstance(one, Squared)]
+        table = Table("squares", [Column("value"), Column("square", unit="m")], rows)
+        return Finding(self.name, "Squares", f"{len(rows)} squares", [table], data={"count": len(rows)})

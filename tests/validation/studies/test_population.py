@@ -1,0 +1,402 @@
+"""Populations: what is scaled and played, what is said of a block that overturns, curves and fits."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from rockcheck.commands.cli import main
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import (
+    Block,
+    Floor,
+    InputError,
+    ModelFailure,
+    Record,
+    Rest,
+    Ricker,
+    Scene,
+    Wall,
+    load_scene,
+)
+from rockcheck.scenes.recordings import Recording
+from rockcheck.validation.execute.pool import Failure
+from rockcheck.validation.studies.population.study import (
+    CAPACITIES,
+    MEASURES,
+    PULSES,
+    fragility,
+    ida,
+    measure_of,
+)
+from rockcheck.validation.uncertainty.population import curve_of, fit_lognormal, play
+
+SCENE = Scene(
+    name="rack",
+    block=Block(half_width=0.3, half_height=1.0),
+    floor=Floor(friction=0.4),
+    walls=[Wall(side="left", gap=0.05, restitution=0.3)],
+    excitation=Rest(),
+    duration=20.0,
+)
+LEVELS = np.linspace(0.2, 1.2, 6)
+TOML = (
+    "duration = 20.0\nblock = { half_width = 0.3, half_height = 1.0 }\nfloor = { friction = 0.4 }\n"
+)
+
+
+def motion(gain: float, rate: float = 3.0) -> Recording:
+    t = 0.02 * np.arange(200)
+    samples = gain * np.sin(rate * t) * np.exp(-0.2 * t)
+    return Recording(samples=samples, time_step=0.02, unit="m/s2", form="CSV")
+
+
+MOTIONS = [("H1", motion(1.0)), ("H2", motion(2.5, 5.0)), ("H3", motion(0.3, 2.0))]
+
+
+def played(study):
+    """What a study's tasks gave, and its finding."""
+    done = {task: study.play(task) for task in study.tasks({})}
+    return done, study.gather(done)
+
+
+@pytest.fixture(scope="module")
+def lines():
+    """An analysis of the motions: peaks (motion, direction, intensity; infinite where it fell), and the finding."""
+    done, found = played(ida(SCENE, MOTIONS, LEVELS))
+    return np.array([runs.peaks for runs in done.values()]).reshape(3, 2, len(LEVELS)), found
+
+
+@pytest.fixture
+def records(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rack.toml").write_text(TOML, encoding="utf-8")
+    (tmp_path / "records").mkdir()
+    for name, one in MOTIONS:
+        rows = "\n".join(f"{0.02 * k:.2f},{a!r}" for k, a in enumerate(one.samples.tolist()))
+        path = tmp_path / "records" / f"{name}.csv"
+        path.write_text(f"time_s,acceleration_m_s2\n{rows}\n", encoding="utf-8")
+    return tmp_path / "records"
+
+
+# Lines
+
+
+def test_a_run_is_the_record_at_that_intensity(lines):
+    peaks, found = lines
+    rows, model = iter(found.table("ida").rows), EventBasedModel(pivot="unilateral", tolerance=1e-8)
+    for (name, one), both in zip(MOTIONS, peaks, strict=True):
+        record = Record.from_samples(one.samples, one.time_step)
+        for sign, line in zip((1, -1), both, strict=True):
+            for level, peak in zip(LEVELS, line, strict=True):
+                scaled = record.scaled(sign * level * 9.80665 / np.max(np.abs(one.samples)))
+                history = model.simulate(SCENE.replace(excitation=scaled, output_step=0.002))
+                fell = history.outcome.startswith("overturned")
+                own = math.inf if fell else history.peak_rotation / SCENE.block.alpha
+                assert peak == pytest.approx(own, abs=2e-4)
+                shown = math.nan if fell else peak
+                assert next(rows) == pytest.approx(
+                    [name, sign, level, shown, int(fell)], nan_ok=True
+                )
+    assert 0 < np.sum(np.isinf(peaks)) < peaks.size
+
+
+def test_a_share_of_the_motions_stays_below_its_quantile(lines):
+    peaks, found = lines
+    for level, row in zip(peaks.reshape(6, -1).T, found.table("quantiles").rows, strict=True):
+        for share, shown in zip((0.16, 0.5, 0.84), row[1:], strict=True):
+            peak = math.inf if math.isnan(shown) else shown
+            assert np.mean(level < peak) < share <= np.mean(level <= peak)
+
+
+def test_a_capacity_is_exceeded_not_met(lines):
+    """Of a limit that is a motion's own peak, that motion stays within it."""
+    peaks, found = lines
+    fits = found.table("fits").records()
+    assert [one["case"] for one in fits] == [
+        "peak above 0.1 α",
+        "peak above 0.5 α",
+        "peak above α, or overturned",
+    ]
+    assert found.data["capacities"] == list(CAPACITIES)
+    shares = [row[2] for row in found.table("fragility").rows]
+    assert shares[-6:] == np.mean(peaks > 1.0, axis=(0, 1)).tolist()
+    limit = float(np.max(peaks[np.isfinite(peaks)]))
+    _, again = played(ida(SCENE, MOTIONS, LEVELS, capacities=[limit]))
+    assert [row[2] for row in again.table("fragility").rows] == np.mean(
+        peaks > limit, axis=(0, 1)
+    ).tolist()
+
+
+@pytest.mark.parametrize("measure", [*MEASURES, "sa:0.5"])
+def test_every_measure_takes_out_the_record_s_own_size(measure):
+    """The same motion twice as large has the same curve."""
+    study = ida(SCENE, [("once", motion(1.0)), ("twice", motion(2.0))], LEVELS, measure=measure)
+    (_, _, once), (_, _, twice) = study.motions
+    assert twice == pytest.approx(2.0 * once, rel=1e-9)
+    one, other = played(study)[0].values()
+    assert one.peaks == pytest.approx(other.peaks, abs=1e-6)
+
+
+def test_measures_have_the_units_of_engineers():
+    record = motion(1.0)
+    of = {name: measure_of(name)[2](record, SCENE) for name in MEASURES}
+    assert of["pga"] == pytest.approx(np.max(np.abs(record.samples)) / 9.80665)
+    assert of["pga-ratio"] == pytest.approx(of["pga"] * 9.80665 / (9.81 * 0.3))
+    assert of["pgv-ratio"] == pytest.approx(of["pgv"] * SCENE.frequency_parameter / (9.81 * 0.3))
+    assert measure_of("sa:0.5")[:2] == ("Sa(0.5 s), 5 %", "g")
+
+
+def test_what_failed_says_nothing_and_ends_the_command_so(monkeypatch):
+    study = ida(SCENE, MOTIONS, LEVELS, capacities=[1.0])
+    done, whole = played(study)
+    last = list(done)[-1]
+    part = study.gather({**done, last: Failure("did not end")})
+    assert (whole.exit_code, part.exit_code) == (0, 3)
+    assert {row[0] for row in part.table("ida").rows} == {"H1", "H2"}
+    assert study.gather({}).table("motions").rows
+
+
+# Playing
+
+
+def test_another_model_plays_until_the_outcome_is_certain():
+    fair = EventBasedModel(pivot="unilateral", tolerance=1e-8)
+
+    class Slow:
+        def simulate(self, scene):
+            if scene.excitation.scale > 3.0:
+                raise ModelFailure("too much")
+            return fair.simulate(scene)
+
+    record = Record.from_samples(motion(2.5).samples, 0.02)
+    scenes = [
+        SCENE.replace(walls=(), excitation=record.scaled(f), duration=0.1)
+        for f in (0.1, 2.0, -2.0, 4.0)
+    ]
+    slow, fast = play(scenes, Slow()), play(scenes, fair)
+    assert slow.side[:3] == fast.side[:3] == (0, fast.side[1], -fast.side[1])
+    assert fast.side[1] != 0
+    assert slow.failed == (False, False, False, True)
+    assert math.isnan(slow.peaks[3])
+
+
+def test_a_task_depends_on_all_that_its_runs_do():
+    key = ida(SCENE, MOTIONS, LEVELS).tasks({})[0].key
+    others = [
+        ida(SCENE, MOTIONS, 2.0 * LEVELS),
+        ida(SCENE.replace(gravity=9.8), MOTIONS, LEVELS),
+        ida(SCENE, MOTIONS, LEVELS, model="ebm"),
+        ida(SCENE, MOTIONS[1:], LEVELS),
+        ida(SCENE, MOTIONS, LEVELS, measure="pgv"),
+    ]
+    assert key not in {study.tasks({})[0].key for study in others}
+    assert ida(SCENE, MOTIONS, LEVELS, capacities=[0.3]).tasks({})[0].key == key
+
+
+# Fragility
+
+
+def test_both_cases_and_directions_are_played():
+    """Reversed, a symmetric block without a wall does the mirror image."""
+    scene = SCENE.replace(excitation=Ricker(amplitude=1.0, period=1.0))
+    study = fragility(scene, (), np.linspace(1.0, 6.0, 4), (1.0, 3.0), model="ebm-unilateral")
+    done, found = played(study)
+    assert [batch.of[0] for batch in done] == ["with the wall"] * PULSES + [
+        "without a wall"
+    ] * PULSES
+    sides = np.array([runs.side for batch, runs in done.items() if not batch.scene.walls]).reshape(
+        PULSES, 2, 4
+    )
+    assert set(np.unique(sides)) == {-1, 0, 1}
+    np.testing.assert_array_equal(sides[:, 0], -sides[:, 1])
+    shares = [row[2] for row in found.table("fragility").rows]
+    assert shares[4:] == pytest.approx(np.mean(sides != 0, axis=(0, 1)))
+    assert shares[:4] != shares[4:]
+
+
+def test_records_are_scaled_to_the_intensity():
+    """Two records that differ only in their size: both directions of each overturn together."""
+    scene = SCENE.replace(walls=())
+    study = fragility(
+        scene, [("a", motion(1.0)), ("b", motion(4.0))], np.linspace(0.5, 12.0, 8), (1.0, 2.0)
+    )
+    done, found = played(study)
+    one, other = done.values()
+    assert one.side == other.side
+    assert {row[2] for row in found.table("fragility").rows} == {0.0, 1.0}
+    assert found.data["pga_g"] == pytest.approx(0.3 * 9.81 / 9.80665)
+    (fit,) = found.table("fits").records()
+    assert fit["median_g"] == pytest.approx(found.data["pga_g"] * fit["median"])
+
+
+def test_the_intensity_in_g_is_that_of_the_pivot_that_lifts_first():
+    """Of a block whose mass lies to the right and low: its right corner, nearer to the mass's centre."""
+    block = Block(half_width=0.3, half_height=1.0, centre_of_mass=(0.1, -0.2))
+    scene = load_scene("loaded").replace(block=block)
+    study = fragility(scene, (), LEVELS, (1.0, 2.0))
+    assert study.data["pga_g"] == pytest.approx((0.3 - 0.1) / (1.0 - 0.2) * scene.gravity / 9.80665)
+
+
+def test_a_set_that_is_none_is_refused():
+    for motions, said in (
+        ((), "is no pulse"),
+        ([("still", motion(0.0))] * 2, "still: a record with"),
+    ):
+        with pytest.raises(InputError, match=said):
+            fragility(SCENE, motions, LEVELS, (1.0, 2.0))
+
+
+# Curves
+
+
+def test_the_lognormal_curve_is_found_again():
+    intensities, motions = np.linspace(0.5, 8.0, 60), 10**7
+    counts = np.round(motions * norm.cdf(np.log(intensities / 2.5) / 0.4)).astype(np.int64)
+    assert fit_lognormal(intensities, counts, np.full(60, motions)) == pytest.approx(
+        (2.5, 0.4), rel=1e-3
+    )
+    for none in (np.zeros(60, dtype=np.int64), np.full(60, 10)):
+        assert np.isnan(fit_lognormal(intensities, none, np.full(60, 10))).all()
+
+
+def test_a_curve_is_found_where_few_overturn():
+    counts = np.array([0] * 23 + [1, 1, 2, 4, 2, 1, 2, 1, 2, 2, 1, 4, 3, 5, 5, 5, 4])
+    intensities = np.linspace(0.02, 2.0, 40)
+    median, dispersion = fit_lognormal(intensities, counts, np.full(40, 12))
+    assert 1.9 < median < 2.4
+    assert 0.2 < dispersion < 0.5
+    assert np.isnan(fit_lognormal(intensities, counts[::-1], np.full(40, 12))).all()  # it falls
+
+
+def test_a_fitted_median_lies_inside_its_interval():
+    """The interval is that of the sets of motions that could have been drawn; without a fit there is none."""
+    hit = np.array([[[True] * 6] * 2, [[False] * 3 + [True] * 3] * 2, [[False] * 5 + [True]] * 2])
+    never = np.zeros_like(hit)
+    curve = curve_of("made", hit, never, LEVELS, 200)
+    chance, medians = np.random.default_rng(8), []
+    for _ in range(400):
+        drawn = hit[chance.integers(3, size=3)]
+        medians.append(fit_lognormal(LEVELS, drawn.sum(axis=(0, 1)), np.full(6, 6))[0])
+    between = np.nanquantile(medians, [0.025, 0.975]).tolist()
+    assert [curve.low, curve.high] == pytest.approx(between, rel=0.2)
+    assert curve.low < curve.median < curve.high
+    assert math.isnan(curve_of("made", ~never, never, LEVELS, 200).low)
+
+
+def test_the_band_holds_the_binomial_spread():
+    hit = np.zeros((100, 2, 3), dtype=bool)
+    hit[:50, :, 1] = hit[:, :, 2] = True  # directions alike: no more is known than from 100 runs
+    none, half, _ = curve_of("made", hit, np.zeros_like(hit), np.array([1.0, 2.0, 3.0])).points
+    assert half[1:4] == pytest.approx([0.5, 0.5 - 1.96 * 0.05, 0.5 + 1.96 * 0.05], abs=0.015)
+    assert none[1:4] == pytest.approx(
+        [0.0, 0.0, 3.8415 / 103.8415], rel=1e-4
+    )  # Wilson's z^2/(n + z^2)
+
+
+def test_the_band_covers_as_often_as_it_says():
+    """Motions with capacities of their own and directions that scatter about them; shares between 2 and 98 %.
+
+    Counts are whole numbers: nearer to 0 and 1 Wilson's interval may hold only 83 % (Brown, Cai and DasGupta 2001).
+    """
+    chance, intensities, median, dispersion = (
+        np.random.default_rng(3),
+        np.geomspace(0.7, 3.3, 8),
+        1.5,
+        0.4,
+    )
+    truth = norm.cdf(np.log(intensities / median) / dispersion)
+    for motions, shared in ((10, 0.0), (20, 0.3), (50, 0.4)):
+        inside = np.zeros(len(intensities))
+        for _ in range(400):
+            alone = math.sqrt(dispersion**2 - shared**2) * chance.standard_normal((motions, 2))
+            capacity = median * np.exp(shared * chance.standard_normal((motions, 1)) + alone)
+            hit = intensities > capacity[:, :, None]
+            points = np.array(curve_of("", hit, np.zeros_like(hit), intensities).points)
+            inside += (points[:, 2] <= truth) & (truth <= points[:, 3])
+        assert np.mean(inside) / 400 >= 0.94
+        assert np.min(inside) / 400 >= 0.9
+
+
+def test_a_curve_never_counts_a_failed_run_as_safe():
+    """Of four motions in both directions: what failed is in no share, no band and no fit."""
+    intensities, failed = np.array([1.0, 2.0, 3.0]), np.zeros((4, 2, 3), dtype=bool)
+    hit = np.zeros_like(failed)
+    hit[:, :, 2] = hit[:2, :, 1] = True
+    plain = curve_of("made", hit, failed, intensities)
+    failed[2:, :, 1] = True  # all that did not overturn at 2: now nothing is known to be safe there
+    failed[0, 0, 2] = True
+    curve = curve_of("made", hit, failed, intensities)
+    assert [point[1] for point in plain.points] == [0.0, 0.5, 1.0]
+    assert [point[1] for point in curve.points] == [0.0, 1.0, 1.0]
+    assert curve.points[1][2:4] == pytest.approx(
+        [2 / (2 + 3.8415), 1.0], rel=1e-4
+    )  # of both motions
+    assert curve.undecided == 5
+    assert curve.median < plain.median
+    failed[:, :, 1] = True
+    nowhere = curve_of("made", hit, failed, intensities)
+    assert [point[1] for point in nowhere.points] == pytest.approx(
+        [0.0, math.nan, 1.0], nan_ok=True
+    )
+    assert nowhere.median > 0.0
+    failed[:] = True
+    assert math.isnan(curve_of("made", hit, failed, intensities).median)
+
+
+# The command
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "records: 0 is too few: give at least 2 records"),
+        (["records/H1.csv"], "records: 1 is too few"),
+        (
+            ["records", "--intensity", "pgd"],
+            "--intensity: unknown intensity 'pgd'; did you mean 'pgv'",
+        ),
+        (["records", "--intensity", "sa"], "unknown intensity 'sa'"),
+        (["records", "--intensity", "sa:0"], "unknown intensity 'sa:0'"),
+        (["records", "--levels", "2:1:9"], "--levels"),
+        (["records", "--levels", "1:2"], "--levels"),
+        (["records", "--levels", "0.1:nan:9"], "--levels"),
+        (["records/X*.csv"], "no such files"),
+        (["records", "--model", "free"], "--model: unknown model 'free'"),
+        (["records", "--read", "unitt=g"], "unitt: unknown key"),
+        (["records", "--read", "unit"], "--read: 'unit': write key=value"),
+        (["none.csv"], "none.csv"),
+    ],
+)
+def test_slips_are_named(records, capsys, words, said):
+    assert main(["ida", "rack.toml", *words]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_the_command_writes_curves_tables_and_page(records, capsys, tmp_path):
+    words = [
+        "ida",
+        "rack.toml",
+        "records/H*.csv",
+        "--levels",
+        "0.2:1.2:6",
+        "--capacity",
+        "0.5",
+        "--json",
+    ]
+    assert main(words) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["unit"], answer["capacities"], answer["left_out"]) == ("g", [0.5], [])
+    folder = tmp_path / "rockcheck-report" / "ida"
+    assert len((folder / "ida.csv").read_text(encoding="utf-8").splitlines()) == 1 + 3 * 2 * 6
+    assert "peak above 0.5 α" in (folder / "index.html").read_text(encoding="utf-8")
+    assert {path.name for path in (folder / "figures").glob("*.svg")} == {
+        "lines.svg",
+        "fragility.svg",
+    }

@@ -1,0 +1,186 @@
+"""The shape of every study: what the one runner does for a made-up one, and that the real ones have the shape."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rockcheck.reports.document import block_markdown, csv, publish
+from rockcheck.scenes import InputError
+from rockcheck.scenes.progress import announcing
+from rockcheck.validation.execute.pool import Failure
+from rockcheck.validation.finding import Axis, Column, Finding, Mark, Panel, Plot, Series, Table, Text, text
+from rockcheck.validation.study import FAULTS, Study, run
+
+MODELS = Path(__file__).parent / "models"
+
+
+@pytest.fixture(autouse=True)
+def _importable(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Workers import the made-up study from its folder."""
+    monkeypatch.syspath_prepend(MODELS)
+
+
+def squares(*arguments: Any, **how: Any) -> Study:
+    from squares import Squares as Made
+
+    made: Study = Made(*arguments, **how)
+    return made
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    path = tmp_path / "log"
+    path.touch()
+    return path
+
+
+def played(log: Path) -> list[float]:
+    return sorted(map(float, log.read_text().split()))
+
+
+@pytest.mark.parametrize("jobs", [0, 1, 2])
+def test_what_was_played_is_read_back_whatever_plays_it(tmp_path: Path, log: Path, jobs: int) -> None:
+    heard: list[tuple[float, float]] = []
+    study = squares([2.0, 3.0, 3.0], log)
+    found = run(study, tmp_path / "out", jobs=jobs, on_progress=lambda done, of, what="": heard.append((done, of)))
+    again = run(study, tmp_path / "out", jobs=jobs)
+    assert found.table("squares").rows == again.table("squares").rows == [[2.0, 4.0], [3.0, 9.0]]
+    assert played(log) == [2.0, 3.0]
+    assert heard[0] == (0, 2)
+    assert heard[-1] == (2, 2)
+    assert found.complete
+    assert found.made is not None
+    assert run(study, tmp_path / "out", jobs=jobs, force=True).data == {"count": 2}
+    assert played(log) == [2.0, 2.0, 3.0, 3.0]
+
+
+def test_a_wave_follows_from_what_was_found(tmp_path: Path, log: Path) -> None:
+    found = run(squares([2.0, 11.0], log), tmp_path / "out", jobs=0)
+    assert played(log) == [2.0, 11.0, 121.0, 14641.0]
+    assert found.data == {"count": 4}
+
+
+def test_a_fault_of_one_task_takes_no_other_down(tmp_path: Path, log: Path) -> None:
+    found = run(squares([2.0, 13.0, 14.0, 15.0], log), tmp_path / "out", jobs=1)
+    assert found.data == {"count": 1}
+    assert {where.partition(",")[0]: why.partition(":")[0] for where, why in found.failures.items()} == {
+        "13": "no square of 13",
+        "14": "ZeroDivisionError",
+        "15": "the process ended with code 3",
+    }
+    (trace,) = (tmp_path / "out" / FAULTS).iterdir()
+    assert "a bug" in trace.read_text()
+    run(squares([2.0, 13.0], log), tmp_path / "out", jobs=1)
+    assert played(log).count(13.0) == 2, "what failed is played again"
+    assert played(log).count(2.0) == 1
+
+
+def test_an_interrupted_run_gathers_what_there_is_and_goes_on(tmp_path: Path, log: Path) -> None:
+    found = run(squares([2.0, 16.0, 3.0], log), tmp_path / "out", jobs=0)
+    assert not found.complete
+    assert found.data == {"count": 1}
+    assert run(squares([2.0, 3.0], log), tmp_path / "out", jobs=0).data == {"count": 2}
+    assert played(log) == [2.0, 3.0, 16.0]
+
+
+def test_what_there_is_no_time_for_is_left_out(tmp_path: Path, log: Path) -> None:
+    found = run(squares([2.0], log), tmp_path / "out", jobs=0, minutes=1e-9)
+    assert not found.complete
+    assert played(log) == []
+
+
+def test_a_damaged_record_is_played_again(tmp_path: Path, log: Path) -> None:
+    run(squares([2.0], log), tmp_path / "out", jobs=0)
+    (record,) = (tmp_path / "out" / "records").glob("*.json")
+    record.write_text(record.read_text().replace("4.0", "5.0"))
+    assert run(squares([2.0], log), tmp_path / "out", jobs=0).table("squares").rows == [[2.0, 4.0]]
+
+
+def test_timed_tasks_are_played_in_this_process_alone(tmp_path: Path, log: Path) -> None:
+    study = squares([2.0], log, where="timed")
+    run(study, tmp_path / "out", jobs=2)
+    (record,) = (tmp_path / "out" / "records").glob("*.json")
+    assert json.loads(record.read_text())["content"]["record"]["process"] == os.getpid()
+
+
+def test_a_long_run_says_how_long(tmp_path: Path, log: Path) -> None:
+    said: list[str] = []
+    with announcing(said.append):
+        run(squares([2.0, 3.0], log, expected=90.0), tmp_path / "out", jobs=0)
+        run(squares([4.0], log, expected=1.0), tmp_path / "out", jobs=0)
+    assert len(said) == 1
+    assert "3 min" in said[0]
+
+
+@pytest.mark.long
+def test_on_a_dask_cluster_it_is_the_same(tmp_path: Path, log: Path) -> None:
+    found = run(squares([2.0, 11.0, 13.0, 15.0], log), tmp_path / "out", scheduler="local:2")
+    assert found.data == {"count": 4}
+    assert len(found.failures) == 2
+
+
+def test_a_folder_that_cannot_be_used_is_bad_input(log: Path) -> None:
+    with pytest.raises(InputError, match="output folder"):
+        run(squares([2.0], log), log)
+
+
+FOUND = Finding(
+    "made",
+    "Made up <b>",
+    "All is well.",
+    [
+        Text("In words.", title="Words", items=["one", "two"]),
+        Table(
+            "numbers",
+            [text("name"), Column("model", kind="model"), Column("share", kind="percent"), Column("x", "length", "m")],
+            [["=1+1|", "mujoco", 0.25, 1.23456e-9], ["b", "mine", None, Mark(2.0, "fail", "too long")]],
+            "Numbers",
+        ),
+        Plot(
+            "curve", panels=[Panel("", [Series("a", [1.0, 2.0], [3.0, None]), Series("", y=[1.0], style="level")])], x=Axis("t"), live=True
+        ),
+    ],
+    verdict="fail",
+    exit_code=1,
+)
+
+
+def test_one_table_is_csv_markdown_and_page(tmp_path: Path) -> None:
+    table = FOUND.table("numbers")
+    assert csv(table).splitlines()[0] == "name,model,share,x"
+    assert "1.23456e-09" in csv(table)
+    assert csv(table).splitlines()[2] == "b,mine,,2.0"
+    shown = block_markdown(table)
+    assert "length, m" in shown
+    assert "25.0 %" in shown
+    assert "✕ 2" in shown
+    page = publish(FOUND, tmp_path).read_text(encoding="utf-8")
+    assert "Made up &lt;b&gt;" in page
+    assert 'class="n fail" title="too long"' in page
+    assert (tmp_path / "figures" / "curve.svg").stat().st_size > 1000
+    assert json.loads((tmp_path / "run.json").read_text())["tables"]["numbers"][1]["x"] == 2.0
+    assert "rockcheckCurves" in (tmp_path / "curves.js").read_text()
+
+
+def real_studies() -> list[tuple[Study, Any]]:
+    """Each study as small as it can be, and how one of its tasks is chosen."""
+    from rockcheck.validation.studies.work_precision.study import WorkPrecision
+
+    return [(WorkPrecision("ebm", quick=True), lambda task: getattr(task, "size", 0) == 1)]
+
+
+@pytest.mark.parametrize(("study", "wanted"), real_studies(), ids=lambda one: getattr(one, "name", ""))
+def test_a_record_of_every_study_is_read_back_as_it_was(study: Study, wanted: Any, tmp_path: Path) -> None:
+    from rockcheck.validation.execute.store import Store
+
+    task = next(task for task in study.tasks({}) if wanted(task))
+    record, store = study.play(task), Store(tmp_path, study.kinds)
+    assert not isinstance(record, Failure)
+    study.keep(store, task, record)
+    assert study.find(store, task) == record
+    assert study.gather({task: record}).as_dict()

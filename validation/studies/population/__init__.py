@@ -1,0 +1,1 @@
+"""Populations: a scene under many motions at many intensities; quantiles, fragility, fits."""

@@ -1,0 +1,425 @@
+"""A block under many motions at many intensities: incremental dynamic analysis (Vamvatsikos and
+Cornell 2002) and fragility.
+
+An intensity is in proportion to the size of its motion, so the factor of a motion is the wanted
+intensity over that of the motion as it is.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from rockcheck.scenes import InputError, Record, Scene
+from rockcheck.scenes.errors import unknown_name
+from rockcheck.scenes.recordings import Recording, intensity
+from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
+from rockcheck.validation.execute import provenance
+from rockcheck.validation.execute.models import build, family
+from rockcheck.validation.execute.pool import Failure
+from rockcheck.validation.finding import (
+    Axis,
+    Block,
+    Column,
+    Finding,
+    Panel,
+    Plot,
+    Series,
+    Table,
+    text,
+)
+from rockcheck.validation.study import Study, Task
+from rockcheck.validation.uncertainty.population import (
+    Curve,
+    Floats,
+    Runs,
+    compiled,
+    curve_of,
+    play,
+)
+
+Motions = Sequence[tuple[str, Recording]]
+#: Records of a set, at the least; frequencies of a set of pulses.
+FEWEST, PULSES = 2, 50
+#: Peaks that a fragility curve is given for (alpha); a block that overturns exceeds all.
+CAPACITIES = (0.1, 0.5, 1.0)
+#: Above all peaks of blocks that stand (alpha).
+MOST = 1e300
+#: Shares of the motions whose peaks stay below the quantiles' curves.
+BAND = (0.16, 0.5, 0.84)
+#: The end of the axis of peaks (alpha).
+FALLEN = 1.25
+#: Sets of motions drawn anew for the interval of a fitted median.
+DRAWS = 200
+#: Time of a run as a rule, s, of compiled models and of others; and of all up to which no process
+#: of their own is worth while.
+A_RUN, A_SLOW_RUN, SOON = 1e-3, 1.0, 5.0
+
+
+@dataclass(frozen=True)
+class Batch(Task):
+    """Runs of a population that are played together: a scene at factors of its base motion.
+
+    `of` says of what in the population they are: a case, a motion.
+    """
+
+    of: tuple[str, ...]
+    scene: Scene = field(repr=False)
+    factors: tuple[float, ...] = field(repr=False)
+    model: str
+    settings: tuple[tuple[str, Any], ...] = ()
+
+    @property
+    def label(self) -> str:
+        """What it is of."""
+        return ", ".join(filter(None, self.of))
+
+    def depends(self) -> Any:
+        """The scene with its motion, the model, the factors, and the code that plays them."""
+        cell = provenance.cell_key(self.scene, self.model, dict(self.settings))
+        return cell, self.factors, provenance.code_digest(play.__module__)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Population(Study):
+    """Scenes, by the names of the cases, each under all motions at all `levels` of intensity, in
+    both directions.
+
+    A motion has a name and its own intensity. `limits` are the events that have a curve: peaks
+    (alpha) by name. `across` is the intensity, `other` its axis in another unit; `data` is told
+    besides.
+    """
+
+    name: str
+    title: str
+    cases: Mapping[str, Scene]
+    motions: Sequence[tuple[str, Any, float]]
+    levels: Floats
+    across: Column
+    limits: Mapping[str, float]
+    model: str
+    settings: Mapping[str, Any]
+    data: Mapping[str, Any]
+    other: dict[str, Any] | None = None
+    record = Runs
+
+    @cached_property
+    def batches(self) -> dict[str, list[Batch]]:
+        """One a motion, by the case. Raises `InputError` where the model cannot play a scene."""
+        player = build(self.model, self.settings)
+        if compiled(player):
+            for scene in self.cases.values():
+                player.check(scene)
+        expected = 2 * len(self.levels) * (A_RUN if compiled(player) else A_SLOW_RUN)
+        soon = expected * len(self.motions) * len(self.cases) < SOON
+        return {
+            case: [
+                Batch(
+                    (case, name),
+                    scene.replace(excitation=motion),
+                    (*(self.levels / own).tolist(), *(-self.levels / own).tolist()),
+                    self.model,
+                    tuple(self.settings.items()),
+                    expected=expected,
+                    compiles=self.model if family(self.model).compiled else "",
+                    where="here" if soon else "worker",
+                )
+                for name, motion, own in self.motions
+            ]
+            for case, scene in self.cases.items()
+        }
+
+    def tasks(self, done: Mapping[Any, Any]) -> Sequence[Batch]:
+        """All batches at once."""
+        return [batch for some in self.batches.values() for batch in some]
+
+    @staticmethod
+    def play(task: Batch) -> Runs:
+        """The runs of a batch."""
+        motions = map(task.scene.excitation.scaled, task.factors)
+        scenes = [task.scene.replace(excitation=motion) for motion in motions]
+        return play(scenes, build(task.model, dict(task.settings)))
+
+    def gather(self, done: Mapping[Any, Any]) -> Finding:
+        """A curve a case and event; of one case also the lines of all motions."""
+        curves: list[Curve] = []
+        blocks: list[Block] = []
+        for case, batches in self.batches.items():
+            played = [one for one in batches if isinstance(done.get(one), Runs)]
+            if played:
+                peaks = np.array([done[one].peaks for one in played]).reshape(len(played), 2, -1)
+                if not case:
+                    blocks += lines_of([p.label for p in played], peaks, self.levels, self.across)
+                curves += [
+                    curve_of(case + event, peaks > limit, np.isnan(peaks), self.levels, DRAWS)
+                    for event, limit in self.limits.items()
+                ]
+        if curves:
+            blocks += blocks_of(curves, self.across, self.other)
+        unit = self.across.unit
+        columns = [text("motion"), Column("own", f"{self.across.label} as it is", unit)]
+        rows = [[name, own] for name, _, own in self.motions]
+        medians = [f"{one.label} {one.median:.3g} {unit}" for one in curves if one.median > 0.0]
+        return Finding(
+            self.name,
+            self.title,
+            f"{len(self.motions)} motions in both directions, {len(self.levels)} intensities. Median"
+            f" {self.across.label}: {', '.join(medians).rstrip() or 'no curve fits'}.",
+            [*blocks, Table("motions", columns, rows, "Motions", on="page", folded=True)],
+            {"model": self.model, **self.data},
+            exit_code=3 if any(isinstance(one, Failure) for one in done.values()) else 0,
+        )
+
+
+def blocks_of(
+    curves: Sequence[Curve], across: Column, other: dict[str, Any] | None = None
+) -> list[Block]:
+    """The curves, drawn and as tables, over the intensity `across`; `other`: its axis in another
+    unit, see `finding.Plot`."""
+    columns = [
+        text("case", "event"),
+        Column("median", f"median {across.label}", across.unit),
+        Column("low", "95 % from"),
+        Column("high", "to"),
+        Column("dispersion", digits=2, help=f"standard deviation of ln({across.label})"),
+        Column("motions", brief=False),
+        Column("undecided", "undecided runs", brief=False),
+    ]
+    rows = [
+        [getattr(one, "label" if c.name == "case" else c.name) for c in columns] for one in curves
+    ]
+    if other:
+        columns.append(Column(f"median_{other['other_unit']}", "median", other["other_unit"]))
+        rows = [[*row, other["per_unit"] * row[1]] for row in rows]
+    series = []
+    for one in curves:
+        level, share, low, high, fit = zip(*one.points, strict=True)
+        series += [
+            Series(one.label, level, share, low, high, style="smooth"),
+            Series(one.label, level, fit, style="dots"),
+        ]
+    names = ("intensity", "share", "band_low", "band_high", "lognormal_fit")
+    return [
+        Plot(
+            "fragility",
+            "Fragility",
+            panels=[Panel("", series)],
+            x=Axis(across.head),
+            y=Axis("probability", limits=(0.0, 1.0)),
+            note="Share of the runs, its 95 % band (Wilson's, with the motions as independent), and"
+            " the lognormal curve of the greatest likelihood, dotted.",
+            live=True,
+            data=other,
+        ),
+        Table(
+            "fits",
+            columns,
+            rows,
+            note="Lognormal fits; the interval of the median is from drawing the motions anew.",
+        ),
+        Table(
+            "fragility",
+            [text("case"), *map(Column, names)],
+            [[one.label, *point] for one in curves for point in one.points],
+            on="file",
+        ),
+    ]
+
+
+def lines_of(motions: Sequence[str], peaks: Floats, levels: Floats, across: Column) -> list[Block]:
+    """Peaks (motion, direction, intensity) as a line a motion, and their quantiles: the smallest
+    peak that the share of the motions does not exceed. A line ends where the block falls."""
+    x, signs = levels.tolist(), (1, -1)
+    quantiles = np.nanquantile(peaks.reshape(-1, len(x)), BAND, axis=0, method="inverted_cdf")
+    known, quantiles = (np.where(np.isinf(some), np.nan, some) for some in (peaks, quantiles))
+    names = ("direction", "intensity", "peak_rotation_alpha", "overturned")
+    lines = [
+        (name, sign, line)
+        for name, both in zip(motions, known.tolist(), strict=True)
+        for sign, line in zip(signs, both, strict=True)
+    ]
+    series = [
+        *(
+            Series(name if sign > 0 else f"{name}, reversed", x, line, style="thin")
+            for name, sign, line in lines
+        ),
+        *(
+            Series(f"{100.0 * share:g} %", x, line, style="smooth")
+            for share, line in zip(BAND, quantiles.tolist(), strict=True)
+        ),
+    ]
+    fell = iter(np.isinf(peaks).ravel().tolist())
+    return [
+        Plot(
+            "lines",
+            f"Peak rotation against {across.label}",
+            panels=[Panel("", series)],
+            x=Axis(across.head),
+            y=Axis("peak |θ|/α", limits=(0.0, FALLEN)),
+            note="A grey line a motion; it ends where the block falls. Coloured: the peak that 16,"
+            " 50 and 84 % of the motions stay below.",
+            live=True,
+        ),
+        Table(
+            "ida",
+            [text("record"), *map(Column, names)],
+            [
+                [name, sign, level, peak, int(next(fell))]
+                for name, sign, line in lines
+                for level, peak in zip(x, line, strict=True)
+            ],
+            on="file",
+        ),
+        Table(
+            "quantiles",
+            [Column("intensity"), *(Column(f"p{100.0 * share:g}") for share in BAND)],
+            [[level, *row] for level, row in zip(x, quantiles.T.tolist(), strict=True)],
+            on="file",
+        ),
+    ]
+
+
+Measure = tuple[str, str, Callable[[Recording, Scene], float]]
+#: Measures of intensity: label, unit, and value of a record for a scene.
+MEASURES: Mapping[str, Measure] = {
+    "pga": ("PGA", "g", lambda record, scene: intensity.peak_acceleration(record)),
+    "pgv": ("PGV", "m/s", lambda record, scene: intensity.peak_velocity(record)),
+    "pga-ratio": (
+        "PGA/(g tan α)",
+        "",
+        lambda record, scene: np.max(np.abs(record.samples)) / (scene.gravity * scene.block.slope),
+    ),
+    "pgv-ratio": (
+        "p PGV/(g tan α)",
+        "",
+        lambda record, scene: (
+            intensity.peak_velocity(record)
+            * scene.frequency_parameter
+            / (scene.gravity * scene.block.slope)
+        ),
+    ),
+}
+
+
+def measure_of(word: str) -> Measure:
+    """The measure of that name, or of "sa:0.5": spectral acceleration at a period, s."""
+    found = re.fullmatch(r"sa:(\d*\.?\d+)", word)
+    if found and (at := float(found[1])) >= 1e-3:
+        return f"Sa({at:g} s), 5 %", "g", lambda r, scene: intensity.spectral_acceleration(r, at)
+    if word not in MEASURES:
+        raise InputError(str(unknown_name("intensity", word, [*MEASURES, "sa:0.5"])), "--intensity")
+    return MEASURES[word]
+
+
+def _recorded(
+    motions: Motions, scene: Scene, of: Callable[[Recording, Scene], float]
+) -> list[tuple[str, Record, float]]:
+    """Records with their own intensities. Raises `InputError` for too few, or one without motion."""
+    if len(motions) < FEWEST:
+        raise InputError(f"{len(motions)} is too few: give at least {FEWEST} records", "records")
+    found = [
+        (name, Record.from_samples(r.samples, r.time_step), float(of(r, scene)))
+        for name, r in motions
+    ]
+    for name, _, own in found:
+        if own <= 0.0:
+            raise InputError(f"{name}: a record without motion has no intensity", "records")
+    return found
+
+
+def ida(
+    scene: Scene,
+    motions: Motions,
+    levels: Floats,
+    *,
+    measure: str = "pga",
+    capacities: Sequence[float] = CAPACITIES,
+    model: str = "ebm-unilateral",
+    left_out: Sequence[str] = (),
+) -> Population:
+    """Peak rotation of the scene's block under each record, scaled to each intensity.
+
+    Raises `InputError` for an unknown measure, fewer than two motions, or one without motion.
+    """
+    label, unit, of = measure_of(measure)
+    return Population(
+        name="ida",
+        title=f"Incremental dynamic analysis: {scene.name}",
+        cases={"": scene},
+        motions=_recorded(motions, scene, of),
+        levels=levels,
+        across=Column("intensity", label, unit),
+        limits={
+            f"peak above {'α, or overturned' if limit == 1.0 else f'{limit:g} α'}": limit
+            for limit in capacities
+        },
+        model=model,
+        settings={"tolerance": 1e-8},
+        data={
+            "scene": scene.name,
+            "measure": measure,
+            "label": label,
+            "unit": unit,
+            "intensities": levels.tolist(),
+            "capacities": list(capacities),
+            "left_out": list(left_out),
+        },
+    )
+
+
+def fragility(
+    scene: Scene,
+    motions: Motions,
+    levels: Floats,
+    frequencies: tuple[float, float],
+    *,
+    model: str = "ebm",
+    settings: Mapping[str, Any] | None = None,
+    left_out: Sequence[str] = (),
+) -> Population:
+    """The probability of overturning, with the wall and without, for a set of records, or, without
+    any, for pulses of the scene's kind at `PULSES` frequencies, over p, between two.
+
+    The intensity is peak acceleration over g tan(alpha). Raises `InputError`.
+    """
+    slope, pulse = scene.gravity * scene.block.slope, scene.excitation
+    if not motions and pulse.kind not in ("ricker", "sine"):
+        raise InputError("are needed: the scene's excitation is no pulse", "records")
+    unit = scene.frequency_parameter / (2.0 * math.pi)
+    free = {"without a wall": scene.replace(walls=())}
+    return Population(
+        name="fragility",
+        title=f"Fragility: {scene.name}",
+        cases={"with the wall": scene, **free} if scene.walls else free,
+        motions=_recorded(motions, scene, MEASURES["pga-ratio"][2])
+        if motions
+        else [
+            (
+                f"{hertz:.4g} Hz",
+                type(pulse)(**pulse.model_dump() | {"amplitude": slope, "period": 1.0 / hertz}),
+                1.0,
+            )
+            for hertz in (np.geomspace(*frequencies, PULSES) * unit).tolist()
+        ],
+        levels=levels,
+        across=Column("intensity", "peak acceleration / (g tan α)"),
+        limits={"": MOST},
+        model=model,
+        settings=settings or {},
+        data={
+            "scene": scene.name,
+            "pga_g": slope / GRAVITY_OF_RECORDS,
+            "left_out": list(left_out),
+        },
+        other={
+            "per_unit": slope / GRAVITY_OF_RECORDS,
+            "other_unit": "g",
+            "other_label": "peak acceleration, g",
+        },
+    )

@@ -1,0 +1,392 @@
+"""A population: scenes, drawn or listed, that one model plays; what each run did, and what the runs
+together say.
+
+Shares have an interval, and over the intensity of the base motion a lognormal curve. The numbers of
+a scene that have a spread (`scenes.trust.inputs`) are drawn together, quasi-randomly: what comes
+out is u_input, how far a figure may lie from the scene's because the scene itself is not known
+exactly (ASME V&V 20-2009, section 4, by sampling), and Sobol indices: which number matters most.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeGuard
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE
+from rockcheck.scenes import History, InputError, ModelFailure, Scene, kinematics
+from rockcheck.scenes.trust.inputs import UncertainScene
+from rockcheck.validation.discrepancy.figures import Stored
+from rockcheck.validation.discrepancy.statistics import CONFIDENCE
+
+if TYPE_CHECKING:
+    from rockcheck.ebm.batch import Outcomes
+
+Floats = NDArray[np.float64]
+#: Median and dispersion where no lognormal curve fits.
+NO_FIT = math.nan, math.nan
+#: Time (s) that a run goes on after the base's motion while its outcome is open; and the share of
+#: the energy of tipping over below which the outcome is decided: a hundredth is left to the model's
+#: own error.
+SETTLE, ENOUGH = 6.0, 0.99
+
+
+class Runs(Stored):
+    """What a model makes of scenes, one value a run.
+
+    `side` is -1 overturned left, +1 right, 0 neither. `failed` runs say nothing, whatever the other
+    fields hold of them. `figures` by name: peak_rotation (alpha).
+    """
+
+    side: tuple[int, ...]
+    failed: tuple[bool, ...]
+    figures: Mapping[str, tuple[float, ...]]
+
+    @property
+    def peaks(self) -> Floats:
+        """Peak rotations, alpha: infinite of a block that overturned, NaN where the run failed."""
+        peaks = np.where(self.side, np.inf, self.figures["peak_rotation"])
+        return np.where(self.failed, np.nan, peaks)
+
+
+def play(scenes: Sequence[Scene], player: Any) -> Runs:
+    """Play scenes with a model until outcome and peak are certain, whatever their durations.
+
+    A run of the event-based model that fails is made once more at a hundredth of the tolerance.
+    Raises `InputError` where the model cannot play one of them.
+    """
+    if compiled(player):
+        found = _batch(scenes, player, strict=False, jobs=1)
+        side, peak, failed = found.side, found.peak, found.failed
+        if failed.any():
+            again = [scene for scene, fault in zip(scenes, failed, strict=True) if fault]
+            finer = _batch(again, player.finer(), strict=False, jobs=1)
+            side[failed], peak[failed], failed[failed] = finer.side, finer.peak, finer.failed
+    else:
+        rows = [_one(scene, player) for scene in scenes]
+        side, peak, failed = (np.array(column) for column in zip(*rows, strict=True))
+    rotations = (peak / np.array([scene.block.alpha for scene in scenes])).tolist()
+    return Runs(side=side.tolist(), failed=failed.tolist(), figures={"peak_rotation": rotations})
+
+
+def _batch(scenes: Sequence[Scene], model: EventBasedModel, **how: Any) -> Outcomes:
+    from rockcheck.ebm.batch import pack, run_batch
+
+    return run_batch(pack(scenes, model), model, **how)
+
+
+def _one(scene: Scene, player: Any) -> tuple[int, float, bool]:
+    try:
+        history = decided(scene, player)
+    except ModelFailure:
+        return SAFE, 0.0, True
+    sides = {"overturned left": LEFT, "overturned right": RIGHT}
+    return sides.get(history.outcome, SAFE), history.peak_rotation, False
+
+
+def decided(scene: Scene, player: Any) -> History:
+    """The history of a scene until its outcome is certain, whatever its duration.
+
+    A block that has not tipped past its balance when the base comes to rest, and has too little
+    energy left to do so, is safe. Any other run is made again and goes on for `SETTLE` s; what then
+    stands is safe.
+    """
+    quiet = max(scene.excitation.quiet_after, scene.vertical.quiet_after)
+    needed = scene.gravity * (scene.block.radius - scene.block.weaker_pivot.height)
+    for settle in (0.0, SETTLE):  # few rows: only the outcome is asked
+        history = player.simulate(scene.replace(duration=quiet + settle, output_step=0.02))
+        names = ("theta", "y", "x_dot", "y_dot", "theta_dot")
+        theta, y, *rates = (history.channels[name][-1] for name in names)
+        energy = kinematics.energy(scene.block, scene.gravity, y, theta, *rates)
+        weak = energy < ENOUGH * needed and abs(theta) < scene.block.alpha
+        if weak or history.outcome.startswith("overturned"):
+            break
+    return history
+
+
+def compiled(player: object) -> TypeGuard[EventBasedModel]:
+    """Whether the model plays whole batches compiled."""
+    return isinstance(player, EventBasedModel) and player.friction != "bouc-wen"
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One curve. A point is intensity, share, lower and upper end of its band, fitted probability.
+
+    The fit is a lognormal curve: at the intensity `median`, known to lie between `low` and `high`,
+    its probability is one half; `dispersion` is the standard deviation of its logarithm. They are
+    NaN, and so are the probabilities, where nothing fits. `motions` were each played in both
+    directions; `undecided` runs failed: shares, bands and the fit are those of the others (NaN at
+    an intensity where all failed).
+    """
+
+    label: str
+    motions: int
+    undecided: int
+    median: float
+    dispersion: float
+    low: float
+    high: float
+    points: Sequence[Sequence[float]]
+
+
+def curve_of(
+    label: str,
+    hit: NDArray[np.bool_],
+    failed: NDArray[np.bool_],
+    intensities: Floats,
+    draws: int = 0,
+) -> Curve:
+    """The curve of runs (motion, direction, intensity): in which it happened, which failed.
+
+    With `draws` of the motions the fitted median has an interval.
+    """
+    from scipy.special import ndtr
+
+    hits, decided = (hit & ~failed).sum(axis=1), (~failed).sum(axis=1)  # (motion, intensity)
+    median, dispersion = fit_lognormal(intensities, hits.sum(axis=0), decided.sum(axis=0))
+    fitted = ndtr(np.log(intensities / median) / dispersion)
+    points = np.column_stack([intensities, *share_of(hits, decided), fitted]).tolist()
+    low, high = _median_between(intensities, hits, decided, draws)
+    motions, undecided = len(hit), int(failed.sum())
+    return Curve(label, motions, undecided, median, dispersion, low, high, points)
+
+
+def share_of(hits: NDArray[np.int64], decided: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
+    """Share and the ends of its `CONFIDENCE` interval at each intensity, from counts of runs
+    (motion, intensity).
+
+    It is Wilson's interval (1927), which holds near 0 and 1, too, where motions drawn anew all say
+    the same. The directions of a motion tell of the same motion, so the number in it is the
+    effective one: share (1 - share) over the variance of the share between motions, at least that
+    of the motions and at most that of the runs (Korn and Graubard 1998). NaN where no run was
+    decided.
+    """
+    from scipy.special import ndtri
+
+    runs, motions = decided.sum(axis=0), (decided > 0).sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = hits.sum(axis=0) / runs
+        variance = motions / (motions - 1) * ((hits - share * decided) ** 2).sum(axis=0) / runs**2
+        effective = np.clip(share * (1.0 - share) / variance, motions, runs)
+        count = np.where(variance > 0.0, effective, motions)
+        z2 = float(ndtri(0.5 + 0.5 * CONFIDENCE)) ** 2 / count
+        middle = (share + 0.5 * z2) / (1.0 + z2)
+        half = np.sqrt(z2 * share * (1.0 - share) + 0.25 * z2 * z2) / (1.0 + z2)
+    return share, middle - half, middle + half
+
+
+def _median_between(
+    intensities: Floats, hits: NDArray[np.int64], decided: NDArray[np.int64], draws: int
+) -> tuple[float, float]:
+    """The interval of the fitted median: of sets of motions drawn anew, where most have a fit."""
+    sets = np.random.default_rng(2).integers(len(hits), size=(draws, len(hits)))
+    medians = [
+        fit_lognormal(intensities, hits[rows].sum(axis=0), decided[rows].sum(axis=0))[0]
+        for rows in sets
+    ]
+    known = [median for median in medians if not math.isnan(median)]
+    return _ends(known) if known and len(known) >= 0.9 * draws else NO_FIT
+
+
+def fit_lognormal(
+    intensities: Floats, hits: NDArray[np.int64], runs: NDArray[np.int64]
+) -> tuple[float, float]:
+    """Median and dispersion of the lognormal curve of the greatest likelihood (Baker 2015).
+
+    `hits` counts the runs, of those that were decided, in which it happened at each intensity.
+    `NO_FIT` where that is all or none, or where the curve does not rise with the intensity.
+    """
+    from scipy import optimize, special
+
+    if not 0 < hits.sum() < runs.sum():
+        return NO_FIT
+    logarithm = np.log(intensities)
+    centre = float(np.mean(logarithm))
+
+    def unlikelihood(line: Floats) -> float:
+        # convex, as a straight line in ln x; not so in median and dispersion
+        linear = line[0] + line[1] * (logarithm - centre)
+        likelihood = hits * special.log_ndtr(linear) + (runs - hits) * special.log_ndtr(-linear)
+        return -float(np.sum(likelihood))
+
+    how = {"xatol": 1e-9, "fatol": 1e-9, "maxiter": 2000}
+    level, slope = optimize.minimize(unlikelihood, [0.0, 1.0], method="Nelder-Mead", options=how).x
+    return (float(np.exp(centre - level / slope)), float(1.0 / slope)) if slope > 0.0 else NO_FIT
+
+
+#: Draws unless more are asked for; Sobol's sequence is balanced for powers of two.
+SAMPLES = 1024
+#: Rows of a band's history at the most: a picture has no more columns.
+MOST_ROWS = 2000
+#: Shares of the draws between which the bands lie.
+BANDS = (0.025, 0.16, 0.5, 0.84, 0.975)
+_SEED = 1
+
+
+class Interval(Stored):
+    """A figure's value with its interval of `CONFIDENCE`."""
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+
+    @property
+    def half_width(self) -> float:
+        """Distance from the value to the farther end: the figure's u_input."""
+        return max(self.high - self.value, self.value - self.low)
+
+
+class Sensitivity(Stored):
+    """Sobol indices of one uncertain number: shares of a figure's variance, by itself and with all
+    others."""
+
+    name: str
+    first: float
+    total: float
+
+
+class Inputs(Stored):
+    """What the spread of the inputs makes of a scene's figures.
+
+    `figures`: peak rotation (alpha; a block that falls counts as 1, the balance point) and last
+    slip (m; of the blocks that stand) at the scene's own numbers, between the 2.5 and 97.5 %
+    quantiles of the draws. `overturns`: the share of the draws that fall, with its interval (Wilson
+    1927). `sensitivities` of the peak, largest total index first; empty where inputs are correlated
+    (the indices are for independent ones) or the peak does not vary.
+    """
+
+    samples: int
+    model: str
+    names: tuple[str, ...]
+    figures: tuple[Interval, ...]
+    overturns: Interval
+    sensitivities: tuple[Sensitivity, ...]
+    theta_band: float = 0.0
+    note: str = ""
+
+    def u_input(self, name: str) -> float | None:
+        """Half the 95 % interval of a figure, on its longer side; None for a figure that is not
+        among them.
+
+        Of theta_rms the RMS over time of half the band's width, alpha.
+        """
+        if name == "theta_rms":
+            return self.theta_band
+        return next((figure.half_width for figure in self.figures if figure.name == name), None)
+
+
+@dataclass(frozen=True)
+class Propagated:
+    """Draws of a scene, played: what they say, and the bands on theta (alpha) at times `t` (s), a
+    row a quantile of `BANDS`."""
+
+    inputs: Inputs
+    t: Floats
+    bands: Floats
+    values: Floats
+    peaks: Floats
+    fallen: NDArray[np.bool_]
+
+
+def propagate(
+    given: UncertainScene,
+    *,
+    model: EventBasedModel | None = None,
+    samples: int = SAMPLES,
+    seed: int = _SEED,
+    indices: bool = True,
+) -> Propagated:
+    """Play `samples` draws of an uncertain scene with an event-based model (default: the unilateral
+    one).
+
+    Deterministic in `seed`. Raises `InputError` where nothing of the scene is uncertain, or a draw
+    is not a scene.
+    """
+    from scipy.stats import binomtest, qmc
+
+    from rockcheck.ebm.ensemble import play_ensemble
+
+    if not given.spreads:
+        said = "no number of this scene is uncertain: write one as { value = 0.3, sd = 0.03 }"
+        raise InputError(said)
+    model = model or EventBasedModel(pivot="unilateral", tolerance=1e-8)
+    count = 1 << max(1, (samples - 1).bit_length())
+    chance = np.random.default_rng(seed)
+    values = given.values(qmc.Sobol(len(given.spreads), seed=chance).random(count))
+    played = play_ensemble([given.at(row) for row in values], model, rows=MOST_ROWS)
+    own = play_ensemble([given.scene], model)
+    peaks, fallen = np.minimum(played.peak / played.alpha, 1.0), played.side != 0
+    one = np.minimum(own.peak / own.alpha, 1.0)
+    figures = [_interval("peak_rotation", "alpha", one, peaks)]
+    if np.any(~fallen):
+        figures.append(_interval("last_slip", "m", own.last_slip, played.last_slip[~fallen]))
+    bands = np.quantile(played.theta / given.scene.block.alpha, BANDS, axis=0)
+    share = binomtest(int(np.sum(fallen)), count).proportion_ci(CONFIDENCE, method="wilson")
+    correlated = (
+        "inputs are correlated: Sobol indices, which are for independent ones, are left out"
+    )
+    found = Inputs(
+        samples=count,
+        model=model.name,
+        names=given.names,
+        figures=tuple(figures),
+        overturns=Interval(
+            name="overturns", unit="1", value=float(np.mean(fallen)), low=share.low, high=share.high
+        ),
+        sensitivities=sensitivities(given, model, seed=seed)
+        if indices and given.independent
+        else (),
+        theta_band=float(np.sqrt(np.mean((0.5 * (bands[-1] - bands[0])) ** 2))),
+        note="" if given.independent else correlated,
+    )
+    return Propagated(found, played.t, bands, values, peaks, fallen)
+
+
+def sensitivities(
+    given: UncertainScene, model: EventBasedModel, *, samples: int = SAMPLES, seed: int = _SEED
+) -> tuple[Sensitivity, ...]:
+    """First and total Sobol indices of the peak rotation (Saltelli et al. 2010, by scipy), largest
+    total first.
+
+    `samples` (a power of two) times the number of inputs and two more runs. Empty where the peak
+    does not vary.
+    """
+    from scipy.stats import sobol_indices
+
+    def peak_and_fall(points: Floats) -> Floats:
+        scenes = [given.at(row) for row in points.T]
+        found = _batch(scenes, model, until_decided=False)
+        peaks = found.peak / np.array([scene.block.alpha for scene in scenes])
+        return np.array([np.minimum(peaks, 1.0), found.side != 0], dtype=float)
+
+    laws: list[Any] = [spread.law for spread in given.spreads.values()]
+    how = {"func": peak_and_fall, "n": samples, "dists": laws}
+    try:
+        found = sobol_indices(**how, rng=np.random.default_rng(seed))
+    except TypeError:  # scipy before 1.15 calls it random_state
+        found = sobol_indices(**how, random_state=np.random.default_rng(seed))
+    first, total = found.first_order[0].tolist(), found.total_order[0].tolist()
+    rows = [
+        Sensitivity(name=name, first=a, total=b)
+        for name, a, b in zip(given.names, first, total, strict=True)
+    ]
+    return tuple(sorted(rows, key=lambda row: -row.total)) if any(total) else ()
+
+
+def _ends(values: Floats | list[float]) -> tuple[float, float]:
+    """Between them lie `CONFIDENCE` of the values."""
+    low, high = np.quantile(values, (0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE))
+    return float(low), float(high)
+
+
+def _interval(name: str, unit: str, own: Floats, draws: Floats) -> Interval:
+    low, high = _ends(draws)
+    return Interval(name=name, unit=unit, value=float(own[0]), low=low, high=high)
