@@ -13,7 +13,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table as Grid
 
-from rockcheck.reports.drawers import figure_of, live_data
+from rockcheck.reports.drawers import figure_of, live_data, scripts_of
 from rockcheck.reports.show.words import number
 from rockcheck.reports.style import FORMATS, LOOKS, keep_drawn, looks
 from rockcheck.scenes.writing import json_text, made, markdown_table, table_text, write_whole
@@ -150,13 +150,14 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
     for name, content in {**tables, **found.files, "summary.md": markdown(found)}.items():
         *parts, last = name.split("/")
         write_whole(made(folder, *parts) / last, content)
-    plots = [block for block in found.blocks if isinstance(block, Plot)]
+    plots = list(found.plots())
+    figures = made(folder, FIGURES)
     for plot in plots:
-        keep_drawn(folder / FIGURES / plot.name, json_text(asdict(plot)), partial(figure_of, plot), formats)
+        keep_drawn(figures / plot.name, json_text(asdict(plot)), partial(figure_of, plot), formats)
     above = (("Report", "../index.html"),) if (folder.parent / "index.html").exists() else ()
     site = Site(folder, f"rockcheck: {found.title}", above)
     site.assets()
-    live = [live_data(plot) for plot in plots if plot.live]
+    live = [live_data(plot) for plot in plots if plot.live and plot.kind == "lines"]
     if live:
         text = json_text(live).replace("<", "\\u003c")
         write_whole(folder / "curves.js", f"window.rockcheckCurves = {text};\n")
@@ -165,6 +166,7 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
         "finding.html",
         found=found,
         live=bool(live),
+        scripts=scripts_of(plots, figures),
         looks=looks(LOOKS),
         row_cells=row_cells,
         figures=FIGURES,

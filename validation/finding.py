@@ -196,11 +196,15 @@ class Finding:
     failures: Mapping[str, str] = field(default_factory=dict)
     complete: bool = True
     made: Made | None = None
-    files: Mapping[str, str] = field(default_factory=dict)
+    files: Mapping[str, str | bytes] = field(default_factory=dict)
 
     def tables(self) -> Iterator[Table]:
         """The tables among the blocks."""
         return (block for block in self.blocks if isinstance(block, Table))
+
+    def plots(self) -> Iterator[Plot]:
+        """The plots among the blocks."""
+        return (block for block in self.blocks if isinstance(block, Plot))
 
     def table(self, name: str) -> Table:
         """A table by its name."""

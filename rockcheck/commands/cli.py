@@ -34,7 +34,7 @@ COMMANDS = {
     "uncertainty": ("uncertainty", "rockcheck uncertainty fig5a --model mujoco --set time_step=1e-3"),
     "validate": ("validate", "rockcheck validate smoke --out rockcheck-report"),
     "accept": ("accept", 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"'),
-    "spectrum": ("spectrum", "rockcheck spectrum --figure 8 --size 50 --refine"),
+    "spectrum": ("spectrum", "rockcheck spectrum fig8 --size 50 --refine"),
     "ida": ("ida", "rockcheck ida shelf.toml records --intensity sa:0.5"),
     "benchmark": ("benchmark", "rockcheck benchmark --quick"),
     "conformance": ("conformance", "rockcheck conformance --engine mujoco --settings default"),

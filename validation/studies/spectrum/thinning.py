@@ -12,7 +12,8 @@ Floats = NDArray[np.float64]
 
 @kernel
 def enough(t: Floats, values: Floats, coarse: float) -> NDArray[np.bool_]:
-    """Which rows to keep, so that straight lines between them are within `coarse` of all `values` (n, k) at the times `t` (n).
+    """Which rows to keep, so that straight lines between them are within `coarse` of all `values`
+    (n, k) at the times `t` (n).
 
     From the first and last row on, each part is split at the row farthest from its straight line.
     """
@@ -28,7 +29,9 @@ def enough(t: Floats, values: Floats, coarse: float) -> NDArray[np.bool_]:
         for row in range(first + 1, last):
             share = (t[row] - t[first]) / (t[last] - t[first])
             for k in range(values.shape[1]):
-                apart = abs(values[row, k] - ((1.0 - share) * values[first, k] + share * values[last, k]))
+                apart = abs(
+                    values[row, k] - ((1.0 - share) * values[first, k] + share * values[last, k])
+                )
                 if apart > farthest:
                     worst, farthest = row, apart
         if worst > first:
