@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -14,27 +12,18 @@ from axe_playwright_python.sync_playwright import Axe
 from rockcheck.ebm import Spectrum
 from rockcheck.reports.document import publish
 from rockcheck.reports.studies.spectra import paper_figure, write_page
-from rockcheck.reports.studies.stress import write_stress
 from rockcheck.reports.style import save
 from rockcheck.validation.execute.pool import Failure as Lost
 from rockcheck.validation.spectra import study as spectra
-from rockcheck.validation.studies.stress.results import Failure, RunTotals, Stress
+from rockcheck.validation.studies.stress.runs import Chunk, RunTotals
+from rockcheck.validation.studies.stress.stability import CASES, Stable, places
+from rockcheck.validation.studies.stress.study import Stress
 from rockcheck.validation.studies.work_precision.runs import BenchmarkRun, Play
 from rockcheck.validation.studies.work_precision.savings import Saving
 from rockcheck.validation.studies.work_precision.study import Measure, Measured, WorkPrecision
 
 pytestmark = pytest.mark.browser
 
-MADE = MappingProxyType(
-    {
-        "created": "2026-01-01T00:00:00+00:00",
-        "quick": True,
-        "jobs": 1,
-        "wall_seconds": 3.0,
-        "versions": {"rockcheck": "0.1.0", "python": "3.11", "mujoco": "4.0.0"},
-        "hardware": {"processor": "made up", "cores": "2"},
-    }
-)
 PHONE = {"viewport": {"width": 390, "height": 800}}
 
 
@@ -55,15 +44,12 @@ def benchmark_page(folder: Path) -> Path:
 
 
 def stress_page(folder: Path) -> Path:
-    failure = Failure("ebm", "ends", 1, 7, math.inf, "no mode is consistent", file="failures/ebm-ends-1-7.toml")
-    (folder / "failures").mkdir()
-    (folder / failure.file).touch()
-    looked, worst = Counter(ends=10, finite=10, mirror=9), {"ends": (math.inf, 7), "finite": (0.0, 9), "mirror": (0.0, 9)}
-    batches = {
-        model: RunTotals(model=model, runs=10, looked_at=looked, worst=worst, failures=faults)
-        for model, faults in (("ebm", (failure,)), ("ebm-unilateral", ()))
-    }
-    return write_stress(Stress(suite="stress", seed=1, complete=True, batches=batches, **MADE), folder)
+    lost = {Chunk("ebm", 1, 7, 1): Lost("no mode is consistent")}
+    looked, worst = Counter(ends=10, finite=10, mirror=9), {"finite": (0.0, 9), "mirror": (0.0, 9)}
+    figures = {"looked_at": looked, "worst": worst, "counts": Counter(runs=10)}
+    kept = {Chunk(model, 1, 0, 10): RunTotals(model=model, **figures) for model in ("ebm", "cm")}
+    maps = {place: Stable(place.line, place.at, place.value, 0.1, "sinks") for place in places(quick=True) if place.at not in CASES}
+    return publish(Stress(quick=True).gather({**lost, **kept, **maps}), folder)
 
 
 def spectra_page(folder: Path) -> Path:
