@@ -107,7 +107,6 @@ EQUIVALENT = {
         "largest <= ROUNDING * scale  ->  largest < ROUNDING * scale",
     ): "equal to the last bit",
     ("ebm/horizon.py", "tolerance=1e-13", "1e-13  ->  1.0000000000000001e-11"): "still far below the perturbation",
-    ("validation/spectra/ida.py", "0.9 * _FITS", "len(medians) < 0.9 * _FITS  ->  len(medians) <= 0.9 * _FITS"): "one more fit of 200",
     ("ebm/core/settle.py", "[SETTLE, -1.0, -1.0", "1.0  ->  100.0"): "any time long before the first impact",
     ("ebm/core/series.py", "stack", "top + 2  ->  top - 2"): "the narrowest interval ends the search before the stack is full",
     ("ebm/core/series.py", "a[row, 0] + low", "a[row, 0] > floor  ->  a[row, 0] >= floor"): "a bound that saves the search, met or not",
