@@ -72,23 +72,6 @@ def test_rows_far_apart_leave_one_that_can_be_compared() -> None:
     assert predictability_horizon(scene.replace(duration=12.0)) == 4.0
 
 
-def test_what_is_played_beside_the_scene() -> None:
-    """Only what can make a difference: the other law where a block may hop beside a wall, motions and starts that there are."""
-    free, bilateral = EventBasedModel(pivot="unilateral"), EventBasedModel(pivot="bilateral")
-    beside = balanced(initial_rotation=0.0, walls=[Wall(side="left", gap=0.1, restitution=0.5)])
-    (law,) = _disturbed(beside, free, 1e-6)
-    assert law == (free.model_copy(update={"impacts": "floor-first"}), beside)
-    assert [*_disturbed(beside, bilateral, 1e-6)] == []
-    assert [*_disturbed(balanced(initial_rotation=0.0), free, 1e-6)] == []
-    assert [one.initial_rotation for _, one in _disturbed(balanced(initial_rotation=0.1), free, 1e-6)] == [
-        0.1 * (1 - 1e-6),
-        0.1 * (1 + 1e-6),
-    ]
-    shaken = balanced(initial_rotation=0.0, excitation=Sine(amplitude=5.0, period=2.0, cycles=5))
-    assert [one.excitation.amplitude for _, one in _disturbed(shaken, free, 1e-6)] == [5.0 * (1 - 1e-6), 5.0 * (1 + 1e-6)]
-    assert len([*_disturbed(shaken.replace(initial_rotation=0.1), free, 1e-6)]) == 4
-
-
 def test_a_start_against_a_wall_is_disturbed_away_from_it() -> None:
     tilt = 0.3 * PAPER_BLOCK.alpha
     gap = PAPER_BLOCK.radius * (math.sin(PAPER_BLOCK.alpha + tilt) - math.sin(PAPER_BLOCK.alpha - tilt))  # of the upright block

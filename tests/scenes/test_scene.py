@@ -99,7 +99,7 @@ def test_restitution_is_between_0_and_1(value):
         ({"excitation": {"kind": "record", "file": 3}}, "excitation.file", "the path of a"),
         ({"excitation": {"kind": "record", "file": "a.csv", "unscaled": [0.1]}}, "excitation.unscaled", "together with file"),
         ({"excitation": {"kind": "record", "file": "a.csv", "time_step": -0.1}}, "excitation.time_step", "-0.1 is not allowed"),
-        ({"excitation": {"kind": "record", "file": "a.csv", "unit": "ft/s2"}}, "excitation.unit", "cm/s2"),
+        ({"excitation": {"kind": "record", "file": "a.csv", "unit": "furlong"}}, "excitation.unit", "cm/s2"),
         ({"vertical": {"kind": "ricker", "amplitude": 1.0}}, "vertical.period", "is missing"),
         ({"initial_rotation": 1.6}, "initial_rotation", "1.6 is not allowed"),
         ({"initial_rotation": 0.1}, "initial_rotation", "inside the left wall"),

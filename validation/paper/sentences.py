@@ -45,15 +45,11 @@ FALLEN, STANDS, GAINED, LOST = "FTGX"
 
 @dataclass(frozen=True)
 class Claim:
-    """A sentence of the paper, where it stands, what was computed for it, and the verdict."""
+    """A sentence of the paper, what was computed for it, and the verdict."""
 
-    name: str
-    sentence: str
-    place: str
+    about: Mapping[str, Any]
     verdict: str
     finding: str
-    criterion: str
-    figures: tuple[int, ...]
     rows: Sequence[Row]
 
 
@@ -61,84 +57,68 @@ class Claim:
 class Beyond:
     """A finding that the paper does not tell of, and the case that shows it best."""
 
-    name: str
-    sentence: str
+    about: Mapping[str, Any]
     words: str
-    gained_means: str
-    lost_means: str
     shown: Shown
 
 
 def claims_of(paper: Paper) -> list[Claim]:
-    """The paper's sentences, judged."""
-    return [_judged(paper, **sentence) for sentence in SENTENCES["claim"]]
-
-
-def _judged(
-    paper: Paper,
-    *,
-    measure: str,
-    finding: str,
-    criterion: str,
-    generally: bool = False,
-    **more: Any,
-) -> Claim:
-    """A sentence holds where all rows do, or, of what is said to be so generally, most of them."""
-    about = {name: more.pop(name) for name in ("name", "sentence", "place", "figures")}
-    rows, says = getattr(measures, measure)(paper, **more)
-    judged = [row.holds for row in rows if row.holds is not None]
-    enough = sum(judged) > GENERALLY * len(judged) if generally else all(judged)
-    said = finding.format(held=sum(judged), all=len(judged), **says)
-    against = [row.what for row in rows if row.holds is False]
-    if any(judged) and 0 < len(against) <= MOST_NAMED:
-        said += f" Not so: {'; '.join(against)}."
-    return Claim(
-        **about,
-        verdict="holds" if enough else "holds in part" if any(judged) else "does not hold",
-        finding=said,
-        criterion=criterion
-        + (f"; generally: in more than {GENERALLY:.0%} of the cases" if generally else ""),
-        rows=rows,
-    )
+    """The paper's sentences, judged: a sentence holds where all rows do, or, of what is said to be
+    so generally, most of them."""
+    found = []
+    for about in SENTENCES["claim"]:
+        rows, says = getattr(measures, about["measure"])(paper, **about.get("with", {}))
+        judged = [row.holds for row in rows if row.holds is not None]
+        held = sum(judged)
+        enough = held > GENERALLY * len(judged) if "generally" in about else all(judged)
+        said = about["finding"].format(held=held, all=len(judged), **says)
+        against = [row.what for row in rows if row.holds is False]
+        if held and 0 < len(against) <= MOST_NAMED:
+            said += f" Not so: {'; '.join(against)}."
+        verdict = "holds" if enough else "holds in part" if held else "does not hold"
+        found.append(Claim(about, verdict, said, rows))
+    return found
 
 
 def findings_of(paper: Paper) -> list[Beyond]:
     """What the spectra show and the paper does not say."""
     found = []
-    for one in SENTENCES["finding"]:
-        shown: Shown = getattr(measures, one["measure"])(paper)
+    for about in SENTENCES["finding"]:
+        shown: Shown = getattr(measures, about["measure"])(paper)
         counts = {"gained": shown.gained.sum(), "lost": shown.lost.sum()}
-        words = one["words"].format(**counts, **shown.says)
-        means = one["gained"], one.get("lost", "")
-        found.append(Beyond(one["name"], one["sentence"], words, *means, shown))
+        found.append(Beyond(about, about["words"].format(**counts, **shown.says), shown))
     return found
 
 
 def blocks(paper: Paper, claims: Sequence[Claim]) -> Iterator[Block]:
     """The sentences with their verdicts, the safe areas behind most of them, and our findings."""
-    columns = {
-        "sentence": text("sentence", "sentence, restated"),
-        "place": text("place", "where in the paper", brief=False),
-        "verdict": text("verdict"),
-        "finding": text("finding"),
-        "criterion": text("criterion", "judged by", brief=False),
-        "figures": text("figures", brief=False),
-    }
+    columns = [
+        text("sentence", "sentence, restated"),
+        text("place", "where in the paper", brief=False),
+        text("verdict"),
+        text("finding"),
+        text("criterion", "judged by", brief=False),
+        text("figures", brief=False),
+    ]
     rows = [
         [
-            *(getattr(claim, name) for name in ("sentence", "place")),
+            *(claim.about[name] for name in ("sentence", "place")),
             Mark(claim.verdict, VERDICTS[claim.verdict]),
-            *(claim.finding, claim.criterion, ", ".join(map(str, claim.figures))),
+            claim.finding,
+            claim.about["criterion"],
+            ", ".join(map(str, claim.about["figures"])),
         ]
         for claim in claims
     ]
     size = f"{len(paper.amplitudes)} x {len(paper.frequencies)}"
     note = f"Each sentence of section 5 and the conclusions, judged by spectra of {size} nodes."
     title = "What the paper says of them, checked"
-    yield Table("claims", list(columns.values()), rows, title, note)
+    yield Table("claims", columns, rows, title, note)
     yield _areas(paper)
     yield _rows(
-        "claim-figures", "The figures behind each verdict", {c.name: c.rows for c in claims}
+        "claim-figures",
+        "The figures behind each verdict",
+        {c.about["name"]: c.rows for c in claims},
     )
     yield from beyond(paper, findings_of(paper))
 
@@ -148,12 +128,14 @@ def beyond(paper: Paper, found: Sequence[Beyond]) -> Iterator[Block]:
     yield Table(
         "findings",
         [text("sentence", "finding"), text("case", "where"), text("words", "nodes", brief=False)],
-        [[one.sentence, f"{one.shown.case} (Fig. {one.shown.figure})", one.words] for one in found],
+        [
+            [one.about["sentence"], f"{one.shown.case} (Fig. {one.shown.figure})", one.words]
+            for one in found
+        ],
         "What the paper does not say",
     )
     gained, lost = (
-        "; ".join(filter(None, means))
-        for means in zip(*((one.gained_means, one.lost_means) for one in found), strict=True)
+        "; ".join(one.about[key] for one in found if key in one.about) for key in ("gained", "lost")
     )
     yield Plot(
         "findings",
@@ -168,7 +150,9 @@ def beyond(paper: Paper, found: Sequence[Beyond]) -> Iterator[Block]:
             "key": {FALLEN: "overturned", STANDS: "safe", GAINED: gained, LOST: lost},
         },
     )
-    yield _rows("finding-figures", "All cases", {one.name: one.shown.rows for one in found})
+    yield _rows(
+        "finding-figures", "All cases", {one.about["name"]: one.shown.rows for one in found}
+    )
 
 
 def _map(one: Shown, column: int) -> dict[str, Any]:

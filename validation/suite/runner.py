@@ -54,6 +54,7 @@ class PlannedCell(Task):
 
     scene: Scene = field(compare=False)
     variant: ModelVariant = field(compare=False)
+    model: str
     key: str
     uncertainty: bool = field(default=False, compare=False)
 
@@ -86,6 +87,7 @@ class PlannedBatch(Task):
     base: Scene = field(compare=False)
     variant: ModelVariant = field(compare=False)
     numbers: range = field(compare=False)
+    model: str
     key: str
 
     @property
@@ -245,7 +247,7 @@ class SuiteStudy(Study):
     def _planned(self, scene: Scene, variant: ModelVariant) -> PlannedCell:
         own = self.suite.suite_of(scene.name)
         keyed = replace(variant, settings={**variant.settings, **key_of(own.uncertainty)})
-        return PlannedCell(scene, variant, _key(scene, keyed), own.uncertainty, **self._how(scene.name, variant))
+        return PlannedCell(scene, variant, variant.label, _key(scene, keyed), own.uncertainty, **self._how(scene.name, variant))
 
     def _how(self, place: str, variant: ModelVariant) -> dict[str, Any]:
         kind = family(variant.family_name)
@@ -261,7 +263,7 @@ class SuiteStudy(Study):
             numbers = range(start, min(start + ensemble.batch, ensemble.count))
             settings = {**variant.settings, "drawn": {**drawing, "numbers": [numbers.start, numbers.stop]}}
             key = _key(base, replace(variant, settings=settings))
-            yield PlannedBatch(ensemble, base, variant, numbers, key, **self._how(ensemble.name, variant))
+            yield PlannedBatch(ensemble, base, variant, numbers, variant.label, key, **self._how(ensemble.name, variant))
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Planned]:
         """All cells and batches of models that are installed."""

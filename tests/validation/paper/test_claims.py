@@ -49,7 +49,7 @@ def synthetic(height, size=40):
 def judged(spectra_made, least=None):
     least = least or {None: 10.0, (0.103, 0.0): 9.0, (0.103, 1.0): 8.0}
     tongues = {one.scene.floor.friction: tongue(one) for one in spectra_made if not one.scene.walls}
-    return {claim.name: claim for claim in claims_of(Paper(spectra_made, least, tongues))}
+    return {claim.about["name"]: claim for claim in claims_of(Paper(spectra_made, least, tongues))}
 
 
 def tongue(spectrum):
@@ -340,6 +340,6 @@ def test_the_documentation_tells_the_findings_of_the_kept_spectra():
     part = text.partition("<!-- findings -->")[2].partition("<!-- end -->")[0]
     shown = [line.strip("| \n").split(" | ") for line in part.splitlines()]
     assert [row for row in shown if len(row) == 3][1:] == [
-        [one.sentence, f"{one.shown.case} (Fig. {one.shown.figure})", one.words]
+        [one.about["sentence"], f"{one.shown.case} (Fig. {one.shown.figure})", one.words]
         for one in findings_of(Paper(kept_spectra()))
     ]

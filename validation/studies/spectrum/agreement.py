@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import Spectrum
 from rockcheck.engines.engine import Engine
-from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build, not_installed
 from rockcheck.validation.finding import Block, Column, Plot, Table, Text, text
@@ -36,44 +35,8 @@ NEAR = 2
 MAPPED, MAP_SIZE = 8, 25
 
 
-class Share(Stored):
-    """Equal outcomes of one model at the nodes of one spectrum, near the boundary or away from it.
-
-    `equal` counts them against each of `REFERENCES`; `failed` are nodes that the model could not
-    finish, counted as unequal.
-    """
-
-    spectrum: str
-    figure: int | None
-    model: str
-    near: bool
-    nodes: int
-    failed: int
-    equal: dict[str, int]
-
-
-class Map(Stored):
-    """The spectra of one figure by one model, coarsely: by panel, rows of letters, lowest amplitude
-    first. `equal` of the `nodes` have the unilateral event-based model's outcome."""
-
-    model: str
-    nodes: int
-    equal: int
-    outcomes: dict[str, tuple[str, ...]]
-
-
-class Agreement(Stored):
-    """All shares, and a map by each model; `date` is the day of the run, in UTC."""
-
-    format: int = 3
-    about: str
-    date: str
-    versions: dict[str, str]
-    settings: dict[str, dict[str, Any]]
-    shares: tuple[Share, ...]
-    map_frequencies: tuple[float, ...]
-    map_amplitudes: tuple[float, ...]
-    maps: tuple[Map, ...]
+#: All shares and maps, as JSON keeps them (`agree`).
+Agreement = Mapping[str, Any]
 
 
 def choose_nodes(
@@ -139,64 +102,70 @@ def agree(
     book: Book, spectra: Mapping[Panel, Spectrum], request: Request, count: int
 ) -> Agreement | None:
     """Up to `count` nodes of each spectrum by the other models, and how many outcomes are equal;
-    and a map of one figure by each model. None where nodes are still to be played."""
+    and a map of one figure by each model. None where nodes are still to be played.
+
+    `shares` are those of one model at the nodes of one spectrum, near the boundary or away from it:
+    `equal` counts nodes against each of `REFERENCES`; `failed` are nodes that the model could not
+    finish, counted as unequal. A map has rows of letters by panel, lowest amplitude first; `equal`
+    of its `nodes` have the unilateral event-based model's outcome.
+    """
     others = [replace(request, model=model, settings={}) for model in candidates()]
     requests = {one.model: one for one in (request, *others)}
     shares = [list(_shares(book, panel, one, others, count)) for panel, one in spectra.items()]
-    maps = _maps(book, list(spectra), requests)
+    maps = list(_maps(book, list(spectra), requests))
     if book.wanted:
         return None
     fewer = [one.model for one in others if one.model in PLAYED_SHARE]
-    return Agreement(
-        about=f"Share of equal outcomes at {count} nodes of each spectrum of {request.size} x"
+    about = (
+        f"Share of equal outcomes at {count} nodes of each spectrum of {request.size} x"
         f" {request.size} nodes. Half of them are at most {NEAR} nodes from a boundary (near), the"
         " others further away. Models are held against the paper's bilateral event-based model and"
         " against the unilateral one, which lets the block hop as the other models do. Runs of the"
         " other models end with the pulse where the block then lacks the energy to tip over,"
         f" otherwise {SETTLE:g} s later. A block that then stands counts as safe."
-        + (f" Played at fewer of the nodes: {', '.join(fewer)}." if fewer else ""),
-        date=datetime.now(UTC).date().isoformat(),
-        versions=provenance.versions(),
-        settings={model: dict(one.settings) for model, one in requests.items()},
-        shares=tuple(share for some in shares for share in some),
-        map_frequencies=tuple(_coarse(request).frequencies.tolist()),
-        map_amplitudes=tuple(_coarse(request).amplitudes.tolist()),
-        maps=tuple(maps),
     )
+    return {
+        "about": about + (f" Played at fewer of the nodes: {', '.join(fewer)}." if fewer else ""),
+        "date": datetime.now(UTC).date().isoformat(),
+        "versions": provenance.versions(),
+        "settings": {model: dict(one.settings) for model, one in requests.items()},
+        "shares": [share for some in shares for share in some],
+        "map_frequencies": _coarse(request).frequencies.tolist(),
+        "map_amplitudes": _coarse(request).amplitudes.tolist(),
+        "maps": maps,
+    }
 
 
 def _shares(
     book: Book, panel: Panel, spectrum: Spectrum, others: Sequence[Request], count: int
-) -> Iterator[Share]:
+) -> Iterator[dict[str, Any]]:
     nodes, near = choose_nodes(spectrum, count, panel.name)
     i, j = nodes.T
     sides = {"ebm": spectrum.outcomes[i, j]}
     for one in others:
-        if not plays(one, panel):
-            continue
         chosen = first_of(near, nodes_played(one.model, count))
         where = one.amplitudes[i[chosen]], one.frequencies[j[chosen]]
-        found = book.outcomes(panel.scene, *where, one.model, one.settings)
-        if found is None:
+        if not plays(one, panel):
             continue
-        mine, failures = found
-        sides.setdefault(one.model, mine)
+        if (found := book.outcomes(panel.scene, *where, one.model, one.settings)) is None:
+            continue
+        sides.setdefault(one.model, found[0])
         for part in (True, False):
             here = near[chosen] == part
-            fine = here & ~failures
-            yield Share(
-                spectrum=panel.name,
-                figure=panel.figure,
-                model=one.model,
-                near=part,
-                nodes=int(here.sum()),
-                failed=int(np.sum(here & failures)),
-                equal={
-                    other: int(np.sum(fine & (mine == sides[other][chosen])))
+            fine = here & ~found[1]
+            yield {
+                "spectrum": panel.name,
+                "figure": panel.figure,
+                "model": one.model,
+                "near": part,
+                "nodes": int(here.sum()),
+                "failed": int(np.sum(here & found[1])),
+                "equal": {
+                    other: int(np.sum(fine & (found[0] == sides[other][chosen])))
                     for other in REFERENCES
                     if other != one.model and other in sides
                 },
-            )
+            }
 
 
 def _coarse(request: Request) -> Request:
@@ -209,60 +178,58 @@ def mapped(panels: Sequence[Panel]) -> list[Panel]:
     return [p for p in panels if p.figure == (MAPPED if MAPPED in figures else figures[0])]
 
 
-def _maps(book: Book, panels: Sequence[Panel], requests: Mapping[str, Request]) -> Iterator[Map]:
-    played = {
-        model: [book.spectrum(panel, _coarse(one)) for panel in mapped(panels)]
-        for model, one in requests.items()
-        if model not in PLAYED_SHARE
-    }
-    if book.wanted:
-        return
-    for model, spectra in played.items():
-        both = list(zip(mapped(panels), spectra, played["ebm-unilateral"], strict=True))
-        yield Map(
-            model=model,
-            nodes=sum(mine.outcomes.size for _, mine, _ in both if mine),
-            equal=sum(
-                int(np.sum(mine.outcomes == true.outcomes))
-                for _, mine, true in both
-                if mine and true
-            ),
-            outcomes={
-                panel.name: tuple(map("".join, letters_of(mine.outcomes, mine.undecided)))
-                for panel, mine, _ in both
-                if mine
-            },
+def _maps(
+    book: Book, panels: Sequence[Panel], requests: Mapping[str, Request]
+) -> Iterator[dict[str, Any]]:
+    letters: dict[str, dict[str, list[str]]] = {}
+    for model, one in requests.items():
+        for panel in mapped(panels) if model not in PLAYED_SHARE else ():
+            if (drawn := book.spectrum(panel, _coarse(one))) is not None:
+                rows = letters_of(drawn.outcomes, drawn.undecided)
+                letters.setdefault(model, {})[panel.name] = ["".join(row) for row in rows]
+    for model, mine in letters.items():
+        true = letters.get("ebm-unilateral", {})
+        equal = sum(
+            a == b
+            for name in mine.keys() & true.keys()
+            for a, b in zip("".join(mine[name]), "".join(true[name]), strict=True)
         )
+        nodes = MAP_SIZE**2 * len(mine)
+        yield {"model": model, "nodes": nodes, "equal": equal, "outcomes": mine}
 
 
 def blocks(found: Agreement, panels: Sequence[Panel], came: bool) -> Iterator[Block]:
     """What a reader is told of it; `came`: it came with the package."""
-    origin = f"Computed on {found.date}"
+    origin = f"Computed on {found['date']}"
     if came:
         origin = (
-            f"Not computed in this run: it came with the package, from a run on {found.date} by"
-            f" rockcheck {found.versions.get('rockcheck', '')}. --agreement 200 computes it anew"
+            f"Not computed in this run: it came with the package, from a run on {found['date']} by"
+            f" rockcheck {found['versions'].get('rockcheck', '')}. --agreement 200 computes it anew"
         )
     settings = "; ".join(
         f"{model} {', '.join(f'{key} {value}' for key, value in chosen.items()) or 'as it comes'}"
-        for model, chosen in found.settings.items()
+        for model, chosen in found["settings"].items()
     )
-    engines = {"mujoco", "pybullet", "pymunk", "dartpy", "drake"} & found.versions.keys()
-    versions = ", ".join(f"{name} {found.versions[name]}" for name in sorted(engines))
-    about = f"{found.about} {origin}. Settings: {settings}. {versions}."
+    engines = {"mujoco", "pybullet", "pymunk", "dartpy", "drake"} & found["versions"].keys()
+    versions = ", ".join(f"{name} {found['versions'][name]}" for name in sorted(engines))
+    about = f"{found['about']} {origin}. Settings: {settings}. {versions}."
     yield Text(about, "The same spectra by the other models", on="page")
-    models = list(dict.fromkeys(share.model for share in found.shares))
-    rows = [[model, *_row([s for s in found.shares if s.model == model])] for model in models]
+    models = list(dict.fromkeys(share["model"] for share in found["shares"]))
+    rows = [[model, *_row([s for s in found["shares"] if s["model"] == model])] for model in models]
     yield Table("agreement", [Column("model", kind="model"), *_columns()], rows)
-    groups = dict.fromkeys((share.spectrum, share.model) for share in found.shares)
+    groups = dict.fromkeys((share["spectrum"], share["model"]) for share in found["shares"])
     rows = [
-        [name, model, *_row([s for s in found.shares if (s.spectrum, s.model) == (name, model)])]
+        [
+            name,
+            model,
+            *_row([s for s in found["shares"] if (s["spectrum"], s["model"]) == (name, model)]),
+        ]
         for name, model in groups
     ]
     columns = [text("spectrum"), Column("model", kind="model"), *_columns()]
     by = {"title": "Spectrum by spectrum", "on": "page", "folded": True}
     yield Table("agreement-by-spectrum", columns, rows, **by)  # type: ignore[arg-type]
-    if found.maps:
+    if found["maps"]:
         yield _drawn(found, panels)
 
 
@@ -275,40 +242,42 @@ def _columns() -> list[Column]:
     return [*shares, Column("nodes"), Column("failed")]
 
 
-def _row(shares: Sequence[Share]) -> list[Any]:
+def _row(shares: Sequence[Any]) -> list[Any]:
     cells: list[Any] = []
     for reference in REFERENCES:
         for near in (True, False):
-            mine = [share for share in shares if share.near == near and reference in share.equal]
-            nodes = sum(share.nodes for share in mine)
-            cells.append(sum(s.equal[reference] for s in mine) / nodes if nodes else None)
-    return [*cells, sum(s.nodes for s in shares), sum(s.failed for s in shares)]
+            mine = [
+                share for share in shares if share["near"] == near and reference in share["equal"]
+            ]
+            nodes = sum(share["nodes"] for share in mine)
+            cells.append(sum(s["equal"][reference] for s in mine) / nodes if nodes else None)
+    return [*cells, sum(s["nodes"] for s in shares), sum(s["failed"] for s in shares)]
 
 
 def _drawn(found: Agreement, panels: Sequence[Panel]) -> Plot:
     equal = ", ".join(
-        f"{one.model} {one.equal} of {one.nodes}"
-        for one in found.maps
-        if one.model != "ebm-unilateral"
+        f"{one['model']} {one['equal']} of {one['nodes']}"
+        for one in found["maps"]
+        if one["model"] != "ebm-unilateral"
     )
     shown = [
         {
             "title": panel.title.replace(", ", "\n") if row == 0 else "",
             "free": panel.wall is None,
-            "outcomes": "".join(one.outcomes[panel.name]),
+            "outcomes": "".join(one["outcomes"][panel.name]),
             "place": [row, 1, column],
-            "row": one.model,
+            "row": one["model"],
         }
-        for row, one in enumerate(found.maps)
+        for row, one in enumerate(found["maps"])
         for column, panel in enumerate(panels)
     ]
-    axes = {"frequencies": found.map_frequencies, "amplitudes": found.map_amplitudes}
-    size = len(found.map_frequencies)
+    axes = {"frequencies": found["map_frequencies"], "amplitudes": found["map_amplitudes"]}
+    size = len(found["map_frequencies"])
     return Plot(
         "models",
         f"Fig. {panels[0].figure} by every model" if panels[0].figure else "By every model",
         kind="spectra",
         note=f"{size} x {size} nodes a spectrum; equal to the unilateral event-based model's:"
         f" {equal}.",
-        data={**axes, "record": False, "panels": shown, "height": 0.4 + 0.92 * len(found.maps)},
+        data={**axes, "record": False, "panels": shown, "height": 0.4 + 0.92 * len(found["maps"])},
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -68,21 +69,19 @@ class Request:
             said = f"{self.size} is not allowed: give 2 to {MOST_SIZE} nodes an axis"
             raise InputError(said, "--size")
         settings = {**SETTINGS.get(self.model, {}), **self.settings}
-        frequencies = axis(*self.frequency_range, self.size, "--frequencies")
-        amplitudes = axis(*self.amplitude_range, self.size, "--amplitudes")
-        for name, value in (("settings", settings), ("_axes", (frequencies, amplitudes))):
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, "settings", settings)
         build(self.model, settings)
+        _ = self.frequencies, self.amplitudes
 
-    @property
+    @cached_property
     def frequencies(self) -> Floats:
         """omega_p/p of the nodes."""
-        return self._axes[0]  # type: ignore[attr-defined]
+        return axis(*self.frequency_range, self.size, "--frequencies")
 
-    @property
+    @cached_property
     def amplitudes(self) -> Floats:
         """a_p/(g tan alpha) of the nodes."""
-        return self._axes[1]  # type: ignore[attr-defined]
+        return axis(*self.amplitude_range, self.size, "--amplitudes")
 
     def other_laws(self, scene: Scene) -> list[dict[str, Any]]:
         """The settings with each other law of impacts on which outcomes may depend."""

@@ -93,7 +93,7 @@ class Spectra(Study):
             blocks += sentences.blocks(found.paper, claims)
         compared = found.agreement
         if self._papers and not self.compared:
-            compared = agreement.Agreement.model_validate(read_json(KEPT / "agreement.json"))
+            compared = read_json(KEPT / "agreement.json")
             panels = [*paper_panels()]
         if compared:
             mapped = agreement.mapped(panels)
@@ -106,7 +106,7 @@ class Spectra(Study):
             data={
                 "model": self.request.model,
                 "settings": dict(self.request.settings),
-                "agreement": compared and compared.model_dump(mode="json"),
+                "agreement": compared,
             },
             files={
                 f"{self._stem(panel)}.{kind}": write(one, self._about(panel, one))
