@@ -190,7 +190,13 @@ class Motion:
 
 
 def play_motions(
-    scene: Scene, amplitude_ratios: Floats, frequency_ratios: Floats, *, model: EventBasedModel, parts: int
+    scene: Scene,
+    amplitude_ratios: Floats,
+    frequency_ratios: Floats,
+    *,
+    model: EventBasedModel,
+    parts: int,
+    jobs: int | None = None,
 ) -> list[Motion | None]:
     """The motion at nodes of a spectrum (1-D arrays of one length), None where the run failed.
 
@@ -204,7 +210,7 @@ def play_motions(
     played = [scenes[a if changing else 1.0, f] for a, f in nodes]
     lengths = np.array([one.duration / natural.time_unit(one) for one in played])
     packed = replace(_packed(scene, amplitude_ratios, frequency_ratios, model), durations=lengths)
-    found = batch.run_batch(packed, model, until_decided=False, parts=parts, strict=False)
+    found = batch.run_batch(packed, model, until_decided=False, parts=parts, strict=False, jobs=jobs)
     motions: list[Motion | None] = []
     for one, failed, side, at_rest, states, written in zip(
         played, found.failed, found.side, found.at_rest, found.motion, found.written, strict=True

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,16 +13,18 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table as Grid
 
-from rockcheck.reports.drawers import figure_of, live_data
+from rockcheck.reports.drawers import figure_of, live_data, scripts_of
 from rockcheck.reports.show.words import number
 from rockcheck.reports.style import FORMATS, LOOKS, keep_drawn, looks
-from rockcheck.scenes.writing import json_text, markdown_table, table_text, write_whole
+from rockcheck.scenes.writing import json_text, made, markdown_table, table_text, write_whole
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Text, plain
 
 #: The sign of a verdict, beside its colour.
 SIGNS = {"pass": "✓", "changed": "△", "incomplete": "–", "fail": "✕", "error": "!", "": ""}
 #: The folder of a page's figures.
 FIGURES = "figures"
+#: The folder of the scenes that show a failure.
+FAILING = "failures"
 #: Rows of a table that a terminal shows.
 MOST_ROWS = 40
 COLOURS = {"fail": "red", "error": "red", "changed": "yellow", "incomplete": "yellow"}
@@ -30,6 +32,8 @@ COLOURS = {"fail": "red", "error": "red", "changed": "yellow", "incomplete": "ye
 
 def words(cell: Any, column: Column, write: Callable[[float, int], str] = number) -> str:
     """A cell's value for people; a sign before it where it has a verdict."""
+    if isinstance(cell, Mark) and cell.digits:
+        column = replace(column, digits=cell.digits)
     shown = _value(plain(cell), column, write)
     sign = SIGNS[cell.verdict] if isinstance(cell, Mark) else ""
     return f"{sign} {shown}".strip()
@@ -135,21 +139,25 @@ def block_markdown(block: Table | Plot | Text) -> str:
 
 
 def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -> Path:
-    """Write `run.json`, a CSV a table, `summary.md`, the figures and `index.html`; returns the
-    page."""
+    """Write `run.json`, a CSV a table, `summary.md`, the figures, the scenes of failures and
+    `index.html`; returns the page."""
     from rockcheck.reports.site import Site
 
     write_whole(folder / "run.json", json_text(found.as_dict()) + "\n")
-    for table in found.tables():
-        write_whole(folder / f"{table.name}.csv", csv(table))
-    write_whole(folder / "summary.md", markdown(found))
-    plots = [block for block in found.blocks if isinstance(block, Plot)]
+    tables = {f"{table.name}.csv": csv(table) for table in found.tables()}
+    for old in (folder / FAILING).glob("*.toml"):
+        old.unlink()
+    for name, content in {**tables, **found.files, "summary.md": markdown(found)}.items():
+        *parts, last = name.split("/")
+        write_whole(made(folder, *parts) / last, content)
+    plots = list(found.plots())
+    figures = made(folder, FIGURES)
     for plot in plots:
-        keep_drawn(folder / FIGURES / plot.name, json_text(asdict(plot)), partial(figure_of, plot), formats)
+        keep_drawn(figures / plot.name, json_text(asdict(plot)), partial(figure_of, plot), formats)
     above = (("Report", "../index.html"),) if (folder.parent / "index.html").exists() else ()
     site = Site(folder, f"rockcheck: {found.title}", above)
     site.assets()
-    live = [live_data(plot) for plot in plots if plot.live]
+    live = [live_data(plot) for plot in plots if plot.live and plot.kind == "lines"]
     if live:
         text = json_text(live).replace("<", "\\u003c")
         write_whole(folder / "curves.js", f"window.rockcheckCurves = {text};\n")
@@ -158,6 +166,7 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
         "finding.html",
         found=found,
         live=bool(live),
+        scripts=scripts_of(plots, figures),
         looks=looks(LOOKS),
         row_cells=row_cells,
         figures=FIGURES,

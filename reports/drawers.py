@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import importlib
 import math
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rockcheck.reports.style import LOOKS, PAGE, figure_style, log_scales
@@ -15,7 +17,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Drawers of other kinds of plots: module and function, which takes the plot and returns a figure.
-DRAWERS: dict[str, tuple[str, str]] = {}
+DRAWERS: dict[str, tuple[str, str]] = {
+    "spectra": ("rockcheck.reports.show.spectrum", "figure"),
+    "stable-steps": (__name__, "stable_steps"),
+}
+#: What writes the scripts of a live plot of such a kind: module and function, which takes the plot
+#: and the folder of figures and returns the scripts that the page reads, in order.
+SCRIPTS = {"spectra": ("rockcheck.reports.show.spectrum", "write_scripts")}
 #: Colours by day and by night of series without a look, in their order; grey for "thin" ones.
 COLOURS = (
     ("#0072b2", "#3d9fdc"),
@@ -40,10 +48,19 @@ STYLES: dict[str, dict[str, Any]] = {
 def figure_of(plot: Plot) -> Figure:
     """The figure of a plot."""
     if plot.kind in DRAWERS:
-        module, name = DRAWERS[plot.kind]
-        drawn: Figure = getattr(importlib.import_module(module), name)(plot)
+        drawn: Figure = _function(DRAWERS[plot.kind])(plot)
         return drawn
     return lines(plot)
+
+
+def scripts_of(plots: Sequence[Plot], folder: Path) -> list[str]:
+    """Writes the scripts of live plots with a drawer of their own; returns those of the page."""
+    found = [_function(SCRIPTS[plot.kind])(plot, folder) for plot in plots if plot.live and plot.kind in SCRIPTS]
+    return list(dict.fromkeys(script for some in found for script in some))
+
+
+def _function(name: tuple[str, str]) -> Any:
+    return getattr(importlib.import_module(name[0]), name[1])
 
 
 def lines(plot: Plot) -> Figure:
@@ -72,6 +89,44 @@ def lines(plot: Plot) -> Figure:
             ax.set_xlabel(plot.x.label)
         if handles:
             figure.legend(handles.values(), handles, loc="outside lower center", ncols=4)
+    return figure
+
+
+def stable_steps(plot: Plot) -> Figure:
+    """A panel an axis: the largest stable step of each model with its settings, by colour and number."""
+    import numpy as np
+    from matplotlib.figure import Figure
+
+    tried, models = plot.data["tried"], plot.data["models"]
+    with figure_style():
+        figure = Figure(figsize=(PAGE, 5.6), layout="constrained")
+        for ax, (words, values, found) in zip(
+            figure.subplots(2, 2).flat, plot.data["panels"], strict=True
+        ):
+            steps = np.array(found, dtype=float)
+            with np.errstate(divide="ignore"):
+                ax.imshow(
+                    np.log10(steps),
+                    cmap="viridis",
+                    vmin=np.log10(tried[-1]),
+                    vmax=np.log10(tried[0]),
+                    aspect="auto",
+                )
+            for (row, column), step in np.ndenumerate(steps):
+                colour = "#1b1b1b" if step >= tried[2] or not step else "w"
+                ax.text(
+                    column,
+                    row,
+                    f"{step:g}" if step else "none",
+                    ha="center",
+                    va="center",
+                    fontsize=6,
+                    color=colour,
+                )
+            ax.set_xticks(range(len(values)), [f"{value:g}" for value in values])
+            ax.set_yticks(range(len(models)), models)
+            ax.grid(visible=False)
+            ax.set_xlabel(words)
     return figure
 
 
@@ -151,4 +206,4 @@ def _short(values: Any) -> list[float | None]:
     return [None if value is None or not math.isfinite(value) else float(f"{value:.5g}") for value in values]
 
 
-__all__ = ["DRAWERS", "Series", "figure_of", "lines", "live_data"]
+__all__ = ["DRAWERS", "Series", "figure_of", "lines", "live_data", "scripts_of"]

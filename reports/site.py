@@ -95,7 +95,7 @@ STUDIES = (
     ("Benchmark", "benchmark/index.html"),
     ("Stress", "stress/index.html"),
     ("Conformance", "conformance/index.html"),
-    ("Overturning spectra", "spectra.html"),
+    ("Overturning spectra", "spectrum/index.html"),
     ("Incremental dynamic analysis", "ida/index.html"),
     ("Fragility", "fragility/index.html"),
     ("Trend", "trend/index.html"),

@@ -1,4 +1,4 @@
-"""Makes the table of the paper's sentences in docs/spectra.md, from the spectra that come with the package.
+"""Makes the table of the paper's sentences in docs/spectra.md, by a run of the 28 spectra.
 
 `python docs/site_tools/claims.py`, some seconds.
 """
@@ -7,30 +7,33 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from rockcheck.scenes.writing import markdown_table
-from rockcheck.validation.spectra.claims import Claim, check_claims, extra_runs
-from rockcheck.validation.spectra.findings import kept_spectra
-from rockcheck.validation.spectra.study import SpectrumRequest
-from rockcheck.validation.spectra.tiles import Tiles
+from rockcheck.validation.paper.panels import paper_panels
+from rockcheck.validation.studies.spectrum.study import Spectra
+from rockcheck.validation.study import run
 
 PAGE = Path(__file__).parents[1] / "spectra.md"
 PLACE = re.compile(r"(?<=<!-- claims -->\n\n).*?(?=\n\n<!-- end -->)", flags=re.S)
+COLUMNS = {
+    "sentence": "sentence, restated",
+    "place": "where in the paper",
+    "verdict": "verdict",
+    "finding": "finding",
+}
 
 
-def claims_found(folder: Path) -> Sequence[Claim]:
-    """The claims on the grid that is kept; what they need beyond it is played, and kept in `folder`."""
-    spectra = kept_spectra()
-    request = SpectrumRequest(spectra[0].frequency_ratios, spectra[0].amplitude_ratios)
-    return check_claims(spectra, extra_runs(spectra, Tiles(folder), request))
+def claims_found(folder: Path) -> list[Mapping[str, Any]]:
+    """The rows of the table of claims; what is played is kept in `folder`."""
+    return run(Spectra(paper_panels()), folder).table("claims").records()
 
 
-def table(claims: Sequence[Claim]) -> str:
+def table(claims: list[Mapping[str, Any]]) -> str:
     """A row a sentence."""
-    rows = [(claim.sentence, claim.place, claim.verdict, claim.finding) for claim in claims]
-    return markdown_table(("sentence, restated", "where in the paper", "verdict", "finding"), rows)
+    return markdown_table(list(COLUMNS.values()), [[row[key] for key in COLUMNS] for row in claims])
 
 
 def main() -> None:

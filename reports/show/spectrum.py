@@ -1,17 +1,35 @@
-"""Draws an overturning spectrum in the paper's colours."""
+"""Draws overturning spectra in the paper's colours, and writes what their page is clicked on."""
 
 from __future__ import annotations
 
+import itertools
+import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rockcheck.ebm.spectrum import Spectrum
-from rockcheck.scenes import Scene
+import numpy as np
+
+from rockcheck.ebm.spectrum import LEFT, Spectrum
+from rockcheck.reports.style import LOOKS, PAGE, figure_style
+from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
+from rockcheck.scenes.writing import write_whole
+from rockcheck.validation.finding import Plot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: The paper's colours.
-COLOURS = {"safe": "#3b6fb6", "counterclockwise": "#e8833a", "clockwise": "#f2cf4a", "overturned": "#e8833a", "undecided": "#9a9a9a"}
+COLOURS = {
+    "safe": "#3b6fb6",
+    "counterclockwise": "#e8833a",
+    "clockwise": "#f2cf4a",
+    "overturned": "#e8833a",
+    "undecided": "#9a9a9a",
+}
+#: Of the letters of a plot's nodes (`validation.studies.spectrum.tiles`), beside a wall too; and of
+#: those of `validation.paper.blocks`.
+LETTERS = {"S": "safe", "L": "counterclockwise", "R": "clockwise", "U": "undecided"}
+MARKED = {"F": "#e9e9e9", "T": "#a9c1df", "G": "#009168", "X": "#c4342d"}
 #: The mark of a node whose outcome depends on the law of impacts.
 LAW_MARK: dict[str, Any] = {
     "linestyle": "none",
@@ -35,35 +53,138 @@ def spectrum_figure(spectrum: Spectrum) -> Figure:
 def draw(spectrum: Spectrum, axes: Any) -> None:
     """Draws a spectrum into matplotlib axes in the paper's colours.
 
-    Blue is safe. Without a wall orange is overturned counterclockwise and yellow clockwise; with a wall orange is overturned.
-    Grey is undecided, a black ring around a node says that its outcome depends on the law of impacts.
+    Blue is safe. Without a wall orange is overturned counterclockwise and yellow clockwise; with a
+    wall orange is overturned. Grey is undecided, a black ring around a node says that its outcome
+    depends on the law of impacts.
     """
-    from matplotlib.colors import ListedColormap
-
-    names = ("counterclockwise", "safe", "overturned" if spectrum.scene.walls else "clockwise", "undecided")
-    shown = spectrum.outcomes.copy()
-    shown[tuple(spectrum.undecided.T)] = 2
-    axes.pcolormesh(
-        spectrum.frequency_ratios,
-        spectrum.amplitude_ratios,
-        shown,
-        cmap=ListedColormap([COLOURS[name] for name in names]),
-        vmin=-1,
-        vmax=2,
-        shading="nearest",
-        rasterized=True,
-    )
-    if spectrum.depends_on_law is not None and len(spectrum.depends_on_law):
-        i, j = spectrum.depends_on_law.T
-        axes.plot(spectrum.frequency_ratios[j], spectrum.amplitude_ratios[i], **LAW_MARK)
-    horizontal, vertical = axis_labels(spectrum.scene)
+    letters = np.array(["L", "S", "R"])[spectrum.outcomes - LEFT]
+    letters[tuple(spectrum.undecided.T)] = "U"
+    law: Any = [] if spectrum.depends_on_law is None else spectrum.depends_on_law
+    axis = spectrum.frequency_ratios, spectrum.amplitude_ratios
+    _paint(axes, letters, *axis, free=not spectrum.scene.walls, law=law)
+    horizontal, vertical = axis_labels(spectrum.scene.excitation.kind == "record")
     axes.set_xlabel(horizontal)
     axes.set_ylabel(vertical)
+
+
+def _paint(axes: Any, letters: Any, x: Any, y: Any, *, free: bool, law: Any) -> None:
+    from matplotlib.colors import ListedColormap
+
+    colours = {letter: COLOURS[name] for letter, name in LETTERS.items()} | MARKED
+    if not free:
+        colours["R"] = COLOURS["overturned"]
+    codes = np.searchsorted(sorted(colours), letters)
+    colour_map = ListedColormap([colours[letter] for letter in sorted(colours)])
+    look = {"cmap": colour_map, "vmin": 0, "vmax": len(colours) - 1}
+    axes.pcolormesh(x, y, codes, shading="nearest", rasterized=True, **look)
+    if len(law):
+        i, j = np.transpose(law)
+        axes.plot(np.asarray(x)[j], np.asarray(y)[i], **LAW_MARK)
     axes.grid(False)
 
 
-def axis_labels(scene: Scene) -> tuple[str, str]:
-    """What the axes of the scene's spectrum show, in plain text: frequency and amplitude ratio, or size and scale."""
-    if scene.excitation.kind == "record":
+def axis_labels(record: bool) -> tuple[str, str]:
+    """What the axes of a spectrum show, in plain text: frequency and amplitude ratio, or with a
+    record the block's size and the record's scale."""
+    if record:
         return "size of the block / its own", "scale of the record"
     return "\u03c9\u209a / p", "a\u209a / (g tan \u03b1)"
+
+
+def figure(plot: Plot) -> Figure:
+    """Spectra of a plot of the kind "spectra" (see `validation.studies.spectrum`), each where its
+    `place` is: row, rows and column."""
+    from matplotlib.figure import Figure
+
+    data = plot.data
+    panels = data["panels"]
+    rows = max(panel["place"][0] + panel["place"][1] for panel in panels)
+    columns = 1 + max(panel["place"][2] for panel in panels)
+    horizontal, vertical = axis_labels(data["record"])
+    with figure_style():
+        width = PAGE if len(panels) > 1 else PAGE / 1.6
+        figure = Figure(figsize=(width, data["height"]), layout="constrained")
+        grid = figure.add_gridspec(rows, columns)
+        x, y = data["frequencies"], data["amplitudes"]
+        for panel in panels:
+            row, high, column = panel["place"]
+            axes = figure.add_subplot(grid[row : row + high, column])
+            letters = np.array(list(panel["outcomes"])).reshape(len(y), len(x))
+            _paint(axes, letters, x, y, free=panel["free"], law=panel.get("law", ()))
+            axes.set_title(panel["title"], fontsize=7.0)
+            axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+            # Beside a panel without a wall, two rows high, the column next to it is named, too.
+            below, beside = row + high == rows or column < high - 1, column < high
+            axes.tick_params(labelbottom=below, labelleft=beside, labelsize=6.5)
+            axes.locator_params(integer=True)
+            axes.spines[["top", "right"]].set_visible(True)
+            of = LOOKS[panel["row"]].label.replace(", ", ",\n") if "row" in panel else vertical
+            axes.set_xlabel(horizontal if below else "", fontsize=7.0)
+            axes.set_ylabel(of if beside else "", fontsize=7.0)
+        if len(panels) == 1 and data["pulse"]:
+            _units(axes, data)
+        _legend(figure, data)
+        figure.suptitle(plot.title, fontsize=9, x=0.01, ha="left")
+    return figure
+
+
+def _units(axes: Any, data: Any) -> None:
+    """The pulses of the axes in Hz and g, too."""
+    hertz = 1.0 / data["pulse"]["period"][0] / data["frequencies"][0]
+    g = data["pulse"]["amplitude"][0] / data["amplitudes"][0] / GRAVITY_OF_RECORDS
+    above = axes.secondary_xaxis("top", functions=(lambda x: x * hertz, lambda x: x / hertz))
+    above.set_xlabel("frequency of the pulse, Hz")
+    beside = axes.secondary_yaxis("right", functions=(lambda y: y * g, lambda y: y / g))
+    beside.set_ylabel("peak acceleration, g")
+
+
+def outcome_key(panels: Any) -> dict[str, str]:
+    """What the colours of some spectra mean, by their names in `COLOURS`."""
+    free, walled = (any(panel["free"] is wall for panel in panels) for wall in (True, False))
+    key = {"safe": "safe"}
+    if free:
+        key["clockwise"] = f"{'no wall: ' if walled else ''}overturned clockwise"
+    other = "overturned" + ("; no wall:" if free and walled else "")
+    key["counterclockwise"] = other + (" counterclockwise" if free else "")
+    return key | {"undecided": "undecided"}
+
+
+def _legend(figure: Figure, data: Any) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    shown = "".join(panel["outcomes"] for panel in data["panels"])
+    key = {COLOURS[name]: words for name, words in outcome_key(data["panels"]).items()}
+    if "U" not in shown:
+        del key[COLOURS["undecided"]]
+    if "key" in data:
+        key = {MARKED[letter]: words for letter, words in data["key"].items()}
+    handles: list[Any] = [Patch(facecolor=colour, label=words) for colour, words in key.items()]
+    if any(panel.get("law") for panel in data["panels"]):
+        handles.append(Line2D([], [], label="depends on the impact law", **LAW_MARK))
+    columns = 4 if "key" not in data else 1
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=7)
+
+
+def write_scripts(plot: Plot, folder: Path) -> list[str]:
+    """Write what the page's script needs to be clicked on: `<name>.nodes.js`, small, which the page
+    reads at once, and `<name>.histories.js`, read when a node is played. Returns the scripts."""
+    data = dict(plot.data, stem=plot.name, axes=axis_labels(plot.data["record"]))
+    panels = data["panels"]
+    data["key"] = outcome_key(panels)
+    data["panels"] = [
+        {name: panel[name] for name in ("title", "free", "nodes")}
+        | {"outcomes": _runs(panel["outcomes"])}
+        for panel in panels
+    ]
+    played = [panel["motions"] for panel in panels]
+    for what, content in (("Nodes", data), ("Histories", played)):
+        text = json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+        place = f"(window.rockcheck{what} ??= {{}})[{json.dumps(plot.name)}]"
+        write_whole(folder / f"{plot.name}.{what.lower()}.js", f"{place} = {text};\n")
+    return ["pages/assets/animation.js", f"figures/{plot.name}.nodes.js", "pages/assets/nodes.js"]
+
+
+def _runs(letters: str) -> str:
+    """Letters run-length encoded: each run as its length and its letter."""
+    return "".join(f"{len(list(same))}{letter}" for letter, same in itertools.groupby(letters))

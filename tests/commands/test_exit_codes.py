@@ -8,16 +8,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from filelock import FileLock
 
 from rockcheck.commands import cli, publish
 from rockcheck.commands.cli import EXIT_CODES, main
-from rockcheck.scenes import ModelFailure
-from rockcheck.validation.execute.pool import Ended, Pool
-from rockcheck.validation.spectra.study import paper_panels
-from rockcheck.validation.spectra.tiles import Tiles
 from rockcheck.validation.suite.results import Run
 
 ROCKCHECK = [sys.executable, "-m", "rockcheck"]
@@ -41,21 +36,6 @@ def test_a_fault_inside_has_a_code_of_its_own(tmp_path, monkeypatch, capsys):
     assert "a fault\nof two lines" in report.read_text()
     if os.name == "posix":
         assert report.stat().st_mode & 0o777 == 0o600
-
-
-@pytest.mark.parametrize(
-    ("error", "raised"),
-    [
-        (ZeroDivisionError("ours"), ZeroDivisionError),
-        (ModelFailure("no motion"), ModelFailure),
-        (MemoryError(), ModelFailure),
-        (TimeoutError(), ModelFailure),
-    ],
-)
-def test_a_fault_in_a_worker_of_a_spectrum_is_told_from_a_model_that_fails(tmp_path, monkeypatch, error, raised):
-    monkeypatch.setattr(Pool, "run", lambda _, calls: iter([Ended(calls[0], error=error)]))
-    with Tiles(tmp_path, jobs=1) as tiles, pytest.raises(raised):
-        tiles.play(paper_panels(8)[0].scene, np.ones(1), np.ones(1), model="cm", settings={})
 
 
 def test_a_fault_that_cannot_be_written_down_is_told(monkeypatch, capsys):

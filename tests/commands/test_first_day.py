@@ -94,7 +94,7 @@ def test_a_scene_is_no_suite(type_):
     write("rack.toml", SCENE)
     _, err = type_("accept", "rack.toml", code=2)
     assert err == (
-        "rockcheck: rack.toml: is a scene, not a suite; `rockcheck run` plays a scene,"
+        "rockcheck: rack.toml: is a scene, not a suite; `rockcheck validate` plays a scene,"
         " and a suite is a file with scenes = ['rack.toml'], and tables [models.NAME]\n"
     )
     _, err = type_("validate", "rack.toml", "--strict", code=2)
@@ -271,15 +271,3 @@ def test_a_model_of_ones_own_that_raises_shows_its_traceback(type_):
     _, err = type_("validate", "mine.toml", "--no-report", "--jobs", "1", *CODE, code=3)
     assert err.startswith("rockcheck: short, other: ZeroDivisionError: a bug")
     assert "ZeroDivisionError" in Path(err.rpartition("traceback in ")[2].strip()).read_text()
-
-
-@pytest.mark.parametrize(("wall", "model"), [('[[walls]]\nside = "left"\ngap = 0.05\n', "ebm-unilateral"), ("", "ebm")])
-def test_beside_a_wall_of_ones_own_the_block_may_hop(type_, wall, model):
-    pulse = '[excitation]\nkind = "ricker"\namplitude = 3.0\nperiod = 1.0\n'
-    scene = write("rack.toml", SCENE + wall + pulse)
-    type_("spectrum", "--scene", scene, "--size", "3")
-    (record,) = json.loads(Path("rockcheck-report/spectra/spectra.json").read_text())["spectra"]
-    assert record["model"] == model
-    type_("spectrum", "--scene", scene, "--size", "3", "--pivot", "bilateral")
-    models = {one["model"] for one in json.loads(Path("rockcheck-report/spectra/spectra.json").read_text())["spectra"]}
-    assert models == {model, "ebm"}

@@ -90,13 +90,3 @@ def test_a_folder_of_24_files_in_eight_formats_shakes_the_rack(type_):
     for component in ("N-S", "E-W"):
         peaks = [row["peak_rotation_alpha"] for row in least if component in row["record"]]
         assert peaks == pytest.approx([peaks[0]] * 8, abs=5e-3)
-
-
-def test_a_fragility_beside_a_wall_of_ones_own_lets_the_block_hop(type_):
-    type_("new rack.toml")
-    found = {}
-    for pivot in ("", "--pivot unilateral", "--pivot bilateral"):
-        told = type_(f"spectrum --scene rack.toml --fragility --size 4 --amplitudes 1 6 --json {pivot}")
-        found[pivot] = json.loads(told)["tables"]["fragility"]
-    assert found[""] == found["--pivot unilateral"]
-    assert found[""][:4] != found["--pivot bilateral"][:4]  # beside the wall

@@ -71,7 +71,7 @@ def test_a_suite_or_a_name_alone_runs_nothing(folder, capsys, model, command):
     (folder / "mine.toml").write_text(SUITE.replace("{model}", model) + SCENE)
     words = {
         "simulate": ["simulate", "scene.toml", "--model", model, "--set", "command=touch ran"],
-        "spectrum": ["spectrum", "--scene", "scene.toml", "--size", "3", "--model", model],
+        "spectrum": ["spectrum", "scene.toml", "--size", "3", "--model", model],
         "conformance": ["conformance", "--engine", model],
     }
     assert main(words.get(command, [command, "mine.toml"])) == 2

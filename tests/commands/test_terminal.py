@@ -143,7 +143,7 @@ def test_json_is_all_that_is_on_stdout(capsys):
     found = result("compare", "b.csv", "a.csv")
     rms = next(figure for figure in found["figures"] if figure["measure"] == "theta_rms")
     assert rms["value"] == pytest.approx(0.001 / load_scene("mine.toml").block.alpha)
-    assert result("spectrum", "--scene", "mine.toml", "--size", "3")["report"] == "rockcheck-report/spectra.html"
+    assert result("spectrum", "mine.toml", "--size", "3")["report"] == "rockcheck-report/spectrum/index.html"
     Path("suite.toml").write_text(SUITE)
     run = result("validate", "suite.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1", code=1)
     assert run["verdict"] == "fail"
@@ -206,7 +206,7 @@ def test_the_time_left_counts_what_is_done_here(monkeypatch):
     assert lines.left() == pytest.approx(40.0)
 
 
-@pytest.mark.parametrize(("name", "page"), [("ida", "ida/index.html"), ("spectrum", "spectra.html"), ("validate", "index.html")])
+@pytest.mark.parametrize(("name", "page"), [("ida", "ida/index.html"), ("spectrum", "index.html"), ("validate", "index.html")])
 def test_the_help_names_the_page_that_is_written(name, page, capsys):
     main([name, "--help"])
     assert f"the page to open is {page} in it" in " ".join(capsys.readouterr().out.split())

@@ -1,26 +1,31 @@
-"""Figures and page of the spectra."""
+"""Figures of the spectra."""
 
 from __future__ import annotations
 
-import dataclasses
-import re
-from dataclasses import replace
+import json
 from pathlib import Path
 
 import numpy as np
 from matplotlib.colors import to_rgba
 
 from rockcheck.ebm import Spectrum
-from rockcheck.reports.show.spectrum import COLOURS, draw
-from rockcheck.reports.studies import spectra as pages
-from rockcheck.reports.studies.spectra import draw_figures, maps_shown, paper_figure, write_page
-from rockcheck.reports.style import save, stamp_in, stamp_of
-from rockcheck.validation.spectra.agreement import CANDIDATES, PLAYED_SHARE, Agreement, mapped
-from rockcheck.validation.spectra.claims import Claim, Claims
-from rockcheck.validation.spectra.findings import findings, kept_spectra
-from rockcheck.validation.spectra.refinement import Refined, Refinement
-from rockcheck.validation.spectra.study import FIGURES, KEPT, SPECTRA, SpectrumRequest, paper_panels
-from rockcheck.validation.spectra.study import save as save_spectra
+from rockcheck.reports.document import block_markdown
+from rockcheck.reports.drawers import figure_of, scripts_of
+from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, draw
+from rockcheck.scenes.reading import read_json
+from rockcheck.validation.paper.measures import Paper
+from rockcheck.validation.paper.panels import KEPT, kept_spectra, paper_panels
+from rockcheck.validation.paper.sentences import beyond, findings_of
+from rockcheck.validation.studies.spectrum.agreement import (
+    CANDIDATES,
+    PLAYED_SHARE,
+    Agreement,
+    blocks,
+    mapped,
+)
+from rockcheck.validation.studies.spectrum.grids import Request
+from rockcheck.validation.studies.spectrum.study import Spectra
+from rockcheck.validation.studies.spectrum.tiles import Played
 
 SIZE = 12
 
@@ -39,10 +44,20 @@ def made(panel):
     )
 
 
+def plot_of(*figures, letter="R"):
+    """The plot of a figure whose nodes were all played to one outcome."""
+    study = Spectra(paper_panels(*figures), Request(SIZE))
+    done = {task: Played(letter * len(task.amplitudes)) for task in study.tasks({})}
+    return next(study.gather(done).plots())
+
+
 def test_the_papers_colours():
     from matplotlib.figure import Figure
 
-    for panel, clockwise in ((paper_panels(8)[0], COLOURS["clockwise"]), (paper_panels(8)[1], COLOURS["overturned"])):
+    for panel, clockwise in (
+        (paper_panels(8)[0], COLOURS["clockwise"]),
+        (paper_panels(8)[1], COLOURS["overturned"]),
+    ):
         axes = Figure().subplots()
         draw(made(panel), axes)
         (mesh,) = axes.collections
@@ -54,116 +69,59 @@ def test_the_papers_colours():
 
 
 def test_a_figure_has_the_papers_panels():
-    panels = paper_panels(9)
-    figure = paper_figure(panels, [made(panel) for panel in panels])
-    assert [axes.get_title(loc="left") for axes in figure.axes] == [panel.title for panel in panels]
+    figure = figure_of(plot_of(9))
+    assert [axes.get_title(loc="left") for axes in figure.axes] == [panel.title for panel in paper_panels(9)]
     assert figure.get_suptitle() == "Fig. 9: Wall on the right, μ = 0.6"
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.texts] == [
+        "safe",
+        "no wall: overturned clockwise",
+        "overturned; no wall: counterclockwise",
+    ]
 
 
-def test_the_page_shows_what_the_folder_holds(tmp_path):
-    panels, folder = paper_panels(7), tmp_path / SPECTRA
-    folder.mkdir()
-    spectra = [made(panel) for panel in panels]
-    save_spectra(panels, spectra, SpectrumRequest(np.linspace(0.5, 8.0, SIZE), np.linspace(1.0, 12.0, SIZE)), folder)
-    save(paper_figure(panels, spectra), folder / "figure-7")
-    text = write_page(tmp_path).read_text(encoding="utf-8")
-    assert "Fig. 7" in text
-    assert "Fig. 8: " not in text
-    # The long studies came with the package, and the page says so.
-    assert text.count("came with the package") == 2
-    assert "84.7 %" in text  # ebm-unilateral near a boundary
-    assert (folder / "models.svg").exists()
-    for link in re.findall(r'(?:href|src)="([^"#:]+)"', text):
-        assert (tmp_path / link).exists(), link
+def test_what_is_undecided_or_depends_on_the_law_is_in_the_legend():
+    plot = plot_of(9, letter="U")
+    plot.data["panels"][1]["law"] = [[2, 3]]
+    figure = figure_of(plot)
+    (legend,) = figure.legends
+    assert {"undecided", "depends on the impact law"} <= {text.get_text() for text in legend.texts}
+    (ring,) = figure.axes[1].lines
+    assert ring.get_marker() == LAW_MARK["marker"]
+    assert ring.get_xydata().tolist() == [[plot.data["frequencies"][3], plot.data["amplitudes"][2]]]
 
 
-def test_what_is_drawn_already_is_not_drawn_again(tmp_path, monkeypatch):
-    """Drawn anew only where it would show something else, in the formats that are asked for; no file shows what is not so any more."""
-    panels = paper_panels(7)
-    spectra = [made(panel) for panel in panels]
-    drawn = []
-    monkeypatch.setattr(pages, "paper_figure", lambda *given, **of: drawn.append(of) or paper_figure(*given, **of))
-    draw_figures(panels, spectra, "ebm", tmp_path)
-    first = (tmp_path / "figure-7.svg").read_bytes()
-    draw_figures(panels, spectra, "ebm", tmp_path)
-    assert len(drawn) == 1
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["figure-7.svg"]
-    for _ in range(2):
-        draw_figures(panels, spectra, "ebm", tmp_path, ("svg", "png", "pdf"))
-    assert len(drawn) == 2
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["figure-7.pdf", "figure-7.png", "figure-7.svg"]
-    assert (tmp_path / "figure-7.svg").read_bytes() == first
-    changed = spectra[0].outcomes.copy()
-    changed[0, 0] = 1
-    draw_figures(panels, [replace(spectra[0], outcomes=changed), *spectra[1:]], "ebm", tmp_path)
-    assert len(drawn) == 3
-    assert [path.name for path in tmp_path.iterdir()] == ["figure-7.svg"]
-    assert (tmp_path / "figure-7.svg").read_bytes() != first
+def test_the_scripts_hold_every_node(tmp_path):
+    plot = plot_of(8)
+    scripts = scripts_of([plot], tmp_path)
+    assert "figures/figure-8.nodes.js" in scripts
+    text = (tmp_path / "figure-8.nodes.js").read_text(encoding="utf-8")
+    data = json.loads(text.partition(" = ")[2].rstrip(";\n"))
+    assert [panel["outcomes"] for panel in data["panels"]] == [f"{SIZE**2}R"] * 7
+    assert len(data["pulse"]["amplitude"]) == len(data["amplitudes"]) == SIZE
+    assert "rockcheckHistories" in (tmp_path / "figure-8.histories.js").read_text(encoding="utf-8")
 
 
-def test_the_shipped_figure_shows_the_shipped_study():
-    """`rockcheck spectrum --figure all --agreement 200` writes both; they are kept together."""
-    found = Agreement.model_validate_json((KEPT / "agreement.json").read_text(encoding="utf-8"))
-    panels = mapped([panel for figure in FIGURES for panel in paper_panels(figure)])
-    assert stamp_in(KEPT / "models.svg").split()[0] == stamp_of(maps_shown(found, panels)).split()[0]
-
-
-def test_studies_of_the_folder_come_first(tmp_path):
-    folder = tmp_path / SPECTRA
-    folder.mkdir()
-    one = Refined(spectrum="mine", nodes=100, runs=7, wrong=3, areas=2, dimension=1.0)
-    study = Refinement(date="2031-01-02", versions={"rockcheck": "0"}, grid="10 x 10", model="ebm", settings={}, spectra=(one,))
-    (folder / "refinement.json").write_text(study.model_dump_json(), encoding="utf-8")
-    text = write_page(tmp_path).read_text(encoding="utf-8")
-    assert "Computed on 2031-01-02" in text
-    assert "14.3 times fewer" in text
-    assert "came with the package" not in text  # nor is agreement shown: there is none of the paper's figures
-
-
-def test_the_documentation_shows_the_kept_studies():
+def test_the_documentation_shows_the_kept_study():
     page = (Path(__file__).parents[2] / "docs" / "spectra.md").read_text(encoding="utf-8")
-    shown = {tuple(cell.strip() for cell in line.strip("|").split("|")) for line in page.splitlines() if line.startswith("|")}
-    agreement = Agreement.model_validate_json((KEPT / "agreement.json").read_text(encoding="utf-8"))
-    refinement = Refinement.model_validate_json((KEPT / "refinement.json").read_text(encoding="utf-8"))
-    assert {row[1:] for row in agreement.rows if row[0] == "all"} <= shown
-    assert set(refinement.rows) <= shown
-    assert len(refinement.spectra) == len({share.spectrum for share in agreement.shares}) == 28
-    assert refinement.runs < refinement.nodes / 8
-    assert all(share.nodes == 100 for share in agreement.shares if share.model not in PLAYED_SHARE)
-    assert {share.model for share in agreement.shares} == set(CANDIDATES)
+    found = Agreement.model_validate(read_json(KEPT / "agreement.json"))
+    panels = mapped(paper_panels())
+    _, table, by_spectrum, plot = blocks(found, panels, came=True)
+    shown = page.partition("<!-- agreement -->")[2].strip().splitlines()
+    assert block_markdown(table).splitlines()[2:] == shown[2 : 2 + len(table.rows)]
+    assert len({row[0] for row in by_spectrum.rows}) == 28
+    assert all(share.nodes == 100 for share in found.shares if share.model not in PLAYED_SHARE)
+    assert {share.model for share in found.shares} == set(CANDIDATES)
+    figure = figure_of(plot)
+    assert len(figure.axes) == len(panels) * len(found.maps)
 
 
-def test_the_documentation_tells_the_findings_of_the_kept_spectra():
-    text = (Path(__file__).parents[2] / "docs" / "spectra.md").read_text(encoding="utf-8")
-    shown = [line.strip("| \n").split(" | ") for line in text.partition("<!-- findings -->")[2].partition("<!-- end -->")[0].splitlines()]
-    found = findings(kept_spectra())
-    assert [row for row in shown if len(row) == 3][1:] == [[one.sentence, f"{one.case} (Fig. {one.figure})", one.words] for one in found]
-
-
-def test_the_page_tells_the_findings_and_the_tally(tmp_path):
-    data = tmp_path / SPECTRA
-    data.mkdir()
-    spectra = kept_spectra()
-    panels = [panel for number in (6, 7, 8, 9) for panel in paper_panels(number)]
-    one = spectra[0]
-    request = SpectrumRequest(one.frequency_ratios, one.amplitude_ratios)
-    coarse = [  # four nodes an axis: the histories that are kept beside them take their time
-        dataclasses.replace(
-            s,
-            outcomes=s.outcomes[::33, ::33],
-            frequency_ratios=s.frequency_ratios[::33],
-            amplitude_ratios=s.amplitude_ratios[::33],
-            undecided=s.undecided[:0],
-        )
-        for s in spectra
-    ]
-    save_spectra(panels, coarse, request, data)
-    claims = [
-        Claim(name=verdict, sentence=verdict, verdict=verdict, finding="", criterion="", figures=(6,), rows=())
-        for verdict in ("holds", "holds", "holds in part")
-    ]
-    (data / "claims.json").write_text(Claims(grid="4 x 4", model="ebm", claims=tuple(claims)).model_dump_json(), encoding="utf-8")
-    text = re.sub(r"\s+", " ", write_page(tmp_path).read_text(encoding="utf-8"))
-    assert "Of 3 sentences of the paper 2 hold, 1 hold in part, 0 do not." in text
-    assert all(one.words in text for one in findings(coarse))
-    assert (data / "findings.svg").exists()
+def test_a_map_of_each_finding():
+    paper = Paper(kept_spectra())
+    found = findings_of(paper)
+    _, plot, rows = beyond(paper, found)
+    for panel, one in zip(plot.data["panels"], found, strict=True):
+        assert panel["outcomes"].count("G") == one.shown.gained.sum()
+        assert panel["outcomes"].count("X") == one.shown.lost.sum()
+    assert len(figure_of(plot).axes) == 3
+    assert len(rows.rows) == sum(len(one.shown.rows) for one in found)

@@ -1,9 +1,11 @@
-"""The pages of spectra, fragility and incremental dynamic analysis in a real browser: hover, click, keys, accessibility."""
+"""The pages of spectra, fragility and incremental dynamic analysis in a real browser: hover, click,
+keys, accessibility."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +13,14 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright import sync_api as playwright
 
-from rockcheck.ebm import Spectrum
 from rockcheck.reports.document import publish
 from rockcheck.reports.show.spectrum import COLOURS
-from rockcheck.reports.studies.spectra import own_figure, paper_figure, write_page
-from rockcheck.reports.style import save
 from rockcheck.validation.finding import Block, Column, Finding, Made
-from rockcheck.validation.spectra.study import SPECTRA, Panel, SpectrumRequest, paper_panels
-from rockcheck.validation.spectra.study import save as save_spectra
+from rockcheck.validation.paper.panels import Panel, paper_panels
 from rockcheck.validation.studies.population.study import blocks_of, lines_of
+from rockcheck.validation.studies.spectrum.grids import Request
+from rockcheck.validation.studies.spectrum.study import Spectra
+from rockcheck.validation.studies.spectrum.tiles import Played
 from rockcheck.validation.uncertainty.population import curve_of
 
 pytestmark = pytest.mark.browser
@@ -27,26 +28,26 @@ SIZE = 20
 FREQUENCIES, AMPLITUDES = np.linspace(0.5, 8.0, SIZE), np.linspace(1.0, 12.0, SIZE)
 
 
+def written(study: Spectra, folder: Path, letters: str) -> Path:
+    """The page of a study whose outcomes are made up; its histories are the model's own."""
+    done = {task: Played(letters) if task.what == "outcomes" else study.play(task) for task in study.tasks({})}
+    made = Made(created="2031-01-02T00:00:00+00:00", jobs=1, wall_seconds=1.0, versions={}, hardware={})
+    return publish(replace(study.gather(done), made=made), folder, formats=("svg",))
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Fig. 8 made up: safe up to the sixth amplitude, overturned right from there on; its histories are the model's own."""
+    """Fig. 8 made up: safe up to the sixth amplitude, overturned right from there on."""
     path = tmp_path_factory.mktemp("spectra")
-    (path / SPECTRA).mkdir()
-    outcomes = np.zeros((SIZE, SIZE), dtype=np.int8)
-    outcomes[6:] = 1
-    panels = paper_panels(8)
-    grid = {"outcomes": outcomes, "frequency_ratios": FREQUENCIES, "amplitude_ratios": AMPLITUDES, "undecided": np.array([[0, 0]])}
-    spectra = [Spectrum(**grid, evaluations=SIZE**2, scene=panel.scene, model=None) for panel in panels]
-    save_spectra(panels, spectra, SpectrumRequest(FREQUENCIES, AMPLITUDES), path / SPECTRA)
-    save(paper_figure(panels, spectra), path / SPECTRA / "figure-8")
-    write_page(path)
+    letters = "U" + "S" * (6 * SIZE - 1) + "R" * (SIZE - 6) * SIZE
+    written(Spectra(paper_panels(8), Request(SIZE)), path, letters)
     return path
 
 
 @pytest.fixture
 def page(visitor: Callable[..., playwright.Page], folder: Path) -> playwright.Page:
     page = visitor(folder, viewport={"width": 1280, "height": 900})
-    page.goto((folder / "spectra.html").as_uri())
+    page.goto((folder / "index.html").as_uri())
     return page
 
 
@@ -62,7 +63,12 @@ def place(page: playwright.Page, panel: int, row: int, column: int) -> tuple[flo
 
 def test_the_panels_stand_as_in_the_paper_and_are_painted(page: playwright.Page) -> None:
     assert page.locator(".panel h3").all_inner_texts() == [panel.title for panel in paper_panels(8)]
-    outcomes = ["safe", "no wall: overturned clockwise", "overturned; no wall: counterclockwise", "undecided"]
+    outcomes = [
+        "safe",
+        "no wall: overturned clockwise",
+        "overturned; no wall: counterclockwise",
+        "undecided",
+    ]
     assert page.locator(".key.outcomes span").all_inner_texts() == outcomes
     colours = """([panel, nodes]) => {
         const c = document.querySelectorAll('.panel canvas')[panel], w = c.clientWidth - 48, h = c.clientHeight - 30, r = devicePixelRatio;
@@ -81,22 +87,23 @@ def test_pointing_at_a_node_names_it_in_every_panel(page: playwright.Page) -> No
     page.mouse.move(*place(page, 3, 10, 7))
     said = page.locator("output.node").inner_text()
     assert said.startswith(f"ωₚ/p {FREQUENCIES[7]:.3g}, aₚ / (g tan α) {AMPLITUDES[10]:.3g}: a pulse of ")
-    assert page.locator(".panel .said").all_inner_texts() == ["overturned clockwise", *["overturned"] * 6]
+    assert page.locator(".panel .said").all_inner_texts() == [
+        "overturned clockwise",
+        *["overturned"] * 6,
+    ]
     page.mouse.move(*place(page, 3, 2, 7))
     assert page.locator(".panel .said").all_inner_texts() == ["safe"] * 7
 
 
 def test_ones_own_block_is_told_in_hertz_and_g(visitor: Callable[..., playwright.Page], tmp_path: Path) -> None:
-    (tmp_path / SPECTRA).mkdir()
     panel = Panel("shelf", "shelf", paper_panels(8)[1].scene)
-    grid = {"outcomes": np.zeros((SIZE, SIZE), dtype=np.int8), "undecided": np.zeros((0, 2), dtype=np.int64)}
-    grid |= {"frequency_ratios": FREQUENCIES, "amplitude_ratios": AMPLITUDES}
-    spectrum = Spectrum(**grid, evaluations=SIZE**2, scene=panel.scene, model=None)
-    save_spectra([panel], [spectrum], SpectrumRequest(FREQUENCIES, AMPLITUDES), tmp_path / SPECTRA)
-    save(own_figure(panel, spectrum), tmp_path / SPECTRA / "shelf")
     page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
-    page.goto(write_page(tmp_path).as_uri())
-    assert page.locator(".key.outcomes span").all_inner_texts() == ["safe", "overturned", "undecided"]  # it is beside a wall
+    page.goto(written(Spectra((panel,), Request(SIZE)), tmp_path, "S" * SIZE**2).as_uri())
+    assert page.locator(".key.outcomes span").all_inner_texts() == [
+        "safe",
+        "overturned",
+        "undecided",
+    ]  # it is beside a wall
     page.evaluate("Object.values(rockcheckFigures)[0].point([4, 7])")
     said = page.locator("output.node").inner_text()
     g, hertz = map(float, re.search(r"a pulse of ([\d.]+) g .*, ([\d.]+) Hz", said).groups())
@@ -179,10 +186,15 @@ def test_the_lines_of_an_ida_are_named_under_the_pointer(visitor: Callable[..., 
 
 @pytest.mark.long
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("what", ["spectra", "fragility", "ida"])
+@pytest.mark.parametrize("what", ["spectra", "ida"])
 def test_accessible(visitor: Callable[..., playwright.Page], folder: Path, tmp_path: Path, what: str, scheme: str) -> None:
-    address = folder / "spectra.html" if what == "spectra" else {"fragility": fragility_page, "ida": ida_page}[what](tmp_path)
-    page = visitor(address.parent, color_scheme=scheme, bypass_csp=True, viewport={"width": 1280, "height": 900})
+    address = folder / "index.html" if what == "spectra" else ida_page(tmp_path)
+    page = visitor(
+        address.parent,
+        color_scheme=scheme,
+        bypass_csp=True,
+        viewport={"width": 1280, "height": 900},
+    )
     page.goto(address.as_uri())
     if what == "spectra":
         page.evaluate("(f => f.choose(f.panels[2], [8, 8]))(rockcheckFigures['figure-8'])")
@@ -195,5 +207,5 @@ def test_accessible(visitor: Callable[..., playwright.Page], folder: Path, tmp_p
 
 def test_a_phone_needs_no_sideways_scrolling(visitor: Callable[..., playwright.Page], folder: Path) -> None:
     page = visitor(folder, viewport={"width": 390, "height": 800})
-    page.goto((folder / "spectra.html").as_uri())
+    page.goto((folder / "index.html").as_uri())
     assert page.evaluate("document.documentElement.scrollWidth") == 390

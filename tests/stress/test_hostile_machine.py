@@ -21,11 +21,11 @@ from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.execute import pool
 from rockcheck.validation.execute import store as stores
 from rockcheck.validation.execute.store import HISTORIES, Store
-from rockcheck.validation.stress import study
-from rockcheck.validation.stress.invariants import CheckedRun
-from rockcheck.validation.stress.players import PLAYERS, EventBased
-from rockcheck.validation.stress.results import Failure, RunTotals
-from rockcheck.validation.stress.study import Chunk
+from rockcheck.validation.studies.stress import study
+from rockcheck.validation.studies.stress.invariants import CheckedRun
+from rockcheck.validation.studies.stress.players import PLAYERS, EventBased
+from rockcheck.validation.studies.stress.results import Failure, RunTotals
+from rockcheck.validation.studies.stress.study import Chunk
 
 #: They wait for processes that hang or are killed.
 pytestmark = pytest.mark.long

@@ -4,7 +4,6 @@
 |---|---|
 | `histories/` | `.csv.gz` and `.events.csv.gz` (`scenes.History.save`); `.json`, the record with their hashes, is written last |
 | `comparisons/` | `.json`: the comparisons of a cell, peaks of an ensemble's batch, a horizon of predictability |
-| `tiles/` | `.json`: outcomes at some nodes of a spectrum |
 | `records/` | `.json`: what a task of a study gave |
 
 A name contains the hash of everything that the content depends on. So runs that share a folder can only ever write the same
@@ -32,7 +31,6 @@ from rockcheck.scenes.writing import made, write_whole
 
 HISTORIES = "histories"
 COMPARISONS = "comparisons"
-TILES = "tiles"
 RECORDS = "records"
 #: What a history's files are called after its name.
 TABLE = ".csv.gz"

@@ -43,6 +43,12 @@
     const units = data.pulse && data.panels.length === 1;
     const rim = units ? { ...RIM, top: 34, right: 46 } : RIM, G = 9.80665;
     const pulseWords = (i, j) => `${words(data.pulse.amplitude[i] / G)} g (${words(data.pulse.amplitude[i])} m/s²), ${words(1 / data.pulse.period[j])} Hz (period ${words(data.pulse.period[j])} s)`;
+    const key = make("p", { class: "key outcomes" }, host);
+    for (const [name, said] of Object.entries(data.key)) {
+      const entry = make("span", {}, key);
+      make("i", { class: name }, entry);
+      entry.append(said);
+    }
     const grid = make("div", { class: data.panels.length > 1 ? "panels" : "panels one" }, host);
     const output = make("output", { class: "node" }, host, "Point at a node to name it; click to play it. With a panel in focus: arrows move, enter plays.");
     const panels = data.panels.map(panel => {
@@ -180,7 +186,7 @@
 
   function withHistories(stem, then) {
     if (window.rockcheckHistories?.[stem]) { then(window.rockcheckHistories[stem]); return; }
-    const script = make("script", { src: `spectra/${stem}.histories.js` });
+    const script = make("script", { src: `figures/${stem}.histories.js` });
     script.addEventListener("load", () => then(window.rockcheckHistories[stem]));
     document.head.append(script);
   }
@@ -256,9 +262,9 @@
 
   document.addEventListener("DOMContentLoaded", () => {
     window.rockcheckFigures = {};
-    for (const host of document.querySelectorAll("[data-nodes]")) {
-      const data = window.rockcheckNodes?.[host.dataset.nodes];
-      if (data) window.rockcheckFigures[host.dataset.nodes] = figure(host, data);
+    for (const host of document.querySelectorAll("[data-spectra]")) {
+      const data = window.rockcheckNodes?.[host.dataset.spectra];
+      if (data) window.rockcheckFigures[host.dataset.spectra] = figure(host, data);
     }
   });
 })();

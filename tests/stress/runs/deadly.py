@@ -1,4 +1,4 @@
-"""Stands in for functions of `validation.stress.study`, in worker processes: some runs kill their process, or never end."""
+"""Stands in for functions of `validation.studies.stress.study`, in worker processes: some runs kill their process, or never end."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from collections import Counter
 from pathlib import Path
 
 from rockcheck.scenes import Scene
-from rockcheck.validation.stress import study
-from rockcheck.validation.stress.invariants import CheckedRun
-from rockcheck.validation.stress.players import EventBased
-from rockcheck.validation.stress.results import Failure, RunTotals
+from rockcheck.validation.studies.stress import study
+from rockcheck.validation.studies.stress.invariants import CheckedRun
+from rockcheck.validation.studies.stress.players import EventBased
+from rockcheck.validation.studies.stress.results import Failure, RunTotals
 
 
 def play_some(label: str, seed: int, first: int, count: int) -> RunTotals:

@@ -1,0 +1,345 @@
+"""What the paper says of its 28 spectra, judged by spectra that are made up; and what it does not
+say."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+
+from rockcheck.ebm import EventBasedModel, Spectrum
+from rockcheck.ebm.spectrum import TOLERANCE, node_scene, play_nodes
+from rockcheck.validation.paper.measures import Paper, near_one_impact
+from rockcheck.validation.paper.panels import FIGURES, kept_spectra, paper_panels
+from rockcheck.validation.paper.sentences import claims_of, findings_of
+from rockcheck.validation.studies.spectrum.tiles import nodes_of, play
+
+MODEL = EventBasedModel(tolerance=TOLERANCE)
+
+
+def made(panel, outcomes, size=40):
+    return Spectrum(
+        outcomes=np.asarray(outcomes, dtype=np.int8),
+        frequency_ratios=np.linspace(0.5, 8.0, size),
+        amplitude_ratios=np.linspace(1.0, 12.0, size),
+        evaluations=size * size,
+        undecided=np.zeros((0, 2), dtype=np.int64),
+        scene=panel.scene,
+        model=None,
+    )
+
+
+def synthetic(height, size=40):
+    """The 28 spectra, safe below a horizontal line at the share of the grid that `height` gives for
+    (side, mu, gap, e) or (mu,)."""
+    spectra_made = []
+    for figure, (side, mu) in FIGURES.items():
+        for panel in paper_panels(figure):
+            key = (
+                (mu,) if panel.wall is None else (side, mu, panel.wall.gap, panel.wall.restitution)
+            )
+            outcomes = np.ones((size, size), dtype=np.int8)
+            outcomes[: round(size * height(*key))] = 0
+            spectra_made.append(made(panel, outcomes, size))
+    return spectra_made
+
+
+def judged(spectra_made, least=None):
+    least = least or {None: 10.0, (0.103, 0.0): 9.0, (0.103, 1.0): 8.0}
+    tongues = {one.scene.floor.friction: tongue(one) for one in spectra_made if not one.scene.walls}
+    return {claim.name: claim for claim in claims_of(Paper(spectra_made, least, tongues))}
+
+
+def tongue(spectrum):
+    """Nodes that are said to overturn after one impact: just above the line, at omega_p/p from 2 to
+    3."""
+    found = np.zeros(spectrum.outcomes.shape, dtype=bool)
+    lowest = int(np.argmax(~spectrum.safe[:, 0]))
+    found[
+        lowest : lowest + 3, (spectrum.frequency_ratios >= 2.0) & (spectrum.frequency_ratios <= 3.0)
+    ] = True
+    return found
+
+
+def verdicts(spectra_made, least=None):
+    return {name: claim.verdict for name, claim in judged(spectra_made, least).items()}
+
+
+def test_claims_about_areas_hold_where_made_to():
+    def height(*key):
+        if len(key) == 1:
+            return {0.3: 0.5, 0.6: 0.4}[key[0]]
+        side, mu, gap, e = key
+        return (
+            0.2
+            - 0.3 * (mu - 0.3)
+            - 0.05 * e
+            - 0.5 * gap
+            + (0.5 if (side, gap, e) == ("right", 0.003, 0.0) else 0.0)
+        )
+
+    found = verdicts(synthetic(height, size=1000))
+    assert found["lower friction"] == found["lower restitution"] == found["smaller gap"] == "holds"
+    assert (
+        found["left wall, high frequency"]
+        == found["right wall, near"]
+        == found["right wall, far"]
+        == "holds"
+    )
+    assert found["likelier side"] == "holds"  # all that overturns was made clockwise
+    assert (
+        found["overturning with one impact"] == "does not hold"
+    )  # less is safe beside the left wall
+    assert found["left wall"] == "holds"
+    assert (
+        found["overturning towards the wall"] == "holds in part"
+    )  # beside the right walls, too, all was made to fall clockwise
+
+
+def test_claims_about_areas_fail_where_made_to():
+    def height(*key):
+        if len(key) == 1:
+            return {0.3: 0.4, 0.6: 0.5}[key[0]]
+        _, mu, gap, e = key
+        return 0.45 + 0.3 * (mu - 0.3) + 0.05 * e + 0.5 * gap
+
+    found = verdicts(
+        synthetic(height, size=1000), {None: 8.0, (0.103, 0.0): 9.0, (0.103, 1.0): math.inf}
+    )
+    names = (
+        "lower friction",
+        "lower restitution",
+        "smaller gap",
+        "left wall, high frequency",
+        "right wall, near",
+        "right wall, far",
+    )
+    assert found["left wall"] == "does not hold"
+    assert {name: found[name] for name in names} == dict.fromkeys(names, "does not hold")
+
+
+def test_the_side_decides_where_made_to():
+    """Left walls leave 0.2 of the nodes safe; right ones more, the more the lower the friction is,
+    with harm at mu 0.6 only."""
+
+    def height(*key):
+        return 0.5 if len(key) == 1 else 0.2 if key[0] == "left" else {0.3: 0.8, 0.6: 0.4}[key[1]]
+
+    found = judged(synthetic(height, size=100))
+    assert found["side matters most"].verdict == "holds"
+    assert (
+        "side 40.0 %, friction 20.0 %, gap 0.0 %, restitution 0.0 %"
+        in found["side matters most"].finding
+    )
+    assert found["side and friction"].verdict == "holds"
+    assert found["right wall, no guarantee"].verdict == "holds"
+    assert (
+        "larger than without a wall in 6 of 12 spectra, smaller in 6"
+        in found["right wall, no guarantee"].finding
+    )
+    depends = found["right wall, what it depends on"]
+    assert (depends.verdict, [row.holds for row in depends.rows]) == (
+        "holds in part",
+        [True, False],
+    )  # the gap was made to matter not
+
+
+def test_the_side_does_not_matter_where_made_so():
+    """All walls alike, and better than none: what depends on friction only does not depend on the
+    side."""
+    found = verdicts(
+        synthetic(lambda *key: 0.2 if len(key) == 1 else {0.3: 0.4, 0.6: 0.6}[key[1]], size=100)
+    )
+    assert found["side matters most"] == found["side and friction"] == "does not hold"
+    assert found["right wall, no guarantee"] == "holds in part"
+    assert found["right wall, what it depends on"] == "does not hold"
+
+
+def test_overturning_with_one_impact_is_taken_away_where_made_so():
+    found = judged(
+        synthetic(lambda *key: 0.5 if len(key) == 1 else 0.7 if key[2:] == (0.003, 0.0) else 0.4)
+    )
+    claim = found["overturning with one impact"]
+    assert claim.verdict == "holds"
+    assert claim.rows[0].value.endswith("of which it makes 100.0 % safe")
+
+
+def test_a_shape_is_not_an_area():
+    """Two safe regions of one area that lie elsewhere differ in shape."""
+    spectra_made = synthetic(lambda *key: 0.5)
+    for one in spectra_made:
+        if one.scene.walls and one.scene.floor.friction == 0.6 and one.scene.walls[0].gap == 0.003:
+            one.outcomes[:] = one.outcomes[::-1].copy()
+    claim = judged(spectra_made)["restitution gives the shape"]
+    assert claim.verdict == "does not hold"
+    assert (
+        claim.rows[0].value
+        == "the safe region differs at up to 100.0 % of the nodes between gaps, at up to 0.0 % between e"
+    )
+
+
+def test_exceptions_are_named_and_found():
+    def height(*key):
+        return (
+            0.5
+            if len(key) == 1
+            else 0.4 - 0.1 * key[3] - key[2] * (1.0 if key[:2] != ("right", 0.6) else 0.0)
+        )
+
+    spectra_made = synthetic(height)
+    claim = judged(spectra_made)["smaller gap"]
+    assert claim.verdict == "holds in part"
+    assert (
+        claim.finding == "Larger at the smaller gap in 12 of 16 pairs."
+    )  # four exceptions are too many to name
+    odd = next(s for s in spectra_made if s.scene.name == "figure-8-gap-53-e-0")
+    odd.outcomes[:, 10:] = 1  # less safe at high frequency
+    claim = judged(spectra_made)["lower restitution"]
+    assert claim.finding.endswith("Not so: right wall, μ 0.3, 53 mm.")
+    row = next(row for row in claim.rows if not row.holds)
+    assert "ω_p/p 2.4 to 8.0, amplitude 1.0 to 3.5" in row.value
+
+
+def test_sides_that_the_pulse_turns_round():
+    def height(*key):
+        return 0.5 if len(key) == 1 else 0.3
+
+    spectra_made = synthetic(height)
+    for spectrum in spectra_made:
+        if not spectrum.scene.walls:
+            spectrum.outcomes[spectrum.outcomes == 1] = -1
+    claim = judged(spectra_made)["likelier side"]
+    assert claim.verdict == "does not hold"
+    assert "With the pulse reversed it would be so over all of them" in claim.finding
+
+
+def test_a_range_is_named_up_to_which_a_side_is_likelier():
+    spectra_made = synthetic(lambda *key: 0.25)
+    for spectrum in spectra_made:
+        if not spectrum.scene.walls:
+            spectrum.outcomes[20:] = -1  # clockwise from amplitude 10 to 19 of 40 only
+    claim = judged(spectra_made)["likelier side"]
+    assert claim.verdict == "holds in part"
+    values = {row.what: row.value for row in claim.rows}
+    assert (
+        values["μ 0.3, the lowest overturning"]
+        == "clockwise at 40 of 40 frequencies, up to ω_p/p of 8.0"
+    )
+    assert (
+        values["μ 0.3, lower amplitudes"] == "clockwise up to a_p of 8.9 g tan α"
+    )  # as many rows again
+
+
+def test_the_documentation_says_what_is_found(tmp_path, monkeypatch):
+    docs = Path(__file__).parents[3] / "docs"
+    monkeypatch.syspath_prepend(docs / "site_tools")
+    from claims import PLACE, claims_found, table
+
+    found = claims_found(tmp_path)
+    assert PLACE.findall((docs / "spectra.md").read_text(encoding="utf-8")) == [table(found)]
+    assert all(claim["place"] for claim in found)
+
+
+def test_what_holds_generally_may_have_exceptions():
+    """Three in four are not more than that."""
+
+    def height(*key):
+        return 0.5 if len(key) == 1 else 0.4 - 0.1 * key[3] * (-1.0 if key[:3] in harmed else 1.0)
+
+    walls = [("left", 0.3, 0.003), ("left", 0.3, 0.053), ("right", 0.6, 0.103)]
+    harmed = set(walls[:2])
+    assert verdicts(synthetic(height))["lower restitution"] == "holds"
+    harmed = set(walls)
+    assert verdicts(synthetic(height))["lower restitution"] == "holds in part"
+
+
+def test_impacts_before_the_fall_are_counted():
+    panel, amplitudes = paper_panels(6)[0], np.linspace(1.0, 12.0, 23)
+    frequencies = np.full(23, 2.5)
+    sides, _ = play_nodes(panel.scene, amplitudes, frequencies, model=MODEL)
+    (task,) = nodes_of(
+        panel.scene, amplitudes, frequencies, "ebm", {"tolerance": TOLERANCE}, "one impact"
+    )
+    one = np.array([letter == "Y" for letter in play(task).letters])
+    assert one[sides == 1].any()
+    for amplitude in amplitudes[one & (sides == 1)]:
+        history = EventBasedModel().simulate(node_scene(panel.scene, float(amplitude), 2.5))
+        before = [
+            event.kind
+            for event in history.event_list
+            if event.kind in ("floor impact", "overturned right")
+        ]
+        assert before == ["floor impact", "overturned right"]
+
+
+def test_the_nodes_that_may_fall_after_one_impact():
+    (free,) = (one for one in kept_spectra() if one.scene.name == "figure-6-unobstructed")
+    i, j = near_one_impact(free)
+    assert (free.outcomes[i, j] == 1).all()
+    assert 2.0 <= free.frequency_ratios[j].min() < free.frequency_ratios[j].max() <= 4.0
+
+
+def test_the_kept_spectra_are_the_model_s():
+    """A sample of each; the paper's model may have changed since at some few nodes of a chaotic
+    boundary."""
+    draw = np.random.default_rng(7)
+    wrong = 0
+    for spectrum in kept_spectra():
+        i, j = draw.integers(100, size=(2, 40))
+        sides, failed = play_nodes(
+            spectrum.scene, spectrum.amplitude_ratios[i], spectrum.frequency_ratios[j], model=MODEL
+        )
+        wrong += int(np.sum((sides != spectrum.outcomes[i, j]) & ~failed))
+    assert wrong <= 2
+
+
+def test_each_finding_counts_its_nodes_one_by_one():
+    spectra = kept_spectra()
+    by = {}
+    for one in spectra:
+        wall = one.scene.walls[0] if one.scene.walls else None
+        by[one.scene.floor.friction, (wall.side, wall.gap, wall.restitution) if wall else None] = (
+            one.outcomes
+        )
+    equal, either, stronger = findings_of(Paper(spectra))
+    wall, free = by[0.3, ("right", 0.103, 1.0)], by[0.3, None]
+    assert (equal.shown.gained.sum(), equal.shown.lost.sum()) == (
+        sum(w == 0 and f != 0 for w, f in zip(wall.flat, free.flat, strict=True)),
+        sum(w != 0 and f == 0 for w, f in zip(wall.flat, free.flat, strict=True)),
+    )
+    assert equal.shown.case == "right wall, 103 mm, e = 1, μ = 0.3"
+    left, right, free = by[0.6, ("left", 0.053, 1.0)], by[0.6, ("right", 0.053, 1.0)], by[0.6, None]
+    assert either.shown.lost.sum() == sum(
+        f == 0 and a != 0 and b != 0
+        for f, a, b in zip(free.flat, left.flat, right.flat, strict=True)
+    )
+    wall = by[0.3, ("right", 0.053, 1.0)]
+    count = sum(
+        wall[i, j] == 0 and any(wall[k, j] != 0 for k in range(i))
+        for i in range(100)
+        for j in range(100)
+    )
+    assert stronger.shown.gained.sum() == count > 1000
+
+
+def test_an_undecided_node_is_neither_safe_nor_overturned():
+    spectra = kept_spectra()
+    k = next(k for k, one in enumerate(spectra) if one.scene.name == "figure-8-gap-103-e-1")
+    safe = np.argwhere(spectra[k].safe & ~spectra[0].safe)
+    counted = int(findings_of(Paper(spectra))[0].shown.gained.sum())
+    spectra[k] = dataclasses.replace(spectra[k], undecided=safe[:1])
+    found = findings_of(Paper(spectra))[0]
+    assert found.shown.case == "right wall, 103 mm, e = 1, μ = 0.3"
+    assert found.shown.gained.sum() == counted - 1
+
+
+def test_the_documentation_tells_the_findings_of_the_kept_spectra():
+    text = (Path(__file__).parents[3] / "docs" / "spectra.md").read_text(encoding="utf-8")
+    part = text.partition("<!-- findings -->")[2].partition("<!-- end -->")[0]
+    shown = [line.strip("| \n").split(" | ") for line in part.splitlines()]
+    assert [row for row in shown if len(row) == 3][1:] == [
+        [one.sentence, f"{one.shown.case} (Fig. {one.shown.figure})", one.words]
+        for one in findings_of(Paper(kept_spectra()))
+    ]

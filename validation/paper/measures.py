@@ -1,0 +1,441 @@
+"""How the paper's sentences about its 28 spectra are measured, and our own findings: the measures
+that `data/paper/sentences.toml` names.
+
+Each takes the spectra and its arguments, and returns rows of figures and what the finding says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.ebm import Spectrum
+from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE
+from rockcheck.scenes import Scene
+from rockcheck.validation.paper.panels import AMPLITUDES, FIGURES, GAPS, RESTITUTIONS
+
+Mask = NDArray[np.bool_]
+Place = tuple[int, ...]
+#: The parameters of the walls: in this order a spectrum has its place. Gaps in mm.
+AXES: dict[str, tuple[Any, ...]] = {
+    "side": ("left", "right"),
+    "friction": (0.3, 0.6),
+    "gap": tuple(1000.0 * gap for gap in GAPS),
+    "restitution": RESTITUTIONS,
+}
+SIZES = tuple(map(len, AXES.values()))
+WALLS: list[Place] = list(np.ndindex(*SIZES))
+SAID = ("{} wall", "μ {:g}", "{:g} mm", "e {:g}")
+#: A change of the safe area of less than this share of the nodes is no change: a band one node wide
+#: along the boundary.
+SMALL = 0.01
+#: Where the paper's example of overturning with one impact lies, omega_p/p.
+ONE_IMPACT = (2.0, 3.0)
+#: The amplitudes that are scanned, beyond the spectra's own range, and at which omega_p/p.
+SCANNED, SCANNED_AT = np.arange(AMPLITUDES[0], 20.005, 0.01), 6.0
+
+
+@dataclass(frozen=True)
+class Row:
+    """One figure behind a sentence; `holds` None where it only informs."""
+
+    what: str
+    value: str
+    holds: bool | None = None
+
+
+Measured = tuple[list[Row], dict[str, Any]]
+
+
+class Paper:
+    """The 28 spectra on one grid: outcomes and safe nodes by place, and those without a wall by
+    friction; and what is known beyond them.
+
+    `least`: the lowest overturning amplitude of `SCANNED` by (gap, e) of a right wall, None without
+    one; infinite where none overturns. `tongues`: by friction, the nodes of `near_one_impact` at
+    which the free block overturns after exactly one floor impact.
+    """
+
+    def __init__(
+        self,
+        spectra: Sequence[Spectrum],
+        least: Mapping[tuple[float, float] | None, float] | None = None,
+        tongues: Mapping[float, Mask] | None = None,
+    ) -> None:
+        self.frequencies, self.amplitudes = spectra[0].frequency_ratios, spectra[0].amplitude_ratios
+        self.least, self.tongues = least or {}, tongues or {}
+        nodes = spectra[0].outcomes.shape
+        self.outcomes, self.alone = (
+            np.zeros((*SIZES, *nodes), np.int8),
+            np.zeros((2, *nodes), np.int8),
+        )
+        self.safe, self.safe_alone = self.outcomes != 0, self.alone != 0
+        for one in spectra:
+            mu = AXES["friction"].index(one.scene.floor.friction)
+            outcomes, safe, place = self.alone, self.safe_alone, (mu,)
+            for wall in one.scene.walls:
+                outcomes, safe = self.outcomes, self.safe
+                side, e = AXES["side"].index(wall.side), RESTITUTIONS.index(wall.restitution)
+                place = side, mu, GAPS.index(wall.gap), e  # type: ignore[assignment]
+            outcomes[place], safe[place] = one.outcomes, one.safe
+
+    @property
+    def falls(self) -> Mask:
+        """Which nodes overturn; one whose run failed is neither safe nor overturned."""
+        return self.outcomes != SAFE
+
+    @property
+    def falls_alone(self) -> Mask:
+        """The same without a wall."""
+        return self.alone != SAFE
+
+
+def about(place: Sequence[int | None]) -> str:
+    """The wall and friction of a place in words, without what is None."""
+    values = zip(SAID, AXES.values(), place, strict=True)
+    return ", ".join(said.format(axis[n]) for said, axis, n in values if n is not None)
+
+
+def share(mask: Mask | float) -> str:
+    """A share in percent, one decimal."""
+    return f"{100.0 * float(np.mean(mask)):.1f} %"
+
+
+def _along(axis: str) -> Iterator[tuple[Place, int]]:
+    """The places at the beginning of an axis, and which axis it is."""
+    k = list(AXES).index(axis)
+    return ((place, k) for place in WALLS if place[k] == 0)
+
+
+def _at(place: Sequence[int | None], k: int, n: int | None) -> Any:
+    return (*place[:k], n, *place[k + 1 :])
+
+
+def pairs(paper: Paper, axis: str, free: bool = False) -> Measured:
+    """Each value of a parameter, said to be safer, against the next."""
+    rows = [_pair(paper, "no wall", *paper.safe_alone)] if free else []
+    for place, k in _along(axis):
+        for n, (one, other) in enumerate(pairwise(AXES[axis])):
+            what = about(_at(place, k, None))
+            what += f": {one:g} against {other:g} mm" if len(AXES[axis]) > 2 else ""
+            both = (paper.safe[_at(place, k, m)] for m in (n, n + 1))
+            rows.append(_pair(paper, what, *both))
+    return rows, {}
+
+
+def _pair(paper: Paper, what: str, safer: Mask, other: Mask) -> Row:
+    """Areas, and the nodes where the opposite holds."""
+    i, j = np.nonzero(~safer & other)
+    f, a = paper.frequencies[j], paper.amplitudes[i]
+    opposite = "nowhere the opposite"
+    if len(i):
+        opposite = f"the opposite at {share(len(i) / safer.size)} of the nodes,"
+        opposite += (
+            f" ω_p/p {f.min():.1f} to {f.max():.1f}, amplitude {a.min():.1f} to {a.max():.1f}"
+        )
+    value = f"safe area {share(safer)} against {share(other)}; {opposite}"
+    return Row(what, value, bool(safer.mean() > other.mean()))
+
+
+def against_none(
+    paper: Paper, parts: Sequence[Mapping[str, Any]], above: float = 0.0, examples: str = ""
+) -> Measured:
+    """Safe areas with walls against none, at omega_p/p > `above`.
+
+    A part has parameters of walls, and a bound: with the wall it is `below`, or `beyond`, so many
+    times the area without one, and so much (shares of the nodes). With `examples` some walls must
+    help, and some harm.
+    """
+    rows, gains, ratios = [], [], []
+    high = paper.frequencies > above
+    for number, part in enumerate(parts):
+        for place in WALLS:
+            values = {name: AXES[name][n] for name, n in zip(AXES, place, strict=True)}
+            if values != values | {name: part[name] for name in AXES if name in part}:
+                continue
+            wall, none = (
+                float(np.mean(safe[:, high]))
+                for safe in (paper.safe[place], paper.safe_alone[place[1]])
+            )
+            holds = None
+            for name, sign in (("below", 1.0), ("beyond", -1.0)):
+                if name in part:
+                    times, more = part[name]
+                    holds = sign * (wall - times * none) < sign * more
+            value = f"safe area {share(wall)} with the wall, {share(none)} without"
+            rows.append(Row(about(place), value, holds))
+            gains.append((wall - none, number))
+            ratios.append(wall / none if none else 1.0)
+    helped, harmed = sum(gain > SMALL for gain, _ in gains), sum(gain < -SMALL for gain, _ in gains)
+    if examples:
+        said = ((f"{examples} may enlarge the safe area", helped), ("it may shrink it", harmed))
+        rows[:0] = [Row(what, f"{n} of {len(gains)} spectra", n > 0) for what, n in said]
+    return rows, {
+        "helped": helped,
+        "harmed": harmed,
+        "harmed_first": sum(gain < -SMALL for gain, number in gains if number == 0),
+        "spectra": len(gains),
+        "least_loss": share(1.0 - max(ratios)),
+        "most_loss": share(1.0 - min(ratios)),
+        "gain": share(max(ratios) - 1.0),
+    }
+
+
+def towards_the_wall(paper: Paper) -> Measured:
+    """Nodes that overturn towards the wall: none."""
+    counts = [(place, np.sum(paper.outcomes[place] == (LEFT, RIGHT)[place[0]])) for place in WALLS]
+    return [Row(about(place), f"{n} nodes", bool(n == 0)) for place, n in counts], {}
+
+
+def matters_most(paper: Paper, most: str) -> Measured:
+    """Nodes that are safe in one of two spectra only which differ in one parameter alone, mean over
+    all such pairs."""
+    means = {}
+    for k, axis in enumerate(AXES):
+        two = combinations(np.moveaxis(paper.safe, k, 0), 2)
+        means[axis] = float(np.mean([np.mean(one != other) for one, other in two]))
+    rows = [Row(most, f"{share(means[most])} of the nodes")]
+    rows += [Row(axis, share(n), means[most] > n) for axis, n in means.items() if axis != most]
+    return rows, {"means": ", ".join(f"{axis} {share(mean)}" for axis, mean in means.items())}
+
+
+def side_decides(paper: Paper) -> Measured:
+    """Nodes that are safe with the wall on one side only, at either friction."""
+    depends = np.mean(paper.safe[0] != paper.safe[1], axis=(-2, -1))
+    rows = []
+    for gap, e in np.ndindex(*SIZES[2:]):
+        low, high = depends[:, gap, e]
+        value = f"the side decides at {share(low)} of the nodes at μ 0.3, at {share(high)} at μ 0.6"
+        rows.append(Row(about((None, None, gap, e)), value, bool(low > high)))
+    return rows, {}
+
+
+def one_impact(paper: Paper) -> Measured:
+    """Of the nodes that overturn with one impact without the wall, those that it makes safe."""
+    rows, shares = [], []
+    for mu, tongue in sorted(paper.tongues.items()):
+        safe, f = paper.safe[0, AXES["friction"].index(mu), 0, 0], paper.frequencies
+        for low, high in (ONE_IMPACT, (ONE_IMPACT[1], ONE_IMPACT[1] + 1.0)):
+            there = tongue & ((f >= low) & (f <= high))
+            part = float(np.mean(safe[there])) if there.any() else 0.0
+            where = f"ω_p/p {low:g} to {high:g}"
+            value = f"{there.sum()} nodes without the wall, of which it makes {share(part)} safe"
+            holds = part > 0.5 if low == ONE_IMPACT[0] else None
+            rows.append(Row(f"μ {mu:g}, {where}", value, holds))
+            shares.append(f"{share(part)} at μ = {mu:g} and {where}")
+    return rows, {"shares": ", ".join(shares)}
+
+
+def turns(paper: Paper, side: str, axes: Sequence[str]) -> Measured:
+    """Pairs of walls that differ in one parameter alone: one helps, one harms."""
+    areas, alone = (np.mean(safe, axis=(-2, -1)) for safe in (paper.safe, paper.safe_alone))
+    gains = (areas - alone[None, :, None, None])[AXES["side"].index(side)]
+    rows = []
+    for axis in axes:
+        two = list(combinations(np.moveaxis(gains, list(AXES).index(axis) - 1, 0), 2))
+        both = [np.stack(pair) for pair in two]
+        turn = sum(int(((one.min(0) < -SMALL) & (one.max(0) > SMALL)).sum()) for one in both)
+        value = (
+            f"turns a benefit into harm, or back, in {turn} of {sum(o[0].size for o in both)} pairs"
+        )
+        rows.append(Row(f"{axis} alone", value, turn > 0))
+    return rows, {"turns": "; ".join(f"{row.what} {row.value}" for row in rows).capitalize()}
+
+
+def least_amplitude(paper: Paper) -> Measured:
+    """The lowest overturning amplitude on the scan, with walls against none."""
+    walls = {wall: value for wall, value in paper.least.items() if wall}
+    none = paper.least[None]
+    rows = [Row("no wall", f"overturns from a_p = {none:.2f} g tan α")]
+    for (gap, e), value in walls.items():
+        what = f"right wall, {1000 * gap:g} mm, e {e:g}"
+        rows.append(Row(what, f"from {value:.2f} g tan α", value < none))
+    said = ", ".join(f"{value:.1f} (e = {e:g})" for (_, e), value in walls.items())
+    return rows, {"without": none, "walls": said}
+
+
+def restitution_rules(paper: Paper) -> Measured:
+    """The most nodes that differ between two gaps against the most between e, at mu = 0.6."""
+    rows, most = [], []
+    for side, safe in zip(AXES["side"], paper.safe[:, 1], strict=True):
+        by_gap = np.max([np.mean(a != b, axis=(-2, -1)) for a, b in combinations(safe, 2)])
+        by_e = np.max(np.mean(safe[:, 0] != safe[:, 1], axis=(-2, -1)))
+        value = f"the safe region differs at up to {share(by_gap)} of the nodes between gaps,"
+        rows.append(
+            Row(
+                f"{side} wall, μ 0.6",
+                f"{value} at up to {share(by_e)} between e",
+                bool(by_gap < by_e),
+            )
+        )
+        most.append((by_gap, by_e))
+    gaps, e = map(share, np.max(most, axis=0))
+    return rows, {"gaps": gaps, "e": e}
+
+
+def likelier_side(paper: Paper) -> Measured:
+    """Nodes that overturn clockwise against counterclockwise without a wall: up to an amplitude, up
+    to a frequency, and in all."""
+    rows, ends, whole = [], [], []
+    a = paper.amplitudes
+    for mu, outcomes in zip(AXES["friction"], paper.alone, strict=True):
+        left, right = (np.mean(outcomes == side, axis=1) for side in (LEFT, RIGHT))
+        gain = np.cumsum(right - left) > 0.0  # over amplitudes from the lowest up to each
+        until = a[np.flatnonzero(gain)[-1]] if gain.any() else 0.0
+        said = f"clockwise up to a_p of {until:.1f} g tan α"
+        rows.append(Row(f"μ {mu:g}, lower amplitudes", said, bool(until > 0.0)))
+        rows.append(_lowest(paper, mu, outcomes))
+        value = f"clockwise {share(right)} of the nodes, counterclockwise {share(left)}"
+        where = f"μ {mu:g}, a_p from {a[0]:g} to {a[-1]:g} g tan α"
+        rows.append(Row(where, value, bool(right.mean() > left.mean())))
+        ends.append(f"{until:.1f} g tan α (μ = {mu:g})")
+        whole.append(f"{share(right)} against {share(left)} of the nodes (μ = {mu:g})")
+    # The mirror image: a right wall under the reversed pulse is a left wall under the pulse.
+    wall, none = paper.safe[0, 0, 0, 0], paper.safe_alone[0]
+    value = f"safe area {share(wall)}, {share(none)} without"
+    rows.append(Row("with the pulse reversed: right wall, μ 0.3, 3 mm, e 0", value))
+    back = " With the pulse reversed it would be so over all of them, but then a right wall would"
+    said = f"{back} shrink the safe area." if wall.mean() < none.mean() else ""
+    return rows, {"ends": " and ".join(ends), "whole": ", ".join(whole), "reversed": said}
+
+
+def _lowest(paper: Paper, mu: float, outcomes: NDArray[np.int8]) -> Row:
+    """At how many frequencies the lowest overturning is clockwise, up to the one at which that side
+    leads by most."""
+    falls = outcomes != SAFE
+    some = np.flatnonzero(falls.any(axis=0))
+    clockwise = outcomes[np.argmax(falls, axis=0)[some], some] == RIGHT
+    lead = np.cumsum(np.where(clockwise, 1, -1))
+    count = int(np.argmax(lead)) + 1
+    end = paper.frequencies[some[count - 1]]
+    value = (
+        f"clockwise at {np.sum(clockwise[:count])} of {count} frequencies, up to ω_p/p of {end:.1f}"
+    )
+    return Row(f"μ {mu:g}, the lowest overturning", value, bool(lead[count - 1] > 0))
+
+
+def wall_of(scene: Scene) -> tuple[float, float] | None:
+    """Gap and restitution of the wall, None without one."""
+    return (scene.walls[0].gap, scene.walls[0].restitution) if scene.walls else None
+
+
+def is_scanned(scene: Scene) -> bool:
+    """Whether it is one of the scenes whose lowest overturning amplitude is looked for."""
+    wall = (scene.walls[0].side, scene.walls[0].gap) if scene.walls else None
+    return scene.floor.friction == AXES["friction"][0] and wall in (None, ("right", GAPS[-1]))
+
+
+def near_one_impact(spectrum: Spectrum) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The nodes (i, j) at omega_p/p from `ONE_IMPACT` to one more that overturn clockwise."""
+    f = spectrum.frequency_ratios
+    near = (f >= ONE_IMPACT[0]) & (f <= ONE_IMPACT[1] + 1.0)
+    return np.nonzero((spectrum.outcomes == RIGHT) & near)  # type: ignore[return-value]
+
+
+# What the paper does not say: nodes that are gained, lost and safe besides, by place.
+
+
+@dataclass(frozen=True)
+class Shown:
+    """The case that shows a finding best: its place or friction, in words, and the nodes that its
+    map marks; then rows and what the finding says, as of any measure."""
+
+    case: str
+    figure: int
+    gained: Mask
+    lost: Mask
+    safe: Mask
+    rows: list[Row]
+    says: dict[str, Any]
+
+
+def _figure(side: int, mu: int) -> int:
+    what = AXES["side"][side], AXES["friction"][mu]
+    return next(number for number, shows in FIGURES.items() if shows == what)
+
+
+def _case(place: Place) -> str:
+    side, mu, gap, e = (axis[n] for axis, n in zip(AXES.values(), place, strict=True))
+    return f"{side} wall, {gap:g} mm, e = {e:g}, μ = {mu:g}"
+
+
+def exchange(paper: Paper) -> Shown:
+    """The wall that changes the safe area least, and what it changes."""
+    alone, falls_alone = (
+        mask[None, :, None, None] for mask in (paper.safe_alone, paper.falls_alone)
+    )
+    saved, lost = paper.safe & falls_alone, paper.falls & alone
+    counts = {place: (int(saved[place].sum()), int(lost[place].sum())) for place in WALLS}
+    place = min(counts, key=lambda one: abs(counts[one][0] - counts[one][1]))
+    return Shown(
+        _case(place),
+        _figure(*place[:2]),
+        saved[place],
+        lost[place],
+        paper.safe[place] & ~saved[place],
+        [
+            Row(_case(one), f"saves at {m} nodes, overturns at {n}")
+            for one, (m, n) in counts.items()
+        ],
+        {
+            "with_wall": share(paper.safe[place]),
+            "without": share(paper.safe_alone[place[1]]),
+            "both": sum(m > 0 and n > 0 for m, n in counts.values()),
+            "all": len(counts),
+        },
+    )
+
+
+def either_side(paper: Paper) -> Shown:
+    """Nodes at which the block stands alone and falls beside a wall on either side."""
+    alone, falls_alone = (mask[:, None, None] for mask in (paper.safe_alone, paper.falls_alone))
+    harmed, helped = alone & paper.falls.all(axis=0), falls_alone & paper.safe.all(axis=0)
+    places = list(np.ndindex(*SIZES[1:]))
+    place = mu, gap, e = max(places, key=lambda one: int(harmed[one].sum()))
+    return Shown(
+        f"{AXES['gap'][gap]:g} mm, e = {RESTITUTIONS[e]:g}, μ = {AXES['friction'][mu]:g}",
+        _figure(1, mu),
+        helped[place],
+        harmed[place],
+        paper.safe_alone[mu] & ~harmed[place],
+        [
+            Row(
+                about((None, *one)),
+                f"falls on either side at {harmed[one].sum()} nodes, saved at {helped[one].sum()}",
+            )
+            for one in places
+        ],
+        {},
+    )
+
+
+def stronger_is_safe(paper: Paper) -> Shown:
+    """Nodes that are safe though a weaker pulse of the same frequency overturns the block."""
+    above = paper.safe & np.logical_or.accumulate(paper.falls, axis=-2)
+    alone = paper.safe_alone & np.logical_or.accumulate(paper.falls_alone, axis=-2)
+    place = max(WALLS, key=lambda one: int(above[one].sum()))
+    free = alone[place[1]]
+    masks = [(f"no wall, μ {mu:g}", mask) for mu, mask in zip(AXES["friction"], alone, strict=True)]
+    masks += [(_case(one), above[one]) for one in WALLS]
+    return Shown(
+        _case(place),
+        _figure(*place[:2]),
+        above[place],
+        np.zeros_like(free),
+        paper.safe[place] & ~above[place],
+        [
+            Row(what, f"{mask.sum()} nodes, at {mask.any(axis=0).sum()} frequencies")
+            for what, mask in masks
+        ],
+        {
+            "frequencies": above[place].any(axis=0).sum(),
+            "all": len(paper.frequencies),
+            "free": free.sum(),
+            "free_frequencies": free.any(axis=0).sum(),
+        },
+    )

@@ -1,1 +1,0 @@
-"""Overturning spectra of all models: tiles, the claims of the paper, agreement."""

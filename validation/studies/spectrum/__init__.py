@@ -1,0 +1,1 @@
+"""Overturning spectra: tiles, refinement, histories, the other models."""

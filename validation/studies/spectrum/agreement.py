@@ -1,0 +1,314 @@
+"""The same spectra by the other models: at some nodes of each, the share of outcomes that are equal
+to the event-based models', and coarse maps of one figure."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.ebm import Spectrum
+from rockcheck.engines.engine import Engine
+from rockcheck.validation.discrepancy.figures import Stored
+from rockcheck.validation.execute import provenance
+from rockcheck.validation.execute.models import build, not_installed
+from rockcheck.validation.finding import Block, Column, Plot, Table, Text, text
+from rockcheck.validation.paper.panels import Panel
+from rockcheck.validation.studies.spectrum.grids import Book, Request
+from rockcheck.validation.studies.spectrum.tiles import letters_of
+from rockcheck.validation.uncertainty.population import SETTLE
+
+CANDIDATES = ("ebm-unilateral", "cm", "mujoco", "pybullet", "pymunk", "dart", "drake")
+#: The share of the nodes that a model plays, where it is not all. These engines draw no map:
+#: whether they, too, agree is told by fewer nodes, and a run of DART costs four times, one of Drake
+#: twice the others'.
+PLAYED_SHARE = {"pymunk": 0.3, "dart": 0.1, "drake": 0.2}
+REFERENCES = {"ebm": "bilateral", "ebm-unilateral": "unilateral"}
+#: A node is near the boundary if a node of another outcome is among those at most this many nodes
+#: away, diagonals included.
+NEAR = 2
+#: The paper's figure of which every model draws a map, and the map's nodes an axis.
+MAPPED, MAP_SIZE = 8, 25
+
+
+class Share(Stored):
+    """Equal outcomes of one model at the nodes of one spectrum, near the boundary or away from it.
+
+    `equal` counts them against each of `REFERENCES`; `failed` are nodes that the model could not
+    finish, counted as unequal.
+    """
+
+    spectrum: str
+    figure: int | None
+    model: str
+    near: bool
+    nodes: int
+    failed: int
+    equal: dict[str, int]
+
+
+class Map(Stored):
+    """The spectra of one figure by one model, coarsely: by panel, rows of letters, lowest amplitude
+    first. `equal` of the `nodes` have the unilateral event-based model's outcome."""
+
+    model: str
+    nodes: int
+    equal: int
+    outcomes: dict[str, tuple[str, ...]]
+
+
+class Agreement(Stored):
+    """All shares, and a map by each model; `date` is the day of the run, in UTC."""
+
+    format: int = 3
+    about: str
+    date: str
+    versions: dict[str, str]
+    settings: dict[str, dict[str, Any]]
+    shares: tuple[Share, ...]
+    map_frequencies: tuple[float, ...]
+    map_amplitudes: tuple[float, ...]
+    maps: tuple[Map, ...]
+
+
+def choose_nodes(
+    spectrum: Spectrum, count: int, name: str
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """`count` nodes (i, j) of a spectrum and whether each is near the boundary: half of them are,
+    where there are so many.
+
+    The choice is random but depends only on `name`. Nodes that the reference could not decide are
+    left out.
+    """
+    near = near_boundary(spectrum.outcomes)
+    random = np.random.default_rng(zlib.crc32(name.encode()))
+    decided = np.ones(near.shape, dtype=bool)
+    decided[tuple(spectrum.undecided.T)] = False
+    inside, outside = np.argwhere(near & decided), np.argwhere(~near & decided)
+    wanted = max(min(count // 2, len(inside)), min(count - len(outside), len(inside)))
+    chosen = [inside[random.permutation(len(inside))[:wanted]]]
+    chosen.append(outside[random.permutation(len(outside))[: count - wanted]])
+    nodes = np.concatenate(chosen)
+    return nodes, near[nodes[:, 0], nodes[:, 1]]
+
+
+def first_of(near: NDArray[np.bool_], count: int) -> NDArray[np.int64]:
+    """The indices of `count` of the chosen nodes, in the order chosen: the first half of each side,
+    or all nodes."""
+    if count >= len(near):
+        return np.arange(len(near))
+    sides = [np.flatnonzero(near == part) for part in (True, False)]
+    wanted = [min(count // 2, len(sides[0])), min(count - count // 2, len(sides[1]))]
+    return np.concatenate([side[:number] for side, number in zip(sides, wanted, strict=True)])
+
+
+def near_boundary(outcomes: NDArray[np.int8]) -> NDArray[np.bool_]:
+    """Which nodes have another outcome within `NEAR` nodes."""
+    from scipy import ndimage
+
+    filters = ndimage.maximum_filter, ndimage.minimum_filter
+    most, least = (one(outcomes, 2 * NEAR + 1, mode="nearest") for one in filters)
+    near: NDArray[np.bool_] = most != least
+    return near
+
+
+def candidates() -> tuple[str, ...]:
+    """The models that are held against the event-based ones and are installed."""
+    return tuple(model for model in CANDIDATES if not not_installed(model))
+
+
+def nodes_played(model: str, count: int) -> int:
+    """At how many of `count` nodes of a spectrum a model plays; two at least, one on each side."""
+    return max(2, round(PLAYED_SHARE.get(model, 1.0) * count))
+
+
+def plays(request: Request, panel: Panel) -> bool:
+    """Whether the model has what the panel asks of contacts; an engine without restitution does not
+    play walls that bounce."""
+    model = build(request.model, request.settings)
+    lacks = model.lacks() if isinstance(model, Engine) else ()
+    return "restitution" not in lacks or panel.wall is None or panel.wall.restitution == 0.0
+
+
+def agree(
+    book: Book, spectra: Mapping[Panel, Spectrum], request: Request, count: int
+) -> Agreement | None:
+    """Up to `count` nodes of each spectrum by the other models, and how many outcomes are equal;
+    and a map of one figure by each model. None where nodes are still to be played."""
+    others = [replace(request, model=model, settings={}) for model in candidates()]
+    requests = {one.model: one for one in (request, *others)}
+    shares = [list(_shares(book, panel, one, others, count)) for panel, one in spectra.items()]
+    maps = _maps(book, list(spectra), requests)
+    if book.wanted:
+        return None
+    fewer = [one.model for one in others if one.model in PLAYED_SHARE]
+    return Agreement(
+        about=f"Share of equal outcomes at {count} nodes of each spectrum of {request.size} x"
+        f" {request.size} nodes. Half of them are at most {NEAR} nodes from a boundary (near), the"
+        " others further away. Models are held against the paper's bilateral event-based model and"
+        " against the unilateral one, which lets the block hop as the other models do. Runs of the"
+        " other models end with the pulse where the block then lacks the energy to tip over,"
+        f" otherwise {SETTLE:g} s later. A block that then stands counts as safe."
+        + (f" Played at fewer of the nodes: {', '.join(fewer)}." if fewer else ""),
+        date=datetime.now(UTC).date().isoformat(),
+        versions=provenance.versions(),
+        settings={model: dict(one.settings) for model, one in requests.items()},
+        shares=tuple(share for some in shares for share in some),
+        map_frequencies=tuple(_coarse(request).frequencies.tolist()),
+        map_amplitudes=tuple(_coarse(request).amplitudes.tolist()),
+        maps=tuple(maps),
+    )
+
+
+def _shares(
+    book: Book, panel: Panel, spectrum: Spectrum, others: Sequence[Request], count: int
+) -> Iterator[Share]:
+    nodes, near = choose_nodes(spectrum, count, panel.name)
+    i, j = nodes.T
+    sides = {"ebm": spectrum.outcomes[i, j]}
+    for one in others:
+        if not plays(one, panel):
+            continue
+        chosen = first_of(near, nodes_played(one.model, count))
+        where = one.amplitudes[i[chosen]], one.frequencies[j[chosen]]
+        found = book.outcomes(panel.scene, *where, one.model, one.settings)
+        if found is None:
+            continue
+        mine, failures = found
+        sides.setdefault(one.model, mine)
+        for part in (True, False):
+            here = near[chosen] == part
+            fine = here & ~failures
+            yield Share(
+                spectrum=panel.name,
+                figure=panel.figure,
+                model=one.model,
+                near=part,
+                nodes=int(here.sum()),
+                failed=int(np.sum(here & failures)),
+                equal={
+                    other: int(np.sum(fine & (mine == sides[other][chosen])))
+                    for other in REFERENCES
+                    if other != one.model and other in sides
+                },
+            )
+
+
+def _coarse(request: Request) -> Request:
+    return replace(request, size=MAP_SIZE, refine=False)
+
+
+def mapped(panels: Sequence[Panel]) -> list[Panel]:
+    """The panels of which every model draws a map: those of one figure."""
+    figures = [panel.figure for panel in panels]
+    return [p for p in panels if p.figure == (MAPPED if MAPPED in figures else figures[0])]
+
+
+def _maps(book: Book, panels: Sequence[Panel], requests: Mapping[str, Request]) -> Iterator[Map]:
+    played = {
+        model: [book.spectrum(panel, _coarse(one)) for panel in mapped(panels)]
+        for model, one in requests.items()
+        if model not in PLAYED_SHARE
+    }
+    if book.wanted:
+        return
+    for model, spectra in played.items():
+        both = list(zip(mapped(panels), spectra, played["ebm-unilateral"], strict=True))
+        yield Map(
+            model=model,
+            nodes=sum(mine.outcomes.size for _, mine, _ in both if mine),
+            equal=sum(
+                int(np.sum(mine.outcomes == true.outcomes))
+                for _, mine, true in both
+                if mine and true
+            ),
+            outcomes={
+                panel.name: tuple(map("".join, letters_of(mine.outcomes, mine.undecided)))
+                for panel, mine, _ in both
+                if mine
+            },
+        )
+
+
+def blocks(found: Agreement, panels: Sequence[Panel], came: bool) -> Iterator[Block]:
+    """What a reader is told of it; `came`: it came with the package."""
+    origin = f"Computed on {found.date}"
+    if came:
+        origin = (
+            f"Not computed in this run: it came with the package, from a run on {found.date} by"
+            f" rockcheck {found.versions.get('rockcheck', '')}. --agreement 200 computes it anew"
+        )
+    settings = "; ".join(
+        f"{model} {', '.join(f'{key} {value}' for key, value in chosen.items()) or 'as it comes'}"
+        for model, chosen in found.settings.items()
+    )
+    engines = {"mujoco", "pybullet", "pymunk", "dartpy", "drake"} & found.versions.keys()
+    versions = ", ".join(f"{name} {found.versions[name]}" for name in sorted(engines))
+    about = f"{found.about} {origin}. Settings: {settings}. {versions}."
+    yield Text(about, "The same spectra by the other models", on="page")
+    models = list(dict.fromkeys(share.model for share in found.shares))
+    rows = [[model, *_row([s for s in found.shares if s.model == model])] for model in models]
+    yield Table("agreement", [Column("model", kind="model"), *_columns()], rows)
+    groups = dict.fromkeys((share.spectrum, share.model) for share in found.shares)
+    rows = [
+        [name, model, *_row([s for s in found.shares if (s.spectrum, s.model) == (name, model)])]
+        for name, model in groups
+    ]
+    columns = [text("spectrum"), Column("model", kind="model"), *_columns()]
+    by = {"title": "Spectrum by spectrum", "on": "page", "folded": True}
+    yield Table("agreement-by-spectrum", columns, rows, **by)  # type: ignore[arg-type]
+    if found.maps:
+        yield _drawn(found, panels)
+
+
+def _columns() -> list[Column]:
+    shares = [
+        Column(f"{part}_{short}", f"{part}, {short}", kind="percent")
+        for short in REFERENCES.values()
+        for part in ("near", "away")
+    ]
+    return [*shares, Column("nodes"), Column("failed")]
+
+
+def _row(shares: Sequence[Share]) -> list[Any]:
+    cells: list[Any] = []
+    for reference in REFERENCES:
+        for near in (True, False):
+            mine = [share for share in shares if share.near == near and reference in share.equal]
+            nodes = sum(share.nodes for share in mine)
+            cells.append(sum(s.equal[reference] for s in mine) / nodes if nodes else None)
+    return [*cells, sum(s.nodes for s in shares), sum(s.failed for s in shares)]
+
+
+def _drawn(found: Agreement, panels: Sequence[Panel]) -> Plot:
+    equal = ", ".join(
+        f"{one.model} {one.equal} of {one.nodes}"
+        for one in found.maps
+        if one.model != "ebm-unilateral"
+    )
+    shown = [
+        {
+            "title": panel.title.replace(", ", "\n") if row == 0 else "",
+            "free": panel.wall is None,
+            "outcomes": "".join(one.outcomes[panel.name]),
+            "place": [row, 1, column],
+            "row": one.model,
+        }
+        for row, one in enumerate(found.maps)
+        for column, panel in enumerate(panels)
+    ]
+    axes = {"frequencies": found.map_frequencies, "amplitudes": found.map_amplitudes}
+    size = len(found.map_frequencies)
+    return Plot(
+        "models",
+        f"Fig. {panels[0].figure} by every model" if panels[0].figure else "By every model",
+        kind="spectra",
+        note=f"{size} x {size} nodes a spectrum; equal to the unilateral event-based model's:"
+        f" {equal}.",
+        data={**axes, "record": False, "panels": shown, "height": 0.4 + 0.92 * len(found.maps)},
+    )

@@ -1,0 +1,334 @@
+"""`rockcheck spectrum`: overturning spectra, the paper's and one's own, as a study."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.ebm import Spectrum
+from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, node_scene
+from rockcheck.scenes import Ricker, Sine
+from rockcheck.scenes.reading import read_json
+from rockcheck.scenes.writing import table_text
+from rockcheck.validation.execute import provenance
+from rockcheck.validation.execute.models import build
+from rockcheck.validation.finding import Block, Column, Finding, Mark, Plot, Table, Text, text
+from rockcheck.validation.paper import measures, sentences
+from rockcheck.validation.paper.panels import GAPS, KEPT, Panel, paper_panels, title_of
+from rockcheck.validation.studies.spectrum import agreement, tiles
+from rockcheck.validation.studies.spectrum.grids import Book, Request, differing
+from rockcheck.validation.study import Study
+from rockcheck.validation.uncertainty.population import compiled
+
+#: Nodes an axis whose histories are kept, both ends of the axis among them.
+KEPT_AN_AXIS = 16
+ABOUT = (
+    "Which pulses overturn the block: frequency against amplitude of the pulse, each node a run"
+    " until its outcome is certain. ωₚ is the pulse's circular frequency, over that of the block,"
+    " p = √(3g/4R) if it is homogeneous; aₚ its peak acceleration, over the g tan α that lifts a"
+    " corner. Point at a node: each spectrum of the figure says what becomes of the block there. A"
+    " click plays the motion: of the model's own histories, the one next to the click that ends the"
+    " same way."
+)
+LAWS = (
+    "Depends on the impact law: so many nodes have another outcome where a block strikes one"
+    ' contact after another and not all at once (impacts = "moreau"): as it lands flush against a'
+    ' wall that bounces ("floor-first") or flat on the floor while it slides ("leading-first",'
+    ' "trailing-first"). In the figure they have a ring. Rigid-body mechanics does not tell between'
+    " these laws."
+)
+
+
+@dataclass(frozen=True)
+class Spectra(Study):
+    """The spectra of some panels, all on one grid by one model. At `compared` nodes of each, where
+    that is not 0, the other models play, too. Raises `InputError` where the model cannot play."""
+
+    panels: tuple[Panel, ...]
+    request: Request = field(default_factory=Request)
+    compared: int = 0
+    name = "spectrum"
+    record = tiles.Played
+    play = staticmethod(tiles.play)
+
+    def __post_init__(self) -> None:
+        check = getattr(build(self.request.model, self.request.settings), "check", None)
+        for panel in self.panels if check else ():
+            check(panel.scene)  # type: ignore[misc]
+
+    def tasks(self, done: Mapping[Any, Any]) -> Sequence[tiles.Nodes]:
+        """What is asked for beyond what is done."""
+        book = Book(done)
+        self._found(book)
+        return book.wanted
+
+    def gather(self, done: Mapping[Any, Any]) -> Finding:
+        """The spectra that are whole, and what they say."""
+        found = self._found(Book(done))
+        panels, spectra = list(found.spectra), list(found.spectra.values())
+        nodes = sum(one.outcomes.size for one in spectra)
+        answer = (
+            f"{len(spectra)} spectra: {nodes} nodes, {sum(s.evaluations for s in spectra)} runs."
+        )
+        if len(self.panels) == len(spectra) == 1:
+            answer = f"{100.0 * spectra[0].safe_area:.2f} % of {nodes} nodes are safe."
+        blocks: list[Block] = [Text(ABOUT, on="page"), *self._figures(found)]
+        blocks.append(self._shares(found.spectra))
+        if any(one.depends_on_law is not None for one in spectra):
+            blocks.append(Text(LAWS, on="page"))
+        if found.paper:
+            claims = sentences.claims_of(found.paper)
+            tally = Counter(claim.verdict for claim in claims)
+            answer = (
+                f"Of {tally.total()} sentences of the paper {tally['holds']} hold,"
+                f" {tally['holds in part']} hold in part, {tally['does not hold']} do not."
+            )
+            blocks += sentences.blocks(found.paper, claims)
+        compared = found.agreement
+        if self._papers and not self.compared:
+            compared = agreement.Agreement.model_validate(read_json(KEPT / "agreement.json"))
+            panels = [*paper_panels()]
+        if compared:
+            mapped = agreement.mapped(panels)
+            blocks += agreement.blocks(compared, mapped, came=not self.compared)
+        return Finding(
+            self.name,
+            "Overturning spectra" if len(self.panels) > 1 else self.panels[0].title,
+            answer,
+            blocks,
+            data={
+                "model": self.request.model,
+                "settings": dict(self.request.settings),
+                "agreement": compared and compared.model_dump(mode="json"),
+            },
+            files={
+                f"{self._stem(panel)}.{kind}": write(one, self._about(panel, one))
+                for panel, one in found.spectra.items()
+                for kind, write in (("csv", _csv), ("npz", _npz))
+            },
+        )
+
+    @property
+    def _papers(self) -> bool:
+        names = {panel.name for panel in self.panels}
+        return self.request.model == "ebm" and names >= {panel.name for panel in paper_panels()}
+
+    def _stem(self, panel: Panel) -> str:
+        """The name of a spectrum's files: the panel's, and the model's where that is not the
+        paper's."""
+        model = self.request.model
+        return panel.name if model == "ebm" else f"{panel.name}--{model}"
+
+    def _found(self, book: Book) -> _Found:
+        """All that can be said by what is played; what is asked for beyond that is in the book."""
+        request, found = self.request, _Found()
+        how = request.model, request.settings
+        i, j = (axis.ravel() for axis in np.meshgrid(*[_spread(request.size)] * 2, indexing="ij"))
+        fast = compiled(build(*how))
+        for panel in self.panels:
+            one = book.spectrum(panel, request)
+            laws = [book.spectrum(panel, request, law) for law in request.other_laws(panel.scene)]
+            if fast:
+                nodes = request.amplitudes[i], request.frequencies[j]
+                motions = book.ask(tiles.nodes_of(panel.scene, *nodes, *how, "motions"))
+                found.motions[panel] = motions[0] if motions else tiles.Played()
+            if one is not None:
+                whole = [law for law in laws if law is not None]
+                law = differing(one, whole) if laws and len(whole) == len(laws) else None
+                found.spectra[panel] = replace(one, depends_on_law=law)
+        if len(found.spectra) == len(self.panels):
+            if self._papers:
+                found.paper = self._paper(book, list(found.spectra.values()))
+            if self.compared:
+                found.agreement = agreement.agree(book, found.spectra, request, self.compared)
+        return found
+
+    def _paper(self, book: Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
+        """The 28 spectra and what the paper's sentences need beyond them."""
+        request = self.request
+        how = request.model, request.settings
+        least, one_impact = {}, {}
+        for scene in (one.scene for one in spectra if measures.is_scanned(one.scene)):
+            scan = measures.SCANNED, np.full(len(measures.SCANNED), measures.SCANNED_AT)
+            if (outcomes := book.outcomes(scene, *scan, *how)) is not None:
+                falls = outcomes[0] != SAFE
+                least[measures.wall_of(scene)] = (
+                    float(measures.SCANNED[np.argmax(falls)]) if falls.any() else np.inf
+                )
+        for one in (one for one in spectra if not one.scene.walls):
+            i, j = measures.near_one_impact(one)
+            tasks = tiles.nodes_of(
+                one.scene, request.amplitudes[i], request.frequencies[j], *how, "one impact"
+            )
+            if (records := book.ask(tasks)) is not None:
+                mask = np.zeros(one.outcomes.shape, dtype=bool)
+                mask[i, j] = [letter == "Y" for record in records for letter in record.letters]
+                one_impact[one.scene.floor.friction] = mask
+        return None if book.wanted else measures.Paper(spectra, least, one_impact)
+
+    def _shares(self, spectra: Mapping[Panel, Spectrum]) -> Table:
+        laws = any(one.depends_on_law is not None for one in spectra.values())
+        rows = []
+        for panel, one in spectra.items():
+            law = one.depends_on_law
+            stem = self._stem(panel)
+            row: list[Any] = [panel.name, panel.title, panel.figure]
+            row += [
+                one.safe_area,
+                *(float(np.mean(one.outcomes == side)) for side in (LEFT, RIGHT)),
+            ]
+            row += [len(one.undecided), *([None if law is None else len(law)] if laws else [])]
+            files = [Mark(kind.upper(), link=f"{stem}.{kind}") for kind in ("csv", "npz")]
+            rows.append([*row, one.evaluations, *files])
+        columns = [text("spectrum"), text("title", brief=False), Column("figure", brief=False)]
+        columns += [
+            Column(name, kind="percent", digits=4, help=words)
+            for name, words in (
+                ("safe", ""),
+                ("left", "overturned counterclockwise"),
+                ("right", "overturned clockwise"),
+            )
+        ]
+        columns += [Column("undecided"), *([Column("depends_on_law")] if laws else [])]
+        columns += [Column("runs"), text("csv", brief=False), text("npz", brief=False)]
+        return Table("spectra", columns, rows, "Shares of outcomes")
+
+    def _figures(self, found: _Found) -> Iterator[Plot]:
+        """The clickable spectra: a plot a figure of the paper, or one's own."""
+        request = self.request
+        by = "" if request.model == "ebm" else f", by {request.model}"
+        for number in dict.fromkeys(panel.figure for panel in found.spectra):
+            mine = {p: one for p, one in found.spectra.items() if p.figure == number}
+            panels = [self._panel(panel, one, found) for panel, one in mine.items()]
+            first = next(iter(mine))
+            name = self._stem(first)
+            if number is not None:
+                name = name.replace(first.name, f"figure-{number}")
+            title = title_of(number) if number else first.title
+            yield Plot(
+                name,
+                title + by,
+                kind="spectra",
+                live=True,
+                note=f"{request.size} x {request.size} nodes, {request.model}"
+                + (", refined along boundaries." if request.refine else "."),
+                data={
+                    "frequencies": request.frequencies.tolist(),
+                    "amplitudes": request.amplitudes.tolist(),
+                    "record": first.scene.excitation.kind == "record",
+                    "pulse": _pulse(first, request),
+                    "panels": panels,
+                    "height": 4.0,
+                },
+            )
+
+    def _panel(self, panel: Panel, one: Spectrum, found: _Found) -> dict[str, Any]:
+        wall, spread = panel.wall, _spread(self.request.size)
+        motions = found.motions.get(panel, tiles.Played())
+        block = panel.scene.block
+        place = [0, 4, 0]
+        if panel.figure is not None:
+            place = (
+                [0 if wall.restitution == 0.0 else 2, 2, 1 + GAPS.index(wall.gap)]
+                if wall
+                else [1, 2, 0]
+            )
+        law = one.depends_on_law
+        return {
+            "title": panel.title,
+            "free": wall is None,
+            "outcomes": "".join(tiles.letters_of(one.outcomes, one.undecided).ravel()),
+            "law": [] if law is None else law.tolist(),
+            "place": place,
+            "nodes": [
+                [int(spread[n // len(spread)]), int(spread[n % len(spread)])]
+                for n in motions.played
+            ],
+            "motions": {
+                "block": [block.half_width, block.half_height],
+                "alpha": block.alpha,
+                "walls": [{"side": one.side, "gap": one.gap} for one in panel.scene.walls],
+                "ends": motions.ends,
+                "rows": motions.rows,
+            },
+        }
+
+    def _about(self, panel: Panel, one: Spectrum) -> str:
+        """The settings of a spectrum's files, as JSON; a record's samples are left out: its name
+        says which it is."""
+        scene = panel.scene.model_dump(mode="json")
+        for part in ("excitation", "vertical"):
+            scene[part].pop("unscaled", None)
+        about = {
+            "name": self._stem(panel),
+            "title": panel.title,
+            "figure": panel.figure,
+            "scene": scene,
+            "model": self.request.model,
+            "settings": dict(self.request.settings),
+            "refined": self.request.refine,
+            "evaluations": one.evaluations,
+            "versions": provenance.versions(),
+        }
+        return json.dumps(about)
+
+
+@dataclass
+class _Found:
+    """What is known: the spectra that are whole, motions at some of their nodes, and the rest."""
+
+    spectra: dict[Panel, Spectrum] = field(default_factory=dict)
+    motions: dict[Panel, tiles.Played] = field(default_factory=dict)
+    paper: measures.Paper | None = None
+    agreement: agreement.Agreement | None = None
+
+
+def _spread(size: int) -> NDArray[np.int64]:
+    spread = np.linspace(0, size - 1, min(size, KEPT_AN_AXIS))
+    return np.unique(np.round(spread).astype(np.int64))
+
+
+def _pulse(panel: Panel, request: Request) -> dict[str, list[float]] | None:
+    """Amplitude (m/s^2) and period (s) of the pulses along the axes; None for a record."""
+    if not isinstance(panel.scene.excitation, Ricker | Sine):
+        return None
+    f, a = request.frequencies, request.amplitudes
+    along, across = (
+        [node_scene(panel.scene, *node).excitation for node in nodes]
+        for nodes in (((one, f[0]) for one in a), ((a[0], one) for one in f))
+    )
+    return {
+        "amplitude": [one.amplitude for one in along],  # type: ignore[union-attr]
+        "period": [one.period for one in across],  # type: ignore[union-attr]
+    }
+
+
+def _npz(spectrum: Spectrum, about: str) -> bytes:
+    content = io.BytesIO()
+    law: Any = spectrum.depends_on_law
+    np.savez_compressed(
+        content,
+        outcomes=spectrum.outcomes,
+        frequency_ratios=spectrum.frequency_ratios,
+        amplitude_ratios=spectrum.amplitude_ratios,
+        undecided=spectrum.undecided,
+        settings=np.array(about),
+        **({} if law is None else {"depends_on_law": law}),
+    )
+    return content.getvalue()
+
+
+def _csv(spectrum: Spectrum, about: str) -> bytes:
+    """One row an amplitude ratio, one column a frequency ratio: -1 overturned left, 0 safe, 1
+    overturned right."""
+    columns = ["amplitude_ratio\\frequency_ratio", *map(repr, spectrum.frequency_ratios.tolist())]
+    rows = zip(spectrum.amplitude_ratios.tolist(), spectrum.outcomes.tolist(), strict=True)
+    table = table_text(columns, ([amplitude, *row] for amplitude, row in rows))
+    return f"# rockcheck spectrum {about}\n{table}".encode()
