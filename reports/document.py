@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,8 @@ from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Tex
 SIGNS = {"pass": "✓", "changed": "△", "incomplete": "–", "fail": "✕", "error": "!", "": ""}
 #: The folder of a page's figures.
 FIGURES = "figures"
+#: The folder of the scenes that show a failure.
+FAILING = "failures"
 #: Rows of a table that a terminal shows.
 MOST_ROWS = 40
 COLOURS = {"fail": "red", "error": "red", "changed": "yellow", "incomplete": "yellow"}
@@ -30,6 +32,8 @@ COLOURS = {"fail": "red", "error": "red", "changed": "yellow", "incomplete": "ye
 
 def words(cell: Any, column: Column, write: Callable[[float, int], str] = number) -> str:
     """A cell's value for people; a sign before it where it has a verdict."""
+    if isinstance(cell, Mark) and cell.digits:
+        column = replace(column, digits=cell.digits)
     shown = _value(plain(cell), column, write)
     sign = SIGNS[cell.verdict] if isinstance(cell, Mark) else ""
     return f"{sign} {shown}".strip()
@@ -135,14 +139,17 @@ def block_markdown(block: Table | Plot | Text) -> str:
 
 
 def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -> Path:
-    """Write `run.json`, a CSV a table, `summary.md`, the figures and `index.html`; returns the
-    page."""
+    """Write `run.json`, a CSV a table, `summary.md`, the figures, the scenes of failures and
+    `index.html`; returns the page."""
     from rockcheck.reports.site import Site
 
     write_whole(folder / "run.json", json_text(found.as_dict()) + "\n")
     tables = {f"{table.name}.csv": csv(table) for table in found.tables()}
+    for old in (folder / FAILING).glob("*.toml"):
+        old.unlink()
     for name, content in {**tables, **found.files, "summary.md": markdown(found)}.items():
-        write_whole(folder / name, content)
+        *parts, last = name.split("/")
+        write_whole(made(folder, *parts) / last, content)
     plots = list(found.plots())
     figures = made(folder, FIGURES)
     for plot in plots:

@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Drawers of other kinds of plots: module and function, which takes the plot and returns a figure.
-DRAWERS: dict[str, tuple[str, str]] = {"spectra": ("rockcheck.reports.show.spectrum", "figure")}
+DRAWERS: dict[str, tuple[str, str]] = {
+    "spectra": ("rockcheck.reports.show.spectrum", "figure"),
+    "stable-steps": (__name__, "stable_steps"),
+}
 #: What writes the scripts of a live plot of such a kind: module and function, which takes the plot
 #: and the folder of figures and returns the scripts that the page reads, in order.
 SCRIPTS = {"spectra": ("rockcheck.reports.show.spectrum", "write_scripts")}
@@ -86,6 +89,44 @@ def lines(plot: Plot) -> Figure:
             ax.set_xlabel(plot.x.label)
         if handles:
             figure.legend(handles.values(), handles, loc="outside lower center", ncols=4)
+    return figure
+
+
+def stable_steps(plot: Plot) -> Figure:
+    """A panel an axis: the largest stable step of each model with its settings, by colour and number."""
+    import numpy as np
+    from matplotlib.figure import Figure
+
+    tried, models = plot.data["tried"], plot.data["models"]
+    with figure_style():
+        figure = Figure(figsize=(PAGE, 5.6), layout="constrained")
+        for ax, (words, values, found) in zip(
+            figure.subplots(2, 2).flat, plot.data["panels"], strict=True
+        ):
+            steps = np.array(found, dtype=float)
+            with np.errstate(divide="ignore"):
+                ax.imshow(
+                    np.log10(steps),
+                    cmap="viridis",
+                    vmin=np.log10(tried[-1]),
+                    vmax=np.log10(tried[0]),
+                    aspect="auto",
+                )
+            for (row, column), step in np.ndenumerate(steps):
+                colour = "#1b1b1b" if step >= tried[2] or not step else "w"
+                ax.text(
+                    column,
+                    row,
+                    f"{step:g}" if step else "none",
+                    ha="center",
+                    va="center",
+                    fontsize=6,
+                    color=colour,
+                )
+            ax.set_xticks(range(len(values)), [f"{value:g}" for value in values])
+            ax.set_yticks(range(len(models)), models)
+            ax.grid(visible=False)
+            ax.set_xlabel(words)
     return figure
 
 

@@ -12,7 +12,6 @@ import re
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -136,12 +135,6 @@ def _cell(value: object, digits: int | None) -> object:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
     return f"{value:.{digits}g}" if digits is not None and isinstance(value, float) else value
-
-
-def records_text(kind: type, records: Iterable[Any]) -> str:
-    """Records of one dataclass as CSV, a column a field, floats with six significant digits."""
-    columns = [field.name for field in fields(kind)]
-    return table_text(columns, ([getattr(record, name) for name in columns] for record in records), digits=6)
 
 
 def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -24,6 +24,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 CLOSED = "tests/ebm/test_closed_forms.py::test_"
+POPULATION = "tests/validation/studies/test_population.py"
 UNCERTAINTY = "tests/validation/discrepancy/test_uncertainty.py"
 #: Where faults are planted, and the tests that should notice them, the quickest first.
 TARGETS = {
@@ -75,20 +76,21 @@ TARGETS = {
         "-k",
         "index or order or step or tolerance or peak or small or interval_covers or own_error",
     ],
-    "validation/uncertainty/inputs.py": [
+    "validation/uncertainty/population.py": [
         "tests/validation/discrepancy/test_propagation.py",
+        POPULATION,
         UNCERTAINTY,
         "-k",
-        "propagation or sobol or refused",
+        "propagation or sobol or refused or population",
     ],
-    "validation/uncertainty/population.py": ["tests/validation/studies/test_population.py"],
+    "validation/studies/population/study.py": [POPULATION],
     "ebm/horizon.py": ["tests/ebm/test_horizon.py"],
 }
 #: Files that are never compiled, whose tests play more motions than an interpreter can: what they call is compiled.
 COMPILED = {
     "validation/uncertainty/numerical.py",
-    "validation/uncertainty/inputs.py",
     "validation/uncertainty/population.py",
+    "validation/studies/population/study.py",
     "ebm/horizon.py",
 }
 #: What hangs is noticed: after so long in the processor, or in twenty times that by the clock, which a busy machine does not reach.
@@ -107,6 +109,11 @@ EQUIVALENT = {
         "largest <= ROUNDING * scale  ->  largest < ROUNDING * scale",
     ): "equal to the last bit",
     ("ebm/horizon.py", "tolerance=1e-13", "1e-13  ->  1.0000000000000001e-11"): "still far below the perturbation",
+    (
+        "validation/uncertainty/population.py",
+        "0.9 * draws",
+        "len(known) >= 0.9 * draws  ->  len(known) > 0.9 * draws",
+    ): "one more fit of 200",
     ("ebm/core/settle.py", "[SETTLE, -1.0, -1.0", "1.0  ->  100.0"): "any time long before the first impact",
     ("ebm/core/series.py", "stack", "top + 2  ->  top - 2"): "the narrowest interval ends the search before the stack is full",
     ("ebm/core/series.py", "a[row, 0] + low", "a[row, 0] > floor  ->  a[row, 0] >= floor"): "a bound that saves the search, met or not",

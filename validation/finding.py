@@ -16,12 +16,16 @@ Cell = Any
 
 @dataclass(frozen=True)
 class Mark:
-    """A cell with a verdict, which colours it, and words that explain it under the pointer."""
+    """A cell with a verdict, which colours it, and words that explain it under the pointer.
+
+    `digits` stand for those of its column.
+    """
 
     value: Any
     verdict: Verdict = ""
     words: str = ""
     link: str = ""
+    digits: int = 0
 
 
 @dataclass(frozen=True)
@@ -179,7 +183,7 @@ class Finding:
     `answer` is one sentence, `data` what `--json` says besides the tables. `exit_code` is the
     command's: 0 where nothing is judged. `failures` give the reason by task; a run that was
     interrupted, or had no time for all, is not `complete`. `files` are further files by name, such
-    as JUnit's, and their content.
+    as JUnit's or `failures/NAME.toml`, and their content.
     """
 
     name: str

@@ -228,13 +228,14 @@ def studied(study: Study, out: Path, *, report: bool = True, **how: Any) -> NoRe
     told(found, folder, report=report)
 
 
-def told(found: Finding, folder: Path, *, report: bool = True) -> NoReturn:
-    """Write a finding's page, say what it is, and end with its exit code."""
+def told(found: Finding, folder: Path | None = None, *, report: bool = True) -> NoReturn:
+    """Write a finding's page if it has a folder, say what it is, and end with its exit code."""
     from rockcheck.reports.document import publish, show
 
-    page = publish(found, folder) if report else folder / "run.json"
+    page = folder and (publish(found, folder) if report else folder / "run.json")
     show(found, console())
-    console().print(f"report: {page}", soft_wrap=True)
+    if page:
+        console().print(f"report: {page}", soft_wrap=True)
     answer(found.as_dict() | {"report": page})
     if not found.complete and not found.exit_code:
         raise KeyboardInterrupt

@@ -38,7 +38,6 @@ COMMANDS = {
     "ida": ("ida", "rockcheck ida shelf.toml records --intensity sa:0.5"),
     "benchmark": ("benchmark", "rockcheck benchmark --quick"),
     "conformance": ("conformance", "rockcheck conformance --engine mujoco --settings default"),
-    "calibrate": ("calibrate", "rockcheck calibrate --engine mujoco --restitution 0.5 --step 1e-3"),
     "stress": ("stress", "rockcheck stress --quick"),
     "report": ("report", "rockcheck report rockcheck-report --scene fig4a -o fig4a.pdf"),
     "warm": ("warm", "rockcheck warm"),
@@ -50,6 +49,7 @@ GONE = {
     "diff": "rockcheck compare RUN_A RUN_B",
     "figure": "rockcheck report DIR --scene NAME -o FILE",
     "convergence": "rockcheck benchmark convergence",
+    "calibrate": "rockcheck conformance --tune E",
 }
 #: Commands that are not listed.
 HIDDEN = ("warm",)

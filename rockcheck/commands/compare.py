@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from rockcheck.commands import PlotOption, answer, check_picture, console, save_picture, scene_names, tell_notes
+from rockcheck.commands import PlotOption, answer, check_picture, console, save_picture, scene_names, tell_notes, told
 from rockcheck.scenes import load_scene
 from rockcheck.validation.discrepancy.compare import Discrepancy, compare
 from rockcheck.validation.discrepancy.figures import value_words
@@ -34,11 +34,16 @@ def run(
 ) -> None:
     """Compare two histories, or two finished runs.
 
-    Two folders: what changed between runs of a suite, exit 1 where a verdict or a cell changed.
+    Two folders: what changed between runs of a suite, or of `conformance`, exit 1 where a verdict or a cell changed.
 
     Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg, time_ms, x_mm, ...).
     --plot draws both rotations and their difference.
     """
+    if reference.is_dir() or reference.suffix == ".json":
+        from rockcheck.validation.studies.conformance import study
+
+        if study.wrote(reference):
+            told(study.changes(reference, candidate))
     if reference.is_dir() or candidate.is_dir():
         two_runs(reference, candidate, everything=everything)
         return
@@ -99,8 +104,8 @@ def two_runs(before: Path, after: Path, *, everything: bool) -> None:
     versions = {name: pair for name, pair in versions.items() if pair[0] != pair[1]}
     screen = console()
     counts = {what: sum(change.what == what for change in found) for what in ("verdict", "cell", "outcome", "figure")}
-    told = ", ".join(f"{count} {what}{'s' if count > 1 else ''}" for what, count in counts.items() if count)
-    screen.print(f"{old.suite}: {f'{told} changed' if told else 'nothing changed'}", style="bold", soft_wrap=True)
+    words = ", ".join(f"{count} {what}{'s' if count > 1 else ''}" for what, count in counts.items() if count)
+    screen.print(f"{old.suite}: {f'{words} changed' if words else 'nothing changed'}", style="bold", soft_wrap=True)
     for name, (was, now) in versions.items():
         screen.print(f"{name} {was or 'absent'} -> {now or 'absent'}")
     shown = found if everything else [change for change in found if change.what != "figure"] + _figures(found)[:SHOWN]

@@ -116,7 +116,7 @@ def test_a_run_without_a_verdict_overwrites_none_with_one(capsys):
     suite = 'reference = "still"\n[models.still]\nmodel = "faulty:Still"\n[[scene]]\nname = "short"\n'
     write("suite.toml", suite + SCENE)
     write("scene.toml", SCENE)
-    alone = ["run", "scene.toml", "--models", STILL[0], *STILL[1:], "--jobs", "1", "-q"]
+    alone = ["validate", "scene.toml", "--models", STILL[0], *STILL[1:], "--jobs", "1", "-q"]
     assert main(alone) == 0
     assert main(alone) == 0  # over what nobody judged
     assert main(["validate", "suite.toml", *STILL[1:], "--jobs", "1", "-q"]) == 1  # no tolerance

@@ -94,7 +94,7 @@ def test_a_scene_is_no_suite(type_):
     write("rack.toml", SCENE)
     _, err = type_("accept", "rack.toml", code=2)
     assert err == (
-        "rockcheck: rack.toml: is a scene, not a suite; `rockcheck run` plays a scene,"
+        "rockcheck: rack.toml: is a scene, not a suite; `rockcheck validate` plays a scene,"
         " and a suite is a file with scenes = ['rack.toml'], and tables [models.NAME]\n"
     )
     _, err = type_("validate", "rack.toml", "--strict", code=2)

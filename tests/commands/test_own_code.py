@@ -185,6 +185,7 @@ UNPICKLE = {
 IMPORT = {
     "rockcheck/__init__.py": "the public names",
     "rockcheck/commands/cli.py": "rockcheck's own commands",
+    "reports/drawers.py": "rockcheck's own drawers, by the kind of a plot",
     "validation/execute/models.py": "models by rockcheck's own names; one's own only as the command line allows, in a worker",
 }
 

@@ -68,7 +68,7 @@ def told(capsys):
     ],
 )
 def test_files_folders_and_patterns_each_shake_the_scene(told, words):
-    found = told("run", "rack.toml", *words, *STILL)
+    found = told("validate", "rack.toml", *(part for word in words for part in ("--records", word)), *STILL)
     assert [cell["scene"] for cell in found["cells"]] == ["rack, RSN1_H1", "rack, RSN1_H2"]
     assert [cell["outcome"] for cell in found["cells"]] == ["at rest"] * 2
     assert not found["judged"]
@@ -76,7 +76,7 @@ def test_files_folders_and_patterns_each_shake_the_scene(told, words):
 
 
 def test_a_record_takes_the_place_of_the_excitation_and_lasts(told):
-    told("run", "rack.toml", "records/RSN1_H2.AT2", "--scale", "1.5", *STILL)
+    told("validate", "rack.toml", "--records", "records/RSN1_H2.AT2", "--read", "scale=1.5", *STILL)
     scene = Run.load("rockcheck-report").load_scene("rack, RSN1_H2")
     assert isinstance(scene.excitation, Record)
     np.testing.assert_allclose(scene.excitation.samples, 1.5 * 9.80665 * motion(0.2), atol=1e-6)
@@ -87,8 +87,10 @@ def test_a_record_takes_the_place_of_the_excitation_and_lasts(told):
 def test_a_chosen_component_is_played_though_it_is_vertical(told):
     rows = "".join(f"{0.02 * n:.2f},{a:.6f}\n" for n, a in enumerate(motion(0.3)))
     Path("up.csv").write_text("time_s,acceleration_g\n" + rows, encoding="utf-8")
-    assert main(["run", "rack.toml", "up.csv", *STILL]) == 2
-    assert [c["scene"] for c in told("run", "rack.toml", "up.csv", "--read", "column=acceleration_g", *STILL)["cells"]] == ["rack, up"]
+    assert main(["validate", "rack.toml", "--records", "up.csv", *STILL]) == 2
+    assert [
+        c["scene"] for c in told("validate", "rack.toml", "--records", "up.csv", "--read", "column=acceleration_g", *STILL)["cells"]
+    ] == ["rack, up"]
 
 
 def test_the_vertical_component_of_a_file_goes_with_its_others(told, capsys):
@@ -100,39 +102,39 @@ def test_the_vertical_component_of_a_file_goes_with_its_others(told, capsys):
             f"Corrected data\nChan  1: {name}\n  101 points of accel data equally spaced at   .020 sec, in cm/sec2. (8f10.4)\n{values}\n"
         )
     Path("two.v2").write_text(text, encoding="utf-8")
-    words = ("run", "rack.toml", "two.v2", "--scale", "2", *STILL)
+    words = ("validate", "rack.toml", "--records", "two.v2", "--read", "scale=2", *STILL)
     assert told(*words)["left_out"] == ["two.v2 Up"]
-    assert told(*words, "--vertical")["left_out"] == []
+    assert told(*words, "--read", "vertical=true")["left_out"] == []
     scene = Run.load("rockcheck-report").load_scene("rack, two 90 Deg")
     assert scene.excitation.peak == pytest.approx(2 * 0.1 * 981 / 980.665, rel=1e-3)
     assert scene.vertical.peak == pytest.approx(2 * 0.05 * 981 / 980.665, rel=1e-3)
-    assert main(["run", "rack.toml", "records/RSN1_H1.AT2", "--vertical", *STILL]) == 2
+    assert main(["validate", "rack.toml", "--records", "records/RSN1_H1.AT2", "--read", "vertical=true", *STILL]) == 2
     assert "RSN1_H1.AT2: 0 vertical components in it or in a file of the set that is named alike" in capsys.readouterr().err
 
 
 def test_the_vertical_component_may_be_a_file_of_its_own(told, capsys):
     at2("records/RSN2_H1.AT2", 0.15, "180")
     at2("records/RSN2_V.AT2", 0.05, "UP")
-    found = told("run", "rack.toml", "records", "--vertical", *STILL)
+    found = told("validate", "rack.toml", "--records", "records", "--read", "vertical=true", *STILL)
     assert [cell["scene"] for cell in found["cells"]] == ["rack, RSN1_H1", "rack, RSN1_H2", "rack, RSN2_H1"]
     assert found["left_out"] == []
     peaks = [Run.load("rockcheck-report").load_scene(cell["scene"]).vertical.peak for cell in found["cells"]]
     assert peaks == pytest.approx([0.3, 0.3, 0.05], rel=1e-2)
     Path("records/RSN2_H1.AT2").unlink()
-    assert main(["run", "rack.toml", "records", "--vertical", *STILL]) == 2
+    assert main(["validate", "rack.toml", "--records", "records", "--read", "vertical=true", *STILL]) == 2
     assert "RSN2_V.AT2: a vertical component, and no horizontal one is named alike" in capsys.readouterr().err
 
 
 def test_a_scene_that_there_is_not_is_the_only_line(capsys, monkeypatch):
     monkeypatch.setattr("rockcheck.validation.execute.models.not_installed", lambda name: "not installed" if name == "drake" else "")
-    assert main(["run", "nothere"]) == 2
+    assert main(["validate", "nothere"]) == 2
     said = capsys.readouterr()
     assert said.out == ""
     assert said.err.count("\n") == 1
 
 
 def test_all_models_are_those_that_are_installed(told):
-    found = told("run", "rack.toml", "--models", "all", "--set", "mujoco.time_step=1e-3", "--no-report", "--json")
+    found = told("validate", "rack.toml", "--models", "all", "--set", "mujoco.time_step=1e-3", "--no-report", "--json")
     models = [cell["model"] for cell in found["cells"]]
     assert models == [name for name in FAMILIES if name != "measured" and not not_installed(name)]
     assert {"ebm", "ebm-unilateral", "cm", "mujoco"} <= set(models)
@@ -143,7 +145,10 @@ def test_all_models_are_those_that_are_installed(told):
 
 
 def test_what_falls_is_told_with_its_time_and_without_a_peak(capsys):
-    assert main(["run", "rack.toml", "records/RSN1_H1.AT2", "--models", "faulty:Falls,faulty:Still", *CODE, "--jobs", "1"]) == 0
+    assert (
+        main(["validate", "rack.toml", "--records", "records/RSN1_H1.AT2", "--models", "faulty:Falls,faulty:Still", *CODE, "--jobs", "1"])
+        == 0
+    )
     out = capsys.readouterr().out
     (line,) = (line for line in out.splitlines() if "Falls" in line)
     assert line.split() == ["faulty:Falls", "overturned", "left", "at", "1.57", "s", "ref.", "0.0", "s"]
@@ -158,7 +163,7 @@ def test_what_falls_is_told_with_its_time_and_without_a_peak(capsys):
 
 
 def test_a_model_that_fails_is_exit_3(told):
-    found = told("run", "rack.toml", "--models", "faulty:Bug,faulty:Still", *CODE, "--no-report", "--json", code=3)
+    found = told("validate", "rack.toml", "--models", "faulty:Bug,faulty:Still", *CODE, "--no-report", "--json", code=3)
     assert [cell["status"] for cell in found["cells"]] == ["failed", "done"]
 
 
@@ -166,8 +171,6 @@ def test_validate_plays_a_scene_and_says_so(monkeypatch, capsys):
     for name in ("cm", "mujoco", "pybullet", "pymunk", "dart", "drake", "ebm-bouc-wen"):
         monkeypatch.delitem(FAMILIES, name)
     assert main(["validate", "rack.toml", "--no-report"]) == 0
-    out = capsys.readouterr().out
-    assert out.startswith("rack.toml is a scene: all models play it, nothing is judged (as `rockcheck run rack.toml`)\n")
     assert [cell.model for cell in Run.load("rockcheck-report").cells] == ["ebm", "ebm-unilateral"]
 
 
@@ -199,17 +202,17 @@ def test_a_suite_has_tables_of_records():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("run", "rack.toml", "--models", "ebm,mujcoo"), "unknown model 'mujcoo'; did you mean 'mujoco'"),
-        (("run", "rack.toml", "--models", "measured"), "--models: 'measured' is not allowed"),
+        (("validate", "rack.toml", "--models", "ebm,mujcoo"), "unknown model 'mujcoo'; did you mean 'mujoco'"),
+        (("validate", "rack.toml", "--models", "measured"), "--models: 'measured' is not allowed"),
         (
-            ("run", "rack.toml", "--models", "ebm", "--set", "cm.tolerance=1"),
+            ("validate", "rack.toml", "--models", "ebm", "--set", "cm.tolerance=1"),
             "--set: 'cm.tolerance=1': write MODEL.key=value, with MODEL one of ebm",
         ),
-        (("run", "rack.toml", "--models", "ebm", "--set", "ebm.tol=1"), "ebm.tol: unknown key"),
-        (("run", "rack.toml", "--read", "unit=g"), "records: are missing"),
-        (("run", "rack.toml", "records/X*.AT2"), "X*.AT2: no such files"),
-        (("run", "rakc.toml"), "rakc.toml: cannot be read"),
-        (("run", "rack.toml", "records/RSN1_V.AT2"), "RSN1_V.AT2: a vertical component, and no horizontal one is given"),
+        (("validate", "rack.toml", "--models", "ebm", "--set", "ebm.tol=1"), "ebm.tol: unknown key"),
+        (("validate", "rack.toml", "--read", "unit=g"), "--read: needs --records"),
+        (("validate", "rack.toml", "--records", "records/X*.AT2"), "X*.AT2: no such files"),
+        (("validate", "rakc.toml"), "rakc.toml: cannot be read"),
+        (("validate", "rack.toml", "--records", "records/RSN1_V.AT2"), "RSN1_V.AT2: a vertical component, and no horizontal one is given"),
         (("validate", "wrong.toml"), "records.scenes: unknown scene 'rakk'; did you mean 'rack'"),
     ],
 )
@@ -238,5 +241,5 @@ def test_a_file_of_a_folder_that_is_no_record_is_named_and_left_out(told, comman
 
 
 def test_a_shipped_record_shakes_a_scene_by_its_name(told):
-    found = told("run", "rack.toml", "elcentro_1940_ns.csv", *STILL)
+    found = told("validate", "rack.toml", "--records", "elcentro_1940_ns.csv", *STILL)
     assert [cell["scene"] for cell in found["cells"]] == ["rack, elcentro_1940_ns"]

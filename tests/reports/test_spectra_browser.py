@@ -30,13 +30,8 @@ FREQUENCIES, AMPLITUDES = np.linspace(0.5, 8.0, SIZE), np.linspace(1.0, 12.0, SI
 
 def written(study: Spectra, folder: Path, letters: str) -> Path:
     """The page of a study whose outcomes are made up; its histories are the model's own."""
-    done = {
-        task: Played(letters) if task.what == "outcomes" else study.play(task)
-        for task in study.tasks({})
-    }
-    made = Made(
-        created="2031-01-02T00:00:00+00:00", jobs=1, wall_seconds=1.0, versions={}, hardware={}
-    )
+    done = {task: Played(letters) if task.what == "outcomes" else study.play(task) for task in study.tasks({})}
+    made = Made(created="2031-01-02T00:00:00+00:00", jobs=1, wall_seconds=1.0, versions={}, hardware={})
     return publish(replace(study.gather(done), made=made), folder, formats=("svg",))
 
 
@@ -63,9 +58,7 @@ def place(page: playwright.Page, panel: int, row: int, column: int) -> tuple[flo
     box = canvas.bounding_box()
     assert box is not None
     wide, high = box["width"] - 48.0, box["height"] - 30.0
-    return box["x"] + 42.0 + (column + 0.5) / SIZE * wide, box["y"] + 4.0 + (
-        1.0 - (row + 0.5) / SIZE
-    ) * high
+    return box["x"] + 42.0 + (column + 0.5) / SIZE * wide, box["y"] + 4.0 + (1.0 - (row + 0.5) / SIZE) * high
 
 
 def test_the_panels_stand_as_in_the_paper_and_are_painted(page: playwright.Page) -> None:
@@ -93,9 +86,7 @@ def test_the_panels_stand_as_in_the_paper_and_are_painted(page: playwright.Page)
 def test_pointing_at_a_node_names_it_in_every_panel(page: playwright.Page) -> None:
     page.mouse.move(*place(page, 3, 10, 7))
     said = page.locator("output.node").inner_text()
-    assert said.startswith(
-        f"ωₚ/p {FREQUENCIES[7]:.3g}, aₚ / (g tan α) {AMPLITUDES[10]:.3g}: a pulse of "
-    )
+    assert said.startswith(f"ωₚ/p {FREQUENCIES[7]:.3g}, aₚ / (g tan α) {AMPLITUDES[10]:.3g}: a pulse of ")
     assert page.locator(".panel .said").all_inner_texts() == [
         "overturned clockwise",
         *["overturned"] * 6,
@@ -104,9 +95,7 @@ def test_pointing_at_a_node_names_it_in_every_panel(page: playwright.Page) -> No
     assert page.locator(".panel .said").all_inner_texts() == ["safe"] * 7
 
 
-def test_ones_own_block_is_told_in_hertz_and_g(
-    visitor: Callable[..., playwright.Page], tmp_path: Path
-) -> None:
+def test_ones_own_block_is_told_in_hertz_and_g(visitor: Callable[..., playwright.Page], tmp_path: Path) -> None:
     panel = Panel("shelf", "shelf", paper_panels(8)[1].scene)
     page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
     page.goto(written(Spectra((panel,), Request(SIZE)), tmp_path, "S" * SIZE**2).as_uri())
@@ -119,12 +108,8 @@ def test_ones_own_block_is_told_in_hertz_and_g(
     said = page.locator("output.node").inner_text()
     g, hertz = map(float, re.search(r"a pulse of ([\d.]+) g .*, ([\d.]+) Hz", said).groups())
     scene, block = panel.scene, panel.scene.block
-    assert g == pytest.approx(
-        AMPLITUDES[4] * scene.gravity / 9.80665 * block.half_width / block.half_height, rel=0.01
-    )
-    assert hertz == pytest.approx(
-        FREQUENCIES[7] * scene.frequency_parameter / (2.0 * np.pi), rel=0.01
-    )
+    assert g == pytest.approx(AMPLITUDES[4] * scene.gravity / 9.80665 * block.half_width / block.half_height, rel=0.01)
+    assert hertz == pytest.approx(FREQUENCIES[7] * scene.frequency_parameter / (2.0 * np.pi), rel=0.01)
 
 
 def test_a_click_plays_the_kept_history_that_ends_the_same_way(page: playwright.Page) -> None:
@@ -202,9 +187,7 @@ def test_the_lines_of_an_ida_are_named_under_the_pointer(visitor: Callable[..., 
 @pytest.mark.long
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("what", ["spectra", "ida"])
-def test_accessible(
-    visitor: Callable[..., playwright.Page], folder: Path, tmp_path: Path, what: str, scheme: str
-) -> None:
+def test_accessible(visitor: Callable[..., playwright.Page], folder: Path, tmp_path: Path, what: str, scheme: str) -> None:
     address = folder / "index.html" if what == "spectra" else ida_page(tmp_path)
     page = visitor(
         address.parent,
@@ -218,18 +201,11 @@ def test_accessible(
         playwright.expect(page.locator(".played")).to_be_visible()
     page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
     found = Axe().run(page, options={"preload": False}).response["violations"]
-    serious = [
-        f"{v['id']}: {n['html'][:120]}"
-        for v in found
-        if v["impact"] in ("serious", "critical")
-        for n in v["nodes"][:3]
-    ]
+    serious = [f"{v['id']}: {n['html'][:120]}" for v in found if v["impact"] in ("serious", "critical") for n in v["nodes"][:3]]
     assert serious == []
 
 
-def test_a_phone_needs_no_sideways_scrolling(
-    visitor: Callable[..., playwright.Page], folder: Path
-) -> None:
+def test_a_phone_needs_no_sideways_scrolling(visitor: Callable[..., playwright.Page], folder: Path) -> None:
     page = visitor(folder, viewport={"width": 390, "height": 800})
     page.goto((folder / "index.html").as_uri())
     assert page.evaluate("document.documentElement.scrollWidth") == 390

@@ -2,34 +2,20 @@
 
 from __future__ import annotations
 
-import math
-from collections import Counter
 from pathlib import Path
-from types import MappingProxyType
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
 from rockcheck.reports.document import publish
-from rockcheck.reports.studies.stress import write_stress
 from rockcheck.validation.execute.pool import Failure as Lost
-from rockcheck.validation.stress.results import Failure, RunTotals, Stress
+from rockcheck.validation.finding import Axis, Column, Finding, Mark, Panel, Plot, Series, Table, Text, text
 from rockcheck.validation.studies.work_precision.runs import BenchmarkRun, Play
 from rockcheck.validation.studies.work_precision.savings import Saving
 from rockcheck.validation.studies.work_precision.study import Measure, Measured, WorkPrecision
 
 pytestmark = pytest.mark.browser
 
-MADE = MappingProxyType(
-    {
-        "created": "2026-01-01T00:00:00+00:00",
-        "quick": True,
-        "jobs": 1,
-        "wall_seconds": 3.0,
-        "versions": {"rockcheck": "0.1.0", "python": "3.11", "mujoco": "4.0.0"},
-        "hardware": {"processor": "made up", "cores": "2"},
-    }
-)
 PHONE = {"viewport": {"width": 390, "height": 800}}
 
 
@@ -49,21 +35,22 @@ def benchmark_page(folder: Path) -> Path:
     return publish(WorkPrecision().gather(done), folder)
 
 
-def stress_page(folder: Path) -> Path:
-    failure = Failure("ebm", "ends", 1, 7, math.inf, "no mode is consistent", file="failures/ebm-ends-1-7.toml")
-    (folder / "failures").mkdir()
-    (folder / failure.file).touch()
-    looked, worst = Counter(ends=10, finite=10, mirror=9), {"ends": (math.inf, 7), "finite": (0.0, 9), "mirror": (0.0, 9)}
-    batches = {
-        model: RunTotals(model=model, runs=10, looked_at=looked, worst=worst, failures=faults)
-        for model, faults in (("ebm", (failure,)), ("ebm-unilateral", ()))
-    }
-    return write_stress(Stress(suite="stress", seed=1, complete=True, batches=batches, **MADE), folder)
+def marked_page(folder: Path) -> Path:
+    """What the benchmark's page has none of: verdicts, links, folded blocks, failures, a curve to be read."""
+    rows = [["a", "ebm", Mark(1.0, "pass")], ["b", "cm", Mark(2.0, "fail", "too long", link="run.json")]]
+    columns = [text("name"), Column("model", kind="model"), Column("x", "length", "m")]
+    curve = Panel("", [Series("a", [1.0, 2.0], [3.0, None], [2.0, None], [4.0, None]), Series("b", [1.0, 2.0], [1.0, 2.0], style="thin")])
+    blocks = [
+        Text("no mode is consistent", title="Words", items=["one"], verdict="fail"),
+        Table("rows", columns, rows, "Rows", "A note.", folded=True),
+        Plot("curve", "Curves", panels=[curve], x=Axis("t, s"), y=Axis("x, m"), live=True),
+    ]
+    return publish(Finding("made", "Made up", "It fails.", blocks, verdict="fail", failures={"a": "it blew up"}), folder)
 
 
 STUDIES = {
     "benchmark": (benchmark_page, "What does not converge"),
-    "stress": (stress_page, "no mode is consistent"),
+    "marked": (marked_page, "no mode is consistent"),
 }
 
 

@@ -12,7 +12,7 @@ import pytest
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import load_scene
 from rockcheck.scenes.files import read_toml
-from rockcheck.validation.stress.invariants import check_run
+from rockcheck.validation.studies.stress.invariants import check_run
 
 FOLDER = Path(__file__).parents[1] / "data" / "found_faults"
 INDEX = read_toml(FOLDER / "index.toml")

@@ -16,16 +16,16 @@ from pathlib import Path
 import pytest
 
 from rockcheck.commands.cli import main
+from rockcheck.reports.document import publish
 from rockcheck.scenes import Scene, load_scene
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.execute import pool
 from rockcheck.validation.execute import store as stores
 from rockcheck.validation.execute.store import HISTORIES, Store
-from rockcheck.validation.stress import study
-from rockcheck.validation.stress.invariants import CheckedRun
-from rockcheck.validation.stress.players import PLAYERS, EventBased
-from rockcheck.validation.stress.results import Failure, RunTotals
-from rockcheck.validation.stress.study import Chunk
+from rockcheck.validation.studies.stress import runs, study
+from rockcheck.validation.studies.stress.invariants import CheckedRun
+from rockcheck.validation.studies.stress.players import PLAYERS, EventBased
+from rockcheck.validation.study import run
 
 #: They wait for processes that hang or are killed.
 pytestmark = pytest.mark.long
@@ -45,8 +45,10 @@ sys.exit(main(sys.argv[2:]))
 
 
 def one_line(stderr: str) -> str:
-    # Code that is not yet compiled, and cannot be kept where no file can be large, is announced.
-    (line,) = (said for said in stderr.splitlines() if not said.startswith("rockcheck: compiling "))
+    # Code that is not yet compiled, and cannot be kept where no file can be large, is announced,
+    # and so are long work and how far it is.
+    announced = ("rockcheck: compiling ", "rockcheck: stress: ")
+    (line,) = (said for said in stderr.splitlines() if not said.startswith(announced))
     assert line.startswith("rockcheck: ")
     return line
 
@@ -112,7 +114,7 @@ def test_what_is_no_file_is_written_as_it_is(tmp_path):
 @posix
 def test_disk_full_while_a_study_is_written(tmp_path):
     """Tables that were written stay whole; the file that does not fit leaves nothing; the next run writes all."""
-    done = limited(3000, *SMALL_RUN, "--out", str(tmp_path))
+    done = limited(7000, *SMALL_RUN, "--out", str(tmp_path))
     assert done.returncode == 2
     one_line(done.stderr)
     assert not leavings(tmp_path)
@@ -183,50 +185,49 @@ def test_two_versions_share_a_store(tmp_path):
     assert main(["report", str(tmp_path)]) == 2
 
 
-def test_worker_lost_or_hanging(tmp_path, monkeypatch):
-    """Of runs whose process dies or hangs only the one that does it fails; all others are played."""
+@pytest.fixture
+def deadly(monkeypatch):
+    """Studies whose workers fail, and little patience with them."""
     monkeypatch.syspath_prepend(str(Path(__file__).parent / "runs"))
-    import deadly
-
-    monkeypatch.setattr(study, "play_some", deadly.play_some)
-    monkeypatch.setattr(study, "SECONDS_A_RUN", 0.0)
     monkeypatch.setattr(pool, "COMPILING", 0.0)
-    monkeypatch.setattr(study, "PATIENCE", 6.0)
-    batches = list(study._side_by_side([Chunk("ebm", 1, 0, 4), Chunk("ebm", 1, 13, 1), Chunk("ebm", 1, 14, 2)], 2))
-    assert sum(batch.runs for batch in batches) == 7
-    failures = {failure.number: failure.words for batch in batches for failure in batch.failures}
-    assert failures == {3: "the process ended with code 9", 13: "did not end within 6 s"}
-
-
-def test_shrinking_that_hangs(tmp_path, monkeypatch):
-    """However long the trials of a failing scene take: shrinking ends, and each scene is as small as was found till then."""
-    monkeypatch.syspath_prepend(str(Path(__file__).parent / "runs"))
+    monkeypatch.setattr(runs, "A_RUN", 0.0)
+    monkeypatch.setattr(runs, "PATIENCE", 4.0)
+    monkeypatch.setattr(study, "SHRINKING", 12.0)
+    monkeypatch.setattr(study, "HANGING", 1.0)
     import deadly
 
-    numbers = (3, 4, 5, 13)
-    failures = tuple(Failure("ebm", "mirror", 1, number, 1.0) for number in numbers)
-    batch = study.write_failures({"ebm": RunTotals(model="ebm", runs=20, failures=failures)}, tmp_path)["ebm"]
-    found = {number: load_scene(tmp_path / failure.file) for number, failure in zip(numbers, batch.failures, strict=True)}
-    assert found[3].excitation == PLAYERS["ebm"].scene(1, 3).excitation
-    monkeypatch.setattr(study, "shrink_file", deadly.shrink_file)
-    monkeypatch.setattr(study, "HANGING", 1.0)
+    return deadly
+
+
+def test_worker_lost_or_hanging(tmp_path, deadly):
+    """Of runs whose process dies or hangs only the one that does it fails; all others are played."""
+    found = run(deadly.Deadly("runs", models=("ebm",), runs=16), tmp_path, jobs=2)
+    assert found.data["batches"]["ebm"]["counts"]["runs"] == 16
+    failures = {failure["number"]: failure["words"] for failure in found.table("failures").records()}
+    assert failures == {3: "the process ended with code 9", 13: "did not end within 4 s"}
+    assert all("not shrunk" in text for text in found.scenes.values())
+
+
+def test_shrinking_that_hangs(tmp_path, deadly):
+    """However long the trials of a failing scene take: shrinking ends, and each scene is as small as trials that end make it."""
     began = time.monotonic()
-    study._shrink(batch.failures, tmp_path, 2, 12.0, lambda *_: None)
-    assert time.monotonic() - began < 60.0
-    files = {number: tmp_path / failure.file for number, failure in zip(numbers, batch.failures, strict=True)}
-    small = {number: load_scene(file) for number, file in files.items()}
-    assert small[3].excitation.kind == "rest"
-    assert len(small[3].walls) == 1  # the trial without it is the one that hangs
-    assert small[4] != found[4]
-    assert small[5].duration < 0.1 * found[5].duration
-    assert small[13] == found[13]
-    remarks = {number: file.read_text().partition("rockcheck simulate")[0] for number, file in files.items()}
-    assert {number for number in numbers if "not the smallest" in remarks[number]} == {3, 4}
-    assert {number for number in numbers if "not shrunk" in remarks[number]} == {13}
+    found = run(deadly.Stubborn("runs", models=("ebm",), runs=20), tmp_path, jobs=2)
+    assert time.monotonic() - began < 90.0
+    publish(found, tmp_path)
+    small = {number: load_scene(tmp_path / "failures" / f"ebm-mirror-1-{number}.toml") for number in deadly.FAILING}
+    before = {number: PLAYERS["ebm"].scene(1, number) for number in deadly.FAILING}
+    assert small[3].walls  # the trial without one is the one that hangs
+    assert small[3].excitation.kind == "rest" != before[3].excitation.kind
+    assert small[4].excitation != before[4].excitation
+    assert small[5].duration < 0.1 * before[5].duration
+    assert small[13].excitation == before[13].excitation
+    remarks = {number: found.scenes[f"ebm-mirror-1-{number}.toml"].partition("rockcheck simulate")[0] for number in deadly.FAILING}
+    assert {number for number, said in remarks.items() if "not the smallest" in said} == {3, 4}
+    assert {number for number, said in remarks.items() if "not shrunk" in said} == {13}
 
 
-def test_shrinking_interrupted(tmp_path, monkeypatch, capsys):
-    """Ctrl-C while failures are shrunk: all of them are saved, each with its scene."""
+def test_shrinking_interrupted(tmp_path, monkeypatch):
+    """Ctrl-C while failures are shrunk: all of them are told, the first ones with their scenes."""
 
     def check(self: object, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
         return CheckedRun(figures={"ends": 0.0, "mirror": 1.0}, outcome="at rest")
@@ -235,19 +236,12 @@ def test_shrinking_interrupted(tmp_path, monkeypatch, capsys):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(EventBased, "check", check)
-    monkeypatch.setattr(study, "_side_by_side", lambda work, jobs: (study.play_some(c.label, c.seed, c.first, c.count) for c in work))
-    monkeypatch.setattr(study, "_shrink", interrupt)
-    assert main(["stress", "runs", "--model", "ebm", "--runs", "30", "--out", str(tmp_path)]) == 130
-    assert "interrupted" in capsys.readouterr().err
-    data = json.loads((tmp_path / "run.json").read_text())
-    assert data["complete"] is False
-    failures = data["batches"]["ebm"]["failures"]
-    assert len(failures) == 30
-    files = [failure["file"] for failure in failures if failure["file"]]
-    assert len(files) == study.MOST_FILES
-    for file in files:
-        assert "not shrunk" in (tmp_path / file).read_text()
-        load_scene(tmp_path / file)
+    monkeypatch.setattr(runs.Shrinking, "play", interrupt)
+    found = run(study.Stress("runs", models=("ebm",), runs=30), tmp_path, jobs=0)
+    assert not found.complete
+    assert len(found.table("failures").rows) == 30
+    assert len(found.scenes) == runs.MOST_FILES
+    assert all("not shrunk" in text for text in found.scenes.values())
 
 
 linux = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs Linux: it tells the children")
@@ -288,8 +282,8 @@ def test_interrupted(tmp_path):
     assert "interrupted" in one_line(said)
     data = json.loads((tmp_path / "run.json").read_text())
     assert data["complete"] is False
-    assert data["batches"]["ebm no-slip"]["runs"] < 60000
-    assert "interrupted" in (tmp_path / "index.html").read_text()
+    assert sum(batch["counts"]["runs"] for batch in data["batches"].values()) < 60000
+    assert "Not complete" in (tmp_path / "index.html").read_text()
     assert not leavings(tmp_path)
 
 

@@ -1,316 +1,64 @@
-"""The stress run itself: scenes that can be made again, invariants that notice faults, small scenes that still show them."""
+"""The stress study: its work, what its runs add up to, failures with their smallest scenes, maps."""
 
 from __future__ import annotations
 
-import dataclasses
+import csv
 import json
-import math
+from collections import Counter
 
 import numpy as np
 import pytest
 
 from rockcheck.commands.cli import main
-from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
-from rockcheck.scenes.scene import PAPER_BLOCK
-from rockcheck.validation.stress import invariants, players, study
-from rockcheck.validation.stress.exact import exact_scene
-from rockcheck.validation.stress.generator import ALPHA, FRICTION, RADIUS, random_scene
-from rockcheck.validation.stress.invariants import INVARIANTS, CheckedRun, audited, check_run, energy_error, similar
-from rockcheck.validation.stress.mechanics import BOOLE, arms, integrals, tilted_forces
-from rockcheck.validation.stress.players import PLAYERS, Approximate, energy_without_source
-from rockcheck.validation.stress.results import Stress
-from rockcheck.validation.stress.shrinking import shrink, write_scene
-from rockcheck.validation.stress.stability import SETUPS, fault_of, largest_stable, scene_at, stand_still
-from rockcheck.validation.stress.study import Chunk, chunks, play_some, run_stress
-from rockcheck.validation.stress.tables import invariants_markdown, summary_rows
-
-SLIDES_AND_HITS = Scene(
-    name="hits",
-    block=PAPER_BLOCK,
-    floor=Floor(friction=0.3),
-    walls=[Wall(side="left", gap=0.05, restitution=0.5)],
-    excitation=Ricker(amplitude=8.0, period=1.2),
-    duration=4.0,
-    output_step=0.04,
+from rockcheck.reports.document import publish
+from rockcheck.scenes import Block, Floor, Record, Rest, Scene, Sine, Wall, load_scene
+from rockcheck.validation.execute.pool import Failure
+from rockcheck.validation.studies.stress.generator import random_scene
+from rockcheck.validation.studies.stress.invariants import INVARIANTS, CheckedRun
+from rockcheck.validation.studies.stress.players import PLAYERS
+from rockcheck.validation.studies.stress.runs import (
+    MOST_FILES,
+    Broken,
+    Chunk,
+    RunTotals,
+    parts,
 )
-
-
-def test_a_scene_of_a_seed_can_be_made_alone():
-    assert random_scene(5, 1234) == random_scene(5, 1234)
-    assert random_scene(5, 1234) != random_scene(5, 1235)
-    assert random_scene(5, 1234) != random_scene(6, 1234)
-
-
-def test_scenes_cover_what_a_user_could_write():
-    """The corners of the ranges are reached, and every kind of excitation, wall and start occurs."""
-    scenes = [random_scene(1, n) for n in range(2000)]
-    alphas, radii, friction = (
-        np.array(one) for one in zip(*((s.block.box_angle, s.block.half_diagonal, s.floor.friction) for s in scenes), strict=True)
-    )
-    for values, (low, high) in ((alphas, ALPHA), (radii, RADIUS)):
-        assert low * (1 - 1e-9) <= values.min() < 2.0 * low
-        assert 0.9 * high < values.max() <= high * (1 + 1e-9)
-    assert friction.min() == 0.0
-    assert friction.max() > 0.98 * FRICTION[1]
-    assert {s.excitation.kind for s in scenes} == {s.vertical.kind for s in scenes} == {"rest", "ricker", "sine", "record"}
-    assert {tuple(w.side for w in s.walls) for s in scenes} == {(), ("left",), ("right",), ("left", "right")}
-    assert {w.restitution for s in scenes for w in s.walls} >= {0.0, 1.0}
-    assert any(w.gap == 0.0 for s in scenes for w in s.walls)
-    assert any(abs(s.initial_rotation) == pytest.approx(s.block.alpha) for s in scenes)
-    assert any(s.floor.mu_s > s.floor.friction for s in scenes)
-    assert any(isinstance(s.excitation, Record) and len(s.excitation.unscaled) == 1 for s in scenes)
-    level = [np.max(np.abs(s.vertical.acceleration(s.output_times))) / s.gravity for s in scenes]
-    assert max(level) > 1.0
-    assert any(s.initial_height > 0.0 for s in scenes)
-    for kind in ("bilateral", "bouc-wen", "no-slip"):
-        for n in range(300):
-            scene = random_scene(1, n, kind)
-            assert scene.floor.restitution == scene.initial_height == 0.0
-            assert kind != "bouc-wen" or scene.floor.static_friction is None
-
-
-@pytest.mark.parametrize("make", [random_scene, exact_scene])
-def test_a_third_of_the_blocks_are_asymmetric(make):
-    """To either side, with a moment of inertia of their own or without, some with a load in the middle."""
-    scenes = [make(1, n) for n in range(1500)]
-    off = np.array([scene.block.offset[0] for scene in scenes])
-    assert 0.3 < np.mean(off != 0.0) < 0.37
-    assert 0.4 < np.mean(off[off != 0.0] > 0.0) < 0.6
-    bear = [scene.block for scene in scenes if not scene.block.homogeneous]
-    assert 0.4 < np.mean([block.moment_of_inertia is None for block in bear]) < 0.6
-    assert any(block.offset[0] == 0.0 != block.offset[1] for block in bear)
-    assert any(block.offset[1] == 0.0 != block.offset[0] for block in bear)
-    tilts = [(scene.initial_rotation, scene.block) for scene in scenes if not scene.block.homogeneous and scene.initial_rotation]
-    balanced = [tilt for tilt, block in tilts if abs(tilt) == block.pivot("left" if tilt > 0.0 else "right").alpha]
-    assert min(balanced) < 0.0 < max(balanced)
-
-
-LOADED = SLIDES_AND_HITS.replace(
-    block=Block(half_width=0.4, half_height=1.2, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.4), floor=Floor(friction=0.25)
+from rockcheck.validation.studies.stress.shrinking import scene_text, shrink
+from rockcheck.validation.studies.stress.stability import (
+    CASES,
+    SETUPS,
+    Place,
+    Stable,
+    Still,
+    fault_of,
+    places,
+    scene_at,
+    stand_still,
 )
-
-
-@pytest.mark.parametrize("label", ["ebm", "ebm-unilateral", "ebm no-slip", "ebm-bouc-wen"])
-def test_a_loaded_block_keeps_all_invariants(label):
-    """It slides, rocks and hits the wall. The base works on its mass's centre, its contacts are the box's."""
-    scene = LOADED
-    played = PLAYERS[label].check(scene, 1, 0)  # run 0 is audited
-    assert played.broken == []
-    assert played.events > 3
-    assert {"energy", "mirror", "similarity", "tolerance"} <= played.figures.keys()
-
-
-def test_similar_and_disturbed_blocks_bear_the_same_load():
-    (x, z), block = LOADED.block.offset, LOADED.block
-    other = similar(LOADED, 3).block
-    k = other.half_width / block.half_width
-    assert other.offset == pytest.approx((k * x, k * z))
-    assert other.moment_of_inertia == pytest.approx(k * k * block.moment_of_inertia)
-    changed = [scene.block for scene in invariants._disturbed(LOADED, 1)]
-    assert len(changed) == invariants.DISTURBED
-    for one in changed:
-        for new, old in ((one.offset[0], x), (one.offset[1], z), (one.moment_of_inertia, block.moment_of_inertia)):
-            assert 0.0 < abs(new / old - 1.0) <= 1.01 * invariants.DISTURBANCE
-    full = LOADED.replace(block=block.replace(moment_of_inertia=0.4**2 + 1.2**2 - x * x - z * z))  # as much as there can be
-    assert 0 < len(list(invariants._disturbed(full, 1))) < invariants.DISTURBED
+from rockcheck.validation.studies.stress.study import Stress
+from rockcheck.validation.study import run
 
 
 def test_a_load_is_dropped_only_if_it_does_not_matter():
     """Shrinking tries a block without its load, or with it in the middle, and none that may not be."""
-    big = LOADED.replace(block=LOADED.block.scaled(30.0))
+    loaded = random_scene(1, 0).replace(
+        block=Block(
+            half_width=0.4, half_height=1.2, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.4
+        ),
+        floor=Floor(friction=0.25),
+    )
+    big = loaded.replace(block=loaded.block.scaled(30.0))
     asymmetric, _ = shrink(big, lambda scene: scene.block.offset[0] > 0.0)
     assert asymmetric.block.offset[0] > 0.0 == asymmetric.block.offset[1]
     assert asymmetric.block.moment_of_inertia is None
     assert 0.5 < asymmetric.block.radius < 2.0
     plain, _ = shrink(big, lambda scene: True)
     assert plain.block.homogeneous
-    edge = LOADED.block.replace(half_width=0.94, centre_of_mass=(0.93, 0.0), moment_of_inertia=0.4)
-    rounded, _ = shrink(LOADED.replace(block=edge), lambda scene: scene.block.moment_of_inertia is not None)
+    edge = loaded.block.replace(half_width=0.94, centre_of_mass=(0.93, 0.0), moment_of_inertia=0.4)
+    rounded, _ = shrink(
+        loaded.replace(block=edge), lambda scene: scene.block.moment_of_inertia is not None
+    )
     assert rounded.block == Block(**rounded.block.model_dump())
-
-
-def test_forces_of_an_asymmetric_block():
-    """Tilted to either side: LEAN, whose wall takes the moment of weight and base, and ROCK."""
-    block = LOADED.block
-    on, off, still = np.array([True]), np.array([False]), np.zeros(1, dtype=np.int8)
-    for sign, side in ((1.0, "left"), (-1.0, "right")):
-        pivot, phi, u = block.pivot(side), 0.1, 0.2
-        s, c = pivot.radius * math.sin(pivot.alpha - phi), pivot.radius * math.cos(pivot.alpha - phi)
-        top = 2.0 * block.half_height * math.cos(phi)  # of the top corner over the floor
-        at = arms(block, np.array([sign]), np.array([phi]))
-        leans = tilted_forces(at, 0.3, np.zeros(1), np.array([u]), np.ones(1), (on, on, off), still)
-        assert leans.tip[0] == pytest.approx((u * c - s) / top, rel=1e-13)
-        assert leans.normal[0] == pytest.approx(1.0, rel=1e-13)
-        falls = tilted_forces(at, 0.3, np.zeros(1), np.array([u]), np.ones(1), (on, off, off), still)
-        spin = (u * c - s) / (block.gyration_squared + pivot.radius**2)
-        assert falls.normal[0] == pytest.approx(1.0 + s * spin, rel=1e-13)
-        assert falls.friction[0] == pytest.approx(u - c * spin, rel=1e-13)
-
-
-def test_forces_of_housners_block():
-    """ROCK: (3), and a block that stands on its corner without speed presses with what lifts its centroid."""
-    phi, u = np.array([0.1]), np.array([0.2])
-    on, off = np.array([True]), np.array([False])
-    alpha = PAPER_BLOCK.alpha
-    at = arms(PAPER_BLOCK, np.ones(1), phi)
-    forces = tilted_forces(at, 0.3, np.zeros(1), u, np.ones(1), (on, off, off), np.zeros(1, dtype=np.int8))
-    s, c = math.sin(alpha - 0.1), math.cos(alpha - 0.1)
-    spin = 0.75 * (0.2 * c - s)
-    assert forces.normal[0] == pytest.approx(1.0 + s * spin, rel=1e-13)
-    assert forces.friction[0] == pytest.approx(0.2 - c * spin, rel=1e-13)
-    slips = tilted_forces(at, 0.3, np.zeros(1), u, np.ones(1), (on, off, off), np.ones(1, dtype=np.int8))
-    eta = 0.3
-    assert slips.normal[0] == pytest.approx(1.0 / (1.0 + 3.0 * s * s + 3.0 * eta * s * c), rel=1e-13)
-    assert slips.friction[0] == pytest.approx(-0.3 * slips.normal[0], rel=1e-13)
-
-
-def test_rules_of_integration():
-    x = np.linspace(0.0, 2.0, 17)
-    exact = 2.0**10 / 10.0
-    assert np.sum(integrals(x[1], x**9)) == pytest.approx(exact, rel=1e-13)
-    assert np.sum(integrals(x[1], x**5, BOOLE)) == pytest.approx(2.0**6 / 6.0, rel=1e-13)
-    assert np.sum(integrals(x[1], x**9, BOOLE)) != pytest.approx(exact, rel=1e-6)
-
-
-@pytest.mark.parametrize("label", ["ebm", "ebm-unilateral", "ebm no-slip", "ebm-bouc-wen"])
-def test_a_run_that_keeps_all_invariants(label):
-    """Sliding, rocking, wall and floor impacts: every figure is well inside its bound."""
-    player = PLAYERS[label]
-    played = player.check(SLIDES_AND_HITS, 1, 0)  # run 0 is audited
-    assert played.broken == []
-    assert played.events > 5
-    assert {"energy", "mirror", "similarity", "tolerance", "penetration"} <= played.figures.keys()
-
-
-class Spoilt:
-    """A model whose histories have one thing changed."""
-
-    def __init__(self, **change: object) -> None:
-        self.model = EventBasedModel(pivot="unilateral")
-        self.change = change
-
-    def __getattr__(self, name: str) -> object:
-        return getattr(self.model, name)
-
-    def model_copy(self, **_: object) -> Spoilt:
-        return self
-
-    def simulate(self, scene: Scene) -> History:
-        history = self.model.simulate(scene)
-        channels = {name: column.copy() for name, column in history.channels.items()}
-        for name, change in self.change.items():
-            if name in channels:
-                channels[name] = change(channels[name])  # type: ignore[operator]
-        outcome = self.change.get("outcome", history.outcome)
-        return dataclasses.replace(history, channels=channels, outcome=outcome)
-
-
-def bent(column: np.ndarray) -> np.ndarray:
-    column[len(column) // 2] += 1e-6
-    return column
-
-
-FAULTS = {
-    "finite": {"theta": lambda c: np.where(np.arange(len(c)) == 7, np.nan, c)},
-    "outcome": {"outcome": "overturned left"},
-    "penetration": {"y": lambda c: c - 1e-6},
-    "floor": {"y": lambda c: np.where(np.arange(len(c)) == 3, c + 1e-6, c)},
-    "mirror": {"x": bent},
-    "stick": {"slip_rate": lambda c: c + 1e-6},
-    "coulomb": {"mode": lambda c: np.where(c == "slide-rock", "rock", c)},
-    "energy": {"theta_dot": lambda c: c * (1.0 + 1e-5 * np.sin(np.arange(len(c))))},
-}
-
-
-@pytest.mark.parametrize("name", FAULTS)
-def test_each_invariant_notices_its_fault(name):
-    played = check_run(Spoilt(**FAULTS[name]), SLIDES_AND_HITS, audit=name == "energy")
-    assert name in played.broken
-
-
-def test_tension_in_a_floor_that_only_pushes_is_noticed():
-    """The paper's pivot, judged as if the floor could only push: after a wall impact it pulls."""
-    scene = SLIDES_AND_HITS.replace(
-        excitation=Rest(), walls=(), initial_rotation=0.02, initial_angular_velocity=3.2, duration=0.1, output_step=1e-3
-    )
-    paper = EventBasedModel().simulate(scene)
-
-    class Unfair(Spoilt):
-        def simulate(self, scene: Scene) -> History:
-            return paper
-
-    assert "push" in check_run(Unfair(), scene).broken
-
-
-def test_a_coarse_model_breaks_the_comparison_with_a_finer_one():
-    """A tolerance of 1e-3 is not 1e-10: within the horizon the rotations differ."""
-    played = check_run(EventBasedModel(tolerance=1e-2), SLIDES_AND_HITS)
-    assert played.figures["tolerance"] > INVARIANTS["tolerance"].bound
-
-
-def test_energy_balance_is_exact_to_rounding():
-    for scene in (SLIDES_AND_HITS, SLIDES_AND_HITS.replace(vertical=Sine(amplitude=3.0, period=0.4, cycles=5))):
-        fine = audited(scene)
-        model = EventBasedModel(tolerance=1e-13)
-        assert energy_error(model, fine, model.simulate(fine)) < 1e-11
-
-
-def test_the_spring_of_bouc_wens_friction_gives_energy_only_where_the_floors_push_changes():
-    """(9) keeps z, not energy: its force mu |P| z grows with P. What it gives is less than it can hold."""
-    shakes = SLIDES_AND_HITS.replace(walls=(), vertical=Sine(amplitude=6.0, period=0.15, cycles=27))
-    gains = {}
-    for name, scene in (("shaken", shakes), ("steady", shakes.replace(vertical=Rest()))):
-        for yields in (1e-2, 1e-3):
-            size = yields * scene.block.radius
-            model = EventBasedModel(friction="bouc-wen", yield_displacement=size, tolerance=1e-12)
-            history = model.simulate(audited(scene))
-            assert energy_error(model, audited(scene), history) < 1e-9
-            without = model.model_copy(update={"yield_displacement": 1e-30})  # as if it could hold nothing
-            gains[name, yields] = energy_error(without, audited(scene), history)
-    assert gains["steady", 1e-2] < 1e-9
-    assert gains["steady", 1e-3] < 1e-9
-    assert 1e-6 < gains["shaken", 1e-3] < 0.5 * gains["shaken", 1e-2]
-
-
-def test_energy_that_cannot_be_judged_is_not_said_to_hold(monkeypatch):
-    """A history of too few rows, and one whose work is resolved nowhere: neither has an error of 0, and the run is counted."""
-    model, short = EventBasedModel(), SLIDES_AND_HITS.replace(duration=0.2)
-    assert energy_error(model, short, model.simulate(short)) is None
-    rough = SLIDES_AND_HITS.replace(excitation=Record.from_samples(8.0 * np.sin(np.arange(500.0)), time_step=0.008))
-    assert energy_error(model, rough, model.simulate(rough)) is None  # five kinks between two rows
-    assert energy_error(model, audited(rough), model.simulate(audited(rough))) < 1e-9
-    monkeypatch.setattr(invariants, "RESOLVED", 0.0)
-    played = check_run(model, SLIDES_AND_HITS, audit=True)
-    assert (played.unjudged, "energy" in played.figures, played.broken) == (("energy",), False, [])
-    assert check_run(model, SLIDES_AND_HITS, audit=True, only="energy").figures == {}
-    batch = play_some("ebm", 1, 0, 1)  # run 0 is audited
-    assert (batch.unjudged["energy"], batch.looked_at["energy"]) == (1, 0)
-    found = Stress(**{field.name: "" for field in dataclasses.fields(Stress)} | {"batches": {"ebm": batch}})
-    (row,) = (row for row in summary_rows(found) if row["invariant"] == "energy")
-    assert (row["runs"], row["not judged"], row["failures"]) == (0, 1, 0)
-    assert "1 not judged" in invariants_markdown(found)
-
-
-def test_a_block_that_hangs_is_its_own_mirror_image():
-    """At rest, symmetric, and the floor falls away faster than g: the pivot that cannot let go has no corner to choose."""
-    hangs = SLIDES_AND_HITS.replace(
-        walls=(), excitation=Rest(), vertical=Record.from_samples([0.0, -20.0, -20.0], time_step=0.1), duration=0.3, output_step=0.01
-    )
-    for settings in ({}, {"friction": "no-slip"}, {"friction": "bouc-wen"}, {"pivot": "unilateral"}):
-        played = check_run(EventBasedModel(**settings), hangs)
-        assert played.broken == [], settings
-        assert played.figures["mirror"] == 0.0
-    assert EventBasedModel().simulate(hangs).cost.rules == {"hangs flat": 1}
-
-
-def test_similar_scenes_have_the_same_numbers():
-    other = similar(SLIDES_AND_HITS, 3)
-    k = other.block.radius / PAPER_BLOCK.radius
-    assert k != pytest.approx(1.0)
-    assert other.walls[0].gap == pytest.approx(k * 0.05)
-    assert other.excitation.amplitude == 8.0
-    assert other.excitation.period == pytest.approx(math.sqrt(k) * 1.2)
 
 
 def test_shrinking_drops_all_that_does_not_matter(tmp_path):
@@ -323,15 +71,17 @@ def test_shrinking_drops_all_that_does_not_matter(tmp_path):
     )
 
     def shows(one: Scene) -> bool:
-        return isinstance(one.excitation, Record) and max(one.excitation.unscaled) > 2.0 and one.wall("right") is not None
+        return (
+            isinstance(one.excitation, Record)
+            and max(one.excitation.unscaled) > 2.0
+            and one.wall("right") is not None
+        )
 
-    told: list[Scene] = []
-    small, complete = shrink(scene, shows, trials=2000, smaller=told.append)
+    small, complete = shrink(scene, shows, trials=2000)
     assert complete
-    assert all(map(shows, told))
-    assert told[-1] == small
+    assert shows(small)
     early, complete = shrink(scene, shows, trials=3)
-    assert early in told
+    assert shows(early)
     assert not complete
     assert shrink(scene, shows, seconds=-1.0) == (scene, False)
     assert len(small.excitation.unscaled) < 20
@@ -339,145 +89,145 @@ def test_shrinking_drops_all_that_does_not_matter(tmp_path):
     assert small.walls[0].gap == small.walls[0].restitution == 0.0
     assert small.vertical == Rest()
     assert small.floor.restitution == small.initial_height == small.initial_angular_velocity == 0.0
-    read = load_scene(write_scene(small, tmp_path / "small.toml", "a remark\nanother"))
-    assert read.replace(name=small.name) == small
+    file = tmp_path / "small.toml"
+    file.write_text(scene_text(small, "a remark\nanother"))
+    assert load_scene(file).replace(name=small.name) == small
 
 
-def test_a_batch_counts_what_it_saw():
+def test_totals_count_what_was_seen():
     """Two halves are the whole, and the worst figure names its run."""
-    whole, halves = play_some("ebm", 1, 0, 8), play_some("ebm", 1, 0, 4) + play_some("ebm", 1, 4, 4)
-    for name in (
-        "runs",
-        "looked_at",
-        "worst",
-        "failures",
-        "outcomes",
-        "events",
-        "gaining",
-        "largest_gain",
-        "horizons",
-        "unjudged",
-    ):
-        assert getattr(whole, name) == getattr(halves, name), name
-    assert whole.runs == 8
-    assert whole.looked_at["ends"] == 8
+    whole, halves = Chunk("ebm", 1, 0, 8).play(), RunTotals(model="ebm")
+    for half in parts(Chunk("ebm", 1, 0, 8)):
+        halves.add(half.play())
+    assert vars(whole) | {"cpu_seconds": 0.0} == vars(halves) | {"cpu_seconds": 0.0}
+    assert whole.counts["runs"] == whole.looked_at["ends"] == 8
 
 
-def test_work_is_all_runs_once():
+def test_work_is_all_runs_once_and_what_is_lost_is_halved():
     for runs, quick in ((1003, False), (None, True)):
-        work = chunks(1, runs, quick, list(PLAYERS))
+        work = Stress("runs", quick=quick, runs=runs).tasks({})
         for label, player in PLAYERS.items():
-            numbers = [n for chunk in work if chunk.label == label for n in range(chunk.first, chunk.first + chunk.count)]
+            numbers = [
+                n
+                for chunk in work
+                if chunk.model == label
+                for n in range(chunk.first, chunk.first + chunk.count)
+            ]
             assert sorted(numbers) == list(range(runs or player.quick))
-    assert [half.count for half in Chunk("ebm", 1, 10, 5).halves] == [2, 3]
+    study = Stress("runs", runs=5, models=("ebm",))
+    (whole,) = study.tasks({})
+    done: dict = {whole: Failure("lost")}
+    halves = study.tasks(done)[1:]
+    assert [(half.first, half.count) for half in halves] == [(0, 2), (2, 3)]
+    assert halves[1].seconds < whole.seconds
+    assert parts(Chunk("ebm", 1, 2, 1)) == []
 
 
-def test_a_failure_is_shown_with_its_smallest_scene(tmp_path, monkeypatch, capsys):
-    """An event-based model that breaks an invariant: exit 1, counted, and a scene file that a user can play."""
-
-    def check(self: object, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
-        return CheckedRun(figures={"ends": 0.0, "mirror": 3.0 if scene.walls else 0.0}, outcome="at rest")
-
-    monkeypatch.setattr(type(PLAYERS["ebm"]), "check", check)
-    monkeypatch.setattr(study, "_side_by_side", lambda work, jobs: (play_some(c.label, c.seed, c.first, c.count) for c in work))
-    monkeypatch.setattr(study, "_shrink", lambda failures, folder, *_: [study.shrink_file(one, folder, 10.0) for one in failures])
-    assert main(["stress", "runs", "--model", "ebm", "--runs", "12", "--out", str(tmp_path)]) == 1
-    said = capsys.readouterr().out
-    found = json.loads((tmp_path / "run.json").read_text())["batches"]["ebm"]
-    assert 0 < len(found["failures"]) < 12
-    assert "mirror" in said
-    file = tmp_path / next(failure["file"] for failure in found["failures"] if failure["file"])
-    small = load_scene(file)
-    assert len(small.walls) == 1
-    assert file.name in (tmp_path / "index.html").read_text()
-    assert (tmp_path / "failures.csv").read_text().count("\n") == len(found["failures"]) + 1
-    assert main(["simulate", str(file), "--model", "ebm", "-o", str(tmp_path / "o.csv")]) == 0
-
-
-@pytest.mark.parametrize("label", ["cm", "mujoco", "pybullet"])
-def test_approximate_models_keep_what_they_state(label):
-    player = PLAYERS[label]
-    assert isinstance(player, Approximate)
-    for number in (1, 2, 3):
-        played = player.check(player.scene(1, number), 1, number)
-        assert played.broken == []
-        assert {"depth", "source"} <= played.figures.keys()
-
-
-def test_work_of_the_base_on_a_block_that_stands_or_flies():
-    """A record finer than the rows, with a jump where it ends: the energy of a block that feels only the base is the base's work."""
-    scene = SLIDES_AND_HITS.replace(
-        floor=Floor(friction=0.0),
-        walls=(),
-        excitation=Record.from_samples([0.0, 30.0, -50.0, 7.0, 20.0], time_step=0.013),
-        duration=0.2,
-        output_step=0.05,
+def broken_without_walls(
+    self: object, scene: Scene, seed: int, number: int, only: str = ""
+) -> CheckedRun:
+    return CheckedRun(
+        figures={"ends": 0.0, "mirror": 3.0 if scene.walls else 0.0},
+        outcome="at rest",
+        gains=1,
+        rules={"settles": 2},
     )
-    slides = EventBasedModel().simulate(scene)
-    assert np.ptp(slides.channels["x_dot"]) > 0.05
-    assert abs(energy_without_source(scene, slides)) < 1e-14
-    faster = dataclasses.replace(slides, channels={**slides.channels, "x_dot": 1.1 * slides.channels["x_dot"]})
-    assert energy_without_source(scene, faster) > 1e-5
-    drops = scene.replace(block=LOADED.block, initial_height=2.0, initial_angular_velocity=1.0)  # and turns about the load
-    flies = EventBasedModel(pivot="unilateral").simulate(drops)
-    assert set(flies.channels["mode"]) == {"flight"}
-    assert abs(energy_without_source(drops, flies)) < 1e-13
 
 
-def test_of_an_engine_that_gains_energy_half_the_step_is_told(monkeypatch):
-    """Energy from nowhere that falls with the step is the step's; the words of the failure say so."""
-    player = PLAYERS["mujoco"]
-    scene = player.scene(1, 2)
-    monkeypatch.setattr(players, "energy_without_source", lambda played, history: 0.08 * played.output_step / scene.output_step)
-    played = player.check(scene, 1, 2)
-    assert played.broken == ["source"]
-    assert played.failure == "source 0.08, with half the step 0.04"
+def test_a_failure_is_shown_with_its_smallest_scene(tmp_path, monkeypatch):
+    """An event-based model that breaks an invariant: exit 1, counted, and a scene file that a user can play; kept for the next run."""
+    monkeypatch.setattr(type(PLAYERS["ebm"]), "check", broken_without_walls)
+    stale = tmp_path / "failures" / "old.toml"
+    stale.parent.mkdir()
+    stale.touch()
+    study = Stress("runs", models=("ebm",), runs=12)
+    found = run(study, tmp_path, jobs=0)
+    page = publish(found, tmp_path).read_text()
+    failures, scenes = found.table("failures").records(), found.table("scenes").records()
+    assert (found.exit_code, found.verdict, found.complete) == (1, "fail", True)
+    assert 0 < len(failures) == len(scenes) < 12
+    (mirror,) = (row for row in found.table("invariants").records() if row["invariant"] == "mirror")
+    assert (mirror["worst"], mirror["failures"]) == (3.0, len(failures))
+    assert found.table("models").records()[0]["gaining"] == 12
+    assert found.table("choices").records() == [{"model": "ebm", "choices": "settles 24"}]
+    assert not stale.exists()
+    file = tmp_path / "failures" / scenes[0]["scene"]
+    assert len(load_scene(file).walls) == 1
+    assert f'href="failures/{file.name}"' in page
+    assert main(["simulate", str(file), "--model", "ebm", "-o", str(tmp_path / "o.csv")]) == 0
+    monkeypatch.setattr(type(PLAYERS["ebm"]), "check", None)  # all is read back
+    assert run(study, tmp_path, jobs=0).files == found.files
+
+
+def test_failures_of_the_program_and_of_engines():
+    """A run whose process was lost does not end, and is not shrunk; an engine's failure fails no command; most are only counted."""
+    study = Stress("runs", runs=30, models=("ebm", "cm"))
+    lost, other = Chunk("ebm", 1, 7, 1), Chunk("cm", 1, 0, 30)
+    failures = [Broken("cm", "source", 1, number, 0.1) for number in range(30)]
+    done: dict = dict.fromkeys(study.tasks({}), RunTotals(model="ebm")) | {
+        other: RunTotals(model="cm", failures=failures, counts=Counter(runs=30))
+    }
+    done = {task: one for task, one in done.items() if one.model == task.model}
+    assert (study.gather(done).exit_code, len(study.gather(done).scenes)) == (0, MOST_FILES)
+    done[lost] = Failure("it hangs")
+    found = study.gather(done)
+    assert found.exit_code == 1
+    assert found.table("failures").records()[0]["words"] == "it hangs"
+    assert "not shrunk" in found.files["failures/ebm-ends-1-7.toml"]
 
 
 def test_where_an_engine_breaks_is_found():
     """MuJoCo's own contact lets a block of a millimetre sink; at its best it holds it. Creep under a push is seen, too."""
     assert fault_of(SETUPS["mujoco default"], scene_at("size", 1e-3), 0.01) == "sinks"
     assert fault_of(SETUPS["mujoco"], scene_at("size", 1e-3), 0.01) == ""
-    found = largest_stable("mujoco default", "size", 1e-3, steps=(0.03, 0.01))
+    found = Place("mujoco default", "size", 1e-3, quick=True).play()
     assert (found.step, found.fault) == (0.0, "sinks")
-    creeps, stands = stand_still("mujoco default", "pushed", 5.0), stand_still("mujoco adaptive", "pushed", 5.0)
-    assert creeps.creep > 1e-4
-    assert stands.creep < 1e-6
-    assert stand_still("cm", "left alone", 5.0).jitter < 1e-9
+    creeps, stands = (
+        stand_still("mujoco default", "pushed", 5.0),
+        stand_still("mujoco adaptive", "pushed", 5.0),
+    )
+    assert creeps.moves["creep"] > 1e-4
+    assert stands.moves["creep"] < 1e-6
+    assert stand_still("cm", "left alone", 5.0).moves["jitter"] < 1e-9
 
 
-def test_the_page_and_the_tables(tmp_path):
-    """All that a run has is on its page and in its files."""
-    assert main(["stress", "runs", "--model", "ebm", "--runs", "6", "--jobs", "1", "--out", str(tmp_path), "--quiet", "--seed", "4"]) == 0
-    page = (tmp_path / "index.html").read_text()
-    for invariant in INVARIANTS:
-        assert invariant in page
-    summary = (tmp_path / "summary.md").read_text()
-    assert summary.startswith("## Figures of one whole run\n")
-    assert "`rockcheck stress --seed 4`" in summary
-    assert "| ebm | 6 | 0 |" in summary
-    assert (tmp_path / "invariants.csv").read_text().count("\nebm,") >= 10
+def test_the_maps_are_tables_and_a_picture(tmp_path):
+    """Of what was played; where a process was lost there is no cell."""
+    study = Stress("maps", quick=True)
+    work = study.tasks({})
+    assert work == places(quick=True)
+    done: dict = {
+        task: Still(task.line, task.at, 5.0, 5e-3, {"creep": 1e-3})
+        if task.at in CASES
+        else Stable(task.line, task.at, task.value, 0.1, "sinks")
+        for task in work
+    }
+    done[work[-1]] = Failure("did not end")
+    found = study.gather(done)
+    publish(found, tmp_path)
+    assert {row["0.001"] for row in found.table("steps-size").records()} == {"0.1 sinks"}
+    assert list(found.table("steps-shaking").records()[-1].values())[-1] is None
+    assert {row["creep"] for row in found.table("stand-still").records()} == {1e-3}
+    assert (tmp_path / "figures" / "stable-steps.svg").exists()
+    with (tmp_path / "stable-steps.csv").open() as stream:
+        assert len(list(csv.reader(stream))) == 1 + sum(
+            isinstance(one, Stable) for one in done.values()
+        )
+
+
+def test_the_command(tmp_path, capsys):
+    """All that a run has is in its files."""
+    words = ["--runs", "6", "--jobs", "1", "--out", str(tmp_path), "--seed", "4"]
+    assert main(["stress", "runs", "--model", "ebm", *words, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["seed"], found["batches"]["ebm"]["counts"]["runs"]) == (4, 6)
+    assert [row["invariant"] for row in found["tables"]["invariants"]] == list(INVARIANTS)
+    assert "| ebm | " in (tmp_path / "summary.md").read_text()
 
 
 @pytest.mark.slow
-def test_quick_run():
+def test_quick_run(tmp_path):
     """All models: no event-based one breaks an invariant."""
-    found = run_stress("runs", quick=True, seed=11)
+    found = run(Stress("runs", quick=True, seed=11), tmp_path)
     assert found.complete
-    assert found.broken == []
-
-
-def test_exact_scenes_are_the_same_for_a_seed_and_hold_what_they_are_for():
-    """Numbers of few digits, starts that are noise, walls on both sides, a vertical base that may take all weight, long rest."""
-    scenes = [exact_scene(5, number, "unilateral") for number in range(400)]
-    assert scenes == [exact_scene(5, number, "unilateral") for number in range(400)]
-    assert scenes[:50] != [exact_scene(6, number, "unilateral") for number in range(50)]
-    assert all(len(repr(scene.block.half_width)) < 8 and len(repr(scene.gravity)) < 8 for scene in scenes)
-    assert any(0.0 < abs(scene.initial_rotation) < 1e-12 for scene in scenes)
-    assert any(0.0 < abs(scene.initial_angular_velocity) < 1e-12 for scene in scenes)
-    assert any(len(scene.walls) == 2 and scene.walls[0].gap == scene.walls[1].gap for scene in scenes)
-    assert any(scene.vertical.kind == "record" and min(scene.vertical.samples) == -scene.gravity for scene in scenes)
-    assert any(scene.duration == 1e4 for scene in scenes)
-    yielding = [exact_scene(5, number, "bouc-wen") for number in range(100)]
-    assert all(scene.floor.static_friction is None for scene in yielding)
-    assert [scene.block for scene in yielding] == [scene.block for scene in scenes[:100]]
+    assert found.exit_code == 0

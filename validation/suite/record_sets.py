@@ -1,4 +1,4 @@
-"""Scenes under sets of recorded motions: a suite's tables `[[records]]`, and what `rockcheck run` plays.
+"""Scenes under sets of recorded motions: a suite's tables `[[records]]`, and what `rockcheck validate SCENE` plays.
 
     [[records]]
     files = ["records/RSN1_H*.AT2", "station.V2"]    # files, folders, patterns, beside the suite

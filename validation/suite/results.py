@@ -207,7 +207,7 @@ class Run(Stored):
     hardware: dict[str, str] = Field(default_factory=dict)
     wall_seconds: float = 0.0
     strict: Strict = False
-    #: False where nothing was to be judged, as by `rockcheck run`.
+    #: False where nothing was to be judged, as by `rockcheck validate SCENE`.
     judged: bool = True
     tolerances_file: str = ""
     ensembles: tuple[EnsembleRecord, ...] = ()

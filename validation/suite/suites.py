@@ -253,7 +253,7 @@ def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
     tables = read_toml(path)
     if "block" in tables:
         names = f"scenes = [{printable(path.name)!r}], and tables [models.NAME]"
-        raise InputError(f"{printable(path)}: is a scene, not a suite; `rockcheck run` plays a scene, and a suite is a file with {names}")
+        raise InputError(f"{printable(path)}: is a scene, not a suite; `rockcheck validate` plays a scene, and a suite is a file with {names}")
     try:
         return _suite(SuiteFile(**tables), path, shipped, allow_code)
     except InputError as error:

@@ -1,41 +1,52 @@
-"""Stands in for functions of `validation.stress.study`, in worker processes: some runs kill their process, or never end."""
+"""Stress studies whose workers fail: some runs kill their process, or never end."""
 
 from __future__ import annotations
 
 import os
 import time
 from collections import Counter
-from pathlib import Path
+from typing import Any
 
 from rockcheck.scenes import Scene
-from rockcheck.validation.stress import study
-from rockcheck.validation.stress.invariants import CheckedRun
-from rockcheck.validation.stress.players import EventBased
-from rockcheck.validation.stress.results import Failure, RunTotals
+from rockcheck.validation.studies.stress.invariants import CheckedRun
+from rockcheck.validation.studies.stress.players import EventBased
+from rockcheck.validation.studies.stress.runs import Broken, Chunk, RunTotals
+from rockcheck.validation.studies.stress.study import Stress
+
+FAILING = (3, 4, 5, 13)
 
 
-def play_some(label: str, seed: int, first: int, count: int) -> RunTotals:
+class Deadly(Stress):
     """Run 3 kills its process, run 13 hangs."""
-    for number in range(first, first + count):
-        if number == 3:
+
+    @staticmethod
+    def play(task: Any) -> Any:
+        runs = range(task.first, task.first + task.count)
+        if 3 in runs:
             os._exit(9)
-        if number == 13:
+        if 13 in runs:
             time.sleep(600.0)
-    return RunTotals(model=label, runs=count, looked_at=Counter({"ends": count}))
+        return RunTotals(model=task.model, counts=Counter(runs=task.count))
 
 
-def shrink_file(failure: Failure, folder: Path, seconds: float) -> None:
-    """Every scene fails. Run 13 kills its process, run 4 takes its time, run 3 never ends once it has no walls."""
+class Stubborn(Stress):
+    """Every scene fails. As they shrink, run 13 kills its process, run 4 takes its time, run 3 never ends once it has no walls."""
 
-    def check(self: EventBased, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
-        if number == 13:
-            os._exit(9)
-        if number == 4:
-            time.sleep(0.5)
-        if number == 3 and not scene.walls:
-            time.sleep(600.0)
-        return CheckedRun(figures={"mirror": 1.0})
+    @staticmethod
+    def play(task: Any) -> Any:
+        if isinstance(task, Chunk):
+            failures = [Broken("ebm", "mirror", 1, number, 1.0) for number in FAILING]
+            return RunTotals(model=task.model, counts=Counter(runs=task.count), failures=failures)
 
-    # The players are frozen, and a process that dies can be shown only by one that does.
-    EventBased.check = check  # type: ignore[method-assign]
-    study.shrink_file(failure, folder, seconds)
+        def check(self: EventBased, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
+            if number == 13:
+                os._exit(9)
+            if number == 4:
+                time.sleep(0.5)
+            if number == 3 and not scene.walls:
+                time.sleep(600.0)
+            return CheckedRun(figures={"mirror": 1.0})
+
+        # The players are frozen, and a process that dies can be shown only by one that does.
+        EventBased.check = check  # type: ignore[method-assign]
+        return task.play()

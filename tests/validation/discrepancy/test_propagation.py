@@ -9,7 +9,7 @@ import pytest
 
 from rockcheck import Block, EventBasedModel, Floor, Scene
 from rockcheck.scenes.trust.inputs import Spread, uncertain_scene
-from rockcheck.validation.uncertainty.inputs import BANDS, SAMPLES, Interval, propagate
+from rockcheck.validation.uncertainty.population import BANDS, SAMPLES, Interval, propagate
 
 BLOCK = Block(half_width=0.3, half_height=1.0)
 NORMAL = 1.959964

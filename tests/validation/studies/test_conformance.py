@@ -1,4 +1,4 @@
-"""Conformance cards: planted faults fail just the cards that they should, and outside engines take part."""
+"""Conformance cards: planted faults fail just what they should, and outside engines take part."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import json
 import math
 import os
 from importlib.util import find_spec
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,38 +16,50 @@ from junitparser import JUnitXml
 from rockcheck import engines
 from rockcheck.commands.cli import main
 from rockcheck.engines import MuJoCo
-from rockcheck.reports.scene_file import write_scene_file
 from rockcheck.scenes import Floor, InputError, ModelFailure, Wall, load_scene
-from rockcheck.validation.conformance import cards as cards_module
-from rockcheck.validation.conformance.cards import as_json, changes, junit, make_card, markdown, read_cards
-from rockcheck.validation.conformance.phenomena import PHENOMENA, SCENES
-from rockcheck.validation.conformance.study import Asked, card_of, engines_here, slug_of
+from rockcheck.scenes.writing import json_text
+from rockcheck.validation.execute.models import engine_names, not_installed
+from rockcheck.validation.execute.pool import guarded
+from rockcheck.validation.studies.conformance import study
+from rockcheck.validation.studies.conformance.phenomena import PHENOMENA, SCENES
+from rockcheck.validation.studies.conformance.study import Conformance, Player, changes, named
 
-RIGHT = MuJoCo(time_step=1e-3)
+RIGHT, CONVEX = MuJoCo(time_step=1e-3), MuJoCo(time_step=1e-3, cone_correction=False)
+PLANTED = Player("planted", "best", 1e-3, "planted:Planted", {}, "1")
 
 
-def card(play, **about):
-    return make_card(play, **{"engine": "planted", "version": "1", "settings": "best", "step": 1e-3, **about})
+def played(player):
+    conformance = Conformance((player,))
+    return conformance.gather({t: guarded(Conformance.play, t) for t in conformance.tasks({})})
 
 
-@pytest.fixture(scope="session")
+def verdicts(found, *wanted):
+    (card,) = found.data["cards"]
+    return {row["id"] for row in card["phenomena"] if row["verdict"] in (wanted or ("fail",))}
+
+
+@pytest.fixture
+def planted(monkeypatch):
+    def gather(play):
+        monkeypatch.setattr(study, "build_own", lambda *_: SimpleNamespace(simulate=play))
+        return played(PLANTED)
+
+    return gather
+
+
+@pytest.fixture(scope="module")
 def histories():
-    """The histories of an engine that conforms, which is played once."""
     return {name: RIGHT.simulate(scene) for name, scene in SCENES.items()}
 
 
-@pytest.fixture(scope="session")
-def right(histories):
-    return card(lambda scene: histories[scene.name])
+@pytest.fixture
+def right(planted, histories):
+    return planted(lambda scene: histories[scene.name])
 
 
 def without_restitution(scene):
     walls = [Wall(side=wall.side, gap=wall.gap) for wall in scene.walls]
     return RIGHT.simulate(scene.replace(floor=Floor(friction=scene.floor.friction), walls=walls))
-
-
-def with_convex_cone(scene):
-    return MuJoCo(time_step=1e-3, cone_correction=False).simulate(scene)
 
 
 def with_friction_doubled(scene):
@@ -66,8 +79,6 @@ def with_creep(scene):
 
 
 class SinglePrecision(MuJoCo):
-    """Keeps its state in float32."""
-
     def rigid_world(self, scene):
         world = super().rigid_world(scene)
         whole = world.step
@@ -80,190 +91,187 @@ class SinglePrecision(MuJoCo):
         return world
 
 
-def in_single_precision(scene):
-    return SinglePrecision(time_step=1e-3).simulate(scene)
-
-
 @pytest.mark.parametrize(
     ("play", "failing"),
     [
         (without_restitution, {"RC-06", "RC-07"}),
-        (with_convex_cone, {"RC-04"}),
+        (CONVEX.simulate, {"RC-04"}),
         (with_friction_doubled, {"RC-01", "RC-02"}),
         (with_creep, {"RC-03"}),
-        (in_single_precision, {"RC-05"}),
+        (SinglePrecision(time_step=1e-3).simulate, {"RC-05"}),
     ],
-    ids=lambda one: getattr(one, "__name__", ""),
+    ids=["no restitution", "convex cone", "double friction", "creep", "single precision"],
 )
-def test_a_planted_fault_fails_just_its_cards(play, failing):
-    assert {row.id for row in card(play).failed} == failing
+def test_a_planted_fault_fails_just_what_it_should(planted, play, failing):
+    assert verdicts(planted(play), "fail", "error") == failing
 
 
 def test_an_engine_at_its_best_conforms(right):
-    assert [row.id for row in right.failed] == []
-    assert [row.verdict for row in right.phenomena].count("reported") == 1
+    assert (right.exit_code, verdicts(right, "fail", "error")) == (0, set())
+    assert verdicts(right, "reported") == {"RC-18"}
 
 
 def test_the_engines_here_are_those_that_are_installed():
-    """`ROCKCHECK_ENGINES` names those that must be, so that no machine that should have them skips their tests unseen."""
-    installed = {one.name for one in map(engines.__dict__.get, engines.__all__) if not one.module or find_spec(one.module)}
-    assert set(engines_here()) == installed
-    assert set(os.environ.get("ROCKCHECK_ENGINES", "mujoco").split()) <= set(engines_here())
+    # `ROCKCHECK_ENGINES` names those that must be, so that none is skipped unseen.
+    here = {name for name in engine_names() if not not_installed(name)}
+    known = map(engines.__dict__.get, engines.__all__)
+    assert here == {one.name for one in known if not one.module or find_spec(one.module)}
+    assert set(os.environ.get("ROCKCHECK_ENGINES", "mujoco").split()) <= here
 
 
 @pytest.mark.parametrize(
-    ("name", "failing"),
-    [("mujoco", set()), ("pymunk", set()), ("dart", {"RC-03"}), pytest.param("drake", set(), marks=pytest.mark.slow)],
+    ("name", "settings", "failing"),
+    [
+        ("mujoco", "best", set()),
+        ("mujoco", "default", {"RC-03", "RC-04", "RC-05", "RC-08", "RC-14"}),
+        ("pymunk", "best", set()),
+        ("dart", "best", {"RC-03"}),
+        pytest.param("drake", "best", set(), marks=pytest.mark.slow),
+    ],
 )
-def test_an_engine_gets_a_card(name, failing):
-    """What fails at the best settings is known and listed in the documentation."""
-    if name not in engines_here():
-        pytest.skip(f"{name} is not installed")
-    found = card_of(Asked(name, "best", 1e-3), lambda *told: None)
-    assert {row.id for row in found.failed} == failing
-    assert found.version
+def test_an_engine_gets_a_card(name, settings, failing):
+    # What fails is known and listed in the documentation; the counts of verdicts add up.
+    if reason := not_installed(name):
+        pytest.skip(f"needs {name}: {reason}")
+    found = played(named(name, settings, {}))
+    assert verdicts(found, "fail", "error") == failing
+    (engine,) = found.table("engines").records()
+    counts = [engine[verdict] for verdict in study.VERDICTS]
+    assert sum(counts) == engine["total"] == len(PHENOMENA)
+    assert (engine["lacks"] == 2) == ((name, settings) == ("mujoco", "default") or name == "drake")
+    assert engine["version"]
 
 
-def test_stock_engines_fail_what_they_are_known_for():
-    found = card_of(Asked("mujoco", "default", 1e-3), lambda *told: None)
-    assert {"RC-03", "RC-04", "RC-08"} <= {row.id for row in found.failed}
-    assert {row.id for row in found.phenomena if row.verdict == "lacks"} == {"RC-06", "RC-07"}
-
-
-def test_a_model_that_fails_a_scene_fails_the_cards_that_need_it(histories):
-    def play(scene):
-        if scene.name == "coast":
-            raise ModelFailure("it blew up")
-        return histories[scene.name]
-
-    found = card(play)
-    assert [(row.id, row.verdict, row.reason) for row in found.failed] == [("RC-05", "error", "it blew up")]
-
-
-def test_a_history_without_the_columns_is_an_error_of_its_cards(histories):
+def test_what_goes_wrong_in_a_scene_costs_what_needs_it(planted, histories):
     def play(scene):
         history = histories[scene.name]
-        return dataclasses.replace(history, channels={name: history.channels[name] for name in ("t", "theta")})
+        if scene.name == "coast":
+            raise ModelFailure("it blew up")
+        if scene.name == "cone":
+            raise RuntimeError("no such road")
+        kept = ("t", "theta") if scene.name == "slide" else history.channels
+        return dataclasses.replace(history, channels={key: history.channels[key] for key in kept})
 
-    found = {row.id: row for row in card(play).phenomena}
-    assert "no column x" in found["RC-01"].reason
-    assert found["RC-11"].verdict == "pass"
-
-
-def test_cards_read_back(right, tmp_path):
-    path = tmp_path / "cards.json"
-    path.write_text(json.dumps(as_json([right]), allow_nan=False), encoding="utf-8")
-    (again,) = read_cards(path)
-    assert [row.verdict for row in again.phenomena] == [row.verdict for row in right.phenomena]
-    assert changes([right], [again]) == []
-
-
-def test_what_changed_between_versions(right):
-    rows = list(right.phenomena)
-    rows[0] = dataclasses.replace(rows[0], value=2.0, verdict="fail")
-    rows[8] = dataclasses.replace(rows[8], value=rows[8].value + 0.5 * rows[8].limit)
-    newer = dataclasses.replace(right, version="2", phenomena=tuple(rows))
-    found = changes([right], [newer])
-    assert [(one.id, one.verdicts, one.worse) for one in found] == [
-        ("RC-01", ("pass", "fail"), True),
-        ("RC-09", ("pass", "pass"), False),
-    ]
-    assert found[0].versions == ("1", "2")
-    assert len(changes([right], [])) == len(PHENOMENA)
+    found = planted(play)
+    rows = {row["id"]: row for row in found.table("rows").records() if row["verdict"] == "error"}
+    said = {"RC-01": "no column x", "RC-02": "no such road", "RC-04": "no column y"}
+    said["RC-05"] = "it blew up"
+    assert rows.keys() == said.keys()
+    assert all(words in rows[id]["reason"] for id, words in said.items())
+    (suite,) = JUnitXml.fromstring(found.files["junit.xml"].encode())
+    assert (suite.tests, suite.failures, suite.errors, suite.skipped) == (18, 0, 4, 1)
+    assert found.exit_code == 1
 
 
-@pytest.mark.parametrize("text", ["", "[]", '{"cards": [{}]}', '{"cards": [{"engine": 1, "phenomena": [{"id": 1}]}]}'])
-def test_what_is_no_file_of_cards_is_told(text, tmp_path):
-    path = tmp_path / "cards.json"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match="no cards"):
-        read_cards(path)
-
-
-def test_junit_and_markdown(right):
-    broken = dataclasses.replace(
-        right, engine="broken", phenomena=tuple(dataclasses.replace(row, verdict="fail", value=math.nan) for row in right.phenomena)
+def test_what_changed_between_versions(right, tmp_path):
+    path = tmp_path / "run.json"
+    path.write_text(json_text(right.as_dict()), encoding="utf-8")
+    assert changes(tmp_path, path).table("changes").rows == []
+    run = json.loads(path.read_text(encoding="utf-8"))
+    rows = run["tables"]["rows"]
+    rows[0] |= {"version": "2", "value": 2.0, "verdict": "fail"}
+    rows[8] |= {"value": rows[8]["value"] + 0.5 * rows[8]["limit"]}
+    (tmp_path / "newer.json").write_text(json.dumps(run), encoding="utf-8")
+    found = changes(tmp_path, tmp_path / "newer.json")
+    first, other = found.table("changes").records()
+    assert (first["id"], first["verdict_before"], first["verdict_after"]) == (
+        "RC-01",
+        "pass",
+        "fail",
     )
-    suites = list(JUnitXml.fromstring(junit([right, broken]).encode()))
-    assert [suite.failures for suite in suites] == [0, len(PHENOMENA)]
-    text = markdown([right, broken])
-    assert text.count("| RC-") == 2 * len(PHENOMENA)
-    assert "17 of 17 conform" in text
-    assert text.count("Look at:") == len(PHENOMENA)
+    assert (first["version_before"], first["version_after"], first["worse"]) == ("1", "2", True)
+    assert (other["id"], other["worse"], found.exit_code) == ("RC-09", False, 1)
+    assert main(["compare", str(tmp_path), str(tmp_path / "newer.json"), "--quiet"]) == 1
+    path.write_text('{"tables": {"rows": []}}', encoding="utf-8")
+    gone = changes(tmp_path / "newer.json", path).table("changes").records()
+    assert [row["verdict_after"] for row in gone] == ["absent"] * len(PHENOMENA)
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"tables": {"rows": [{"engine": [1]}]}}', None])
+def test_what_is_no_finished_study_is_told(text, tmp_path):
+    if text is not None:
+        (tmp_path / "run.json").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=r"run.json: (not|cannot be read)"):
+        changes(tmp_path, tmp_path)
 
 
 def test_another_program_takes_part_by_files(histories, tmp_path, capsys):
-    folder = tmp_path / "mine"
+    folder, out = tmp_path / "mine", str(tmp_path / "out")
     assert main(["conformance", "--export", str(folder), "--quiet"]) == 0
     for name, scene in SCENES.items():
-        assert load_scene(folder / f"{slug_of(name)}.toml").initial_state == scene.initial_state
-        columns = (
-            histories[name].frame[["t", "x", "y", "theta"]].rename(columns={"t": "t_s", "x": "x_mm", "y": "y_m", "theta": "theta_deg"})
-        )
-        columns["x_mm"] *= 1e3
-        columns["theta_deg"] *= 180.0 / math.pi
-        columns.to_csv(folder / f"{slug_of(name)}.csv", index=False)
-    out = tmp_path / "out"
-    assert main(["conformance", "--histories", str(folder), "--out", str(out)]) == 0
-    assert "17 of 17" in capsys.readouterr().out
+        assert load_scene(folder / f"{name}.toml").initial_state == scene.initial_state
+        names = {"t": "t_s", "x": "x_mm", "y": "y_m", "theta": "theta_deg"}
+        units = [1.0, 1e3, 1.0, 180.0 / math.pi]
+        columns = histories[name].frame[list(names)].rename(columns=names) * units
+        columns.to_csv(folder / f"{name}.csv", index=False)
+    words = ["conformance", "--histories", str(folder), "--out", out, "--json", "--jobs", "1"]
+    assert main(words) == 0
+    (card,) = json.loads(capsys.readouterr().out)["cards"]
+    assert (card["engine"], card["settings"]) == ("my engine", "as it comes")
+    assert (card["counts"]["pass"], card["counts"]["total"]) == (17, 18)
     (folder / "coast.csv").unlink()
-    assert main(["conformance", "--histories", str(folder), "--out", str(tmp_path / "less"), "--json"]) == 1
-    (found,) = json.loads(capsys.readouterr().out)["cards"]
-    assert [row["id"] for row in found["phenomena"] if row["verdict"] == "error"] == ["RC-05"]
-    assert main(["conformance", "--compare", str(out / "conformance.json"), str(tmp_path / "less" / "conformance.json")]) == 1
-    assert "1 changes, 1 for the worse" in capsys.readouterr().out
+    assert main(words) == 1
+    (card,) = json.loads(capsys.readouterr().out)["cards"]
+    assert [row["id"] for row in card["phenomena"] if row["verdict"] == "error"] == ["RC-05"]
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["--engine", "ebm"], "--engine: 'ebm' is not allowed: give one of mujoco"),
-        (["--step", "2"], "--step: 2 is not allowed"),
+        (["--set", "time_step=0"], "mujoco.time_step: 0 is not allowed"),
+        (["--set", "softness=2"], "mujoco.softness"),
         (["--histories", "nowhere"], "engine.toml: cannot be read"),
-        (["--compare", "nowhere", "nowhere"], "nowhere: cannot be read"),
+        (["--histories", "."], "engine.toml: colour"),
+        (["--tune", "0.5", "--settings", "best"], "--tune: goes with neither"),
+        (
+            ["--tune", "0.5", "--engine", "ebm"],
+            "--engine: 'ebm' is not allowed: give one of mujoco",
+        ),
+        (["--tune", "2"], "--tune: 2.0 is not allowed"),
+        (["--tune", "nan"], "--tune: nan is not allowed"),
+        (["--tune", "0.5", "--set", "time_step=0"], "--set time_step: 0 is not allowed"),
+        (["--tune", "0.5", "--set", "friction=3"], "--set friction: 3 is not allowed"),
+        (["--tune", "0.5", "--set", "friction=red"], "--set friction: red is not allowed"),
+        (["--tune", "0.5", "--set", "step=1"], "'step'"),
     ],
 )
 def test_wrong_input_is_one_line(arguments, words, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "engine.toml").write_text('engine = "mine"\ncolour = "red"\n', encoding="utf-8")
     assert main(["conformance", *arguments]) == 2
-    error = capsys.readouterr().err
-    assert words in error
-    assert error.count("\n") == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert words in line
 
 
-def test_the_page_says_what_goes_wrong(right, tmp_path):
-    from rockcheck.reports.studies.conformance import write_conformance
-
-    rows = [dataclasses.replace(row, verdict="fail", reason=row.phenomenon.means) for row in right.phenomena[:1]]
-    broken = dataclasses.replace(right, engine="<broken>", phenomena=(*rows, *right.phenomena[1:]))
-    page = write_conformance([right, broken], tmp_path).read_text(encoding="utf-8")
-    assert "1 of 2 cards fail" in page
-    assert "&lt;broken&gt;" in page
-    assert rows[0].phenomenon.cure in page
-
-
-def test_scene_files_of_all_phenomena_are_apart(tmp_path):
-    assert len({slug_of(name) for name in SCENES}) == len(SCENES)
-    for name, scene in SCENES.items():
-        write_scene_file(scene, tmp_path, slug_of(name))
-    assert len(list(tmp_path.glob("*.toml"))) == len(SCENES)
-    assert set(cards_module.VERDICTS) == {"pass", "fail", "lacks", "error", "reported"}
-
-
-def test_a_fault_in_code_of_ones_own_costs_its_cards_only(tmp_path, monkeypatch, capsys):
+def test_code_of_ones_own_is_played_by_a_worker(tmp_path, monkeypatch, capsys):
+    # A fault in it costs what needs it only; its settings are named; it is played once.
     monkeypatch.chdir(tmp_path)
     (tmp_path / "halfway.py").write_text(
-        "from rockcheck.engines import MuJoCo\n\n\nclass Halfway(MuJoCo):\n"
+        "from pathlib import Path\nfrom typing import ClassVar\n"
+        "from rockcheck.engines import MuJoCo\n\n\n"
+        "class Halfway(MuJoCo):\n"
+        "    version: ClassVar[str] = '7'\n"
         "    def simulate(self, scene):\n"
+        "        Path('played').open('a').write(scene.name + '\\n')\n"
         "        if scene.name == 'coast':\n"
         "            raise RuntimeError('no such road')\n"
         "        return super().simulate(scene)\n",
         encoding="utf-8",
     )
-    own = "halfway:Halfway"
-    assert main(["conformance", "--engine", own, "--allow-code", own, "--settings", "default", "--json"]) == 1
-    (found,) = json.loads(capsys.readouterr().out)["cards"]
-    rows = {row["id"]: row for row in found["phenomena"]}
-    assert "no such road" in rows["RC-05"]["reason"]
-    assert rows["RC-06"]["verdict"] == "lacks"
-    assert rows["RC-11"]["verdict"] == "pass"
+    own = ["conformance", "--engine", "halfway:Halfway", "--allow-code", "halfway:Halfway"]
+    flawed = [*own, "--set", "cone_correction=false", "--jobs", "1"]
+    assert main([*flawed, "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    (card,) = found["cards"]
+    assert (card["version"], card["settings"]) == ("7", "as it comes, cone_correction=False")
+    failed = {row["id"]: row["verdict"] for row in card["phenomena"] if row["verdict"] != "pass"}
+    assert failed == {"RC-04": "fail", "RC-05": "error", "RC-18": "reported"}
+    assert found["failures"].keys() == {
+        "halfway:Halfway, as it comes, cone_correction=False: RC-05"
+    }
+    assert main([*flawed, "--quiet"]) == 1
+    scenes = (tmp_path / "played").read_text(encoding="utf-8").splitlines()
+    assert (scenes.count("coast"), scenes.count("rest"), scenes.count("uplift")) == (2, 1, 1)
+    assert main([*own, "--set", "colour=red"]) == 2
+    assert "colour" in capsys.readouterr().err

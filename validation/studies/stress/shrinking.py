@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import tomlkit
 
 from rockcheck.scenes import InputError, Record, Rest, Scene
-from rockcheck.scenes.writing import write_whole
 
 Shows = Callable[[Scene], bool]
 #: Most scenes that are tried.
@@ -24,12 +22,10 @@ def shrink(
     *,
     trials: int = MOST_TRIALS,
     seconds: float = math.inf,
-    smaller: Callable[[Scene], object] = lambda scene: None,
 ) -> tuple[Scene, bool]:
     """A scene that `shows` the failure as `scene` does, and from which no single simplification can be taken without losing it.
 
-    Ends after so many `trials` or `seconds` with what it has then; the second value is then false. Tells each `smaller` scene as
-    it is found: a trial may hang.
+    Ends after so many `trials` or `seconds` with what it has then; the second value is then false.
     """
     until = time.monotonic() + seconds
     again = True
@@ -41,7 +37,6 @@ def shrink(
             trials -= 1
             if shows(simpler):
                 scene, again = simpler, True
-                smaller(scene)
                 break
     return scene, True
 
@@ -143,8 +138,8 @@ def _digits(value: float, digits: int) -> float:
     return float(f"{value:.{digits}g}")
 
 
-def write_scene(scene: Scene, path: Path, remarks: str) -> Path:
-    """Writes a scene file that `load_scene` reads back to the bit (samples stand in the file itself), with remarks on top."""
+def scene_text(scene: Scene, remarks: str) -> str:
+    """A scene file that `load_scene` reads back to the bit (samples stand in the file itself), with remarks on top."""
     tables: dict[str, Any] = scene.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
     for key in ("excitation", "vertical"):
         if key in tables:
@@ -152,4 +147,4 @@ def write_scene(scene: Scene, path: Path, remarks: str) -> Path:
     tables.pop("name", None)  # the file's own
     plain = {key: value for key, value in tables.items() if not isinstance(value, dict | list)}
     lines = "".join(f"# {line}\n" for line in remarks.splitlines())
-    return write_whole(path, lines + tomlkit.dumps(plain | {key: value for key, value in tables.items() if key not in plain}))
+    return lines + tomlkit.dumps(plain | {key: value for key, value in tables.items() if key not in plain})

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall
-from rockcheck.validation.stress.generator import ROWS, Excitation, Kind, loaded, most_friction
+from rockcheck.validation.studies.stress.generator import ROWS, Excitation, Kind, loaded, most_friction
 
 #: Half width and half height: the paper's block, Pythagorean ones, squat ones, a square, with one size of rounding each.
 SIDES = ((0.397, 1.555), (0.3, 0.4), (0.4, 0.3), (0.5, 1.0), (1.0, 0.5), (0.1, 0.05), (1.0, 1.0), (0.25, 1.0), (0.2, 1.0), (5.0, 12.0))

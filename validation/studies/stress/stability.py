@@ -7,10 +7,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -18,21 +16,19 @@ from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Res
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import build, not_installed
-from rockcheck.validation.execute.pool import Call, Pool
-from rockcheck.validation.stress.players import energy_without_source
-
-Axis = Literal["size", "friction", "restitution", "shaking"]
+from rockcheck.validation.studies.stress.players import deepest, energy_without_source
+from rockcheck.validation.study import Task
 
 SLOPE = math.tan(0.25)
 #: Values along each axis; all else is the paper's block beside a wall: R in m, friction, restitution of the wall, a_p/(g tan alpha).
-AXES: dict[Axis, tuple[float, ...]] = {
+AXES: dict[str, tuple[float, ...]] = {
     "size": (1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1000.0),
     "friction": (0.0, 0.1, 0.3, 0.6, 0.9, 1.2),
     "restitution": (0.0, 0.25, 0.5, 0.75, 0.95),
     "shaking": (0.5, 1.5, 3.0, 10.0, 30.0, 100.0),
 }
-USUAL: dict[Axis, float] = {"size": 1.6, "friction": 0.3, "restitution": 0.5, "shaking": 3.0}
-AXIS_WORDS: dict[Axis, str] = {
+USUAL: dict[str, float] = {"size": 1.6, "friction": 0.3, "restitution": 0.5, "shaking": 3.0}
+AXIS_WORDS: dict[str, str] = {
     "size": "half diagonal R, m",
     "friction": "friction of the floor",
     "restitution": "restitution of the wall",
@@ -47,8 +43,8 @@ ADAPTIVE_FINEST = 3e-3
 #: run, s; and the step (s).
 HOUR, PUSHED, QUICK_REST, REST_STEP = 3600.0, 300.0, 10.0, 5e-3
 QUICK_STEPS, QUICK_VALUES = STEPS[1:-1:2], 2
-#: Memory that a worker may take, MB.
-MEMORY = 4096.0
+#: What a place may take, s: far more than it needs.
+MOST_SECONDS = 600.0
 
 
 @dataclass(frozen=True)
@@ -64,13 +60,6 @@ class ModelSetup:
     knob: str = "time_step"
     alone: float = HOUR
     finest: float = STEPS[-1]
-
-    def built(self, scene: Scene, step: float) -> Any:
-        """The model with a step in s; the CM's contact is as stiff as the block's size asks for."""
-        settings = dict(self.settings) | {self.knob: step}
-        if self.family == "cm":
-            settings["penetration"] = 1e-7 * scene.block.radius
-        return build(self.family, settings)
 
 
 SETUPS = {
@@ -101,7 +90,7 @@ class Stable:
     """The largest step (sqrt(R/g)) from which on a model is stable, 0 where none was; and what the next coarser one does."""
 
     line: str
-    axis: Axis
+    axis: str
     value: float
     step: float
     fault: str = ""
@@ -115,27 +104,11 @@ class Still:
     case: str
     simulated: float
     step: float
-    creep: float = math.nan
-    sinking: float = math.nan
-    rotation: float = math.nan
-    uplift: float = math.nan
-    jitter: float = math.nan
+    moves: dict[str, float] = field(default_factory=dict)
     fault: str = ""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Stability:
-    """The maps."""
-
-    stable: tuple[Stable, ...]
-    still: tuple[Still, ...]
-
-    def step(self, line: str, axis: Axis, value: float) -> Stable | None:
-        """What was found there."""
-        return next((one for one in self.stable if (one.line, one.axis, one.value) == (line, axis, value)), None)
-
-
-def scene_at(axis: Axis, value: float) -> Scene:
+def scene_at(axis: str, value: float) -> Scene:
     """The paper's shape of block beside a wall under a pulse, with one thing changed."""
     at = USUAL | {axis: value}
     radius, unit = at["size"], math.sqrt(at["size"] / 9.81)
@@ -155,8 +128,10 @@ def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
     """How a run of that step (sqrt(R/g)) breaks: "blows up", "sinks", "gains energy"; empty where it does not."""
     unit, radius = math.sqrt(scene.block.radius / scene.gravity), scene.block.radius
     scene = scene.replace(output_step=max(scene.output_step, step * unit))  # the CM ends a step at each row
+    # The CM's contact is as stiff as the block's size asks for.
+    stiff = {"penetration": 1e-7 * radius} if line.family == "cm" else {}
     try:
-        history = line.built(scene, step * unit).simulate(scene)
+        history = build(line.family, dict(line.settings) | {line.knob: step * unit} | stiff).simulate(scene)
     except ModelFailure as error:
         return "sinks" if "through the floor" in str(error) else "blows up"
     except InputError as error:
@@ -164,29 +139,10 @@ def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
     channels = history.channels
     if not all(np.all(np.isfinite(column)) for column in channels.values() if column.dtype.kind == "f"):
         return "blows up"
-    deepest = max(float(np.max(-gap)) for gap in _gaps(scene, channels)) / radius
     # The distance of one step is no fault.
-    if deepest > DEEPEST + 2.0 * step * float(np.max(np.hypot(channels["x_dot"], channels["y_dot"]))) * unit / radius:
+    if deepest(scene, history) > DEEPEST + 2.0 * step * float(np.max(np.hypot(channels["x_dot"], channels["y_dot"]))) * unit / radius:
         return "sinks"
     return "gains energy" if energy_without_source(scene, history) > MOST_ENERGY else ""
-
-
-def _gaps(scene: Scene, channels: Any) -> Iterable[Any]:
-    yield kinematics.pivot_height(scene.block, channels["y"], channels["theta"])
-    for wall in scene.walls:
-        yield kinematics.wall_gap(scene, wall.side, channels["x"], channels["theta"])
-
-
-def largest_stable(label: str, axis: Axis, value: float, steps: Sequence[float] = STEPS) -> Stable:
-    """Tries steps from the finest up to the first one that breaks."""
-    scene = scene_at(axis, value)
-    best = 0.0
-    for step in sorted(step for step in steps if step >= SETUPS[label].finest):
-        fault = fault_of(SETUPS[label], scene, step)
-        if fault:
-            return Stable(label, axis, value, best, fault)
-        best = step
-    return Stable(label, axis, value, best)
 
 
 #: Push or shaking (at 1 Hz) under which a block should still stand, as a share of what would move it.
@@ -197,11 +153,13 @@ def stand_still(label: str, case: str, duration: float, step: float = REST_STEP)
     """Plays a block that should not move; the paper's."""
     block, mu = PAPER_BLOCK, 0.3
     push = CASES[case] * 9.81 * min(SLOPE, mu)
-    excitation: Rest | Record | Sine = Rest()
-    if case == "pushed":
-        excitation = Record.from_samples([push, push], time_step=duration + 1.0)
-    elif case == "shaken":
-        excitation = Sine(amplitude=push, period=1.0, cycles=int(min(1000, max(duration - 1, 1))))
+    excitation: Rest | Record | Sine = (
+        Record.from_samples([push, push], time_step=duration + 1.0)
+        if case == "pushed"
+        else Sine(amplitude=push, period=1.0, cycles=int(min(1000, max(duration - 1, 1))))
+        if case == "shaken"
+        else Rest()
+    )
     scene = Scene(
         name=case, block=block, floor=Floor(friction=mu), excitation=excitation, duration=duration, output_step=max(step, duration / 4000)
     )
@@ -223,56 +181,45 @@ def stand_still(label: str, case: str, duration: float, step: float = REST_STEP)
         case,
         float(channels["t"][-1]),
         float(history.settings.get("time_step", step)) if line.family == "cm" else step,
-        creep=float(np.max(np.abs(channels["slip"]))) / radius,
-        sinking=max(0.0, float(np.max(-height))) / radius,
-        rotation=float(np.max(np.abs(channels["theta"]))) / block.alpha,
-        uplift=max(0.0, float(np.max(lifted))) / radius,
-        jitter=float(np.sqrt(np.mean(speed[late] ** 2))) / math.sqrt(9.81 * radius) if late.any() else math.nan,
-        fault="" if not history.outcome.startswith("overturned") else history.outcome,
+        {
+            "creep": float(np.max(np.abs(channels["slip"]))) / radius,
+            "sinking": max(0.0, float(np.max(-height))) / radius,
+            "rotation": float(np.max(np.abs(channels["theta"]))) / block.alpha,
+            "uplift": max(0.0, float(np.max(lifted))) / radius,
+            "jitter": float(np.sqrt(np.mean(speed[late] ** 2))) / math.sqrt(9.81 * radius) if late.any() else math.nan,
+        },
+        "" if not history.outcome.startswith("overturned") else history.outcome,
     )
 
 
 @dataclass(frozen=True)
-class MapTask:
-    """One place of a map for one worker; it may take so many `seconds`, far more than it needs."""
+class Place(Task):
+    """A place of a map: a model with settings at a value of an axis, or a block that should stand so long (s)."""
 
-    find: Callable[..., Still | Stable]
-    arguments: tuple[Any, ...]
-    seconds: float = 600.0
+    line: str
+    at: str
+    value: float
+    quick: bool = False
 
-    def lost(self, fault: str) -> Still | Stable:
-        """What stands in its place where its process hangs or dies."""
-        label, case_or_axis, value, step = self.arguments
-        if self.find is stand_still:
-            return Still(label, case_or_axis, value, step, fault=fault)
-        return Stable(label, case_or_axis, value, math.nan, fault)
+    def play(self) -> Still | Stable:
+        """What is there: steps are tried from the finest up to the first one that breaks."""
+        if self.at in CASES:
+            return stand_still(self.line, self.at, self.value)
+        setup, scene, best, fault = SETUPS[self.line], scene_at(self.at, self.value), 0.0, ""
+        for step in sorted(one for one in (QUICK_STEPS if self.quick else STEPS) if one >= setup.finest):
+            if fault := fault_of(setup, scene, step):
+                break
+            best = step
+        return Stable(self.line, self.at, self.value, best, fault)
 
 
-def tasks(quick: bool = False) -> list[MapTask]:
+def places(quick: bool = False) -> list[Place]:
     """The maps of all `SETUPS` that are installed, the longest tasks first; `quick` has fewer values, steps and seconds."""
-    steps = QUICK_STEPS if quick else STEPS
-    values = {axis: some[:: max(1, len(some) // QUICK_VALUES)] if quick else some for axis, some in AXES.items()}
-    labels = [label for label, setup in SETUPS.items() if not not_installed(setup.family)]
+    lines = [label for label, setup in SETUPS.items() if not not_installed(setup.family)]
+    how: dict[str, Any] = {"seconds": MOST_SECONDS, "expected": 0.5 if quick else 4.0}
     still = [
-        MapTask(stand_still, (label, case, QUICK_REST if quick else PUSHED if CASES[case] else SETUPS[label].alone, REST_STEP))
-        for case, label in itertools.product(CASES, labels)
+        Place(line, case, QUICK_REST if quick else PUSHED if CASES[case] else SETUPS[line].alone, **how)
+        for case, line in itertools.product(CASES, lines)
     ]
-    return still + [MapTask(largest_stable, (label, axis, value, steps)) for axis in AXES for value in values[axis] for label in labels]
-
-
-def play(work: Sequence[MapTask], jobs: int) -> Iterator[tuple[int, Still | Stable]]:
-    """Plays tasks in processes; yields (index, result) as they end."""
-    if not work:
-        return
-    with Pool(jobs, MEMORY) as pool:
-        for ended in pool.run(deque(Call(task.find, task.arguments, task.seconds, key=n) for n, task in enumerate(work))):
-            n = ended.call.key
-            yield n, work[n].lost(ended.fault) if ended.error else ended.result
-
-
-def stability_of(found: Iterable[Still | Stable]) -> Stability:
-    """The maps of what was found."""
-    found = list(found)
-    return Stability(
-        stable=tuple(one for one in found if isinstance(one, Stable)), still=tuple(one for one in found if isinstance(one, Still))
-    )
+    values = [(axis, one) for axis, some in AXES.items() for one in (some[:: max(1, len(some) // QUICK_VALUES)] if quick else some)]
+    return still + [Place(line, axis, value, quick, **how) for axis, value in values for line in lines]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import History, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, kinematics
-from rockcheck.validation.stress.mechanics import BOOLE, GROUP, arms, integrals, tilted_forces
+from rockcheck.validation.studies.stress.mechanics import BOOLE, GROUP, arms, integrals, tilted_forces
 
 Floats = NDArray[np.float64]
 

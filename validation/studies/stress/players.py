@@ -15,9 +15,9 @@ from rockcheck.ebm.model import ImpactLaw
 from rockcheck.scenes import History, InputError, ModelFailure, Record, Scene, kinematics
 from rockcheck.scenes.excitations import Excitation
 from rockcheck.validation.execute.models import build
-from rockcheck.validation.stress.exact import exact_scene
-from rockcheck.validation.stress.generator import Kind, random_scene
-from rockcheck.validation.stress.invariants import CheckedRun, check_run
+from rockcheck.validation.studies.stress.exact import exact_scene
+from rockcheck.validation.studies.stress.generator import Kind, random_scene
+from rockcheck.validation.studies.stress.invariants import CheckedRun, check_run
 
 Floats = NDArray[np.float64]
 
@@ -157,9 +157,15 @@ class Approximate(Player):
             stated = speed * math.sqrt(DEPTH) + level * DEPTH
         else:
             stated = speed * self.step + level * self.step**2
-        deep = [-kinematics.pivot_height(scene.block, channels["y"], channels["theta"])]
-        deep += [-kinematics.wall_gap(scene, wall.side, channels["x"], channels["theta"]) for wall in scene.walls]
-        return max(float(np.max(one)) for one in deep) / radius / (2.0 * stated + 1e-5)
+        return deepest(scene, history) / (2.0 * stated + 1e-5)
+
+
+def deepest(scene: Scene, history: History) -> float:
+    """How deep a corner is in floor or wall at most, R."""
+    channels = history.channels
+    gaps = [kinematics.pivot_height(scene.block, channels["y"], channels["theta"])]
+    gaps += [kinematics.wall_gap(scene, wall.side, channels["x"], channels["theta"]) for wall in scene.walls]
+    return max(float(np.max(-gap)) for gap in gaps) / scene.block.radius
 
 
 def energy_without_source(scene: Scene, history: History) -> float:

@@ -1,0 +1,2 @@
+"""Canonical phenomena of rigid contact, each with a certain answer, and the card that an engine
+gets."""

@@ -1,0 +1,537 @@
+"""The phenomena: tiny scenes, what is read off their histories, and what is certain about it.
+
+All figures are read off positions (t, x, y, theta), so that any simulator that writes those can be
+judged.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.scenes import Block, Floor, History, InputError, Record, Scene, Sine, Wall
+from rockcheck.scenes.kinematics import energy
+from rockcheck.scenes.scene import PAPER_BLOCK as SLENDER
+
+FloatArray = NDArray[np.float64]
+G = 9.81
+#: Wider than tall: it slides, drops and bounces without tipping.
+SQUAT = Block(half_width=1.0, half_height=0.5)
+RESTITUTIONS = (0.25, 0.5, 0.75, 1.0)
+DROP = 0.2  # m
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A history whose channels are attributes; raises `InputError` for one that it has not."""
+
+    history: History
+
+    def __getattr__(self, name: str) -> FloatArray:
+        if name not in self.history.channels:
+            raise InputError(f"the history of {self.history.name} has no column {name}")
+        return np.asarray(self.history.channels[name], dtype=float)
+
+
+@dataclass(frozen=True)
+class Phenomenon:
+    """One row of a card: `value` of the motions of its scenes, in their order, should be `target`,
+    and is allowed to be off by `limit`; one without limit is reported only.
+
+    `means` is what a failure means for a user of the engine, `cure` what to look at. `needs` names
+    what an engine may declare to lack.
+    """
+
+    id: str
+    name: str
+    scenes: tuple[Scene, ...]
+    value: Callable[..., float]
+    target: float
+    limit: float | None
+    unit: str
+    source: str
+    means: str
+    cure: str
+    needs: str = ""
+
+    def judge(self, value: float) -> tuple[str, str]:
+        """The verdict ("pass", "fail", or "reported"), and why."""
+        if self.limit is None:
+            return "reported", "reported, not judged"
+        if abs(value - self.target) <= self.limit:
+            return "pass", ""
+        right = f"{value:.4g}, {self.target:g} ± {self.limit:g} {self.unit} is right"
+        return "fail", f"{right}. {self.means} Look at: {self.cure}."
+
+
+def _when(t: FloatArray, values: FloatArray, level: float) -> float:
+    """When `values` first pass `level` upward, linear between rows; NaN if never."""
+    above = np.flatnonzero(values >= level)
+    if not above.size:
+        return math.nan
+    i = int(above[0])
+    near = slice(i - 1, i + 1)
+    return float(t[i]) if i == 0 else float(np.interp(level, values[near], t[near]))
+
+
+def _between(m: Motion, name: str, start: float, end: float) -> float:
+    """How much a channel changes from one time to another."""
+    channel = getattr(m, name)
+    return float(np.interp(end, m.t, channel) - np.interp(start, m.t, channel))
+
+
+def _apart(one: FloatArray, other: FloatArray) -> float:
+    """The largest difference of two channels, over their common rows."""
+    rows = min(len(one), len(other))
+    return float(np.max(np.abs(one[:rows] - other[:rows])))
+
+
+# Sliding.
+
+SLIDE = Scene(
+    name="slide", block=SQUAT, floor=Floor(friction=0.3), initial_velocity=1.5, duration=1.0
+)
+COAST = Scene(
+    name="coast",
+    block=SQUAT,
+    floor=Floor(friction=0.0),
+    initial_velocity=5.0,
+    duration=10.0,
+    output_step=0.05,
+)
+RAMP_TIME = 4.0  # s: from nothing to two and a half times the cone
+CONE = Scene(
+    name="cone",
+    block=SQUAT,
+    floor=Floor(friction=0.4),
+    excitation=Record.from_samples([0.0, -G], time_step=RAMP_TIME),
+    duration=RAMP_TIME,
+)
+CREEP = Scene(
+    name="creep",
+    block=SQUAT,
+    floor=Floor(friction=0.4),
+    excitation=Record.from_samples([-0.36 * G, -0.36 * G], time_step=10.0),
+    duration=10.0,
+    output_step=0.05,
+)
+
+
+def cone(m: Motion) -> float:
+    """The coefficient at which slip begins over mu: the base's acceleration grows by j t, so a free
+    slip by j (t - t0)^3/6."""
+    rate, slipped = G / RAMP_TIME, 0.01
+    # Once slipping, friction stays mu g: x = j (t - t0)^3 / 6.
+    since = _when(m.t, m.x - m.x[0], slipped) - (6.0 * slipped / rate) ** (1.0 / 3.0)
+    return rate * since / (0.4 * G)
+
+
+# Bouncing.
+
+
+def _drop(e: float) -> Scene:
+    return Scene(
+        name=f"drop-e-{e:g}",
+        block=SQUAT,
+        floor=Floor(friction=0.3, restitution=e),
+        initial_height=DROP,
+        duration=0.65,
+        output_step=1e-3,
+    )
+
+
+def _hit(e: float) -> Scene:
+    return Scene(
+        name=f"wall-e-{e:g}",
+        block=SQUAT,
+        floor=Floor(friction=0.0),
+        walls=(Wall(side="left", gap=0.1003, restitution=e),),
+        initial_velocity=-1.0,
+        duration=0.3,
+        output_step=1e-3,
+    )
+
+
+DROPS, HITS = (tuple(make(e) for e in RESTITUTIONS) for make in (_drop, _hit))
+
+
+def _rebound(m: Motion) -> float:
+    """Root of the bounce's height over the drop's."""
+    after = m.t > math.sqrt(2.0 * DROP / G) + 0.01
+    return math.sqrt(max(float(np.max(m.y[after])) - 0.5, 0.0) / DROP)
+
+
+def _speed_back(m: Motion) -> float:
+    """Speed to the right in the last 0.1 s, over that of the approach, 1 m/s."""
+    return float((m.x[-1] - np.interp(m.t[-1] - 0.1, m.t, m.x)) / 0.1)
+
+
+def _worst(seen: Callable[[Motion], float], *motions: Motion) -> float:
+    """The worst difference between the restitution that is seen and e."""
+    return max((seen(m) - e for m, e in zip(motions, RESTITUTIONS, strict=True)), key=abs)
+
+
+# Rocking.
+
+UPLIFT = Scene(
+    name="uplift",
+    block=SLENDER,
+    floor=Floor(friction=0.6),
+    excitation=Record.from_samples([0.0, 0.4 * G], time_step=RAMP_TIME),
+    duration=RAMP_TIME,
+)
+TILT = 0.5 * SLENDER.alpha
+ROCK = Scene(
+    name="rock",
+    block=SLENDER,
+    floor=Floor(friction=0.6),
+    initial_rotation=TILT,
+    duration=2.5,
+    output_step=1e-3,
+)
+#: Angular velocity from rest that just reaches the balance point.
+CRITICAL = math.sqrt(2.0 * (1.0 - math.cos(SLENDER.alpha))) * SLENDER.frequency_parameter
+
+
+def _flicked(name: str, part: float) -> Scene:
+    return Scene(
+        name=name,
+        block=SLENDER,
+        floor=Floor(friction=0.6),
+        initial_angular_velocity=part * CRITICAL,
+        duration=6.0,
+    )
+
+
+def uplift(m: Motion) -> float:
+    """The acceleration of uplift over g tan(alpha).
+
+    From there theta'' = p^2 theta + K (t - t0) for small angles, K = 3 cos(alpha) j/(4 R): theta =
+    K/p^2 (sinh(p s)/p - s).
+    """
+    from scipy.optimize import brentq
+
+    rate, level = 0.4 * G / RAMP_TIME, 0.02 * SLENDER.alpha
+    p, push = SLENDER.frequency_parameter, 0.75 * math.cos(SLENDER.alpha) * rate / SLENDER.radius
+    since = brentq(lambda s: push / p**2 * (math.sinh(p * s) / p - s) - level, 1e-6, 5.0)
+    return rate * (_when(m.t, np.abs(m.theta), level) - since) / (G * math.tan(SLENDER.alpha))
+
+
+def housner(m: Motion) -> float:
+    """The ratio of angular velocities over the first impact, from the turning points, over
+    1 - 1.5 sin^2(alpha)."""
+    alpha = SLENDER.alpha
+    swing = float(np.max(-m.theta[(m.t > _when(m.t, -m.theta, 0.0)) & (m.t < 2.2)]))
+    after, before = (math.cos(alpha - tilt) - math.cos(alpha) for tilt in (swing, TILT))
+    return math.sqrt(max(after, 0.0) / before) / (1.0 - 1.5 * math.sin(alpha) ** 2)
+
+
+def period(m: Motion) -> float:
+    """The quarter period, up to the first impact, over Housner's, without his small angles."""
+    alpha, p = SLENDER.alpha, SLENDER.frequency_parameter
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    # theta = tilt - root^2 takes the singularity at the start away.
+    root = 0.5 * math.sqrt(TILT) * (nodes + 1.0)
+    speed = np.sqrt(2.0 * (np.cos(alpha - TILT) - np.cos(alpha - TILT + root**2))) * p
+    quarter = 0.5 * math.sqrt(TILT) * float(np.sum(weights * 2.0 * root / speed))
+    return _when(m.t, -m.theta, 0.0) / quarter
+
+
+def falls(m: Motion) -> float:
+    """1 if the block overturns, else 0."""
+    return float(m.history.outcome.startswith("overturned"))
+
+
+# What no mechanics does.
+
+TUMBLE = Scene(
+    name="tumble",
+    block=Block(half_width=0.3, half_height=0.5),
+    floor=Floor(friction=0.3),
+    initial_height=0.05,
+    initial_rotation=0.2,
+    initial_velocity=1.0,
+    duration=3.0,
+)
+MIRRORED = TUMBLE.mirrored().replace(name="tumble-mirrored")
+REST = Scene(name="rest", block=SLENDER, floor=Floor(friction=0.5), duration=10.0, output_step=0.05)
+SHAKE = Sine(amplitude=2.0, period=0.5, cycles=4)
+LOOSE = Scene(name="loose", block=SQUAT, floor=Floor(friction=0.0), excitation=SHAKE, duration=2.0)
+LIGHT = ROCK.replace(name="light", gravity=0.5 * G)
+FALLING = ROCK.replace(
+    name="falling-base", vertical=Record.from_samples([-0.5 * G, -0.5 * G], time_step=2.5)
+)
+FLUSH = Scene(
+    name="flush",
+    block=SLENDER,
+    floor=Floor(friction=0.6),
+    initial_height=0.1,
+    initial_velocity=1.0,
+    duration=0.25,
+    output_step=1e-3,
+)
+#: When it lands, s.
+LANDS = math.sqrt(2.0 * 0.1 / G)
+
+
+def energy_gained(m: Motion) -> float:
+    """The largest rise of the energy above its lowest before, over its first, from differences of
+    positions."""
+    rates = [np.diff(channel) / np.diff(m.t) for channel in (m.x, m.y, m.theta)]
+    y, theta = (0.5 * (channel[1:] + channel[:-1]) for channel in (m.y, m.theta))
+    total = energy(TUMBLE.block, G, y, theta, *rates)
+    return float(np.max(total - np.minimum.accumulate(total)) / total[0])
+
+
+def restlessness(m: Motion) -> float:
+    """How far any corner strays from its place, mm."""
+    strayed = np.abs(m.x) + np.abs(m.y - SLENDER.half_height) + SLENDER.radius * np.abs(m.theta)
+    return 1e3 * float(np.max(strayed))
+
+
+def moving_base(loose: Motion, light: Motion, falling: Motion) -> float:
+    """The larger of two errors, both shares.
+
+    How far a loose block leaves its place in space; how far the motion on a base that falls with
+    g/2 is from that under g/2.
+    """
+    t, x, pulse = loose.t, loose.x, 2.0 * math.pi / SHAKE.period
+    base = SHAKE.amplitude / pulse * (t - np.sin(pulse * t) / pulse)
+    strayed = float(np.max(np.abs(x - x[0] + base))) / float(np.max(np.abs(base)))
+    return max(strayed, _apart(light.theta, falling.theta) / SLENDER.alpha)
+
+
+COULOMB, NEWTON, HOUSNER = "Coulomb 1785; momentum", "Newton's law of impact", "Housner 1963"
+
+#: By their names.
+PHENOMENA: dict[str, Phenomenon] = {
+    one.id: one
+    for one in (
+        Phenomenon(
+            "RC-01",
+            "sliding distance",
+            (SLIDE,),
+            lambda m: (m.x[-1] - m.x[0]) / (1.5**2 / (2.0 * 0.3 * G)),
+            1.0,
+            0.02,
+            "of v²/(2 μ g)",
+            COULOMB,
+            "What slides stops too early or too late.",
+            "friction of both bodies, and how the engine combines them",
+        ),
+        Phenomenon(
+            "RC-02",
+            "friction cone: where slip begins",
+            (CONE,),
+            cone,
+            1.0,
+            0.02,
+            "of μ g",
+            COULOMB,
+            "Things hold, or slip, at another slope than you set.",
+            "combination of two frictions; pyramidal against elliptic cone",
+        ),
+        Phenomenon(
+            "RC-03",
+            "static creep at 0.9 of the cone",
+            (CREEP,),
+            lambda m: 3.6e6 * _between(m, "x", 5.0, 10.0) / 5.0,
+            0.0,
+            1.0,
+            "mm an hour",
+            COULOMB,
+            "What friction holds drifts away slowly.",
+            "regularisation of friction: impratio and noslip in MuJoCo, stiction tolerance in"
+            " Drake",
+        ),
+        Phenomenon(
+            "RC-04",
+            "no lift while sliding",
+            (SLIDE,),
+            lambda m: 1e3 * (np.max(m.y) - 0.5),
+            0.0,
+            0.1,
+            "mm",
+            "De Saxcé & Feng 1998: the cone is not associated",
+            "What slides flies: friction of later contacts is lost.",
+            "a solver whose friction is not convex (associated), or a correction of the cone",
+        ),
+        Phenomenon(
+            "RC-05",
+            "nothing slows what nothing holds",
+            (COAST,),
+            lambda m: (m.x[-1] - m.x[0]) / (5.0 * (m.t[-1] - m.t[0])),
+            1.0,
+            1e-5,
+            "of v t",
+            "Newton's first law",
+            "Hidden damping, or too few digits: long runs slow down.",
+            "linear and angular damping 0; double precision",
+        ),
+        Phenomenon(
+            "RC-06",
+            "rebound from the floor at e = 0.25 … 1",
+            DROPS,
+            partial(_worst, _rebound),
+            0.0,
+            0.03,
+            "in e",
+            NEWTON,
+            "Restitution is not what you set, or there is none.",
+            "rockcheck conformance --tune finds the engine's own parameters",
+            needs="restitution",
+        ),
+        Phenomenon(
+            "RC-07",
+            "rebound from a wall at e = 0.25 … 1",
+            HITS,
+            partial(_worst, _speed_back),
+            0.0,
+            0.03,
+            "in e",
+            NEWTON,
+            "Restitution is not what you set, or there is none.",
+            "rockcheck conformance --tune finds the engine's own parameters; thresholds of speed",
+            needs="restitution",
+        ),
+        Phenomenon(
+            "RC-08",
+            "no bounce at e = 0",
+            (_drop(0.0), _hit(0.0)),
+            lambda drop, hit: max(_rebound(drop), abs(_speed_back(hit))),
+            0.0,
+            0.03,
+            "of the approach",
+            NEWTON,
+            "Things hop that should stay where they land.",
+            "correction of penetration apart from velocity; slop; damping of the contact",
+        ),
+        Phenomenon(
+            "RC-09",
+            "uplift at g tan α",
+            (UPLIFT,),
+            uplift,
+            1.0,
+            0.02,
+            "of g tan α",
+            f"{HOUSNER}; moments about the corner",
+            "A block starts to rock too early or too late.",
+            "contact points at the very corners: margins, rounded edges, soft contacts",
+        ),
+        Phenomenon(
+            "RC-10",
+            "Housner's ratio",
+            (ROCK,),
+            housner,
+            1.0,
+            0.01,
+            "of 1 − 1.5 sin² α",
+            HOUSNER,
+            "Rocking dies too fast or too slowly.",
+            "one step for an impact: stiffness and damping of the contact; corner contacts",
+        ),
+        Phenomenon(
+            "RC-11",
+            "free-rocking period",
+            (ROCK,),
+            period,
+            1.0,
+            0.01,
+            "of the quarter period",
+            HOUSNER,
+            "Amplification is found at another frequency.",
+            "inertia of the block; contact points at the very corners; hidden damping",
+        ),
+        Phenomenon(
+            "RC-12",
+            "what must tip, tips",
+            (_flicked("tip", 1.03),),
+            falls,
+            1.0,
+            0.0,
+            "1 if it does",
+            "energy up to the balance point",
+            "A tower that falls is shown as safe.",
+            "hidden damping; sleeping; rounded edges",
+        ),
+        Phenomenon(
+            "RC-13",
+            "what must not tip, does not",
+            (_flicked("return", 0.97),),
+            falls,
+            0.0,
+            0.0,
+            "1 if it does",
+            "energy up to the balance point",
+            "A tower that stands is shown as fallen.",
+            "energy added by contacts; contact points inside of the corners",
+        ),
+        Phenomenon(
+            "RC-14",
+            "energy never rises",
+            (TUMBLE,),
+            energy_gained,
+            0.0,
+            0.02,
+            "of the first",
+            "first law, e = 0 and a base at rest",
+            "Things jump, and stacks explode.",
+            "correction of penetration apart from velocity; a shorter step",
+        ),
+        Phenomenon(
+            "RC-15",
+            "mirror image",
+            (TUMBLE, MIRRORED),
+            lambda one, other: _apart(one.theta, -other.theta) / TUMBLE.block.alpha,
+            0.0,
+            0.01,
+            "α",
+            "symmetry",
+            "Left and right differ: results depend on the order of bodies.",
+            "more iterations of the solver; no random order",
+        ),
+        Phenomenon(
+            "RC-16",
+            "rest stays rest",
+            (REST,),
+            restlessness,
+            0.0,
+            0.1,
+            "mm",
+            "statics",
+            "What stands sinks, jitters or wanders.",
+            "stiffer contacts; slop; correction of penetration",
+        ),
+        Phenomenon(
+            "RC-17",
+            "the same from a moving base",
+            (LOOSE, LIGHT, FALLING),
+            moving_base,
+            0.0,
+            0.01,
+            "of the way; α",
+            "Galilei, d'Alembert",
+            "A shaken floor is not an inertia force: earthquakes are wrong.",
+            "how the base is driven: contacts have to see its velocity",
+        ),
+        Phenomenon(
+            "RC-18",
+            "flush landing: which law",
+            (FLUSH,),
+            lambda m: _between(m, "theta", LANDS + 0.01, LANDS + 0.03) / 0.02,
+            0.0,
+            None,
+            "rad/s",
+            "several answers: not judged",
+            "Not a fault: two corners that land at one instant may share the impulse in several"
+            " ways.",
+            "nothing",
+        ),
+    )
+}
+SCENES: dict[str, Scene] = {scene.name: scene for one in PHENOMENA.values() for scene in one.scenes}

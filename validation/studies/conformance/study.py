@@ -1,0 +1,383 @@
+"""`rockcheck conformance`: engines, models of the user's own and histories written elsewhere,
+each held against phenomena with a certain answer."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from junitparser import Error, JUnitXml, Skipped, TestCase, TestSuite
+from junitparser import Failure as Failed
+
+from rockcheck.scenes import InputError, ModelFailure
+from rockcheck.scenes.errors import printable
+from rockcheck.scenes.files import read_toml
+from rockcheck.scenes.reading import read_json
+from rockcheck.validation.execute.models import build, build_own, family, is_own
+from rockcheck.validation.execute.pool import Failure
+from rockcheck.validation.execute.provenance import cell_key, version_of
+from rockcheck.validation.finding import (
+    Block,
+    Column,
+    Finding,
+    Mark,
+    Table,
+    Text,
+    Verdict,
+    text,
+)
+from rockcheck.validation.studies.conformance.phenomena import PHENOMENA, SCENES, Motion
+from rockcheck.validation.study import Study, Task
+
+#: What a folder of histories says of itself, and how settings are called that nobody named.
+ABOUT, AS_IT_COMES = "engine.toml", "as it comes"
+#: The time step where none is given, and CPU time of a step as a rule, s.
+STEP, A_STEP = 1e-3, 1e-4
+#: A value that moved by more than this share of its limit has changed.
+SHARE = 0.1
+#: Verdicts, their words, their colours, and what they are for JUnit.
+VERDICTS: dict[str, tuple[str, Verdict, Any]] = {
+    "pass": ("conforms", "pass", None),
+    "fail": ("fails", "fail", Failed),
+    "lacks": ("has none", "incomplete", Skipped),
+    "reported": ("reported", "", Skipped),
+    "error": ("error", "error", Error),
+}
+
+
+#: A card, as JSON has it; the columns that say whose it is, and those of its rows.
+Card = dict[str, Any]
+HEAD = (
+    Column("engine", kind="model"),
+    text("version", brief=False),
+    text("settings"),
+    Column("step", unit="s", brief=False),
+)
+ROW = ("id", "name", "target", "value", "limit", "unit", "verdict", "reason")
+
+
+@dataclass(frozen=True)
+class Player:
+    """Who takes part: a model by the name and with the settings that it is built by.
+
+    `engine`, `version`, `settings` and `step` (s) are the words of its card. `cost` is the CPU time
+    of a simulated second as a rule, `search` holds folders in which code of one's own may lie.
+    """
+
+    engine: str
+    settings: str
+    step: float | str | None
+    model: str
+    given: Mapping[str, Any] = field(hash=False)
+    version: str = ""
+    lacks: tuple[str, ...] = ()
+    search: tuple[str, ...] = ()
+    cost: float = 0.0
+
+
+def named(name: str, settings: str | None, given: Mapping[str, Any]) -> Player:
+    """An engine, with rockcheck's best settings unless others are named, or a "module:Class"."""
+    own = is_own(name)
+    kind = {"settings": settings or "best"} if settings or not own else {}
+    built_by = {"time_step": STEP, **kind, **given}
+    if not own:
+        build(name, built_by)  # what is not usable is told before anything runs
+    more = (
+        f"{key}={value}" for key, value in given.items() if key not in ("settings", "time_step")
+    )
+    step = built_by["time_step"]
+    return Player(
+        name,
+        ", ".join([str(built_by.get("settings", AS_IT_COMES)), *more]),
+        step,
+        name,
+        built_by,
+        "" if own else version_of(family(name).libraries[0]),
+        search=(str(Path.cwd()),) if own else (),
+        cost=A_STEP / (step if isinstance(step, float) and step > 0.0 else STEP),
+    )
+
+
+def written(folder: Path) -> Player:
+    """A folder with a CSV for each scene, and an `engine.toml` that says whose they are."""
+    allowed = {"engine": str, "version": str, "settings": str, "step": float, "lacks": list}
+    about = {"engine": ""} | read_toml(folder / ABOUT)
+    for key, value in about.items():
+        if not isinstance(value, allowed.get(key, ())) or (key == "engine" and not value):
+            reason = f"{printable(repr(value))} is not allowed; allowed: {', '.join(allowed)}"
+            raise InputError(reason, f"{printable(folder / ABOUT)}: {printable(key)}")
+    return Player(
+        about["engine"],
+        about.get("settings") or AS_IT_COMES,
+        about.get("step"),
+        "measured",
+        {"files": {name: str(folder / f"{name}.csv") for name in SCENES}},
+        about.get("version", ""),
+        tuple(map(str, about.get("lacks", ()))),
+    )
+
+
+@dataclass(frozen=True)
+class Trial(Task):
+    """One player and one phenomenon, whose scenes it plays."""
+
+    player: Player
+    id: str
+
+    @property
+    def label(self) -> str:
+        """Engine, settings, phenomenon."""
+        return f"{self.player.engine}, {self.player.settings}: {self.id}"
+
+    def depends(self) -> Any:
+        """Also the model's own code, and the files of histories."""
+        who, scenes = self.player, PHENOMENA[self.id].scenes
+        cells = [cell_key(scene, who.model, who.given, who.search) for scene in scenes]
+        return {**super().depends(), "cells": cells}
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a player showed: a value (None: it lacks what it takes, or nothing could be read
+    off)."""
+
+    value: float | None
+    verdict: str
+    reason: str
+    version: str
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Conformance(Study):
+    """Who is held against the phenomena."""
+
+    players: tuple[Player, ...]
+    name = "conformance"
+    record = Seen
+
+    def tasks(self, done: Mapping[Any, Any]) -> Sequence[Trial]:
+        """Player by player."""
+        return [
+            Trial(player, id, expected=player.cost * sum(scene.duration for scene in what.scenes))
+            for player in self.players
+            for id, what in PHENOMENA.items()
+        ]
+
+    @staticmethod
+    def play(task: Trial) -> Seen:
+        """Plays the scenes, reads the value off, and judges it."""
+        who, what = task.player, PHENOMENA[task.id]
+        sys.path.extend(path for path in who.search if path not in sys.path)
+        model: Any = build_own(who.model, who.given)
+        version = who.version or str(getattr(model, "version", ""))
+        if what.needs in tuple(who.lacks or getattr(model, "lacks", tuple)()):
+            reason = f"the engine has no {what.needs} with these settings"
+            return Seen(None, "lacks", reason, version)
+        histories = [model.simulate(scene) for scene in what.scenes]
+        try:
+            value = float(what.value(*map(Motion, histories)))
+        except (ValueError, IndexError) as error:  # what is asked for does not happen in the motion
+            raise ModelFailure(printable(error, 200)) from None
+        notes = dict.fromkeys(note for history in histories for note in history.notes)
+        shown = value if math.isfinite(value) else None
+        return Seen(shown, *what.judge(value), version, tuple(notes))
+
+    def gather(self, done: Mapping[Any, Any]) -> Finding:
+        """A card a player. Raises `InputError` where one cannot be built at all."""
+        cards = [
+            _card(player, found)
+            for player in self.players
+            if (found := {id: done[t] for id in PHENOMENA if (t := Trial(player, id)) in done})
+        ]
+        failing = sum(card["counts"]["fail"] + card["counts"]["error"] > 0 for card in cards)
+        return Finding(
+            self.name,
+            "Conformance: phenomena with a certain answer",
+            f"{len(cards) - failing} of {len(cards)} cards conform.",
+            list(_blocks(cards)),
+            {"cards": cards},
+            "fail" if failing else "pass",
+            int(failing > 0),
+            files={"junit.xml": junit(cards)},
+        )
+
+
+def _card(player: Player, found: Mapping[str, Seen | Failure]) -> Card:
+    """The card of a player, as far as it was played."""
+    faults = {one.reason for one in found.values() if isinstance(one, Failure) and one.refused}
+    if len(faults) == 1 and all(one.reason in faults for one in found.values()):
+        raise InputError(*faults)
+    seen = {
+        id: Seen(None, "error", one.reason, "") if isinstance(one, Failure) else one
+        for id, one in found.items()
+    }
+    rows = []
+    for id, one in seen.items():
+        what = PHENOMENA[id]
+        row = (id, what.name, what.target, one.value, what.limit, what.unit, one.verdict)
+        rows.append(dict(zip(ROW, (*row, one.reason), strict=True)))
+    counts = Counter(row["verdict"] for row in rows)
+    version = next(filter(None, (one.version for one in seen.values())), player.version)
+    return {
+        "engine": player.engine,
+        "version": version,
+        "settings": player.settings,
+        "step": player.step,
+        "title": " ".join(filter(None, [player.engine, version])) + f", {player.settings}",
+        "counts": {verdict: counts[verdict] for verdict in VERDICTS} | {"total": len(rows)},
+        "phenomena": rows,
+        "notes": list(dict.fromkeys(note for one in seen.values() for note in one.notes)),
+    }
+
+
+def _blocks(cards: Sequence[Card]) -> Iterator[Block]:
+    about = [[card[column.name] for column in HEAD] for card in cards]
+    yield Table(
+        "engines",
+        [*HEAD, *(Column(key, words) for key, (words, *_) in VERDICTS.items()), Column("total")],
+        [[*head, *card["counts"].values()] for head, card in zip(about, cards, strict=True)],
+    )
+    wrong = [
+        f"{card['title']}: {row['id']} {row['name']}: {row['reason']}"
+        for card in cards
+        for row in card["phenomena"]
+        if row["verdict"] == "fail"
+    ]
+    of = [
+        {
+            row["id"]: Mark(
+                row["value"],
+                VERDICTS[row["verdict"]][1],
+                row["reason"],
+                digits=6 if (row["limit"] or 1.0) < 1e-3 else 3,
+            )
+            for row in card["phenomena"]
+        }
+        for card in cards
+    ]
+    yield Table(
+        "cards",
+        [
+            text("phenomenon"),
+            Column("target"),
+            Column("limit"),
+            text("unit"),
+            *(Column(card["title"]) for card in cards),
+        ],
+        [
+            [f"{id} {one.name}", one.target, one.limit, one.unit, *(card.get(id) for card in of)]
+            for id, one in PHENOMENA.items()
+        ],
+        "Cards",
+        "Tiny scenes whose answer is closed or certain. One conforms where its value is within the"
+        " limit of the target. –: the engine says that it has none.",
+        on="page",
+    )
+    wrong += [f"{card['title']}: {note}" for card in cards for note in card["notes"]]
+    if wrong:
+        yield Text(title="What goes wrong", items=wrong)
+    yield Table(
+        "phenomena",
+        [
+            text("phenomenon"),
+            text("source", "target from"),
+            text("means", "what a failure means"),
+            text("cure", "what to look at"),
+        ],
+        [[f"{id} {one.name}", one.source, one.means, one.cure] for id, one in PHENOMENA.items()],
+        "The phenomena",
+        on="page",
+    )
+    rows = [
+        [*head, *row.values()]
+        for head, card in zip(about, cards, strict=True)
+        for row in card["phenomena"]
+    ]
+    yield Table("rows", [*HEAD, *map(Column, ROW)], rows, on="file")
+
+
+def junit(cards: Sequence[Card]) -> str:
+    """JUnit XML: a suite a card, a case a phenomenon."""
+    document = JUnitXml("rockcheck conformance")
+    for card in cards:
+        suite = TestSuite(card["title"])
+        for row in card["phenomena"]:
+            case = TestCase(f"{row['id']} {row['name']}", suite.name)
+            kind = VERDICTS[row["verdict"]][2]
+            case.result = [kind(row["reason"])] if kind else []
+            suite.add_testcase(case)
+        document.add_testsuite(suite)
+    return str(document.tostring(), "utf-8")
+
+
+def wrote(path: Path) -> bool:
+    """Whether that is a finished study, a folder or its `run.json`."""
+    try:
+        data = read_json(path / "run.json" if path.is_dir() else path)
+    except InputError:
+        return False
+    return isinstance(data, dict) and "cards" in data
+
+
+def changes(before: Path, after: Path) -> Finding:
+    """What changed between two finished studies, each a folder or its `run.json`: every verdict,
+    and every value that moved by more than `SHARE` of its limit. Cards meet by engine and settings.
+
+    Exit code 1 where something conformed before and does not any more.
+    """
+    old, new = _read(before), _read(after)
+    rows: list[list[Any]] = []
+    for key in {**old, **new}:
+        known = old.get(key) or new[key]
+        absent = known | {"version": "", "value": None, "verdict": "absent"}
+        was, now = (side.get(key, absent) for side in (old, new))
+        values, verdicts = ([one[name] for one in (was, now)] for name in ("value", "verdict"))
+        limit = SHARE * (math.inf if known["limit"] is None else known["limit"])
+        moved = None not in values and abs(values[1] - values[0]) > limit
+        if verdicts[0] != verdicts[1] or moved:
+            worse = verdicts[0] == "pass" and verdicts[1] in ("fail", "error", "absent")
+            versions = (one["version"] for one in (was, now))
+            rows.append([*key, known["name"], *versions, *verdicts, *values, worse])
+    columns = [
+        Column("engine", kind="model"),
+        text("settings"),
+        text("id", "no."),
+        text("phenomenon", brief=False),
+        text("version_before", brief=False),
+        text("version_after", brief=False),
+        text("verdict_before"),
+        text("verdict_after"),
+        Column("value_before"),
+        Column("value_after"),
+        text("worse", brief=False),
+    ]
+    worse = sum(row[-1] for row in rows)
+    return Finding(
+        "conformance-changes",
+        "Conformance: what changed",
+        f"{len(rows)} changes, {worse} for the worse",
+        [Table("changes", columns, rows)],
+        verdict="fail" if worse else "changed" if rows else "pass",
+        exit_code=int(worse > 0),
+    )
+
+
+def _read(path: Path) -> dict[tuple[str, str, str], dict[str, Any]]:
+    """The rows of a finished study; raises `InputError` naming file and fault."""
+    path = path / "run.json" if path.is_dir() else path
+    data = read_json(path)
+    try:
+        return {
+            (row["engine"], row["settings"], row["id"]): row
+            | {name: row[name] and float(row[name]) for name in ("value", "limit")}
+            | {name: str(row[name]) for name in ("name", "version", "verdict")}
+            for row in data["tables"]["rows"]
+        }
+    except (ValueError, KeyError, TypeError):
+        raise InputError(f"{printable(path)}: not what `rockcheck conformance` wrote") from None

@@ -1,0 +1,277 @@
+"""`rockcheck conformance --tune`: engines' own parameters for a wanted restitution and friction,
+found by dropping a block and sliding it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.engines.marching import march_fixed
+from rockcheck.scenes import Floor, InputError, ModelFailure, Scene
+from rockcheck.scenes.errors import printable
+from rockcheck.validation.execute.models import build, home
+from rockcheck.validation.execute.pool import Failure
+from rockcheck.validation.execute.provenance import code_digest
+from rockcheck.validation.finding import Column, Finding, Mark, Table, text
+from rockcheck.validation.studies.conformance.phenomena import DROP, SQUAT, G
+from rockcheck.validation.study import Study, Task
+
+FloatArray = NDArray[np.float64]
+#: How near the wanted restitution has to be, and a friction, of itself.
+NEAR = 2e-3
+SLIDING = 1.5  # m/s
+#: What may be wanted: least and most.
+WANTED = {
+    "restitution": (0.0, 1.0),
+    "friction": (1e-6, 1.3),
+    "time_step": (1e-6, 0.01),
+    "penetration": (0.0, math.inf),
+}
+
+
+@dataclass(frozen=True)
+class Knob:
+    """The parameter that sets an engine's restitution: its bounds, and all parameters in the
+    engine's own words, which `calibrate` fills in."""
+
+    bounds: tuple[float, float]
+    words: Mapping[str, str]
+
+
+KNOBS: dict[str, Knob] = {
+    "mujoco": Knob(
+        (0.5, 2.2),
+        {
+            "geom solref": "{push:.6g} {damp:.6g}",
+            "geom solimp": "0.9999 0.9999 0.001 0.5 1",
+            "geom friction": "{friction:.4g} 0 0",
+            "option": 'timestep="{step:g}" integrator="Euler" cone="elliptic"',
+        },
+    ),
+    "pybullet": Knob(
+        (0.0, 1.2),
+        {
+            "changeDynamics(block)": "restitution=1, lateralFriction=1 (of two bodies they"
+            " multiply)",
+            "changeDynamics(floor)": "restitution={restitution:.4g},"
+            " lateralFriction={friction:.4g}",
+            "setPhysicsEngineParameter": "restitutionVelocityThreshold=0.2 (slower contacts do not"
+            " bounce), contactERP=0.2",
+        },
+    ),
+    "pymunk": Knob(
+        (0.0, 1.2),
+        {
+            "block": "elasticity=1, friction=1 (of two shapes they multiply)",
+            "floor": "elasticity={restitution:.4g}, friction={friction:.4g}",
+            "space": "collision_bias=0.0018 (0.9 ** 60 a second), collision_slop=0.1",
+        },
+    ),
+    "dart": Knob(
+        (0.0, 1.0),
+        {
+            "block": "setRestitutionCoeff(1), setFrictionCoeff({friction:.4g}) (restitutions"
+            " multiply, the smaller friction counts)",
+            "floor": "setRestitutionCoeff({restitution:.4g}), setFrictionCoeff({friction:.4g})",
+            "world": "contacts below 0.1 m/s do not bounce; the error reduction of 0.01 cannot be"
+            " set from Python",
+        },
+    ),
+    "drake": Knob(
+        (0.0, 20.0),
+        {
+            "AddContactMaterial": "dissipation={restitution:.4g} s/m, point_stiffness="
+            "{stiffness:.4g} N/m a kg, each body",
+            "CoulombFriction": "{friction:.4g}, {friction:.4g}",
+            "MultibodyPlant": "time_step={step:g}, DiscreteContactApproximation.kTamsi",
+            "remark": "dissipation, not restitution: it holds for this speed of approach, 2 m/s,"
+            " and this mass",
+        },
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What an engine needs, in its own words, and what was reached with it: restitution, friction,
+    penetration (m)."""
+
+    engine: str
+    step: float
+    parameters: dict[str, str]
+    restitution: float
+    friction: float
+    penetration: float
+    reached: bool
+
+
+def calibrate(
+    engine: str, *, restitution: float, friction: float, time_step: float, penetration: float
+) -> Calibration:
+    """The parameters with which a block dropped from 0.2 m rebounds, and one at 1.5 m/s slides, as
+    wanted.
+
+    Raises `InputError` where the engine cannot reach the restitution, naming what it can.
+    """
+    from scipy.optimize import brentq
+
+    knob, step = KNOBS[engine], time_step
+    model: Any = build(engine, {"time_step": step, "settings": "default"})
+    drop = Scene(
+        name="drop", block=SQUAT, floor=Floor(friction=friction), initial_height=DROP, duration=0.65
+    )
+    slide = Scene(
+        name="slide",
+        block=SQUAT,
+        floor=Floor(friction=friction),
+        initial_velocity=SLIDING,
+        duration=SLIDING / (friction * G) + 0.3,
+    )
+
+    def dropped(setting: float) -> tuple[float, float]:
+        """The restitution seen, and the penetration, m."""
+        parameters = {"restitution": setting, "friction": friction}
+        heights = _played(model, drop, parameters, step)[:, 1] - SQUAT.half_height
+        later = heights[int((math.sqrt(2.0 * DROP / G) + 0.02) / step) :]
+        return math.sqrt(max(float(np.max(later)), 0.0) / DROP), -float(np.min(heights))
+
+    low, high = knob.bounds
+    ends = dropped(low)[0], dropped(high)[0]
+    if not min(ends) - NEAR <= restitution <= max(ends) + NEAR:
+        raise InputError(
+            f"{restitution:g} cannot be reached by {engine} at a step of {step:g} s:"
+            f" {min(ends):.3g} to {max(ends):.3g} can",
+            "--tune",
+        )
+    found = (
+        low
+        if abs(ends[0] - restitution) <= NEAR
+        else high
+        if abs(ends[1] - restitution) <= NEAR
+        else math.nan
+    )
+    if math.isnan(found):
+        found = brentq(
+            lambda setting: dropped(setting)[0] - restitution, low, high, xtol=1e-5, rtol=1e-5
+        )
+    asked = friction
+    for _ in range(12):
+        way = _played(model, slide, {"restitution": found, "friction": asked}, step)[-1, 0]
+        slid = SLIDING**2 / (2.0 * G * float(way))
+        if abs(slid - friction) <= NEAR * friction:
+            break
+        asked *= friction / slid
+    rebound, deep = dropped(found)
+    used = {"step": step, "restitution": found, "friction": asked, **model.tuned(step)}
+    used |= {"push": -used.get("erp", 0.0) / step**2, "damp": -found / step}
+    words = {where: what.format_map(used) for where, what in knob.words.items()}
+    near = (
+        abs(rebound - restitution) <= 5.0 * NEAR
+        and abs(slid - friction) <= 5.0 * NEAR * friction
+        and deep <= penetration
+    )
+    return Calibration(engine, step, words, rebound, slid, max(deep, 0.0), near)
+
+
+def _played(model: Any, scene: Scene, parameters: Mapping[str, float], step: float) -> FloatArray:
+    """States after each step."""
+    times: FloatArray = step * np.arange(math.ceil(scene.duration / step) + 1, dtype=np.float64)
+    world = model.tuned_world(scene, parameters, step)
+    try:
+        return march_fixed(world, scene, times, np.tile([0.0, -G], (len(times) - 1, 1)))[1]
+    except ModelFailure as error:
+        raise InputError(
+            f"{model.name} cannot play a drop with these parameters: {error}", "--set time_step"
+        ) from None
+    finally:
+        world.close()
+
+
+@dataclass(frozen=True)
+class Tune(Task):
+    """What is wanted of an engine: restitution, friction, and a penetration (m) that is not
+    exceeded, at a step (s)."""
+
+    engine: str
+    restitution: float
+    friction: float = 0.3
+    time_step: float = 1e-3
+    penetration: float = math.inf
+
+    def __post_init__(self) -> None:
+        for name, (least, most) in WANTED.items():
+            value = getattr(self, name)
+            if not isinstance(value, int | float) or not least <= value <= most:
+                reason = f"{printable(value)} is not allowed: give {least:g} to {most:g}"
+                raise InputError(reason, "--tune" if name == "restitution" else f"--set {name}")
+
+    def depends(self) -> Any:
+        """Also the engine's code."""
+        return {**super().depends(), "home": code_digest(home(self.engine))}
+
+
+@dataclass(frozen=True)
+class Tuning(Study):
+    """What is wanted, engine by engine."""
+
+    wanted: tuple[Tune, ...]
+    name = "tuning"
+    record = Calibration
+
+    def tasks(self, done: Mapping[Any, Any]) -> Sequence[Tune]:
+        """All at once."""
+        return self.wanted
+
+    @staticmethod
+    def play(task: Tune) -> Calibration:
+        """Finds the parameters."""
+        return calibrate(**task.fields())
+
+    def gather(self, done: Mapping[Any, Any]) -> Finding:
+        """Parameters, and what they reach. Raises `InputError` where no engine can."""
+        ended = [done[task] for task in self.wanted if task in done]
+        found = [one for one in ended if isinstance(one, Calibration)]
+        for one in ended:
+            if isinstance(one, Failure) and one.refused and not found:
+                raise InputError(one.reason)
+        reached = sum(one.reached for one in found)
+        return Finding(
+            self.name,
+            "Parameters for a wanted restitution",
+            f"{reached} of {len(self.wanted)} engines reach what is wanted.",
+            [
+                Table(
+                    "parameters",
+                    [Column("engine", kind="model"), text("where"), text("what")],
+                    [[one.engine, *pair] for one in found for pair in one.parameters.items()],
+                    "Parameters",
+                ),
+                Table(
+                    "reached",
+                    [
+                        Column("engine", kind="model"),
+                        Column("step", unit="s"),
+                        Column("restitution"),
+                        Column("friction"),
+                        Column("penetration", unit="m", digits=2),
+                        text("reached"),
+                    ],
+                    [
+                        [
+                            *(one.engine, one.step, one.restitution, one.friction, one.penetration),
+                            Mark(one.reached, "pass" if one.reached else "fail"),
+                        ]
+                        for one in found
+                    ],
+                    "Reached",
+                ),
+            ],
+            {"engines": {one.engine: asdict(one) for one in found}},
+            "pass" if reached == len(self.wanted) else "fail",
+            int(reached < len(self.wanted)),
+        )

@@ -1,0 +1,214 @@
+"""Runs of one model under stress: chunks of them, what they showed, and smaller scenes of those that failed."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from rockcheck.scenes import Scene
+from rockcheck.scenes.errors import printable
+from rockcheck.validation.studies.stress.invariants import INVARIANTS, CheckedRun
+from rockcheck.validation.studies.stress.players import PLAYERS
+from rockcheck.validation.studies.stress.shrinking import MOST_TRIALS, scene_text, shrink
+from rockcheck.validation.study import Task
+
+#: Time (s) that a run may take on average, event-based or not: so many times what it takes; and a task in addition.
+A_RUN, AN_APPROXIMATE_RUN, AMPLE = 0.2, 2.0, 50.0
+PATIENCE = 20.0
+#: Failures of a model and an invariant that are written as scenes.
+MOST_FILES = 20
+
+
+@dataclass(frozen=True)
+class Broken:
+    """A run that breaks an invariant."""
+
+    model: str
+    invariant: str
+    seed: int
+    number: int
+    figure: float
+    words: str = ""
+
+    @property
+    def scene(self) -> Scene:
+        """Its scene as it was played."""
+        return PLAYERS[self.model].scene(self.seed, self.number)
+
+    @property
+    def name(self) -> str:
+        """The name of its scene file."""
+        return f"{self.model.replace(' ', '-')}-{self.invariant}-{self.seed}-{self.number}.toml"
+
+    def text(self, scene: Scene, remark: str) -> str:
+        """Its scene file with a scene that shows it."""
+        words = (
+            f"{self.invariant}: {INVARIANTS[self.invariant].words}",
+            printable(self.words, 200),
+            remark,
+            f"rockcheck simulate {self.name} {PLAYERS[self.model].command(scene, self.number)}",
+        )
+        return scene_text(scene, "\n".join(filter(None, words)))
+
+
+@dataclass(kw_only=True)
+class RunTotals:
+    """What some runs of one model showed, one after the other."""
+
+    model: str
+    cpu_seconds: float = 0.0
+    #: Number of runs that checked an invariant, and in which it could not be judged; its worst
+    #: figure, and the run of that figure.
+    looked_at: Counter[str] = field(default_factory=Counter)
+    unjudged: Counter[str] = field(default_factory=Counter)
+    worst: dict[str, tuple[float, int]] = field(default_factory=dict)
+    failures: list[Broken] = field(default_factory=list)
+    outcomes: Counter[str] = field(default_factory=Counter)
+    #: How often each modelling choice of the model was made, by its name.
+    rules: Counter[str] = field(default_factory=Counter)
+    #: "runs", "events", runs in which an impact added energy, as its law is known to do ("gaining"),
+    #: and whose comparison ended at the horizon of predictability ("horizons").
+    counts: Counter[str] = field(default_factory=Counter)
+    #: The most energy that an impact added, of what was there.
+    largest_gain: float = 0.0
+
+    def see(self, played: CheckedRun, seed: int, number: int) -> None:
+        """Count one more run."""
+        for name, figure in played.figures.items():
+            found = math.inf if math.isnan(figure) else figure, number
+            self.worst[name] = max(found, self.worst.get(name, found))
+        self.failures += [
+            Broken(self.model, name, seed, number, played.figures[name], played.failure)
+            for name in played.broken
+        ]
+        self.counts["runs"] += 1
+        self.counts["events"] += played.events
+        self.counts["gaining"] += played.gains > 0
+        self.counts["horizons"] += played.horizons
+        self.largest_gain = max(self.largest_gain, played.largest_gain)
+        self.outcomes[played.outcome or "failed"] += 1
+        self.rules.update(played.rules)
+        self.looked_at.update(played.figures.keys())
+        self.unjudged.update(played.unjudged)
+
+    def add(self, other: RunTotals) -> None:
+        """Count what other runs showed."""
+        for name, found in other.worst.items():
+            self.worst[name] = max(found, self.worst.get(name, found))
+        self.largest_gain = max(self.largest_gain, other.largest_gain)
+        for key in vars(self).keys() - {"model", "worst", "largest_gain"}:
+            setattr(self, key, getattr(self, key) + getattr(other, key))
+
+    @property
+    def shown(self) -> list[Broken]:
+        """The first runs that break each invariant: their scenes are written."""
+        ordered = sorted(self.failures, key=lambda one: one.number)
+        broken = {name: [one for one in ordered if one.invariant == name] for name in INVARIANTS}
+        return [one for some in broken.values() for one in some[:MOST_FILES]]
+
+
+@dataclass(frozen=True)
+class Chunk(Task):
+    """Runs `first` to `first + count - 1` of a model under a seed."""
+
+    model: str
+    seed: int
+    first: int
+    count: int
+
+    @property
+    def label(self) -> str:
+        """For progress."""
+        return self.model
+
+    def play(self) -> RunTotals:
+        """What they show."""
+        began, player, totals = (
+            time.process_time(),
+            PLAYERS[self.model],
+            RunTotals(model=self.model),
+        )
+        for number in range(self.first, self.first + self.count):
+            totals.see(
+                checked(self.model, player.scene(self.seed, number), self.seed, number),
+                self.seed,
+                number,
+            )
+        totals.cpu_seconds = time.process_time() - began
+        return totals
+
+
+def checked(label: str, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
+    """What a run shows; a fault of the program itself is a failure like any other."""
+    try:
+        return PLAYERS[label].check(scene, seed, number, only)
+    except Exception as error:  # the other runs go on, and this one is reported with its message
+        failure = printable(f"{type(error).__name__}: {error}", 300)
+        return CheckedRun(figures={"ends": math.inf}, failure=failure)
+
+
+@dataclass(frozen=True)
+class Shrinking(Task):
+    """The search for a smaller scene that fails in the same way: so many trials, so many s."""
+
+    broken: Broken
+    budget: float
+    trials: int = MOST_TRIALS
+
+    @property
+    def label(self) -> str:
+        """For progress."""
+        return "smallest scenes"
+
+    def play(self) -> str:
+        """The file of the smallest scene that was found in time."""
+        broken, name = self.broken, self.broken.invariant
+        most = math.inf if name == "ends" else 100.0 * INVARIANTS[name].bound
+
+        def shows(scene: Scene) -> bool:
+            played = checked(broken.model, scene, broken.seed, broken.number, name)
+            if name not in played.broken or not played.figures[name] >= min(broken.figure, most):
+                return False
+            # A fault of the program: the same one.
+            return (
+                broken.figure < math.inf
+                or played.failure.partition(":")[0] == broken.words.partition(":")[0]
+            )
+
+        if not shows(broken.scene):
+            return broken.text(broken.scene, "as it was found: it does not fail again")
+        scene, complete = shrink(broken.scene, shows, trials=self.trials, seconds=self.budget)
+        remark = (
+            ""
+            if complete
+            else "not the smallest: time was over before all that is simpler was tried"
+        )
+        return broken.text(scene, remark)
+
+
+def chunk(model: str, seed: int, first: int, count: int) -> Chunk:
+    """These runs as a task; what it may take is far more than it does, and little enough for a hang to be found soon."""
+    a_run = A_RUN if PLAYERS[model].event_based else AN_APPROXIMATE_RUN
+    return Chunk(
+        model,
+        seed,
+        first,
+        count,
+        seconds=PATIENCE + count * a_run,
+        expected=count * a_run / AMPLE,
+        compiles=model,
+    )
+
+
+def parts(task: Task) -> Sequence[Task]:
+    """What is played instead where the process of a task hangs or dies: less of it."""
+    if isinstance(task, Chunk) and task.count > 1:
+        half = task.count // 2
+        later = chunk(task.model, task.seed, task.first + half, task.count - half)
+        return [chunk(task.model, task.seed, task.first, half), later]
+    if isinstance(task, Shrinking) and task.trials > 1:
+        return [replace(task, trials=task.trials // 4)]
+    return []
