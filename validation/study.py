@@ -28,7 +28,7 @@ from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import OnProgress, announce, unheard
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.pool import Call, Ended, Failure, Pool, guarded
+from rockcheck.validation.execute.pool import THREADS, Call, Ended, Failure, Pool, guarded
 from rockcheck.validation.execute.remote import Cluster
 from rockcheck.validation.execute.store import RECORDS, Store, name_of
 from rockcheck.validation.finding import Finding, Made
@@ -180,6 +180,7 @@ class _Run:
         until = self.began + 60.0 * minutes if minutes else math.inf
         complete = True
         with ExitStack() as stack:
+            stack.callback(THREADS.reset, THREADS.set(self.jobs))
             try:
                 self._play(stack, until)
             except KeyboardInterrupt:

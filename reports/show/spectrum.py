@@ -116,7 +116,7 @@ def figure(plot: Plot) -> Figure:
             # Beside a panel without a wall, two rows high, the column next to it is named, too.
             below, beside = row + high == rows or column < high - 1, column < high
             axes.tick_params(labelbottom=below, labelleft=beside, labelsize=6.5)
-            axes.locator_params(integer=True)
+            axes.locator_params(integer=not data["record"])
             axes.spines[["top", "right"]].set_visible(True)
             of = LOOKS[panel["row"]].label.replace(", ", ",\n") if "row" in panel else vertical
             axes.set_xlabel(horizontal if below else "", fontsize=7.0)

@@ -16,6 +16,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from multiprocessing import resource_tracker
 from typing import Any, Self
@@ -29,6 +30,8 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_
 AHEAD = 2
 #: What the first call that uses compiled code may take in addition, to compile it, s.
 COMPILING = 600.0
+#: How many threads a run lets this process have; 0: one a core.
+THREADS: ContextVar[int] = ContextVar("threads", default=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +75,10 @@ def guarded(function: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def cores() -> int:
-    """How many threads this process may use: one in a worker, else one a core."""
-    return 1 if os.environ.get("NUMBA_NUM_THREADS") == "1" else os.cpu_count() or 1
+    """How many threads this process may use: one in a worker, else what its run says, or one a
+    core."""
+    one = os.environ.get("NUMBA_NUM_THREADS") == "1"
+    return 1 if one else THREADS.get() or os.cpu_count() or 1
 
 
 @dataclass(frozen=True, eq=False)

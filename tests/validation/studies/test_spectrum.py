@@ -81,6 +81,7 @@ def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
     runs, plain = [], tiles.play_nodes
 
     def killed_at_the_third(scene, a, f, **rest):
+        assert rest["jobs"] == 1
         runs.append(len(a))
         if len(runs) == 3:
             raise KeyboardInterrupt
@@ -111,10 +112,11 @@ def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
 def test_a_task_that_failed_leaves_its_nodes_undecided():
     panel, request = panel_of("figure-8-gap-3-e-0"), Request(4)
     (task,) = Spectra((panel,), request).tasks({})[:1]
-    book = Book({task: Failure("crashed")})
-    found = book.spectrum(panel, request)
-    assert len(found.undecided) == 16
-    assert found.safe_area == 0.0
+    done = {task: Failure("crashed")}
+    spectrum = Book(done).spectrum(panel, request)
+    assert len(spectrum.undecided) == 16
+    assert spectrum.safe_area == 0.0
+    assert Spectra((panel,), request).gather(done).exit_code == 3
 
 
 def test_a_tile_depends_on_all_that_its_outcomes_do():

@@ -19,6 +19,7 @@ from rockcheck.scenes.reading import read_json
 from rockcheck.scenes.writing import table_text
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build
+from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.finding import Block, Column, Finding, Mark, Plot, Table, Text, text
 from rockcheck.validation.paper import measures, sentences
 from rockcheck.validation.paper.panels import GAPS, KEPT, Panel, paper_panels, title_of
@@ -113,6 +114,7 @@ class Spectra(Study):
                 for panel, one in found.spectra.items()
                 for kind, write in (("csv", _csv), ("npz", _npz))
             },
+            exit_code=3 if any(isinstance(one, Failure) for one in done.values()) else 0,
         )
 
     @property
