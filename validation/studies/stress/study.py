@@ -107,7 +107,8 @@ class Stress(Study):
         return Finding(
             self.name,
             "Stress: random scenes against what must always hold",
-            f"seed {self.seed}: {runs:,} runs, {said if broken else 'no failure of an event-based model'}",
+            f"seed {self.seed}: {runs:,} runs,"
+            f" {said if broken else 'no failure of an event-based model'}",
             [
                 *(_runs(totals) if totals else ()),
                 *(_maps(stable) if stable else ()),
