@@ -1,8 +1,10 @@
-"""What is too long for each change, on a machine of any kind: `make nightly`, or `NIGHTLY_QUICK=1 make nightly` for some minutes of it.
+"""What is too long for each change, on a machine of any kind: `make nightly`, or `NIGHTLY_QUICK=1
+make nightly` for some minutes of it.
 
-The slow tests, the whole stress run, a fuzzer for each reader, hostile cases, and known weaknesses of what is depended on. Every part
-is run, whatever the others did. The result goes to docs/nightly.json, which the page "Reliability" shows. Exit 1 where a part failed.
-`NIGHTLY_SEED` (default: the day's number) seeds what is random.
+The slow tests, the whole stress run, a fuzzer for each reader, hostile cases, and known weaknesses
+of what is depended on. Every part is run, whatever the others did. The result goes to
+docs/nightly.json, which the page "Reliability" shows. Exit 1 where a part failed. `NIGHTLY_SEED`
+(default: the day's number) seeds what is random.
 """
 
 from __future__ import annotations
@@ -23,13 +25,23 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "docs" / "nightly.json"
-READERS = ("at2", "record_csv", "scene_toml", "suite_toml", "history_csv", "stored_run", "stored_record", "command_line")
+READERS = (
+    "at2",
+    "record_csv",
+    "scene_toml",
+    "suite_toml",
+    "history_csv",
+    "stored_run",
+    "stored_record",
+    "command_line",
+)
 LOCK = ".ci/requirements.txt"
 
 
 @dataclass(frozen=True)
 class Part:
-    """A command, and how to read its figures from what it said; `needs` is a module without which it is not run."""
+    """A command, and how to read its figures from what it said; `needs` is a module without which
+    it is not run."""
 
     name: str
     command: tuple[str, ...]
@@ -39,7 +51,8 @@ class Part:
 
 @dataclass(frozen=True)
 class Done:
-    """What became of a part: "passed", "failed" or "not run", its time (s), and its figures in words."""
+    """What became of a part: "passed", "failed" or "not run", its time (s), and its figures in
+    words."""
 
     name: str
     command: str
@@ -56,7 +69,9 @@ def last_line(said: str) -> str:
 
 def stress_line(said: str) -> str:
     """The line with runs and failures."""
-    return next((line for line in said.splitlines() if re.match(r"seed \d+: ", line)), last_line(said))
+    return next(
+        (line for line in said.splitlines() if re.match(r"seed \d+: ", line)), last_line(said)
+    )
 
 
 def fuzz_line(said: str) -> str:
@@ -65,30 +80,66 @@ def fuzz_line(said: str) -> str:
 
 
 def audited(said: str) -> str:
-    """How many packages were looked up, and what is known of them; pip-audit's JSON is the last line."""
+    """How many packages were looked up, and what is known of them; pip-audit's JSON is the last
+    line."""
     try:
         found = json.loads(last_line(said))["dependencies"]
     except (ValueError, KeyError):
         return last_line(said)
-    known = [f"{one['name']} {one['version']}: {weak['id']}" for one in found for weak in one.get("vulns", ())]
+    known = [
+        f"{one['name']} {one['version']}: {weak['id']}"
+        for one in found
+        for weak in one.get("vulns", ())
+    ]
     skipped = sum("skip_reason" in one for one in found)
-    return f"{len(found) - skipped} of {len(found)} packages looked up; " + ("; ".join(known) or "no known weakness")
+    return f"{len(found) - skipped} of {len(found)} packages looked up; " + (
+        "; ".join(known) or "no known weakness"
+    )
 
 
 def parts(quick: bool, seed: int, folder: Path) -> Iterator[Part]:
     """All parts, the shortest first."""
     python = sys.executable
-    audit = ("-m", "pip_audit", "-r", LOCK, "--require-hashes", "--disable-pip", "--format", "json", "--progress-spinner", "off")
+    audit = (
+        "-m",
+        "pip_audit",
+        "-r",
+        LOCK,
+        "--require-hashes",
+        "--disable-pip",
+        "--format",
+        "json",
+        "--progress-spinner",
+        "off",
+    )
     yield Part("known weaknesses of dependencies", (python, *audit), audited, "pip_audit")
     if (ROOT / "tests/stress/hostile.py").exists():
         yield Part("hostile cases", (python, "tests/stress/hostile.py"), last_line)
     slow = ("-m", "pytest", "-q", "-m", "slow", *(["tests/cm", "tests/engines"] if quick else []))
     yield Part("slow tests", (python, *slow), last_line)
-    stress = ("-m", "rockcheck", "stress", "--seed", str(seed), "--out", str(folder / "stress"), *(["--quick"] if quick else []))
+    stress = (
+        "-m",
+        "rockcheck",
+        "stress",
+        "--seed",
+        str(seed),
+        "--out",
+        str(folder / "stress"),
+        *(["--quick"] if quick else []),
+    )
     yield Part("stress", (python, *stress), stress_line)
     for reader in READERS[:2] if quick else READERS:
-        options = (f"-runs={2000 if quick else 100000}", f"-seed={seed}", f"-artifact_prefix={folder}/")
-        yield Part(f"fuzz {reader}", (python, "tests/stress/fuzz.py", reader, *options), fuzz_line, "atheris")
+        options = (
+            f"-runs={2000 if quick else 100000}",
+            f"-seed={seed}",
+            f"-artifact_prefix={folder}/",
+        )
+        yield Part(
+            f"fuzz {reader}",
+            (python, "tests/stress/fuzz.py", reader, *options),
+            fuzz_line,
+            "atheris",
+        )
 
 
 def play(part: Part, folder: Path) -> Done:
@@ -99,15 +150,33 @@ def play(part: Part, folder: Path) -> Done:
     print(f"nightly: {part.name}: {words}", flush=True)
     began = time.monotonic()
     ended = subprocess.run(
-        part.command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", check=False
+        part.command,
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+        check=False,
     )
     (folder / f"{part.name.replace(' ', '-')}.log").write_text(ended.stdout, encoding="utf-8")
     done = Done(
-        part.name, words, "failed" if ended.returncode else "passed", round(time.monotonic() - began, 1), part.figures(ended.stdout)
+        part.name,
+        words,
+        "failed" if ended.returncode else "passed",
+        round(time.monotonic() - began, 1),
+        part.figures(ended.stdout),
     )
     if part.name.startswith("known") and done.figures.startswith("0 of"):
-        done = Done(part.name, words, "not run", done.seconds, f"no list of known weaknesses can be reached: {done.figures}")
-    print(f"nightly: {part.name}: {done.result} in {done.seconds:.0f} s: {done.figures}", flush=True)
+        done = Done(
+            part.name,
+            words,
+            "not run",
+            done.seconds,
+            f"no list of known weaknesses can be reached: {done.figures}",
+        )
+    print(
+        f"nightly: {part.name}: {done.result} in {done.seconds:.0f} s: {done.figures}", flush=True
+    )
     if done.result == "failed":
         print("\n".join(ended.stdout.splitlines()[-40:]), flush=True)
     return done
@@ -117,7 +186,9 @@ def commit() -> str:
     """The commit that was tried, with a word where files differ from it."""
 
     def git(*words: str) -> str:
-        return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=False).stdout.strip()
+        return subprocess.run(
+            ["git", *words], cwd=ROOT, capture_output=True, text=True, check=False
+        ).stdout.strip()
 
     changed = git("status", "--porcelain", "--untracked-files=no", "--", ".", ":!docs/nightly.json")
     return (git("rev-parse", "--short", "HEAD") or "unknown") + (" and changes" if changed else "")

@@ -1,18 +1,22 @@
 """The compiled time loop of the Continuous Model. Imported only by a run: it needs numba.
 
-Three surfaces (left wall, right wall, floor) face two corners of the block each. A contact is known by the unit normal n of
-its surface (into the free space) and by the offset r of its corner from the mass's centre c: its gap is n.(c + r) + distance,
-its lever the third entry of J = (n_x, n_y, r x n), its rate J.(vx, vy, w), its mobility K = J M^-1 J^T. All per unit mass.
+Three surfaces (left wall, right wall, floor) face two corners of the block each. A contact is known
+by the unit normal n of its surface (into the free space) and by the offset r of its corner from the
+mass's centre c: its gap is n.(c + r) + distance, its lever the third entry of J = (n_x, n_y, r x
+n), its rate J.(vx, vy, w), its mobility K = J M^-1 J^T. All per unit mass.
 
-**The integrator.** Position Verlet (half a step of motion, a kick at the middle, half a step of motion) with implicit dampers
-and friction, in steps that know events: long ones (3/sqrt(k/m)) while contacts are open or settled, cut so as to end where a
-contact closes, and fine ones (1/50 of the contact time, or the time in which the damper stops the corner) while one is young.
-Springs are explicit (they conserve energy) while a contact is young, implicit once it has settled. Why: impacts and the
-stability of the stiff contacts ask for short steps, the motion between them does not, and friction that lags behind the
-normal force makes the pivot slip in every impact, however stiff the contact (Housner's ratio 0.9082 becomes 0.9029 at mu = 0.3).
+**The integrator.** Position Verlet (half a step of motion, a kick at the middle, half a step of
+motion) with implicit dampers and friction, in steps that know events: long ones (3/sqrt(k/m)) while
+contacts are open or settled, cut so as to end where a contact closes, and fine ones (1/50 of the
+contact time, or the time in which the damper stops the corner) while one is young. Springs are
+explicit (they conserve energy) while a contact is young, implicit once it has settled. Why: impacts
+and the stability of the stiff contacts ask for short steps, the motion between them does not, and
+friction that lags behind the normal force makes the pivot slip in every impact, however stiff the
+contact (Housner's ratio 0.9082 becomes 0.9029 at mu = 0.3).
 
-Error of theta (RMS in 8 s, in alpha) against the event-based unilateral model for El Centro x 1.6, mu 0.3, and CPU seconds for
-these 8 s on one core of a shared machine; the fixed-step schemes with explicit dampers (xi = 7, friction damper 30 sqrt(k/m)):
+Error of theta (RMS in 8 s, in alpha) against the event-based unilateral model for El Centro x 1.6,
+mu 0.3, and CPU seconds for these 8 s on one core of a shared machine; the fixed-step schemes with
+explicit dampers (xi = 7, friction damper 30 sqrt(k/m)):
 
 | scheme | step sqrt(k/m) | k/m = 9.81e6 | k/m = 9.81e8 |
 |---|---|---|---|
@@ -22,8 +26,8 @@ these 8 s on one core of a shared machine; the fixed-step schemes with explicit 
 | Runge-Kutta 4 | 0.008 / 0.002 | 1.9e-4, 0.21 s / 1.8e-4, 0.93 s | 2.7e-6, 2.1 s / 1.5e-6, 7.9 s |
 | this one | 10 / 3 / 1 | 1.0e-4, 0.002 s / 1.1e-4, 0.002 s / 1.1e-4, 0.004 s | 1.3e-6, 0.005 s / 1.6e-6, 0.010 s / 1.5e-6, 0.026 s |
 
-(25 ns a step for the fixed ones, 65 for Runge-Kutta, about 100 here, in a hundredth of the steps. Kinks of the forces bring
-all fixed ones down to first order, so a higher order buys nothing.)
+(25 ns a step for the fixed ones, 65 for Runge-Kutta, about 100 here, in a hundredth of the steps.
+Kinks of the forces bring all fixed ones down to first order, so a higher order buys nothing.)
 """
 
 from __future__ import annotations
@@ -41,7 +45,8 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 #: Velocity of the block: vx, vy, w.
 Velocity = tuple[float, float, float]
-#: Offsets (x, y) of the corners from the mass's centre: bottom left, bottom right, top left, top right.
+#: Offsets (x, y) of the corners from the mass's centre: bottom left, bottom right, top left, top
+#: right.
 Corners = tuple[float, float, float, float, float, float, float, float]
 
 effective_mass = kernel(contact.effective_mass)
@@ -51,22 +56,28 @@ normal_forces = kernel(contact.normal_forces)
 shared_mass = kernel(contact.shared_mass)
 
 SURFACES = LEFT_WALL, RIGHT_WALL, FLOOR = 0, 1, 2
-#: Columns of a contact's memory; contact 2 i + j is corner j (on walls the lower, on the floor the left one is 0) at surface i.
+#: Columns of a contact's memory; contact 2 i + j is corner j (on walls the lower, on the floor the
+#: left one is 0) at surface i.
 COLUMNS = CLOSED, DAMPING, FORCE, LAST_CLOSED, STRUCK, IMPULSE, STIFFNESS = 0, 1, 2, 3, 4, 5, 6
-#: Columns of the floor's friction: force, the spring's stretch, whether it slips, whether it slipped a step ago.
+#: Columns of the floor's friction: force, the spring's stretch, whether it slips, whether it
+#: slipped a step ago.
 SHEAR, STRETCH, SLIPS, SLIPPED = 0, 1, 2, 3
-#: A contact that was open for longer than this (s) strikes when it closes, and its impulse is gathered for as long.
+#: A contact that was open for longer than this (s) strikes when it closes, and its impulse is
+#: gathered for as long.
 STRIKE = 2e-3
-#: A new contact is young for this many contact times 1/sqrt(k/m), longer than an undamped one lasts (pi).
+#: A new contact is young for this many contact times 1/sqrt(k/m), longer than an undamped one lasts
+#: (pi).
 YOUNG = 4.0
-#: Steps while a contact is young: this share of the contact time, or of the time in which its damper stops the corner.
+#: Steps while a contact is young: this share of the contact time, or of the time in which its
+#: damper stops the corner.
 FINE, FINE_DAMPER = 0.02, 1.0
 #: Shortest step, as a share of the contact time; it bounds the number of steps.
 SHORTEST = 1e-3
-#: Sweeps over surfaces and friction end when the forces change by less than this share of them, or after so many.
+#: Sweeps over surfaces and friction end when the forces change by less than this share of them, or
+#: after so many.
 SWEPT, MOST_SWEEPS = 1e-5, 50
-#: No step is cut for a contact that would close by less than this share of the depth under the block's weight; a contact that
-#: closes more slowly than this share of g/sqrt(k/m) is no impact.
+#: No step is cut for a contact that would close by less than this share of the depth under the
+#: block's weight; a contact that closes more slowly than this share of g/sqrt(k/m) is no impact.
 SHALLOW, GENTLE = 0.1, 0.01
 #: A run whose energy exceeds the work done on it by this share has blown up.
 ENERGY = 0.02
@@ -95,7 +106,8 @@ class Parameters(NamedTuple):
 
 @kernel
 def sampled(samples: Floats, rate: float, t: float) -> float:
-    """Linear interpolation in `samples`, `rate` of them a second, the first at t = 0; zero after the last."""
+    """Linear interpolation in `samples`, `rate` of them a second, the first at t = 0; zero after
+    the last."""
     place = t * rate
     left = int(place)
     if left + 1 >= len(samples):
@@ -114,13 +126,23 @@ def facing(surface: int, corners: Corners) -> tuple[float, float, float, float, 
 
 
 @kernel
-def kicked(v: Velocity, inverse: float, nx: float, ny: float, lever: float, impulse: float) -> Velocity:
+def kicked(
+    v: Velocity, inverse: float, nx: float, ny: float, lever: float, impulse: float
+) -> Velocity:
     """Velocity after an impulse along n with that lever; `inverse` is 1/I."""
     return v[0] + nx * impulse, v[1] + ny * impulse, v[2] + inverse * lever * impulse
 
 
 @kernel
-def with_forces(memory: Floats, friction: Floats, inverse: float, surface: int, corners: Corners, v: Velocity, step: float) -> Velocity:
+def with_forces(
+    memory: Floats,
+    friction: Floats,
+    inverse: float,
+    surface: int,
+    corners: Corners,
+    v: Velocity,
+    step: float,
+) -> Velocity:
     """Velocity after the remembered forces of a surface have acted for `step`."""
     nx, ny, ax, ay, bx, by = facing(surface, corners)
     v = kicked(v, inverse, nx, ny, ax * ny - ay * nx, step * memory[2 * surface, FORCE])
@@ -135,12 +157,14 @@ def closes(
     memory: Floats, parameters: Parameters, inverse: float, surface: int, corner: int, rx: float, ry: float, mobility: float,
     other: float, coupling: float, rate: float, slip: float, other_gap: float, other_rate: float, t: float,
 ) -> float:  # fmt: skip
-    """A contact closes at `t`: choose spring and damper, begin a strike if it was open for long. Returns the step that it asks for.
+    """A contact closes at `t`: choose spring and damper, begin a strike if it was open for long.
+    Returns the step that it asks for.
 
-    The corner arrives at `rate` < 0 and slides at `slip`; `other` is the mobility of the surface's other corner. When that one
-    arrives within the contact's own time, the two share the block's mass as their speeds say. Where the mass lies nearer to one
-    of them, equal springs would turn the block, and neither corner would leave with the scene's restitution: there each spring
-    is as stiff as its share is large.
+    The corner arrives at `rate` < 0 and slides at `slip`; `other` is the mobility of the surface's
+    other corner. When that one arrives within the contact's own time, the two share the block's
+    mass as their speeds say. Where the mass lies nearer to one of them, equal springs would turn
+    the block, and neither corner would leave with the scene's restitution: there each spring is as
+    stiff as its share is large.
     """
     one = 2 * surface + corner
     contact_time = 1.0 / math.sqrt(parameters.stiffness)
@@ -161,40 +185,64 @@ def closes(
             mass = 1.0 / (mobility + coupling * min(1.0, other_rate / rate))
         elif surface == FLOOR:
             mass = effective_mass(
-                mobility, 1.0 + inverse * ry * ry, -inverse * rx * ry, rate, slip, parameters.mu_s, parameters.restitution[surface]
+                mobility,
+                1.0 + inverse * ry * ry,
+                -inverse * rx * ry,
+                rate,
+                slip,
+                parameters.mu_s,
+                parameters.restitution[surface],
             )
         else:
             mass = 1.0 / mobility
         memory[one, STIFFNESS] = spring * parameters.stiffness
-        memory[one, DAMPING] = 2.0 * parameters.damping_ratio[surface] * math.sqrt(spring * mass) / contact_time
+        memory[one, DAMPING] = (
+            2.0 * parameters.damping_ratio[surface] * math.sqrt(spring * mass) / contact_time
+        )
     return min(FINE * contact_time, FINE_DAMPER / (memory[one, DAMPING] * mobility + 1e-300))
 
 
 @kernel
 def response(
-    k: float, damping: float, mobility: float, gap: float, before: float, rate: float, step: float, ahead: float
+    k: float,
+    damping: float,
+    mobility: float,
+    gap: float,
+    before: float,
+    rate: float,
+    step: float,
+    ahead: float,
 ) -> tuple[float, float]:
-    """Force of a closed contact as if its own forces did not move it, and how much a unit of velocity lowers it."""
+    """Force of a closed contact as if its own forces did not move it, and how much a unit of
+    velocity lowers it."""
     share = felt_share(damping * mobility * step)
-    return -k * (gap + ahead * rate) - damping * (before + share * (rate - before)), step * (share * damping + k * ahead)
+    return -k * (gap + ahead * rate) - damping * (before + share * (rate - before)), step * (
+        share * damping + k * ahead
+    )
 
 
 @kernel
 def closes_in(parameters: Parameters, gap: float, before: float, rate: float, step: float) -> float:
-    """Time from the end of a step until an open contact closes, infinite if that is not soon or too gentle to matter.
+    """Time from the end of a step until an open contact closes, infinite if that is not soon or too
+    gentle to matter.
 
     `gap` is that in the middle of the step, over which its rate went from `before` to `rate`.
     """
     reach = 0.5 * step + parameters.time_step
     pull = min(0.0, (rate - before) / step)
-    if gap + reach * (rate + 0.5 * pull * reach) > -SHALLOW * parameters.gravity / parameters.stiffness:
+    if (
+        gap + reach * (rate + 0.5 * pull * reach)
+        > -SHALLOW * parameters.gravity / parameters.stiffness
+    ):
         return math.inf
     arrival = math.sqrt(rate * rate - 2.0 * pull * gap)
     return (2.0 * gap / (arrival - rate) if rate < 0.0 else (arrival + rate) / -pull) - 0.5 * step
 
 
 @kernel
-def is_closed(memory: Floats, contact: int, gap: float, rate: float, ahead: float, t: float) -> bool:
+def is_closed(
+    memory: Floats, contact: int, gap: float, rate: float, ahead: float, t: float
+) -> bool:
     """Whether a contact is closed; where it opens, `memory` holds when it was closed last.
 
     A settled contact stays closed while it would close again within the step (`ahead`, s).
@@ -210,11 +258,13 @@ def press(
     memory: Floats, friction: Floats, parameters: Parameters, inverse: float, surface: int, x: float, y: float,
     corners: Corners, v: Velocity, v0: Velocity, step: float, ahead: float, t: float,
 ) -> tuple[Velocity, float, float]:  # fmt: skip
-    """The forces of one surface over a step, from the velocity `v` that the block would have without them and `v0` before it.
+    """The forces of one surface over a step, from the velocity `v` that the block would have
+    without them and `v0` before it.
 
-    `ahead` is how far (s) the springs look ahead: the step for contacts that have settled (implicit, so that the step need not
-    resolve them), zero while one is young. Returns the velocity with the forces; the time until an open contact closes; the
-    step that a contact which closes asks for, else infinity.
+    `ahead` is how far (s) the springs look ahead: the step for contacts that have settled
+    (implicit, so that the step need not resolve them), zero while one is young. Returns the
+    velocity with the forces; the time until an open contact closes; the step that a contact which
+    closes asks for, else infinity.
     """
     k = parameters.stiffness
     nx, ny, ax, ay, bx, by = facing(surface, corners)
@@ -222,15 +272,26 @@ def press(
     gap1, gap2 = away + nx * ax + ny * ay, away + nx * bx + ny * by
     one, two = 2 * surface, 2 * surface + 1
     lever1, lever2 = ax * ny - ay * nx, bx * ny - by * nx
-    k11, k22, k12 = 1.0 + inverse * lever1 * lever1, 1.0 + inverse * lever2 * lever2, 1.0 + inverse * lever1 * lever2
-    # J belongs to the middle of the step, v to its end and v0 to its start: J changes by -w^2 (n.r) a unit of time.
+    k11, k22, k12 = (
+        1.0 + inverse * lever1 * lever1,
+        1.0 + inverse * lever2 * lever2,
+        1.0 + inverse * lever1 * lever2,
+    )
+    # J belongs to the middle of the step, v to its end and v0 to its start: J changes by -w^2 (n.r)
+    # a unit of time.
     half = 0.5 * step
     turn = half * v0[2] ** 2
     turn1, turn2 = turn * (nx * ax + ny * ay), turn * (nx * bx + ny * by)
-    rate1, rate2 = nx * v[0] + ny * v[1] + lever1 * v[2] - turn1, nx * v[0] + ny * v[1] + lever2 * v[2] - turn2
+    rate1, rate2 = (
+        nx * v[0] + ny * v[1] + lever1 * v[2] - turn1,
+        nx * v[0] + ny * v[1] + lever2 * v[2] - turn2,
+    )
     before1 = nx * v0[0] + ny * v0[1] + lever1 * v0[2] + turn1
     before2 = nx * v0[0] + ny * v0[1] + lever2 * v0[2] + turn2
-    closed1, closed2 = is_closed(memory, one, gap1, rate1, ahead, t), is_closed(memory, two, gap2, rate2, ahead, t)
+    closed1, closed2 = (
+        is_closed(memory, one, gap1, rate1, ahead, t),
+        is_closed(memory, two, gap2, rate2, ahead, t),
+    )
     fine = math.inf
     force1 = force2 = 0.0
     if closed1 or closed2:
@@ -238,23 +299,78 @@ def press(
         if closed1:
             if memory[one, CLOSED] == 0.0:
                 slip = v[0] - v[2] * ay
-                fine = closes(memory, parameters, inverse, surface, 0, ax, ay, k11, k22, k12, rate1, slip, gap2, rate2, t)
-            f1, d1 = response(memory[one, STIFFNESS], memory[one, DAMPING], k11, gap1, before1, rate1, step, ahead)
+                fine = closes(
+                    memory,
+                    parameters,
+                    inverse,
+                    surface,
+                    0,
+                    ax,
+                    ay,
+                    k11,
+                    k22,
+                    k12,
+                    rate1,
+                    slip,
+                    gap2,
+                    rate2,
+                    t,
+                )
+            f1, d1 = response(
+                memory[one, STIFFNESS], memory[one, DAMPING], k11, gap1, before1, rate1, step, ahead
+            )
         if closed2:
             if memory[two, CLOSED] == 0.0:
                 slip = v[0] - v[2] * by
-                asked = closes(memory, parameters, inverse, surface, 1, bx, by, k22, k11, k12, rate2, slip, gap1, rate1, t)
+                asked = closes(
+                    memory,
+                    parameters,
+                    inverse,
+                    surface,
+                    1,
+                    bx,
+                    by,
+                    k22,
+                    k11,
+                    k12,
+                    rate2,
+                    slip,
+                    gap1,
+                    rate1,
+                    t,
+                )
                 fine = min(fine, asked)
-            f2, d2 = response(memory[two, STIFFNESS], memory[two, DAMPING], k22, gap2, before2, rate2, step, ahead)
+            f2, d2 = response(
+                memory[two, STIFFNESS], memory[two, DAMPING], k22, gap2, before2, rate2, step, ahead
+            )
         if surface != FLOOR:
             force1, force2 = normal_forces(f1, f2, d1, d2, k11, k12, k12, k22)
         else:
-            # Friction acts at the lower corner, with the cone of both: they slip together or not at all. First as if it stuck.
+            # Friction acts at the lower corner, with the cone of both: they slip together or not at
+            # all. First as if it stuck.
             arm, place = (ay, ax) if ay < by else (by, bx)
-            kt1, kt2, ktt = -inverse * arm * lever1, -inverse * arm * lever2, 1.0 + inverse * arm * arm
-            stop = parameters.friction_damping * step / (1.0 + parameters.friction_damping * step * ktt)
+            kt1, kt2, ktt = (
+                -inverse * arm * lever1,
+                -inverse * arm * lever2,
+                1.0 + inverse * arm * arm,
+            )
+            stop = (
+                parameters.friction_damping
+                * step
+                / (1.0 + parameters.friction_damping * step * ktt)
+            )
             slip = v[0] - v[2] * arm - turn * place
-            free, _ = friction_force(k, parameters.friction_damping, step * ktt, 1e300, 1e300, 1.0, friction[STRETCH], slip, False)
+            free, _ = friction_force(
+                k,
+                parameters.friction_damping,
+                step * ktt,
+                1e300,
+                1e300,
+                1.0,
+                friction[STRETCH],
+                slip,
+                False,
+            )
             force1, force2 = normal_forces(
                 f1 - d1 * kt1 * free, f2 - d2 * kt2 * free, d1, d2,
                 k11 - stop * kt1 * kt1, k12 - stop * kt1 * kt2, k12 - stop * kt2 * kt1, k22 - stop * kt2 * kt2,
@@ -266,13 +382,25 @@ def press(
             )  # fmt: skip
             if slips:
                 mu = math.copysign(parameters.mu_k, shear)
-                force1, force2 = normal_forces(f1, f2, d1, d2, k11 + mu * kt1, k12 + mu * kt1, k12 + mu * kt2, k22 + mu * kt2)
+                force1, force2 = normal_forces(
+                    f1, f2, d1, d2, k11 + mu * kt1, k12 + mu * kt1, k12 + mu * kt2, k22 + mu * kt2
+                )
                 shear = mu * (force1 + force2)
             friction[SHEAR], friction[SLIPS] = shear, 1.0 if slips else 0.0
             v = kicked(v, inverse, 1.0, 0.0, -arm, step * shear)
             rate1, rate2 = rate1 + step * kt1 * shear, rate2 + step * kt2 * shear
-        v = kicked(kicked(v, inverse, nx, ny, lever1, step * force1), inverse, nx, ny, lever2, step * force2)
-        rate1, rate2 = rate1 + step * (k11 * force1 + k12 * force2), rate2 + step * (k12 * force1 + k22 * force2)
+        v = kicked(
+            kicked(v, inverse, nx, ny, lever1, step * force1),
+            inverse,
+            nx,
+            ny,
+            lever2,
+            step * force2,
+        )
+        rate1, rate2 = (
+            rate1 + step * (k11 * force1 + k12 * force2),
+            rate2 + step * (k12 * force1 + k22 * force2),
+        )
     elif surface == FLOOR:
         friction[SHEAR] = friction[SLIPS] = 0.0
     memory[one, FORCE], memory[two, FORCE] = force1, force2
@@ -292,7 +420,8 @@ def wall_force(memory: Floats) -> float:
 
 @kernel
 def flush(memory: Floats, until: float, events: Floats, n_events: int) -> int:
-    """Write the strikes that began by `until` into `events` behind the first `n_events`; returns how many there are then."""
+    """Write the strikes that began by `until` into `events` behind the first `n_events`; returns
+    how many there are then."""
     for i in range(len(memory)):
         if memory[i, STRUCK] <= until:
             events[n_events, :] = memory[i, STRUCK], float(i), memory[i, IMPULSE]
@@ -306,11 +435,13 @@ def kick(
     memory: Floats, friction: Floats, parameters: Parameters, inverse: float, surfaces: Integers, x: float, y: float,
     corners: Corners, v: Velocity, v0: Velocity, step: float, settled: bool, t: float,
 ) -> tuple[Velocity, float, float, int]:  # fmt: skip
-    """The forces of all surfaces over a step, from the velocity `v` that the block would have without them and `v0` before it.
+    """The forces of all surfaces over a step, from the velocity `v` that the block would have
+    without them and `v0` before it.
 
-    One surface alone is solved at once. Where a wall touches too, each surface in turn takes back its force (first that of the
-    last step) and replaces it, until they agree. Returns the velocity; the time until an open contact closes; the step that a
-    contact which closes asks for, else infinity; the sweeps over the surfaces.
+    One surface alone is solved at once. Where a wall touches too, each surface in turn takes back
+    its force (first that of the last step) and replaces it, until they agree. Returns the velocity;
+    the time until an open contact closes; the step that a contact which closes asks for, else
+    infinity; the sweeps over the surfaces.
     """
     touching = wall_force(memory) > 0.0
     if touching:
@@ -326,10 +457,24 @@ def kick(
                 v = with_forces(memory, friction, inverse, surface, corners, v, -step)
             force1, force2 = memory[2 * surface, FORCE], memory[2 * surface + 1, FORCE]
             v, next_closing, fine = press(
-                memory, friction, parameters, inverse, surface, x, y, corners, v, v0, step, step if settled else 0.0, t
+                memory,
+                friction,
+                parameters,
+                inverse,
+                surface,
+                x,
+                y,
+                corners,
+                v,
+                v0,
+                step,
+                step if settled else 0.0,
+                t,
             )
             closing, young = min(closing, next_closing), min(young, fine)
-            change += abs(memory[2 * surface, FORCE] - force1) + abs(memory[2 * surface + 1, FORCE] - force2)
+            change += abs(memory[2 * surface, FORCE] - force1) + abs(
+                memory[2 * surface + 1, FORCE] - force2
+            )
             whole += memory[2 * surface, FORCE] + memory[2 * surface + 1, FORCE]
         if (not touching and wall_force(memory) == 0.0) or change <= SWEPT * whole:
             break
@@ -342,11 +487,14 @@ def stretch(
     memory: Floats, friction: Floats, parameters: Parameters,
     corners: Corners, v: Velocity, v0: Velocity, step: float,
 ) -> None:  # fmt: skip
-    """The friction spring follows the lower corner over a step; one that slips keeps the length of its largest force."""
+    """The friction spring follows the lower corner over a step; one that slips keeps the length of
+    its largest force."""
     friction[SLIPPED] = friction[SLIPS]
     load = memory[2 * FLOOR, FORCE] + memory[2 * FLOOR + 1, FORCE]
     if load > 0.0:
-        arm, place = (corners[1], corners[0]) if corners[1] < corners[3] else (corners[3], corners[2])
+        arm, place = (
+            (corners[1], corners[0]) if corners[1] < corners[3] else (corners[3], corners[2])
+        )
         friction[STRETCH] += step * (v[0] - v[2] * arm - 0.5 * step * v0[2] ** 2 * place)
         if friction[SLIPS] != 0.0:  # the spring slips along, so that slip leaves no other memory
             longest = parameters.mu_k * load / parameters.stiffness
@@ -371,13 +519,15 @@ def advance(
     output: Floats,
     events: Floats,
 ) -> tuple[int, int, int, int, int, float]:
-    """Fill the rows of `output` (x, y, theta and their rates) with the motion that follows `state`, which is moved along.
+    """Fill the rows of `output` (x, y, theta and their rates) with the motion that follows `state`,
+    which is moved along.
 
-    `state` goes on with the time until which a contact is young, the step that it asks for, the time until an open contact
-    closes, the energy allowed by the work done on the block, and that work with every part of it counted as positive.
-    `surfaces` lists those of the scene, the floor last; `memory` holds one row a contact, `friction` the floor's. `events`
-    gets rows (onset time, contact, impulse). Returns how it ended, the rows and events written, the steps taken, the sweeps
-    over the surfaces that they took, and the time reached.
+    `state` goes on with the time until which a contact is young, the step that it asks for, the
+    time until an open contact closes, the energy allowed by the work done on the block, and that
+    work with every part of it counted as positive. `surfaces` lists those of the scene, the floor
+    last; `memory` holds one row a contact, `friction` the floor's. `events` gets rows (onset time,
+    contact, impulse). Returns how it ended, the rows and events written, the steps taken, the
+    sweeps over the surfaces that they took, and the time reached.
     """
     left, right, bottom, top = parameters.reach
     inverse = parameters.inverse_inertia
@@ -391,7 +541,9 @@ def advance(
         end = (first_row + row) * output_step
         while t < end:
             settled = t >= calm
-            step = max(min(parameters.time_step if settled else fine, closing), SHORTEST * contact_time)
+            step = max(
+                min(parameters.time_step if settled else fine, closing), SHORTEST * contact_time
+            )
             if t + step > end - SHORTEST * contact_time:
                 step = end - t
             half = 0.5 * step
@@ -408,9 +560,26 @@ def advance(
                 -left * c - top * s, -left * s + top * c, right * c - top * s, right * s + top * c,
             )  # fmt: skip
             v0 = v
-            u, vg = sampled(horizontal, horizontal_rate, middle), sampled(vertical, vertical_rate, middle)
+            u, vg = (
+                sampled(horizontal, horizontal_rate, middle),
+                sampled(vertical, vertical_rate, middle),
+            )
             v = v[0] - step * u, v[1] - step * (parameters.gravity + vg), v[2]
-            v, closing, young, swept = kick(memory, friction, parameters, inverse, surfaces, x, y, corners, v, v0, step, settled, middle)
+            v, closing, young, swept = kick(
+                memory,
+                friction,
+                parameters,
+                inverse,
+                surfaces,
+                x,
+                y,
+                corners,
+                v,
+                v0,
+                step,
+                settled,
+                middle,
+            )
             sweeps += swept
             stretch(memory, friction, parameters, corners, v, v0, step)
             if young < math.inf:
@@ -432,7 +601,9 @@ def advance(
             if abs(theta) >= 0.5 * math.pi:
                 state[:6] = x, y, theta, v[0], v[1], v[2]
                 return OVERTURNED, row, n_events, steps, sweeps, t
-        energy = 0.5 * (v[0] ** 2 + v[1] ** 2 + v[2] ** 2 / inverse) + parameters.gravity * (y - bottom)
+        energy = 0.5 * (v[0] ** 2 + v[1] ** 2 + v[2] ** 2 / inverse) + parameters.gravity * (
+            y - bottom
+        )
         if not (energy <= allowed + ENERGY * gross and energy < 1e300):
             return BLOWN_UP, row, n_events, steps, sweeps, t
         output[row, :] = x, y, theta, v[0], v[1], v[2]

@@ -26,20 +26,24 @@ if TYPE_CHECKING:
 MOST_STEPS = 4_000_000_000
 #: Samples of a period of a pulse; the straight lines between them are off by 2e-8 of its amplitude.
 SAMPLES_A_PERIOD = 16384
-#: Longest stretch of motion (s) in one call of the compiled loop: it bounds the memory for events, and Ctrl-C is heard between.
+#: Longest stretch of motion (s) in one call of the compiled loop: it bounds the memory for events,
+#: and Ctrl-C is heard between.
 SLAB = 5.0
-#: Damping of the floor's friction spring in units of sqrt(k/m): so stiff that friction follows the normal force without lag.
+#: Damping of the floor's friction spring in units of sqrt(k/m): so stiff that friction follows the
+#: normal force without lag.
 FRICTION_DAMPING = 1000.0
 #: A surface within this distance (m) of the block at the start is touched already.
 TOUCHING = 1e-9
 
 
 class ContinuousModel(Frozen):
-    """The paper's Continuous Model (Chatzis & Smyth 2012): one equation of motion for all modes, corners on springs.
+    """The paper's Continuous Model (Chatzis & Smyth 2012): one equation of motion for all modes,
+    corners on springs.
 
-    Each bottom corner meets the floor, each side's corners a wall, in a Kelvin-Voigt contact that can only push; the floor
-    has stick-slip friction with a memory. As the stiffness rises the motion tends to that of a rigid block whose floor can
-    only push (the *unilateral* event-based model), not to the paper's, whose pivot the floor may pull.
+    Each bottom corner meets the floor, each side's corners a wall, in a Kelvin-Voigt contact that
+    can only push; the floor has stick-slip friction with a memory. As the stiffness rises the
+    motion tends to that of a rigid block whose floor can only push (the *unilateral* event-based
+    model), not to the paper's, whose pivot the floor may pull.
 
     penetration
         The one target that ties the two numerical knobs, in m: how deep the block sinks when it stands on one corner.
@@ -55,10 +59,10 @@ class ContinuousModel(Frozen):
         "calibrated": a contact that closes is given the damping with which a clamped contact of its effective mass has the
         scene's restitution (`contact.damping_ratio`, `contact.effective_mass`). "paper": (33) with the whole mass, constant.
 
-    What the calibration leaves out: slip that stops or turns within an impact (then friction, not the spring, decides; up
-    to 0.08 of restitution on floors with restitution), another corner that the impact presses down (a wall hit at more than
-    the slenderness angle, 0.02). A restitution of zero is reached within
-    `contact.least_restitution`, 7e-5 for the paper's block.
+    What the calibration leaves out: slip that stops or turns within an impact (then friction, not
+    the spring, decides; up to 0.08 of restitution on floors with restitution), another corner that
+    the impact presses down (a wall hit at more than the slenderness angle, 0.02). A restitution of
+    zero is reached within `contact.least_restitution`, 7e-5 for the paper's block.
     """
 
     penetration: Positive = 1e-8
@@ -78,7 +82,8 @@ class ContinuousModel(Frozen):
         return self
 
     def coarser(self, factor: float) -> Self:
-        """The same model with steps `factor` times as long, and the contacts as much softer as that allows (step ~ 1/sqrt(k/m))."""
+        """The same model with steps `factor` times as long, and the contacts as much softer as that
+        allows (step ~ 1/sqrt(k/m))."""
         change: dict[str, float] = {"penetration": factor**2 * self.penetration}
         if self.stiffness is not None:
             change = {"stiffness": self.stiffness / factor**2}
@@ -92,14 +97,16 @@ class ContinuousModel(Frozen):
 
     def time_step_in(self, scene: Scene) -> float:
         """Longest step in s in that scene, a whole fraction of its output step."""
-        longest = 3.0 / math.sqrt(self.stiffness_in(scene)) if self.time_step is None else self.time_step
+        longest = (
+            3.0 / math.sqrt(self.stiffness_in(scene)) if self.time_step is None else self.time_step
+        )
         return scene.output_step / math.ceil(scene.output_step / longest * (1.0 - 1e-12))
 
     def simulate(self, scene: Scene) -> History:
         """The motion of the scene's block. Events: floor impacts, wall impacts, overturning.
 
-        Raises `ModelFailure` where the motion gains energy out of nothing (far too long a step, absurd excitation) or asks for
-        too many steps.
+        Raises `ModelFailure` where the motion gains energy out of nothing (far too long a step,
+        absurd excitation) or asks for too many steps.
         """
         check_kind(scene, Scene, "load_scene", "scene")
         began = time.perf_counter()
@@ -110,8 +117,13 @@ class ContinuousModel(Frozen):
         parameters = self._parameters(scene)
         dt = parameters.time_step
         if times[-1] / dt > MOST_STEPS:
-            raise ModelFailure(f"cm: {times[-1] / dt:.3g} steps of {dt:.3g} s are needed; at most {MOST_STEPS:.3g} are allowed")
-        walls = [kernels.LEFT_WALL] * (scene.wall("left") is not None) + [kernels.RIGHT_WALL] * (scene.wall("right") is not None)
+            raise ModelFailure(
+                f"cm: {times[-1] / dt:.3g} steps of {dt:.3g} s are needed; at most"
+                f" {MOST_STEPS:.3g} are allowed"
+            )
+        walls = [kernels.LEFT_WALL] * (scene.wall("left") is not None) + [kernels.RIGHT_WALL] * (
+            scene.wall("right") is not None
+        )
         surfaces = np.array([*walls, kernels.FLOOR])
         horizontal, horizontal_rate = _samples(scene.excitation, scene.duration)
         vertical, vertical_rate = _samples(scene.vertical, scene.duration)
@@ -120,7 +132,9 @@ class ContinuousModel(Frozen):
         output = np.empty((len(times), 6))
         output[0] = kinematics.of_mass(scene.block, scene.initial_state)
         rows_a_slab = max(1, math.ceil(SLAB / scene.output_step))
-        events = np.empty((len(memory) * (math.ceil(rows_a_slab * scene.output_step / kernels.STRIKE) + 2), 3))
+        events = np.empty(
+            (len(memory) * (math.ceil(rows_a_slab * scene.output_step / kernels.STRIKE) + 2), 3)
+        )
 
         def advance(row: int, rows: int) -> tuple[int, int, int, int, int, float]:
             return kernels.advance(
@@ -153,33 +167,57 @@ class ContinuousModel(Frozen):
             evaluations=sweeps,
         )
         happened = [
-            Event(t=float(t), kind="floor impact" if contact_ >= 2 * kernels.FLOOR else "wall impact", impulse=float(impulse))
+            Event(
+                t=float(t),
+                kind="floor impact" if contact_ >= 2 * kernels.FLOOR else "wall impact",
+                impulse=float(impulse),
+            )
             for t, contact_, impulse in np.concatenate(strikes)
         ]
         happened.sort(key=lambda event: event.t)
         if ending == kernels.OVERTURNED:
-            happened.append(Event(t=reached, kind="overturned left" if state[2] > 0.0 else "overturned right"))
+            happened.append(
+                Event(t=reached, kind="overturned left" if state[2] > 0.0 else "overturned right")
+            )
         settings = {
             "penetration": scene.gravity / parameters.stiffness,
             "stiffness": parameters.stiffness,
             "time_step": dt,
             "damping_rule": self.damping_rule,
         }
-        return observe(scene, self.name, kinematics.of_box(scene.block, output[:row]), events=happened, cost=cost, settings=settings)
+        return observe(
+            scene,
+            self.name,
+            kinematics.of_box(scene.block, output[:row]),
+            events=happened,
+            cost=cost,
+            settings=settings,
+        )
 
     def _parameters(self, scene: Scene) -> kernels.Parameters:
         from rockcheck.cm import kernels
 
         k = self.stiffness_in(scene)
-        calibrated = partial(contact.damping_ratio, least=contact.least_restitution(k, scene.frequency_parameter))
+        calibrated = partial(
+            contact.damping_ratio, least=contact.least_restitution(k, scene.frequency_parameter)
+        )
         ratio = calibrated if self.damping_rule == "calibrated" else contact.damping_ratio_of_paper
         left, right = scene.wall("left"), scene.wall("right")
         b, h, (dx, dz) = scene.block.half_width, scene.block.half_height, scene.block.offset
-        restitution = (left.restitution if left else 0.0, right.restitution if right else 0.0, scene.floor.restitution)
-        distance = [math.inf if wall is None else scene.block.half_width + wall.gap for wall in (left, right)]
+        restitution = (
+            left.restitution if left else 0.0,
+            right.restitution if right else 0.0,
+            scene.floor.restitution,
+        )
+        distance = [
+            math.inf if wall is None else scene.block.half_width + wall.gap
+            for wall in (left, right)
+        ]
         return kernels.Parameters(
             reach=(b + dx, b - dx, h + dz, h - dz),
-            inverse_inertia=3.0 / (b * b + h * h) if scene.block.homogeneous else 1.0 / scene.block.gyration_squared,
+            inverse_inertia=3.0 / (b * b + h * h)
+            if scene.block.homogeneous
+            else 1.0 / scene.block.gyration_squared,
             gravity=scene.gravity,
             stiffness=k,
             friction_damping=FRICTION_DAMPING * math.sqrt(k),
@@ -192,8 +230,11 @@ class ContinuousModel(Frozen):
             time_step=self.time_step_in(scene),
         )
 
-    def _initial(self, scene: Scene, parameters: kernels.Parameters) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """State and contact memory at t = 0. A block on the floor starts sunk in by its weight, so that it does not bounce."""
+    def _initial(
+        self, scene: Scene, parameters: kernels.Parameters
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """State and contact memory at t = 0. A block on the floor starts sunk in by its weight, so
+        that it does not bounce."""
         from rockcheck.cm import kernels
 
         x, y, tilt, *rates = scene.initial_state
@@ -202,7 +243,9 @@ class ContinuousModel(Frozen):
         memory[:, kernels.STRUCK] = math.inf
         memory[:, kernels.LAST_CLOSED] = -math.inf
         memory[:, kernels.STIFFNESS] = k
-        memory[:, kernels.DAMPING] = np.repeat(2.0 * math.sqrt(k) * np.array(parameters.damping_ratio), 2)
+        memory[:, kernels.DAMPING] = np.repeat(
+            2.0 * math.sqrt(k) * np.array(parameters.damping_ratio), 2
+        )
         for wall in scene.walls:
             if kinematics.wall_gap(scene, wall.side, x, tilt) < TOUCHING:
                 surface = kernels.LEFT_WALL if wall.side == "left" else kernels.RIGHT_WALL
@@ -215,7 +258,9 @@ class ContinuousModel(Frozen):
         energy = kinematics.energy(scene.block, scene.gravity, y, tilt, *rates)
         gross = energy + 0.01 * scene.gravity * scene.block.half_width
         placed = np.array(kinematics.of_mass(scene.block, scene.initial_state))
-        if sunk > 0.0 and tilt == 0.0 and scene.block.offset[0] != 0.0:  # the corner nearer to the mass's centre carries more
+        if (
+            sunk > 0.0 and tilt == 0.0 and scene.block.offset[0] != 0.0
+        ):  # the corner nearer to the mass's centre carries more
             left, right = scene.block.pivot("left").arm, scene.block.pivot("right").arm
             placed[2] += 2.0 * sunk * (right - left) / (left + right) ** 2
             sunk *= 2.0 * (left * left + right * right) / (left + right) ** 2
@@ -223,8 +268,11 @@ class ContinuousModel(Frozen):
         return np.array((*placed, 0.0, math.inf, 0.0, energy, gross)), memory
 
 
-def _samples(excitation: Rest | Ricker | Sine | Record, duration: float) -> tuple[NDArray[np.float64], float]:
-    """The excitation as samples (m/s^2) with straight lines between them, and their number a second; a record's own."""
+def _samples(
+    excitation: Rest | Ricker | Sine | Record, duration: float
+) -> tuple[NDArray[np.float64], float]:
+    """The excitation as samples (m/s^2) with straight lines between them, and their number a
+    second; a record's own."""
     if isinstance(excitation, Record):
         return excitation.samples, 1.0 / excitation.time_step
     if isinstance(excitation, Rest):

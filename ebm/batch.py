@@ -1,7 +1,9 @@
-"""Many runs of the event-based model at once, compiled and on all cores: outcomes and peaks, and their motion where it is asked for.
+"""Many runs of the event-based model at once, compiled and on all cores: outcomes and peaks, and
+their motion where it is asked for.
 
-Scenes are packed into plain arrays, one row a run, so that the loop over them never comes back to Python. Threads take
-chunks of rows; the result of a row does not depend on the others, nor on the number of threads.
+Scenes are packed into plain arrays, one row a run, so that the loop over them never comes back to
+Python. Threads take chunks of rows; the result of a row does not depend on the others, nor on the
+number of threads.
 """
 
 from __future__ import annotations
@@ -30,20 +32,32 @@ Floats = NDArray[np.float64]
 _CHUNK = 256
 #: Rows of settings and grounds, by the names of their fields.
 SIDE = np.dtype([(name, np.float64) for name in Side._fields])
-SETTING = np.dtype([(name, SIDE if kind is Side else np.float64) for name, kind in get_type_hints(Setting).items() if name != "law"])
+SETTING = np.dtype(
+    [
+        (name, SIDE if kind is Side else np.float64)
+        for name, kind in get_type_hints(Setting).items()
+        if name != "law"
+    ]
+)
 GROUND = np.dtype(
-    [(name, np.int64 if kind == "int" else np.float64) for name, kind in Ground.__annotations__.items() if name != "samples"]
+    [
+        (name, np.int64 if kind == "int" else np.float64)
+        for name, kind in Ground.__annotations__.items()
+        if name != "samples"
+    ]
     + [("first", np.int64), ("count", np.int64)]
 )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Packed:
-    """Runs as arrays, one row each, natural units: settings (`SETTING`) and grounds (`GROUND`), initial states, lengths.
+    """Runs as arrays, one row each, natural units: settings (`SETTING`) and grounds (`GROUND`),
+    initial states, lengths.
 
     All rows have one law of impacts at several contacts (see `Setting`).
 
-    Recorded samples of all rows stand in one `samples` array, where a row's ground has `count` of them from `first` on.
+    Recorded samples of all rows stand in one `samples` array, where a row's ground has `count` of
+    them from `first` on.
     """
 
     settings: NDArray[np.void]
@@ -59,7 +73,13 @@ class Packed:
 
     def rows(self, part: slice, durations: Floats) -> Rows:
         """Some of the rows, for compiled code, with these durations of all rows."""
-        some = self.settings[part], self.horizontal[part], self.vertical[part], self.states[part], durations[part]
+        some = (
+            self.settings[part],
+            self.horizontal[part],
+            self.vertical[part],
+            self.states[part],
+            durations[part],
+        )
         return Rows(*some, self.samples, self.law)
 
 
@@ -79,19 +99,21 @@ class Rows(NamedTuple):
 class Outcomes:
     """What a batch found, one value a run.
 
-    `side` is -1 overturned left, +1 overturned right, 0 not overturned; `peak` the largest |theta| in rad (pi/2 when
-    overturned; rotations after the outcome is certain are counted too), `t_end` the time in sqrt(R/g) at which the run
-    was decided; `series` the number of Taylor expansions.
+    `side` is -1 overturned left, +1 overturned right, 0 not overturned; `peak` the largest |theta|
+    in rad (pi/2 when overturned; rotations after the outcome is certain are counted too), `t_end`
+    the time in sqrt(R/g) at which the run was decided; `series` the number of Taylor expansions.
     """
 
     side: NDArray[np.int8]
     peak: Floats
     t_end: Floats
     series: NDArray[np.int64]
-    #: How each run ended, a key of `ebm.core.march.FAILURES` where it failed; and whether it then was at rest.
+    #: How each run ended, a key of `ebm.core.march.FAILURES` where it failed; and whether it then
+    #: was at rest.
     ending: NDArray[np.int64]
     at_rest: NDArray[np.bool_]
-    #: Of each run `written` rows, equally spaced from its start on: x, y, theta and their rates, as in `Packed.states`.
+    #: Of each run `written` rows, equally spaced from its start on: x, y, theta and their rates, as
+    #: in `Packed.states`.
     motion: Floats
     written: NDArray[np.int64]
 
@@ -127,8 +149,11 @@ def pack(scenes: Sequence[Scene], model: EventBasedModel) -> Packed:
     )
 
 
-def pack_pulses(scene: Scene, model: EventBasedModel, amplitudes: Floats, periods: Floats) -> Packed:
-    """Packs one scene under many pulses of its own kind: amplitudes in m/s^2, periods in s, 1-D arrays of one length."""
+def pack_pulses(
+    scene: Scene, model: EventBasedModel, amplitudes: Floats, periods: Floats
+) -> Packed:
+    """Packs one scene under many pulses of its own kind: amplitudes in m/s^2, periods in s, 1-D
+    arrays of one length."""
     model.check(scene)
     unit, count = natural.time_unit(scene), len(amplitudes)
     template = type(scene.excitation)
@@ -138,7 +163,9 @@ def pack_pulses(scene: Scene, model: EventBasedModel, amplitudes: Floats, period
     ratio = 1.0 / periods
     horizontal = np.repeat(np.array([(*one[:-1], 0, 1)], dtype=GROUND), count)
     for power in range(4):
-        horizontal[f"c{power}"] *= amplitudes * (ratio**power if one.kind == natural.GAUSSIAN else 1.0)
+        horizontal[f"c{power}"] *= amplitudes * (
+            ratio**power if one.kind == natural.GAUSSIAN else 1.0
+        )
     horizontal["rate"] *= ratio**2 if one.kind == natural.GAUSSIAN else ratio
     horizontal["centre"] *= periods
     horizontal["quiet"] *= periods
@@ -166,7 +193,8 @@ def _setting(scene: Scene, model: EventBasedModel) -> Setting:
 
 
 def _without_law(setting: Setting) -> tuple[Any, ...]:
-    """A row of `SETTING`. The law, the last field, is the same for all rows, and its type tells what is compiled."""
+    """A row of `SETTING`. The law, the last field, is the same for all rows, and its type tells
+    what is compiled."""
     return setting[:-1]
 
 
@@ -180,22 +208,40 @@ def run_batch(
     jobs: int | None = None,
     on_progress: OnProgress = unheard,
 ) -> Outcomes:
-    """Runs every row; with `until_decided` to the moment when outcome and peak are certain, whatever its duration.
+    """Runs every row; with `until_decided` to the moment when outcome and peak are certain,
+    whatever its duration.
 
-    With `parts` the motion is kept at the ends of so many equal parts of each row's duration, its start included; not together
-    with `until_decided`. `jobs` threads (default: all cores). `on_progress` is told the rows done. Where a row reaches
-    a cap or has no consistent motion: `ModelFailure` if `strict`, else only its `ending` says so.
+    With `parts` the motion is kept at the ends of so many equal parts of each row's duration, its
+    start included; not together with `until_decided`. `jobs` threads (default: all cores).
+    `on_progress` is told the rows done. Where a row reaches a cap or has no consistent motion:
+    `ModelFailure` if `strict`, else only its `ending` says so.
     """
     count, kept = len(packed), parts + 1 if parts and not until_decided else 0
     side, peak, t_end = np.zeros(count, dtype=np.int8), np.zeros(count), np.zeros(count)
     series, ending, written = (np.zeros(count, dtype=np.int64) for _ in range(3))
-    at_rest, motion, modes = np.zeros(count, dtype=bool), np.zeros((count, kept, 6)), np.zeros((count, kept), dtype=np.int8)
-    control = Control(model.tolerance, min(model.most_steps, 2_000_000), model.most_events, until_decided, 1.0)
+    at_rest, motion, modes = (
+        np.zeros(count, dtype=bool),
+        np.zeros((count, kept, 6)),
+        np.zeros((count, kept), dtype=np.int8),
+    )
+    control = Control(
+        model.tolerance, min(model.most_steps, 2_000_000), model.most_events, until_decided, 1.0
+    )
     durations = np.full(count, 1e6) if until_decided else packed.durations
 
     def chunk(first: int) -> int:
         rows = slice(first, min(first + _CHUNK, count))
-        found = side[rows], peak[rows], t_end[rows], series[rows], ending[rows], at_rest[rows], motion[rows], modes[rows], written[rows]
+        found = (
+            side[rows],
+            peak[rows],
+            t_end[rows],
+            series[rows],
+            ending[rows],
+            at_rest[rows],
+            motion[rows],
+            modes[rows],
+            written[rows],
+        )
         _run_rows(packed.rows(rows, durations), control, *found)
         return rows.stop - rows.start
 
@@ -204,16 +250,28 @@ def run_batch(
         for rows in pool.map(chunk, range(0, count, _CHUNK)):
             done += rows
             on_progress(done, count)
-    found = Outcomes(side=side, peak=peak, t_end=t_end, series=series, ending=ending, at_rest=at_rest, motion=motion, written=written)
+    found = Outcomes(
+        side=side,
+        peak=peak,
+        t_end=t_end,
+        series=series,
+        ending=ending,
+        at_rest=at_rest,
+        motion=motion,
+        written=written,
+    )
     if strict and found.failed.any():
         first = int(np.argmax(found.failed))
-        raise ModelFailure(f"{model.name}: run {first} of the batch: {FAILURES[int(ending[first])]}")
+        raise ModelFailure(
+            f"{model.name}: run {first} of the batch: {FAILURES[int(ending[first])]}"
+        )
     return found
 
 
 @inner_kernel
 def row_ground(row, samples):
-    """The base motion of a packed row, of the types that a single history has: the loop is then compiled once for both."""
+    """The base motion of a packed row, of the types that a single history has: the loop is then
+    compiled once for both."""
     return Ground(
         kind=int(row["kind"]),
         c0=row["c0"],
@@ -247,7 +305,8 @@ def row_side(r):
 
 @inner_kernel
 def row_setting(r, law):
-    """Block, floor and walls of a packed row, of the types that a single history has; all rows have one law of impacts, or none."""
+    """Block, floor and walls of a packed row, of the types that a single history has; all rows have
+    one law of impacts, or none."""
     return Setting(
         left=row_side(r["left"]),
         right=row_side(r["right"]),
@@ -270,12 +329,18 @@ def row_setting(r, law):
 
 @inner_kernel
 def play_row(rows, i, step, control, records, z, scratch):
-    """Plays row i in z, with rows of the motion a `step` apart (see `ebm.core.march.march`); returns its Tally."""
+    """Plays row i in z, with rows of the motion a `step` apart (see `ebm.core.march.march`);
+    returns its Tally."""
     for k in range(6):
         z[k] = rows.states[i, k]
     b = row_setting(rows.settings[i], rows.law)
-    gh, gv = row_ground(rows.horizontal[i], rows.samples), row_ground(rows.vertical[i], rows.samples)
-    control = Control(control.tolerance, control.most_steps, control.most_events, control.until_decided, step)
+    gh, gv = (
+        row_ground(rows.horizontal[i], rows.samples),
+        row_ground(rows.vertical[i], rows.samples),
+    )
+    control = Control(
+        control.tolerance, control.most_steps, control.most_events, control.until_decided, step
+    )
     return march(b, gh, gv, z, rows.durations[i], control, None, records, scratch)
 
 

@@ -1,4 +1,5 @@
-"""Histories of many scenes of one duration at once: rotations on a common grid, peaks, outcomes and last slips."""
+"""Histories of many scenes of one duration at once: rotations on a common grid, peaks, outcomes and
+last slips."""
 
 from __future__ import annotations
 
@@ -29,9 +30,9 @@ _CHUNK = 32
 class Ensemble:
     """What a model makes of some scenes, one row a scene.
 
-    `theta` (rad, n x rows) at times `t` (s), after a fall pi/2 to its side; empty where no rows were asked for. `side` is -1
-    overturned left, +1 right, 0 not; `peak` the largest |theta| (rad, pi/2 of a fall); `last_slip` in m; `alpha`
-    the blocks' own (rad).
+    `theta` (rad, n x rows) at times `t` (s), after a fall pi/2 to its side; empty where no rows
+    were asked for. `side` is -1 overturned left, +1 right, 0 not; `peak` the largest |theta| (rad,
+    pi/2 of a fall); `last_slip` in m; `alpha` the blocks' own (rad).
     """
 
     t: Floats
@@ -42,10 +43,13 @@ class Ensemble:
     alpha: Floats
 
 
-def play_ensemble(scenes: Sequence[Scene], model: EventBasedModel, *, rows: int = 0, jobs: int | None = None) -> Ensemble:
+def play_ensemble(
+    scenes: Sequence[Scene], model: EventBasedModel, *, rows: int = 0, jobs: int | None = None
+) -> Ensemble:
     """Play scenes of one duration to their end, on `jobs` threads (default: all cores).
 
-    Raises `InputError` where the model cannot play one of them, or has Bouc-Wen friction, and `ModelFailure`.
+    Raises `InputError` where the model cannot play one of them, or has Bouc-Wen friction, and
+    `ModelFailure`.
     """
     packed = pack(scenes, model)
     first, count = scenes[0], len(scenes)
@@ -58,7 +62,15 @@ def play_ensemble(scenes: Sequence[Scene], model: EventBasedModel, *, rows: int 
 
     def chunk(begin: int) -> None:
         part = slice(begin, begin + _CHUNK)
-        _sample_rows(packed.rows(part, packed.durations), control, steps[part], states[part], theta[part], peak[part], ending[part])
+        _sample_rows(
+            packed.rows(part, packed.durations),
+            control,
+            steps[part],
+            states[part],
+            theta[part],
+            peak[part],
+            ending[part],
+        )
 
     with threads(jobs or os.cpu_count() or 1) as pool:
         list(pool.map(chunk, range(0, count, _CHUNK)))
@@ -68,14 +80,18 @@ def play_ensemble(scenes: Sequence[Scene], model: EventBasedModel, *, rows: int 
         raise ModelFailure(f"{model.name}: scene {i} of the ensemble: {FAILURES[int(ending[i])]}")
     side = np.where(ending == OVERTURNED, -np.sign(states[:, THETA]), 0.0).astype(np.int8)
     placed = [natural.to_si(scene, z[None, :])[0] for scene, z in zip(scenes, states, strict=True)]
-    slip = [float(kinematics.slip(scene.block, z[X], z[THETA])) for scene, z in zip(scenes, placed, strict=True)]
+    slip = [
+        float(kinematics.slip(scene.block, z[X], z[THETA]))
+        for scene, z in zip(scenes, placed, strict=True)
+    ]
     alpha = np.array([scene.block.alpha for scene in scenes])
     return Ensemble(t=t, theta=theta, side=side, peak=peak, last_slip=np.array(slip), alpha=alpha)
 
 
 @kernel
 def _sample_rows(rows, control, steps, states, theta, peak, ending):
-    """Plays each row to its end: its rotations on the grid, its last state, its peak and how it ended."""
+    """Plays each row to its end: its rotations on the grid, its last state, its peak and how it
+    ended."""
     count = theta.shape[1]
     records = Records(np.empty((count, 6)), np.empty(count, dtype=np.int8), np.empty((0, 5)))
     scratch, z = scratch_with(*workspace()), np.empty(6)

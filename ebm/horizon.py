@@ -13,31 +13,39 @@ from rockcheck.ebm.model import EventBasedModel, ImpactLaw
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.scene import Scene
 
-#: The relative disturbance, and the separation (alpha) up to which two histories still count as the same.
+#: The relative disturbance, and the separation (alpha) up to which two histories still count as the
+#: same.
 PERTURBATION, ALLOWED = 1e-6, 1e-3
 START = ("initial_rotation", "initial_angular_velocity", "initial_velocity", "initial_height")
-#: The choice, as `History.cost.rules` counts it, at which the laws of one bottom corner before the other part.
+#: The choice, as `History.cost.rules` counts it, at which the laws of one bottom corner before the
+#: other part.
 FLAT = NAMES[FLAT_LANDING]
 
 
 def predictability_horizon(
-    scene: Scene, model: EventBasedModel | None = None, *, perturbation: float = PERTURBATION, allowed: float = ALLOWED
+    scene: Scene,
+    model: EventBasedModel | None = None,
+    *,
+    perturbation: float = PERTURBATION,
+    allowed: float = ALLOWED,
 ) -> float:
     """Time in s up to which two histories of this scene can be compared point by point.
 
-    The scene is played by `model` (default: the unilateral one at tolerance 1e-13) as it is and with a relative
-    `perturbation` of either sign of its excitation and of its initial state; a rotation or velocity that is zero gets that
-    part of alpha, alpha p or R alpha p. The horizon is the last output time up to which all rotations
-    stay within `allowed` (alpha) of the undisturbed ones; the scene's duration where they always do.
+    The scene is played by `model` (default: the unilateral one at tolerance 1e-13) as it is and
+    with a relative `perturbation` of either sign of its excitation and of its initial state; a
+    rotation or velocity that is zero gets that part of alpha, alpha p or R alpha p. The horizon is
+    the last output time up to which all rotations stay within `allowed` (alpha) of the undisturbed
+    ones; the scene's duration where they always do.
 
-    With 1e-6 and 1e-3 it is the time in which the motion amplifies an error a thousandfold. Beyond it an error of 1e-4 alpha,
-    as a good engine has, has grown to a tenth of the motion. How far two histories are apart then depends on the scene, not on
-    the models. It is the ratio that matters: with 1e-7 and 1e-4 the horizon of El Centro is the same. Deterministic.
-    The model's tolerance has to be well below the perturbation. Raises what `simulate` raises.
+    With 1e-6 and 1e-3 it is the time in which the motion amplifies an error a thousandfold. Beyond
+    it an error of 1e-4 alpha, as a good engine has, has grown to a tenth of the motion. How far two
+    histories are apart then depends on the scene, not on the models. It is the ratio that matters:
+    with 1e-7 and 1e-4 the horizon of El Centro is the same. Deterministic. The model's tolerance
+    has to be well below the perturbation. Raises what `simulate` raises.
 
-    Where several contacts are struck at once, as when a block lands flush against a bouncing wall or
-    flat on the floor, the scene is played under the `other_laws` of impacts, too: histories mean the
-    same only as long as they do not depend on the law.
+    Where several contacts are struck at once, as when a block lands flush against a bouncing wall
+    or flat on the floor, the scene is played under the `other_laws` of impacts, too: histories mean
+    the same only as long as they do not depend on the law.
     """
     model = model or EventBasedModel(pivot="unilateral", tolerance=1e-13)
     played = model.simulate(scene)
@@ -49,7 +57,9 @@ def predictability_horizon(
         theta = other.simulate(disturbed).channels["theta"][:rows]
         apart = np.abs(theta - undisturbed[: len(theta)]) > allowed * scene.block.alpha
         rows = int(np.argmax(apart)) if apart.any() else rows
-    return scene.duration if rows == len(undisturbed) else float(scene.output_times[max(rows - 1, 1)])
+    return (
+        scene.duration if rows == len(undisturbed) else float(scene.output_times[max(rows - 1, 1)])
+    )
 
 
 def may_fly(scene: Scene) -> bool:
@@ -71,8 +81,11 @@ def other_laws(model: EventBasedModel, *, walls: bool, flat: bool) -> tuple[Impa
     return tuple(law for law in laws if law != model.impacts)
 
 
-def _disturbed(scene: Scene, model: EventBasedModel, perturbation: float) -> Iterator[tuple[EventBasedModel, Scene]]:
-    """A base motion a little stronger or weaker; a start farther from rest, nearer to it or off zero."""
+def _disturbed(
+    scene: Scene, model: EventBasedModel, perturbation: float
+) -> Iterator[tuple[EventBasedModel, Scene]]:
+    """A base motion a little stronger or weaker; a start farther from rest, nearer to it or off
+    zero."""
     alpha, rate = scene.block.alpha, scene.block.alpha * scene.frequency_parameter
     speed = scene.block.radius * rate
     units = {"initial_rotation": alpha, "initial_angular_velocity": rate, "initial_velocity": speed}
@@ -80,7 +93,13 @@ def _disturbed(scene: Scene, model: EventBasedModel, perturbation: float) -> Ite
     for change in (-perturbation, perturbation):
         if scene.excitation.kind != "rest" or scene.vertical.kind != "rest":
             factor = 1.0 + change
-            yield model, scene.replace(excitation=scene.excitation.scaled(factor), vertical=scene.vertical.scaled(factor))
+            yield (
+                model,
+                scene.replace(
+                    excitation=scene.excitation.scaled(factor),
+                    vertical=scene.vertical.scaled(factor),
+                ),
+            )
         farther = {name: value + change * value for name, value in given.items()}
         zeros = [{name: change * unit} for name, unit in units.items() if name not in given]
         for start in (farther, *zeros):

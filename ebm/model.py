@@ -33,16 +33,18 @@ ImpactLaw = Literal["moreau", "closed", "open", "floor-first", "leading-first", 
 class EventBasedModel(Frozen):
     """The paper's Event-Based Model and its extensions.
 
-    `tolerance` bounds the local truncation error of each Taylor step: of a rotation in alpha, of a length in alpha R.
-    `pivot`: "bilateral" is the paper's model, in which the pivot never leaves the floor; "unilateral" lets the floor only
-    push, so that the block may hop. `friction`: "coulomb" switches exactly between stick and slip, "bouc-wen" is the paper's
-    regularisation (9) with the `yield_displacement` u_y in m, "no-slip" is Housner's block. `impacts` (unilateral) is the law of
-    impacts at several contacts at once: "moreau" strikes all that touch together, "floor-first" one after another; they differ
-    where a block lands flush against a bouncing wall. ("closed" and "open" are the two branches that "moreau" takes there.)
-    "leading-first" and "trailing-first" strike one bottom corner before the other where a block lands
-    flat while it slides. `energy_cap` (unilateral) lowers
-    the restitution of an impact that would add kinetic energy to the largest that does not. `estimate_error` runs the scene
-    again at tolerance/100 and puts the largest change of theta/alpha into `cost.error_estimate`. A run that reaches
+    `tolerance` bounds the local truncation error of each Taylor step: of a rotation in alpha, of a
+    length in alpha R. `pivot`: "bilateral" is the paper's model, in which the pivot never leaves
+    the floor; "unilateral" lets the floor only push, so that the block may hop. `friction`:
+    "coulomb" switches exactly between stick and slip, "bouc-wen" is the paper's regularisation (9)
+    with the `yield_displacement` u_y in m, "no-slip" is Housner's block. `impacts` (unilateral) is
+    the law of impacts at several contacts at once: "moreau" strikes all that touch together,
+    "floor-first" one after another; they differ where a block lands flush against a bouncing wall.
+    ("closed" and "open" are the two branches that "moreau" takes there.) "leading-first" and
+    "trailing-first" strike one bottom corner before the other where a block lands flat while it
+    slides. `energy_cap` (unilateral) lowers the restitution of an impact that would add kinetic
+    energy to the largest that does not. `estimate_error` runs the scene again at tolerance/100 and
+    puts the largest change of theta/alpha into `cost.error_estimate`. A run that reaches
     `most_steps` or `most_events` is a `ModelFailure`.
     """
 
@@ -64,7 +66,8 @@ class EventBasedModel(Frozen):
         return "ebm" if self.pivot == "bilateral" else "ebm-unilateral"
 
     def finer(self) -> Self:
-        """The same model at a hundredth of its tolerance, or at the finest tolerance that double precision allows."""
+        """The same model at a hundredth of its tolerance, or at the finest tolerance that double
+        precision allows."""
         return self.model_copy(update={"tolerance": max(self.tolerance / 100.0, 1e-15)})
 
     def check(self, scene: Scene) -> None:
@@ -73,43 +76,58 @@ class EventBasedModel(Frozen):
         if self.friction == "bouc-wen":
             self._check_bouc_wen(scene)
         if self.friction == "no-slip" and scene.initial_velocity != 0.0:
-            raise InputError(f'{scene.initial_velocity:g} is not allowed with friction="no-slip": it never slips', "initial_velocity")
+            raise InputError(
+                f'{scene.initial_velocity:g} is not allowed with friction="no-slip": it never slips',
+                "initial_velocity",
+            )
         if self.pivot == "bilateral":
             if scene.floor.restitution > 0.0:
                 raise InputError(
-                    f"{scene.floor.restitution:g} is not allowed with the bilateral pivot: a floor impact that rebounds is free flight,"
+                    f"{scene.floor.restitution:g} is not allowed with the bilateral pivot: a floor"
+                    " impact that rebounds is free flight,"
                     ' which this model excludes; use 0, or pivot="unilateral"',
                     "floor.restitution",
                 )
             if scene.initial_height > 0.0:
                 raise InputError(
-                    f"{scene.initial_height:g} is not allowed with the bilateral pivot, which never leaves the floor; use 0, or"
+                    f"{scene.initial_height:g} is not allowed with the bilateral pivot, which"
+                    " never leaves the floor; use 0, or"
                     ' pivot="unilateral"',
                     "initial_height",
                 )
         elif scene.floor.restitution == 1.0:
             raise InputError(
-                "1 is not allowed: a block that loses nothing at the floor never settles; use less than 1", "floor.restitution"
+                "1 is not allowed: a block that loses nothing at the floor never settles; use less"
+                " than 1",
+                "floor.restitution",
             )
 
     def _check_bouc_wen(self, scene: Scene) -> None:
         if self.pivot != "bilateral":
-            raise InputError(f'{self.pivot!r} is not allowed with friction="bouc-wen": only "bilateral" is', "pivot")
+            raise InputError(
+                f'{self.pivot!r} is not allowed with friction="bouc-wen": only "bilateral" is',
+                "pivot",
+            )
         if scene.floor.mu_s != scene.floor.friction:
             raise InputError(
-                f"{scene.floor.mu_s:g} is not allowed: Bouc-Wen friction has one coefficient, {scene.floor.friction:g}",
+                f"{scene.floor.mu_s:g} is not allowed: Bouc-Wen friction has one coefficient,"
+                f" {scene.floor.friction:g}",
                 "floor.static_friction",
             )
 
     def simulate(self, scene: Scene) -> History:
-        """The motion of the scene on its output grid. Raises `InputError` (see `check`) or `ModelFailure`."""
+        """The motion of the scene on its output grid. Raises `InputError` (see `check`) or
+        `ModelFailure`."""
         self.check(scene)
         history = self._simulate(scene, self.tolerance)
         if not self.estimate_error:
             return history
         finer = self._simulate(scene, max(self.tolerance / 100.0, FINEST))
         rows = min(len(finer.channels["theta"]), len(history.channels["theta"]))
-        change = np.max(np.abs(finer.channels["theta"][:rows] - history.channels["theta"][:rows])) / scene.block.alpha
+        change = (
+            np.max(np.abs(finer.channels["theta"][:rows] - history.channels["theta"][:rows]))
+            / scene.block.alpha
+        )
         cost = Cost(**(vars(history.cost) | {"error_estimate": float(change)}))
         return History(**(vars_of(history) | {"cost": cost}))
 
@@ -140,20 +158,39 @@ class EventBasedModel(Frozen):
         _compiled(scratch, self.pivot == "unilateral")
 
         def play(most_steps: int) -> tuple[Tally, NDArray[np.int64]]:
-            control = march.Control(tolerance, most_steps, self.most_events, False, scene.output_step / unit)
+            control = march.Control(
+                tolerance, most_steps, self.most_events, False, scene.output_step / unit
+            )
             state[:] = natural.state_of(scene)
-            return march.run(b, horizontal, vertical, state, scene.duration / unit, control, out, out_mode, log, *scratch)
+            return march.run(
+                b,
+                horizontal,
+                vertical,
+                state,
+                scene.duration / unit,
+                control,
+                out,
+                out_mode,
+                log,
+                *scratch,
+            )
 
         ready, cpu = time.perf_counter(), time.process_time()
-        # A run of few steps is played here: to hand it over takes longer. Each sample of a record is a step.
-        few = min(self.most_steps, _AT_ONCE if max(len(horizontal.samples), len(vertical.samples)) < _AT_ONCE else 0)
+        # A run of few steps is played here: to hand it over takes longer. Each sample of a record
+        # is a step.
+        few = min(
+            self.most_steps,
+            _AT_ONCE if max(len(horizontal.samples), len(vertical.samples)) < _AT_ONCE else 0,
+        )
         found = play(few) if few else None
         if found is None or (found[0].ending == march.TOO_MANY_STEPS and few < self.most_steps):
             found = interruptible(partial(play, self.most_steps))
         tally, rules = found
         seconds, cpu = time.perf_counter() - ready, time.process_time() - cpu
         if tally.ending in march.FAILURES:
-            raise ModelFailure(f"{self.name}: {march.FAILURES[tally.ending]} at t = {tally.t * unit:.6g} s")
+            raise ModelFailure(
+                f"{self.name}: {march.FAILURES[tally.ending]} at t = {tally.t * unit:.6g} s"
+            )
         rows = max(tally.rows, 1)
         out[0] = natural.state_of(scene) if tally.rows == 0 else out[0]
         events = _events(log[: min(tally.events, len(log))], unit, scene.block.radius)
@@ -193,7 +230,13 @@ def _events(log: np.ndarray, unit: float, radius: float) -> list[Event]:
 
     modes, kinds, speed = march.MODE_NAMES, march.EVENT_NAMES, radius / unit
     return [
-        Event(t=t * unit, kind=kinds[int(kind)], mode_before=modes[int(before)], mode_after=modes[int(after)], impulse=impulse * speed)
+        Event(
+            t=t * unit,
+            kind=kinds[int(kind)],
+            mode_before=modes[int(before)],
+            mode_after=modes[int(after)],
+            impulse=impulse * speed,
+        )
         for t, kind, before, after, impulse in log.tolist()
     ]
 
@@ -213,16 +256,25 @@ def _compiled(scratch: tuple[Any, ...], unilateral: bool) -> None:
     from rockcheck.scenes.excitations import Rest
     from rockcheck.scenes.scene import Block, Floor
 
-    scene = Scene(name="warm-up", block=Block(half_width=1.0, half_height=4.0), floor=Floor(friction=0.5), excitation=Rest(), duration=1.0)
+    scene = Scene(
+        name="warm-up",
+        block=Block(half_width=1.0, half_height=4.0),
+        floor=Floor(friction=0.5),
+        excitation=Rest(),
+        duration=1.0,
+    )
     b = natural.setting_of(scene, unilateral=unilateral, no_slip=False, energy_cap=False)
     control = march.Control(WARM_UP_TOLERANCE, 1, 1, False, 1.0)
     nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
-    march.run(b, *natural.grounds_of(scene), natural.state_of(scene), 1.0, control, *nothing, *scratch)
+    march.run(
+        b, *natural.grounds_of(scene), natural.state_of(scene), 1.0, control, *nothing, *scratch
+    )
     _READY.add(kind)
 
 
 #: Steps that take about as long as to hand a run over to the thread that Ctrl-C need not wait for.
 _AT_ONCE = 500
-#: The variants of the event loop that are compiled: by the friction (its kind of scratch) and by the pivot.
+#: The variants of the event loop that are compiled: by the friction (its kind of scratch) and by
+#: the pivot.
 _READY: set[tuple[int, bool]] = set()
 WARM_UP_TOLERANCE = 0.01

@@ -1,6 +1,8 @@
-"""Between a scene (SI) and the natural units of the compiled code: lengths in R, accelerations in g, times in sqrt(R/g).
+"""Between a scene (SI) and the natural units of the compiled code: lengths in R, accelerations in
+g, times in sqrt(R/g).
 
-Of a block that is not homogeneous R is that of its weaker pivot, and the compiled code follows its mass's centre, not the box's.
+Of a block that is not homogeneous R is that of its weaker pivot, and the compiled code follows its
+mass's centre, not the box's.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ def time_unit(scene: Scene) -> float:
     return math.sqrt(scene.block.radius / scene.gravity)
 
 
-def setting_of(scene: Scene, *, unilateral: bool, no_slip: bool, energy_cap: bool, impacts: str = "moreau") -> Setting:
+def setting_of(
+    scene: Scene, *, unilateral: bool, no_slip: bool, energy_cap: bool, impacts: str = "moreau"
+) -> Setting:
     """Block, floor and walls of a scene in natural units."""
     radius = scene.block.radius
     left, right = scene.wall("left"), scene.wall("right")
@@ -49,7 +53,8 @@ def setting_of(scene: Scene, *, unilateral: bool, no_slip: bool, energy_cap: boo
 
 
 def law_of(unilateral: bool, impacts: str) -> int | None:
-    """The law of impacts at several contacts, as the event loop knows it; the bilateral pivot has none."""
+    """The law of impacts at several contacts, as the event loop knows it; the bilateral pivot has
+    none."""
     return LAWS.index(impacts) if unilateral else None
 
 
@@ -59,12 +64,21 @@ def side_of(block: Block, side: Literal["left", "right"]) -> Side:
     if block.homogeneous:
         arm, sine, cosine = math.sin(alpha), math.sin(2.0 * alpha), math.cos(2.0 * alpha)
         return Side(alpha, 1.0, arm, alpha, 1.0, sine, cosine, sine, cosine, 0.75)
-    pivot, other, unit = block.pivot(side), block.pivot("right" if side == "left" else "left"), block.radius
-    top, square, radius = 2.0 * block.half_height - pivot.height, pivot.radius**2, pivot.radius / unit
+    pivot, other, unit = (
+        block.pivot(side),
+        block.pivot("right" if side == "left" else "left"),
+        block.radius,
+    )
+    top, square, radius = (
+        2.0 * block.half_height - pivot.height,
+        pivot.radius**2,
+        pivot.radius / unit,
+    )
     return Side(
         alpha=pivot.alpha,
         radius=radius,
-        arm=radius * math.sin(pivot.alpha),  # as gaps have it: flush with a wall they are 0 to the bit
+        arm=radius
+        * math.sin(pivot.alpha),  # as gaps have it: flush with a wall they are 0 to the bit
         top_alpha=math.atan2(pivot.arm, top),
         top_radius=math.hypot(pivot.arm, top) / unit,
         tip_sin=pivot.arm * (pivot.height + top) / square,
@@ -78,7 +92,9 @@ def side_of(block: Block, side: Literal["left", "right"]) -> Side:
 def grounds_of(scene: Scene) -> tuple[Ground, Ground]:
     """Horizontal and vertical ground motion in natural units."""
     unit = time_unit(scene)
-    return ground_of(scene.excitation, scene.gravity, unit), ground_of(scene.vertical, scene.gravity, unit)
+    return ground_of(scene.excitation, scene.gravity, unit), ground_of(
+        scene.vertical, scene.gravity, unit
+    )
 
 
 def state_of(scene: Scene) -> NDArray[np.float64]:
@@ -89,7 +105,9 @@ def state_of(scene: Scene) -> NDArray[np.float64]:
     lean = theta if theta != 0.0 else w
     pivot = block.weaker_pivot if lean == 0.0 else block.pivot("left" if lean > 0.0 else "right")
     alpha, own = pivot.alpha, pivot.radius / radius
-    state = np.array([x / radius, y / radius, theta, vx * unit / radius, vy * unit / radius, w * unit])
+    state = np.array(
+        [x / radius, y / radius, theta, vx * unit / radius, vy * unit / radius, w * unit]
+    )
     if scene.initial_height == 0.0:
         state[1] = own * math.cos(alpha - abs(theta))
     if scene.initial_velocity == 0.0:
@@ -98,7 +116,8 @@ def state_of(scene: Scene) -> NDArray[np.float64]:
 
 
 def to_si(scene: Scene, states: NDArray[np.float64]) -> NDArray[np.float64]:
-    """States (n x 6: x, y, theta and rates) of the mass's centre in natural units as those of the box's centre in SI."""
+    """States (n x 6: x, y, theta and rates) of the mass's centre in natural units as those of the
+    box's centre in SI."""
     radius, unit = scene.block.radius, time_unit(scene)
     found = states * np.array([radius, radius, 1.0, radius / unit, radius / unit, 1.0 / unit])
     if scene.block.centre_of_mass is not None:

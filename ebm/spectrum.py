@@ -1,4 +1,5 @@
-"""Overturning spectra: the outcome over a grid of pulse frequencies and amplitudes (the paper's Figs. 6 to 9)."""
+"""Overturning spectra: the outcome over a grid of pulse frequencies and amplitudes (the paper's
+Figs. 6 to 9)."""
 
 from __future__ import annotations
 
@@ -23,28 +24,34 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 MOST_NODES = 50_000_000
-#: Tolerance (alpha) of the model that plays a spectrum by default: far too small to move a boundary by a node.
+#: Tolerance (alpha) of the model that plays a spectrum by default: far too small to move a boundary
+#: by a node.
 TOLERANCE = 4e-8
-#: Of a refined spectrum: distance of the nodes that are run first, the fewest cells an axis that they may leave, and how far (in
-#: nodes) around a boundary nothing is inferred: hairs thinner than the nodes' distance break into dots, which are found so.
+#: Of a refined spectrum: distance of the nodes that are run first, the fewest cells an axis that
+#: they may leave, and how far (in nodes) around a boundary nothing is inferred: hairs thinner than
+#: the nodes' distance break into dots, which are found so.
 COARSEST, FEWEST_CELLS, FOLLOWED = 8, 12, 3
 #: The outcome codes of a spectrum.
 LEFT, SAFE, RIGHT = -1, 0, 1
 _UNKNOWN = 9
 #: Results of nodes: their sides, and whether the run failed.
 Nodes = tuple[NDArray[np.int8], NDArray[np.bool_]]
-#: Plays nodes of a spectrum: scene, amplitude ratios and frequency ratios (1-D, of one length) to sides and failures, see `play_nodes`.
+#: Plays nodes of a spectrum: scene, amplitude ratios and frequency ratios (1-D, of one length) to
+#: sides and failures, see `play_nodes`.
 Player = Callable[[Scene, Floats, Floats], Nodes]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Spectrum(Shown):
-    """Outcomes over frequency and amplitude, or over block size and scale of a record (see `overturning_spectrum`).
+    """Outcomes over frequency and amplitude, or over block size and scale of a record (see
+    `overturning_spectrum`).
 
-    `outcomes[i, j]` is -1 (overturned left, counterclockwise), 0 (safe) or +1 (right, clockwise) at `amplitude_ratios[i]`
-    (a_p / (g tan alpha)) and `frequency_ratios[j]` (omega_p / p). `evaluations` counts the runs, fewer than nodes where only
-    the boundary was refined. `undecided` lists the nodes (i, j) whose run failed: their outcome says 0, but `safe` excludes them.
-    `depends_on_law` lists the nodes whose outcome is another one under another law of impacts; None where that was not looked at.
+    `outcomes[i, j]` is -1 (overturned left, counterclockwise), 0 (safe) or +1 (right, clockwise) at
+    `amplitude_ratios[i]` (a_p / (g tan alpha)) and `frequency_ratios[j]` (omega_p / p).
+    `evaluations` counts the runs, fewer than nodes where only the boundary was refined. `undecided`
+    lists the nodes (i, j) whose run failed: their outcome says 0, but `safe` excludes them.
+    `depends_on_law` lists the nodes whose outcome is another one under another law of impacts; None
+    where that was not looked at.
     """
 
     outcomes: NDArray[np.int8]
@@ -69,7 +76,8 @@ class Spectrum(Shown):
         return float(np.mean(self.safe))
 
     def least_overturning_amplitude(self) -> Floats:
-        """The lowest overturning amplitude ratio at each frequency ratio; NaN where none overturns."""
+        """The lowest overturning amplitude ratio at each frequency ratio; NaN where none
+        overturns."""
         fallen = self.outcomes != SAFE
         first = np.argmax(fallen, axis=0)
         return np.where(fallen.any(axis=0), self.amplitude_ratios[first], np.nan)
@@ -88,17 +96,24 @@ def overturning_spectrum(
 ) -> Spectrum:
     """The outcomes of a scene under pulses of its own kind, each run until its outcome is decided.
 
-    `frequency_ratios` (omega_p/p) and `amplitude_ratios` (a_p/(g tan alpha)) are increasing, positive and finite. `scene`
-    gives block, floor, walls and the kind of pulse (Ricker or sine); its duration and the pulse's own size are not used.
-    Where the scene's excitation is a record, `frequency_ratios` are sizes of the block relative to its own (the gaps stay as
-    they are) and `amplitude_ratios` multiply the record. With `refine` only every eighth node is run at first (more of a
-    small grid), then those between nodes that differ (and their neighbours). `jobs` threads, default all cores; `on_progress` is
-    told the nodes done by `model`. `play` runs the nodes elsewhere or by another model, instead of `model` here.
-    Raises `InputError`.
+    `frequency_ratios` (omega_p/p) and `amplitude_ratios` (a_p/(g tan alpha)) are increasing,
+    positive and finite. `scene` gives block, floor, walls and the kind of pulse (Ricker or sine);
+    its duration and the pulse's own size are not used. Where the scene's excitation is a record,
+    `frequency_ratios` are sizes of the block relative to its own (the gaps stay as they are) and
+    `amplitude_ratios` multiply the record. With `refine` only every eighth node is run at first
+    (more of a small grid), then those between nodes that differ (and their neighbours). `jobs`
+    threads, default all cores; `on_progress` is told the nodes done by `model`. `play` runs the
+    nodes elsewhere or by another model, instead of `model` here. Raises `InputError`.
     """
-    frequencies, amplitudes = _axis(frequency_ratios, "frequency_ratios"), _axis(amplitude_ratios, "amplitude_ratios")
+    frequencies, amplitudes = (
+        _axis(frequency_ratios, "frequency_ratios"),
+        _axis(amplitude_ratios, "amplitude_ratios"),
+    )
     if len(frequencies) * len(amplitudes) > MOST_NODES:
-        raise InputError(f"{len(frequencies)} x {len(amplitudes)} nodes are more than {MOST_NODES}", "frequency_ratios")
+        raise InputError(
+            f"{len(frequencies)} x {len(amplitudes)} nodes are more than {MOST_NODES}",
+            "frequency_ratios",
+        )
     check_kind(scene, Scene, "load_scene", "scene")
     check_excitation(scene)
     if play is None:
@@ -141,18 +156,23 @@ def play_nodes(
     jobs: int | None = None,
     on_progress: OnProgress = unheard,
 ) -> Nodes:
-    """The outcomes at nodes of a spectrum (1-D arrays of one length): sides (-1, 0, +1), and whether the run failed.
+    """The outcomes at nodes of a spectrum (1-D arrays of one length): sides (-1, 0, +1), and
+    whether the run failed.
 
     A run that fails is made once more at a hundredth of the tolerance.
     """
     sides, failed = _batch_of(scene, amplitude_ratios, frequency_ratios, model, jobs, on_progress)
     if failed.any():
         finer = model.model_copy(update={"tolerance": max(1e-2 * model.tolerance, 1e-15)})
-        sides[failed], failed[failed] = _batch_of(scene, amplitude_ratios[failed], frequency_ratios[failed], finer, jobs, unheard)
+        sides[failed], failed[failed] = _batch_of(
+            scene, amplitude_ratios[failed], frequency_ratios[failed], finer, jobs, unheard
+        )
     return sides, failed
 
 
-def _play_part(scene: Scene, amplitude_ratios: Floats, frequency_ratios: Floats, *, count: Count, **how: Any) -> Nodes:
+def _play_part(
+    scene: Scene, amplitude_ratios: Floats, frequency_ratios: Floats, *, count: Count, **how: Any
+) -> Nodes:
     return play_nodes(scene, amplitude_ratios, frequency_ratios, on_progress=count.part(), **how)
 
 
@@ -171,18 +191,29 @@ def _batch_of(
     return found.side, found.failed
 
 
-def _packed(scene: Scene, amplitude_ratios: Floats, frequency_ratios: Floats, model: EventBasedModel) -> Packed:
+def _packed(
+    scene: Scene, amplitude_ratios: Floats, frequency_ratios: Floats, model: EventBasedModel
+) -> Packed:
     from rockcheck.ebm import batch
 
     if scene.excitation.kind == "record":
-        return batch.pack([node_scene(scene, a, f) for a, f in zip(amplitude_ratios, frequency_ratios, strict=True)], model)
+        return batch.pack(
+            [
+                node_scene(scene, a, f)
+                for a, f in zip(amplitude_ratios, frequency_ratios, strict=True)
+            ],
+            model,
+        )
     periods = 2.0 * math.pi / (frequency_ratios * scene.frequency_parameter)
-    return batch.pack_pulses(scene, model, amplitude_ratios * scene.gravity * scene.block.slope, periods)
+    return batch.pack_pulses(
+        scene, model, amplitude_ratios * scene.gravity * scene.block.slope, periods
+    )
 
 
 @dataclass(frozen=True)
 class Motion:
-    """The motion at one node: `rows` of t (s), theta (rad), x and y (m), fewer where the node's `block` overturns; and the outcome."""
+    """The motion at one node: `rows` of t (s), theta (rad), x and y (m), fewer where the node's
+    `block` overturns; and the outcome."""
 
     block: Block
     rows: Floats
@@ -200,32 +231,49 @@ def play_motions(
 ) -> list[Motion | None]:
     """The motion at nodes of a spectrum (1-D arrays of one length), None where the run failed.
 
-    Each lasts as long as its `node_scene`, and has a row at its start and at the ends of so many equal parts.
+    Each lasts as long as its `node_scene`, and has a row at its start and at the ends of so many
+    equal parts.
     """
     from rockcheck.ebm import batch, natural
 
     nodes = list(zip(amplitude_ratios.tolist(), frequency_ratios.tolist(), strict=True))
-    changing = scene.excitation.kind == "record"  # its nodes are blocks of other sizes; the length of a pulse is its period's
-    scenes = {key: node_scene(scene, *key) for key in (nodes if changing else [(1.0, f) for f in np.unique(frequency_ratios).tolist()])}
+    changing = (
+        scene.excitation.kind == "record"
+    )  # its nodes are blocks of other sizes; the length of a pulse is its period's
+    scenes = {
+        key: node_scene(scene, *key)
+        for key in (nodes if changing else [(1.0, f) for f in np.unique(frequency_ratios).tolist()])
+    }
     played = [scenes[a if changing else 1.0, f] for a, f in nodes]
     lengths = np.array([one.duration / natural.time_unit(one) for one in played])
     packed = replace(_packed(scene, amplitude_ratios, frequency_ratios, model), durations=lengths)
-    found = batch.run_batch(packed, model, until_decided=False, parts=parts, strict=False, jobs=jobs)
+    found = batch.run_batch(
+        packed, model, until_decided=False, parts=parts, strict=False, jobs=jobs
+    )
     motions: list[Motion | None] = []
     for one, failed, side, at_rest, states, written in zip(
         played, found.failed, found.side, found.at_rest, found.motion, found.written, strict=True
     ):
         x, y, theta = natural.to_si(one, states[: max(int(written), 1)])[:, :3].T
-        upright = int(np.argmax(fallen)) if (fallen := np.abs(theta) >= 0.5 * math.pi).any() else len(theta)
+        upright = (
+            int(np.argmax(fallen))
+            if (fallen := np.abs(theta) >= 0.5 * math.pi).any()
+            else len(theta)
+        )
         t = one.duration / parts * np.arange(len(theta))
         rows = np.column_stack([t, theta, x, y])[: max(upright, 1)]
-        outcome = {LEFT: "overturned left", RIGHT: "overturned right"}.get(int(side), "at rest" if at_rest else "moving")
+        outcome = {LEFT: "overturned left", RIGHT: "overturned right"}.get(
+            int(side), "at rest" if at_rest else "moving"
+        )
         motions.append(None if failed else Motion(one.block, rows, outcome))
     return motions
 
 
-def node_scene(scene: Scene, amplitude_ratio: float, frequency_ratio: float, settle: float = 6.0) -> Scene:
-    """The scene of one node of a spectrum, for any model to play; it lasts until `settle` s after the motion of the base."""
+def node_scene(
+    scene: Scene, amplitude_ratio: float, frequency_ratio: float, settle: float = 6.0
+) -> Scene:
+    """The scene of one node of a spectrum, for any model to play; it lasts until `settle` s after
+    the motion of the base."""
     if isinstance(scene.excitation, Record):
         return scene.replace(
             excitation=scene.excitation.scaled(float(amplitude_ratio)),
@@ -235,23 +283,31 @@ def node_scene(scene: Scene, amplitude_ratio: float, frequency_ratio: float, set
     tan_alpha = scene.block.slope
     amplitude = float(amplitude_ratio) * scene.gravity * tan_alpha
     period = 2.0 * math.pi / (float(frequency_ratio) * scene.frequency_parameter)
-    pulse = type(scene.excitation)(**scene.excitation.model_dump() | {"amplitude": amplitude, "period": period})
-    return scene.replace(excitation=pulse, duration=max(pulse.quiet_after, scene.vertical.quiet_after) + settle)
+    pulse = type(scene.excitation)(
+        **scene.excitation.model_dump() | {"amplitude": amplitude, "period": period}
+    )
+    return scene.replace(
+        excitation=pulse, duration=max(pulse.quiet_after, scene.vertical.quiet_after) + settle
+    )
 
 
 def check_excitation(scene: Scene) -> None:
     """Raises `InputError` where the scene's excitation has no size that a spectrum could vary."""
     if scene.excitation.kind not in ("ricker", "sine", "record"):
         raise InputError(
-            f"{scene.excitation.kind!r} is not allowed: a spectrum needs a ricker or sine pulse, or a record", "excitation.kind"
+            f"{scene.excitation.kind!r} is not allowed: a spectrum needs a ricker or sine pulse,"
+            " or a record",
+            "excitation.kind",
         )
 
 
 def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None]) -> None:
-    """Fills `outcomes`: a coarse grid, then at each halving only cells whose corners differ, with a ring around them.
+    """Fills `outcomes`: a coarse grid, then at each halving only cells whose corners differ, with a
+    ring around them.
 
-    The coarse grid has every eighth node, or more of them where that would be fewer than a dozen cells an axis. At last the
-    boundary is followed: no node near one of another outcome is left to inference, so that a thin tongue is found to its tip.
+    The coarse grid has every eighth node, or more of them where that would be fewer than a dozen
+    cells an axis. At last the boundary is followed: no node near one of another outcome is left to
+    inference, so that a thin tongue is found to its tip.
     """
     rows, columns = outcomes.shape
     inferred = np.zeros(outcomes.shape, dtype=bool)
@@ -268,7 +324,10 @@ def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None]
             near = near | _shifted(near, axis, 1) | _shifted(near, axis, -1)
         wanted = np.zeros(outcomes.shape, dtype=bool)
         for i, j in zip(*np.nonzero(near), strict=True):
-            wanted[i * step : min((i + 1) * step, rows - 1) + 1 : 1, j * step : min((j + 1) * step, columns - 1) + 1] = True
+            wanted[
+                i * step : min((i + 1) * step, rows - 1) + 1 : 1,
+                j * step : min((j + 1) * step, columns - 1) + 1,
+            ] = True
         finer = _lattice(rows, columns, half)
         run(wanted & finer)
         # Cells without a boundary are uniform: their inner nodes take the value of a corner.
@@ -288,7 +347,10 @@ def _near_another(outcomes: NDArray[np.int8]) -> NDArray[np.bool_]:
     from scipy import ndimage
 
     width = 2 * FOLLOWED + 1
-    least, most = (extreme(outcomes, width, mode="nearest") for extreme in (ndimage.minimum_filter, ndimage.maximum_filter))
+    least, most = (
+        extreme(outcomes, width, mode="nearest")
+        for extreme in (ndimage.minimum_filter, ndimage.maximum_filter)
+    )
     near: NDArray[np.bool_] = least != most
     return near
 
@@ -316,7 +378,9 @@ def _shifted(cells: NDArray[np.bool_], axis: int, by: int) -> NDArray[np.bool_]:
     out = np.zeros_like(cells)
     source = [slice(None), slice(None)]
     target = [slice(None), slice(None)]
-    source[axis], target[axis] = (slice(None, -1), slice(1, None)) if by > 0 else (slice(1, None), slice(None, -1))
+    source[axis], target[axis] = (
+        (slice(None, -1), slice(1, None)) if by > 0 else (slice(1, None), slice(None, -1))
+    )
     out[tuple(target)] = cells[tuple(source)]
     return out
 
@@ -327,7 +391,11 @@ def _axis(values: ArrayLike, key: str) -> NDArray[np.float64]:
     except (TypeError, ValueError):
         raise InputError("numbers are asked for", key) from None
     if axis.ndim != 1 or axis.size == 0:
-        raise InputError(f"{axis.size} values of {axis.ndim} dimensions; a list of at least one number is asked for", key)
+        raise InputError(
+            f"{axis.size} values of {axis.ndim} dimensions; a list of at least one number is asked"
+            " for",
+            key,
+        )
     if not np.all(np.isfinite(axis)) or axis[0] <= 0.0:
         raise InputError("positive finite numbers are asked for", key)
     if np.any(np.diff(axis) <= 0.0):

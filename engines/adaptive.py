@@ -1,10 +1,12 @@
-"""Adaptive stepping: an engine's contact solver inside an integrator of third order whose steps end at the events.
+"""Adaptive stepping: an engine's contact solver inside an integrator of third order whose steps end
+at the events.
 
-With a fixed step, the error of an engine is the time of its impacts and a drift along the arcs of its contacts, both of
-first order in the step. Here the engine only turns velocities into velocities, at the mean pose of a step (drift, kick, drift);
-step ends are placed where gaps close, where slip stops and where a block at rest may start to move; an impact has a step of
-its own, so short that nothing else happens in it. Between events, where the acceleration changes smoothly from step to step,
-that change corrects the drift, which is then of third order.
+With a fixed step, the error of an engine is the time of its impacts and a drift along the arcs of
+its contacts, both of first order in the step. Here the engine only turns velocities into
+velocities, at the mean pose of a step (drift, kick, drift); step ends are placed where gaps close,
+where slip stops and where a block at rest may start to move; an impact has a step of its own, so
+short that nothing else happens in it. Between events, where the acceleration changes smoothly from
+step to step, that change corrects the drift, which is then of third order.
 """
 
 from __future__ import annotations
@@ -29,8 +31,11 @@ _ROOM = 8192
 class Push(Protocol):
     """An engine as a map of velocities."""
 
-    def __call__(self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool) -> Vector:
-        """Velocity of the block after `dt` s with the felt acceleration in m/s^2 and the contacts closed at `pose`.
+    def __call__(
+        self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool
+    ) -> Vector:
+        """Velocity of the block after `dt` s with the felt acceleration in m/s^2 and the contacts
+        closed at `pose`.
 
         Contacts take their restitution only where `bouncing`; otherwise they stop what approaches.
         """
@@ -39,38 +44,65 @@ class Push(Protocol):
 def march_adaptively(
     scene: Scene, base: BaseMotion, push: Push, longest: float, short: float = 1.0
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Times (n) and states (n, 6) at step ends, and the accelerations (n-1, 2) felt in the steps, until |theta| = pi/2.
+    """Times (n) and states (n, 6) at step ends, and the accelerations (n-1, 2) felt in the steps,
+    until |theta| = pi/2.
 
-    The scene is one of a block with R = 1, see `engines.marching.in_units_of`; `base` is its base motion. No step is longer than
-    `longest` s; those at impacts and after events are `short` times the usual.
-    Raises `ModelFailure` if the motion blows up or needs very many steps.
+    The scene is one of a block with R = 1, see `engines.marching.in_units_of`; `base` is its base
+    motion. No step is longer than `longest` s; those at impacts and after events are `short` times
+    the usual. Raises `ModelFailure` if the motion blows up or needs very many steps.
     """
     from rockcheck.engines import stepping
     from rockcheck.scenes.compiled import for_types_of
 
     contacts, end = contacts_of(scene), float(scene.output_times[-1])
     limits = stepping.limits_of(scene, longest, short)
-    corners = np.array([(*contact.corner, *contact.normal, contact.distance) for contact in contacts])
+    corners = np.array(
+        [(*contact.corner, *contact.normal, contact.distance) for contact in contacts]
+    )
     starts = np.array([*base.starts, math.inf])
-    across, up = ((np.array(one.pieces or np.empty((0, 1))), one.interval, one.last) for one in (base.across, base.up))
+    across, up = (
+        (np.array(one.pieces or np.empty((0, 1))), one.interval, one.last)
+        for one in (base.across, base.up)
+    )
     most_steps = 100_000 + 20 * int(end / longest)
 
-    run = stepping.begun(np.array(kinematics.of_mass(scene.block, scene.initial_state), dtype=float), base.velocity(0.0), len(contacts))
+    run = stepping.begun(
+        np.array(kinematics.of_mass(scene.block, scene.initial_state), dtype=float),
+        base.velocity(0.0),
+        len(contacts),
+    )
     rows, count = np.empty((_ROOM, stepping.COLUMNS)), 1
     rows[0, :7] = 0.0, *run.state[:6]
-    step = for_types_of(stepping.step, run, corners, starts, across, up, limits, end, 0.0, 0.0, 0.0, rows[0])
+    step = for_types_of(
+        stepping.step, run, corners, starts, across, up, limits, end, 0.0, 0.0, 0.0, rows[0]
+    )
     going = stepping.plan(run, corners, starts, across, up, limits, end)
     while going:
         x, y, theta, vx, vy, w, dt, ax, ay, impact = run.asked.tolist()
         kicked = push((x, y, theta), (vx, vy, w), dt, (ax, ay), impact != 0.0)
         if count == len(rows):
             rows = np.concatenate([rows, np.empty_like(rows)])
-        going = step(run, corners, starts, across, up, limits, end, kicked[0], kicked[1], kicked[2], rows[count])
+        going = step(
+            run,
+            corners,
+            starts,
+            across,
+            up,
+            limits,
+            end,
+            kicked[0],
+            kicked[1],
+            kicked[2],
+            rows[count],
+        )
         count += 1
         if count % 512 == 0:
             tell(rows[count - 1, 0], end)
         if count > most_steps:
             going = stepping.LOST
         if going == stepping.LOST:
-            raise ModelFailure(f"no end to the events, or a motion that blew up, after {count} steps at t = {rows[count - 1, 0]:g} s")
+            raise ModelFailure(
+                f"no end to the events, or a motion that blew up, after {count} steps at t ="
+                f" {rows[count - 1, 0]:g} s"
+            )
     return rows[:count, 0].copy(), rows[:count, 1:7].copy(), rows[1:count, 7:].copy()

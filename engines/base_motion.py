@@ -1,4 +1,5 @@
-"""The shaking base as its velocity: a difference of velocities is the exact mean of an acceleration over a step."""
+"""The shaking base as its velocity: a difference of velocities is the exact mean of an acceleration
+over a step."""
 
 from __future__ import annotations
 
@@ -27,14 +28,19 @@ class BaseVelocity:
             self.interval = 1.0
         else:
             self.interval = excitation.period / SAMPLES_A_PERIOD
-        self.times = self.interval * np.arange(math.ceil(excitation.quiet_after / self.interval - 1e-9) + 1)
+        self.times = self.interval * np.arange(
+            math.ceil(excitation.quiet_after / self.interval - 1e-9) + 1
+        )
         # Lists: an engine's loop asks for one time after another.
         self.pieces: list[list[float]] = []
         self.last = 0.0
         if len(self.times) > 1:
             samples = excitation.acceleration(self.times)
             lines = np.array([np.diff(samples) / self.interval, samples[:-1]])
-            pieces = PPoly(lines if isinstance(excitation, Record) else CubicSpline(self.times, samples).c, self.times)
+            pieces = PPoly(
+                lines if isinstance(excitation, Record) else CubicSpline(self.times, samples).c,
+                self.times,
+            )
             velocity = pieces.antiderivative()
             self.pieces, self.last = velocity.c[::-1].T.tolist(), float(velocity(self.times[-1]))
 
@@ -44,7 +50,8 @@ class BaseVelocity:
 
 
 def velocity_at(t: Any, pieces: Any, interval: Any, last: Any) -> Any:
-    """`last` after all `pieces`, polynomials in the time since their start, which follow each other after `interval` s."""
+    """`last` after all `pieces`, polynomials in the time since their start, which follow each other
+    after `interval` s."""
     index = int(t / interval)
     if index >= len(pieces):
         return last
@@ -56,32 +63,44 @@ def velocity_at(t: Any, pieces: Any, interval: Any, last: Any) -> Any:
 
 
 class BaseMotion:
-    """The base motion of a scene along both axes; `starts` are times at which it may set a resting block in motion."""
+    """The base motion of a scene along both axes; `starts` are times at which it may set a resting
+    block in motion."""
 
     def __init__(self, scene: Scene) -> None:
-        self.across, self.up, self.gravity = BaseVelocity(scene.excitation), BaseVelocity(scene.vertical), scene.gravity
-        self.starts = _starts_of_motion(scene, np.unique(np.concatenate([self.across.times, self.up.times])))
+        self.across, self.up, self.gravity = (
+            BaseVelocity(scene.excitation),
+            BaseVelocity(scene.vertical),
+            scene.gravity,
+        )
+        self.starts = _starts_of_motion(
+            scene, np.unique(np.concatenate([self.across.times, self.up.times]))
+        )
 
     def velocity(self, t: float) -> tuple[float, float]:
         """Velocity of the base to the right and up in m/s at the time `t` >= 0 in s."""
         return self.across(t), self.up(t)
 
     def felt_acceleration(self, edges: FloatArray) -> FloatArray:
-        """What the block feels, -u and -(g + vg) in m/s^2, as means over the steps between the times `edges`; shape (steps, 2)."""
+        """What the block feels, -u and -(g + vg) in m/s^2, as means over the steps between the
+        times `edges`; shape (steps, 2)."""
         gained = np.diff([self.velocity(t) for t in edges.tolist()], axis=0)
         return -gained / np.diff(edges)[:, None] - np.array([0.0, self.gravity])
 
 
 def _starts_of_motion(scene: Scene, times: FloatArray) -> list[float]:
-    """Times in order at which a block at rest, flat on the floor, may start or stop to slide or to tip, s.
+    """Times in order at which a block at rest, flat on the floor, may start or stop to slide or to
+    tip, s.
 
-    There |u| passes mu (g + vg) or tan(alpha) (g + vg); accelerations are taken to be linear between `times`.
+    There |u| passes mu (g + vg) or tan(alpha) (g + vg); accelerations are taken to be linear
+    between `times`.
     """
     pushing = np.abs(scene.excitation.acceleration(times))
     holding = scene.gravity + scene.vertical.acceleration(times)
     found = []
     left, right = scene.block.pivot("left"), scene.block.pivot("right")
-    for limit in dict.fromkeys((scene.floor.friction, left.arm / left.height, right.arm / right.height)):
+    for limit in dict.fromkeys(
+        (scene.floor.friction, left.arm / left.height, right.arm / right.height)
+    ):
         excess = pushing - limit * holding
         change = np.flatnonzero((excess[1:] > 0.0) != (excess[:-1] > 0.0))
         part = excess[change] / (excess[change] - excess[change + 1])

@@ -1,4 +1,5 @@
-"""Which corners of the block can touch which surface of a scene, and the kinematics of those contacts.
+"""Which corners of the block can touch which surface of a scene, and the kinematics of those
+contacts.
 
 All methods take scalars or arrays, SI units, relative to the base, counterclockwise positive.
 """
@@ -20,11 +21,13 @@ class Contact:
     surface: Literal["floor", "left", "right"]
     corner: tuple[float, float]  # from the mass's centre, in the block's own frame, m
     normal: tuple[float, float]  # out of the surface
-    distance: float  # from the surface to the point of the floor below the centre of the box as it stands, m
+    # from the surface to the point of the floor below the centre of the box as it stands, m
+    distance: float
     restitution: float
 
     def arm(self, cos: Any, sin: Any) -> Arm:
-        """From the mass's centre to the corner of the block turned by theta, given its cosine and sine: right, up, m."""
+        """From the mass's centre to the corner of the block turned by theta, given its cosine and
+        sine: right, up, m."""
         return arm_of(*self.corner, cos, sin)
 
     def gap(self, x: Any, y: Any, arm: Arm) -> Any:
@@ -51,18 +54,29 @@ def rate_of(nx: Any, nz: Any, x_dot: Any, y_dot: Any, theta_dot: Any, arm: Arm) 
     return nx * (x_dot - theta_dot * arm[1]) + nz * (y_dot + theta_dot * arm[0])
 
 
-def acceleration_of(nx: Any, nz: Any, x_ddot: Any, y_ddot: Any, theta_ddot: Any, theta_dot: Any, arm: Arm) -> Any:
+def acceleration_of(
+    nx: Any, nz: Any, x_ddot: Any, y_ddot: Any, theta_ddot: Any, theta_dot: Any, arm: Arm
+) -> Any:
     """The acceleration of the gap to a surface with the normal (nx, nz), m/s^2."""
     turning = theta_dot * theta_dot
-    return nx * (x_ddot - theta_ddot * arm[1] - turning * arm[0]) + nz * (y_ddot + theta_ddot * arm[0] - turning * arm[1])
+    return nx * (x_ddot - theta_ddot * arm[1] - turning * arm[0]) + nz * (
+        y_ddot + theta_ddot * arm[0] - turning * arm[1]
+    )
 
 
 def contacts_of(scene: Scene) -> tuple[Contact, ...]:
-    """The contacts a scene can use: its lower corners on the floor and, where there is a wall, the corners of that side."""
+    """The contacts a scene can use: its lower corners on the floor and, where there is a wall, the
+    corners of that side."""
     b, h = scene.block.half_width, scene.block.half_height
     dx, dz = scene.block.offset
     found = [
-        Contact(surface="floor", corner=(bx - dx, -h - dz), normal=(0.0, 1.0), distance=0.0, restitution=scene.floor.restitution)
+        Contact(
+            surface="floor",
+            corner=(bx - dx, -h - dz),
+            normal=(0.0, 1.0),
+            distance=0.0,
+            restitution=scene.floor.restitution,
+        )
         for bx in (-b, b)
     ]
     for wall in scene.walls:

@@ -15,14 +15,17 @@ from rockcheck.scenes import Scene
 FloatArray = NDArray[np.float64]
 SLAB = 10.0  # half the thickness of floor and walls
 REACH = 100.0  # half their extent
-#: DART drops rebounds slower than 0.1 of its units of length a second, and caps them at 100: sqrt(g R) is made so many of them.
+#: DART drops rebounds slower than 0.1 of its units of length a second, and caps them at 100: sqrt(g
+#: R) is made so many of them.
 NATURAL_SPEED = 30.0
-#: Of its iterative solver, which converges where steps are tiny; its direct one gives way by 3e-4 g dt in each step.
+#: Of its iterative solver, which converges where steps are tiny; its direct one gives way by 3e-4 g
+#: dt in each step.
 SWEEPS, TOLERANCE = 100, 1e-8
 
 
 class Dart(Engine):
-    """DART, with FCL's collision detection; at its best penetration is corrected apart from velocity, and nothing sleeps."""
+    """DART, with FCL's collision detection; at its best penetration is corrected apart from
+    velocity, and nothing sleeps."""
 
     name: ClassVar[str] = "dart"
     module: ClassVar[str] = "dartpy"
@@ -39,7 +42,8 @@ class Dart(Engine):
 
 
 class _DartWorld(World):
-    """A world with a box in its plane, floor and walls, and DART's default parameters; `scale` of its lengths are one of the scene's."""
+    """A world with a box in its plane, floor and walls, and DART's default parameters; `scale` of
+    its lengths are one of the scene's."""
 
     def __init__(self, scene: Scene, scale: float = 1.0) -> None:
         import dartpy
@@ -54,18 +58,38 @@ class _DartWorld(World):
         joint.setArbitraryPlane([1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
         inertia = scale**2 * scene.block.gyration_squared
         body.setInertia(dartpy.dynamics.Inertia(1.0, np.zeros(3), inertia * np.eye(3)))
-        # Restitutions of two bodies multiply, of frictions the smaller counts: the block's leave those of floor and walls.
-        self.contact = self._box(body, (2.0 * b, 2.0 * b, 2.0 * h), scene.floor.friction, 1.0, scale * np.array(scene.block.offset))
+        # Restitutions of two bodies multiply, of frictions the smaller counts: the block's leave
+        # those of floor and walls.
+        self.contact = self._box(
+            body,
+            (2.0 * b, 2.0 * b, 2.0 * h),
+            scene.floor.friction,
+            1.0,
+            scale * np.array(scene.block.offset),
+        )
         self.world.addSkeleton(self.block)
         self._slab("floor", (0.0, 1.0), 0.0, scene.floor.friction, scene.floor.restitution, scale)
         for wall in scene.walls:
             inward = 1.0 if wall.side == "left" else -1.0
-            self._slab(wall.side, (inward, 0.0), scene.block.half_width + wall.gap, 0.0, wall.restitution, scale)
+            self._slab(
+                wall.side,
+                (inward, 0.0),
+                scene.block.half_width + wall.gap,
+                0.0,
+                wall.restitution,
+                scale,
+            )
 
     def _box(
-        self, body: Any, size: tuple[float, float, float], friction: float, restitution: float, offset: FloatArray | None = None
+        self,
+        body: Any,
+        size: tuple[float, float, float],
+        friction: float,
+        restitution: float,
+        offset: FloatArray | None = None,
     ) -> Any:
-        """A box as a body's shape, by `offset` behind the mass's centre; returns what holds its friction and restitution."""
+        """A box as a body's shape, by `offset` behind the mass's centre; returns what holds its
+        friction and restitution."""
         node = body.createShapeNode(self.dart.dynamics.BoxShape(size))
         if offset is not None and offset.any():
             node.setRelativeTranslation([-offset[0], 0.0, -offset[1]])
@@ -75,7 +99,15 @@ class _DartWorld(World):
         contact.setRestitutionCoeff(restitution)
         return contact
 
-    def _slab(self, name: str, normal: tuple[float, float], distance: float, friction: float, restitution: float, scale: float) -> None:
+    def _slab(
+        self,
+        name: str,
+        normal: tuple[float, float],
+        distance: float,
+        friction: float,
+        restitution: float,
+        scale: float,
+    ) -> None:
         """A thick box whose face looks along the normal."""
         slab = self.dart.dynamics.Skeleton(name)
         joint, body = slab.createWeldJointAndBodyNodePair()
@@ -103,7 +135,10 @@ class _DartWorld(World):
 
     def state(self) -> State:
         """Where the block is."""
-        pose, velocity = self.block.getPositions() / self.scale, self.block.getVelocities() / self.scale
+        pose, velocity = (
+            self.block.getPositions() / self.scale,
+            self.block.getVelocities() / self.scale,
+        )
         return (*pose.tolist(), *velocity.tolist())
 
 

@@ -19,14 +19,20 @@ from rockcheck.scenes.errors import printable
 FloatArray = NDArray[np.float64]
 CORNER_RADIUS = 1e-5  # of the block's radius
 STIFFNESS = 2e8  # of each of two bodies in contact, N/m for a block of 1 kg and R = 1 m
-DISSIPATION = 1e4  # of Hunt and Crossley, s/m: nothing bounces, and an impact is over within its step
-STICTION, COARSEST_STICTION = 1e-7, 1e-3  # m/s: slower slip counts as none; at 1e-8 the solver often fails
+DISSIPATION = (
+    1e4  # of Hunt and Crossley, s/m: nothing bounces, and an impact is over within its step
+)
+STICTION, COARSEST_STICTION = (
+    1e-7,
+    1e-3,
+)  # m/s: slower slip counts as none; at 1e-8 the solver often fails
 IMPACT_STEPS = 40  # in which an impact can bounce
 SLAB, REACH = 20.0, 600.0  # thickness and extent of floor and walls
 
 
 class Drake(Engine):
-    """Drake's discrete plant; at its best with tiny spheres as corners, stiff contacts, and TAMSI, whose friction does not lift."""
+    """Drake's discrete plant; at its best with tiny spheres as corners, stiff contacts, and TAMSI,
+    whose friction does not lift."""
 
     name: ClassVar[str] = "drake"
     module: ClassVar[str] = "pydrake"
@@ -43,9 +49,15 @@ class Drake(Engine):
         return _DrakeWorld(scene)
 
     def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
-        """Corners on slabs, so soft that an impact lasts for some steps, with `restitution` as Hunt and Crossley's dissipation."""
+        """Corners on slabs, so soft that an impact lasts for some steps, with `restitution` as Hunt
+        and Crossley's dissipation."""
         floor = Floor(friction=parameters["friction"])
-        return _RigidDrakeWorld(scene.replace(floor=floor), self.tuned(step)["stiffness"], parameters["restitution"], stiction=1e-4)
+        return _RigidDrakeWorld(
+            scene.replace(floor=floor),
+            self.tuned(step)["stiffness"],
+            parameters["restitution"],
+            stiction=1e-4,
+        )
 
     def tuned(self, step: float) -> dict[str, float]:
         """The stiffness with which a block of 1 kg is in contact for `IMPACT_STEPS`, N/m."""
@@ -53,11 +65,14 @@ class Drake(Engine):
 
 
 class _DrakeWorld(World):
-    """A plant with a box in its plane, floor and walls, and Drake's default parameters; made when the step is known."""
+    """A plant with a box in its plane, floor and walls, and Drake's default parameters; made when
+    the step is known."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.dt = scene, 0.0
-        self.start: FloatArray | State = tuple(kinematics.of_mass(scene.block, np.array(scene.initial_state)).tolist())
+        self.start: FloatArray | State = tuple(
+            kinematics.of_mass(scene.block, np.array(scene.initial_state)).tolist()
+        )
 
     def place(self, state: FloatArray | State) -> None:
         """Put the block where `state` says."""
@@ -88,7 +103,12 @@ class _DrakeWorld(World):
     def _make(self, dt: float) -> None:
         from pydrake.math import RigidTransform, RotationMatrix
         from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
-        from pydrake.multibody.tree import FixedOffsetFrame, PlanarJoint, SpatialInertia, UnitInertia
+        from pydrake.multibody.tree import (
+            FixedOffsetFrame,
+            PlanarJoint,
+            SpatialInertia,
+            UnitInertia,
+        )
         from pydrake.systems.analysis import Simulator
         from pydrake.systems.framework import DiagramBuilder
 
@@ -97,11 +117,21 @@ class _DrakeWorld(World):
         self.plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=dt)
         self.plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
         inertia = self.scene.block.gyration_squared
-        body = self.plant.AddRigidBody("block", SpatialInertia(1.0, np.zeros(3), UnitInertia(inertia, inertia, inertia)))
+        body = self.plant.AddRigidBody(
+            "block", SpatialInertia(1.0, np.zeros(3), UnitInertia(inertia, inertia, inertia))
+        )
         # The joint's plane is its frame's x and y: to the right and up.
-        upright = RigidTransform(RotationMatrix([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]))
-        ends = {"plane of the world": self.plant.world_frame(), "plane of the block": body.body_frame()}
-        frames = [self.plant.AddFrame(FixedOffsetFrame(name, frame, upright)) for name, frame in ends.items()]
+        upright = RigidTransform(
+            RotationMatrix([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+        )
+        ends = {
+            "plane of the world": self.plant.world_frame(),
+            "plane of the block": body.body_frame(),
+        }
+        frames = [
+            self.plant.AddFrame(FixedOffsetFrame(name, frame, upright))
+            for name, frame in ends.items()
+        ]
         self.plant.AddJoint(PlanarJoint("plane", *frames, np.zeros(3)))
         self.shape(body)
         self.plant.Finalize()
@@ -119,12 +149,18 @@ class _DrakeWorld(World):
         from pydrake.math import RigidTransform
         from pydrake.multibody.plant import CoulombFriction
 
-        b, h, mu = self.scene.block.half_width, self.scene.block.half_height, self.scene.floor.friction
+        b, h, mu = (
+            self.scene.block.half_width,
+            self.scene.block.half_height,
+            self.scene.floor.friction,
+        )
         rough, smooth = CoulombFriction(mu, mu), CoulombFriction(0.0, 0.0)
         add, world = self.plant.RegisterCollisionGeometry, self.plant.world_body()
         dx, dz = self.scene.block.offset
         add(body, RigidTransform([-dx, 0.0, -dz]), Box(2.0 * b, 2.0 * b, 2.0 * h), "box", rough)
-        logging.getLogger("drake").setLevel(logging.ERROR)  # it would warn that half-spaces do not meet deformable bodies
+        logging.getLogger("drake").setLevel(
+            logging.ERROR
+        )  # it would warn that half-spaces do not meet deformable bodies
         add(world, HalfSpace.MakePose([0.0, 0.0, 1.0], np.zeros(3)), HalfSpace(), "floor", rough)
         for wall in self.scene.walls:
             inward = 1.0 if wall.side == "left" else -1.0
@@ -135,17 +171,26 @@ class _DrakeWorld(World):
 class _RigidDrakeWorld(_DrakeWorld):
     """Contacts of tiny spheres on slabs, so stiff, as they come, that a step stops them."""
 
-    def __init__(self, scene: Scene, stiffness: float = STIFFNESS, dissipation: float = DISSIPATION, stiction: float = STICTION) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        stiffness: float = STIFFNESS,
+        dissipation: float = DISSIPATION,
+        stiction: float = STICTION,
+    ) -> None:
         super().__init__(scene)
         self.stiffness, self.dissipation, self.stiction = stiffness, dissipation, stiction
         self.coarser: _RigidDrakeWorld | None = None
 
     def step_unsolved(self, felt: tuple[float, float], dt: float, failure: ModelFailure) -> None:
-        """The one step with a larger stiction speed, which smooths the turn from stick to slip that TAMSI stumbles over."""
+        """The one step with a larger stiction speed, which smooths the turn from stick to slip that
+        TAMSI stumbles over."""
         if self.stiction >= COARSEST_STICTION:
             raise failure
         if self.coarser is None:
-            self.coarser = _RigidDrakeWorld(self.scene, self.stiffness, self.dissipation, 10.0 * self.stiction)
+            self.coarser = _RigidDrakeWorld(
+                self.scene, self.stiffness, self.dissipation, 10.0 * self.stiction
+            )
         self.coarser.place(self.state())
         self.coarser.step(felt, dt)
         self.place(self.coarser.state())
@@ -159,7 +204,8 @@ class _RigidDrakeWorld(_DrakeWorld):
         from pydrake.multibody.plant import CoulombFriction, DiscreteContactApproximation
 
         plant, scene = self.plant, self.scene
-        # SAP's and the lagged approximations' friction is convex: what slides lifts off, whatever the step.
+        # SAP's and the lagged approximations' friction is convex: what slides lifts off, whatever
+        # the step.
         plant.set_discrete_contact_approximation(DiscreteContactApproximation.kTamsi)
 
         plant.set_stiction_tolerance(self.stiction)
@@ -167,12 +213,25 @@ class _RigidDrakeWorld(_DrakeWorld):
         def material(mu: float) -> Any:
             properties = ProximityProperties()
             friction = CoulombFriction(mu, mu)
-            AddContactMaterial(dissipation=self.dissipation, point_stiffness=self.stiffness, friction=friction, properties=properties)
+            AddContactMaterial(
+                dissipation=self.dissipation,
+                point_stiffness=self.stiffness,
+                friction=friction,
+                properties=properties,
+            )
             return properties
 
         add, world = plant.RegisterCollisionGeometry, plant.world_body()
-        for n, (bx, bz) in enumerate(dict.fromkeys(contact.corner for contact in contacts_of(scene))):
-            add(body, RigidTransform([bx, 0.0, bz]), Sphere(CORNER_RADIUS), f"corner {n}", material(scene.floor.friction))
+        for n, (bx, bz) in enumerate(
+            dict.fromkeys(contact.corner for contact in contacts_of(scene))
+        ):
+            add(
+                body,
+                RigidTransform([bx, 0.0, bz]),
+                Sphere(CORNER_RADIUS),
+                f"corner {n}",
+                material(scene.floor.friction),
+            )
         for name, contact in {contact.surface: contact for contact in contacts_of(scene)}.items():
             (nx, nz), depth = contact.normal, contact.distance + CORNER_RADIUS + 0.5 * SLAB
             box = Box(SLAB if nx else REACH, REACH, SLAB if nz else REACH)

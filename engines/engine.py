@@ -1,4 +1,5 @@
-"""The door that every engine stands behind: its settings, what it is asked for, and the history that comes out."""
+"""The door that every engine stands behind: its settings, what it is asked for, and the history
+that comes out."""
 
 from __future__ import annotations
 
@@ -33,16 +34,18 @@ STOCK_STEP = 1e-4
 class Engine(Frozen):
     """A physics engine as a model of the block.
 
-    `time_step` in s, or "adaptive": then steps end at the events and are at most `largest_step` s long. Those at impacts and just
-    after events are `short_steps` times their usual length. Where no step is given it is "adaptive", or `STOCK_STEP` where the
-    engine cannot vary its steps.
+    `time_step` in s, or "adaptive": then steps end at the events and are at most `largest_step` s
+    long. Those at impacts and just after events are `short_steps` times their usual length. Where
+    no step is given it is "adaptive", or `STOCK_STEP` where the engine cannot vary its steps.
 
-    `settings` "best" is the set-up that converges to rigid contact with Coulomb friction and Newton's restitution; "default" is
-    the engine as it comes, a box on a floor with the engine's own contact parameters, which cannot step adaptively.
+    `settings` "best" is the set-up that converges to rigid contact with Coulomb friction and
+    Newton's restitution; "default" is the engine as it comes, a box on a floor with the engine's
+    own contact parameters, which cannot step adaptively.
     """
 
     name: ClassVar[str]
-    #: The module that it needs, and the package that holds it, as pip knows it; "" where it comes with rockcheck.
+    #: The module that it needs, and the package that holds it, as pip knows it; "" where it comes
+    #: with rockcheck.
     module: ClassVar[str] = ""
     package: ClassVar[str] = ""
     #: Why its steps cannot vary; "" where they can.
@@ -66,16 +69,24 @@ class Engine(Frozen):
     def _step_or_adaptive(cls, value: object) -> float | Literal["adaptive"]:
         if value == "adaptive":
             return "adaptive"
-        if isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < math.inf:
+        if (
+            isinstance(value, int | float)
+            and not isinstance(value, bool)
+            and 0.0 < value < math.inf
+        ):
             return float(value)
         raise InputError(f'{printable(value)} is not allowed: give a step above 0 s, or "adaptive"')
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
         if self.settings == "default" and self.time_step == "adaptive":
-            raise InputError('"adaptive" is not allowed with settings = "default": give a step in s', "time_step")
+            raise InputError(
+                '"adaptive" is not allowed with settings = "default": give a step in s', "time_step"
+            )
         if self.fixed_because and self.time_step == "adaptive":
-            raise InputError(f'"adaptive" is not allowed: {self.fixed_because}; give a step in s', "time_step")
+            raise InputError(
+                f'"adaptive" is not allowed: {self.fixed_because}; give a step in s', "time_step"
+            )
         return self
 
     @classmethod
@@ -84,21 +95,26 @@ class Engine(Frozen):
         return not cls.module or find_spec(cls.module) is not None
 
     def coarser(self, factor: float) -> Self:
-        """The same engine with all steps `factor` times as long; of adaptive ones those at the events, too."""
+        """The same engine with all steps `factor` times as long; of adaptive ones those at the
+        events, too."""
         knobs = ("largest_step", "short_steps") if self.time_step == "adaptive" else ("time_step",)
         return self.model_copy(update={knob: factor * getattr(self, knob) for knob in knobs})
 
     @abstractmethod
     def rigid_world(self, scene: Scene) -> World:
-        """The scene as this engine holds it at its best: contacts stop or bounce within one step, whatever the step."""
+        """The scene as this engine holds it at its best: contacts stop or bounce within one step,
+        whatever the step."""
 
     @abstractmethod
     def stock_world(self, scene: Scene) -> World:
         """The scene as this engine holds it with its own contact parameters."""
 
     def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
-        """The scene with the engine's own parameters of contact, by default "restitution" and "friction" of its floor."""
-        floor = Floor.model_construct(friction=parameters["friction"], restitution=parameters["restitution"])
+        """The scene with the engine's own parameters of contact, by default "restitution" and
+        "friction" of its floor."""
+        floor = Floor.model_construct(
+            friction=parameters["friction"], restitution=parameters["restitution"]
+        )
         return self.stock_world(scene.model_copy(update={"floor": floor}))
 
     def tuned(self, step: float) -> dict[str, float]:
@@ -115,31 +131,44 @@ class Engine(Frozen):
         if scene.floor.mu_s != scene.floor.friction:
             friction = f"kinetic {scene.floor.friction:g} is used for static {scene.floor.mu_s:g}"
             notes.append(f"the engine has one friction coefficient: {friction}")
-        if "restitution" in self.lacks() and any(contact.restitution > 0.0 for contact in contacts_of(scene)):
-            notes.append(f"{self.name} has no coefficient of restitution with these settings; that of the scene is not used")
+        if "restitution" in self.lacks() and any(
+            contact.restitution > 0.0 for contact in contacts_of(scene)
+        ):
+            notes.append(
+                f"{self.name} has no coefficient of restitution with these settings; that of the"
+                " scene is not used"
+            )
         return notes
 
     def simulate(self, scene: Scene) -> History:
         """The history of the scene as the engine plays it.
 
-        The cost's `wall_seconds` and `cpu_seconds` are those of the march alone. Raises `InputError` if the scene needs
-        more than five million steps, `NotInstalled` if the engine is missing, `ModelFailure` if the motion blows up or its
-        events do not end.
+        The cost's `wall_seconds` and `cpu_seconds` are those of the march alone. Raises
+        `InputError` if the scene needs more than five million steps, `NotInstalled` if the engine
+        is missing, `ModelFailure` if the motion blows up or its events do not end.
         """
         if not self.installed():
-            raise NotInstalled(f"the engine {self.name} is not installed: pip install {self.package}", self.name)
+            raise NotInstalled(
+                f"the engine {self.name} is not installed: pip install {self.package}", self.name
+            )
         check_kind(scene, Scene, "load_scene", "scene")
         step = self.largest_step if self.time_step == "adaptive" else self.time_step
         if scene.duration / step > MOST_STEPS:
             key = "largest_step" if self.time_step == "adaptive" else "time_step"
-            raise InputError(f"{step:g} is not allowed: {scene.duration:g} s would need more than {MOST_STEPS} steps", key)
+            raise InputError(
+                f"{step:g} is not allowed: {scene.duration:g} s would need more than {MOST_STEPS}"
+                " steps",
+                key,
+            )
         start = time.perf_counter()
         unit = scene.block.radius if self.settings == "best" else 1.0  # of length, m
         played = in_units_of(unit, scene)
         base = BaseMotion(played)
         march: Callable[[], Marched]
         with ExitStack() as stack:
-            world = self.rigid_world(played) if self.settings == "best" else self.stock_world(played)
+            world = (
+                self.rigid_world(played) if self.settings == "best" else self.stock_world(played)
+            )
             stack.callback(world.close)
             if self.time_step == "adaptive":
                 march = partial(march_adaptively, played, base, world.push, step, self.short_steps)

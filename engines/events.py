@@ -1,4 +1,5 @@
-"""Events of a motion that was computed with contacts instead of modes, read off the states at the step ends."""
+"""Events of a motion that was computed with contacts instead of modes, read off the states at the
+step ends."""
 
 from __future__ import annotations
 
@@ -13,20 +14,29 @@ from rockcheck.scenes import Event, Scene, kinematics
 from rockcheck.scenes.observation import STATE, modes_of
 
 FloatArray = NDArray[np.float64]
-HOLD = 2e-3  # s: shorter openings of a contact are the engine's chatter, and an impulse is summed over this time
+# s: shorter openings of a contact are the engine's chatter, and an impulse is summed over this time
+HOLD = 2e-3
 REST = 20e-3  # s: a shorter rest is the dead centre of a last tiny rocking
-CLOSED = 1e-6  # block radii; wider at fixed steps, where a resting block falls freely for a step now and then
-GAP_NOISE, SLIP_NOISE = 1e-4, 1e-3  # of the thresholds: what a gap and a slip of a contact that holds may show
+# block radii; wider at fixed steps, where a resting block falls freely for a step now and then
+CLOSED = 1e-6
+GAP_NOISE, SLIP_NOISE = (
+    1e-4,
+    1e-3,
+)  # of the thresholds: what a gap and a slip of a contact that holds may show
 SLIPPING = 1e-3  # m/s
 TURNING = 1e-3  # rad/s
 
 
-def events_of(scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: FloatArray, felt: FloatArray) -> list[Event]:
-    """Events in order of time; `t` (n) and `states` (n, 6) of the mass's centre at step ends, `felt` (n-1 or more, 2) accelerations.
+def events_of(
+    scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: FloatArray, felt: FloatArray
+) -> list[Event]:
+    """Events in order of time; `t` (n) and `states` (n, 6) of the mass's centre at step ends,
+    `felt` (n-1 or more, 2) accelerations.
 
-    "floor impact" and "wall impact": the onset of a contact that had been open for more than 2 ms, with its normal
-    impulse in the first 2 ms; "uplift": one lower corner opens after both were closed for more than 20 ms; "lift-off",
-    "landing": of both; "release": a wall contact opens after more than 2 ms; "slip" and "stick" of the pivot; "settled"; "overturned ...".
+    "floor impact" and "wall impact": the onset of a contact that had been open for more than 2 ms,
+    with its normal impulse in the first 2 ms; "uplift": one lower corner opens after both were
+    closed for more than 20 ms; "lift-off", "landing": of both; "release": a wall contact opens
+    after more than 2 ms; "slip" and "stick" of the pivot; "settled"; "overturned ...".
     """
     motion = _Motion(scene, contacts, t, states, felt)
     found: list[tuple[float, str, int, float]] = []
@@ -34,19 +44,33 @@ def events_of(scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: 
     for contact, flags in zip(contacts, closed, strict=True):
         for index in _rises(flags):
             kind = "floor impact" if contact.surface == "floor" else "wall impact"
-            found.append((motion.onset(contact, index), kind, index, motion.impulse(contact, index)))
+            found.append(
+                (motion.onset(contact, index), kind, index, motion.impulse(contact, index))
+            )
         if contact.surface != "floor":
-            found += [(t[end], "release", end, 0.0) for end in _falls(flags) if t[end] - t[_run_start(flags, end)] > HOLD]
-    floor = [flags for contact, flags in zip(contacts, closed, strict=True) if contact.surface == "floor"]
+            found += [
+                (t[end], "release", end, 0.0)
+                for end in _falls(flags)
+                if t[end] - t[_run_start(flags, end)] > HOLD
+            ]
+    floor = [
+        flags for contact, flags in zip(contacts, closed, strict=True) if contact.surface == "floor"
+    ]
     flat, flight = floor[0] & floor[1], ~(floor[0] | floor[1])
     noise = GAP_NOISE * motion.near
     lowest, highest = np.sort([motion.gap(contact) for contact in contacts[:2]], axis=0)
-    found += [(t[_start(highest, i, noise)], "uplift", i, 0.0) for i in _falls(_held(flat, t, REST, value=True)) if not flight[i]]
+    found += [
+        (t[_start(highest, i, noise)], "uplift", i, 0.0)
+        for i in _falls(_held(flat, t, REST, value=True))
+        if not flight[i]
+    ]
     found += [(t[_start(lowest, i, noise)], "lift-off", i, 0.0) for i in _rises(flight)]
     found += [(t[i], "landing", i, 0.0) for i in _falls(flight)]
     slip_speed = np.abs(motion.slip_rate)
     slipping = _held(_held(~flight & (slip_speed > SLIPPING), t), t, value=True)
-    found += [(t[_start(slip_speed, i, SLIP_NOISE * SLIPPING)], "slip", i, 0.0) for i in _rises(slipping)]
+    found += [
+        (t[_start(slip_speed, i, SLIP_NOISE * SLIPPING)], "slip", i, 0.0) for i in _rises(slipping)
+    ]
     found += [(t[i], "stick", i, 0.0) for i in _falls(slipping) if not flight[i]]
     resting = _held(flat & ~slipping & (np.abs(states[:, 5]) < TURNING), t, REST, value=True)
     found += [(t[i], "settled", i, 0.0) for i in _rises(resting)]
@@ -60,7 +84,13 @@ def events_of(scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: 
     before = motion.modes([max(event[2] - 1, 0) for event in found])
     after = motion.modes([motion.later(event[2]) for event in found])
     return [
-        Event(t=float(time), kind=kind, mode_before=b, mode_after="overturned" if kind.startswith("overturned") else a, impulse=impulse)
+        Event(
+            t=float(time),
+            kind=kind,
+            mode_before=b,
+            mode_after="overturned" if kind.startswith("overturned") else a,
+            impulse=impulse,
+        )
         for (time, kind, _, impulse), b, a in zip(found, before, after, strict=True)
     ]
 
@@ -68,12 +98,24 @@ def events_of(scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: 
 class _Motion:
     """The states at all step ends, and what can be told from them."""
 
-    def __init__(self, scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: FloatArray, felt: FloatArray) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        contacts: Sequence[Contact],
+        t: FloatArray,
+        states: FloatArray,
+        felt: FloatArray,
+    ) -> None:
         self.scene, self.contacts, self.t, self.states, self.felt = scene, contacts, t, states, felt
-        self.near = CLOSED * scene.block.radius + 2.0 * scene.gravity * float(np.min(np.diff(t), initial=1e-3)) ** 2
+        self.near = (
+            CLOSED * scene.block.radius
+            + 2.0 * scene.gravity * float(np.min(np.diff(t), initial=1e-3)) ** 2
+        )
         #: The same of the box's centre.
         self.box = kinematics.of_box(scene.block, states)
-        self.slip_rate = kinematics.slip_rate(scene.block, states[:, 2], self.box[:, 3], states[:, 5])
+        self.slip_rate = kinematics.slip_rate(
+            scene.block, states[:, 2], self.box[:, 3], states[:, 5]
+        )
 
     def gap(self, contact: Contact, rows: slice = slice(None)) -> FloatArray:
         """Gaps of a contact at step ends, m."""
@@ -98,9 +140,11 @@ class _Motion:
         return min(int(np.searchsorted(self.t, self.t[index] + HOLD)), len(self.t) - 1)
 
     def impulse(self, contact: Contact, index: int) -> float:
-        """Normal impulse per unit mass of a contact in the 2 ms after its onset, m/s, from the balance of momentum.
+        """Normal impulse per unit mass of a contact in the 2 ms after its onset, m/s, from the
+        balance of momentum.
 
-        Engines report forces differently, and some dearly; what the contacts gave is what the free fall does not explain.
+        Engines report forces differently, and some dearly; what the contacts gave is what the free
+        fall does not explain.
         """
         from scipy.optimize import nnls
 
@@ -116,18 +160,31 @@ class _Motion:
             if other is contact or np.any(self.gap(other, slice(first, last + 1)) < self.near):
                 arm = other.arm(cos, sin)
                 normal = other.rate(along_x, along_y, turning, arm)
-                friction = self.scene.floor.friction * (along_x - arm[1] * turning) if other.surface == "floor" else 0.0 * normal
+                friction = (
+                    self.scene.floor.friction * (along_x - arm[1] * turning)
+                    if other.surface == "floor"
+                    else 0.0 * normal
+                )
                 columns += [normal + friction, normal - friction]  # the edges of its cone
                 owners += [other, other]
         scale = np.array([1.0, 1.0, 1.0 / self.scene.block.radius])
-        impulses, _ = nnls(np.array(columns).T * scale[:, None], gained * np.array([1.0, 1.0, inertia]) * scale)
-        return float(sum(part for part, owner in zip(impulses, owners, strict=True) if owner is contact))
+        impulses, _ = nnls(
+            np.array(columns).T * scale[:, None], gained * np.array([1.0, 1.0, inertia]) * scale
+        )
+        return float(
+            sum(part for part, owner in zip(impulses, owners, strict=True) if owner is contact)
+        )
 
     def modes(self, indices: Sequence[int]) -> list[str]:
         """Modes of motion at some step ends."""
         chosen = self.box[list(indices)]
         channels = {name: chosen[:, column] for column, name in enumerate(STATE)}
-        return [str(mode) for mode in modes_of(self.scene, channels | {"slip_rate": self.slip_rate[list(indices)]})]
+        return [
+            str(mode)
+            for mode in modes_of(
+                self.scene, channels | {"slip_rate": self.slip_rate[list(indices)]}
+            )
+        ]
 
 
 def _rises(flags: NDArray[np.bool_]) -> list[int]:
@@ -141,7 +198,8 @@ def _falls(flags: NDArray[np.bool_]) -> list[int]:
 
 
 def _start(values: FloatArray, index: int, noise: float) -> int:
-    """Where the rise of `values` above `noise` began that goes on at `index`: what grows slowly is noticed late."""
+    """Where the rise of `values` above `noise` began that goes on at `index`: what grows slowly is
+    noticed late."""
     while index > 0 and values[index] > max(values[index - 1], noise):
         index -= 1
     return index
@@ -153,7 +211,9 @@ def _run_start(flags: NDArray[np.bool_], end: int) -> int:
     return int(unset[-1]) + 1 if unset.size else 0
 
 
-def _held(flags: NDArray[np.bool_], t: FloatArray, hold: float = HOLD, *, value: bool = False) -> NDArray[np.bool_]:
+def _held(
+    flags: NDArray[np.bool_], t: FloatArray, hold: float = HOLD, *, value: bool = False
+) -> NDArray[np.bool_]:
     """`flags` without those runs of `value` inside it that last for `hold` s or less."""
     edges = np.flatnonzero(flags[1:] != flags[:-1]) + 1
     starts, ends = edges[:-1], edges[1:]  # of runs that neither begin nor end the motion

@@ -1,4 +1,5 @@
-"""What stands around the march of any engine: its unit of length, fixed steps, and the states on a scene's output grid."""
+"""What stands around the march of any engine: its unit of length, fixed steps, and the states on a
+scene's output grid."""
 
 from __future__ import annotations
 
@@ -8,24 +9,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.engines.world import World
-from rockcheck.scenes import Block, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from rockcheck.scenes import (
+    Block,
+    ModelFailure,
+    Record,
+    Rest,
+    Ricker,
+    Scene,
+    Sine,
+    Wall,
+    kinematics,
+)
 from rockcheck.scenes.progress import tell
 
 FloatArray = NDArray[np.float64]
-Marched = tuple[FloatArray, FloatArray, FloatArray]  # times (n) and states (n, 6) at step ends, felt accelerations (n-1, 2)
+Marched = tuple[
+    FloatArray, FloatArray, FloatArray
+]  # times (n) and states (n, 6) at step ends, felt accelerations (n-1, 2)
 STEPS_AT_ONCE = 2048
 BLOWN_UP = 1e6  # m, rad, m/s or rad/s: no scene comes near it
 
 
 def in_units_of(length: float, scene: Scene) -> Scene:
-    """The scene with all lengths in units of `length` m, so that the absolute tolerances of an engine fit any block."""
+    """The scene with all lengths in units of `length` m, so that the absolute tolerances of an
+    engine fit any block."""
 
     def rescaled(excitation: Rest | Ricker | Sine | Record) -> Rest | Ricker | Sine | Record:
         return excitation.scaled(1.0 / length)
 
     return scene.replace(
         block=_rescaled(scene.block, length),
-        walls=tuple(Wall(side=wall.side, gap=wall.gap / length, restitution=wall.restitution) for wall in scene.walls),
+        walls=tuple(
+            Wall(side=wall.side, gap=wall.gap / length, restitution=wall.restitution)
+            for wall in scene.walls
+        ),
         excitation=rescaled(scene.excitation),
         vertical=rescaled(scene.vertical),
         initial_velocity=scene.initial_velocity / length,
@@ -46,7 +63,8 @@ def _rescaled(block: Block, length: float) -> Block:
 
 
 def march_fixed(world: World, scene: Scene, times: FloatArray, felt: FloatArray) -> Marched:
-    """Times, states of the mass's centre at all step ends and felt accelerations, up to the first state with |theta| >= pi/2.
+    """Times, states of the mass's centre at all step ends and felt accelerations, up to the first
+    state with |theta| >= pi/2.
 
     Raises `ModelFailure` if the motion blows up or the block falls through the floor.
     """
@@ -60,9 +78,15 @@ def march_fixed(world: World, scene: Scene, times: FloatArray, felt: FloatArray)
         if tipped.size:
             states = states[: tipped[0] + 1]
         if not np.all(np.abs(states) < BLOWN_UP):  # catches nan, too
-            raise ModelFailure(f"the motion blew up between t = {times[first]:g} and {times[first + len(states)]:g} s")
+            raise ModelFailure(
+                f"the motion blew up between t = {times[first]:g} and"
+                f" {times[first + len(states)]:g} s"
+            )
         if np.any(states[:, 1] < 0.0):
-            raise ModelFailure(f"the block fell through the floor before t = {times[first + len(states)]:g} s: is the step too long?")
+            raise ModelFailure(
+                f"the block fell through the floor before t = {times[first + len(states)]:g} s: is"
+                " the step too long?"
+            )
         pieces.append(states)
         if tipped.size:
             break
@@ -71,7 +95,8 @@ def march_fixed(world: World, scene: Scene, times: FloatArray, felt: FloatArray)
 
 
 def at_output_times(scene: Scene, times: FloatArray, states: FloatArray) -> FloatArray:
-    """States on the scene's output grid: positions by cubic Hermite interpolation between steps, velocities linear.
+    """States on the scene's output grid: positions by cubic Hermite interpolation between steps,
+    velocities linear.
 
     Velocities jump at impacts, where a cubic would overshoot.
     """
@@ -83,5 +108,7 @@ def at_output_times(scene: Scene, times: FloatArray, states: FloatArray) -> Floa
         return states[: len(wanted)]
     inside = np.minimum(wanted, times[-1])
     positions = CubicHermiteSpline(times, states[:, :3], states[:, 3:])(inside)
-    velocities = np.column_stack([np.interp(inside, times, states[:, column]) for column in (3, 4, 5)])
+    velocities = np.column_stack(
+        [np.interp(inside, times, states[:, column]) for column in (3, 4, 5)]
+    )
     return np.hstack([positions, velocities])

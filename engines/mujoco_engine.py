@@ -16,21 +16,26 @@ from rockcheck.scenes import ModelFailure, Scene
 from rockcheck.scenes.errors import printable
 
 FloatArray = NDArray[np.float64]
-CORNER_RADIUS = 1e-8  # of the block's radius; contacts are points, and MuJoCo has no contact of a point with a plane
+# of the block's radius; contacts are points, and MuJoCo has no contact of a point with a plane
+CORNER_RADIUS = 1e-8
 PUSHED_OUT = 0.01  # share of a penetration that one step removes
 IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 1.0)
-RIGID = 1e7  # inverse regularisation of a contact, kg, where MuJoCo gives at most 1.5e4 to a block of 1 kg
-SLIDING = 1e-7  # block radii per second: how well a slip rate has to be known for the correction of the cone
+# inverse regularisation of a contact, kg, where MuJoCo gives at most 1.5e4 to a block of 1 kg
+RIGID = 1e7
+# block radii per second: how well a slip rate has to be known for the correction of the cone
+SLIDING = 1e-7
 FLATTEST = -0.05  # slope that the secant method trusts
 MOST_CORRECTIONS = 20
 
 
 class MuJoCo(Engine):
-    """MuJoCo, with contacts that remove the approach within one step (Euler, elliptic cone, Newton solver).
+    """MuJoCo, with contacts that remove the approach within one step (Euler, elliptic cone, Newton
+    solver).
 
-    `cone_correction` applies De Saxce's correction to the floor's contacts. MuJoCo's friction is associated: a sliding
-    contact lifts off at mu times its slip rate, whatever the step; the correction takes just that out. It belongs to
-    the "best" settings; the stock engine ("default") has none.
+    `cone_correction` applies De Saxce's correction to the floor's contacts. MuJoCo's friction is
+    associated: a sliding contact lifts off at mu times its slip rate, whatever the step; the
+    correction takes just that out. It belongs to the "best" settings; the stock engine ("default")
+    has none.
     """
 
     name: ClassVar[str] = "mujoco"
@@ -47,7 +52,8 @@ class MuJoCo(Engine):
         return _MuJoCoWorld(_stock_model(scene, scene.floor.friction))
 
     def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
-        """A box on a plane whose contacts stop within a step, with `restitution` in steps of damping."""
+        """A box on a plane whose contacts stop within a step, with `restitution` in steps of
+        damping."""
         friction, damping = parameters["friction"], parameters["restitution"] / step
         impedance = " ".join(map(repr, IMPEDANCE))
         solref = f"{-PUSHED_OUT / step**2!r} {-damping!r}"
@@ -100,7 +106,8 @@ class _MuJoCoWorld(World):
         return states
 
     def check(self) -> None:
-        """Raise `ModelFailure` if MuJoCo met a state or an acceleration that is huge or not finite."""
+        """Raise `ModelFailure` if MuJoCo met a state or an acceleration that is huge or not
+        finite."""
         if self.warnings:
             kinds = self.mujoco.mjtWarning
             bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
@@ -114,18 +121,28 @@ class _MuJoCoWorld(World):
 
 
 class _RigidMuJoCoWorld(_MuJoCoWorld):
-    """Contacts that end a step with -e times the normal velocity they began it with, and Coulomb's cone if corrected."""
+    """Contacts that end a step with -e times the normal velocity they began it with, and Coulomb's
+    cone if corrected."""
 
-    def __init__(self, model_text: str, contacts: Sequence[Contact], corrected_friction: float) -> None:
+    def __init__(
+        self, model_text: str, contacts: Sequence[Contact], corrected_friction: float
+    ) -> None:
         super().__init__(model_text)
         self.friction = corrected_friction
         self.stiffness, self.damping = self.model.pair_solref.T
         self.stiffness[:] = 0.0
         restitutions = np.array([contact.restitution for contact in contacts])
         self.stopping, self.bouncing = np.full(len(contacts), -1.0), -1.0 - restitutions
-        self.tuned: tuple[float, bool] | None = None  # step and `bouncing` of the push that the damping is for
-        # Not of a penetration that would come back as a bounce: no weight presses the block on a wall.
-        self.pushing_out = np.where([contact.surface == "floor" for contact in contacts] & (restitutions == 0.0), -PUSHED_OUT, 0.0)
+        self.tuned: tuple[float, bool] | None = (
+            None  # step and `bouncing` of the push that the damping is for
+        )
+        # Not of a penetration that would come back as a bounce: no weight presses the block on a
+        # wall.
+        self.pushing_out = np.where(
+            [contact.surface == "floor" for contact in contacts] & (restitutions == 0.0),
+            -PUSHED_OUT,
+            0.0,
+        )
 
     def march(self, felt: FloatArray, dt: float) -> FloatArray:
         """States after each step."""
@@ -146,7 +163,9 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
             self._correct_cone(rows, dt)
             self.mujoco.mj_Euler(self.model, self.data)
 
-    def push(self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool) -> Vector:
+    def push(
+        self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool
+    ) -> Vector:
         """Velocity after `dt` s with the contacts closed at `pose`."""
         model, data = self.model, self.data
         self.qpos[:] = pose
@@ -156,7 +175,9 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
             self.damping[:] = (self.bouncing if bouncing else self.stopping) * (IMPEDANCE[0] / dt)
             self.tuned = dt, bouncing
         self.mujoco.mj_step1(model, data)
-        data.efc_D.fill(RIGID)  # MuJoCo caps the impedance, and with it the share of an impact that its contacts take up
+        data.efc_D.fill(
+            RIGID
+        )  # MuJoCo caps the impedance, and with it the share of an impact that its contacts take up
         self.mujoco.mj_fwdAcceleration(model, data)
         self.mujoco.mj_fwdConstraint(model, data)
         if self.friction > 0.0 and (rows := self._slipping_rows()):
@@ -166,7 +187,8 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
         return velocity[0] + dt * ax, velocity[1] + dt * ay, velocity[2] + dt * spin
 
     def _slipping_rows(self) -> list[int]:
-        """The first constraint row of each floor contact, if one of them has reached the edge of its cone."""
+        """The first constraint row of each floor contact, if one of them has reached the edge of
+        its cone."""
         forces = self.data.efc_force.tolist()
         # Three rows for each contact with friction, which come first, and one for each without.
         rows = range(0, 3 * ((len(forces) - self.data.ncon) // 2), 3)
@@ -176,13 +198,17 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
         return []
 
     def _correct_cone(self, rows: list[int], dt: float) -> None:
-        """Solve again with the normal target of each floor contact lowered by mu times its slip rate, until that is consistent.
+        """Solve again with the normal target of each floor contact lowered by mu times its slip
+        rate, until that is consistent.
 
-        The fixed point obeys Coulomb's law with the contact neither parting nor closing (De Saxce & Feng 1998). Found by
-        the secant method, from the slip rate before the step.
+        The fixed point obeys Coulomb's law with the contact neither parting nor closing (De Saxce &
+        Feng 1998). Found by the secant method, from the slip rate before the step.
         """
         model, data, count = self.model, self.data, len(rows)
-        original, tangents = data.efc_aref.copy(), data.efc_J.reshape(-1, 3)[[row + 2 for row in rows]]
+        original, tangents = (
+            data.efc_aref.copy(),
+            data.efc_J.reshape(-1, 3)[[row + 2 for row in rows]],
+        )
         guess: list[float] = np.abs(tangents @ self.qvel).tolist()
         slope = [-1.0] * count  # of the excess over the guess
         last: list[tuple[float, float]] = []
@@ -201,7 +227,8 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
 
 
 def _planar_body(scene: Scene, geoms: str, raised: float = 0.0) -> str:
-    """A body of unit mass that moves in the plane x, z and turns counterclockwise, its origin `raised` m above that of the floor."""
+    """A body of unit mass that moves in the plane x, z and turns counterclockwise, its origin
+    `raised` m above that of the floor."""
     inertia = scene.block.gyration_squared
     return f"""
 <body pos="0 0 {raised!r}">
@@ -218,7 +245,8 @@ def _model(world: str, settings: str = "") -> str:
 def _plane(name: str, scene: Scene, inset: float, attributes: str) -> str:
     """The floor, or a wall `inset` m behind its surface.
 
-    The floor stays where it is and the block is raised instead: a plane nearer to the origin than 1e-6 m MuJoCo takes to be in it.
+    The floor stays where it is and the block is raised instead: a plane nearer to the origin than
+    1e-6 m MuJoCo takes to be in it.
     """
     if name == "floor":
         return f'<geom name="floor" type="plane" size="0 0 1" {attributes}/>'
@@ -229,16 +257,25 @@ def _plane(name: str, scene: Scene, inset: float, attributes: str) -> str:
 
 
 def _point_contact_model(scene: Scene) -> str:
-    """Corners as tiny spheres, and one contact pair for each contact that the scene can use, in their order."""
+    """Corners as tiny spheres, and one contact pair for each contact that the scene can use, in
+    their order."""
     off = 'contype="0" conaffinity="0"'
     contacts = contacts_of(scene)
-    corners = {corner: f"corner {number}" for number, corner in enumerate(dict.fromkeys(contact.corner for contact in contacts))}
+    corners = {
+        corner: f"corner {number}"
+        for number, corner in enumerate(dict.fromkeys(contact.corner for contact in contacts))
+    }
     spheres = "".join(
-        f'<geom name="{name}" type="sphere" size="{CORNER_RADIUS!r}" pos="{bx!r} 0 {bz!r}" {off}/>' for (bx, bz), name in corners.items()
+        f'<geom name="{name}" type="sphere" size="{CORNER_RADIUS!r}" pos="{bx!r} 0 {bz!r}" {off}/>'
+        for (bx, bz), name in corners.items()
     )
-    planes = "".join(_plane(name, scene, CORNER_RADIUS, off) for name in dict.fromkeys(contact.surface for contact in contacts))
+    planes = "".join(
+        _plane(name, scene, CORNER_RADIUS, off)
+        for name in dict.fromkeys(contact.surface for contact in contacts)
+    )
     impedance = " ".join(map(repr, IMPEDANCE))
-    # A frictionless floor is a frictionless contact: MuJoCo would raise a coefficient of zero to 1e-5.
+    # A frictionless floor is a frictionless contact: MuJoCo would raise a coefficient of zero to
+    # 1e-5.
     mu = scene.floor.friction
     kinds = dict.fromkeys(("floor", "left", "right"), 'condim="1"')
     if mu > 0.0:
@@ -247,8 +284,9 @@ def _point_contact_model(scene: Scene) -> str:
         f'<pair geom1="{contact.surface}" geom2="{corners[contact.corner]}" solimp="{impedance}" {kinds[contact.surface]}/>'
         for contact in contacts
     )
-    # Without warm start Newton's method needs fewer iterations, and it does not get stuck on the edge of a stiff cone.
-    # The 50 iterations of a line search that MuJoCo allows are too few there: Newton's method would stop short of its solution.
+    # Without warm start Newton's method needs fewer iterations, and it does not get stuck on the
+    # edge of a stiff cone. The 50 iterations of a line search that MuJoCo allows are too few there:
+    # Newton's method would stop short of its solution.
     settings = f"""
 <option integrator="Euler" cone="elliptic" impratio="1" jacobian="dense" solver="Newton" iterations="100" tolerance="1e-15"
   ls_tolerance="1e-6" ls_iterations="200"><flag island="disable" warmstart="disable"/></option>
@@ -257,11 +295,15 @@ def _point_contact_model(scene: Scene) -> str:
 
 
 def _stock_model(scene: Scene, mu: float, settings: str = "") -> str:
-    """A box on a plane, beside planes; without `settings` with MuJoCo's default contact parameters, solver and cone."""
+    """A box on a plane, beside planes; without `settings` with MuJoCo's default contact parameters,
+    solver and cone."""
     block = scene.block
     planes = _plane("floor", scene, 0.0, f'condim="3" friction="{mu!r} 0 0"')
     planes += "".join(_plane(wall.side, scene, 0.0, 'condim="1"') for wall in scene.walls)
-    (dx, dz), size = block.offset, f"{block.half_width!r} {block.half_width!r} {block.half_height!r}"
+    (dx, dz), size = (
+        block.offset,
+        f"{block.half_width!r} {block.half_width!r} {block.half_height!r}",
+    )
     place = "" if block.centre_of_mass is None else f'pos="{-dx!r} 0 {-dz!r}" '
     box = f'<geom type="box" {place}size="{size}" condim="1" friction="0 0 0"/>'
     return _model(planes + _planar_body(scene, box), settings)

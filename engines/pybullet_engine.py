@@ -17,14 +17,17 @@ from rockcheck.engines.world import State, World
 from rockcheck.scenes import Scene
 
 FloatArray = NDArray[np.float64]
-CORNER_RADIUS = 1e-9  # of the block's radius; contacts are points, and Bullet has no contact of a point with a plane
+# of the block's radius; contacts are points, and Bullet has no contact of a point with a plane
+CORNER_RADIUS = 1e-9
 SLAB = 10.0  # half the thickness, in m, of floor and walls as the engine comes
 REACH = 300.0  # half their extent
-FLOOR_ERP = 0.02  # share of a penetration that one step removes; none where it would add to a bounce or make one
+# share of a penetration that one step removes; none where it would add to a bounce or make one
+FLOOR_ERP = 0.02
 
 
 class PyBullet(Engine):
-    """PyBullet, with its default solver iterated until it has converged, without slop, damping and sleeping."""
+    """PyBullet, with its default solver iterated until it has converged, without slop, damping and
+    sleeping."""
 
     name: ClassVar[str] = "pybullet"
     module: ClassVar[str] = "pybullet"
@@ -59,7 +62,8 @@ def _aloft(scene: Scene) -> tuple[float, float, float]:
 
 
 class _PyBulletWorld(World):
-    """A physics server of its own with block, floor and walls, and PyBullet's default parameters."""
+    """A physics server of its own with block, floor and walls, and PyBullet's default
+    parameters."""
 
     def __init__(self, scene: Scene) -> None:
         self.bullet = pybullet = _bullet()
@@ -72,39 +76,62 @@ class _PyBulletWorld(World):
         self._make_surface(0.0, 1.0, 0.0, scene.floor.friction, scene.floor.restitution)
         for wall in scene.walls:
             inward = 1.0 if wall.side == "left" else -1.0
-            self._make_surface(inward, 0.0, scene.block.half_width + wall.gap, 0.0, wall.restitution)
+            self._make_surface(
+                inward, 0.0, scene.block.half_width + wall.gap, 0.0, wall.restitution
+            )
 
     def make_block(self, scene: Scene) -> int:
-        """A box. Friction and restitution of two bodies multiply: the block's are 1, so that those of floor and walls count."""
+        """A box. Friction and restitution of two bodies multiply: the block's are 1, so that those
+        of floor and walls count."""
         half = [scene.block.half_width, scene.block.half_width, scene.block.half_height]
         dx, dz = scene.block.offset
         placed = {} if scene.block.homogeneous else {"collisionFramePosition": [-dx, 0.0, -dz]}
-        shape = self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=half, **placed, **self.options)
-        body: int = self.bullet.createMultiBody(1.0, shape, basePosition=_aloft(scene), **self.options)
+        shape = self.bullet.createCollisionShape(
+            self.bullet.GEOM_BOX, halfExtents=half, **placed, **self.options
+        )
+        body: int = self.bullet.createMultiBody(
+            1.0, shape, basePosition=_aloft(scene), **self.options
+        )
         self.bullet.changeDynamics(body, -1, lateralFriction=1.0, restitution=1.0, **self.options)
         if not scene.block.homogeneous:  # of a plain box Bullet finds the inertia itself
             inertia = scene.block.gyration_squared
-            self.bullet.changeDynamics(body, -1, mass=1.0, localInertiaDiagonal=[inertia] * 3, **self.options)
+            self.bullet.changeDynamics(
+                body, -1, mass=1.0, localInertiaDiagonal=[inertia] * 3, **self.options
+            )
         return body
 
-    def _make_surface(self, normal_x: float, normal_z: float, distance: float, friction: float, restitution: float) -> None:
+    def _make_surface(
+        self, normal_x: float, normal_z: float, distance: float, friction: float, restitution: float
+    ) -> None:
         """The floor, or a wall, `distance` m from the point below the block."""
         shape, depth = self.make_shape(normal_x, normal_z)
         depth += distance
-        body = self.bullet.createMultiBody(0.0, shape, basePosition=[-normal_x * depth, 0.0, -normal_z * depth], **self.options)
-        self.bullet.changeDynamics(body, -1, lateralFriction=friction, restitution=restitution, **self.options)
+        body = self.bullet.createMultiBody(
+            0.0, shape, basePosition=[-normal_x * depth, 0.0, -normal_z * depth], **self.options
+        )
+        self.bullet.changeDynamics(
+            body, -1, lateralFriction=friction, restitution=restitution, **self.options
+        )
 
     def make_shape(self, normal_x: float, normal_z: float) -> tuple[int, float]:
-        """A thick box whose face looks along the normal, and how far behind that its centre is, m."""
+        """A thick box whose face looks along the normal, and how far behind that its centre is,
+        m."""
         extent = [SLAB if normal_x else REACH, REACH, SLAB if normal_z else REACH]
-        return self.bullet.createCollisionShape(self.bullet.GEOM_BOX, halfExtents=extent, **self.options), SLAB
+        return self.bullet.createCollisionShape(
+            self.bullet.GEOM_BOX, halfExtents=extent, **self.options
+        ), SLAB
 
     def place(self, state: FloatArray | State) -> None:
-        """Put the block where `state` says. Bullet's y axis points into the plane: its angles are clockwise."""
+        """Put the block where `state` says. Bullet's y axis points into the plane: its angles are
+        clockwise."""
         x, z, theta, vx, vz, w = map(float, state)
         turn = (0.0, -math.sin(0.5 * theta), 0.0, math.cos(0.5 * theta))
-        self.bullet.resetBasePositionAndOrientation(self.body, (x, 0.0, z), turn, physicsClientId=self.client)
-        self.bullet.resetBaseVelocity(self.body, (vx, 0.0, vz), (0.0, -w, 0.0), physicsClientId=self.client)
+        self.bullet.resetBasePositionAndOrientation(
+            self.body, (x, 0.0, z), turn, physicsClientId=self.client
+        )
+        self.bullet.resetBaseVelocity(
+            self.body, (vx, 0.0, vz), (0.0, -w, 0.0), physicsClientId=self.client
+        )
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
         """One step."""
@@ -116,11 +143,15 @@ class _PyBulletWorld(World):
 
     def state(self) -> State:
         """Where the block is."""
-        (x, _, z), (_, turn, _, whole) = self.bullet.getBasePositionAndOrientation(self.body, physicsClientId=self.client)
+        (x, _, z), (_, turn, _, whole) = self.bullet.getBasePositionAndOrientation(
+            self.body, physicsClientId=self.client
+        )
         (vx, _, vz), (_, w, _) = self.bullet.getBaseVelocity(self.body, physicsClientId=self.client)
         return x, z, -2.0 * math.atan2(turn, whole), vx, vz, -w
 
-    def push(self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool) -> Vector:
+    def push(
+        self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool
+    ) -> Vector:
         """Velocity after `dt` s with the contacts closed at `pose`."""
         self.bounce(bouncing)
         self.place((*pose, *velocity))
@@ -136,8 +167,9 @@ class _PyBulletWorld(World):
 class _RigidPyBulletWorld(_PyBulletWorld):
     """Contacts of points with planes, solved to convergence.
 
-    A sphere is pushed at its lowest point: its radius below the corner turns the block with a moment that no step makes
-    smaller. On planes Bullet's normals are exact for spheres however small; on boxes it would lose them.
+    A sphere is pushed at its lowest point: its radius below the corner turns the block with a
+    moment that no step makes smaller. On planes Bullet's normals are exact for spheres however
+    small; on boxes it would lose them.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -155,15 +187,21 @@ class _RigidPyBulletWorld(_PyBulletWorld):
         )
 
     def make_block(self, scene: Scene) -> int:
-        """The block as tiny spheres at its corners; a huge inertia about the other axes keeps it in its plane."""
-        places = [[bx, 0.0, bz] for bx, bz in dict.fromkeys(contact.corner for contact in contacts_of(scene))]
+        """The block as tiny spheres at its corners; a huge inertia about the other axes keeps it in
+        its plane."""
+        places = [
+            [bx, 0.0, bz]
+            for bx, bz in dict.fromkeys(contact.corner for contact in contacts_of(scene))
+        ]
         shape = self.bullet.createCollisionShapeArray(
             shapeTypes=[self.bullet.GEOM_SPHERE] * len(places),
             radii=[CORNER_RADIUS] * len(places),
             collisionFramePositions=places,
             **self.options,
         )
-        body: int = self.bullet.createMultiBody(1.0, shape, basePosition=_aloft(scene), useMaximalCoordinates=1, **self.options)
+        body: int = self.bullet.createMultiBody(
+            1.0, shape, basePosition=_aloft(scene), useMaximalCoordinates=1, **self.options
+        )
         inertia = scene.block.gyration_squared
         self.bullet.changeDynamics(
             body,
@@ -184,7 +222,9 @@ class _RigidPyBulletWorld(_PyBulletWorld):
     def make_shape(self, normal_x: float, normal_z: float) -> tuple[int, float]:
         """A plane, behind the surface by the radius of the corners."""
         normal = [normal_x, 0.0, normal_z]
-        return self.bullet.createCollisionShape(self.bullet.GEOM_PLANE, planeNormal=normal, **self.options), CORNER_RADIUS
+        return self.bullet.createCollisionShape(
+            self.bullet.GEOM_PLANE, planeNormal=normal, **self.options
+        ), CORNER_RADIUS
 
     def march(self, felt: FloatArray, dt: float) -> FloatArray:
         """States after each step."""
@@ -195,5 +235,7 @@ class _RigidPyBulletWorld(_PyBulletWorld):
     def bounce(self, bouncing: bool) -> None:
         """Let all contacts have their restitution, or none."""
         if bouncing is not self.bouncing and (self.bounces or self.bouncing is None):
-            self.bullet.setPhysicsEngineParameter(restitutionVelocityThreshold=0.0 if bouncing else 1e30, **self.options)
+            self.bullet.setPhysicsEngineParameter(
+                restitutionVelocityThreshold=0.0 if bouncing else 1e30, **self.options
+            )
             self.bouncing = bouncing

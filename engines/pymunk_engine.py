@@ -46,12 +46,17 @@ class _PymunkWorld(World):
         b, h, slab = scene.block.half_width, scene.block.half_height, self.slab
         self.space = pymunk.Space()
         self.body = pymunk.Body(1.0, scene.block.gyration_squared)
-        # Friction and elasticity of two shapes multiply: the block's are 1, so that those of floor and walls count.
+        # Friction and elasticity of two shapes multiply: the block's are 1, so that those of floor
+        # and walls count.
         dx, dz = scene.block.offset
-        self.box = pymunk.Poly(self.body, [(x - dx, z - dz) for x, z in ((-b, -h), (b, -h), (b, h), (-b, h))])
+        self.box = pymunk.Poly(
+            self.body, [(x - dx, z - dz) for x, z in ((-b, -h), (b, -h), (b, h), (-b, h))]
+        )
         self.box.friction = self.box.elasticity = 1.0
         self.space.add(self.body, self.box)
-        surfaces = [((-REACH, -slab), (REACH, -slab), scene.floor.friction, scene.floor.restitution)]
+        surfaces = [
+            ((-REACH, -slab), (REACH, -slab), scene.floor.friction, scene.floor.restitution)
+        ]
         for wall in scene.walls:
             place = (b + wall.gap + slab) * (-1.0 if wall.side == "left" else 1.0)
             surfaces.append(((place, -REACH), (place, REACH), 0.0, wall.restitution))
@@ -88,20 +93,26 @@ class _RigidPymunkWorld(_PymunkWorld):
         self.space.collision_slop = 0.0
         self.space.collision_bias = KEPT
         self.space.iterations = ITERATIONS
-        self.space.collision_persistence = 1  # steps after which a contact that has opened is forgotten
+        self.space.collision_persistence = (
+            1  # steps after which a contact that has opened is forgotten
+        )
         self.aloft = (0.0, 10.0 * scene.block.radius, 0.0, 0.0, 0.0, 0.0)
 
     def bounce(self, bouncing: bool) -> None:
         """Let contacts have their restitution, or none."""
         self.box.elasticity = float(bouncing)
 
-    def push(self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool) -> Vector:
+    def push(
+        self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool
+    ) -> Vector:
         """Velocity after `dt` s with the contacts closed at `pose`.
 
-        Chipmunk begins with the impulses of the step before, which has to be as long: a step aloft makes it forget them.
-        It moves a body before it looks for contacts.
+        Chipmunk begins with the impulses of the step before, which has to be as long: a step aloft
+        makes it forget them. It moves a body before it looks for contacts.
         """
         self.place(self.aloft)
         self.step((0.0, 0.0), dt)
         (x, y, theta), (vx, vy, w) = pose, velocity
-        return super().push((x - vx * dt, y - vy * dt, theta - w * dt), velocity, dt, felt, bouncing)
+        return super().push(
+            (x - vx * dt, y - vy * dt, theta - w * dt), velocity, dt, felt, bouncing
+        )

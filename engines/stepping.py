@@ -1,7 +1,9 @@
-"""The step of `engines.adaptive`, compiled: what is asked of the engine next, and what its answer makes of the block.
+"""The step of `engines.adaptive`, compiled: what is asked of the engine next, and what its answer
+makes of the block.
 
-Lengths are in R. A contact is a row of `corners`, first those of the floor's two, then those of walls: the corner (2), the surface's
-normal (2) and its distance, see `engines.contacts`. A base motion is its pieces, their interval and the last velocity.
+Lengths are in R. A contact is a row of `corners`, first those of the floor's two, then those of
+walls: the corner (2), the surface's normal (2) and its distance, see `engines.contacts`. A base
+motion is its pieces, their interval and the last velocity.
 """
 
 from __future__ import annotations
@@ -25,12 +27,16 @@ CLOSED = 5e-9  # a corner nearer than this touches
 DRIFT = 3e-6  # of the longest step: a corner that rests may leave its surface by so much in one, and touches from there if it is more
 EMBEDDED = 5e-10  # how deep the engine sees a corner that touches
 PROBE_STEP = 6e-5  # the longest step where the acceleration is not known, that is, after an event
-SHORTEST_STEP = 2e-8  # an impact takes one: its time is wrong by so much, its place by what the block moves in it
+# an impact takes one: its time is wrong by so much, its place by what the block moves in it
+SHORTEST_STEP = 2e-8
 LONG_APPROACH = 6e-4  # from farther away the prediction of an event is only trusted to 95 %
-RESTING = 0.001  # of g times the longest step: slower approaches and departures are not told from rest
+RESTING = (
+    0.001  # of g times the longest step: slower approaches and departures are not told from rest
+)
 TOGETHER = 20.0  # of corners that strike at one moment, one may be so many times as fast as another: the slenderness of a slender block
 SETTLING_GAP = 2e-6
-# A corner that leaves and is back within twice this share of a step is taken to stay: of the longest step, after an event of a probe.
+# A corner that leaves and is back within twice this share of a step is taken to stay: of the
+# longest step, after an event of a probe.
 SETTLING_TIME = 0.2
 
 #: Contacts with the floor, the first rows of `corners`; all others are with walls.
@@ -39,15 +45,17 @@ FLOOR = 2
 OVER, GOES_ON, LOST = 0, 1, 2
 #: Of a row of the march: time, state (6), felt acceleration (2).
 COLUMNS = 9
-# The state: pose, velocity; mean acceleration and length of the step before, and whether they are known; time, velocity of the base
-# then.
+# The state: pose, velocity; mean acceleration and length of the step before, and whether they are
+# known; time, velocity of the base then.
 X, Y, THETA, VX, VY, W, AX, AY, SPIN, PAST_DT, KNOWN, T, BASE_X, BASE_Y = range(14)
-# What is asked of the engine: mean pose, velocity, length of the step, felt acceleration, and whether it is an impact.
+# What is asked of the engine: mean pose, velocity, length of the step, felt acceleration, and
+# whether it is an impact.
 POSE, VELOCITY, DT, FELT_X, FELT_Y, IMPACT = 0, 3, 6, 7, 8, 9
 
 
 class Limits(NamedTuple):
-    """What counts as near, short, long and slow in a scene, in R, s and R/s; its gravity; its block's height, standing."""
+    """What counts as near, short, long and slow in a scene, in R, s and R/s; its gravity; its
+    block's height, standing."""
 
     longest: float
     closed: float
@@ -61,12 +69,14 @@ class Limits(NamedTuple):
 
 
 class March(NamedTuple):
-    """What a run keeps from step to step; which contacts are closed in this step and were in the one before; what it asks for."""
+    """What a run keeps from step to step; which contacts are closed in this step and were in the
+    one before; what it asks for."""
 
     state: Floats
     closed: NDArray[np.bool_]
     before: NDArray[np.bool_]
-    #: Whether the step ends where slip stops; the velocity at which a contact is carried along its arc, right and up.
+    #: Whether the step ends where slip stops; the velocity at which a contact is carried along its
+    #: arc, right and up.
     stops: NDArray[np.bool_]
     carry: Floats
     asked: Floats
@@ -75,7 +85,8 @@ class March(NamedTuple):
 
 
 def limits_of(scene: Scene, longest: float, short: float) -> Limits:
-    """Those of a scene whose steps are at most `longest` s, and at events `short` times the usual."""
+    """Those of a scene whose steps are at most `longest` s, and at events `short` times the
+    usual."""
     moment = short / scene.frequency_parameter
     probe = min(PROBE_STEP * moment, longest)
     return Limits(
@@ -96,11 +107,17 @@ def begun(state: Floats, base: tuple[float, float], contacts: int) -> March:
     whole = np.zeros(BASE_Y + 1)
     whole[:6], whole[BASE_X : BASE_Y + 1] = state, base
     closed, before, stops = (np.zeros(count, dtype=bool) for count in (contacts, contacts, 1))
-    return March(whole, closed, before, stops, np.zeros(2), np.zeros(IMPACT + 1), np.zeros(1, dtype=np.int64))
+    return March(
+        whole, closed, before, stops, np.zeros(2), np.zeros(IMPACT + 1), np.zeros(1, dtype=np.int64)
+    )
 
 
 _velocity_at, _rate_of = inner_kernel(velocity_at), inner_kernel(rate_of)
-_arm_of, _gap_of, _acceleration_of = inner_kernel(arm_of), inner_kernel(gap_of), inner_kernel(acceleration_of)
+_arm_of, _gap_of, _acceleration_of = (
+    inner_kernel(arm_of),
+    inner_kernel(gap_of),
+    inner_kernel(acceleration_of),
+)
 
 
 @inner_kernel
@@ -111,7 +128,8 @@ def trusted(predicted: float, limits: Limits) -> float:
 
 @inner_kernel
 def time_to_close(gap: float, rate: float, curvature: float) -> float:
-    """When a gap with this rate and acceleration is zero, s; infinity if never. A gap that opens closes on its way back."""
+    """When a gap with this rate and acceleration is zero, s; infinity if never. A gap that opens
+    closes on its way back."""
     discriminant = rate * rate - 2.0 * curvature * gap
     if discriminant < 0.0:
         return math.inf
@@ -144,7 +162,10 @@ def length(run: March, corners: Floats, limits: Limits, dt: float) -> tuple[floa
     for i in range(len(corners)):
         bx, bz, nx, nz, distance = corners[i]
         arm = _arm_of(bx, bz, cos, sin)
-        gap, rate = _gap_of(nx, nz, distance, z[X], z[Y], arm), _rate_of(nx, nz, z[VX], z[VY], z[W], arm)
+        gap, rate = (
+            _gap_of(nx, nz, distance, z[X], z[Y], arm),
+            _rate_of(nx, nz, z[VX], z[VY], z[W], arm),
+        )
         run.closed[i] = not (gap > limits.closed or rate > leaving)
         if not run.closed[i]:
             curvature = _acceleration_of(nx, nz, z[AX], z[AY], z[SPIN], z[W], arm) if known else 0.0
@@ -169,29 +190,39 @@ def length(run: March, corners: Floats, limits: Limits, dt: float) -> tuple[floa
 def join(run: March, corners: Floats, limits: Limits, speed: float) -> None:
     """Lets corners share an impact that would strike at the same moment, not a hair later.
 
-    The corner that strikes touches from `closed` away, at `speed`, so the impact is early by the time in which it would arrive. What
-    comes down k times as fast is then still k times as far.
+    The corner that strikes touches from `closed` away, at `speed`, so the impact is early by the
+    time in which it would arrive. What comes down k times as fast is then still k times as far.
     """
     z = run.state
     cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
     for i in range(len(corners)):
         bx, bz, nx, nz, distance = corners[i]
         arm = _arm_of(bx, bz, cos, sin)
-        gap, rate = _gap_of(nx, nz, distance, z[X], z[Y], arm), _rate_of(nx, nz, z[VX], z[VY], z[W], arm)
-        run.closed[i] = run.closed[i] or (rate < -speed and gap < limits.closed * min(-rate / speed, TOGETHER))
+        gap, rate = (
+            _gap_of(nx, nz, distance, z[X], z[Y], arm),
+            _rate_of(nx, nz, z[VX], z[VY], z[W], arm),
+        )
+        run.closed[i] = run.closed[i] or (
+            rate < -speed and gap < limits.closed * min(-rate / speed, TOGETHER)
+        )
 
 
 @inner_kernel
 def drift(run: March, corners: Floats, dt: float) -> None:
     """The mean pose of the step and the velocity that the engine sees, into `asked`.
 
-    The engine sees the block in its mean pose, with the corners that touch just below the surface. What rests on a surface at the
-    step's end still moves along its arc in the mean pose; `carry` is that velocity. The engine's contacts know nothing of arcs, but
-    in a frame that moves with it they are right.
+    The engine sees the block in its mean pose, with the corners that touch just below the surface.
+    What rests on a surface at the step's end still moves along its arc in the mean pose; `carry` is
+    that velocity. The engine's contacts know nothing of arcs, but in a frame that moves with it
+    they are right.
     """
     z, (ax, ay, spin) = run.state, smooth(run)[:3]
     half, sixth, later = 0.5 * dt, dt * dt / 6.0, z[W] + dt * spin
-    px, py, mean = z[X] + half * z[VX] + sixth * ax, z[Y] + half * z[VY] + sixth * ay, z[THETA] + half * z[W] + sixth * spin
+    px, py, mean = (
+        z[X] + half * z[VX] + sixth * ax,
+        z[Y] + half * z[VY] + sixth * ay,
+        z[THETA] + half * z[W] + sixth * spin,
+    )
     run.carry[:] = 0.0
     cos, sin = math.cos(mean), math.sin(mean)
     for first, end in ((0, FLOOR), (FLOOR, len(corners))):
@@ -199,7 +230,10 @@ def drift(run: March, corners: Floats, dt: float) -> None:
         for i in range(first, end):
             if run.closed[i]:
                 bx, bz, nx, nz, distance = corners[i]
-                highest, last = max(highest, _gap_of(nx, nz, distance, px, py, _arm_of(bx, bz, cos, sin))), i
+                highest, last = (
+                    max(highest, _gap_of(nx, nz, distance, px, py, _arm_of(bx, bz, cos, sin))),
+                    i,
+                )
         if last >= 0:
             bx, bz, nx, nz, _ = corners[last]
             px, py = px - nx * (highest + EMBEDDED), py - nz * (highest + EMBEDDED)
@@ -209,12 +243,17 @@ def drift(run: March, corners: Floats, dt: float) -> None:
             if nz != 0.0:
                 run.carry[1] = later * (ends[0] - arm[0])
     run.asked[POSE], run.asked[POSE + 1], run.asked[POSE + 2] = px, py, mean
-    run.asked[VELOCITY], run.asked[VELOCITY + 1], run.asked[VELOCITY + 2] = z[VX] + run.carry[0], z[VY] + run.carry[1], z[W]
+    run.asked[VELOCITY], run.asked[VELOCITY + 1], run.asked[VELOCITY + 2] = (
+        z[VX] + run.carry[0],
+        z[VY] + run.carry[1],
+        z[W],
+    )
 
 
 @inner_kernel
 def smooth(run: March) -> tuple[float, float, float, bool]:
-    """The acceleration of the step before where the same contacts were closed in it, else zero; and whether they were."""
+    """The acceleration of the step before where the same contacts were closed in it, else zero; and
+    whether they were."""
     z = run.state
     if z[KNOWN] == 0.0:
         return 0.0, 0.0, 0.0, False
@@ -225,7 +264,9 @@ def smooth(run: March) -> tuple[float, float, float, bool]:
 
 
 @kernel
-def plan(run: March, corners: Floats, starts: Floats, across: Base, up: Base, limits: Limits, end: float) -> int:
+def plan(
+    run: March, corners: Floats, starts: Floats, across: Base, up: Base, limits: Limits, end: float
+) -> int:
     """Asks for the next step; returns OVER at the `end` or where the block lies, else GOES_ON."""
     z = run.state
     if not (z[T] < end - 1e-12 and abs(z[THETA]) < math.pi / 2):
@@ -234,9 +275,15 @@ def plan(run: March, corners: Floats, starts: Floats, across: Base, up: Base, li
         run.next_start[0] += 1
     dt, impact = length(run, corners, limits, min(end - z[T], starts[run.next_start[0]] - z[T]))
     z[T] += dt
-    base_x, base_y = _velocity_at(z[T], across[0], across[1], across[2]), _velocity_at(z[T], up[0], up[1], up[2])
+    base_x, base_y = (
+        _velocity_at(z[T], across[0], across[1], across[2]),
+        _velocity_at(z[T], up[0], up[1], up[2]),
+    )
     run.asked[DT], run.asked[IMPACT] = dt, impact
-    run.asked[FELT_X], run.asked[FELT_Y] = (z[BASE_X] - base_x) / dt, (z[BASE_Y] - base_y) / dt - limits.gravity
+    run.asked[FELT_X], run.asked[FELT_Y] = (
+        (z[BASE_X] - base_x) / dt,
+        (z[BASE_Y] - base_y) / dt - limits.gravity,
+    )
     z[BASE_X], z[BASE_Y] = base_x, base_y
     drift(run, corners, dt)
     return GOES_ON
@@ -247,7 +294,8 @@ def step(
     run: March, corners: Floats, starts: Floats, across: Base, up: Base, limits: Limits, end: float,
     kicked_x: float, kicked_y: float, kicked_w: float, row: Floats,
 ) -> int:  # fmt: skip
-    """Ends the step with the velocity that the engine gave, writes its `row`, and plans the next one; LOST where it has blown up."""
+    """Ends the step with the velocity that the engine gave, writes its `row`, and plans the next
+    one; LOST where it has blown up."""
     z, dt = run.state, run.asked[DT]
     known = z[KNOWN] != 0.0
     move(run, kicked_x - run.carry[0], kicked_y - run.carry[1], kicked_w, dt)
@@ -267,10 +315,12 @@ def step(
 
 @inner_kernel
 def move(run: March, vx: float, vy: float, w: float, dt: float) -> None:
-    """Pose, velocity and mean acceleration at the step's end, where the block has the velocity (vx, vy, w).
+    """Pose, velocity and mean acceleration at the step's end, where the block has the velocity (vx,
+    vy, w).
 
-    Where the same contacts were closed in the step before, the acceleration is taken to be linear over both steps, for the mean
-    pose (there the last one will do) and for the drift: dt/2 (v + v_new) - dt^2/12 (change of the acceleration over the step).
+    Where the same contacts were closed in the step before, the acceleration is taken to be linear
+    over both steps, for the mean pose (there the last one will do) and for the drift: dt/2 (v +
+    v_new) - dt^2/12 (change of the acceleration over the step).
     """
     z, (ax, ay, spin, same) = run.state, smooth(run)
     bend = dt**3 / (6.0 * (dt + z[PAST_DT])) if same else 0.0
@@ -302,7 +352,8 @@ def put_back(run: March, corners: Floats, limits: Limits) -> None:
 
 @inner_kernel
 def settles(z: Floats, corners: Floats, limits: Limits) -> bool:
-    """Whether both lower corners are on the floor, or so near and slow that they are back on it at once."""
+    """Whether both lower corners are on the floor, or so near and slow that they are back on it at
+    once."""
     cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
     for i in range(FLOOR):
         bx, bz, nx, nz, distance = corners[i]

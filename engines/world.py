@@ -16,8 +16,8 @@ State = tuple[float, float, float, float, float, float]
 class World(ABC):
     """One scene as an engine holds it: a block of unit mass that is free to move in its plane.
 
-    A state is x, y, theta of the mass's centre and their rates, x = 0 where the centre of the box stands first; theta is
-    counterclockwise positive.
+    A state is x, y, theta of the mass's centre and their rates, x = 0 where the centre of the box
+    stands first; theta is counterclockwise positive.
     """
 
     @abstractmethod
@@ -26,7 +26,8 @@ class World(ABC):
 
     @abstractmethod
     def step(self, felt: tuple[float, float], dt: float) -> None:
-        """One step of `dt` s with the `felt` acceleration, to the right and up, in units of length a s^2."""
+        """One step of `dt` s with the `felt` acceleration, to the right and up, in units of length
+        a s^2."""
 
     @abstractmethod
     def state(self) -> State:
@@ -43,7 +44,9 @@ class World(ABC):
     def bounce(self, bouncing: bool) -> None:  # noqa: B027 - asked of those alone whose steps can vary
         """Let contacts have their restitution, or none."""
 
-    def push(self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool) -> Vector:
+    def push(
+        self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool
+    ) -> Vector:
         """The engine as a map of velocities, for adaptive steps: see `engines.adaptive.Push`."""
         self.bounce(bouncing)
         self.place((*pose, *velocity))

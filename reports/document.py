@@ -130,10 +130,15 @@ def block_markdown(block: Table | Plot | Text) -> str:
     """A block as Markdown, as the documentation and `summary.md` have it."""
     title = f"## {block.title}\n\n" if block.title else ""
     if isinstance(block, Text):
-        return title + "\n\n".join(filter(None, [block.text, "\n".join(f"- {item}" for item in block.items)]))
+        return title + "\n\n".join(
+            filter(None, [block.text, "\n".join(f"- {item}" for item in block.items)])
+        )
     if isinstance(block, Plot) or block.on == "file":
         return ""
-    rows = [[words(cell, column) for cell, column in zip(row, block.columns, strict=True)] for row in block.rows]
+    rows = [
+        [words(cell, column) for cell, column in zip(row, block.columns, strict=True)]
+        for row in block.rows
+    ]
     note = f"\n\n{block.note}" if block.note else ""
     return title + markdown_table([column.head for column in block.columns], rows) + note
 

@@ -55,7 +55,11 @@ def figure_of(plot: Plot) -> Figure:
 
 def scripts_of(plots: Sequence[Plot], folder: Path) -> list[str]:
     """Writes the scripts of live plots with a drawer of their own; returns those of the page."""
-    found = [_function(SCRIPTS[plot.kind])(plot, folder) for plot in plots if plot.live and plot.kind in SCRIPTS]
+    found = [
+        _function(SCRIPTS[plot.kind])(plot, folder)
+        for plot in plots
+        if plot.live and plot.kind in SCRIPTS
+    ]
     return list(dict.fromkeys(script for some in found for script in some))
 
 
@@ -70,7 +74,9 @@ def lines(plot: Plot) -> Figure:
     columns = min(COLUMNS, len(plot.panels))
     rows = math.ceil(len(plot.panels) / columns)
     with figure_style():
-        figure = Figure(figsize=(PAGE, (3.4 if rows == 1 else 2.1 * rows) + 0.4), layout="constrained")
+        figure = Figure(
+            figsize=(PAGE, (3.4 if rows == 1 else 2.1 * rows) + 0.4), layout="constrained"
+        )
         grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         handles: dict[str, Any] = {}
         per = plot.data["per_unit"] if plot.data else 1.0
@@ -93,7 +99,8 @@ def lines(plot: Plot) -> Figure:
 
 
 def stable_steps(plot: Plot) -> Figure:
-    """A panel an axis: the largest stable step of each model with its settings, by colour and number."""
+    """A panel an axis: the largest stable step of each model with its settings, by colour and
+    number."""
     import numpy as np
     from matplotlib.figure import Figure
 
@@ -143,13 +150,23 @@ def _scale(ax: Axes, x: Axis, y: Axis) -> None:
 def _draw(ax: Axes, panel: Panel, handles: dict[str, Any]) -> None:
     for series, colour in zip(panel.series, colours(panel), strict=True):
         if series.style == "level":
-            drawn = ax.axhline(_known(series.y[0]), color="#6e6e6e", linewidth=1.0, linestyle=(0, (6, 3)))
+            drawn = ax.axhline(
+                _known(series.y[0]), color="#6e6e6e", linewidth=1.0, linestyle=(0, (6, 3))
+            )
         else:
             if series.high:
-                low, high = ([_known(value) for value in values] for values in (series.low, series.high))
+                low, high = (
+                    [_known(value) for value in values] for values in (series.low, series.high)
+                )
                 ax.fill_between(series.x, low, high, color=colour[0], alpha=0.15, linewidth=0)
-            look = STYLES[series.style] | ({"marker": LOOKS[series.look].marker} if series.look in LOOKS and series.style == "line" else {})
-            (drawn,) = ax.plot(series.x, [_known(value) for value in series.y], color=colour[0], **look)
+            look = STYLES[series.style] | (
+                {"marker": LOOKS[series.look].marker}
+                if series.look in LOOKS and series.style == "line"
+                else {}
+            )
+            (drawn,) = ax.plot(
+                series.x, [_known(value) for value in series.y], color=colour[0], **look
+            )
         if series.label and series.style != "thin":
             handles.setdefault(series.label, drawn)
 
@@ -184,7 +201,9 @@ def live_data(plot: Plot) -> dict[str, Any]:
             "colour": colour,
             "low": _short(series.low),
             "high": _short(series.high),
-            "fit": _short(fits[series.label].y) if series.label in fits and series.style != "thin" else [],
+            "fit": _short(fits[series.label].y)
+            if series.label in fits and series.style != "thin"
+            else [],
             "width": 0.7 if series.style == "thin" else 2.0,
         }
         for series, colour in zip(panel.series, colours(panel), strict=True)
@@ -203,7 +222,10 @@ def live_data(plot: Plot) -> dict[str, Any]:
 
 
 def _short(values: Any) -> list[float | None]:
-    return [None if value is None or not math.isfinite(value) else float(f"{value:.5g}") for value in values]
+    return [
+        None if value is None or not math.isfinite(value) else float(f"{value:.5g}")
+        for value in values
+    ]
 
 
 __all__ = ["DRAWERS", "Series", "figure_of", "lines", "live_data", "scripts_of"]

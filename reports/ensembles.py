@@ -1,4 +1,5 @@
-"""What is shown of an ensemble: the distribution of peak rotation by model, and how models agree scene by scene."""
+"""What is shown of an ensemble: the distribution of peak rotation by model, and how models agree
+scene by scene."""
 
 from __future__ import annotations
 
@@ -77,29 +78,49 @@ class EnsembleView:
     def samples(self) -> dict[str, Sample]:
         """By model: peaks (alpha, NaN where it failed) and outcomes of all scenes."""
         return {
-            model: Sample(np.array([math.nan if peak is None else peak for peak in peaks]), self.record.outcomes[model])
+            model: Sample(
+                np.array([math.nan if peak is None else peak for peak in peaks]),
+                self.record.outcomes[model],
+            )
             for model, peaks in self.record.peaks.items()
         }
 
     @property
     def references(self) -> tuple[str, ...]:
         """Models that others are held against here; the run's own reference first."""
-        named = [self.run.reference, self.run.model_form, *(f.against for cell in self.cells for f in cell.figures)]
+        named = [
+            self.run.reference,
+            self.run.model_form,
+            *(f.against for cell in self.cells for f in cell.figures),
+        ]
         return tuple(model for model in dict.fromkeys(named) if model in self.samples)
 
     def candidates(self, against: str) -> tuple[str, ...]:
         """Models that are held against that reference."""
-        return tuple(cell.model for cell in self.cells if any(figure.against == against for figure in cell.figures))
+        return tuple(
+            cell.model
+            for cell in self.cells
+            if any(figure.against == against for figure in cell.figures)
+        )
 
     def figure(self, model: str, measure: str, against: str) -> Figure:
         """One of a model's figures."""
         (cell,) = (cell for cell in self.cells if cell.model == model)
-        return next(figure for figure in cell.figures if (figure.measure, figure.against) == (measure, against))
+        return next(
+            figure
+            for figure in cell.figures
+            if (figure.measure, figure.against) == (measure, against)
+        )
 
     def overturning(self, model: str, against: str) -> Overturning:
         """The scenes by who falls in them."""
         reference, candidate = self.samples[against].fallen, self.samples[model].fallen
-        counts = (reference & candidate, reference & ~candidate, ~reference & candidate, ~reference & ~candidate)
+        counts = (
+            reference & candidate,
+            reference & ~candidate,
+            ~reference & candidate,
+            ~reference & ~candidate,
+        )
         return Overturning(*(int(np.sum(count)) for count in counts))
 
     @property
@@ -112,36 +133,65 @@ class EnsembleView:
         if drawn.gap:
             facts.append(("gap (m)", _distribution(drawn.gap)))
         if drawn.pulse:
-            facts += [("pulse", "Ricker, of random phase"), ("its period (s)", _distribution(drawn.pulse.period))]
+            facts += [
+                ("pulse", "Ricker, of random phase"),
+                ("its period (s)", _distribution(drawn.pulse.period)),
+            ]
             facts.append(("its peak (m/s²)", _distribution(drawn.pulse.amplitude)))
         if drawn.noise:
             noise = drawn.noise
             facts.append(
-                ("noise", f"Kanai-Tajimi, {number(noise.frequency)} Hz, damping {number(noise.damping)}, {number(noise.strong)} s")
+                (
+                    "noise",
+                    f"Kanai-Tajimi, {number(noise.frequency)} Hz, damping {number(noise.damping)},"
+                    f" {number(noise.strong)} s",
+                )
             )
             facts.append(("its peak (m/s²)", _distribution(noise.amplitude)))
         moved = {"friction": "floor", "gap": "wall"}
-        hidden = {moved[key] for key in moved if getattr(drawn, key)} | ({"base"} if drawn.pulse or drawn.noise else set())
+        hidden = {moved[key] for key in moved if getattr(drawn, key)} | (
+            {"base"} if drawn.pulse or drawn.noise else set()
+        )
         if self._base is not None:
-            facts += [(key, words) for key, words in display.scene_facts(self._base) if key not in hidden]
+            facts += [
+                (key, words) for key, words in display.scene_facts(self._base) if key not in hidden
+            ]
         return facts
 
     @cached_property
     def _base(self) -> Scene | None:
-        return Scene(**{"name": self.name, **self.ensemble.scene}) if "excitation" not in self.ensemble.scene else None
+        return (
+            Scene(**{"name": self.name, **self.ensemble.scene})
+            if "excitation" not in self.ensemble.scene
+            else None
+        )
 
     def table(self) -> str:
         """Peak rotation (alpha) and outcome of every scene by every model, as CSV."""
-        columns = ["scene", *(f"{what} {model}" for model in self.samples for what in ("peak_rotation_alpha", "outcome"))]
-        values = [column for sample in self.samples.values() for column in (sample.peaks.tolist(), sample.outcomes)]
-        return table_text(columns, ([n, *row] for n, row in enumerate(zip(*values, strict=True), 1)))
+        columns = [
+            "scene",
+            *(
+                f"{what} {model}"
+                for model in self.samples
+                for what in ("peak_rotation_alpha", "outcome")
+            ),
+        ]
+        values = [
+            column
+            for sample in self.samples.values()
+            for column in (sample.peaks.tolist(), sample.outcomes)
+        ]
+        return table_text(
+            columns, ([n, *row] for n, row in enumerate(zip(*values, strict=True), 1))
+        )
 
 
 def distributions_figure(view: EnsembleView) -> Drawing:
-    """The share of scenes whose peak is below each value, by model, and below it the difference from the reference.
+    """The share of scenes whose peak is below each value, by model, and below it the difference
+    from the reference.
 
-    An overturned block is beyond every peak, so that a curve ends at the share that stays. Shaded: where the
-    Kolmogorov-Smirnov test finds no difference at its level.
+    An overturned block is beyond every peak, so that a curve ends at the share that stays. Shaded:
+    where the Kolmogorov-Smirnov test finds no difference at its level.
     """
     from matplotlib.figure import Figure
     from scipy.stats import kstwobign
@@ -152,15 +202,27 @@ def distributions_figure(view: EnsembleView) -> Drawing:
         figure = Figure(figsize=(PAGE, 4.4))
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
         figure.subplots_adjust(0.085, 0.1, 0.985, 0.9, hspace=0.09)
-        grid = np.unique(np.concatenate([[0.0], *(_standing(sample) for sample in view.samples.values()), [MOST * 1.05]]))
+        grid = np.unique(
+            np.concatenate(
+                [[0.0], *(_standing(sample) for sample in view.samples.values()), [MOST * 1.05]]
+            )
+        )
         shares = {
-            model: np.searchsorted(_standing(sample), grid, side="right") / len(sample.peaks) for model, sample in view.samples.items()
+            model: np.searchsorted(_standing(sample), grid, side="right") / len(sample.peaks)
+            for model, sample in view.samples.items()
         }
         for model, share in shares.items():
-            style = known[model].line | ({"linewidth": 1.8, "zorder": 1.9} if model == reference else {"linewidth": 1.0})
+            style = known[model].line | (
+                {"linewidth": 1.8, "zorder": 1.9} if model == reference else {"linewidth": 1.0}
+            )
             above.step(grid, share, where="post", **style)
             if model != reference:
-                below.step(grid, share - shares[reference], where="post", **known[model].line | {"linewidth": 0.8})
+                below.step(
+                    grid,
+                    share - shares[reference],
+                    where="post",
+                    **known[model].line | {"linewidth": 0.8},
+                )
         counts = [len(sample.peaks) for sample in view.samples.values()]
         same = float(kstwobign.ppf(CONFIDENCE)) * math.sqrt(2.0 / min(counts))
         band = below.axhspan(-same, same, color="#009168", alpha=0.1, linewidth=0)
@@ -169,16 +231,25 @@ def distributions_figure(view: EnsembleView) -> Drawing:
         above.set_ylabel("share of scenes\nbelow the peak")
         below.set_ylabel("difference")
         below.set_xlabel("peak rotation |θ|/α of blocks that stay; the rest has overturned")
-        below.set_xlim(0.0, min(float(grid[-1]), MOST * 1.5))  # beyond: blocks that were still falling at the end
+        below.set_xlim(
+            0.0, min(float(grid[-1]), MOST * 1.5)
+        )  # beyond: blocks that were still falling at the end
         below.legend([band], [f"no difference at the {CONFIDENCE:.0%} level"], loc="lower right")
         title = f"{view.name}: peak rotation in {max(counts)} scenes"
         figure.text(0.012, 0.985, title, va="top", weight="bold", fontsize=8.5)
-        figure.legend(*above.get_legend_handles_labels(), ncols=6, loc="upper left", bbox_to_anchor=(0.0, 0.965), borderaxespad=0.3)
+        figure.legend(
+            *above.get_legend_handles_labels(),
+            ncols=6,
+            loc="upper left",
+            bbox_to_anchor=(0.0, 0.965),
+            borderaxespad=0.3,
+        )
     return figure
 
 
 def peaks_figure(view: EnsembleView) -> Drawing:
-    """Each scene as a point: its peak by a candidate against that by the reference; overturned blocks in the margins."""
+    """Each scene as a point: its peak by a candidate against that by the reference; overturned
+    blocks in the margins."""
     from matplotlib.figure import Figure
 
     reference = view.references[0]
@@ -190,7 +261,9 @@ def peaks_figure(view: EnsembleView) -> Drawing:
         height = 0.75 + 1.85 * rows
         figure = Figure(figsize=(PAGE, height))
         panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-        figure.subplots_adjust(0.08, 0.42 / height, 0.99, 1.0 - 0.45 / height, wspace=0.12, hspace=0.3)
+        figure.subplots_adjust(
+            0.08, 0.42 / height, 0.99, 1.0 - 0.45 / height, wspace=0.12, hspace=0.3
+        )
         for ax, model in zip(panels, candidates, strict=False):
             _cloud(ax, Samples(view.samples[reference], view.samples[model]), known[model].light)
             ax.set_title(known[model].label)
@@ -198,7 +271,14 @@ def peaks_figure(view: EnsembleView) -> Drawing:
             ax.set_visible(False)
         figure.supxlabel(f"peak |θ|/α by {known[reference].label}", fontsize=7.5, y=0.05 / height)
         figure.supylabel("peak |θ|/α by the model", fontsize=7.5, x=0.005)
-        figure.text(0.012, 1.0 - 0.06 / height, f"{view.name}: scene by scene", va="top", weight="bold", fontsize=8.5)
+        figure.text(
+            0.012,
+            1.0 - 0.06 / height,
+            f"{view.name}: scene by scene",
+            va="top",
+            weight="bold",
+            fontsize=8.5,
+        )
     return figure
 
 
@@ -234,7 +314,10 @@ def _standing(sample: Sample) -> np.ndarray:
 
 def _cloud(ax: Axes, samples: Samples, color: str) -> None:
     fallen = MOST * 3.2
-    x, y = (np.where(s.fallen, fallen, np.clip(s.peaks, LEAST, MOST * 1.6)) for s in (samples.reference, samples.candidate))
+    x, y = (
+        np.where(s.fallen, fallen, np.clip(s.peaks, LEAST, MOST * 1.6))
+        for s in (samples.reference, samples.candidate)
+    )
     apart = samples.reference.fallen != samples.candidate.fallen
     ax.plot([LEAST, MOST], [LEAST, MOST], color="#999999", linewidth=0.6, zorder=1)
     ax.plot(x[~apart], y[~apart], ".", color=color, markersize=2.0, markeredgewidth=0, alpha=0.7)
@@ -252,7 +335,16 @@ def _cloud(ax: Axes, samples: Samples, color: str) -> None:
     close = samples.log_ratios()
     if len(close) > 1:
         words = f"ln ratio {np.mean(close):+.2g} ± {np.std(close, ddof=1):.2g}\n{len(close)} above {SMALLEST_PEAK:g}"
-        ax.text(0.97, 0.03, words, transform=ax.transAxes, ha="right", va="bottom", fontsize=5.5, color="#555555")
+        ax.text(
+            0.97,
+            0.03,
+            words,
+            transform=ax.transAxes,
+            ha="right",
+            va="bottom",
+            fontsize=5.5,
+            color="#555555",
+        )
 
 
 def _distribution(of: Distribution) -> str:

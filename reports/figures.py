@@ -1,4 +1,5 @@
-"""Figures of one scene for a paper: the quantities of its Figs. 4 and 5 for all models, and their differences below each."""
+"""Figures of one scene for a paper: the quantities of its Figs. 4 and 5 for all models, and their
+differences below each."""
 
 from __future__ import annotations
 
@@ -28,17 +29,25 @@ LEGEND_COLUMNS = 6
 TOLERANCE = "#009168"
 
 
-def histories_figure(view: SceneView, against: str | None = None, channels: Sequence[Channel] = PAPER_CHANNELS) -> Figure:
-    """Each channel of all models over time, under each the difference from `against` with the tolerances shaded, then impacts.
+def histories_figure(
+    view: SceneView, against: str | None = None, channels: Sequence[Channel] = PAPER_CHANNELS
+) -> Figure:
+    """Each channel of all models over time, under each the difference from `against` with the
+    tolerances shaded, then impacts.
 
-    `against` None: the first reference of the scene; where there is none the differences are left out.
+    `against` None: the first reference of the scene; where there is none the differences are left
+    out.
     """
     from matplotlib.figure import Figure
 
     if against is None:
         against = next(iter(view.references), None)
     with figure_style():
-        heights = [0.55] + [h for _ in channels for h in ([1.0, 0.62] if against else [1.0])] + [0.16 * len(view.histories) + 0.15]
+        heights = (
+            [0.55]
+            + [h for _ in channels for h in ([1.0, 0.62] if against else [1.0])]
+            + [0.16 * len(view.histories) + 0.15]
+        )
         shades = _shades(view, against, channels)
         legend_rows = -(-(len(view.histories) + len(shades)) // LEGEND_COLUMNS)
         # Margins in inches: a layout engine would need several times the drawing's own time.
@@ -46,7 +55,9 @@ def histories_figure(view: SceneView, against: str | None = None, channels: Sequ
         height = top + bottom + 0.92 * sum(heights) + space * len(heights)
         figure = Figure(figsize=(PAGE, height))
         axes = list(figure.subplots(len(heights), 1, sharex=True, height_ratios=heights))
-        figure.subplots_adjust(0.95 / PAGE, bottom / height, 1.0 - 0.08 / PAGE, 1.0 - top / height, hspace=space / 0.7)
+        figure.subplots_adjust(
+            0.95 / PAGE, bottom / height, 1.0 - 0.08 / PAGE, 1.0 - top / height, hspace=space / 0.7
+        )
         _ground(axes[0], view)
         below = iter(axes[1:])
         for channel in channels:
@@ -60,7 +71,9 @@ def histories_figure(view: SceneView, against: str | None = None, channels: Sequ
         axes[-1].set_xlabel("time (s)")
         axes[-1].set_xlim(float(view.t[0]), float(view.t[-1]) or 1.0)
         edge = 0.08 / PAGE
-        figure.text(edge, 1.0 - 0.06 / height, _title(view, against), va="top", weight="bold", fontsize=8.5)
+        figure.text(
+            edge, 1.0 - 0.06 / height, _title(view, against), va="top", weight="bold", fontsize=8.5
+        )
         handles, labels = axes[1].get_legend_handles_labels()
         figure.legend(
             handles + shades,
@@ -70,7 +83,15 @@ def histories_figure(view: SceneView, against: str | None = None, channels: Sequ
             bbox_to_anchor=(0.0, 1.0 - 0.2 / height),
             borderaxespad=0.0,
         )
-        figure.text(1.0 - edge, 0.03 / height, _stamp(view), ha="right", va="bottom", fontsize=4.5, color="#777777")
+        figure.text(
+            1.0 - edge,
+            0.03 / height,
+            _stamp(view),
+            ha="right",
+            va="bottom",
+            fontsize=4.5,
+            color="#777777",
+        )
     return figure
 
 
@@ -91,7 +112,8 @@ def thumbnail(view: SceneView) -> Figure:
 
 
 def write_figures(view: SceneView, folder: Path) -> list[Path]:
-    """Write the figures of a scene into `folder`: a thumbnail, and where the run asks for them those for a paper, one a reference."""
+    """Write the figures of a scene into `folder`: a thumbnail, and where the run asks for them
+    those for a paper, one a reference."""
     written = save(thumbnail(view), folder / f"{view.slug}-small", ["svg"])
     for against in view.figure_references if view.printed else ():
         written += save(histories_figure(view, against), folder / figure_stem(view, against))
@@ -102,18 +124,23 @@ def figure_stem(view: SceneView, against: str | None) -> str:
     """File name, without its suffix, of the figure whose differences are from `against`."""
     if against is None or against == next(iter(view.references), None):
         return view.slug
-    return f"{view.slug}-against-{''.join(c if c.isalnum() or c in '._-' else '-' for c in against)}"
+    return (
+        f"{view.slug}-against-{''.join(c if c.isalnum() or c in '._-' else '-' for c in against)}"
+    )
 
 
 def fineness(view: SceneView, channel: Channel, bands: Sequence[Band]) -> float:
     """Where the scale of differences turns from linear to logarithmic, in the channel's unit.
 
-    The tightest tolerance that is not below a thousandth of the channel's largest value, else that thousandth: finer
-    scales would show nothing but decades.
+    The tightest tolerance that is not below a thousandth of the channel's largest value, else that
+    thousandth: finer scales would show nothing but decades.
     """
     largest = max((_largest(columns[channel.name]) for columns in view.drawn.values()), default=0.0)
     least = float(f"{FINE * largest:.1g}") or 1e-12
-    return min((band.limit for band in bands if band.channel == channel.name and band.limit >= least), default=least)
+    return min(
+        (band.limit for band in bands if band.channel == channel.name and band.limit >= least),
+        default=least,
+    )
 
 
 def _largest(values: np.ndarray) -> float:
@@ -127,7 +154,8 @@ def _ground(ax: Axes, view: SceneView) -> None:
 
 
 def _values(ax: Axes, view: SceneView, channel: Channel) -> None:
-    """One channel of all models, the first reference drawn wide below the others; wall impacts on each model's own curve."""
+    """One channel of all models, the first reference drawn wide below the others; wall impacts on
+    each model's own curve."""
     for order, (model, look) in enumerate(looks(view.run.models).items()):
         if model not in view.values:
             continue
@@ -135,16 +163,43 @@ def _values(ax: Axes, view: SceneView, channel: Channel) -> None:
         values = view.drawn[model][channel.name]
         if model in view.measured:
             rows = view.measured[model]
-            ax.plot(view.t[rows], values[rows], ".", color=look.light, markersize=2.0, label=look.label, zorder=3.0)
+            ax.plot(
+                view.t[rows],
+                values[rows],
+                ".",
+                color=look.light,
+                markersize=2.0,
+                label=look.label,
+                zorder=3.0,
+            )
         else:
-            ax.plot(view.t, values, **look.line | ({"linewidth": 1.6, "zorder": 1.9} if first else {"zorder": 2.0 + 0.01 * order}))
+            ax.plot(
+                view.t,
+                values,
+                **look.line
+                | ({"linewidth": 1.6, "zorder": 1.9} if first else {"zorder": 2.0 + 0.01 * order}),
+            )
         if channel.name == "theta":
             _mark_fall(ax, view, model, look.light)
             until = view.falls.get(model, math.inf)
-            times = np.array([e.t for e in view.histories[model].event_list if e.kind == "wall impact" and e.t <= until])
+            times = np.array(
+                [
+                    e.t
+                    for e in view.histories[model].event_list
+                    if e.kind == "wall impact" and e.t <= until
+                ]
+            )
             if len(times):
                 at = np.interp(times, view.t, np.nan_to_num(values))
-                ax.plot(times, at, marker="D", markersize=2.4, markerfacecolor="white", markeredgecolor=look.light, linestyle="")
+                ax.plot(
+                    times,
+                    at,
+                    marker="D",
+                    markersize=2.4,
+                    markerfacecolor="white",
+                    markeredgecolor=look.light,
+                    linestyle="",
+                )
     ax.set_ylabel(channel.symbol)
 
 
@@ -152,20 +207,44 @@ def _mark_fall(ax: Axes, view: SceneView, model: str, colour: str) -> None:
     """A cross where the block falls: nothing is drawn beyond."""
     if model in view.falls:
         row = int(np.searchsorted(view.t, view.falls[model]))
-        ax.plot(view.t[row], view.drawn[model]["theta"][row], marker="x", markersize=4.5, markeredgewidth=1.2, color=colour, zorder=4.0)
+        ax.plot(
+            view.t[row],
+            view.drawn[model]["theta"][row],
+            marker="x",
+            markersize=4.5,
+            markeredgewidth=1.2,
+            color=colour,
+            zorder=4.0,
+        )
 
 
 def _differences(ax: Axes, view: SceneView, channel: Channel, against: str) -> None:
     bands = [band for band in view.bands(against) if band.channel == channel.name]
     known = looks(view.run.models)
-    for limit, until in sorted({(band.limit, band.until) for band in bands if band.kind == "peak"}, reverse=True):
+    for limit, until in sorted(
+        {(band.limit, band.until) for band in bands if band.kind == "peak"}, reverse=True
+    ):
         ax.fill_between([0.0, until], -limit, limit, color=TOLERANCE, alpha=0.13, linewidth=0)
     for limit, until in sorted({(band.limit, band.until) for band in bands if band.kind == "rms"}):
         ax.plot([until, until], [0.0, limit], color=TOLERANCE, linewidth=0.8, zorder=3.0)
-        ax.plot(until, limit, marker="_", color=TOLERANCE, markersize=7.0, markeredgewidth=1.4, zorder=3.0)
-    for band in {band.model: band for band in sorted(bands, key=lambda band: band.until) if band.kind == "rms"}.values():
+        ax.plot(
+            until,
+            limit,
+            marker="_",
+            color=TOLERANCE,
+            markersize=7.0,
+            markeredgewidth=1.4,
+            zorder=3.0,
+        )
+    for band in {
+        band.model: band
+        for band in sorted(bands, key=lambda band: band.until)
+        if band.kind == "rms"
+    }.values():
         running = view.running_rms(band)
-        ax.plot(view.t[: len(running)], running, color=known[band.model].light, linewidth=1.5, alpha=0.8)
+        ax.plot(
+            view.t[: len(running)], running, color=known[band.model].light, linewidth=1.5, alpha=0.8
+        )
     fine = largest = fineness(view, channel, bands)
     for model, difference in view.differences(channel.name, against).items():
         largest = max(largest, _largest(difference))
@@ -181,7 +260,8 @@ def _differences(ax: Axes, view: SceneView, channel: Channel, against: str) -> N
 
 
 def _decades(fine: float, largest: float) -> dict[float, str]:
-    """Places and words of at most five ticks of an asinh axis: zero, and plus and minus two decades."""
+    """Places and words of at most five ticks of an asinh axis: zero, and plus and minus two
+    decades."""
     top = math.floor(math.log10(max(largest, fine)))
     low = max(math.ceil(math.log10(fine)), top - 2)
     ticks = {0.0: "0"}
@@ -198,30 +278,62 @@ def _tracks(ax: Axes, view: SceneView) -> None:
     for row, model in enumerate(shown):
         for kind, marker, size in TRACKED:
             times = [e.t for e in view.histories[model].event_list if e.kind == kind]
-            ax.plot(times, [row] * len(times), marker=marker, markersize=size, markeredgewidth=0.5, color=known[model].light, linestyle="")
+            ax.plot(
+                times,
+                [row] * len(times),
+                marker=marker,
+                markersize=size,
+                markeredgewidth=0.5,
+                color=known[model].light,
+                linestyle="",
+            )
     ax.set_yticks(range(len(shown)), [_short(known[model].label) for model in shown], fontsize=6)
     ax.set_ylim(len(shown) - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
-    ax.text(0.998, 0.97, "impacts: | floor, ◆ wall", transform=ax.transAxes, ha="right", va="top", fontsize=6, color="#555555")
+    ax.text(
+        0.998,
+        0.97,
+        "impacts: | floor, ◆ wall",
+        transform=ax.transAxes,
+        ha="right",
+        va="top",
+        fontsize=6,
+        color="#555555",
+    )
 
 
 def _short(label: str, most: int = 17) -> str:
     return label if len(label) <= most else label[: most - 1] + "…"
 
 
-def _shades(view: SceneView, against: str | None, channels: Sequence[Channel]) -> list[Patch | Line2D]:
+def _shades(
+    view: SceneView, against: str | None, channels: Sequence[Channel]
+) -> list[Patch | Line2D]:
     """Legend entries for what the figure has besides the models."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     names = [channel.name for channel in channels]
     found: list[Patch | Line2D] = []
-    kinds = {band.kind for band in view.bands(against) if band.channel in names} if against else set()
+    kinds = (
+        {band.kind for band in view.bands(against) if band.channel in names} if against else set()
+    )
     if "peak" in kinds:
         found.append(Patch(color=TOLERANCE, alpha=0.25, label="tolerance"))
     if "rms" in kinds:
         found.append(Line2D([], [], color="#555555", linewidth=1.8, label="RMS so far"))
-        found.append(Line2D([], [], color=TOLERANCE, marker="_", markersize=7.0, markeredgewidth=1.4, linestyle="", label="its limit"))
+        found.append(
+            Line2D(
+                [],
+                [],
+                color=TOLERANCE,
+                marker="_",
+                markersize=7.0,
+                markeredgewidth=1.4,
+                linestyle="",
+                label="its limit",
+            )
+        )
     if view.horizon is not None and view.horizon < view.t[-1]:
         found.append(Patch(color="#000000", alpha=0.08, label="beyond the horizon"))
     return found
@@ -234,7 +346,11 @@ def _mark_horizon(ax: Axes, view: SceneView) -> None:
 
 def _title(view: SceneView, against: str | None) -> str:
     """What the figure shows, in one line."""
-    words = f"{view.name}: all models" + (f"; below each the difference from {looks(view.run.models)[against].label}" if against else "")
+    words = f"{view.name}: all models" + (
+        f"; below each the difference from {looks(view.run.models)[against].label}"
+        if against
+        else ""
+    )
     return words
 
 

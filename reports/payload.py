@@ -1,7 +1,9 @@
-"""The data of a scene's page, as a script file: a page opened from the file system cannot fetch data.
+"""The data of a scene's page, as a script file: a page opened from the file system cannot fetch
+data.
 
-Values are float32 (rounded to 6e-8 of their size), a line of `rows` values for the ground, each channel and each running figure.
-All lines of a page are packed together, and each place holds its line's number: what models agree on is kept once, nearly.
+Values are float32 (rounded to 6e-8 of their size), a line of `rows` values for the ground, each
+channel and each running figure. All lines of a page are packed together, and each place holds its
+line's number: what models agree on is kept once, nearly.
 """
 
 from __future__ import annotations
@@ -27,15 +29,18 @@ def packed(values: ArrayLike) -> str:
 
 
 def packed_lines(lines: Sequence[ArrayLike]) -> str:
-    """Lines of values as base64 of a deflated stream: of each little-endian float32 the first byte, then of each the second, and so on.
+    """Lines of values as base64 of a deflated stream: of each little-endian float32 the first byte,
+    then of each the second, and so on.
 
-    A line shorter than others ends with NaN. Neighbours share their sign and exponent, so bytes of one place compress well: a page
-    takes half of what plain values take.
+    A line shorter than others ends with NaN. Neighbours share their sign and exponent, so bytes of
+    one place compress well: a page takes half of what plain values take.
     """
     values = np.full((len(lines), max(map(np.size, lines))), np.nan, "<f4")
     for place, line in zip(values, lines, strict=True):
         place[: np.size(line)] = line
-    return base64.b64encode(zlib.compress(values.reshape(-1, 1).view(np.uint8).T.tobytes())).decode("ascii")
+    return base64.b64encode(zlib.compress(values.reshape(-1, 1).view(np.uint8).T.tobytes())).decode(
+        "ascii"
+    )
 
 
 def payload(view: SceneView) -> dict[str, Any]:
@@ -63,10 +68,19 @@ def payload(view: SceneView) -> dict[str, Any]:
         "references": view.references,
         "horizon": view.horizon,
         "channels": [
-            {"name": c.name, "label": c.label, "unit": "" if c.unit == "1" else c.unit, "fine": fineness(view, c, bands)} for c in CHANNELS
+            {
+                "name": c.name,
+                "label": c.label,
+                "unit": "" if c.unit == "1" else c.unit,
+                "fine": fineness(view, c, bands),
+            }
+            for c in CHANNELS
         ],
         "window": view.active,
-        "bands": [vars(band) | ({"running": line(view.running_rms(band))} if band.kind == "rms" else {}) for band in bands],
+        "bands": [
+            vars(band) | ({"running": line(view.running_rms(band))} if band.kind == "rms" else {})
+            for band in bands
+        ],
         "models": [
             {
                 "name": model,
@@ -74,7 +88,10 @@ def payload(view: SceneView) -> dict[str, Any]:
                 "look": look.key,
                 "dash": look.dash,
                 "values": {name: line(values) for name, values in view.values[model].items()},
-                "events": [[float(f"{e.t:.6f}"), e.kind, float(f"{e.impulse:.3g}")] for e in view.histories[model].event_list],
+                "events": [
+                    [float(f"{e.t:.6f}"), e.kind, float(f"{e.impulse:.3g}")]
+                    for e in view.histories[model].event_list
+                ],
                 "modes": _spells(view, model),
                 "agreement": view.agreement.get(model),
                 "fell": view.falls.get(model),

@@ -14,7 +14,8 @@ from rockcheck.scenes.writing import write_whole
 
 
 def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
-    """Write the scene as `<slug>.toml` with its records as CSV beside it; returns file names and texts, the TOML first.
+    """Write the scene as `<slug>.toml` with its records as CSV beside it; returns file names and
+    texts, the TOML first.
 
     `load_scene` reads the file back to a scene that moves in the same way.
     """
@@ -22,14 +23,22 @@ def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
     files = {f"{slug}.toml": tomlkit.dumps(document)}
     for name, record in records.items():
         rows = [f"{record.time_step * n:.12g},{value!r}" for n, value in enumerate(record.unscaled)]
-        files[name] = "\n".join([f"# {re.sub(r'[^ -~]', '?', record.source)}", "time_s,acceleration_m_s2", *rows]) + "\n"
+        files[name] = (
+            "\n".join(
+                [f"# {re.sub(r'[^ -~]', '?', record.source)}", "time_s,acceleration_m_s2", *rows]
+            )
+            + "\n"
+        )
     for name, text in files.items():
         write_whole(folder / name, text)
-    return {name: text for name, text in files.items() if name.endswith(".toml")} | dict.fromkeys(records, "")
+    return {name: text for name, text in files.items() if name.endswith(".toml")} | dict.fromkeys(
+        records, ""
+    )
 
 
 def scene_tables(scene: Scene, slug: str) -> tuple[dict[str, Any], dict[str, Record]]:
-    """A scene as the tables of a scene file, what is at its default left out, and its records by file name."""
+    """A scene as the tables of a scene file, what is at its default left out, and its records by
+    file name."""
     records: dict[str, Record] = {}
     tables: dict[str, Any] = scene.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
     for key in ("excitation", "vertical"):

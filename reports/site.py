@@ -1,4 +1,5 @@
-"""The pages of a finished run: one folder that opens from the file system and asks nothing of any other place."""
+"""The pages of a finished run: one folder that opens from the file system and asks nothing of any
+other place."""
 
 from __future__ import annotations
 
@@ -17,7 +18,12 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from rockcheck.reports import tables, words
-from rockcheck.reports.ensembles import EnsembleView, distributions_figure, ensemble_views, write_ensemble_figures
+from rockcheck.reports.ensembles import (
+    EnsembleView,
+    distributions_figure,
+    ensemble_views,
+    write_ensemble_figures,
+)
 from rockcheck.reports.figures import figure_stem, histories_figure, write_figures
 from rockcheck.reports.overview import entry, outcome_of, write_overview
 from rockcheck.reports.payload import script
@@ -49,8 +55,9 @@ STATISTICS_SHOWN = (
     ("peak_bias", "bias"),
     ("peak_scatter", "scatter"),
 )
-#: What a page with figures for a paper takes to be made, in pages without. Less than FEW in all are written by the process itself: it
-#: has what draws anyway, and another process takes as long as twenty pages to have it, too.
+#: What a page with figures for a paper takes to be made, in pages without. Less than FEW in all are
+#: written by the process itself: it has what draws anyway, and another process takes as long as
+#: twenty pages to have it, too.
 PRINTED, FEW = 25, 40
 #: What a verdict is called and the sign that goes with its colour.
 VERDICTS = {
@@ -66,16 +73,22 @@ VERDICTS = {
 
 @dataclass(frozen=True)
 class Site:
-    """A folder of pages with one look; `links` are its parts for the navigation, (title, address from the index)."""
+    """A folder of pages with one look; `links` are its parts for the navigation, (title, address
+    from the index)."""
 
     folder: Path
     name: str
     links: tuple[tuple[str, str], ...] = ()
 
     def page(self, address: str, template: str, **context: Any) -> Path:
-        """Write the page `address` (relative to the folder, with slashes) from a template of `data/templates/`."""
+        """Write the page `address` (relative to the folder, with slashes) from a template of
+        `data/templates/`."""
         root = "../" * address.count("/")
-        text = _environment().get_template(template).render(site=self, root=root, address=address, **context)
+        text = (
+            _environment()
+            .get_template(template)
+            .render(site=self, root=root, address=address, **context)
+        )
         return write_whole(made(self.folder, *address.split("/")[:-1]) / Path(address).name, text)
 
     def assets(self) -> None:
@@ -106,39 +119,60 @@ View = SceneView | EnsembleView
 
 
 def write_figure(folder: Path, name: str, path: Path, against: str | None = None) -> Path:
-    """Draw a finished run's scene or ensemble into the file `path`, whose ending is one of `style.FORMATS`; returns it.
+    """Draw a finished run's scene or ensemble into the file `path`, whose ending is one of
+    `style.FORMATS`; returns it.
 
-    `against`: the model whose differences a scene's figure shows, by default its first reference. Raises `InputError` for what
-    the run does not have.
+    `against`: the model whose differences a scene's figure shows, by default its first reference.
+    Raises `InputError` for what the run does not have.
     """
     kind = path.suffix.lower().removeprefix(".")
     if kind not in FORMATS:
         allowed = ", ".join(f".{one}" for one in FORMATS)
-        raise InputError(f"{printable(path)}: a figure is written as {allowed}, not as {printable(path.suffix)!r}")
+        raise InputError(
+            f"{printable(path)}: a figure is written as {allowed}, not as"
+            f" {printable(path.suffix)!r}"
+        )
     pages = _Pages(folder, (name,))
     view = pages.views[name]
     if isinstance(view, EnsembleView):
         if against is not None:
-            raise InputError("an ensemble's figure shows differences from its reference", "--against")
+            raise InputError(
+                "an ensemble's figure shows differences from its reference", "--against"
+            )
         return save(distributions_figure(view), path.with_suffix(""), [kind], named=True)[0]
     if against is not None and against not in view.histories:
         raise unknown_name("model with a history of this scene", against, view.histories)
     if not view.histories:
-        raise InputError(f"{printable(name)}: no model has a history of it: {'; '.join(view.missing.values())}")
+        raise InputError(
+            f"{printable(name)}: no model has a history of it: {'; '.join(view.missing.values())}"
+        )
     return save(histories_figure(view, against), path.with_suffix(""), [kind], named=True)[0]
 
 
-def write_site(folder: Path, *, jobs: int = 1, afresh: bool = True, wanted: Sequence[str] = (), on_progress: OnProgress = unheard) -> Path:
-    """Write `index.html` and a page a scene and an ensemble, with figures and data, beside a finished run; returns the index.
+def write_site(
+    folder: Path,
+    *,
+    jobs: int = 1,
+    afresh: bool = True,
+    wanted: Sequence[str] = (),
+    on_progress: OnProgress = unheard,
+) -> Path:
+    """Write `index.html` and a page a scene and an ensemble, with figures and data, beside a
+    finished run; returns the index.
 
-    In a large run the scenes that are `shown` have a page, and those that are `wanted`. Pages are made in up to `jobs` processes.
-    Unless `afresh`, one stays that shows the same as it would now. What belonged to scenes without a page is removed. Raises
-    `InputError` where a wanted scene is not of the run.
+    In a large run the scenes that are `shown` have a page, and those that are `wanted`. Pages are
+    made in up to `jobs` processes. Unless `afresh`, one stays that shows the same as it would now.
+    What belonged to scenes without a page is removed. Raises `InputError` where a wanted scene is
+    not of the run.
     """
     pages = _Pages(folder, wanted)
     pages.site.assets()
     stamps = {name: pages.stamp(view) for name, view in pages.views.items()}
-    waiting = {name: stamp for name, stamp in stamps.items() if afresh or _stamp_of(folder / _address(pages.views[name])) != stamp}
+    waiting = {
+        name: stamp
+        for name, stamp in stamps.items()
+        if afresh or _stamp_of(folder / _address(pages.views[name])) != stamp
+    }
     for done, _ in enumerate(_write_pages(pages, waiting, jobs), 1):
         on_progress(done, len(waiting) + 1)
     current = {f"{view.slug}.html" for view in pages.views.values()}
@@ -150,14 +184,18 @@ def write_site(folder: Path, *, jobs: int = 1, afresh: bool = True, wanted: Sequ
 
 
 def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterator[None]:
-    """Write these pages, each with its stamp, and last the index, in processes of their own where that is quicker."""
+    """Write these pages, each with its stamp, and last the index, in processes of their own where
+    that is quicker."""
     work = sum(PRINTED if pages.views[name].printed else 1 for name in stamps)
     if min(jobs, len(stamps)) < 2 or work < FEW:
         yield from map(pages.write, stamps, stamps.values())
         pages.write_index()
         yield
         return
-    calls = [Call(_write_page, (pages.folder, pages.wanted, name, stamp)) for name, stamp in stamps.items()]
+    calls = [
+        Call(_write_page, (pages.folder, pages.wanted, name, stamp))
+        for name, stamp in stamps.items()
+    ]
     with Pool(min(jobs, len(stamps))) as pool:
         for ended in pool.run(deque([*calls, Call(_write_index, (pages.folder, pages.wanted))])):
             if ended.error is not None:
@@ -166,7 +204,8 @@ def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterato
 
 
 class _Pages:
-    """The pages of a finished run, by name of the scene or the ensemble: of those that are shown, and those that are wanted."""
+    """The pages of a finished run, by name of the scene or the ensemble: of those that are shown,
+    and those that are wanted."""
 
     def __init__(self, folder: Path, wanted: Sequence[str] = ()) -> None:
         self.folder = folder
@@ -177,7 +216,10 @@ class _Pages:
             if name not in slugs:
                 raise unknown_name("scene of the run", name, slugs)
         chosen = {*shown(self.run), *wanted}
-        found: list[View] = [*scene_views(self.run, folder, chosen), *ensemble_views(self.run, folder, slugs)]
+        found: list[View] = [
+            *scene_views(self.run, folder, chosen),
+            *ensemble_views(self.run, folder, slugs),
+        ]
         self.views = {view.name: view for view in found}
         links = [(view.name, _address(view)) for view in found]
         links += [(title, address) for title, address in STUDIES if (folder / address).exists()]
@@ -188,7 +230,9 @@ class _Pages:
         view = self.views[name]
         page = self.folder / _address(view)
         before = _belongings(page)
-        self._write_ensemble(view, stamp) if isinstance(view, EnsembleView) else self._write_scene(view, stamp)
+        self._write_ensemble(view, stamp) if isinstance(view, EnsembleView) else self._write_scene(
+            view, stamp
+        )
         for old in before - _belongings(page):
             (self.folder / PAGES / old).unlink(missing_ok=True)
 
@@ -210,27 +254,49 @@ class _Pages:
         self._page(view, stamp, "ensemble.html", columns=STATISTICS_SHOWN)
 
     def _page(self, view: View, stamp: str, template: str, **context: Any) -> None:
-        self.site.page(_address(view), template, view=view, stamp=stamp, **context, **_common(self.run))
+        self.site.page(
+            _address(view), template, view=view, stamp=stamp, **context, **_common(self.run)
+        )
 
     def write_index(self) -> None:
         """The page to open, which shows when the run was."""
         scenes = [view for view in self.views.values() if isinstance(view, SceneView)]
         ensembles = [view for view in self.views.values() if isinstance(view, EnsembleView)]
         worst, times = tables.worst_first(self.run), tables.run_times(self.run)
-        summaries = {model: FAMILIES[model].summary for model in self.run.models if model in FAMILIES}
-        told: dict[str, Any] = {"scenes": scenes, "ensembles": ensembles, "worst": worst, "times": times, "summaries": summaries}
+        summaries = {
+            model: FAMILIES[model].summary for model in self.run.models if model in FAMILIES
+        }
+        told: dict[str, Any] = {
+            "scenes": scenes,
+            "ensembles": ensembles,
+            "worst": worst,
+            "times": times,
+            "summaries": summaries,
+        }
         told |= write_overview(self.run, made(self.folder, PAGES, "figures"), self.views)
         self.site.page(INDEX, "index.html", **told, **_common(self.run))
 
     def stamp(self, view: View) -> str:
-        """Hash of all that a page shows and of the code that draws it; not when the run was, nor what was read back."""
+        """Hash of all that a page shows and of the code that draws it; not when the run was, nor
+        what was read back."""
         run = self.run
         shown = {
             "what": view.record.model_dump(mode="json")
             if isinstance(view, EnsembleView)
             else [run.scenes[view.name], view.stride, view.printed],
             "cells": [cell.model_dump(mode="json", exclude={"read_back"}) for cell in view.cells],
-            "run": run.model_dump(mode="json", include={"suite", "reference", "model_form", "models", "measures", "versions", "hardware"}),
+            "run": run.model_dump(
+                mode="json",
+                include={
+                    "suite",
+                    "reference",
+                    "model_form",
+                    "models",
+                    "measures",
+                    "versions",
+                    "hardware",
+                },
+            ),
             "links": self.site.links,
             "drawn by": _appearance(),
         }
@@ -243,7 +309,8 @@ def _address(view: View) -> str:
 
 @cache
 def _pages_of(folder: Path, wanted: Sequence[str]) -> _Pages:
-    """In a process of the pool, which ends with the run: it reads the run once for all its pages."""
+    """In a process of the pool, which ends with the run: it reads the run once for all its
+    pages."""
     return _Pages(folder, wanted)
 
 
@@ -260,7 +327,15 @@ def _appearance() -> str:
     """Hash of the code, templates, scripts and styles that make the pages."""
     files = sorted(path for path in DATA.rglob("*") if path.is_file())
     hashes = [f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}" for path in files]
-    return provenance.digest("\n".join([provenance.code_digest("rockcheck.reports"), provenance.version_of("matplotlib"), *hashes]))
+    return provenance.digest(
+        "\n".join(
+            [
+                provenance.code_digest("rockcheck.reports"),
+                provenance.version_of("matplotlib"),
+                *hashes,
+            ]
+        )
+    )
 
 
 def _stamp_of(page: Path) -> str:
@@ -271,7 +346,9 @@ def _stamp_of(page: Path) -> str:
 
 def _belongings(page: Path) -> set[str]:
     """The files of a scene's page, relative to the folder of pages."""
-    found = re.findall(r'(?:href|src)="((?:figures|data|scene-files)/[A-Za-z0-9._-]+)"', head_of(page, MOST_BYTES))
+    found = re.findall(
+        r'(?:href|src)="((?:figures|data|scene-files)/[A-Za-z0-9._-]+)"', head_of(page, MOST_BYTES)
+    )
     return {*found, f"figures/{page.stem}-small.svg"}
 
 
@@ -285,14 +362,19 @@ def _common(run: Run) -> dict[str, Any]:
 
 
 def model_styles() -> str:
-    """A style sheet with a class `look-<key>` for each look of a model that sets its colour, by day and by night."""
-    rows = (f".look-{look.key} {{ --look: light-dark({look.light}, {look.dark}); }}" for look in (*LOOKS.values(), *SPARE))
+    """A style sheet with a class `look-<key>` for each look of a model that sets its colour, by day
+    and by night."""
+    rows = (
+        f".look-{look.key} {{ --look: light-dark({look.light}, {look.dark}); }}"
+        for look in (*LOOKS.values(), *SPARE)
+    )
     return "\n".join(rows) + "\n"
 
 
 @cache
 def _environment() -> Environment:
-    """The templates with what they call. Kept, since compiling a page's templates takes longer than drawing its figures."""
+    """The templates with what they call. Kept, since compiling a page's templates takes longer than
+    drawing its figures."""
     environment = Environment(
         loader=FileSystemLoader(DATA / "templates"),
         autoescape=True,
@@ -301,7 +383,16 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         finalize=lambda value: inert(value) if type(value) is str else value,
     )
-    for filter in (words.number, words.unit, words.duration, words.moment, words.ratio, words.window, words.dash_array, words.readable):
+    for filter in (
+        words.number,
+        words.unit,
+        words.duration,
+        words.moment,
+        words.ratio,
+        words.window,
+        words.dash_array,
+        words.readable,
+    ):
         environment.filters[filter.__name__] = filter
     for function in (
         words.share,

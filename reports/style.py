@@ -1,7 +1,8 @@
 """How a model looks, the same in every figure and on every page, and how figures are saved.
 
-Hues are from Okabe & Ito's palette for colour-blind readers ("Color universal design", 2008), darkened where a line on
-white would fall below a contrast of 3:1. A dash pattern says the same once more for print without colour.
+Hues are from Okabe & Ito's palette for colour-blind readers ("Color universal design", 2008),
+darkened where a line on white would fall below a contrast of 3:1. A dash pattern says the same once
+more for print without colour.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ FORMATS = ("svg", "png", "pdf")
 
 @dataclass(frozen=True)
 class Look:
-    """A model's label, its colour on white and on black (hex), its dash pattern (line widths on, off) and its marker.
+    """A model's label, its colour on white and on black (hex), its dash pattern (line widths on,
+    off) and its marker.
 
     `key` names the colour in style sheets.
     """
@@ -47,7 +49,11 @@ class Look:
     @property
     def line(self) -> dict[str, Any]:
         """Keywords for `Axes.plot`."""
-        return {"color": self.light, "linestyle": (0, self.dash) if self.dash else "-", "label": self.label}
+        return {
+            "color": self.light,
+            "linestyle": (0, self.dash) if self.dash else "-",
+            "label": self.label,
+        }
 
 
 LOOKS = {
@@ -65,7 +71,8 @@ LOOKS = {
         Look("measured", "measured", "#6e6e6e", "#a0a0a0", (), "x"),
     )
 }
-#: For models that have no look of their own, in the order in which a run names them; their label is the model's name.
+#: For models that have no look of their own, in the order in which a run names them; their label is
+#: the model's name.
 SPARE = (
     Look("spare-1", "", "#5b4db3", "#978be8", (6.0, 2.0)),
     Look("spare-2", "", "#7d5a3c", "#b98f6b", (1.0, 1.0)),
@@ -76,7 +83,8 @@ SPARE = (
 
 
 def looks(models: Iterable[str]) -> dict[str, Look]:
-    """The look of each of a run's models; a model without one of its own gets a spare colour, by its place among such."""
+    """The look of each of a run's models; a model without one of its own gets a spare colour, by
+    its place among such."""
     found: dict[str, Look] = {}
     for model in models:
         spare = SPARE[sum(name not in LOOKS for name in found) % len(SPARE)]
@@ -86,7 +94,8 @@ def looks(models: Iterable[str]) -> dict[str, Look]:
 
 @contextmanager
 def figure_style() -> Iterator[None]:
-    """The common style of all figures, for a `with` block: sizes for a journal's page, light grid, reproducible SVG.
+    """The common style of all figures, for a `with` block: sizes for a journal's page, light grid,
+    reproducible SVG.
 
     Figures made inside need no display: build them with `matplotlib.figure.Figure`.
     """
@@ -130,7 +139,8 @@ def figure_style() -> Iterator[None]:
 
 
 def log_scales(ax: Axes, *, decades: int = 7) -> None:
-    """Logarithmic axes in powers of ten, at most so many, written out: `figure_style` leaves the $ of matplotlib's labels as it is."""
+    """Logarithmic axes in powers of ten, at most so many, written out: `figure_style` leaves the $
+    of matplotlib's labels as it is."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     for axis in (ax.xaxis, ax.yaxis):
@@ -143,11 +153,23 @@ def log_scales(ax: Axes, *, decades: int = 7) -> None:
 def power_of_ten(value: float) -> str:
     """10⁻³; plain from 0.1 to 1000."""
     exponent = round(math.log10(value))
-    return f"{value:g}" if -1 <= exponent <= 3 else "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return (
+        f"{value:g}"
+        if -1 <= exponent <= 3
+        else "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    )
 
 
-def save(figure: Figure, stem: Path, formats: Iterable[str] = FORMATS, *, stamp: str = "", named: bool = False) -> list[Path]:
-    """Write a figure as `<stem>.svg`, `.png` and `.pdf`; the same figure gives the same bytes, for no date is written.
+def save(
+    figure: Figure,
+    stem: Path,
+    formats: Iterable[str] = FORMATS,
+    *,
+    stamp: str = "",
+    named: bool = False,
+) -> list[Path]:
+    """Write a figure as `<stem>.svg`, `.png` and `.pdf`; the same figure gives the same bytes, for
+    no date is written.
 
     `stamp` says what an SVG shows, see `stamp_of`; `named` that the user chose these very files.
     """
@@ -166,13 +188,18 @@ def save(figure: Figure, stem: Path, formats: Iterable[str] = FORMATS, *, stamp:
     return written
 
 
-def keep_drawn(stem: Path, shown: object, draw: Callable[[], Figure], formats: Sequence[str] = ("svg",)) -> None:
+def keep_drawn(
+    stem: Path, shown: object, draw: Callable[[], Figure], formats: Sequence[str] = ("svg",)
+) -> None:
     """`<stem>.svg` and the other `formats`, drawn only where there is none yet that shows the same.
 
-    `shown` is all that the figure shows, as JSON. The code that draws counts, too. A file of another format is removed if it would
-    show something else.
+    `shown` is all that the figure shows, as JSON. The code that draws counts, too. A file of
+    another format is removed if it would show something else.
     """
-    stamp, paths = stamp_of(shown), {kind: stem.with_name(f"{stem.name}.{kind}") for kind in FORMATS}
+    stamp, paths = (
+        stamp_of(shown),
+        {kind: stem.with_name(f"{stem.name}.{kind}") for kind in FORMATS},
+    )
     current = stamp_in(paths["svg"]) == stamp
     missing = [kind for kind in formats if not (current and paths[kind].is_file())]
     if not current:
@@ -190,7 +217,9 @@ def stamp_of(shown: object) -> str:
 @cache
 def _drawn_by() -> str:
     sources = sorted(Path(__file__).parent.rglob("*.py"))
-    return _short_hash(version("matplotlib").encode() + b"".join(source.read_bytes() for source in sources))
+    return _short_hash(
+        version("matplotlib").encode() + b"".join(source.read_bytes() for source in sources)
+    )
 
 
 def _short_hash(content: bytes) -> str:

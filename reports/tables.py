@@ -1,4 +1,5 @@
-"""What the pages list: checks by how far they are out, run times as ratios, all measures of a scene, a scene in words."""
+"""What the pages list: checks by how far they are out, run times as ratios, all measures of a
+scene, a scene in words."""
 
 from __future__ import annotations
 
@@ -16,12 +17,19 @@ from rockcheck.validation.suite.results import Cell, Check, Run
 
 
 def worst_first(run: Run) -> list[tuple[Cell, Check | None]]:
-    """What is not within tolerance: cells without a history, then checks by how far they are out, then those that changed.
+    """What is not within tolerance: cells without a history, then checks by how far they are out,
+    then those that changed.
 
     A figure that has no tolerance yet is not out of one; the page counts these.
     """
-    failed: list[tuple[Cell, Check | None]] = [(cell, None) for cell in run.cells if cell.status != "done"]
-    checks = [(cell, check) for cell, check in run.checks() if check.weighs != "pass" and check.words != "no tolerance yet"]
+    failed: list[tuple[Cell, Check | None]] = [
+        (cell, None) for cell in run.cells if cell.status != "done"
+    ]
+    checks = [
+        (cell, check)
+        for cell, check in run.checks()
+        if check.weighs != "pass" and check.words != "no tolerance yet"
+    ]
     return failed + sorted(checks, key=lambda pair: (pair[1].verdict != "fail", -overrun(pair[1])))
 
 
@@ -37,7 +45,8 @@ def overrun(check: Check) -> float:
 
 @dataclass(frozen=True)
 class RunTime:
-    """A model's run times: by scene, s, and relative to the reference of the run; `ratio` is the geometric mean of these."""
+    """A model's run times: by scene, s, and relative to the reference of the run; `ratio` is the
+    geometric mean of these."""
 
     model: str
     seconds: Mapping[str, float]
@@ -47,12 +56,26 @@ class RunTime:
 
 def run_times(run: Run) -> list[RunTime]:
     """Run times of all models; a ratio needs the reference to have run in the same scene."""
-    base = {cell.scene: cell.cost.wall_seconds for cell in run.cells if cell.model == run.reference and cell.status == "done"}
+    base = {
+        cell.scene: cell.cost.wall_seconds
+        for cell in run.cells
+        if cell.model == run.reference and cell.status == "done"
+    }
     found = []
     for model in run.models:
-        seconds = {cell.scene: cell.cost.wall_seconds for cell in run.cells if cell.model == model and cell.status == "done"}
-        ratios = {scene: taken / base[scene] for scene, taken in seconds.items() if base.get(scene, 0.0) > 0.0 and taken > 0.0}
-        found.append(RunTime(model, seconds, ratios, geometric_mean(ratios.values()) if ratios else None))
+        seconds = {
+            cell.scene: cell.cost.wall_seconds
+            for cell in run.cells
+            if cell.model == model and cell.status == "done"
+        }
+        ratios = {
+            scene: taken / base[scene]
+            for scene, taken in seconds.items()
+            if base.get(scene, 0.0) > 0.0 and taken > 0.0
+        }
+        found.append(
+            RunTime(model, seconds, ratios, geometric_mean(ratios.values()) if ratios else None)
+        )
     return found
 
 
@@ -66,7 +89,8 @@ class TableEntry:
 
 @dataclass(frozen=True)
 class MeasureRow:
-    """A measure of all models: one that stands for its name and window, and what each model gave."""
+    """A measure of all models: one that stands for its name and window, and what each model
+    gave."""
 
     figure: Figure
     cells: tuple[TableEntry | None, ...]
@@ -81,21 +105,38 @@ class MeasureTable:
 
 
 def measure_table(view: SceneView, against: str) -> MeasureTable:
-    """All figures of a scene that are held against `against`, a row a measure and window, a column a model."""
+    """All figures of a scene that are held against `against`, a row a measure and window, a column
+    a model."""
     found: dict[tuple[str, str], dict[str, TableEntry]] = {}
     for cell in view.cells:
         for check in cell.checks:
             _enter(found, cell.model, check.figure, check, against)
         for figure in cell.figures:
             _enter(found, cell.model, figure, None, against)
-    models = tuple(cell.model for cell in view.cells if any(cell.model in row for row in found.values()))
-    rows = (MeasureRow(next(iter(row.values())).figure, tuple(row.get(model) for model in models)) for row in found.values())
-    return MeasureTable(models, tuple(sorted(rows, key=lambda row: (row.figure.measure, row.figure.until or float("inf")))))
+    models = tuple(
+        cell.model for cell in view.cells if any(cell.model in row for row in found.values())
+    )
+    rows = (
+        MeasureRow(next(iter(row.values())).figure, tuple(row.get(model) for model in models))
+        for row in found.values()
+    )
+    return MeasureTable(
+        models,
+        tuple(sorted(rows, key=lambda row: (row.figure.measure, row.figure.until or float("inf")))),
+    )
 
 
-def _enter(found: dict[tuple[str, str], dict[str, TableEntry]], model: str, figure: Figure, check: Check | None, against: str) -> None:
+def _enter(
+    found: dict[tuple[str, str], dict[str, TableEntry]],
+    model: str,
+    figure: Figure,
+    check: Check | None,
+    against: str,
+) -> None:
     if figure.against == against:
-        found.setdefault((figure.measure, figure.window), {}).setdefault(model, TableEntry(figure, check))
+        found.setdefault((figure.measure, figure.window), {}).setdefault(
+            model, TableEntry(figure, check)
+        )
 
 
 def scene_facts(view: SceneView) -> list[tuple[str, str]]:
@@ -108,7 +149,11 @@ def summary(view: SceneView) -> str:
     said = []
     for model, history in view.histories.items():
         impacts = sum(event.kind in ("floor impact", "wall impact") for event in history.event_list)
-        reached = f"peak {number(history.peak_rotation / view.scene.block.alpha)} α, " if history.overturned_at is None else ""
+        reached = (
+            f"peak {number(history.peak_rotation / view.scene.block.alpha)} α, "
+            if history.overturned_at is None
+            else ""
+        )
         said.append(f"{model}: {reached}{impacts} impacts, {history.fate}")
     return "; ".join(said) + "."
 

@@ -1,4 +1,5 @@
-"""What is shown of one scene: all histories on one time axis, their differences, tolerances and horizon."""
+"""What is shown of one scene: all histories on one time axis, their differences, tolerances and
+horizon."""
 
 from __future__ import annotations
 
@@ -21,10 +22,11 @@ from rockcheck.validation.suite.results import Cell, Run
 from rockcheck.validation.uncertainty.population import Inputs
 
 Array = NDArray[np.float64]
-#: A block that falls is drawn up to this rotation (alpha). Beyond 1 a block in free rocking does not come back.
+#: A block that falls is drawn up to this rotation (alpha). Beyond 1 a block in free rocking does
+#: not come back.
 FALL = 1.5
-#: The opening window: a model turns or slides by at least this share of the largest motion; the margin beside it; and the share of
-#: the whole time from which on the whole is shown.
+#: The opening window: a model turns or slides by at least this share of the largest motion; the
+#: margin beside it; and the share of the whole time from which on the whole is shown.
 STILL, ROOM, NEARLY_ALL = 0.01, 0.05, 0.85
 #: Settings that only a measured history has (`validation.discrepancy.measured`).
 MEASURED = {"file", "offset"}
@@ -32,7 +34,8 @@ MEASURED = {"file", "offset"}
 
 @dataclass(frozen=True)
 class Channel:
-    """A quantity over time: name, label, symbol (for an axis), unit, and the stem of the measures that limit its difference.
+    """A quantity over time: name, label, symbol (for an axis), unit, and the stem of the measures
+    that limit its difference.
 
     `scale` turns the unit of its measures into `unit` (1000: from m to mm).
     """
@@ -64,7 +67,8 @@ PAPER_CHANNELS = CHANNELS[:4]
 
 @dataclass(frozen=True)
 class Band:
-    """A tolerance on the difference of one channel of one model: |d| (or its RMS) at most `limit` from 0 to `until` s."""
+    """A tolerance on the difference of one channel of one model: |d| (or its RMS) at most `limit`
+    from 0 to `until` s."""
 
     channel: str
     model: str
@@ -76,7 +80,8 @@ class Band:
 
 @dataclass(frozen=True)
 class Hop:
-    """How the block leaves the floor: its lowest corner's greatest height (m), by which model, and its longest flight (s)."""
+    """How the block leaves the floor: its lowest corner's greatest height (m), by which model, and
+    its longest flight (s)."""
 
     height: float
     model: str
@@ -87,7 +92,8 @@ class Hop:
 class SceneView:
     """One scene of a finished run, ready to be drawn.
 
-    `t` is every `stride`-th output time (s). Histories are read from the run's `folder` when they are asked for.
+    `t` is every `stride`-th output time (s). Histories are read from the run's `folder` when they
+    are asked for.
     """
 
     run: Run
@@ -133,7 +139,8 @@ class SceneView:
 
     @cached_property
     def outside(self) -> list[str]:
-        """The axes on which the scene lies outside of what the suites cover; empty where nothing is known of them."""
+        """The axes on which the scene lies outside of what the suites cover; empty where nothing is
+        known of them."""
         return experience.outside(self.scene) if experience.known().domain else []
 
     @cached_property
@@ -153,7 +160,10 @@ class SceneView:
 
     def _channels(self, history: History) -> dict[str, Array]:
         block = self.scene.block
-        column = {name: self._on_axis(history, name) for name in ("x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate")}
+        column = {
+            name: self._on_axis(history, name)
+            for name in ("x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate")
+        }
         x, y, theta = column["x"], column["y"], column["theta"]
         motion = (column[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
         found = {
@@ -167,7 +177,8 @@ class SceneView:
         return {c.name: c.scale * found[c.name] for c in CHANNELS} | {"x": x, "y": y}
 
     def _on_axis(self, history: History, name: str) -> Array:
-        """A column on `t`, linear between its rows, NaN outside them and where there is no such column."""
+        """A column on `t`, linear between its rows, NaN outside them and where there is no such
+        column."""
         if name not in history.channels:
             return np.full(len(self.t), math.nan)
         times = np.asarray(history.channels["t"], dtype=float)
@@ -178,7 +189,10 @@ class SceneView:
     @cached_property
     def falls(self) -> dict[str, float]:
         """By model: when the rotation passes `FALL`, s; only those that fall."""
-        beyond = {model: np.flatnonzero(np.abs(columns["theta"]) > FALL) for model, columns in self.values.items()}
+        beyond = {
+            model: np.flatnonzero(np.abs(columns["theta"]) > FALL)
+            for model, columns in self.values.items()
+        }
         return {model: float(self.t[rows[0]]) for model, rows in beyond.items() if len(rows)}
 
     @property
@@ -187,7 +201,11 @@ class SceneView:
         found = {}
         for model, history in self.histories.items():
             if set(history.settings) >= MEASURED:
-                near = np.searchsorted(self.t, np.asarray(history.channels["t"], dtype=float) - 0.5 * float(self.t[1] - self.t[0]))
+                near = np.searchsorted(
+                    self.t,
+                    np.asarray(history.channels["t"], dtype=float)
+                    - 0.5 * float(self.t[1] - self.t[0]),
+                )
                 found[model] = np.unique(near[near < len(self.t)]).tolist()
         return found
 
@@ -195,11 +213,15 @@ class SceneView:
     def drawn(self) -> dict[str, dict[str, Array]]:
         """The `values` up to the fall, NaN from there on."""
         standing = {model: self.t <= self.falls.get(model, math.inf) for model in self.values}
-        return {m: {name: np.where(standing[m], v, math.nan) for name, v in columns.items()} for m, columns in self.values.items()}
+        return {
+            m: {name: np.where(standing[m], v, math.nan) for name, v in columns.items()}
+            for m, columns in self.values.items()
+        }
 
     @cached_property
     def active(self) -> tuple[float, float]:
-        """The window of time, s, in which something happens: a model turns or slides. The whole time where that is nearly all."""
+        """The window of time, s, in which something happens: a model turns or slides. The whole
+        time where that is nearly all."""
         moving = np.zeros(len(self.t), dtype=bool)
         for name in ("theta", "slip_rate"):
             sizes = [np.nan_to_num(np.abs(columns[name])) for columns in self.drawn.values()]
@@ -216,41 +238,77 @@ class SceneView:
 
     @property
     def hop(self) -> Hop | None:
-        """The highest hop, by the most trusted model that may hop. None where no model may hop, or none does."""
-        order = (*self.unilateral, *(cell.model for cell in self.cells if cell.model not in self.bilateral))
-        for cell in sorted(self.cells, key=lambda cell: order.index(cell.model) if cell.model in order else len(order)):
-            height = next((f.value for f in cell.figures if f.measure == "highest_hop" and not f.window), None)
+        """The highest hop, by the most trusted model that may hop. None where no model may hop, or
+        none does."""
+        order = (
+            *self.unilateral,
+            *(cell.model for cell in self.cells if cell.model not in self.bilateral),
+        )
+        for cell in sorted(
+            self.cells,
+            key=lambda cell: order.index(cell.model) if cell.model in order else len(order),
+        ):
+            height = next(
+                (f.value for f in cell.figures if f.measure == "highest_hop" and not f.window), None
+            )
             if cell.model in order and height is not None:
-                return Hop(height, cell.model, self._longest_flight(cell.model)) if height > 0.0 else None
+                return (
+                    Hop(height, cell.model, self._longest_flight(cell.model))
+                    if height > 0.0
+                    else None
+                )
         return None
 
     def _longest_flight(self, model: str) -> float:
         channels = self.histories[model].channels if model in self.histories else {}
         if "mode" not in channels:
             return 0.0
-        t, flying = np.asarray(channels["t"], dtype=float), np.asarray(channels["mode"]).astype(str) == "flight"
+        t, flying = (
+            np.asarray(channels["t"], dtype=float),
+            np.asarray(channels["mode"]).astype(str) == "flight",
+        )
         ends = np.flatnonzero(np.diff(np.r_[False, flying, False].astype(int)))
-        return max((float(t[min(end, len(t) - 1)] - t[start]) for start, end in zip(ends[::2], ends[1::2], strict=True)), default=0.0)
+        return max(
+            (
+                float(t[min(end, len(t) - 1)] - t[start])
+                for start, end in zip(ends[::2], ends[1::2], strict=True)
+            ),
+            default=0.0,
+        )
 
     @property
     def references(self) -> tuple[str, ...]:
-        """Models that others are held against here and that have a history; the run's own reference first."""
-        named = [self.run.reference, self.run.model_form, *(f.against for cell in self.cells for f in cell.figures)]
+        """Models that others are held against here and that have a history; the run's own reference
+        first."""
+        named = [
+            self.run.reference,
+            self.run.model_form,
+            *(f.against for cell in self.cells for f in cell.figures),
+        ]
         return tuple(model for model in dict.fromkeys(named) if model in self.histories)
 
     @property
     def figure_references(self) -> tuple[str | None, ...]:
-        """References that have a figure of their own: all where a wall makes them differ in form, else the first; None without any."""
+        """References that have a figure of their own: all where a wall makes them differ in form,
+        else the first; None without any."""
         return (self.references if self.model_form_matters else self.references[:1]) or (None,)
 
     def differences(self, channel: str, against: str) -> dict[str, Array]:
-        """Candidate minus reference by model up to the first fall of the two, in the channel's unit."""
+        """Candidate minus reference by model up to the first fall of the two, in the channel's
+        unit."""
         reference = self.drawn[against][channel]
-        return {model: columns[channel] - reference for model, columns in self.drawn.items() if model != against}
+        return {
+            model: columns[channel] - reference
+            for model, columns in self.drawn.items()
+            if model != against
+        }
 
     def running_rms(self, band: Band) -> Array:
-        """The RMS difference from 0 up to each time, to `band.until`: what its limit holds for at the end. NaN where it is not known."""
-        both = [self.values.get(model, {}).get(band.channel) for model in (band.model, band.against)]
+        """The RMS difference from 0 up to each time, to `band.until`: what its limit holds for at
+        the end. NaN where it is not known."""
+        both = [
+            self.values.get(model, {}).get(band.channel) for model in (band.model, band.against)
+        ]
         t = self.t[self.t <= band.until + 1e-9]
         if both[0] is None or both[1] is None or len(t) < 2:
             return np.full(len(t), math.nan)
@@ -266,26 +324,51 @@ class SceneView:
                 figure = check.figure
                 stem, _, kind = figure.measure.rpartition("_")
                 channel = next((c for c in CHANNELS if c.measured_by == stem), None)
-                if channel is None or kind not in ("rms", "peak") or check.limit is None or against not in (None, figure.against):
+                if (
+                    channel is None
+                    or kind not in ("rms", "peak")
+                    or check.limit is None
+                    or against not in (None, figure.against)
+                ):
                     continue
                 until = min(figure.until or self.scene.duration, self.scene.duration)
-                found.append(Band(channel.name, cell.model, figure.against, kind, channel.scale * check.limit, until))
+                found.append(
+                    Band(
+                        channel.name,
+                        cell.model,
+                        figure.against,
+                        kind,
+                        channel.scale * check.limit,
+                        until,
+                    )
+                )
         return tuple(found)
 
     @property
     def horizon(self) -> float | None:
-        """Horizon of predictability, s, where the run gives one: the end of a window of that name."""
-        ends = [f.until for cell in self.cells for f in _all_figures(cell) if f.window == "horizon" and f.until is not None]
+        """Horizon of predictability, s, where the run gives one: the end of a window of that
+        name."""
+        ends = [
+            f.until
+            for cell in self.cells
+            for f in _all_figures(cell)
+            if f.window == "horizon" and f.until is not None
+        ]
         return min(ends, default=None)
 
     @property
     def agreement(self) -> dict[str, tuple[float, str, str]]:
-        """By model: the time up to which its events agree with those of its first reference, what comes then, and that reference."""
+        """By model: the time up to which its events agree with those of its first reference, what
+        comes then, and that reference."""
         found: dict[str, tuple[float, str, str]] = {}
         for against in self.references:
             for cell in self.cells:
                 for figure in cell.figures:
-                    wanted = figure.measure == "events_agree_until" and figure.against == against and not figure.window
+                    wanted = (
+                        figure.measure == "events_agree_until"
+                        and figure.against == against
+                        and not figure.window
+                    )
                     if wanted and figure.value is not None:
                         found.setdefault(cell.model, (figure.value, figure.note, against))
         return found
@@ -298,11 +381,14 @@ class SceneView:
     @property
     def unilateral(self) -> tuple[str, ...]:
         """Event-based models here whose floor can only push."""
-        return tuple(cell.model for cell in self.cells if cell.settings.get("pivot") == "unilateral")
+        return tuple(
+            cell.model for cell in self.cells if cell.settings.get("pivot") == "unilateral"
+        )
 
     @property
     def model_form_matters(self) -> bool:
-        """Whether a wall can throw the block into the free flight that one of the models forbids."""
+        """Whether a wall can throw the block into the free flight that one of the models
+        forbids."""
         return bool(self.scene.walls) and bool(self.bilateral)
 
     @cached_property
@@ -324,22 +410,37 @@ class SceneView:
         return min(wide), max(wide), min(tall), max(tall)
 
 
-def scene_views(run: Run, folder: Path, chosen: Container[str] | None = None, *, most_values: int = 2_000_000) -> list[SceneView]:
-    """The views of the chosen scenes of a run, or of all. Where they hold more than `most_values` values, each shows every n-th row."""
+def scene_views(
+    run: Run, folder: Path, chosen: Container[str] | None = None, *, most_values: int = 2_000_000
+) -> list[SceneView]:
+    """The views of the chosen scenes of a run, or of all. Where they hold more than `most_values`
+    values, each shows every n-th row."""
     slugs = slugs_of(run.scenes)
     names = [name for name in run.scenes if chosen is None or name in chosen]
     share = most_values / max(1, len(names))
     views = []
     for name in names:
         scene = run.load_scene(name)
-        columns = (len(CHANNELS) + 2) * max(1, sum(cell.status == "done" for cell in run.of_scene(name)))
+        columns = (len(CHANNELS) + 2) * max(
+            1, sum(cell.status == "done" for cell in run.of_scene(name))
+        )
         values = (scene.duration / scene.output_step + 1.0) * columns
-        views.append(SceneView(run, name, slugs[name], scene, folder, max(1, math.ceil(values / max(share, 20_000.0)))))
+        views.append(
+            SceneView(
+                run,
+                name,
+                slugs[name],
+                scene,
+                folder,
+                max(1, math.ceil(values / max(share, 20_000.0))),
+            )
+        )
     return views
 
 
 def slugs_of(names: Iterable[str]) -> dict[str, str]:
-    """A file name for each scene: safe on any system, different for different scenes also where case does not count."""
+    """A file name for each scene: safe on any system, different for different scenes also where
+    case does not count."""
     slugs: dict[str, str] = {}
     taken: set[str] = set()
     for name in names:

@@ -25,7 +25,9 @@ _MINUS = re.compile(r"(?<![\w.)\]-])-(?=\.?\d)")
 
 def readable(text: str) -> str:
     """A sentence whose numbers do not break at a hyphen: -1.2e-3 as −1.2·10⁻³."""
-    shown = _POWER.sub(lambda found: f"{found[1]}·10{str(int(found[2])).translate(SUPERSCRIPTS)}", text)
+    shown = _POWER.sub(
+        lambda found: f"{found[1]}·10{str(int(found[2])).translate(SUPERSCRIPTS)}", text
+    )
     return _MINUS.sub("−", shown)
 
 
@@ -40,7 +42,8 @@ def duration(seconds: float) -> str:
 
 
 def moment(created: str) -> str:
-    """An ISO 8601 time to the minute. Any other text, as a run from elsewhere may hold, is returned unchanged."""
+    """An ISO 8601 time to the minute. Any other text, as a run from elsewhere may hold, is returned
+    unchanged."""
     try:
         return f"{datetime.fromisoformat(created):%Y-%m-%d %H:%M %Z}"
     except ValueError:
@@ -57,7 +60,9 @@ def ratio(value: float | None) -> str:
 def window(figure: Figure) -> str:
     """The window of a figure in words."""
     if figure.window == "horizon":
-        return "to the horizon" + (f" ({number(figure.until)} s)" if figure.until is not None else "")
+        return "to the horizon" + (
+            f" ({number(figure.until)} s)" if figure.until is not None else ""
+        )
     return f"first {number(figure.until)} s" if figure.until is not None else "whole run"
 
 

@@ -1,8 +1,9 @@
-"""Validation harness for rocking-block models: simulate one scene with several models, compare them, judge them.
+"""Validation harness for rocking-block models: simulate one scene with several models, compare
+them, judge them.
 
-All public names can be imported from here; each is loaded when it is first used, so that `import rockcheck` costs
-next to nothing. The parts lie in `rockcheck.scenes`, `rockcheck.ebm`, `rockcheck.cm`, `rockcheck.engines`,
-`rockcheck.validation` and `rockcheck.reports`.
+All public names can be imported from here; each is loaded when it is first used, so that `import
+rockcheck` costs next to nothing. The parts lie in `rockcheck.scenes`, `rockcheck.ebm`,
+`rockcheck.cm`, `rockcheck.engines`, `rockcheck.validation` and `rockcheck.reports`.
 """
 
 from __future__ import annotations
@@ -11,12 +12,22 @@ import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
-if os.path.isfile(os.path.join(os.path.dirname(__file__), "scenes")):  # what git writes where it may make no links
-    raise ImportError("rockcheck/scenes is no link to scenes/: git config core.symlinks true, then check out again")
+if os.path.isfile(
+    os.path.join(os.path.dirname(__file__), "scenes")
+):  # what git writes where it may make no links
+    raise ImportError(
+        "rockcheck/scenes is no link to scenes/: git config core.symlinks true, then check out"
+        " again"
+    )
 
 if TYPE_CHECKING:
     from rockcheck.cm import ContinuousModel, measured_restitution
-    from rockcheck.ebm import EventBasedModel, Spectrum, overturning_spectrum, predictability_horizon
+    from rockcheck.ebm import (
+        EventBasedModel,
+        Spectrum,
+        overturning_spectrum,
+        predictability_horizon,
+    )
     from rockcheck.engines import Dart, Drake, MuJoCo, PyBullet, Pymunk
     from rockcheck.scenes import (
         Block,
@@ -56,7 +67,12 @@ _HOMES = {
         "load_scene",
         "named_scenes",
     ),
-    "rockcheck.ebm": ("EventBasedModel", "Spectrum", "overturning_spectrum", "predictability_horizon"),
+    "rockcheck.ebm": (
+        "EventBasedModel",
+        "Spectrum",
+        "overturning_spectrum",
+        "predictability_horizon",
+    ),
     "rockcheck.cm": ("ContinuousModel", "measured_restitution"),
     "rockcheck.engines": ("Dart", "Drake", "MuJoCo", "PyBullet", "Pymunk"),
     "rockcheck.validation": ("Discrepancy", "compare"),

@@ -1,9 +1,11 @@
-"""A pytest plugin: `rockcheck_check("my-scene", model="mujoco")` in a test of your own holds a cell against its suite's tolerances.
+"""A pytest plugin: `rockcheck_check("my-scene", model="mujoco")` in a test of your own holds a cell
+against its suite's tolerances.
 
-The suite is the ini option `rockcheck_suite` (a named suite or a .toml file, relative to pytest's root), by default
-`rockcheck.toml` in the root where there is one, else `paper`. Histories are kept in pytest's cache and read back while
-nothing that they depend on has changed. `check` is the fixture's old name, kept for one release where no other plugin
-(such as pytest-check) has a fixture of that name.
+The suite is the ini option `rockcheck_suite` (a named suite or a .toml file, relative to pytest's
+root), by default `rockcheck.toml` in the root where there is one, else `paper`. Histories are kept
+in pytest's cache and read back while nothing that they depend on has changed. `check` is the
+fixture's old name, kept for one release where no other plugin (such as pytest-check) has a fixture
+of that name.
 """
 
 from __future__ import annotations
@@ -21,32 +23,61 @@ if TYPE_CHECKING:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The ini options `rockcheck_suite` and `rockcheck_allow_code`, and the command line's own `--rockcheck-allow-code`."""
-    parser.addini("rockcheck_suite", "suite that the fixture `rockcheck_check` takes scenes, models and tolerances from", default="")
-    parser.addini("rockcheck_allow_code", "models of your own, module:Class, that may be run", type="args", default=[])
+    """The ini options `rockcheck_suite` and `rockcheck_allow_code`, and the command line's own
+    `--rockcheck-allow-code`."""
+    parser.addini(
+        "rockcheck_suite",
+        "suite that the fixture `rockcheck_check` takes scenes, models and tolerances from",
+        default="",
+    )
+    parser.addini(
+        "rockcheck_allow_code",
+        "models of your own, module:Class, that may be run",
+        type="args",
+        default=[],
+    )
     parser.addoption(
-        "--rockcheck-allow-code", action="append", default=[], metavar="MODULE:CLASS", help="a model of your own that rockcheck may run"
+        "--rockcheck-allow-code",
+        action="append",
+        default=[],
+        metavar="MODULE:CLASS",
+        help="a model of your own that rockcheck may run",
     )
 
 
 @pytest.fixture
 def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., Cell]:
-    """`rockcheck_check(scene, model=..., suite=None, strict=False)`: runs that cell and its references, fails the test out of tolerance.
+    """`rockcheck_check(scene, model=..., suite=None, strict=False)`: runs that cell and its
+    references, fails the test out of tolerance.
 
-    Returns the finished `validation.suite.results.Cell`, whose figures a test may look at. With `strict` a figure that left its
-    drift band for the worse fails too, with `strict="both"` a better one. A model that is not installed fails.
+    Returns the finished `validation.suite.results.Cell`, whose figures a test may look at. With
+    `strict` a figure that left its drift band for the worse fails too, with `strict="both"` a
+    better one. A model that is not installed fails.
     """
     config = request.config
 
-    def check(scene: str, *, model: str, suite: str | Path | None = None, strict: bool | Literal["both"] = False) -> Cell:
+    def check(
+        scene: str,
+        *,
+        model: str,
+        suite: str | Path | None = None,
+        strict: bool | Literal["both"] = False,
+    ) -> Cell:
         from rockcheck.validation.suite.runner import run_suite
         from rockcheck.validation.suite.suites import load_suite, named_suites
         from rockcheck.validation.suite.tables import cell_lines
 
         own = config.rootpath / "rockcheck.toml"
-        chosen = str(suite or config.getini("rockcheck_suite") or (own if own.exists() else "paper"))
-        allowed = [*config.getini("rockcheck_allow_code"), *config.getoption("--rockcheck-allow-code")]
-        loaded = load_suite(chosen if chosen in named_suites() else config.rootpath / chosen, allow_code=allowed)
+        chosen = str(
+            suite or config.getini("rockcheck_suite") or (own if own.exists() else "paper")
+        )
+        allowed = [
+            *config.getini("rockcheck_allow_code"),
+            *config.getoption("--rockcheck-allow-code"),
+        ]
+        loaded = load_suite(
+            chosen if chosen in named_suites() else config.rootpath / chosen, allow_code=allowed
+        )
         run = run_suite(loaded.only(scene, model), config.cache.mkdir("rockcheck"), strict=strict)
         cell = run.cell(scene, model)
         assert cell is not None
@@ -54,7 +85,10 @@ def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., Cell]:
         if wrong:
             pytest.fail("\n".join(wrong), pytrace=False)
         if all(check.verdict == "not defined" for check in cell.checks):
-            pytest.fail(f"{scene}, {model}: nothing is judged: the suite has no tolerance for it", pytrace=False)
+            pytest.fail(
+                f"{scene}, {model}: nothing is judged: the suite has no tolerance for it",
+                pytrace=False,
+            )
         return cell
 
     return check
@@ -65,5 +99,9 @@ if find_spec("pytest_check") is None:
     @pytest.fixture
     def check(rockcheck_check: Callable[..., Cell]) -> Callable[..., Cell]:
         """The old name of `rockcheck_check`; it goes with the next release."""
-        warnings.warn("rockcheck's fixture `check` is called `rockcheck_check` now", DeprecationWarning, stacklevel=2)
+        warnings.warn(
+            "rockcheck's fixture `check` is called `rockcheck_check` now",
+            DeprecationWarning,
+            stacklevel=2,
+        )
         return rockcheck_check

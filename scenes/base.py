@@ -1,7 +1,9 @@
-"""What all scene objects share: frozen, strictly validated, faults told in one line; and how they ask to be shown.
+"""What all scene objects share: frozen, strictly validated, faults told in one line; and how they
+ask to be shown.
 
-The contract draws nothing. How a scene, a history, a spectrum or a comparison shows itself is said above: a package registers a
-`View` for a class by an entry point of the group `rockcheck.views`; rockcheck's own is `rockcheck.reports.show`.
+The contract draws nothing. How a scene, a history, a spectrum or a comparison shows itself is said
+above: a package registers a `View` for a class by an entry point of the group `rockcheck.views`;
+rockcheck's own is `rockcheck.reports.show`.
 """
 
 from __future__ import annotations
@@ -30,13 +32,16 @@ def _not_tiny(value: float) -> float:
 
 
 Finite = Annotated[float, Strict(), Field(ge=-MOST, le=MOST, allow_inf_nan=False)]
-Positive = Annotated[float, Strict(), Field(gt=0.0, le=MOST, allow_inf_nan=False), AfterValidator(_not_tiny)]
+Positive = Annotated[
+    float, Strict(), Field(gt=0.0, le=MOST, allow_inf_nan=False), AfterValidator(_not_tiny)
+]
 NonNegative = Annotated[float, Strict(), Field(ge=0.0, le=MOST, allow_inf_nan=False)]
 Restitution = Annotated[float, Strict(), Field(ge=0.0, le=1.0, allow_inf_nan=False)]
 
 
 class Frozen(BaseModel):
-    """A frozen value whose constructor raises `InputError` for whatever is missing, unknown or out of range."""
+    """A frozen value whose constructor raises `InputError` for whatever is missing, unknown or out
+    of range."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -48,7 +53,9 @@ class Frozen(BaseModel):
 
     def replace(self, **change: object) -> Self:
         """A copy with some fields changed, validated like any other; all other fields stay."""
-        return type(self)(**{name: getattr(self, name) for name in type(self).model_fields} | change)
+        return type(self)(
+            **{name: getattr(self, name) for name in type(self).model_fields} | change
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,9 +1,9 @@
 """Compiled functions whose cache can be trusted.
 
-numba's own cache looks at a function's own file only. After a change in a function that it calls, it would silently use the old
-machine code. Here the cache folder is named after the content of all source files of the function's package, such as
-rockcheck.ebm with all below it. numba also runs whatever lies in its cache. Here a file is read only if this user wrote it and
-it is complete.
+numba's own cache looks at a function's own file only. After a change in a function that it calls,
+it would silently use the old machine code. Here the cache folder is named after the content of all
+source files of the function's package, such as rockcheck.ebm with all below it. numba also runs
+whatever lies in its cache. Here a file is read only if this user wrote it and it is complete.
 """
 
 from __future__ import annotations
@@ -43,7 +43,8 @@ from rockcheck.scenes.writing import write_whole
 
 
 def _import_array_functions() -> None:
-    """Import numba's array functions. They would import scipy.linalg (0.2 s) only to know that it is there.
+    """Import numba's array functions. They would import scipy.linalg (0.2 s) only to know that it
+    is there.
 
     It is, since rockcheck needs scipy; what calls BLAS looks for it again when it is compiled.
     """
@@ -71,9 +72,11 @@ _PURPOSES = {
 
 
 class _Compiling(Listener):
-    """Switches garbage collection off while numba compiles: searching the compiler's objects for cycles takes a tenth of its time.
+    """Switches garbage collection off while numba compiles: searching the compiler's objects for
+    cycles takes a tenth of its time.
 
-    A long compilation is announced once a package and process, so that a user knows what the wait is for.
+    A long compilation is announced once a package and process, so that a user knows what the wait
+    is for.
     """
 
     def __init__(self) -> None:
@@ -89,7 +92,9 @@ class _Compiling(Listener):
             gc.disable()
             if announced():
                 function = getattr((event.data or {}).get("dispatcher"), "py_func", None)
-                self.timer = threading.Timer(_SILENT, self._tell, [getattr(function, "__module__", "")])
+                self.timer = threading.Timer(
+                    _SILENT, self._tell, [getattr(function, "__module__", "")]
+                )
                 self.timer.daemon = True
                 self.timer.start()
         self.depth += 1
@@ -109,32 +114,41 @@ class _Compiling(Listener):
         if package not in self.told:
             self.told.add(package)
             what = _PURPOSES.get(package, package)
-            announce(f"compiling {what} for this machine, once a version: about a minute (`rockcheck warm` does it ahead)")
+            announce(
+                f"compiling {what} for this machine, once a version: about a minute (`rockcheck"
+                " warm` does it ahead)"
+            )
 
 
 register("numba:compile", _Compiling())
 
 
 def _package(function: Callable[..., Any]) -> Path:
-    """The folder of the function's package: that of rockcheck.ebm for one of rockcheck.ebm.core.march."""
+    """The folder of the function's package: that of rockcheck.ebm for one of
+    rockcheck.ebm.core.march."""
     below = max(len(function.__module__.split(".")) - 3, 0)
     return Path(function.__code__.co_filename).parents[below]
 
 
 @cache
 def _cache_folder(package: Path) -> Path | None:
-    """The private folder for the compiled code of a package; None, with a line on stderr, where there can be none.
+    """The private folder for the compiled code of a package; None, with a line on stderr, where
+    there can be none.
 
-    What lies there is unpickled and run. So it must be nobody else's: the user's own, closed to all others, in a folder that only
-    the user, the package's owner or root may change.
+    What lies there is unpickled and run. So it must be nobody else's: the user's own, closed to all
+    others, in a folder that only the user, the package's owner or root may change.
     """
     digest = hashlib.sha256()
     for source in [Path(__file__), *sorted(package.rglob("*.py"))]:
         digest.update(source.name.encode() + b"\0" + source.read_bytes())
     name = f"{package.name}-kernels-{digest.hexdigest()[:16]}"
     user_wide = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "rockcheck"
-    for base in (Path(config.CACHE_DIR),) if config.CACHE_DIR else (package / "__pycache__", user_wide):
-        with contextlib.suppress(OSError):  # such as a package that is installed where we may not write
+    for base in (
+        (Path(config.CACHE_DIR),) if config.CACHE_DIR else (package / "__pycache__", user_wide)
+    ):
+        with contextlib.suppress(
+            OSError
+        ):  # such as a package that is installed where we may not write
             if base == user_wide:
                 base.mkdir(mode=0o700, parents=True, exist_ok=True)
             folder = base.absolute() / name
@@ -144,12 +158,17 @@ def _cache_folder(package: Path) -> Path | None:
                     pass
                 _remove_old(folder, package.name)
                 return folder
-    print("rockcheck: no private folder for compiled code, each run compiles anew: set NUMBA_CACHE_DIR to one of your own", file=sys.stderr)
+    print(
+        "rockcheck: no private folder for compiled code, each run compiles anew: set"
+        " NUMBA_CACHE_DIR to one of your own",
+        file=sys.stderr,
+    )
     return None
 
 
 def _is_private(folder: Path, owner: int) -> bool:
-    """Whether nobody but the user can have written into `folder`, or put it there; `owner` is that of the code itself."""
+    """Whether nobody but the user can have written into `folder`, or put it there; `owner` is that
+    of the code itself."""
     if not hasattr(os, "geteuid"):
         return True  # no owners and modes that could be asked
     me, own, above = os.geteuid(), folder.lstat(), folder.parent.stat()
@@ -164,17 +183,19 @@ def _is_private(folder: Path, owner: int) -> bool:
 
 
 def _remove_old(folder: Path, package: str) -> None:
-    """Remove what was compiled from other sources, unless it is young: another process may be using it."""
+    """Remove what was compiled from other sources, unless it is young: another process may be using
+    it."""
     for old in folder.parent.glob(f"{package}-kernels-*"):
         if old != folder and time.time() - old.stat().st_mtime > _KEPT:
             shutil.rmtree(old, ignore_errors=True)
 
 
 def _call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
-    """The types of a call of one of numba's own functions, `operator.add` too: for the same arguments those of the call before.
+    """The types of a call of one of numba's own functions, `operator.add` too: for the same
+    arguments those of the call before.
 
-    numba tries all that such a function may mean, some ten things, at each place where it stands: a quarter of the time that the
-    event loop takes to compile.
+    numba tries all that such a function may mean, some ten things, at each place where it stands: a
+    quarter of the time that the event loop takes to compile.
     """
     known, asked = self.__dict__.setdefault("_rockcheck_known", {}), (args, tuple(kws.items()))
     if asked not in known:
@@ -183,7 +204,8 @@ def _call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
 
 
 class _Compiler(Compiler):
-    """numba's own compiler, which looks up each kind of call once. Only one thread compiles: it holds numba's lock."""
+    """numba's own compiler, which looks up each kind of call once. Only one thread compiles: it
+    holds numba's lock."""
 
     def _compile_core(self) -> Any:
         already = "get_call_type" in vars(types.Function)
@@ -197,15 +219,21 @@ class _Compiler(Compiler):
 
 
 class _Linked(JITCodeLibrary):
-    """The code of an inner kernel, which is linked into the kernels that call it: no machine code is made of it alone.
+    """The code of an inner kernel, which is linked into the kernels that call it: no machine code
+    is made of it alone.
 
-    numba would make some of each, and of all that it calls, though nothing runs it: a third of the time that the event loop takes
-    to compile. And it is optimised where it ends; here only its loops and its arithmetic are put in order.
+    numba would make some of each, and of all that it calls, though nothing runs it: a third of the
+    time that the event loop takes to compile. And it is optimised where it ends; here only its
+    loops and its arithmetic are put in order.
     """
 
     def _optimize_final_module(self) -> None:
-        made = self._codegen._module_pass_manager(opt=0, loop_vectorize=False, slp_vectorize=False, cost="cheap")
-        passes, *builder = made if isinstance(made, tuple) else (made,)  # numba before 0.62 needs no builder
+        made = self._codegen._module_pass_manager(
+            opt=0, loop_vectorize=False, slp_vectorize=False, cost="cheap"
+        )
+        passes, *builder = (
+            made if isinstance(made, tuple) else (made,)
+        )  # numba before 0.62 needs no builder
         passes.run(self._final_module, *builder)
 
     def _finalize_final_module(self) -> None:
@@ -220,7 +248,8 @@ class _Linked(JITCodeLibrary):
 
     @property
     def codegen(self) -> Any:
-        """Where numba leaves the environment of a function: nowhere. It is for what needs Python, which no inner kernel does."""
+        """Where numba leaves the environment of a function: nowhere. It is for what needs Python,
+        which no inner kernel does."""
         return self
 
     def set_env(self, env_name: str, env: object) -> None:
@@ -231,7 +260,9 @@ class _InnerCompiler(_Compiler):
     """A compiler whose result is linked only."""
 
     def __init__(self, typing: Any, target: Any, library: Any, *about: Any) -> None:
-        super().__init__(typing, target, library or _Linked(target.codegen(), "inner kernel"), *about)
+        super().__init__(
+            typing, target, library or _Linked(target.codegen(), "inner kernel"), *about
+        )
 
 
 class _Cache(FunctionCache):
@@ -265,7 +296,10 @@ class _Cache(FunctionCache):
 
     def _path(self, key: object) -> Path:
         about = (numba.__version__, sys.version, key)
-        return self.folder / f"{self.name[-100:]}-{hashlib.sha256(repr(about).encode()).hexdigest()[:32]}.nbc"
+        return (
+            self.folder
+            / f"{self.name[-100:]}-{hashlib.sha256(repr(about).encode()).hexdigest()[:32]}.nbc"
+        )
 
     def load(self, key: object) -> Any:
         """What `save` kept."""
@@ -298,15 +332,18 @@ class _Cache(FunctionCache):
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compiles `function` with numba on its first call, cached on disk until any source of its package changes.
+    """Compiles `function` with numba on its first call, cached on disk until any source of its
+    package changes.
 
-    The compiled code releases the interpreter's lock, so that batches run on threads, and divides as IEEE 754 does (no
-    exception for a zero divisor). Under NUMBA_DISABLE_JIT=1, as for a debugger or to measure coverage, it is interpreted and
-    divides likewise.
+    The compiled code releases the interpreter's lock, so that batches run on threads, and divides
+    as IEEE 754 does (no exception for a zero divisor). Under NUMBA_DISABLE_JIT=1, as for a debugger
+    or to measure coverage, it is interpreted and divides likewise.
     """
     if config.DISABLE_JIT:
         return np.errstate(all="ignore")(function)
-    compiled = numba.njit(nogil=True, error_model="numpy", _nrt=True, no_cfunc_wrapper=True, pipeline_class=_Compiler)(function)
+    compiled = numba.njit(
+        nogil=True, error_model="numpy", _nrt=True, no_cfunc_wrapper=True, pipeline_class=_Compiler
+    )(function)
     folder = _cache_folder(_package(function))
     if folder is not None:
         compiled._cache = _Cache(function, folder)
@@ -314,25 +351,35 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def for_types_of(compiled: Any, *args: Any) -> Callable[..., Any]:
-    """A kernel's machine code for arguments of just these types, compiled or read from the cache if need be.
+    """A kernel's machine code for arguments of just these types, compiled or read from the cache if
+    need be.
 
-    numba looks at the types of all arguments in each call, which takes longer than a short kernel: 3 us where there are some tuples
-    of arrays. For a loop in Python that calls the same kernel many times.
+    numba looks at the types of all arguments in each call, which takes longer than a short kernel:
+    3 us where there are some tuples of arrays. For a loop in Python that calls the same kernel many
+    times.
     """
     if config.DISABLE_JIT:
         return cast(Callable[..., Any], compiled)
-    return cast(Callable[..., Any], compiled.compile(tuple(compiled.typeof_pyval(argument) for argument in args)))
+    return cast(
+        Callable[..., Any],
+        compiled.compile(tuple(compiled.typeof_pyval(argument) for argument in args)),
+    )
 
 
 class _Inner(CPUDispatcher):
-    """A function that kernels call: compiled once for the types that it is given, whoever calls it. Python calls the plain function."""
+    """A function that kernels call: compiled once for the types that it is given, whoever calls it.
+    Python calls the plain function."""
 
     def __call__(self, *args: Any, **named: Any) -> Any:
         return self.py_func(*args, **named)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """For numba: a constant is compiled as a number, else each would be a copy of its own. Where the code is placed it is one again."""
-        return super().get_call_template([types.unliteral(a) for a in args], {name: types.unliteral(a) for name, a in kws.items()})
+        """For numba: a constant is compiled as a number, else each would be a copy of its own.
+        Where the code is placed it is one again."""
+        return super().get_call_template(
+            [types.unliteral(a) for a in args],
+            {name: types.unliteral(a) for name, a in kws.items()},
+        )
 
 
 def _inner(function: Callable[..., Any], **options: bool) -> Any:
@@ -340,19 +387,26 @@ def _inner(function: Callable[..., Any], **options: bool) -> Any:
     if config.DISABLE_JIT:
         return function
     named = {"nopython": True, "error_model": "numpy", "_nrt": False, "forceinline": True} | options
-    return _Inner(function, targetoptions=named | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}, pipeline_class=_InnerCompiler)
+    return _Inner(
+        function,
+        targetoptions=named | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True},
+        pipeline_class=_InnerCompiler,
+    )
 
 
 def inner_kernel(function: Callable[..., Any]) -> Any:
-    """A part of kernels that neither makes nor returns an array, but works on those that it is given.
+    """A part of kernels that neither makes nor returns an array, but works on those that it is
+    given.
 
-    Its code stands where it is called: most are given much, and a call would take longer than they do. It has no reference
-    counting, whose atomic operations cost as much as a short loop, and no entry point for Python, which calls the plain function
-    instead. numba refuses to compile one that makes an array; one that returns an array would free it too early.
+    Its code stands where it is called: most are given much, and a call would take longer than they
+    do. It has no reference counting, whose atomic operations cost as much as a short loop, and no
+    entry point for Python, which calls the plain function instead. numba refuses to compile one
+    that makes an array; one that returns an array would free it too early.
     """
     return _inner(function)
 
 
 def called_kernel(function: Callable[..., Any]) -> Any:
-    """An inner kernel that is called: for what is long and stands in several places, each of which would be compiled again."""
+    """An inner kernel that is called: for what is long and stands in several places, each of which
+    would be compiled again."""
     return _inner(function, forceinline=False)

@@ -1,4 +1,5 @@
-"""The exceptions, each with a message of one line: what a user gave cannot be used, or a model could not finish."""
+"""The exceptions, each with a message of one line: what a user gave cannot be used, or a model
+could not finish."""
 
 from __future__ import annotations
 
@@ -12,7 +13,8 @@ from pydantic import ValidationError
 
 
 class InputError(ValueError):
-    """What the user gave cannot be used; the message is one line saying where, what and what is allowed.
+    """What the user gave cannot be used; the message is one line saying where, what and what is
+    allowed.
 
     `key` is the dotted path of the offending setting within its object, empty where there is none.
     """
@@ -28,13 +30,17 @@ class NotInstalled(InputError):
 
 
 class ModelFailure(RuntimeError):
-    """A model could not finish a scene (blow-up, unsupported physics, a cap reached); its cell fails, the run goes on."""
+    """A model could not finish a scene (blow-up, unsupported physics, a cap reached); its cell
+    fails, the run goes on."""
 
 
 def check_kind(value: object, kind: type, how: str, key: str) -> None:
-    """Raises `InputError` where the argument `key` is no `kind`; `how` says where one comes from."""
+    """Raises `InputError` where the argument `key` is no `kind`; `how` says where one comes
+    from."""
     if not isinstance(value, kind):
-        raise InputError(f"{printable(repr(value))} is not allowed: give a {kind.__name__}, as from {how}", key)
+        raise InputError(
+            f"{printable(repr(value))} is not allowed: give a {kind.__name__}, as from {how}", key
+        )
 
 
 #: So many names a message lists.
@@ -47,7 +53,8 @@ def unknown_name(what: str, name: str, allowed: Iterable[str]) -> InputError:
 
 
 def suggestion(name: str, allowed: Iterable[str]) -> str:
-    """What to say after a name that is not among `allowed`: the nearest one, and all of them, or some of very many."""
+    """What to say after a name that is not among `allowed`: the nearest one, and all of them, or
+    some of very many."""
     names = sorted(allowed)
     near = get_close_matches(name, names, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
@@ -56,7 +63,8 @@ def suggestion(name: str, allowed: Iterable[str]) -> str:
 
 
 def inert(text: str) -> str:
-    """`text` without what steers a terminal or a page: control characters, and those that turn the order of what follows (U+202E).
+    """`text` without what steers a terminal or a page: control characters, and those that turn the
+    order of what follows (U+202E).
 
     Lines and every kind of blank stay.
     """
@@ -66,16 +74,22 @@ def inert(text: str) -> str:
 
 
 def printable(value: object, limit: int = 80) -> str:
-    """`value` as one short line without control characters, safe to write to a terminal; a path is never shortened."""
+    """`value` as one short line without control characters, safe to write to a terminal; a path is
+    never shortened."""
     text = "".join(c if c.isprintable() else "?" for c in str(value))
     return text if len(text) <= limit or isinstance(value, PurePath) else text[: limit - 3] + "..."
 
 
 def from_validation(error: ValidationError, keys: Iterable[str] = ()) -> InputError:
-    """The first fault that pydantic found, as one line: key, value, what is allowed. `keys` are those that could be given."""
+    """The first fault that pydantic found, as one line: key, value, what is allowed. `keys` are
+    those that could be given."""
     faults = error.errors(include_url=False)
     # A key that is misspelt is unknown, and the right one missing: the first says what to mend.
-    fault = next((one for one in faults if one["type"] == "extra_forbidden"), faults[0]) if faults[0]["type"] == "missing" else faults[0]
+    fault = (
+        next((one for one in faults if one["type"] == "extra_forbidden"), faults[0])
+        if faults[0]["type"] == "missing"
+        else faults[0]
+    )
     path = [printable(part) for part in fault["loc"]]
     if path[:1] in (["excitation"], ["vertical"]):
         del path[1:2]  # the excitation's kind, which pydantic adds

@@ -1,7 +1,7 @@
 """Base excitations: pulses, recorded ground motions and rest.
 
-Every excitation counts time from its own start (t = 0) and gives the acceleration of the base in m/s^2, horizontal
-motion positive to the right, vertical motion positive upward.
+Every excitation counts time from its own start (t = 0) and gives the acceleration of the base in
+m/s^2, horizontal motion positive to the right, vertical motion positive upward.
 """
 
 from __future__ import annotations
@@ -24,14 +24,16 @@ FloatArray = NDArray[np.float64]
 class Motion(Frozen):
     """What all excitations share: a base motion made larger or longer is one of the same kind.
 
-    `_size` names the field that its acceleration is proportional to, `_length` the one that its time is; "" where it has none.
+    `_size` names the field that its acceleration is proportional to, `_length` the one that its
+    time is; "" where it has none.
     """
 
     _size: ClassVar[str] = "amplitude"
     _length: ClassVar[str] = "period"
 
     def scaled(self, factor: float) -> Self:
-        """The same motion with `factor` times the acceleration; a negative factor also exchanges left and right."""
+        """The same motion with `factor` times the acceleration; a negative factor also exchanges
+        left and right."""
         return self._times(self._size, factor)
 
     def stretched(self, factor: float) -> Self:
@@ -62,9 +64,10 @@ class Rest(Motion):
 class Ricker(Motion):
     """A Ricker pulse; antisymmetric (the paper's (34)) unless `symmetric`.
 
-    It starts 2 T_p before its centre. An antisymmetric pulse of positive amplitude has a weak negative lobe, a strong
-    positive, a strong negative and a weak positive one. `amplitude` is the peak acceleration a_p in m/s^2 (negative:
-    the mirror image), `period` is T_p = 2 pi / omega_p in s.
+    It starts 2 T_p before its centre. An antisymmetric pulse of positive amplitude has a weak
+    negative lobe, a strong positive, a strong negative and a weak positive one. `amplitude` is the
+    peak acceleration a_p in m/s^2 (negative: the mirror image), `period` is T_p = 2 pi / omega_p in
+    s.
     """
 
     kind: Literal["ricker"] = "ricker"
@@ -80,13 +83,18 @@ class Ricker(Motion):
     @property
     def rate(self) -> float:
         """b of the Gaussian factor exp(-b tau^2), 1/s^2; tau is the time from the centre."""
-        return 2.0 * math.pi**2 / (3.0 * self.period**2) if not self.symmetric else 2.0 * math.pi**2 / self.period**2
+        return (
+            2.0 * math.pi**2 / (3.0 * self.period**2)
+            if not self.symmetric
+            else 2.0 * math.pi**2 / self.period**2
+        )
 
     @property
     def polynomial(self) -> tuple[float, float, float, float]:
         """Coefficients of 1, tau, tau^2, tau^3 of the polynomial factor, SI units.
 
-        Antisymmetric, (34): (a_p/1.38)(2 b tau^2 - 3)(2 pi tau/(sqrt 3 T_p)). Symmetric: a_p (1 - 2 b tau^2).
+        Antisymmetric, (34): (a_p/1.38)(2 b tau^2 - 3)(2 pi tau/(sqrt 3 T_p)). Symmetric: a_p (1 - 2
+        b tau^2).
         """
         if self.symmetric:
             return self.amplitude, 0.0, -2.0 * self.rate * self.amplitude, 0.0
@@ -130,9 +138,9 @@ class Sine(Motion):
 class Record(Motion):
     """A sampled ground motion: linear between its samples, zero after the last one.
 
-    Usually made by `Record.from_file` or `Record.from_samples`. `unscaled` holds the samples in m/s^2 as recorded, and
-    `scale` multiplies them. A scene longer than its record goes on with a base at rest. `notes` say what the file's reader did,
-    such as a first time that is not 0.
+    Usually made by `Record.from_file` or `Record.from_samples`. `unscaled` holds the samples in
+    m/s^2 as recorded, and `scale` multiplies them. A scene longer than its record goes on with a
+    base at rest. `notes` say what the file's reader did, such as a first time that is not 0.
     """
 
     _size: ClassVar[str] = "scale"
@@ -142,7 +150,9 @@ class Record(Motion):
     time_step: Positive
     scale: Finite = 1.0
     source: str = "samples"
-    notes: Annotated[tuple[Annotated[str, StringConstraints(max_length=300)], ...], Field(max_length=20)] = ()
+    notes: Annotated[
+        tuple[Annotated[str, StringConstraints(max_length=300)], ...], Field(max_length=20)
+    ] = ()
 
     @model_validator(mode="before")
     @classmethod
@@ -155,7 +165,9 @@ class Record(Motion):
             path = data.pop("file")
             if not isinstance(path, str | Path):
                 raise InputError(f"{path!r} is not allowed: give the path of a record file", "file")
-            reading = Reading(**{name: data.pop(name) for name in Reading.model_fields if name in data})
+            reading = Reading(
+                **{name: data.pop(name) for name in Reading.model_fields if name in data}
+            )
             data |= _told(read_record(Path(path), reading), Path(path))
         return data
 
@@ -163,9 +175,10 @@ class Record(Motion):
     def from_file(cls, path: str | Path, scale: float = 1.0, **reading: Any) -> Self:
         """The record in a file of one of the formats of `rockcheck.scenes.recordings`.
 
-        `reading` holds what the file does not say, or which part of it is wanted: the options of `recordings.Reading`, such as
-        `unit="cm/s2"`, `time_step=0.005`, `column=2` or `component="360 Deg"`.
-        Raises `InputError`, naming file and line, where the file is not what it says it is, or something is not known.
+        `reading` holds what the file does not say, or which part of it is wanted: the options of
+        `recordings.Reading`, such as `unit="cm/s2"`, `time_step=0.005`, `column=2` or
+        `component="360 Deg"`. Raises `InputError`, naming file and line, where the file is not what
+        it says it is, or something is not known.
         """
         settings: dict[str, Any] = {"file": path, "scale": scale} | reading
         return cls(**settings)
@@ -173,7 +186,11 @@ class Record(Motion):
     @classmethod
     def from_samples(cls, samples: ArrayLike, time_step: float, scale: float = 1.0) -> Self:
         """A record of `samples` (m/s^2, 1-D) taken every `time_step` s, the first at t = 0."""
-        return cls(unscaled=tuple(np.asarray(samples, dtype=float).ravel().tolist()), time_step=time_step, scale=scale)
+        return cls(
+            unscaled=tuple(np.asarray(samples, dtype=float).ravel().tolist()),
+            time_step=time_step,
+            scale=scale,
+        )
 
     @property
     def samples(self) -> FloatArray:
@@ -199,7 +216,12 @@ class Record(Motion):
 def _told(found: Recording, path: Path) -> dict[str, Any]:
     """A file's recording as fields of a `Record`."""
     samples = tuple(found.samples.tolist())
-    return {"unscaled": samples, "time_step": found.time_step, "source": path.name, "notes": found.notes}
+    return {
+        "unscaled": samples,
+        "time_step": found.time_step,
+        "source": path.name,
+        "notes": found.notes,
+    }
 
 
 Excitation = Annotated[Rest | Ricker | Sine | Record, Field(discriminator="kind")]

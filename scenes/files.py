@@ -32,7 +32,8 @@ def load_scene(source: str | Path) -> Scene:
 
 
 def load_uncertain_scene(source: str | Path) -> UncertainScene:
-    """A scene with what its file says of the numbers that are not known exactly (see `scenes.trust.inputs`). Raises as `load_scene`."""
+    """A scene with what its file says of the numbers that are not known exactly (see
+    `scenes.trust.inputs`). Raises as `load_scene`."""
     return _read(_path_of(source))
 
 
@@ -42,7 +43,9 @@ def _path_of(source: str | Path) -> Path:
         return known[str(source)]
     path = Path(source)
     if path.suffix.lower() != ".toml":
-        raise InputError(f"{unknown_name('scene', str(source), known)}; or the path of a .toml file")
+        raise InputError(
+            f"{unknown_name('scene', str(source), known)}; or the path of a .toml file"
+        )
     return path
 
 
@@ -54,14 +57,20 @@ def _read(path: Path) -> UncertainScene:
         raise InputError(f"{printable(path)}: {error}") from None
 
 
-def uncertain_scene_from(data: Mapping[str, Any], *, folder: Path, default_name: str) -> UncertainScene:
-    """A scene from the tables of a scene file, with what they say of numbers that are not known exactly."""
+def uncertain_scene_from(
+    data: Mapping[str, Any], *, folder: Path, default_name: str
+) -> UncertainScene:
+    """A scene from the tables of a scene file, with what they say of numbers that are not known
+    exactly."""
     plain, spreads, correlations = split(data)
-    return uncertain_scene(scene_from(plain, folder=folder, default_name=default_name), spreads, correlations)
+    return uncertain_scene(
+        scene_from(plain, folder=folder, default_name=default_name), spreads, correlations
+    )
 
 
 def scene_from(data: dict[str, Any], *, folder: Path, default_name: str) -> Scene:
-    """A scene from the tables of a scene file; record files are looked up in `folder`, then among the package's records."""
+    """A scene from the tables of a scene file; record files are looked up in `folder`, then among
+    the package's records."""
     data = {"name": default_name, **data}
     if isinstance(data.get("walls"), dict):
         raise InputError("must be a list of tables: write [[walls]], not [walls]", "walls")
@@ -74,8 +83,8 @@ def scene_from(data: dict[str, Any], *, folder: Path, default_name: str) -> Scen
 
 #: Largest TOML file, bytes.
 MOST_BYTES = 10_000_000
-#: A key with too many parts: the parser's memory grows with the square of their number. The search takes linear time, since a
-#: match begins only at a part, and no part can match in two ways.
+#: A key with too many parts: the parser's memory grows with the square of their number. The search
+#: takes linear time, since a match begins only at a part, and no part can match in two ways.
 _PART = r"""(?:"[^"\n]*+"|'[^'\n]*+'|[^\s.,=\[\]"']++)"""
 _DEEP_KEY = re.compile(rf"(?<![^\s.,=\[\]]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{49}}")
 
@@ -87,5 +96,8 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{printable(path)}: a key of more than 50 parts")
     try:
         return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # such as an integer of more digits than Python reads
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # such as an integer of more digits than Python reads
         raise InputError(f"{printable(path)}: not valid TOML: {printable(error)}") from None

@@ -34,8 +34,9 @@ LYING = math.pi / 2 - 0.05
 #: Endings of files that a history can be written to, and the columns that hold words.
 FORMATS = ("", ".csv", ".gz", ".json", ".mat", ".parquet")
 WORDS = ("kind", "mode_before", "mode_after")
-#: The column of a CSV that says what the table does not, as JSON in its first row, so that any reader takes the file as a
-#: plain table; "-" in the others, since pandas warns of a column that holds words here and nothing there.
+#: The column of a CSV that says what the table does not, as JSON in its first row, so that any
+#: reader takes the file as a plain table; "-" in the others, since pandas warns of a column that
+#: holds words here and nothing there.
 ABOUT = "rockcheck_history"
 #: What it says of a block that is not homogeneous.
 _MASS = ("centre_of_mass", "moment_of_inertia")
@@ -45,7 +46,8 @@ MODES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight", "ove
 
 @dataclass(frozen=True, kw_only=True)
 class Event:
-    """One change of contact or mode at time `t` (s); `impulse` per unit mass in m/s, 0 where nothing strikes."""
+    """One change of contact or mode at time `t` (s); `impulse` per unit mass in m/s, 0 where
+    nothing strikes."""
 
     t: float
     kind: str
@@ -56,19 +58,23 @@ class Event:
 
 @dataclass(frozen=True, kw_only=True)
 class Cost:
-    """What a run took. `set_up` and `wall_seconds` in s (set-up, such as building an engine's scene, is not in the latter)."""
+    """What a run took. `set_up` and `wall_seconds` in s (set-up, such as building an engine's
+    scene, is not in the latter)."""
 
     wall_seconds: float = 0.0
     cpu_seconds: float = 0.0
     set_up: float = 0.0
     steps: int = 0
     evaluations: int = 0
-    #: Impacts at which the impact law added kinetic energy, and the most that one of them added, relative.
+    #: Impacts at which the impact law added kinetic energy, and the most that one of them added,
+    #: relative.
     energy_gains: int = 0
     largest_energy_gain: float = 0.0
-    #: How often each modelling choice of the event-based model was made, by its name; those that never were are left out.
+    #: How often each modelling choice of the event-based model was made, by its name; those that
+    #: never were are left out.
     rules: Mapping[str, int] = field(default_factory=dict)
-    #: Largest change of theta/alpha against the same run at a tighter tolerance, where that was asked for.
+    #: Largest change of theta/alpha against the same run at a tighter tolerance, where that was
+    #: asked for.
     error_estimate: float | None = None
 
 
@@ -76,10 +82,11 @@ class Cost:
 class History(Shown):
     """The motion of a block as one model sees it. SI units, signs as in the scene.
 
-    `channels` holds one 1-D array a name, all of one length: t, x, y, theta, x_dot, y_dot, theta_dot, slip, slip_rate, mode.
-    x and y are those of the box's centre, relative to the base (of a homogeneous block its centroid); `slip` is how far the
-    pivot corner stands from its first place along the floor, `slip_rate` that corner's horizontal velocity. A history that ends
-    in overturning stops there.
+    `channels` holds one 1-D array a name, all of one length: t, x, y, theta, x_dot, y_dot,
+    theta_dot, slip, slip_rate, mode. x and y are those of the box's centre, relative to the base
+    (of a homogeneous block its centroid); `slip` is how far the pivot corner stands from its first
+    place along the floor, `slip_rate` that corner's horizontal velocity. A history that ends in
+    overturning stops there.
     """
 
     name: str
@@ -89,15 +96,18 @@ class History(Shown):
     outcome: str
     cost: Cost = Cost()
     settings: Mapping[str, Any] = field(default_factory=dict)
-    #: Things a reader should know, one line each (for example that the record is shorter than the scene).
+    #: Things a reader should know, one line each (for example that the record is shorter than the
+    #: scene).
     notes: tuple[str, ...] = ()
     #: Of the block, m; None for a history read from a file that does not say.
     half_width: float | None = None
     half_height: float | None = None
-    #: Of a block that is not homogeneous: place of its mass's centre (m), moment of inertia per unit mass (m^2); see `Block`.
+    #: Of a block that is not homogeneous: place of its mass's centre (m), moment of inertia per
+    #: unit mass (m^2); see `Block`.
     centre_of_mass: tuple[float, float] | None = None
     moment_of_inertia: float | None = None
-    #: Half width of the 95 % interval by measure (SI), of figures that are uncertain at their source, such as a mean of tests.
+    #: Half width of the 95 % interval by measure (SI), of figures that are uncertain at their
+    #: source, such as a mean of tests.
     uncertainty: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
@@ -105,7 +115,9 @@ class History(Shown):
         """The motion as a table, columns as in `channels`."""
         import pandas as pd
 
-        return pd.DataFrame({name: self.channels[name] for name in COLUMNS if name in self.channels})
+        return pd.DataFrame(
+            {name: self.channels[name] for name in COLUMNS if name in self.channels}
+        )
 
     @cached_property
     def events(self) -> pd.DataFrame:
@@ -139,7 +151,8 @@ class History(Shown):
 
     @property
     def overturned_at(self) -> float | None:
-        """When the block overturned, s: at |theta| = pi/2, or where a history of an overturned block ends; None for one that stays."""
+        """When the block overturned, s: at |theta| = pi/2, or where a history of an overturned
+        block ends; None for one that stays."""
         if not self.outcome.startswith("overturned"):
             return None
         event = next((one.t for one in self.event_list if one.kind == self.outcome), None)
@@ -155,17 +168,23 @@ class History(Shown):
         return self.outcome if at is None else f"{self.outcome} at {at:.3g} s"
 
     def expected(self, quantity: str = "peak_rotation") -> Expected:
-        """A figure corrected by what the suites found about this model, with its 95 % interval (rad): `scenes.trust.experience`.
+        """A figure corrected by what the suites found about this model, with its 95 % interval
+        (rad): `scenes.trust.experience`.
 
         Raises `InputError` where nothing is known of the model, or of the figure.
         """
         known_of = known().trust.get(self.model, {})
         if quantity not in known_of:
-            raise InputError(f"the suites say nothing of {quantity} by {self.model}; known: {', '.join(known_of) or 'nothing'}", "quantity")
+            raise InputError(
+                f"the suites say nothing of {quantity} by {self.model}; known:"
+                f" {', '.join(known_of) or 'nothing'}",
+                "quantity",
+            )
         return expected(known_of[quantity], float(getattr(self, quantity)))
 
     def save(self, path: str | Path) -> None:
-        """Write a file of the format that its name ends in; CSV where it has no ending, as /dev/stdout.
+        """Write a file of the format that its name ends in; CSV where it has no ending, as
+        /dev/stdout.
 
         | ending | what is written |
         |---|---|
@@ -175,8 +194,8 @@ class History(Shown):
         | .mat | the same as a MATLAB file: structures `about`, `channels` and `events` |
         | .parquet | the table, the rest in the frame's `attrs`; `<stem>.events.parquet` beside it; needs the package pyarrow |
 
-        All is written whole, or nothing is touched. `load` reads the CSV, compressed or not. Raises `InputError` for another
-        ending, and `OSError` that names the file which cannot be written.
+        All is written whole, or nothing is touched. `load` reads the CSV, compressed or not. Raises
+        `InputError` for another ending, and `OSError` that names the file which cannot be written.
         """
         path = Path(path)
         check_format(path)
@@ -187,17 +206,23 @@ class History(Shown):
             return
         if path.suffix.lower() == ".parquet":
             attrs = {ABOUT: json.loads(json.dumps(about, default=str))}
-            write_together({events_path(path): _parquet(self.events, {}), path: _parquet(self.frame, attrs)}, named=True)
+            write_together(
+                {events_path(path): _parquet(self.events, {}), path: _parquet(self.frame, attrs)},
+                named=True,
+            )
             return
         table, beside = self._tables(about)
         contents = {path: table}
         if path.is_file() or not path.exists():  # beside /dev/stdout there is nothing to be written
             contents = {events_path(path): beside, **contents}
         packed = path.suffix.lower() == ".gz"
-        write_together({one: _packed(text) if packed else text for one, text in contents.items()}, named=True)
+        write_together(
+            {one: _packed(text) if packed else text for one, text in contents.items()}, named=True
+        )
 
     def packed(self) -> dict[str, bytes]:
-        """The two files that `save` writes for a name ending in ".csv.gz", by their endings: ".csv.gz", ".events.csv.gz"."""
+        """The two files that `save` writes for a name ending in ".csv.gz", by their endings:
+        ".csv.gz", ".events.csv.gz"."""
         table, events = self._tables(self._about())
         return {".csv.gz": _packed(table), ".events.csv.gz": _packed(events)}
 
@@ -218,7 +243,11 @@ class History(Shown):
 
     def _tables(self, about: Mapping[str, Any]) -> tuple[str, str]:
         """The motion and the events as CSV."""
-        columns = {name: np.asarray(self.channels[name]).tolist() for name in COLUMNS if name in self.channels}
+        columns = {
+            name: np.asarray(self.channels[name]).tolist()
+            for name in COLUMNS
+            if name in self.channels
+        }
         rows = len(next(iter(columns.values()), ()))
         columns[ABOUT] = [json.dumps(about, sort_keys=True, default=str), *["-"] * rows][:rows]
         return columns_text(columns), columns_text(self._event_columns())
@@ -229,10 +258,12 @@ class History(Shown):
 
     @classmethod
     def load(cls, path: str | Path, *, columns: Mapping[str, str] | None = None) -> History:
-        """Read what `save` wrote, or any CSV with columns `t` and `theta` (SI units) and perhaps more of `COLUMNS`.
+        """Read what `save` wrote, or any CSV with columns `t` and `theta` (SI units) and perhaps
+        more of `COLUMNS`.
 
-        `columns` maps the file's names of columns to those of a history, where they differ.
-        Raises `InputError` for a file that is missing, lacks those columns, is not numeric, not finite or not ordered in time.
+        `columns` maps the file's names of columns to those of a history, where they differ. Raises
+        `InputError` for a file that is missing, lacks those columns, is not numeric, not finite or
+        not ordered in time.
         """
         import pandas as pd
 
@@ -241,24 +272,40 @@ class History(Shown):
         frame = read_table(path).rename(columns=str.strip).rename(columns=dict(columns or {}))
         beside = events_path(path)
         events = read_table(beside) if beside.exists() else pd.DataFrame()
-        if len(frame) and not isinstance(frame.index, pd.RangeIndex):  # pandas would take the first column for names of rows
+        if len(frame) and not isinstance(
+            frame.index, pd.RangeIndex
+        ):  # pandas would take the first column for names of rows
             raise InputError(f"{shown}: rows have more values than the heading has columns")
         about = _about(frame, shown)
         channels = _checked_channels(frame, shown)
         try:
             event_list = tuple(
-                Event(t=float(t), kind=str(kind), mode_before=_text(before), mode_after=_text(after), impulse=float(impulse))
-                for t, kind, before, after, impulse in events.reindex(columns=EVENT_COLUMNS).itertuples(index=False)
+                Event(
+                    t=float(t),
+                    kind=str(kind),
+                    mode_before=_text(before),
+                    mode_after=_text(after),
+                    impulse=float(impulse),
+                )
+                for t, kind, before, after, impulse in events.reindex(
+                    columns=EVENT_COLUMNS
+                ).itertuples(index=False)
             )
-            cost = Cost(**{k: v for k, v in about.get("cost", {}).items() if k in Cost.__dataclass_fields__})
+            cost = Cost(
+                **{k: v for k, v in about.get("cost", {}).items() if k in Cost.__dataclass_fields__}
+            )
         except (AttributeError, TypeError, ValueError):
-            raise InputError(f"{printable(beside)}: not an events table written by rockcheck") from None
+            raise InputError(
+                f"{printable(beside)}: not an events table written by rockcheck"
+            ) from None
         return cls(
             name=printable(about.get("name", path.stem), 200),
             model=printable(about.get("model", "measured"), 200),
             channels=channels,
             event_list=event_list,
-            outcome=str(about["outcome"]) if about.get("outcome") in OUTCOMES else outcome_of(channels),
+            outcome=str(about["outcome"])
+            if about.get("outcome") in OUTCOMES
+            else outcome_of(channels),
             cost=cost,
             settings=about.get("settings", {}),
             notes=tuple(printable(note, 1000) for note in about.get("notes", ())),
@@ -274,9 +321,13 @@ def check_format(path: Path) -> None:
     kind = path.suffix.lower()
     if kind not in FORMATS or (kind == ".gz" and not path.name.lower().endswith(".csv.gz")):
         allowed = ".csv, .csv.gz, .json, .mat or .parquet"
-        raise InputError(f"{printable(path)}: a history is written as {allowed}, not as {printable(path.suffix)}")
+        raise InputError(
+            f"{printable(path)}: a history is written as {allowed}, not as {printable(path.suffix)}"
+        )
     if kind == ".parquet" and not find_spec("pyarrow"):
-        raise InputError(f"{printable(path)}: Parquet needs the package pyarrow: pip install pyarrow")
+        raise InputError(
+            f"{printable(path)}: Parquet needs the package pyarrow: pip install pyarrow"
+        )
 
 
 def _parquet(table: pd.DataFrame, about: Mapping[str, Any]) -> bytes:
@@ -287,34 +338,57 @@ def _parquet(table: pd.DataFrame, about: Mapping[str, Any]) -> bytes:
     return content.getvalue()
 
 
-def _json(about: Mapping[str, Any], channels: Mapping[str, NDArray[Any]], events: Mapping[str, list[Any]]) -> str:
+def _json(
+    about: Mapping[str, Any], channels: Mapping[str, NDArray[Any]], events: Mapping[str, list[Any]]
+) -> str:
     columns = {name: column.tolist() for name, column in channels.items()}
     return json_text({**about, "channels": columns, "events": events}) + "\n"
 
 
-def _mat(about: Mapping[str, Any], channels: Mapping[str, NDArray[Any]], events: Mapping[str, list[Any]]) -> bytes:
+def _mat(
+    about: Mapping[str, Any], channels: Mapping[str, NDArray[Any]], events: Mapping[str, list[Any]]
+) -> bytes:
     from scipy.io import savemat
 
     said = {name: value for name, value in about.items() if isinstance(value, str | int | float)}
-    said |= {name: json.dumps(value, default=str) for name, value in about.items() if isinstance(value, dict | list)}
-    columns = {name: column.astype(object) if column.dtype.kind in "UO" else column for name, column in channels.items()}
-    happened = {name: np.array(column, dtype=object if name in WORDS else float) for name, column in events.items()}
+    said |= {
+        name: json.dumps(value, default=str)
+        for name, value in about.items()
+        if isinstance(value, dict | list)
+    }
+    columns = {
+        name: column.astype(object) if column.dtype.kind in "UO" else column
+        for name, column in channels.items()
+    }
+    happened = {
+        name: np.array(column, dtype=object if name in WORDS else float)
+        for name, column in events.items()
+    }
     content = io.BytesIO()
-    savemat(content, {"about": said, "channels": columns, "events": happened}, oned_as="column", do_compression=True)
+    savemat(
+        content,
+        {"about": said, "channels": columns, "events": happened},
+        oned_as="column",
+        do_compression=True,
+    )
     return content.getvalue()
 
 
 def outcome_of(channels: Mapping[str, NDArray[Any]], *, still: float = 1e-4) -> str:
-    """The outcome that a table of motion shows at its end; at rest is |theta| and |theta_dot| below `still` (rad, rad/s)."""
+    """The outcome that a table of motion shows at its end; at rest is |theta| and |theta_dot| below
+    `still` (rad, rad/s)."""
     theta = channels["theta"]
     if abs(theta[-1]) >= LYING:
         return "overturned left" if theta[-1] > 0 else "overturned right"
-    quiet = abs(theta[-1]) < still and all(abs(channels[c][-1]) < still for c in ("theta_dot", "x_dot") if c in channels)
+    quiet = abs(theta[-1]) < still and all(
+        abs(channels[c][-1]) < still for c in ("theta_dot", "x_dot") if c in channels
+    )
     return "at rest" if quiet else "moving"
 
 
 def events_path(path: Path) -> Path:
-    """The file of the events beside a history's CSV, compressed where that is, or beside its Parquet."""
+    """The file of the events beside a history's CSV, compressed where that is, or beside its
+    Parquet."""
     if path.suffix.lower() == ".parquet":
         return path.with_name(f"{path.stem}.events.parquet")
     packed = path.suffix if path.name.lower().endswith(".csv.gz") else ""
@@ -324,10 +398,12 @@ def events_path(path: Path) -> Path:
 def _packed(text: str) -> bytes:
     """Compressed; the same text gives the same bytes.
 
-    Digits of floats hardly repeat, so short matches cost more than they save: without them (`Z_FILTERED`) it is 7 % smaller.
-    A higher level saves 3 % in twice the time.
+    Digits of floats hardly repeat, so short matches cost more than they save: without them
+    (`Z_FILTERED`) it is 7 % smaller. A higher level saves 3 % in twice the time.
     """
-    packer = zlib.compressobj(4, wbits=zlib.MAX_WBITS | 16, strategy=zlib.Z_FILTERED)  # 16: as gzip writes
+    packer = zlib.compressobj(
+        4, wbits=zlib.MAX_WBITS | 16, strategy=zlib.Z_FILTERED
+    )  # 16: as gzip writes
     return packer.compress(text.encode()) + packer.flush()
 
 
@@ -336,7 +412,8 @@ def _text(value: object) -> str:
 
 
 def _about(frame: pd.DataFrame, shown: str) -> dict[str, Any]:
-    """What `save` says of a history in the table's first row; empty for a file of another program."""
+    """What `save` says of a history in the table's first row; empty for a file of another
+    program."""
     if ABOUT not in frame.columns or not len(frame):
         return {}
     try:
@@ -344,7 +421,9 @@ def _about(frame: pd.DataFrame, shown: str) -> dict[str, Any]:
     except (TypeError, ValueError, RecursionError):
         about = None
     parts = {"cost": dict, "settings": dict, "notes": list}
-    if not isinstance(about, dict) or not all(isinstance(about.get(name, kind()), kind) for name, kind in parts.items()):
+    if not isinstance(about, dict) or not all(
+        isinstance(about.get(name, kind()), kind) for name, kind in parts.items()
+    ):
         raise InputError(f"{shown}: column {ABOUT!r}: not written by rockcheck")
     return about
 
@@ -354,7 +433,10 @@ def _size(about: Mapping[str, Any], key: str, shown: str) -> float | None:
     if value is None:
         return None
     if isinstance(value, bool) or not isinstance(value, int | float) or not LEAST <= value <= MOST:
-        raise InputError(f"{printable(value)} is not allowed: give a length of {LEAST:g} to {MOST:g} m", f"{shown}: {key}")
+        raise InputError(
+            f"{printable(value)} is not allowed: give a length of {LEAST:g} to {MOST:g} m",
+            f"{shown}: {key}",
+        )
     return float(value)
 
 
@@ -380,7 +462,9 @@ def _mass(about: Mapping[str, Any], shown: str) -> dict[str, Any]:
 
 def _uncertainty(about: Mapping[str, Any], shown: str) -> dict[str, float]:
     found = about.get("uncertainty", {})
-    if not isinstance(found, dict) or not all(isinstance(u, int | float) and 0.0 <= u < math.inf for u in found.values()):
+    if not isinstance(found, dict) or not all(
+        isinstance(u, int | float) and 0.0 <= u < math.inf for u in found.values()
+    ):
         raise InputError(f"{shown}: column {ABOUT!r}: not written by rockcheck", "uncertainty")
     return {printable(name): float(u) for name, u in found.items()}
 
@@ -390,7 +474,9 @@ def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]
 
     missing = [name for name in ("t", "theta") if name not in frame.columns]
     if missing:
-        raise InputError(f"{shown}: no column {missing[0]!r}; t and theta are needed, of {', '.join(COLUMNS)}")
+        raise InputError(
+            f"{shown}: no column {missing[0]!r}; t and theta are needed, of {', '.join(COLUMNS)}"
+        )
     doubled = [name for name in COLUMNS if list(frame.columns).count(name) > 1]
     if doubled:
         raise InputError(f"{shown}: two columns {doubled[0]!r}")
@@ -412,7 +498,9 @@ def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]
         bad = np.flatnonzero(~(np.abs(values) <= MOST))
         if bad.size:
             why = f"larger than {MOST:g}" if np.isfinite(values[bad[0]]) else "not finite"
-            raise InputError(f"{shown}: column {name!r}, row {bad[0] + 1}: {values[bad[0]]} is {why}")
+            raise InputError(
+                f"{shown}: column {name!r}, row {bad[0] + 1}: {values[bad[0]]} is {why}"
+            )
         channels[name] = values
     if np.any(np.diff(channels["t"]) <= 0.0):
         raise InputError(f"{shown}: column 't' does not increase")

@@ -1,7 +1,9 @@
-"""Geometry and energy of the block's state, the same for every model. Arrays or scalars, SI units, per unit mass.
+"""Geometry and energy of the block's state, the same for every model. Arrays or scalars, SI units,
+per unit mass.
 
-x and y are those of the *box's* centre: where the corners are does not depend on where the mass is. Models that need the mass's centre
-change over with `of_mass` and `of_box`; of a homogeneous block both are one.
+x and y are those of the *box's* centre: where the corners are does not depend on where the mass is.
+Models that need the mass's centre change over with `of_mass` and `of_box`; of a homogeneous block
+both are one.
 """
 
 from __future__ import annotations
@@ -19,7 +21,9 @@ def slip(block: Block, x: Any, theta: Any) -> Any:
 
     A function of the state: x - S (R sin(alpha - |theta|) - B), continuous through theta = 0.
     """
-    return x - np.sign(theta) * (block.half_diagonal * np.sin(block.box_angle - np.abs(theta)) - block.half_width)
+    return x - np.sign(theta) * (
+        block.half_diagonal * np.sin(block.box_angle - np.abs(theta)) - block.half_width
+    )
 
 
 def slip_rate(block: Block, theta: Any, x_dot: Any, theta_dot: Any) -> Any:
@@ -37,28 +41,38 @@ def wall_gap(scene: Scene, side: str, x: Any, theta: Any) -> Any:
     outward = 1.0 if side == "left" else -1.0
     wall = next(w for w in scene.walls if w.side == side)
     block = scene.block
-    return outward * x + block.half_width + wall.gap - block.half_diagonal * np.sin(block.box_angle + np.abs(theta))
+    return (
+        outward * x
+        + block.half_width
+        + wall.gap
+        - block.half_diagonal * np.sin(block.box_angle + np.abs(theta))
+    )
 
 
 def of_mass(block: Block, states: Any) -> Any:
-    """States (..., 6: x, y, theta and rates) of the mass's centre, from those of the box's centre."""
+    """States (..., 6: x, y, theta and rates) of the mass's centre, from those of the box's
+    centre."""
     return states if block.centre_of_mass is None else _moved(block, states, 1.0)
 
 
 def of_box(block: Block, states: Any) -> Any:
-    """States (..., 6: x, y, theta and rates) of the box's centre, from those of the mass's centre."""
+    """States (..., 6: x, y, theta and rates) of the box's centre, from those of the mass's
+    centre."""
     return states if block.centre_of_mass is None else _moved(block, states, -1.0)
 
 
 def _moved(block: Block, states: Any, sense: float) -> Any:
-    """The states of a point that the block carries: by `sense` times the offset of the mass's centre further."""
+    """The states of a point that the block carries: by `sense` times the offset of the mass's
+    centre further."""
     x, y, theta, x_dot, y_dot, w = np.moveaxis(np.asarray(states, dtype=float), -1, 0)
     (dx, dz), s, c = block.offset, np.sin(theta), np.cos(theta)
     right, up = sense * (dx * c - dz * s), sense * (dx * s + dz * c)
     return np.stack([x + right, y + up, theta, x_dot - w * up, y_dot + w * right, w], axis=-1)
 
 
-def mass_motion(block: Block, y: Any, theta: Any, x_dot: Any, y_dot: Any, theta_dot: Any) -> tuple[Any, Any, Any]:
+def mass_motion(
+    block: Block, y: Any, theta: Any, x_dot: Any, y_dot: Any, theta_dot: Any
+) -> tuple[Any, Any, Any]:
     """Height and velocity (up; right, up) of the mass's centre, from those of the box's centre."""
     if block.centre_of_mass is None:
         return y, x_dot, y_dot
@@ -67,8 +81,13 @@ def mass_motion(block: Block, y: Any, theta: Any, x_dot: Any, y_dot: Any, theta_
     return y, x_dot, y_dot
 
 
-def energy(block: Block, gravity: float, y: Any, theta: Any, x_dot: Any, y_dot: Any, theta_dot: Any) -> Any:
-    """Kinetic plus potential energy per unit mass in the base's frame, zero for the block standing still, J/kg."""
+def energy(
+    block: Block, gravity: float, y: Any, theta: Any, x_dot: Any, y_dot: Any, theta_dot: Any
+) -> Any:
+    """Kinetic plus potential energy per unit mass in the base's frame, zero for the block standing
+    still, J/kg."""
     y, x_dot, y_dot = mass_motion(block, y, theta, x_dot, y_dot, theta_dot)
     height = block.weaker_pivot.height
-    return 0.5 * (x_dot**2 + y_dot**2 + block.gyration_squared * theta_dot**2) + gravity * (y - height)
+    return 0.5 * (x_dot**2 + y_dot**2 + block.gyration_squared * theta_dot**2) + gravity * (
+        y - height
+    )

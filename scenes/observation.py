@@ -30,11 +30,12 @@ def observe(
     settings: Mapping[str, Any] | None = None,
     notes: Sequence[str] = (),
 ) -> History:
-    """The History of a run whose `state` has one row per output time: x, y, theta, x_dot, y_dot, theta_dot (SI).
+    """The History of a run whose `state` has one row per output time: x, y, theta, x_dot, y_dot,
+    theta_dot (SI).
 
-    Fewer rows than `scene.output_times` mean that the run ended early; rows from the first |theta| >= pi/2 on are left
-    out. `mode` and `outcome` are derived from the motion where the model does not know them. Adds a note where the
-    record is shorter than the scene.
+    Fewer rows than `scene.output_times` mean that the run ended early; rows from the first |theta|
+    >= pi/2 on are left out. `mode` and `outcome` are derived from the motion where the model does
+    not know them. Adds a note where the record is shorter than the scene.
     """
     tipped = np.flatnonzero(np.abs(state[:, 2]) >= math.pi / 2)
     rows = int(tipped[0]) if tipped.size else len(state)
@@ -43,7 +44,9 @@ def observe(
     channels: dict[str, NDArray[Any]] = {"t": scene.output_times[:rows]}
     channels |= {name: state[:, column] for column, name in enumerate(STATE)}
     channels["slip"] = kinematics.slip(scene.block, channels["x"], channels["theta"])
-    channels["slip_rate"] = kinematics.slip_rate(scene.block, channels["theta"], channels["x_dot"], channels["theta_dot"])
+    channels["slip_rate"] = kinematics.slip_rate(
+        scene.block, channels["theta"], channels["x_dot"], channels["theta_dot"]
+    )
     channels["mode"] = modes_of(scene, channels) if mode is None else mode[:rows]
     if outcome is None:
         outcome = _overturned(tipped, events) or outcome_of(channels)
@@ -77,7 +80,8 @@ def scene_notes(scene: Scene) -> tuple[str, ...]:
 
 
 def modes_of(scene: Scene, channels: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
-    """Modes of motion read off the kinematics, for models that have contacts instead of modes (tolerances in SI units)."""
+    """Modes of motion read off the kinematics, for models that have contacts instead of modes
+    (tolerances in SI units)."""
     block = scene.block
     theta, sliding = channels["theta"], np.abs(channels["slip_rate"]) > 1e-3
     flat = (np.abs(theta) < 1e-4 * block.alpha) & (np.abs(channels["theta_dot"]) < 1e-3)
@@ -93,7 +97,8 @@ def modes_of(scene: Scene, channels: Mapping[str, NDArray[Any]]) -> NDArray[Any]
 
 
 def _overturned(tipped: NDArray[np.intp], events: Sequence[Event]) -> str | None:
-    """The side on which the block fell, from an `overturned left|right` event that the model reported."""
+    """The side on which the block fell, from an `overturned left|right` event that the model
+    reported."""
     for event in events:
         if event.kind.startswith("overturned"):
             return event.kind

@@ -1,7 +1,7 @@
 """How far a run has come: one protocol for models, spectra, studies, suites and pages.
 
-Long work calls `on_progress(done, total, what)`. A model has no argument for it. It calls `tell`, which reaches the block that is
-`listening` in the same thread; without one the call costs nothing.
+Long work calls `on_progress(done, total, what)`. A model has no argument for it. It calls `tell`,
+which reaches the block that is `listening` in the same thread; without one the call costs nothing.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from typing import Protocol
 
 
 class OnProgress(Protocol):
-    """Called now and then with the parts done, the parts in all (of any unit), and a few words on what was last."""
+    """Called now and then with the parts done, the parts in all (of any unit), and a few words on
+    what was last."""
 
     def __call__(self, done: float, total: float, what: str = "") -> None:
         """See the class."""
@@ -47,7 +48,8 @@ _announcer: Callable[[str], None] | None = None
 
 
 def announce(words: str) -> None:
-    """Says in one line what a user waits for, from any thread. It is silent where no block is `announcing`."""
+    """Says in one line what a user waits for, from any thread. It is silent where no block is
+    `announcing`."""
     if _announcer is not None:
         _announcer(words)
 

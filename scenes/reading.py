@@ -1,4 +1,5 @@
-"""Reading files that somebody else may have written: only regular files, of bounded size, as UTF-8 text."""
+"""Reading files that somebody else may have written: only regular files, of bounded size, as UTF-8
+text."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ MOST_COLUMNS, MOST_LINE = 1000, 1_000_000
 
 
 def within(folder: Path, *parts: str) -> Path:
-    """The path of what a folder holds that somebody may have sent. Raises `InputError` where it leads out of the folder, as by a link."""
+    """The path of what a folder holds that somebody may have sent. Raises `InputError` where it
+    leads out of the folder, as by a link."""
     path = folder.joinpath(*parts)
     if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder)):
         raise InputError(f"{printable(path)}: cannot be read: lies outside the run's folder")
@@ -40,22 +42,31 @@ def within(folder: Path, *parts: str) -> Path:
 def open_regular(path: Path, most: int = MOST_BYTES) -> IO[bytes]:
     """A regular file of at most `most` bytes, open for reading.
 
-    Raises `InputError` for anything else, such as a pipe or a device, which may have no end or wait for ever, and does not open it.
+    Raises `InputError` for anything else, such as a pipe or a device, which may have no end or wait
+    for ever, and does not open it.
     """
     shown = printable(path)
     try:
         if not stat.S_ISREG(os.stat(path).st_mode):
             raise InputError(f"{shown}: cannot be read: not a file")
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        handle = os.open(
+            path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+        )
     except InputError:
         raise
     except (OSError, ValueError) as error:  # a path that holds a null character is a ValueError
-        raise InputError(f"{shown}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+        raise InputError(
+            f"{shown}: cannot be read: {getattr(error, 'strerror', None) or error}"
+        ) from None
     about = os.fstat(handle)
     if stat.S_ISREG(about.st_mode) and about.st_size <= most:
         return os.fdopen(handle, "rb")
     os.close(handle)
-    raise InputError(f"{shown}: larger than {most} bytes" if stat.S_ISREG(about.st_mode) else f"{shown}: cannot be read: not a file")
+    raise InputError(
+        f"{shown}: larger than {most} bytes"
+        if stat.S_ISREG(about.st_mode)
+        else f"{shown}: cannot be read: not a file"
+    )
 
 
 def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
@@ -98,14 +109,19 @@ def _inert(value: Any) -> Any:
 
 
 def read_text(path: Path, most: int = MOST_BYTES, *, latin: bool = False) -> str:
-    """The text of a file without a byte-order mark. Raises `InputError` where it is no file, too large or not UTF-8.
+    """The text of a file without a byte-order mark. Raises `InputError` where it is no file, too
+    large or not UTF-8.
 
-    With `latin` a file that is not UTF-8 is read as UTF-16 if it has that byte-order mark, else as Latin-1 if it has no control
-    characters.
+    With `latin` a file that is not UTF-8 is read as UTF-16 if it has that byte-order mark, else as
+    Latin-1 if it has no control characters.
     """
     content = read_bytes(path, most)
     try:
-        text = content.decode("utf-16") if latin and _NOT_UTF8.match(content) else content.decode("utf-8-sig")
+        text = (
+            content.decode("utf-16")
+            if latin and _NOT_UTF8.match(content)
+            else content.decode("utf-8-sig")
+        )
     except UnicodeDecodeError:
         if not latin or _CONTROLS.search(content):
             raise InputError(f"{printable(path)}: not a text file") from None
@@ -114,7 +130,8 @@ def read_text(path: Path, most: int = MOST_BYTES, *, latin: bool = False) -> str
 
 
 def read_arrays(path: Path, most: int = MOST_BYTES) -> dict[str, np.ndarray]:
-    """The arrays of an NPZ file, by name. Raises `InputError` where it is none, is not whole, is too large or holds objects."""
+    """The arrays of an NPZ file, by name. Raises `InputError` where it is none, is not whole, is
+    too large or holds objects."""
     import numpy as np
 
     shown = printable(path)
@@ -141,7 +158,8 @@ _CONTROLS = re.compile(rb"[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")
 
 @contextmanager
 def open_table(path: Path) -> Iterator[IO[bytes]]:
-    """A table's content, open for reading; one that gzip has compressed is decompressed as it is read. Raises `InputError`."""
+    """A table's content, open for reading; one that gzip has compressed is decompressed as it is
+    read. Raises `InputError`."""
     with open_regular(path, MOST_TABLE_BYTES) as stream:
         packed = stream.read(len(_GZIP)) == _GZIP
         stream.seek(0)
@@ -153,9 +171,11 @@ def open_table(path: Path) -> Iterator[IO[bytes]]:
 
 
 def read_table(path: Path, **options: Any) -> pd.DataFrame:
-    """A CSV file by pandas, plain or compressed by gzip; `options` are those of pandas. Lines that start with # are remarks.
+    """A CSV file by pandas, plain or compressed by gzip; `options` are those of pandas. Lines that
+    start with # are remarks.
 
-    Raises `InputError` where it is no such file, or a line of it is too long for a table of histories.
+    Raises `InputError` where it is no such file, or a line of it is too long for a table of
+    histories.
     """
     import pandas as pd
 
@@ -171,12 +191,17 @@ def read_table(path: Path, **options: Any) -> pd.DataFrame:
         raise InputError(f"{shown}: cannot be read: {error.strerror}") from None
     except InputError:
         raise
-    except (ValueError, OverflowError, RecursionError) as error:  # pandas' own parser errors are ValueErrors
+    except (
+        ValueError,
+        OverflowError,
+        RecursionError,
+    ) as error:  # pandas' own parser errors are ValueErrors
         raise InputError(f"{shown}: not a CSV table: {printable(error)}") from None
 
 
 def _check_lines(stream: IO[bytes], shown: str) -> None:
-    """Every row stands on one line, of a bounded number of columns; all of them are no more than a table may hold."""
+    """Every row stands on one line, of a bounded number of columns; all of them are no more than a
+    table may hold."""
     number = size = 0
     while line := stream.readline(MOST_LINE + 1):
         number += 1
@@ -184,10 +209,17 @@ def _check_lines(stream: IO[bytes], shown: str) -> None:
         if size > MOST_TABLE_BYTES:  # a small compressed file may hold very much
             raise InputError(f"{shown}: larger than {MOST_TABLE_BYTES} bytes")
         if len(line) > MOST_LINE:
-            raise InputError(f"{shown}: not a CSV table: line {number}: longer than {MOST_LINE} bytes")
+            raise InputError(
+                f"{shown}: not a CSV table: line {number}: longer than {MOST_LINE} bytes"
+            )
         if line.startswith(b"#"):
             continue
         if line.count(b",") >= MOST_COLUMNS:
-            raise InputError(f"{shown}: not a CSV table: line {number}: more than {MOST_COLUMNS} columns")
+            raise InputError(
+                f"{shown}: not a CSV table: line {number}: more than {MOST_COLUMNS} columns"
+            )
         if line.count(b'"') % 2 and line.partition(b"#")[0].count(b'"') % 2:
-            raise InputError(f"{shown}: not a CSV table: line {number}: a quotation mark that is not closed on its line")
+            raise InputError(
+                f"{shown}: not a CSV table: line {number}: a quotation mark that is not closed on"
+                " its line"
+            )

@@ -1,4 +1,5 @@
-"""A scene: a rigid block on a shaking floor, perhaps beside walls. It knows nothing of the models that play it."""
+"""A scene: a rigid block on a shaking floor, perhaps beside walls. It knows nothing of the models
+that play it."""
 
 from __future__ import annotations
 
@@ -17,14 +18,16 @@ from rockcheck.scenes.excitations import Excitation, Rest
 __all__ = ["PAPER_BLOCK", "Block", "Floor", "Scene", "Wall"]
 
 MOST_SAMPLES = 5_000_000
-#: At mu = 4/3 the pivot of a homogeneous block can jam while it slips (Painleve); physics beyond it is not unique.
+#: At mu = 4/3 the pivot of a homogeneous block can jam while it slips (Painleve); physics beyond it
+#: is not unique.
 PAINLEVE_FRICTION = 4.0 / 3.0
 
 
 class Floor(Frozen):
     """The floor's Coulomb friction and restitution.
 
-    `friction` is the kinetic coefficient; `static_friction` None means the same. `restitution` is the normal one, e_g.
+    `friction` is the kinetic coefficient; `static_friction` None means the same. `restitution` is
+    the normal one, e_g.
     """
 
     friction: NonNegative
@@ -36,10 +39,16 @@ class Floor(Frozen):
         for key in ("friction", "static_friction"):
             value = getattr(self, key)
             if value is not None and value >= PAINLEVE_FRICTION:
-                raise InputError(f"{value:g} is not allowed: must be below 4/3, where a slipping pivot may jam (Painleve)", key)
+                raise InputError(
+                    f"{value:g} is not allowed: must be below 4/3, where a slipping pivot may jam"
+                    " (Painleve)",
+                    key,
+                )
         if self.static_friction is not None and self.static_friction < self.friction:
             raise InputError(
-                f"{self.static_friction:g} is not allowed: must be at least the kinetic friction {self.friction:g}", "static_friction"
+                f"{self.static_friction:g} is not allowed: must be at least the kinetic friction"
+                f" {self.friction:g}",
+                "static_friction",
             )
         return self
 
@@ -50,7 +59,8 @@ class Floor(Frozen):
 
 
 class Wall(Frozen):
-    """A rigid frictionless wall; `gap` is the clear distance in m to the block's side as it stands, `restitution` is e."""
+    """A rigid frictionless wall; `gap` is the clear distance in m to the block's side as it stands,
+    `restitution` is e."""
 
     side: Literal["left", "right"]
     gap: NonNegative
@@ -60,10 +70,11 @@ class Wall(Frozen):
 class Scene(Shown, Frozen):
     """All that a model needs to know; SI units, angles in rad, counterclockwise positive.
 
-    The box stands with its centre above x = 0 unless it starts tilted: `initial_rotation` tilts it about the corner
-    it would rock on, which keeps its place. `initial_angular_velocity` (rad/s) and `initial_velocity` (m/s, the slip rate
-    of that corner) complete its state, see `initial_state`; `initial_height` (m) lifts it off the floor. `duration`
-    counts from the excitation's start. `gravity` in m/s^2.
+    The box stands with its centre above x = 0 unless it starts tilted: `initial_rotation` tilts it
+    about the corner it would rock on, which keeps its place. `initial_angular_velocity` (rad/s) and
+    `initial_velocity` (m/s, the slip rate of that corner) complete its state, see `initial_state`;
+    `initial_height` (m) lifts it off the floor. `duration` counts from the excitation's start.
+    `gravity` in m/s^2.
     """
 
     name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.,+=()-]{0,99}$")]
@@ -85,24 +96,33 @@ class Scene(Shown, Frozen):
     @classmethod
     def _one_wall_a_side(cls, walls: tuple[Wall, ...]) -> tuple[Wall, ...]:
         if len({wall.side for wall in walls}) < len(walls):
-            raise InputError("two walls on one side; at most one wall on the left and one on the right are allowed")
+            raise InputError(
+                "two walls on one side; at most one wall on the left and one on the right are"
+                " allowed"
+            )
         return tuple(sorted(walls, key=lambda wall: wall.side))
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
         if self.floor.mu_s >= self.block.least_painleve_friction:
             raise InputError(
-                f"{self.floor.mu_s:g} is not allowed: must be below {self.block.least_painleve_friction:.4g}, where a slipping pivot of"
+                f"{self.floor.mu_s:g} is not allowed: must be below"
+                f" {self.block.least_painleve_friction:.4g}, where a slipping pivot of"
                 " this block may jam (Painleve)",
                 "floor.friction" if self.floor.static_friction is None else "floor.static_friction",
             )
         if self.duration / self.output_step > MOST_SAMPLES:
-            raise InputError(f"{self.output_step:g} s gives more than {MOST_SAMPLES} samples in {self.duration:g} s", "output_step")
+            raise InputError(
+                f"{self.output_step:g} s gives more than {MOST_SAMPLES} samples in"
+                f" {self.duration:g} s",
+                "output_step",
+            )
         for wall in self.walls:
             reach = self._reach(wall.side)
             if reach > self.block.half_width + wall.gap + 1e-12 * self.block.half_diagonal:
                 raise InputError(
-                    f"{self.initial_rotation:g} is not allowed: the block would start {reach - self.block.half_width - wall.gap:.3g} m"
+                    f"{self.initial_rotation:g} is not allowed: the block would start"
+                    f" {reach - self.block.half_width - wall.gap:.3g} m"
                     f" inside the {wall.side} wall",
                     "initial_rotation",
                 )
@@ -112,7 +132,9 @@ class Scene(Shown, Frozen):
         """How far the initial block reaches to one side, m from the place of its upright centre."""
         tilt, radius, alpha = self.initial_rotation, self.block.half_diagonal, self.block.box_angle
         outward = 1.0 if side == "left" else -1.0
-        centroid = math.copysign(1.0, tilt) * (radius * math.sin(alpha - abs(tilt)) - self.block.half_width)
+        centroid = math.copysign(1.0, tilt) * (
+            radius * math.sin(alpha - abs(tilt)) - self.block.half_width
+        )
         return radius * math.sin(alpha + abs(tilt)) - outward * centroid
 
     def wall(self, side: Literal["left", "right"]) -> Wall | None:
@@ -132,14 +154,22 @@ class Scene(Shown, Frozen):
 
     @property
     def initial_state(self) -> tuple[float, float, float, float, float, float]:
-        """x, y, theta of the box's centre and their rates at t = 0 (SI, relative to the base), turning about the lower corner."""
+        """x, y, theta of the box's centre and their rates at t = 0 (SI, relative to the base),
+        turning about the lower corner."""
         tilt, spin, block = self.initial_rotation, self.initial_angular_velocity, self.block
         radius, alpha = block.half_diagonal, block.box_angle
         pivot = math.copysign(1.0, tilt if tilt != 0.0 else spin)
         s, c = math.sin(alpha - abs(tilt)), math.cos(alpha - abs(tilt))
         x = pivot * (radius * s - block.half_width) if tilt != 0.0 else 0.0
         y = self.initial_height + (radius * c if tilt != 0.0 else block.half_height)
-        return x, y, tilt, self.initial_velocity - radius * c * spin, pivot * radius * s * spin, spin
+        return (
+            x,
+            y,
+            tilt,
+            self.initial_velocity - radius * c * spin,
+            pivot * radius * s * spin,
+            spin,
+        )
 
     def mirrored(self) -> Scene:
         """The same scene with left and right exchanged."""

@@ -1,4 +1,5 @@
-"""Threads that run kernels (`scenes.compiled`), and how Ctrl-C ends the wait for them. Needs no compiler."""
+"""Threads that run kernels (`scenes.compiled`), and how Ctrl-C ends the wait for them. Needs no
+compiler."""
 
 from __future__ import annotations
 
@@ -51,9 +52,10 @@ _RUNNERS: list[_Runner] = []
 def interruptible(call: Callable[[], Result]) -> Result:
     """The result of `call`, which runs a kernel. Ctrl-C ends the wait at once.
 
-    Python handles a signal only between two of its own steps, and a kernel may run for minutes. The main thread is the one that is
-    interrupted; it has the kernel run in a second thread, which is kept: to start one takes longer than a short run. After
-    Ctrl-C that thread goes on unobserved, and the next call has a new one. So has a forked process.
+    Python handles a signal only between two of its own steps, and a kernel may run for minutes. The
+    main thread is the one that is interrupted; it has the kernel run in a second thread, which is
+    kept: to start one takes longer than a short run. After Ctrl-C that thread goes on unobserved,
+    and the next call has a new one. So has a forked process.
     """
     if threading.current_thread() is not threading.main_thread():
         return call()
@@ -73,7 +75,8 @@ def interruptible(call: Callable[[], Result]) -> Result:
 
 @contextlib.contextmanager
 def threads(count: int) -> Iterator[ThreadPoolExecutor]:
-    """Threads for kernels. When an exception (Ctrl-C is one) leaves the block, kernels that still run are not waited for."""
+    """Threads for kernels. When an exception (Ctrl-C is one) leaves the block, kernels that still
+    run are not waited for."""
     pool = ThreadPoolExecutor(count)
     try:
         yield pool

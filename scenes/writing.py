@@ -19,7 +19,8 @@ from rockcheck.scenes.errors import InputError, inert, printable
 
 
 def made(folder: Path, *parts: str) -> Path:
-    """A folder of results, made if need be, or one within it. Raises `InputError` for a part that is a link."""
+    """A folder of results, made if need be, or one within it. Raises `InputError` for a part that
+    is a link."""
     folder.mkdir(parents=True, exist_ok=True)
     for part in parts:
         folder = no_link(folder / part)
@@ -28,14 +29,18 @@ def made(folder: Path, *parts: str) -> Path:
 
 
 def no_link(path: Path) -> Path:
-    """`path`; raises `InputError` where it is a link, through which something outside of a folder of results would be written."""
+    """`path`; raises `InputError` where it is a link, through which something outside of a folder
+    of results would be written."""
     if path.is_symlink():
-        raise InputError(f"{printable(path)}: a link; results are not written through it: remove it")
+        raise InputError(
+            f"{printable(path)}: a link; results are not written through it: remove it"
+        )
     return path
 
 
 def write_whole(path: Path, content: str | bytes, *, named: bool = False) -> Path:
-    """Write a file so that a reader sees the old content or the new, never a part. See `write_together`."""
+    """Write a file so that a reader sees the old content or the new, never a part. See
+    `write_together`."""
     write_together({path: content}, named=named)
     return path
 
@@ -43,8 +48,9 @@ def write_whole(path: Path, content: str | bytes, *, named: bool = False) -> Pat
 def write_together(contents: Mapping[Path, str | bytes], *, named: bool = False) -> None:
     """Write files, text as UTF-8, so that all of them are new or all of them are as they were.
 
-    A link, a pipe or a device that stands in the way is replaced: whoever sent a folder may have put it there. Only where the user
-    `named` this very file is it written as it is, such as /dev/stdout, and a link stays one. Raises `OSError` that names the file.
+    A link, a pipe or a device that stands in the way is replaced: whoever sent a folder may have
+    put it there. Only where the user `named` this very file is it written as it is, such as
+    /dev/stdout, and a link stays one. Raises `OSError` that names the file.
     """
     finished: list[tuple[str, Path]] = []
     with ExitStack() as leavings:
@@ -55,7 +61,9 @@ def write_together(contents: Mapping[Path, str | bytes], *, named: bool = False)
                 if named and path.exists() and not path.is_file() and not path.is_dir():
                     path.write_bytes(data)
                     continue
-                handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:60]}.", suffix=".part")
+                handle, temporary = tempfile.mkstemp(
+                    dir=target.parent, prefix=f".{target.name[:60]}.", suffix=".part"
+                )
                 leavings.callback(Path(temporary).unlink, missing_ok=True)
                 with os.fdopen(handle, "wb") as stream:
                     stream.write(data)
@@ -74,7 +82,8 @@ def write_together(contents: Mapping[Path, str | bytes], *, named: bool = False)
 
 
 def write_new(path: Path, content: str) -> Path:
-    """Write a text file that must not be there yet, whole or not at all. Raises `FileExistsError` where it is."""
+    """Write a text file that must not be there yet, whole or not at all. Raises `FileExistsError`
+    where it is."""
     try:
         handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
     except OSError as error:
@@ -93,12 +102,16 @@ def _named(error: OSError, path: Path) -> OSError:
     return OSError(error.errno, error.strerror or str(error), str(path))
 
 
-#: How a cell begins that a spreadsheet would take for a formula; a number, or a sign alone, is none.
+#: How a cell begins that a spreadsheet would take for a formula; a number, or a sign alone, is
+#: none.
 _FORMULA = re.compile(r"[=@＝＠](?!\Z)|[-+－＋](?!(?:inf|nan|\d*+\.?+\d*+(?:[eE][-+]?\d++)?)\Z)")
 
 
-def table_text(columns: Sequence[str], rows: Iterable[Sequence[object]], *, digits: int | None = None) -> str:
-    """A table as CSV; floats with all their digits, or with so many significant ones. None and NaN are empty cells."""
+def table_text(
+    columns: Sequence[str], rows: Iterable[Sequence[object]], *, digits: int | None = None
+) -> str:
+    """A table as CSV; floats with all their digits, or with so many significant ones. None and NaN
+    are empty cells."""
     return _csv(columns, ([_cell(value, digits) for value in row] for row in rows))
 
 
@@ -108,11 +121,16 @@ def columns_text(columns: Mapping[str, Sequence[object]]) -> str:
 
 
 def _cells(values: Sequence[object]) -> Sequence[object]:
-    """A column's cells. Numbers are looked at one by one only where there is a NaN, the one value that does not equal itself."""
+    """A column's cells. Numbers are looked at one by one only where there is a NaN, the one value
+    that does not equal itself."""
     if len(values) and isinstance(values[0], str):
         shown = {value: _cell(value, None) for value in set(values)}
         return [shown[value] for value in values]
-    return [_cell(value, None) for value in values] if any(map(operator.ne, values, values)) else values
+    return (
+        [_cell(value, None) for value in values]
+        if any(map(operator.ne, values, values))
+        else values
+    )
 
 
 def _csv(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
@@ -140,7 +158,9 @@ def _cell(value: object, digits: int | None) -> object:
 def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """A table as Markdown, without a line's end; a bar in a cell is escaped."""
     lines = (columns, ["---"] * len(columns), *rows)
-    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+    return "\n".join(
+        "| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines
+    )
 
 
 def finite(value: Any) -> Any:
@@ -153,5 +173,6 @@ def finite(value: Any) -> Any:
 
 
 def json_text(value: Any) -> str:
-    """A value as indented JSON (see `finite`); what JSON does not know, such as a path, is written as text."""
+    """A value as indented JSON (see `finite`); what JSON does not know, such as a path, is written
+    as text."""
     return json.dumps(finite(value), indent=1, allow_nan=False, default=str)

@@ -18,7 +18,8 @@ from rockcheck.scenes.errors import NotInstalled
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
 
-#: What may be skipped while `CI` is set: how the reason begins, and where it is no fault of the job. All else that is skipped fails it.
+#: What may be skipped while `CI` is set: how the reason begins, and where it is no fault of the
+#: job. All else that is skipped fails it.
 MAY_BE_SKIPPED: dict[str, bool] = {
     "needs pybullet": sys.version_info >= (3, 12),  # which has wheels for 3.11 only
     "needs Linux": sys.platform != "linux",
@@ -48,7 +49,9 @@ def _judged(report: Any) -> None:
     """In CI a test, or a whole file, that is skipped without a listed reason has failed."""
     if not os.environ.get("CI") or not report.skipped or hasattr(report, "wasxfail"):
         return
-    reason = str(report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr).removeprefix("Skipped: ")
+    reason = str(
+        report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
+    ).removeprefix("Skipped: ")
     if not _may_be_skipped(reason):
         report.outcome = "failed"
         report.longrepr = f"skipped in CI, and tests/conftest.py lists no such reason: {reason}"
@@ -97,7 +100,8 @@ def browser() -> Iterator[Browser]:
 def visitor(browser: Browser) -> Iterator[Callable[..., Page]]:
     """`visitor(folder, **settings)` is an empty page of the browser, for the files of a folder.
 
-    In the end no page must have complained on its console, or asked for anything outside of its folder.
+    In the end no page must have complained on its console, or asked for anything outside of its
+    folder.
     """
     complaints: list[str] = []
     contexts: list[BrowserContext] = []
@@ -106,10 +110,27 @@ def visitor(browser: Browser) -> Iterator[Callable[..., Page]]:
         contexts.append(browser.new_context(**settings))
         page = contexts[-1].new_page()
         home = folder.as_uri()
-        page.on("console", lambda message: complaints.append(message.text) if message.type in ("error", "warning") else None)
+        page.on(
+            "console",
+            lambda message: (
+                complaints.append(message.text) if message.type in ("error", "warning") else None
+            ),
+        )
         page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("requestfailed", lambda request: None if request.failure == ABORTED else complaints.append(f"failed: {request.url}"))
-        page.on("request", lambda request: None if request.url.startswith((home, "data:", "about:")) else complaints.append(request.url))
+        page.on(
+            "requestfailed",
+            lambda request: (
+                None if request.failure == ABORTED else complaints.append(f"failed: {request.url}")
+            ),
+        )
+        page.on(
+            "request",
+            lambda request: (
+                None
+                if request.url.startswith((home, "data:", "about:"))
+                else complaints.append(request.url)
+            ),
+        )
         return page
 
     yield visit
@@ -133,7 +154,8 @@ def synthetic(
     outcome: str = "moving",
     **columns: Any,
 ) -> History:
-    """A history with theta in alpha; x, y and velocities are zero unless given, y touches the floor."""
+    """A history with theta in alpha; x, y and velocities are zero unless given, y touches the
+    floor."""
     theta = ALPHA * np.asarray(theta, dtype=float)
     time = np.asarray(t if t is not None else 0.01 * np.arange(len(theta)), dtype=float)
     zero = np.zeros(len(theta))
@@ -161,6 +183,8 @@ def made() -> Callable[..., History]:
 def in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The working folder is an empty one, but for the models of `faulty.py`, imported afresh."""
     monkeypatch.chdir(tmp_path)
-    shutil.copy(Path(__file__).parent / "validation" / "models" / "faulty.py", tmp_path / "faulty.py")
+    shutil.copy(
+        Path(__file__).parent / "validation" / "models" / "faulty.py", tmp_path / "faulty.py"
+    )
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "faulty", raising=False)

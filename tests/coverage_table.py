@@ -1,7 +1,9 @@
-"""Branch coverage by folder, from what `make coverage` has gathered: `python tests/coverage_table.py`.
+"""Branch coverage by folder, from what `make coverage` has gathered: `python
+tests/coverage_table.py`.
 
-The compiled core (the modules that pyproject.toml exempts from type checking, for the compiler infers them) has rows of its own: numba
-runs it unseen, and only the runs with NUMBA_DISABLE_JIT=1 count for it. A share is of lines and branches together, as coverage.py has it.
+The compiled core (the modules that pyproject.toml exempts from type checking, for the compiler
+infers them) has rows of its own: numba runs it unseen, and only the runs with NUMBA_DISABLE_JIT=1
+count for it. A share is of lines and branches together, as coverage.py has it.
 """
 
 from __future__ import annotations
@@ -22,10 +24,16 @@ LEAST = 0.9
 def main() -> None:
     """Prints the table, and the modules below nine tenths with their lines."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    (compiled,) = (one["module"] for one in settings["tool"]["mypy"]["overrides"] if one.get("disallow_untyped_defs") is False)
+    (compiled,) = (
+        one["module"]
+        for one in settings["tool"]["mypy"]["overrides"]
+        if one.get("disallow_untyped_defs") is False
+    )
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "coverage.json")
-        subprocess.run([sys.executable, "-m", "coverage", "json", "-q", "-o", str(file)], check=True, cwd=ROOT)
+        subprocess.run(
+            [sys.executable, "-m", "coverage", "json", "-q", "-o", str(file)], check=True, cwd=ROOT
+        )
         found = json.loads(file.read_text(encoding="utf-8"))["files"]
     rows: defaultdict[str, list[dict[str, int]]] = defaultdict(list)
     short = []
@@ -39,8 +47,14 @@ def main() -> None:
     print(f"{'folder':32}{'modules':>8}{'lines':>8}{'branches':>10}{'covered':>9}")
     rows["all"] = [part for parts in rows.values() for part in parts]
     for folder, parts in rows.items():
-        total = {key: sum(part[key] for part in parts) for key in parts[0] if isinstance(parts[0][key], int)}
-        print(f"{folder:32}{len(parts):8}{total['num_statements']:8}{total['num_branches']:10}{share(total):9.1%}")
+        total = {
+            key: sum(part[key] for part in parts)
+            for key in parts[0]
+            if isinstance(parts[0][key], int)
+        }
+        print(
+            f"{folder:32}{len(parts):8}{total['num_statements']:8}{total['num_branches']:10}{share(total):9.1%}"
+        )
     print(*([f"\nbelow {LEAST:.0%}:", *short] if short else []), sep="\n")
 
 

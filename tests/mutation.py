@@ -1,10 +1,12 @@
-"""Do the tests notice? `python tests/mutation.py` plants small faults in the source, one at a time, and runs the tests that should fail.
+"""Do the tests notice? `python tests/mutation.py` plants small faults in the source, one at a time,
+and runs the tests that should fail.
 
-A sample of all faults that the operators below can make, drawn with a seed: comparisons that include their limit or do not, signs,
-products for quotients, `and` for `or`, negated conditions, changed numbers. Each is planted in a copy of the packages, which is
-interpreted (NUMBA_DISABLE_JIT=1), but for the files in COMPILED. Faults that survive are printed with file and line; those that nothing
-can notice are in EQUIVALENT.
-Arguments: `--sample N` faults a file, `--seed N`, `--file NAME` (repeatable), and after `--` what pytest is given, too.
+A sample of all faults that the operators below can make, drawn with a seed: comparisons that
+include their limit or do not, signs, products for quotients, `and` for `or`, negated conditions,
+changed numbers. Each is planted in a copy of the packages, which is interpreted
+(NUMBA_DISABLE_JIT=1), but for the files in COMPILED. Faults that survive are printed with file and
+line; those that nothing can notice are in EQUIVALENT. Arguments: `--sample N` faults a file,
+`--seed N`, `--file NAME` (repeatable), and after `--` what pytest is given, too.
 """
 
 from __future__ import annotations
@@ -41,14 +43,23 @@ TARGETS = {
     ],
     "ebm/core/guards.py": ["tests/ebm/core/test_core_parts.py", "tests/ebm/test_edges.py"],
     "ebm/core/modes.py": ["tests/ebm/core/test_core_parts.py", "tests/ebm/test_edges.py"],
-    "validation/suite/tolerances.py": ["tests/validation/suite/test_verdicts.py", "tests/validation/suite/test_tolerances.py"],
+    "validation/suite/tolerances.py": [
+        "tests/validation/suite/test_verdicts.py",
+        "tests/validation/suite/test_tolerances.py",
+    ],
     "validation/suite/verdicts.py": [
         "tests/validation/suite/test_verdicts.py",
         "tests/validation/suite/test_impact_laws.py",
         "tests/commands/test_cli.py",
     ],
-    "validation/discrepancy/statistics.py": ["tests/validation/suite/test_verdicts.py", "tests/validation/suite/test_ensembles.py"],
-    "validation/discrepancy/compare.py": ["tests/validation/discrepancy/test_measures.py", "tests/validation/discrepancy/test_measured.py"],
+    "validation/discrepancy/statistics.py": [
+        "tests/validation/suite/test_verdicts.py",
+        "tests/validation/suite/test_ensembles.py",
+    ],
+    "validation/discrepancy/compare.py": [
+        "tests/validation/discrepancy/test_measures.py",
+        "tests/validation/discrepancy/test_measured.py",
+    ],
     "validation/discrepancy/measures.py": [
         "tests/validation/discrepancy/test_measures.py",
         "tests/validation/discrepancy/test_measured.py",
@@ -66,10 +77,25 @@ TARGETS = {
         "tests/ebm/test_edges.py",
     ],
     "ebm/core/march.py": ["tests/ebm/core/test_core_parts.py", "tests/ebm/test_edges.py"],
-    "scenes/block.py": ["tests/scenes/test_scene.py", "tests/ebm/test_loaded_blocks.py::test_pivots_of_a_block"],
-    "scenes/trust/inputs.py": ["tests/scenes/test_inputs.py", UNCERTAINTY, "-k", "inputs or scene_file or correlated or faults"],
-    "scenes/recordings/sets.py": ["tests/scenes/test_record_sets.py", "tests/scenes/test_recordings.py"],
-    "scenes/recordings/intensity.py": ["tests/scenes/test_recordings.py", "-k", "intensities or spectral or periods"],
+    "scenes/block.py": [
+        "tests/scenes/test_scene.py",
+        "tests/ebm/test_loaded_blocks.py::test_pivots_of_a_block",
+    ],
+    "scenes/trust/inputs.py": [
+        "tests/scenes/test_inputs.py",
+        UNCERTAINTY,
+        "-k",
+        "inputs or scene_file or correlated or faults",
+    ],
+    "scenes/recordings/sets.py": [
+        "tests/scenes/test_record_sets.py",
+        "tests/scenes/test_recordings.py",
+    ],
+    "scenes/recordings/intensity.py": [
+        "tests/scenes/test_recordings.py",
+        "-k",
+        "intensities or spectral or periods",
+    ],
     "validation/uncertainty/verdict.py": [UNCERTAINTY, "-k", "what_a_difference_says"],
     "validation/uncertainty/numerical.py": [
         UNCERTAINTY,
@@ -86,17 +112,19 @@ TARGETS = {
     "validation/studies/population/study.py": [POPULATION],
     "ebm/horizon.py": ["tests/ebm/test_horizon.py"],
 }
-#: Files that are never compiled, whose tests play more motions than an interpreter can: what they call is compiled.
+#: Files that are never compiled, whose tests play more motions than an interpreter can: what they
+#: call is compiled.
 COMPILED = {
     "validation/uncertainty/numerical.py",
     "validation/uncertainty/population.py",
     "validation/studies/population/study.py",
     "ebm/horizon.py",
 }
-#: What hangs is noticed: after so long in the processor, or in twenty times that by the clock, which a busy machine does not reach.
+#: What hangs is noticed: after so long in the processor, or in twenty times that by the clock,
+#: which a busy machine does not reach.
 SECONDS = 180
-#: Faults that change no result, by file, a part of the line (of a number: of the expression that it stands in), the text of the
-#: fault, and why.
+#: Faults that change no result, by file, a part of the line (of a number: of the expression that it
+#: stands in), the text of the fault, and why.
 EQUIVALENT = {
     (
         "validation/uncertainty/numerical.py",
@@ -108,15 +136,31 @@ EQUIVALENT = {
         "largest <= ROUNDING",
         "largest <= ROUNDING * scale  ->  largest < ROUNDING * scale",
     ): "equal to the last bit",
-    ("ebm/horizon.py", "tolerance=1e-13", "1e-13  ->  1.0000000000000001e-11"): "still far below the perturbation",
+    (
+        "ebm/horizon.py",
+        "tolerance=1e-13",
+        "1e-13  ->  1.0000000000000001e-11",
+    ): "still far below the perturbation",
     (
         "validation/uncertainty/population.py",
         "0.9 * draws",
         "len(known) >= 0.9 * draws  ->  len(known) > 0.9 * draws",
     ): "one more fit of 200",
-    ("ebm/core/settle.py", "[SETTLE, -1.0, -1.0", "1.0  ->  100.0"): "any time long before the first impact",
-    ("ebm/core/series.py", "stack", "top + 2  ->  top - 2"): "the narrowest interval ends the search before the stack is full",
-    ("ebm/core/series.py", "a[row, 0] + low", "a[row, 0] > floor  ->  a[row, 0] >= floor"): "a bound that saves the search, met or not",
+    (
+        "ebm/core/settle.py",
+        "[SETTLE, -1.0, -1.0",
+        "1.0  ->  100.0",
+    ): "any time long before the first impact",
+    (
+        "ebm/core/series.py",
+        "stack",
+        "top + 2  ->  top - 2",
+    ): "the narrowest interval ends the search before the stack is full",
+    (
+        "ebm/core/series.py",
+        "a[row, 0] + low",
+        "a[row, 0] > floor  ->  a[row, 0] >= floor",
+    ): "a bound that saves the search, met or not",
     (
         "ebm/core/laws/impacts.py",
         "abs(q) <= mu_s * p",
@@ -127,25 +171,53 @@ EQUIVALENT = {
         "-1.0 if q > 0.0",
         "-1.0  ->  1.0",
     ): "at most one of the two slips is consistent up to friction 4/3, so that it does not matter which is tried first",
-    ("ebm/core/laws/contact_impacts.py", "_MOST_STAGES = 40", "40  ->  41"): "no impact that ends takes as many stages",
+    (
+        "ebm/core/laws/contact_impacts.py",
+        "_MOST_STAGES = 40",
+        "40  ->  41",
+    ): "no impact that ends takes as many stages",
     (
         "ebm/core/laws/contact_impacts.py",
         "1.0 if floor",
         "1.0  ->  100.0",
     ): "a unit of distance",
-    ("ebm/core/guards.py", "tau, -1", "1  ->  2"): "any negative number says that there is no event",
-    ("ebm/core/guards.py", "_has(a, wall, 0)", "0  ->  1"): "one term of the gap's series fewer, which is below the tolerance",
-    ("ebm/core/guards.py", "_has(a, G_LANDING, 0)", "0  ->  1"): "one term of the gap's series fewer, which is below the tolerance",
+    (
+        "ebm/core/guards.py",
+        "tau, -1",
+        "1  ->  2",
+    ): "any negative number says that there is no event",
+    (
+        "ebm/core/guards.py",
+        "_has(a, wall, 0)",
+        "0  ->  1",
+    ): "one term of the gap's series fewer, which is below the tolerance",
+    (
+        "ebm/core/guards.py",
+        "_has(a, G_LANDING, 0)",
+        "0  ->  1",
+    ): "one term of the gap's series fewer, which is below the tolerance",
     (
         "ebm/core/guards.py",
         "gap < np.inf",
         "TIP if wall == G_TIP_GAP else FAR  ->  TIP if not wall == G_TIP_GAP else FAR",
     ): "on one wall the other's gap cannot close, and its own is zero throughout",
-    ("ebm/core/modes.py", "m[PULL] < 0 and (b.unilateral", "m[PULL] < 0  ->  m[PULL] <= 0"): "a floor pushes or pulls: it is never 0",
+    (
+        "ebm/core/modes.py",
+        "m[PULL] < 0 and (b.unilateral",
+        "m[PULL] < 0  ->  m[PULL] <= 0",
+    ): "a floor pushes or pulls: it is never 0",
     ("ebm/core/modes.py", "m[PULL] < 0", "0  ->  1"): "a floor pushes or pulls, 1 or -1",
-    ("ebm/core/modes.py", "_touched(b, z, 1, True)", "1  ->  2"): "of an upright block both sides are looked at, whatever the sense",
+    (
+        "ebm/core/modes.py",
+        "_touched(b, z, 1, True)",
+        "1  ->  2",
+    ): "of an upright block both sides are looked at, whatever the sense",
     ("ebm/core/modes.py", "if flat else 0", "0  ->  1"): "only a flat block asks for it",
-    ("ebm/core/guards.py", "a[PHI, 0] > 0.5", "a[PHI, 0] > 0.5  ->  a[PHI, 0] >= 0.5"): "a bound that saves the guards, met or not",
+    (
+        "ebm/core/guards.py",
+        "a[PHI, 0] > 0.5",
+        "a[PHI, 0] > 0.5  ->  a[PHI, 0] >= 0.5",
+    ): "a bound that saves the guards, met or not",
     (
         "ebm/core/guards.py",
         "root < tau",
@@ -167,7 +239,11 @@ def changed(node: ast.AST) -> Iterator[ast.AST]:
     if isinstance(fault, ast.Compare) and len(fault.ops) == 1 and type(fault.ops[0]) in SWAPS:
         fault.ops = [SWAPS[type(fault.ops[0])]()]
         yield fault
-    elif isinstance(fault, ast.BinOp) and isinstance(fault.right, ast.Name) and fault.right.id in SIGNS:
+    elif (
+        isinstance(fault, ast.BinOp)
+        and isinstance(fault.right, ast.Name)
+        and fault.right.id in SIGNS
+    ):
         return  # to divide by one is to multiply by it
     elif isinstance(fault, ast.BinOp | ast.AugAssign | ast.BoolOp) and type(fault.op) in SWAPS:
         fault.op = SWAPS[type(fault.op)]()
@@ -178,7 +254,11 @@ def changed(node: ast.AST) -> Iterator[ast.AST]:
         fault.test = ast.UnaryOp(ast.Not(), fault.test)
         yield fault
     elif isinstance(fault, ast.Constant) and type(fault.value) in (int, float):
-        fault.value = fault.value * 100.0 if isinstance(fault.value, float) and fault.value else fault.value + 1
+        fault.value = (
+            fault.value * 100.0
+            if isinstance(fault.value, float) and fault.value
+            else fault.value + 1
+        )
         yield fault
 
 
@@ -191,7 +271,9 @@ class Plant(ast.NodeTransformer):
     def visit(self, node: ast.AST) -> ast.AST:
         """The texts of errors and the numbers of an enumeration hold no fault."""
         if isinstance(node, ast.Raise | ast.JoinedStr) or (
-            isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple) and not node.col_offset
+            isinstance(node, ast.Assign)
+            and isinstance(node.targets[0], ast.Tuple)
+            and not node.col_offset
         ):
             return node
         for fault in changed(node):
@@ -205,14 +287,19 @@ class Plant(ast.NodeTransformer):
         return kept
 
     def _around(self, node: ast.AST) -> str:
-        """Of a number the expression that it stands in: a line may hold the same number more than once."""
+        """Of a number the expression that it stands in: a line may hold the same number more than
+        once."""
         if not isinstance(node, ast.Constant):
             return ""
-        return next(ast.unparse(one) for one in reversed(self.within) if not isinstance(one, ast.UnaryOp))
+        return next(
+            ast.unparse(one) for one in reversed(self.within) if not isinstance(one, ast.UnaryOp)
+        )
 
 
 def shown(node: ast.AST) -> str:
-    return ast.unparse(node.test if isinstance(node, ast.If | ast.While) else node).replace("\n", " ")[:90]
+    return ast.unparse(node.test if isinstance(node, ast.If | ast.While) else node).replace(
+        "\n", " "
+    )[:90]
 
 
 class PlainCore:
@@ -227,7 +314,8 @@ class PlainCore:
 
 
 def survives(tree: Path, name: str, source: str, arguments: list[str]) -> bool:
-    """Whether all tests pass with this source; what hangs is noticed. In a process that begins with the libraries loaded."""
+    """Whether all tests pass with this source; what hangs is noticed. In a process that begins with
+    the libraries loaded."""
     path = tree / "rockcheck" / name
     plain = path.read_text(encoding="utf-8")
     child = os.fork()
@@ -243,7 +331,15 @@ def survives(tree: Path, name: str, source: str, arguments: list[str]) -> bool:
             os.dup2(quiet, 2)
             import pytest
 
-            words = ["-x", "-q", "-p", "no:cacheprovider", "-m", "not slow and not browser", *arguments]
+            words = [
+                "-x",
+                "-q",
+                "-p",
+                "no:cacheprovider",
+                "-m",
+                "not slow and not browser",
+                *arguments,
+            ]
             code = int(pytest.main(words, plugins=[PlainCore()] if name in COMPILED else []))
         except BaseException:
             code = 9
@@ -268,7 +364,9 @@ def main() -> None:
     killed = total = 0
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder)
-        shutil.copytree(ROOT / "rockcheck", tree / "rockcheck", ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(
+            ROOT / "rockcheck", tree / "rockcheck", ignore=shutil.ignore_patterns("__pycache__")
+        )
         sys.path.insert(0, folder)
         os.environ["PYTHONPATH"] = folder
         for library in ("numba", "pandas", "pydantic", "scipy.integrate", "scipy.stats"):
@@ -282,19 +380,33 @@ def main() -> None:
             listed.visit(ast.parse(source))
             if not survives(tree, name, source, [*tests, *asked.pytest]):
                 sys.exit(f"{name}: its tests fail without a fault")
-            chosen = sorted(random.Random(f"{asked.seed} {name}").sample(range(len(listed.found)), min(asked.sample, len(listed.found))))
+            chosen = sorted(
+                random.Random(f"{asked.seed} {name}").sample(
+                    range(len(listed.found)), min(asked.sample, len(listed.found))
+                )
+            )
             noticed = judged = 0
             for index in chosen:
                 line, text, around = listed.found[index]
-                if any((file, fault) == (name, text) and part in (around or lines[line - 1]) for file, part, fault in EQUIVALENT):
+                if any(
+                    (file, fault) == (name, text) and part in (around or lines[line - 1])
+                    for file, part, fault in EQUIVALENT
+                ):
                     continue
-                fault = ast.unparse(ast.fix_missing_locations(Plant(index).visit(ast.parse(source))))
+                fault = ast.unparse(
+                    ast.fix_missing_locations(Plant(index).visit(ast.parse(source)))
+                )
                 judged += 1
                 lives = survives(tree, name, fault, [*tests, *asked.pytest])
                 noticed += not lives
                 if lives:
-                    print(f"survives  {name}:{line}  {text}" + (f"  in  {around}" if around else ""), flush=True)
-            print(f"{name}: {noticed} of {judged} noticed ({len(listed.found)} possible)", flush=True)
+                    print(
+                        f"survives  {name}:{line}  {text}" + (f"  in  {around}" if around else ""),
+                        flush=True,
+                    )
+            print(
+                f"{name}: {noticed} of {judged} noticed ({len(listed.found)} possible)", flush=True
+            )
             killed, total = killed + noticed, total + judged
     print(f"{killed} of {total} noticed, {100.0 * killed / max(total, 1):.0f} %")
     sys.exit(killed < 0.95 * total)

@@ -51,12 +51,16 @@ class Task:
     seconds: float = field(default=math.inf, kw_only=True, compare=False, repr=False)
     expected: float = field(default=0.0, kw_only=True, compare=False, repr=False)
     compiles: str = field(default="", kw_only=True, compare=False, repr=False)
-    where: Literal["worker", "here", "timed"] = field(default="worker", kw_only=True, compare=False, repr=False)
+    where: Literal["worker", "here", "timed"] = field(
+        default="worker", kw_only=True, compare=False, repr=False
+    )
 
     @property
     def label(self) -> str:
         """A few words for progress and failures."""
-        return ", ".join(f"{v:g}" if isinstance(v, float) else str(v) for v in self.fields().values())
+        return ", ".join(
+            f"{v:g}" if isinstance(v, float) else str(v) for v in self.fields().values()
+        )
 
     def fields(self) -> dict[str, Any]:
         """What it is: the fields that count."""
@@ -147,11 +151,13 @@ def run(
 ) -> Finding:
     """Play what is not up to date in `folder`, keep each record as it comes, and gather.
 
-    `jobs` processes (default: one a core; 0: in this one), or the Dask cluster at `scheduler`. What has not begun
-    after `minutes` is left out. Ctrl-C ends the tasks, and what was played is gathered. Raises
-    `InputError` where the folder cannot be used or no cluster answers.
+    `jobs` processes (default: one a core; 0: in this one), or the Dask cluster at `scheduler`. What
+    has not begun after `minutes` is left out. Ctrl-C ends the tasks, and what was played is
+    gathered. Raises `InputError` where the folder cannot be used or no cluster answers.
     """
-    return _Run(study, folder, os.cpu_count() or 1 if jobs is None else jobs, scheduler, force, on_progress).finding(minutes)
+    return _Run(
+        study, folder, os.cpu_count() or 1 if jobs is None else jobs, scheduler, force, on_progress
+    ).finding(minutes)
 
 
 class _Run:
@@ -172,7 +178,9 @@ class _Run:
         try:
             self.store = Store(folder, study.kinds)
         except OSError as error:
-            raise InputError(f"{printable(folder)}: cannot be used as the output folder: {error.strerror}") from None
+            raise InputError(
+                f"{printable(folder)}: cannot be used as the output folder: {error.strerror}"
+            ) from None
         self.known: dict[Task, None] = {}
         self.done: dict[Task, Any] = {}
 
@@ -187,7 +195,9 @@ class _Run:
                 complete = False
         found = self.study.gather(self.done)
         self.store.prune()
-        failed = {task.label: one.reason for task, one in self.done.items() if isinstance(one, Failure)}
+        failed = {
+            task.label: one.reason for task, one in self.done.items() if isinstance(one, Failure)
+        }
         about = Made(
             created=datetime.now(UTC).isoformat(timespec="seconds"),
             jobs=self.jobs,
@@ -211,7 +221,10 @@ class _Run:
                 continue
             if workers is None:
                 workers = stack.enter_context(self._workers())
-            calls = (Call(guarded, (self.study.play, task), task.seconds, task.compiles, task) for task in elsewhere)
+            calls = (
+                Call(guarded, (self.study.play, task), task.seconds, task.compiles, task)
+                for task in elsewhere
+            )
             for ended in workers.run(deque(calls), until=until):
                 self._end(ended.call.key, Failure(ended.fault) if ended.error else ended.result)
             if time.monotonic() >= until:
@@ -219,7 +232,9 @@ class _Run:
 
     def _next(self) -> list[Task]:
         """The tasks of the next wave that have to be played; the others are read back."""
-        while new := [task for task in dict.fromkeys(self.study.tasks(self.done)) if task not in self.known]:
+        while new := [
+            task for task in dict.fromkeys(self.study.tasks(self.done)) if task not in self.known
+        ]:
             self.known.update(dict.fromkeys(new))
             for task in new:
                 if not self.force and (record := self.study.find(self.store, task)) is not None:
@@ -245,11 +260,17 @@ class _Run:
         return task.where == "worker" and self.jobs > 0
 
     def _workers(self) -> Any:
-        return Cluster(self.scheduler, self.study.memory_mb) if self.scheduler else Pool(self.jobs, self.study.memory_mb)
+        return (
+            Cluster(self.scheduler, self.study.memory_mb)
+            if self.scheduler
+            else Pool(self.jobs, self.study.memory_mb)
+        )
 
     def _estimate(self, waiting: Sequence[Task]) -> None:
         """Says how long a wave will take where that is long."""
-        seconds = sum(task.expected / (max(1, self.jobs) if task.where == "worker" else 1) for task in waiting)
+        seconds = sum(
+            task.expected / (max(1, self.jobs) if task.where == "worker" else 1) for task in waiting
+        )
         if seconds >= LONG:
             announce(f"{self.study.name}: {len(waiting)} tasks, about {words_of(seconds)}")
 

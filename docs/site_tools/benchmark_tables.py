@@ -16,7 +16,8 @@ def table(heading: str) -> list[list[str]]:
 
 
 def errors_and_cost(line: str) -> tuple[Sequence[float], float]:
-    """Of a "model setting": median RMS errors of rotation (alpha), a kind of scene each, and CPU ms a simulated second."""
+    """Of a "model setting": median RMS errors of rotation (alpha), a kind of scene each, and CPU ms
+    a simulated second."""
     for model, setting, cost, *errors in table("Median RMS error of"):
         if f"{model} {setting}" == line:
             return [float(error) for error in errors], float(cost)

@@ -1,8 +1,10 @@
-"""Pure rocking under 9,900 pulses by rockcheck's batches and by heyoka's, which advance eight runs at once on the processor's lanes.
+"""Pure rocking under 9,900 pulses by rockcheck's batches and by heyoka's, which advance eight runs
+at once on the processor's lanes.
 
-`pip install heyoka`, then `python docs/site_tools/ensembles.py`: the table of docs/benchmark.md, "Beside an ensemble integrator". Both take
-the grid of pulses of `rockcheck benchmark ebm` without slip, from the uplift to one unit of time after the pulse's mirror image of its
-start, on one core. heyoka is a Taylor integrator with event detection, too; its events call Python.
+`pip install heyoka`, then `python docs/site_tools/ensembles.py`: the table of docs/benchmark.md,
+"Beside an ensemble integrator". Both take the grid of pulses of `rockcheck benchmark ebm` without
+slip, from the uplift to one unit of time after the pulse's mirror image of its start, on one core.
+heyoka is a Taylor integrator with event detection, too; its events call Python.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ RESTS = 1e-6
 
 @dataclass(frozen=True)
 class Ended:
-    """A batch's runs at their ends: whether they have overturned, else the rotation, rad; CPU seconds, Taylor steps a run."""
+    """A batch's runs at their ends: whether they have overturned, else the rotation, rad; CPU
+    seconds, Taylor steps a run."""
 
     fell: NDArray[np.bool_]
     rotation: Floats
@@ -47,7 +50,13 @@ class Ended:
 
 def pulses(model: EventBasedModel) -> Packed:
     """The grid without its weakest row, which hardly lifts the block."""
-    scene = Scene(name="grid", block=PAPER_BLOCK, floor=Floor(friction=1.0), excitation=Ricker(amplitude=1.0, period=1.0), duration=10.0)
+    scene = Scene(
+        name="grid",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=1.0),
+        excitation=Ricker(amplitude=1.0, period=1.0),
+        duration=10.0,
+    )
     amplitudes, periods = grid(scene, NODES)
     lifts = amplitudes > 1.05 * scene.gravity * math.tan(ALPHA)
     packed = pack_pulses(scene, model, amplitudes[lifts], periods[lifts])
@@ -67,11 +76,14 @@ def ours(packed: Packed, tolerance: float, **how: Any) -> Ended:
 def pulse_at(ground: NDArray[np.void], t: Floats) -> Floats:
     """Base acceleration over g of each run at its own times."""
     tau = t - ground["centre"]
-    return np.asarray(tau * (ground["c1"] + ground["c3"] * tau**2) * np.exp(-ground["rate"] * tau**2))
+    return np.asarray(
+        tau * (ground["c1"] + ground["c3"] * tau**2) * np.exp(-ground["rate"] * tau**2)
+    )
 
 
 def uplift(packed: Packed) -> tuple[Floats, Floats]:
-    """When the pulse first exceeds tan(alpha), by bisection, and the side to which the block turns."""
+    """When the pulse first exceeds tan(alpha), by bisection, and the side to which the block
+    turns."""
     ground, limit = packed.horizontal, math.tan(ALPHA)
     shares = np.linspace(0.0, 1.0, 4001)[:, None] * packed.durations
     first = np.argmax(np.abs(pulse_at(ground, shares)) > limit, axis=0)
@@ -85,7 +97,8 @@ def uplift(packed: Packed) -> tuple[Floats, Floats]:
 
 
 class Heyoka:
-    """heyoka's integrator of the paper's (3), (4) without slip in natural units, phi = |theta|, on all lanes."""
+    """heyoka's integrator of the paper's (3), (4) without slip in natural units, phi = |theta|, on
+    all lanes."""
 
     def __init__(self, tolerance: float) -> None:
         self.lanes = heyoka.recommended_simd_size()
@@ -126,17 +139,28 @@ class Heyoka:
         """All runs, so many at once as there are lanes."""
         ground, end, integrator = packed.horizontal, packed.durations, self.integrator
         # The angular acceleration is zero at the uplift; this is the rate at which it grows.
-        growth = (pulse_at(ground, start + LATER) * side * math.cos(ALPHA) - math.sin(ALPHA)) * 0.75 / LATER
+        growth = (
+            (pulse_at(ground, start + LATER) * side * math.cos(ALPHA) - math.sin(ALPHA))
+            * 0.75
+            / LATER
+        )
         fell, rotation, steps = np.zeros(len(packed), dtype=bool), np.zeros(len(packed)), 0
         began = time.process_time()
         for first in range(0, len(packed), self.lanes):
             runs = np.minimum(np.arange(first, first + self.lanes), len(packed) - 1)
             integrator.set_time(start[runs] + LATER)
             integrator.state[:] = growth[runs] * LATER**3 / 6.0, growth[runs] * LATER**2 / 2.0
-            integrator.pars[:] = side[runs], *(ground[name][runs] for name in ("c1", "c3", "rate", "centre")), np.ones(self.lanes)
+            integrator.pars[:] = (
+                side[runs],
+                *(ground[name][runs] for name in ("c1", "c3", "rate", "centre")),
+                np.ones(self.lanes),
+            )
             integrator.propagate_until(end[runs])
             steps += sum(result[3] for result in integrator.propagate_res)
-            fell[runs], rotation[runs] = integrator.state[0] > 1.5, integrator.pars[0] * integrator.state[0]
+            fell[runs], rotation[runs] = (
+                integrator.state[0] > 1.5,
+                integrator.pars[0] * integrator.state[0],
+            )
         return Ended(fell, rotation, time.process_time() - began, steps / len(packed))
 
 
@@ -153,17 +177,44 @@ def main() -> None:
             "rockcheck, until decided": partial(ours, packed, tolerance, until_decided=True),
             f"heyoka, {other.lanes} lanes": partial(other.play, packed, start, side),
         }
-        rounds = [(right_hand_side_seconds(), {name: play() for name, play in plays.items()}) for _ in range(ROUNDS)]
+        rounds = [
+            (right_hand_side_seconds(), {name: play() for name, play in plays.items()})
+            for _ in range(ROUNDS)
+        ]
         for name in plays:
             ended = rounds[-1][1][name]
             seconds = [found[name].seconds / len(packed) for _, found in rounds]
             ratio = median(found[name].seconds / len(packed) / one for one, found in rounds)
             same = ended.fell == truth.fell
             error = np.abs(ended.rotation - truth.rotation)[same & ~truth.fell]
-            known = ["", ""] if "decided" in name else [f"{np.quantile(error, 0.95):.1e}", str(np.count_nonzero(~same))]
-            rows.append([name, f"{tolerance:g}", f"{1e6 * median(seconds):.1f}", f"{ratio:.0f}", f"{ended.steps:.1f}", *known])
-    heads = ["integrator", "tolerance", "CPU μs a run", "right-hand sides", "steps a run", "p95 error at the end, rad", "other outcome"]
-    print(f"{len(packed)} pulses; heyoka {heyoka.__version__}, Python {sys.version.split()[0]}\n\n{markdown_table(heads, rows)}")
+            known = (
+                ["", ""]
+                if "decided" in name
+                else [f"{np.quantile(error, 0.95):.1e}", str(np.count_nonzero(~same))]
+            )
+            rows.append(
+                [
+                    name,
+                    f"{tolerance:g}",
+                    f"{1e6 * median(seconds):.1f}",
+                    f"{ratio:.0f}",
+                    f"{ended.steps:.1f}",
+                    *known,
+                ]
+            )
+    heads = [
+        "integrator",
+        "tolerance",
+        "CPU μs a run",
+        "right-hand sides",
+        "steps a run",
+        "p95 error at the end, rad",
+        "other outcome",
+    ]
+    print(
+        f"{len(packed)} pulses; heyoka {heyoka.__version__}, Python"
+        f" {sys.version.split()[0]}\n\n{markdown_table(heads, rows)}"
+    )
 
 
 if __name__ == "__main__":

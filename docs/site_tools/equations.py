@@ -1,4 +1,5 @@
-"""A hook of MkDocs: equations become MathML when the site is built, so that a page needs no script and no font to show them."""
+"""A hook of MkDocs: equations become MathML when the site is built, so that a page needs no script
+and no font to show them."""
 
 from __future__ import annotations
 
@@ -18,5 +19,7 @@ def on_page_content(html: str, **_: Any) -> str:
 
 
 def _as_mathml(found: re.Match[str]) -> str:
-    mathml = LatexToMathML().convert_with_local_state(unescape(found[3]).strip(), displaystyle=found[2] == "[")
+    mathml = LatexToMathML().convert_with_local_state(
+        unescape(found[3]).strip(), displaystyle=found[2] == "["
+    )
     return f'<{found[1]} class="equation">{mathml}</{found[1]}>'

@@ -1,7 +1,8 @@
-"""What the suites have found about each model: `python docs/site_tools/experience.py RUN ...` from the folders of finished runs.
+"""What the suites have found about each model: `python docs/site_tools/experience.py RUN ...` from
+the folders of finished runs.
 
-Writes bias and scatter of the figures and the domain of the scenes to scenes/data/experience.json, which `History.expected` and the
-report read, and the tables of docs/theory.md.
+Writes bias and scatter of the figures and the domain of the scenes to scenes/data/experience.json,
+which `History.expected` and the report read, and the tables of docs/theory.md.
 """
 
 from __future__ import annotations

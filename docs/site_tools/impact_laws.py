@@ -1,8 +1,10 @@
-"""Makes the tables and the figure of docs/impact_laws.md: which law of impacts each engine follows at landings where laws part.
+"""Makes the tables and the figure of docs/impact_laws.md: which law of impacts each engine follows
+at landings where laws part.
 
-`python docs/site_tools/impact_laws.py flush|flat [LANDINGS]` plays them (160 flush ones take half an hour) and writes their table,
-with the flush ones the figure, too. The landings are drawn with a seed. Flush: a random block stands flush against a wall that
-bounces and comes back to it, most of them from a tilt, one in eight after a pulse. Flat: a random block is dropped while it moves.
+`python docs/site_tools/impact_laws.py flush|flat [LANDINGS]` plays them (160 flush ones take half
+an hour) and writes their table, with the flush ones the figure, too. The landings are drawn with a
+seed. Flush: a random block stands flush against a wall that bounces and comes back to it, most of
+them from a tilt, one in eight after a pulse. Flat: a random block is dropped while it moves.
 """
 
 from __future__ import annotations
@@ -22,21 +24,33 @@ from rockcheck.cm import ContinuousModel
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Ricker, Scene, Wall
 from rockcheck.scenes.writing import markdown_table
-from rockcheck.validation.discrepancy.impact_laws import TELLS, Landing, LawFollowed, parting_landing
+from rockcheck.validation.discrepancy.impact_laws import (
+    TELLS,
+    Landing,
+    LawFollowed,
+    parting_landing,
+)
 from rockcheck.validation.execute.models import Model
 
 LANDINGS, SEED, PULSED = 160, 1, 8
 DOCS = Path(__file__).parents[1]
 COLUMNS = ("closed", "closed or open", "open", "floor-first", "none")
 FLAT_COLUMNS = ("moreau", "moreau or leading-first", "leading-first", "trailing-first", "none")
-COLOURS = {"closed": "#0072b2", "closed or open": "#56b4e9", "open": "#e69f00", "floor-first": "#009e73", "none": "#999999"}
+COLOURS = {
+    "closed": "#0072b2",
+    "closed or open": "#56b4e9",
+    "open": "#e69f00",
+    "floor-first": "#009e73",
+    "none": "#999999",
+}
 #: The landing that is drawn, and who is drawn beside the laws.
 EXAMPLE, DRAWN = 3, {"mujoco adaptive": "#d55e00", "dart 1e-05": "#cc79a7", "cm": "#000000"}
 
 
 @dataclass(frozen=True)
 class Row:
-    """What one model did at the landings, and what the default law does there; None where that cannot be told or the model failed."""
+    """What one model did at the landings, and what the default law does there; None where that
+    cannot be told or the model failed."""
 
     model: str
     found: Sequence[LawFollowed | None]
@@ -50,7 +64,9 @@ class Row:
         alike = [
             min(one.errors[law] for law in one.errors if law in usual.law.split(" or "))
             for one, usual in zip(self.found, self.default, strict=True)
-            if one is not None and usual is not None and set(one.law.split(" or ")) & set(usual.law.split(" or "))
+            if one is not None
+            and usual is not None
+            and set(one.law.split(" or ")) & set(usual.law.split(" or "))
         ]
         yield f"`{self.model}`"
         yield from (str(counts[law] or "") for law in columns)
@@ -59,7 +75,8 @@ class Row:
 
 
 def landing(number: int) -> Scene:
-    """A scene with a landing: block, friction, side, restitution and motion at random; it lasts as long as it is looked at."""
+    """A scene with a landing: block, friction, side, restitution and motion at random; it lasts as
+    long as it is looked at."""
     r = np.random.default_rng([SEED, number])
     alpha = r.uniform(0.1, 0.4)
     block = Block(half_width=math.sin(alpha), half_height=math.cos(alpha))  # R = 1 m
@@ -80,9 +97,13 @@ def landing(number: int) -> Scene:
         pulse = Ricker(amplitude=9.81 * math.tan(alpha) * r.uniform(1.5, 4.0), period=period)
         scene = scene.replace(excitation=pulse, initial_rotation=0.0, initial_angular_velocity=0.0)
     found = parting_landing(scene)
-    by_rule = found and found.followed_by(EventBasedModel(pivot="unilateral", impacts="floor-first").simulate(scene), scene)
+    by_rule = found and found.followed_by(
+        EventBasedModel(pivot="unilateral", impacts="floor-first").simulate(scene), scene
+    )
     if found is None or by_rule is None or by_rule.law != "floor-first":
-        return landing(number + 1000 * PULSED)  # it fell, never came back, or tells little: another one of its kind
+        return landing(
+            number + 1000 * PULSED
+        )  # it fell, never came back, or tells little: another one of its kind
     return _as_long_as(scene, found)
 
 
@@ -104,7 +125,9 @@ def flat_landing(number: int) -> Scene:
 
 
 def _as_long_as(scene: Scene, found: Landing) -> Scene:
-    told = scene.output_step * (found.start + max(len(motion) for motion in found.branches.values()))
+    told = scene.output_step * (
+        found.start + max(len(motion) for motion in found.branches.values())
+    )
     return scene.replace(duration=min(scene.duration, told))
 
 
@@ -120,7 +143,9 @@ def models() -> dict[str, Model]:
     found: dict[str, Model] = {}
     for engine in (getattr(engines, name) for name in engines.__all__):
         if engine.installed():
-            steps: tuple[float | str, ...] = (1e-5, 1e-4) if engine.fixed_because else (1e-5, 1e-4, "adaptive")
+            steps: tuple[float | str, ...] = (
+                (1e-5, 1e-4) if engine.fixed_because else (1e-5, 1e-4, "adaptive")
+            )
             if engine().lacks():  # without restitution it follows none, whatever the step
                 steps = (1e-4,)
             found |= {f"{engine.name} {step}": engine(time_step=step) for step in steps}
@@ -132,7 +157,9 @@ def played(scenes: Sequence[Scene]) -> Iterator[Row]:
     landings = [where for scene in scenes if (where := parting_landing(scene))]
 
     def followed(model: Model) -> list[LawFollowed | None]:
-        return [_followed(where, scene, model) for where, scene in zip(landings, scenes, strict=True)]
+        return [
+            _followed(where, scene, model) for where, scene in zip(landings, scenes, strict=True)
+        ]
 
     default = followed(EventBasedModel(pivot="unilateral"))
     for words, model in models().items():
@@ -159,14 +186,31 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     milliseconds = 1e3 * (scene.output_times - where.t)
     for law, rotation in where.branches.items():
         times = milliseconds[where.start :][: len(rotation)]
-        left.plot(times, rotation[: len(times)], color=COLOURS[law], linewidth=3.0, alpha=0.6, label=f"law: {law}")
+        left.plot(
+            times,
+            rotation[: len(times)],
+            color=COLOURS[law],
+            linewidth=3.0,
+            alpha=0.6,
+            label=f"law: {law}",
+        )
     known = models()
     for (name, colour), dash in zip(DRAWN.items(), ((4, 2), (1, 1.5), (6, 2, 1, 2)), strict=True):
         if name in known:
             rotation = known[name].simulate(scene).channels["theta"] / scene.block.alpha
-            left.plot(milliseconds[: len(rotation)], rotation, color=colour, linewidth=1.2, linestyle=(0, dash), label=name)
+            left.plot(
+                milliseconds[: len(rotation)],
+                rotation,
+                color=colour,
+                linewidth=1.2,
+                linestyle=(0, dash),
+                label=name,
+            )
     wall = scene.walls[0]
-    left.set_title(f"A landing: {wall.side} wall, e = {wall.restitution:g}, α = {scene.block.alpha:.2f} rad", fontsize=9)
+    left.set_title(
+        f"A landing: {wall.side} wall, e = {wall.restitution:g}, α = {scene.block.alpha:.2f} rad",
+        fontsize=9,
+    )
     left.set_xlabel("time after the landing, ms")
     left.set_ylabel("rotation θ/α")
     left.set_xlim(-40.0, 100.0)
@@ -174,14 +218,24 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     names = [row.model for row in rows]
     before = np.zeros(len(rows))
     for law in COLUMNS:
-        counts = np.array([sum(one is not None and one.law == law for one in row.found) for row in rows], dtype=float)
+        counts = np.array(
+            [sum(one is not None and one.law == law for one in row.found) for row in rows],
+            dtype=float,
+        )
         right.barh(names, counts, left=before, color=COLOURS[law], label=law)
         before += counts
     right.invert_yaxis()
     right.set_xlabel("landings")
     right.set_title("The law that is followed", fontsize=9)
     right.tick_params(labelsize=8)
-    right.legend(fontsize=7, ncols=len(COLUMNS), loc="upper center", bbox_to_anchor=(0.4, -0.14), columnspacing=0.8, handlelength=1.2)
+    right.legend(
+        fontsize=7,
+        ncols=len(COLUMNS),
+        loc="upper center",
+        bbox_to_anchor=(0.4, -0.14),
+        columnspacing=0.8,
+        handlelength=1.2,
+    )
     figure.savefig(path, dpi=130)
 
 

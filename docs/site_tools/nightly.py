@@ -1,4 +1,5 @@
-"""The last result of `make nightly`, from docs/nightly.json, as tables of the page "Reliability" (a hook of MkDocs)."""
+"""The last result of `make nightly`, from docs/nightly.json, as tables of the page "Reliability" (a
+hook of MkDocs)."""
 
 from __future__ import annotations
 
@@ -26,13 +27,16 @@ def tables(kept: dict[str, Any]) -> str:
             continue
         night = kept[kind]
         lines += [
-            f"{words}: {night['date']}, commit {night['commit']}, seed {night['seed']}, Python {night['python']}, {night['machine']}.",
+            f"{words}: {night['date']}, commit {night['commit']}, seed {night['seed']}, Python"
+            f" {night['python']}, {night['machine']}.",
             "",
             "| part | result | time, s | figures |",
             "|---|---|---|---|",
         ]
         for part in night["parts"]:
             figures = part["figures"].replace("|", "\\|").replace("<", "&lt;")
-            lines.append(f"| {part['name']} | {part['result']} | {part['seconds']:.0f} | {figures} |")
+            lines.append(
+                f"| {part['name']} | {part['result']} | {part['seconds']:.0f} | {figures} |"
+            )
         lines.append("")
     return "\n".join(lines)

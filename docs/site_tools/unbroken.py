@@ -1,4 +1,5 @@
-"""A hook of MkDocs: numbers such as 1e-12 and short code such as `ebm-unilateral` are not broken at a hyphen; comments are left out."""
+"""A hook of MkDocs: numbers such as 1e-12 and short code such as `ebm-unilateral` are not broken at
+a hyphen; comments are left out."""
 
 from __future__ import annotations
 
@@ -6,7 +7,9 @@ import re
 from typing import Any
 
 #: What holds no running text, and single tags.
-APART = re.compile(r"(<!--.*?-->|<pre.*?</pre>|<math.*?</math>|<code>.*?</code>|<[^>]+>)", re.DOTALL)
+APART = re.compile(
+    r"(<!--.*?-->|<pre.*?</pre>|<math.*?</math>|<code>.*?</code>|<[^>]+>)", re.DOTALL
+)
 NUMBER = re.compile(r"\b\d+(?:\.\d+)?e-\d+\b")
 #: Characters of code that fit on a phone's line.
 SHORT = 26
@@ -21,5 +24,11 @@ def _held(part: str) -> str:
     if part.startswith("<!--"):
         return ""
     if part.startswith("<code>"):
-        return part.replace("<code>", '<code class="unbroken">', 1) if len(part) <= SHORT + len("<code></code>") else part
-    return part if part.startswith("<") else NUMBER.sub(r'<span class="unbroken">\g<0></span>', part)
+        return (
+            part.replace("<code>", '<code class="unbroken">', 1)
+            if len(part) <= SHORT + len("<code></code>")
+            else part
+        )
+    return (
+        part if part.startswith("<") else NUMBER.sub(r'<span class="unbroken">\g<0></span>', part)
+    )

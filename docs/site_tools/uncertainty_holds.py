@@ -1,7 +1,7 @@
 """How often u_num holds: `python docs/site_tools/uncertainty_holds.py [SEED [SCENES]]`.
 
-Random scenes beside walls, each played by MuJoCo and PyBullet at adaptive and fixed steps, and by CM.
-The truth is the model's own run at a sixteenth of the step; an error of rounding is no miss.
+Random scenes beside walls, each played by MuJoCo and PyBullet at adaptive and fixed steps, and by
+CM. The truth is the model's own run at a sixteenth of the step; an error of rounding is no miss.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
-"""Which corners rest on floor and walls, and how a block is put exactly onto a contact that it reaches.
+"""Which corners rest on floor and walls, and how a block is put exactly onto a contact that it
+reaches.
 
-Natural units. A contact is closed where its gap and the gap's rate are zero; there is one zero of position, one of velocity.
+Natural units. A contact is closed where its gap and the gap's rate are zero; there is one zero of
+position, one of velocity.
 """
 
 from __future__ import annotations
@@ -12,8 +14,8 @@ import numpy as np
 from rockcheck.ebm.core.motion import HEIGHT, THETA, VX, VY, W, X, side_of
 from rockcheck.scenes.compiled import inner_kernel
 
-#: The zero of position (R) and of velocity (sqrt(g R)): a contact nearer and slower than this is closed, a pivot that slips more
-#: slowly stands, a block tilted and turning by less is upright.
+#: The zero of position (R) and of velocity (sqrt(g R)): a contact nearer and slower than this is
+#: closed, a pivot that slips more slowly stands, a block tilted and turning by less is upright.
 CLOSED = 1e-10
 SLOW = 1e-9
 
@@ -22,8 +24,9 @@ SLOW = 1e-9
 def lower(b, z):
     """The side of the lower corner, the pivot: that to which the block tips, or begins to tip.
 
-    Upright and at rest both are equally low, to rounding. It is the weaker one then: its distance is
-    the unit of length, so its height is right to the bit, and a mirror image has the mirrored corner.
+    Upright and at rest both are equally low, to rounding. It is the weaker one then: its distance
+    is the unit of length, so its height is right to the bit, and a mirror image has the mirrored
+    corner.
     """
     sense = z[THETA] if z[THETA] != 0.0 else z[W]
     return side_of(b, sense if sense != 0.0 else b.right.arm - b.left.arm)
@@ -51,11 +54,16 @@ def stop(z):
 
 @inner_kernel
 def wall_gap(b, z, side):
-    """The clear gap between the wall on `side` (+1 left, -1 right) and the corner that faces it; infinite without a wall."""
+    """The clear gap between the wall on `side` (+1 left, -1 right) and the corner that faces it;
+    infinite without a wall."""
     gap, faces = b.gap_left if side > 0 else b.gap_right, side_of(b, side)
     if gap == math.inf:
         return gap
-    radius, alpha = (faces.top_radius, faces.top_alpha) if side * z[THETA] > 0.0 else (faces.radius, faces.alpha)
+    radius, alpha = (
+        (faces.top_radius, faces.top_alpha)
+        if side * z[THETA] > 0.0
+        else (faces.radius, faces.alpha)
+    )
     return side * z[X] + faces.arm + gap - radius * math.sin(alpha + abs(z[THETA]))
 
 
@@ -63,7 +71,8 @@ def wall_gap(b, z, side):
 def closed_wall(b, z, side, bottom):
     """Whether the corner facing the wall on `side` rests on it.
 
-    A tilted block has one such corner; `bottom` picks, at theta = 0, the corner that keeps touching while it tilts away.
+    A tilted block has one such corner; `bottom` picks, at theta = 0, the corner that keeps touching
+    while it tilts away.
     """
     if not abs(wall_gap(b, z, side)) < CLOSED:
         return False
@@ -92,7 +101,8 @@ def closed_floor(b, z):
 
 @inner_kernel
 def closed_gap(gap, rate):
-    """A gap and its rate; both zero where it touches and closes slowly enough to rest. Then its acceleration decides."""
+    """A gap and its rate; both zero where it touches and closes slowly enough to rest. Then its
+    acceleration decides."""
     if abs(gap) < CLOSED:
         if -SLOW < rate < 0.0:
             return 0.0, 0.0
@@ -113,7 +123,8 @@ def upright(b, z):
 
 @inner_kernel
 def land_upright(b, z, sign, on_floor):
-    """Sets a theta near zero to exactly zero and keeps the pivot's place. A side that then touches a wall touches it exactly."""
+    """Sets a theta near zero to exactly zero and keeps the pivot's place. A side that then touches
+    a wall touches it exactly."""
     side = side_of(b, sign)
     z[X] += sign * (side.arm - side.radius * math.sin(side.alpha - sign * z[THETA]))
     if on_floor:
@@ -129,4 +140,8 @@ def land_upright(b, z, sign, on_floor):
 @inner_kernel
 def between_walls(b, z):
     """Whether the block touches both walls at once."""
-    return b.gap_left < np.inf and b.gap_right < np.inf and wall_gap(b, z, 1) + wall_gap(b, z, -1) < CLOSED
+    return (
+        b.gap_left < np.inf
+        and b.gap_right < np.inf
+        and wall_gap(b, z, 1) + wall_gap(b, z, -1) < CLOSED
+    )

@@ -1,4 +1,5 @@
-"""Ground motion for compiled code: its value, its Taylor series, its kinks, and when it next exceeds a level.
+"""Ground motion for compiled code: its value, its Taylor series, its kinks, and when it next
+exceeds a level.
 
 Natural units throughout: acceleration in g, time in sqrt(R/g).
 """
@@ -21,8 +22,9 @@ NEVER = np.inf
 class Ground(NamedTuple):
     """One component of the base motion.
 
-    GAUSSIAN is (c0 + c1 tau + c2 tau^2 + c3 tau^3) exp(-rate tau^2), tau from `centre`; SINE is c0 sin(rate t) up to
-    `quiet`; SAMPLED is linear between `samples`, every `step`. After `quiet` there is no motion.
+    GAUSSIAN is (c0 + c1 tau + c2 tau^2 + c3 tau^3) exp(-rate tau^2), tau from `centre`; SINE is c0
+    sin(rate t) up to `quiet`; SAMPLED is linear between `samples`, every `step`. After `quiet`
+    there is no motion.
     """
 
     kind: int
@@ -38,7 +40,8 @@ class Ground(NamedTuple):
 
 
 _NO_SAMPLES = np.zeros(1)
-#: Times that differ by less than this share of a sample interval, or of a pulse's width, are the same time. Rounding of a double.
+#: Times that differ by less than this share of a sample interval, or of a pulse's width, are the
+#: same time. Rounding of a double.
 _SAME, _EPSILON = 2.0**-30, 2.0**-52
 #: Newton's method finds a root in fewer trials, or not at all.
 _SOME = 30
@@ -48,20 +51,37 @@ STILL_GROUND = Ground(STILL, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _NO_SAMPLES
 _RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, 40)])
 
 
-def ground_of(excitation: Rest | Ricker | Sine | Record, gravity: float, time_unit: float) -> Ground:
+def ground_of(
+    excitation: Rest | Ricker | Sine | Record, gravity: float, time_unit: float
+) -> Ground:
     """The compiled form of an excitation, in units of `gravity` (m/s^2) and `time_unit` (s)."""
     quiet = excitation.quiet_after / time_unit
     if isinstance(excitation, Ricker):
         c0, c1, c2, c3 = (c * time_unit**k / gravity for k, c in enumerate(excitation.polynomial))
-        return Ground(GAUSSIAN, c0, c1, c2, c3, excitation.rate * time_unit**2, excitation.centre / time_unit, quiet, 0.0, _NO_SAMPLES)
+        return Ground(
+            GAUSSIAN,
+            c0,
+            c1,
+            c2,
+            c3,
+            excitation.rate * time_unit**2,
+            excitation.centre / time_unit,
+            quiet,
+            0.0,
+            _NO_SAMPLES,
+        )
     if isinstance(excitation, Sine):
         rate = 2.0 * math.pi * time_unit / excitation.period
-        return Ground(SINE, excitation.amplitude / gravity, 0.0, 0.0, 0.0, rate, 0.0, quiet, 0.0, _NO_SAMPLES)
+        return Ground(
+            SINE, excitation.amplitude / gravity, 0.0, 0.0, 0.0, rate, 0.0, quiet, 0.0, _NO_SAMPLES
+        )
     if isinstance(excitation, Record):
         samples = np.ascontiguousarray(excitation.samples / gravity)
         if not samples.any():
             return STILL_GROUND
-        return Ground(SAMPLED, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, quiet, excitation.time_step / time_unit, samples)
+        return Ground(
+            SAMPLED, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, quiet, excitation.time_step / time_unit, samples
+        )
     return STILL_GROUND
 
 
@@ -105,13 +125,23 @@ def fill_series(g, t, sign, n, a, row):
         q1 = size * (g.c1 + tau * (2.0 * g.c2 + 3.0 * tau * g.c3))
         q2 = size * (g.c2 + 3.0 * tau * g.c3)
         q3 = size * g.c3
-        bell, e1, e2, e3 = 1.0, 0.0, 0.0, 0.0  # coefficients k to k-3 of the bell by its value, which obeys bell' = -2 rate tau bell
+        bell, e1, e2, e3 = (
+            1.0,
+            0.0,
+            0.0,
+            0.0,
+        )  # coefficients k to k-3 of the bell by its value, which obeys bell' = -2 rate tau bell
         spread = -2.0 * g.rate
         fall = spread * tau
         for k in range(n + 1):
             a[row, k] = q0 * bell + q1 * e1 + q2 * e2 + q3 * e3
             r = _RECIPROCAL[k + 1]
-            bell, e1, e2, e3 = (fall * r) * bell + (spread * r) * e1, bell, e1, e2  # two operations from one coefficient to the next
+            bell, e1, e2, e3 = (
+                (fall * r) * bell + (spread * r) * e1,
+                bell,
+                e1,
+                e2,
+            )  # two operations from one coefficient to the next
         return
     for k in range(n + 1):
         a[row, k] = 0.0
@@ -132,15 +162,21 @@ def fill_series(g, t, sign, n, a, row):
 
 @inner_kernel
 def next_kink(g, t):
-    """The next time after t at which the motion is not smooth, or up to which its series can be trusted.
+    """The next time after t at which the motion is not smooth, or up to which its series can be
+    trusted.
 
-    In the rise of a pulse exp(-rate tau^2) the terms of a series still grow where it is cut off, unless it is a short one.
+    In the rise of a pulse exp(-rate tau^2) the terms of a series still grow where it is cut off,
+    unless it is a short one.
     """
     if g.kind == GAUSSIAN:
         tau = t - g.centre
         if tau >= 0.0 or g.rate * tau * tau < 4.0:
             return NEVER
-        return g.centre - 6.0 / math.sqrt(g.rate) if g.rate * tau * tau > 36.0001 else t - 4.0 / (g.rate * tau)
+        return (
+            g.centre - 6.0 / math.sqrt(g.rate)
+            if g.rate * tau * tau > 36.0001
+            else t - 4.0 / (g.rate * tau)
+        )
     if g.kind == SAMPLED:
         i = interval(g, t)
         return (i + 1) * g.step if i + 1 < g.samples.size else NEVER
@@ -151,7 +187,8 @@ def next_kink(g, t):
 
 @inner_kernel
 def acceleration_after(g, t):
-    """Acceleration so soon after t that its sign tells how it leaves a zero at t, and before the next kink."""
+    """Acceleration so soon after t that its sign tells how it leaves a zero at t, and before the
+    next kink."""
     return acceleration(g, _soon(g, t))
 
 
@@ -162,14 +199,16 @@ def _soon(g, t):
 
 @inner_kernel
 def weightless_at(g, t):
-    """The time at which vertical base motion falls away with 1 g, if it falls away with less at t, and with more soon after; else t."""
+    """The time at which vertical base motion falls away with 1 g, if it falls away with less at t,
+    and with more soon after; else t."""
     now, after = 1.0 + acceleration(g, t), 1.0 + acceleration_after(g, t)
     return t + (_soon(g, t) - t) * now / (now - after) if now > 0.0 > after else t
 
 
 @inner_kernel
 def _next_extremum(g, t):
-    """The next time after t up to which the motion is monotone; NEVER where it is monotone (and dying out) for good."""
+    """The next time after t up to which the motion is monotone; NEVER where it is monotone (and
+    dying out) for good."""
     if g.kind == SAMPLED:
         return next_kink(g, t)
     if g.kind == SINE:
@@ -178,10 +217,13 @@ def _next_extremum(g, t):
         return min((2.0 * k + 1.0) * quarter, g.quiet) if t < g.quiet else NEVER
     if g.kind == STILL:
         return NEVER
-    # Extrema within _SAME pulse widths of t count as passed, or rounding would find the same one for ever.
+    # Extrema within _SAME pulse widths of t count as passed, or rounding would find the same one
+    # for ever.
     past = t - g.centre + _SAME / math.sqrt(g.rate)
     best = NEVER
-    if g.c1 == 0.0 and g.c3 == 0.0:  # (c0 + c2 tau^2) bell: at 0 and where c2 = rate (c0 + c2 tau^2)
+    if (
+        g.c1 == 0.0 and g.c3 == 0.0
+    ):  # (c0 + c2 tau^2) bell: at 0 and where c2 = rate (c0 + c2 tau^2)
         a, b, c = 0.0, -g.rate * g.c2, g.c2 - g.rate * g.c0
         if past < 0.0:
             best = 0.0
@@ -201,7 +243,8 @@ def _next_extremum(g, t):
 
 @inner_kernel
 def largest_ahead(g, t):
-    """A bound on |acceleration| from time t on: its value now and at the extrema to come; a record's largest sample."""
+    """A bound on |acceleration| from time t on: its value now and at the extrema to come; a
+    record's largest sample."""
     if t > g.quiet or g.kind == STILL:
         return 0.0
     if g.kind == SINE:
@@ -219,23 +262,29 @@ def largest_ahead(g, t):
 
 @inner_kernel
 def impulse_ahead(g, t):
-    """A bound on the integral of |acceleration| from time t on: exact in a pulse's last lobe, infinite before it."""
+    """A bound on the integral of |acceleration| from time t on: exact in a pulse's last lobe,
+    infinite before it."""
     if t > g.quiet or g.kind == STILL:
         return 0.0
     tau = t - g.centre
-    if g.kind != GAUSSIAN or tau < 0.0 or g.rate * tau * tau < 1.5:  # the last zero, which a symmetric pulse has before it
+    if (
+        g.kind != GAUSSIAN or tau < 0.0 or g.rate * tau * tau < 1.5
+    ):  # the last zero, which a symmetric pulse has before it
         return NEVER
-    v2 = -g.c3 / (2.0 * g.rate)  # the velocity of the base is (v0 + v1 tau + v2 tau^2) exp(-rate tau^2)
+    v2 = -g.c3 / (
+        2.0 * g.rate
+    )  # the velocity of the base is (v0 + v1 tau + v2 tau^2) exp(-rate tau^2)
     v0 = (2.0 * v2 - g.c1) / (2.0 * g.rate)
     return abs(v0 + tau * (g.c0 + tau * v2)) * math.exp(-g.rate * tau * tau)
 
 
 @inner_kernel
 def _passage(g, a, b, fa, fb, level):
-    """Where the acceleration passes the level between a, inside it by fa, and b, beyond it by fb; it is monotone in between.
+    """Where the acceleration passes the level between a, inside it by fa, and b, beyond it by fb;
+    it is monotone in between.
 
-    Newton's method, aimed a little past the root so that the bracket closes on it from both sides, and halving where that leads
-    nowhere; returns the bracket's outer end.
+    Newton's method, aimed a little past the root so that the bracket closes on it from both sides,
+    and halving where that leads nowhere; returns the bracket's outer end.
     """
     rising = fb > 0.0
     close = 2.0 * _EPSILON * abs(b)
@@ -260,10 +309,11 @@ def _passage(g, a, b, fa, fb, level):
 
 @inner_kernel
 def next_exceedance(g, t, low, high, noise, ahead):
-    """The time from t on at which the acceleration passes below `low` or above `high`, on that side, to be beyond by `noise`; else NEVER.
+    """The time from t on at which the acceleration passes below `low` or above `high`, on that
+    side, to be beyond by `noise`; else NEVER.
 
-    This is when it passes the limit itself, but at most `ahead` before it passes the limit by the noise: an acceleration that stays
-    near its limit has not exceeded it.
+    This is when it passes the limit itself, but at most `ahead` before it passes the limit by the
+    noise: an acceleration that stays near its limit has not exceeded it.
     """
     here = acceleration(g, t)
     while True:
@@ -272,13 +322,24 @@ def next_exceedance(g, t, low, high, noise, ahead):
         end = _next_extremum(g, t)
         if end == NEVER:
             return NEVER
-        there = g.samples[interval(g, end)] if g.kind == SAMPLED else acceleration(g, end)  # just before it, where a record ends
+        there = (
+            g.samples[interval(g, end)] if g.kind == SAMPLED else acceleration(g, end)
+        )  # just before it, where a record ends
         if there < low - noise or there > high + noise:
             level, beyond = (low, low - noise) if there < low else (high, high + noise)
-            passed = t if (here - level) * (there - level) > 0.0 else _passage(g, t, end, here - level, there - level, level)
-            if passed + ahead < end and (acceleration(g, passed + ahead) - beyond) * (there - beyond) > 0.0:
+            passed = (
+                t
+                if (here - level) * (there - level) > 0.0
+                else _passage(g, t, end, here - level, there - level, level)
+            )
+            if (
+                passed + ahead < end
+                and (acceleration(g, passed + ahead) - beyond) * (there - beyond) > 0.0
+            ):
                 return passed  # it passes the limit by the noise sooner than `ahead`
-            left = _passage(g, passed, end, acceleration(g, passed) - beyond, there - beyond, beyond)
+            left = _passage(
+                g, passed, end, acceleration(g, passed) - beyond, there - beyond, beyond
+            )
             return max(passed, left - ahead)
         if end <= t:
             return NEVER

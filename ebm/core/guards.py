@@ -1,9 +1,10 @@
 """The guards of a mode: what must not turn negative as long as it lasts.
 
-Contact forces that push, friction inside the cone, slip that keeps its direction, open contacts that stay open. A guard is a linear
-combination of the series of a step (positions and forces) or of their rates; GUARDS lists them, and a table in the workspace
-holds the weights that a mode gives them. The first root of a guard is an event; the signs with which they leave zero select the
-mode (see ebm.core.modes).
+Contact forces that push, friction inside the cone, slip that keeps its direction, open contacts
+that stay open. A guard is a linear combination of the series of a step (positions and forces) or of
+their rates; GUARDS lists them, and a table in the workspace holds the weights that a mode gives
+them. The first root of a guard is an event; the signs with which they leave zero select the mode
+(see ebm.core.modes).
 """
 
 from __future__ import annotations
@@ -13,7 +14,18 @@ import math
 import numpy as np
 
 from rockcheck.ebm.core.contacts import CLOSED, SLOW, closed_gap
-from rockcheck.ebm.core.lanes import LANES, above, falls, load, powers, ramp, store, total, upto, zeros
+from rockcheck.ebm.core.lanes import (
+    LANES,
+    above,
+    falls,
+    load,
+    powers,
+    ramp,
+    store,
+    total,
+    upto,
+    zeros,
+)
 from rockcheck.ebm.core.motion import (
     COS,
     FAMILY,
@@ -91,17 +103,21 @@ _COMBINES = np.array(
     + [(GUARD, GUARD, GUARD)]
 )
 _MOST = 3
-# The columns of the table: the weight of each series, a constant, and how many terms fewer than the order the guard has (-1: no guard).
+# The columns of the table: the weight of each series, a constant, and how many terms fewer than the
+# order the guard has (-1: no guard).
 _CONSTANT, _SHORTER = 30, 31
-#: A force is the second derivative of a truncated series: its zero is found to rounding from nearby only, within this share of a step.
+#: A force is the second derivative of a truncated series: its zero is found to rounding from nearby
+#: only, within this share of a step.
 _NEARBY = 0.25
-#: The weight with which the noise of forces hides no base acceleration: nothing is rounded in it. Its square is a number, too.
+#: The weight with which the noise of forces hides no base acceleration: nothing is rounded in it.
+#: Its square is a number, too.
 _ANY = 2.0**400
 
 
 @inner_kernel
 def _has(a, which, shorter):
-    """Enters a guard into the table: so many terms shorter than the series, its weights and its constant still zero."""
+    """Enters a guard into the table: so many terms shorter than the series, its weights and its
+    constant still zero."""
     row = TABLE + which
     for k in range(_MOST):
         a[row, _COMBINES[which, k]] = 0.0
@@ -124,7 +140,9 @@ def fill_guards(b, m, pivot, a):
         return
     _has(a, G_PHI, 0)
     a[TABLE + G_PHI, PHI] = 1.0
-    if a[PHI, 0] >= 0.5 or m[FLOOR] == OFF:  # else no step on the floor is long enough to turn the block over
+    if (
+        a[PHI, 0] >= 0.5 or m[FLOOR] == OFF
+    ):  # else no step on the floor is long enough to turn the block over
         _has(a, G_TOPPLE, 0)
         a[TABLE + G_TOPPLE, PHI], a[TABLE + G_TOPPLE, _CONSTANT] = -1.0, 0.5 * math.pi
     if m[FLOOR] == OFF:
@@ -135,7 +153,8 @@ def fill_guards(b, m, pivot, a):
     if m[FLOOR] == SLIPPING:
         _has(a, G_SLIP, 1)
         along_wall = m[TIP] != 0 or m[FAR] != 0
-        # Along a wall V = (c + C) dtheta/dt, and C = -c at theta = 0: the rotation tells the sense of slip everywhere.
+        # Along a wall V = (c + C) dtheta/dt, and C = -c at theta = 0: the rotation tells the sense
+        # of slip everywhere.
         a[TABLE + G_SLIP, PHI if along_wall else XI] = m[SLIP]
         a[TABLE + G_SLIP, SIN] = 0.0 if along_wall else -m[SLIP]
     if b.walls:
@@ -172,7 +191,8 @@ def _fill_gap(b, m, tip, pivot, a):
     sense = 1.0 if tip else -1.0
     rock = m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
     if rock and not tip and distance - pivot - (b.left.arm + b.right.arm) > -CLOSED:
-        # About a fixed pivot the far gap shrinks with phi, down to this value as the block lands: it cannot close before.
+        # About a fixed pivot the far gap shrinks with phi, down to this value as the block lands:
+        # it cannot close before.
         return
     _has(a, which, 0)
     row, side = TABLE + which, side_of(b, m[S])
@@ -187,7 +207,8 @@ def _fill_gap(b, m, tip, pivot, a):
 
 @inner_kernel
 def _fill_flat(b, m, a):
-    """The guards of a translating block; the tip wall is the left one, the far wall the right one."""
+    """The guards of a translating block; the tip wall is the left one, the far wall the right
+    one."""
     on_wall = m[TIP] != 0 or m[FAR] != 0
     hangs = m[FLOOR] != OFF and m[PULL] < 0  # a floor that pulls at what a wall holds
     for wall in (G_TIP_GAP, G_FAR_GAP):
@@ -196,9 +217,13 @@ def _fill_flat(b, m, a):
             _has(a, wall, 0)
             a[TABLE + wall, XI] = 1.0 if wall == G_TIP_GAP else -1.0
             a[TABLE + wall, _CONSTANT] = gap
-    if m[TIP] != m[FAR] and (m[FLOOR] == OFF or hangs):  # on the floor, Q is the base acceleration that the wall takes
+    if m[TIP] != m[FAR] and (
+        m[FLOOR] == OFF or hangs
+    ):  # on the floor, Q is the base acceleration that the wall takes
         _has(a, G_TIP_PUSH, 2)
-        a[TABLE + G_TIP_PUSH, NA if m[FLOOR] == OFF else Q] = 1.0 if m[FLOOR] == OFF else m[TIP] - m[FAR]
+        a[TABLE + G_TIP_PUSH, NA if m[FLOOR] == OFF else Q] = (
+            1.0 if m[FLOOR] == OFF else m[TIP] - m[FAR]
+        )
     if m[FLOOR] == OFF:
         _has(a, G_LANDING, 0)
         a[TABLE + G_LANDING, Y], a[TABLE + G_LANDING, _CONSTANT] = 1.0, -b.height
@@ -206,7 +231,9 @@ def _fill_flat(b, m, a):
     if m[FLOOR] == SLIPPING:
         _has(a, G_SLIP, 1)
         a[TABLE + G_SLIP, XI] = m[SLIP]
-    if b.mu_s == LEAST_FRICTION:  # a force below rounding, which is to stay what it is where P vanishes
+    if (
+        b.mu_s == LEAST_FRICTION
+    ):  # a force below rounding, which is to stay what it is where P vanishes
         _fill_friction(b, m, 0.0, a)
         a[TABLE + G_CONE_PLUS, _CONSTANT] = a[TABLE + G_CONE_MINUS, _CONSTANT] = b.mu_s
     else:
@@ -219,7 +246,8 @@ def _fill_flat(b, m, a):
         held = m[TIP if plus else FAR] != 0
         uplift = G_UPLIFT_PLUS if plus else G_UPLIFT_MINUS
         if m[FLOOR] != STICK or not held:
-            # A block that hangs by both corners tips as soon as anything favours one side, however little.
+            # A block that hangs by both corners tips as soon as anything favours one side, however
+            # little.
             hangs_flat = hangs and not on_wall
             _has(a, uplift, 2)
             a[TABLE + uplift, P] = 0.0 if hangs_flat else (b.left.arm if plus else b.right.arm)
@@ -230,7 +258,8 @@ def _fill_flat(b, m, a):
 
 @inner_kernel
 def _coefficients(which, half, a):
-    """Eight coefficients, from `half` on, of a guard of the table, without its constant. A series without weight need not be there."""
+    """Eight coefficients, from `half` on, of a guard of the table, without its constant. A series
+    without weight need not be there."""
     row, sum, rate = TABLE + which, zeros(), KIND[which] == RATE
     for part in range(_MOST):
         series = _COMBINES[which, part]
@@ -241,7 +270,8 @@ def _coefficients(which, half, a):
 
 @inner_kernel
 def guard(which, order, a):
-    """Writes a guard of the table into the workspace and returns its degree, or -1 where the mode has no such guard."""
+    """Writes a guard of the table into the workspace and returns its degree, or -1 where the mode
+    has no such guard."""
     row = TABLE + which
     if a[row, _SHORTER] < 0.0:
         return -1
@@ -255,9 +285,11 @@ def guard(which, order, a):
 
 @inner_kernel
 def _with_slack(which, slack, a):
-    """The noise allowed to the guard in the workspace, in a mode with this slack. An open contact is not noise.
+    """The noise allowed to the guard in the workspace, in a mode with this slack. An open contact
+    is not noise.
 
-    A gap that touches without speed may close by the noise. That takes time, so that the events of one instant come to an end.
+    A gap that touches without speed may close by the noise. That takes time, so that the events of
+    one instant come to an end.
     """
     if KIND[which] != POSITION:
         return slack * NOISE[KIND[which]]
@@ -269,9 +301,11 @@ def _with_slack(which, slack, a):
 
 @inner_kernel
 def seen(kind, smooth):
-    """How far ahead a guard of this kind is judged where the base motion is smooth for the time `smooth`.
+    """How far ahead a guard of this kind is judged where the base motion is smooth for the time
+    `smooth`.
 
-    Forces follow the base acceleration at once, and the series does not know it beyond its next kink. Positions change little at one.
+    Forces follow the base acceleration at once, and the series does not know it beyond its next
+    kink. Positions change little at one.
     """
     return min(AHEAD, smooth) if kind == FORCE else AHEAD
 
@@ -279,44 +313,62 @@ def seen(kind, smooth):
 @inner_kernel
 def _coefficient(which, k, a):
     """Coefficient k of a guard of the table that is no rate, without its constant."""
-    row, one, two, three = TABLE + which, _COMBINES[which, 0], _COMBINES[which, 1], _COMBINES[which, 2]
+    row, one, two, three = (
+        TABLE + which,
+        _COMBINES[which, 0],
+        _COMBINES[which, 1],
+        _COMBINES[which, 2],
+    )
     return a[row, one] * a[one, k] + a[row, two] * a[two, k] + a[row, three] * a[three, k]
 
 
 @inner_kernel
 def starts_positive(which, ahead, a):
-    """A cheap proof, without writing the guard, that it leaves zero upward, seen so far ahead; a mode without it has nothing to prove."""
+    """A cheap proof, without writing the guard, that it leaves zero upward, seen so far ahead; a
+    mode without it has nothing to prove."""
     row = TABLE + which
     if a[row, _SHORTER] < 0.0:
         return True
     if KIND[which] == RATE:
         return False
     begin = _coefficient(which, 0, a) + a[row, _CONSTANT]
-    floor = max(NOISE[KIND[which]], CLOSED) if G_LANDING <= which <= G_FAR_GAP else NOISE[KIND[which]]
+    floor = (
+        max(NOISE[KIND[which]], CLOSED) if G_LANDING <= which <= G_FAR_GAP else NOISE[KIND[which]]
+    )
     return leads_up(begin, _coefficient(which, 1, a), _coefficient(which, 2, a), floor, ahead)
 
 
 @inner_kernel
 def _stays_positive(which, order, until, slack, a):
-    """A cheap proof, without writing the guard, that it is positive up to a time: more so than the sum of all its terms that fall."""
+    """A cheap proof, without writing the guard, that it is positive up to a time: more so than the
+    sum of all its terms that fall."""
     row = TABLE + which
     if a[row, _SHORTER] < 0.0:
         return True
     if KIND[which] == RATE:
         return False
     begin, degree = a[row, _CONSTANT] + _coefficient(which, 0, a), order - int(a[row, _SHORTER])
-    low, high = upto(_coefficients(which, 0, a), degree), upto(_coefficients(which, LANES, a), degree - LANES)
+    low, high = (
+        upto(_coefficients(which, 0, a), degree),
+        upto(_coefficients(which, LANES, a), degree - LANES),
+    )
     fallen = total((above(falls(low), 0) + falls(high) * eighth(until)) * powers(until))
     return begin > max(slack * NOISE[KIND[which]], CLOSED) and -fallen < 0.999999 * begin
 
 
 @inner_kernel
 def _past_a_touch(degree, root, noise, a):
-    """Where the guard in the workspace is positive again if it falls below zero by less than the noise, by its parabola; else the root.
+    """Where the guard in the workspace is positive again if it falls below zero by less than the
+    noise, by its parabola; else the root.
 
     The two roots of a touch are known less well than an INSTANT apart.
     """
-    begin, fall, half_bend, power = value(a, GUARD, degree, root), slope(a, GUARD, degree, root), 0.0, 1.0
+    begin, fall, half_bend, power = (
+        value(a, GUARD, degree, root),
+        slope(a, GUARD, degree, root),
+        0.0,
+        1.0,
+    )
     for k in range(2, degree + 1):
         half_bend += 0.5 * k * (k - 1) * a[GUARD, k] * power
         power *= root
@@ -326,7 +378,8 @@ def _past_a_touch(degree, root, noise, a):
 
 @inner_kernel
 def first_event(order, h, slack, a, stack):
-    """The first time within the step at which a guard ends the mode, and which; h and -1 where none does.
+    """The first time within the step at which a guard ends the mode, and which; h and -1 where none
+    does.
 
     A gap that closes within an INSTANT of it is the event: contacts before forces.
     """
@@ -343,7 +396,11 @@ def first_event(order, h, slack, a, stack):
                 return root, k
             closes = 0 <= which <= G_FAR_GAP < k
             if root != NO_ROOT and root < tau - (INSTANT if closes else 0.0):
-                past = _past_a_touch(degree, root, noise, a) if KIND[k] == FORCE and 0.0 < root <= _NEARBY * h else root
+                past = (
+                    _past_a_touch(degree, root, noise, a)
+                    if KIND[k] == FORCE and 0.0 < root <= _NEARBY * h
+                    else root
+                )
                 if past == root:
                     tau, which = root, k
                 elif past < tau:
@@ -355,9 +412,11 @@ def first_event(order, h, slack, a, stack):
 
 @inner_kernel
 def rock_guards_hold(b, m, pivot, order, h, a):
-    """A cheap proof that a rocking block keeps every guard of ROCK but G_PHI through a step h. False where it proves nothing.
+    """A cheap proof that a rocking block keeps every guard of ROCK but G_PHI through a step h.
+    False where it proves nothing.
 
-    Each guard is bounded from below as in `first_root`, without being written. Inside the cone the floor pushes.
+    Each guard is bounded from below as in `first_root`, without being written. Inside the cone the
+    floor pushes.
     """
     if a[PHI, 0] > 0.5:
         return False
@@ -365,7 +424,9 @@ def rock_guards_hold(b, m, pivot, order, h, a):
         for which in (G_TIP_GAP, G_FAR_GAP):
             drop(a, which)
             _fill_gap(b, m, which == G_TIP_GAP, pivot, a)
-            if a[TABLE + which, _SHORTER] == 0.0 and not _rock_gap_holds(TABLE + which, order, h, a):
+            if a[TABLE + which, _SHORTER] == 0.0 and not _rock_gap_holds(
+                TABLE + which, order, h, a
+            ):
                 return False
     if b.no_slip and not b.unilateral:
         return True
@@ -380,7 +441,8 @@ def rock_guards_hold(b, m, pivot, order, h, a):
 
 @inner_kernel
 def _rock_gap_holds(row, order, h, a):
-    """Whether a bound on the gap that this row of the table gives to ROCK shows it open through a step h."""
+    """Whether a bound on the gap that this row of the table gives to ROCK shows it open through a
+    step h."""
     along, across = a[row, COS], a[row, SIN]
     cos_low, cos_high = halves(a, COS, order)
     sin_low, sin_high = halves(a, SIN, order)

@@ -1,11 +1,13 @@
 """Eight numbers that compiled code adds and multiplies at once: the lanes of one vector register.
 
-A Taylor series has sixteen terms (see `ebm.core.series.ORDER`), two such values. LLVM makes the machine code: one instruction where
-a register holds eight numbers (AVX-512), two or four where it holds fewer, with the same result to the bit. Here numba learns
-the type and what can be done with it: for each function there is the plain one, on an array of eight, which also says what it does, and
-the code that is built in its place.
+A Taylor series has sixteen terms (see `ebm.core.series.ORDER`), two such values. LLVM makes the
+machine code: one instruction where a register holds eight numbers (AVX-512), two or four where it
+holds fewer, with the same result to the bit. Here numba learns the type and what can be done with
+it: for each function there is the plain one, on an array of eight, which also says what it does,
+and the code that is built in its place.
 
-`put`, `upto` and `above` take any lane number: where there is no such lane they put nothing, keep all, or keep none.
+`put`, `upto` and `above` take any lane number: where there is no such lane they put nothing, keep
+all, or keep none.
 """
 
 from __future__ import annotations
@@ -56,18 +58,24 @@ def _indices(places: Any) -> Any:
 def _all(b: Any, number: Any, vector: Any = _VECTOR) -> Any:
     """The same number in all lanes."""
     nothing = ir.Constant(vector, ir.Undefined)
-    return b.shuffle_vector(b.insert_element(nothing, number, ir.IntType(32)(0)), nothing, _indices([0] * LANES))
+    return b.shuffle_vector(
+        b.insert_element(nothing, number, ir.IntType(32)(0)), nothing, _indices([0] * LANES)
+    )
 
 
 def _where(b: Any, how: str, place: Any) -> Any:
     """The lanes whose number compares so with `place`."""
-    return b.icmp_signed(how, ir.Constant(_VECTOR_OF_PLACES, _PLACES.tolist()), _all(b, place, _VECTOR_OF_PLACES))
+    return b.icmp_signed(
+        how, ir.Constant(_VECTOR_OF_PLACES, _PLACES.tolist()), _all(b, place, _VECTOR_OF_PLACES)
+    )
 
 
 def _compiled(result: Any, *given: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Tells numba that the plain function of this name, without the underscore, is compiled by the decorated one.
+    """Tells numba that the plain function of this name, without the underscore, is compiled by the
+    decorated one.
 
-    That is given numba's context, the builder of the code, the types and the values of the arguments, for arguments of the types `given`.
+    That is given numba's context, the builder of the code, the types and the values of the
+    arguments, for arguments of the types `given`.
     """
 
     def tell(code: Callable[..., Any]) -> Callable[..., Any]:
@@ -77,17 +85,26 @@ def _compiled(result: Any, *given: Any) -> Callable[[Callable[..., Any]], Callab
             key = plain
 
             def generic(self, args: Any, kws: Any) -> Any:
-                return signature(result, *(a if isinstance(a, types.Array) else kind for a, kind in zip(args, given, strict=True)))
+                return signature(
+                    result,
+                    *(
+                        a if isinstance(a, types.Array) else kind
+                        for a, kind in zip(args, given, strict=True)
+                    ),
+                )
 
         infer_global(plain, types.Function(_Template))
-        lower_builtin(plain, *given)(lambda context, b, kinds, values: code(context, b, kinds.args, values))
+        lower_builtin(plain, *given)(
+            lambda context, b, kinds, values: code(context, b, kinds.args, values)
+        )
         return code
 
     return tell
 
 
 class _Arithmetic(AbstractTemplate):
-    """The types of sums and products: of lanes with lanes, and of lanes with a number, which all lanes then have."""
+    """The types of sums and products: of lanes with lanes, and of lanes with a number, which all
+    lanes then have."""
 
     def generic(self, args: Any, kws: Any) -> Any:
         if _LANES in args and all(kind in (_LANES, types.float64) for kind in args):
@@ -101,7 +118,10 @@ def _calculates(operation: Any, instruction: str) -> None:
     for kinds in ((_LANES, _LANES), (_LANES, types.float64), (types.float64, _LANES)):
 
         def code(_: Any, b: Any, found: Any, values: Any, kinds: Any = kinds) -> Any:
-            both = [value if kind == _LANES else _all(b, value) for kind, value in zip(kinds, values, strict=True)]
+            both = [
+                value if kind == _LANES else _all(b, value)
+                for kind, value in zip(kinds, values, strict=True)
+            ]
             return getattr(b, instruction)(*both)
 
         lower_builtin(operation, *kinds)(code)
@@ -144,7 +164,9 @@ def powers(t: float) -> Numbers:
 def _powers(context: Any, b: Any, kinds: Any, values: Any) -> Any:
     result, t = _ONES, values[0]
     for bit in (1, 2, 4):
-        has = ir.Constant(ir.VectorType(ir.IntType(1), LANES), [bool(place & bit) for place in _PLACES])
+        has = ir.Constant(
+            ir.VectorType(ir.IntType(1), LANES), [bool(place & bit) for place in _PLACES]
+        )
         result = b.fmul(result, b.select(has, _all(b, t), _ONES))
         t = b.fmul(t, t)
     return result
@@ -212,7 +234,8 @@ def _falls(context: Any, b: Any, kinds: Any, values: Any) -> Any:
 
 
 def total(v: Numbers) -> float:
-    """The sum of all lanes: of the two halves, of the two quarters of that, and of the two numbers that are left."""
+    """The sum of all lanes: of the two halves, of the two quarters of that, and of the two numbers
+    that are left."""
     while len(v) > 1:
         half = len(v) // 2
         v = v[:half] + v[half:]
@@ -238,7 +261,9 @@ def load(a: Numbers, row: int, k: int) -> Numbers:
 def _place(context: Any, b: Any, kinds: Any, values: Any) -> Any:
     """A pointer to lanes in a matrix."""
     matrix = make_array(kinds[0])(context, b, values[0])
-    number = cgutils.get_item_pointer(context, b, kinds[0], matrix, [values[1], values[2]], wraparound=False)
+    number = cgutils.get_item_pointer(
+        context, b, kinds[0], matrix, [values[1], values[2]], wraparound=False
+    )
     return b.bitcast(number, ir.PointerType(_VECTOR))
 
 

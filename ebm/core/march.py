@@ -1,4 +1,5 @@
-"""The event loop: series, first root of the guards, impact or selection, until the end. Natural units (see ebm.core.motion).
+"""The event loop: series, first root of the guards, impact or selection, until the end. Natural
+units (see ebm.core.motion).
 
 docs/theory.md, "How an event is handled", goes with this file.
 """
@@ -128,40 +129,62 @@ from rockcheck.ebm.core.series import (
 from rockcheck.ebm.core.settle import no_impacts, settling_speed
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
-__all__ = ["DONE", "EVENT_NAMES", "FAILURES", "MODE_NAMES", "OVERTURNED", "TOO_MANY_EVENTS", "TOO_MANY_STEPS", "Control", "Tally", "run"]
+__all__ = [
+    "DONE",
+    "EVENT_NAMES",
+    "FAILURES",
+    "MODE_NAMES",
+    "OVERTURNED",
+    "TOO_MANY_EVENTS",
+    "TOO_MANY_STEPS",
+    "Control",
+    "Tally",
+    "run",
+]
 
 # Where the counts of the modelling choices begin in a run's integers.
 _RULES = MODE_SIZE + 7
 #: Events that are changes of mode and nothing else.
 _CHANGES = (UPLIFT, SLIPS, LIFT_OFF, RELEASE)
-#: A step reaches at most so many times as far as the last ones went: where a block rattles, its series need few terms. Of a longer
-#: step before, this share counts after each further one.
+#: A step reaches at most so many times as far as the last ones went: where a block rattles, its
+#: series need few terms. Of a longer step before, this share counts after each further one.
 _FARTHER, _FADES = 8.0, 0.25
 
 
 @kernel
 def run(b, gh, gv, z, t_end, control, out, out_mode, log, a, stack, yields=None):
-    """Simulates from state z (changed in place) at t = 0 to t_end; returns a Tally, and how often each modelling choice was made.
+    """Simulates from state z (changed in place) at t = 0 to t_end; returns a Tally, and how often
+    each modelling choice was made.
 
-    Row i of `out` (n x 6) is the state at i * output_step, `out_mode` its mode; `log` (n x 5) takes one row an event: time,
-    kind, mode before, mode after, impulse. `a` and `stack` are a `workspace()`. With Bouc-Wen friction `yields` is its yield
-    displacement; without it the loop is compiled for Coulomb's.
+    Row i of `out` (n x 6) is the state at i * output_step, `out_mode` its mode; `log` (n x 5) takes
+    one row an event: time, kind, mode before, mode after, impulse. `a` and `stack` are a
+    `workspace()`. With Bouc-Wen friction `yields` is its yield displacement; without it the loop is
+    compiled for Coulomb's.
     """
     scratch = scratch_with(a, stack)
-    return march(b, gh, gv, z, t_end, control, yields, Records(out, out_mode, log), scratch), scratch.whole[_RULES:]
+    return march(
+        b, gh, gv, z, t_end, control, yields, Records(out, out_mode, log), scratch
+    ), scratch.whole[_RULES:]
 
 
 @kernel
 def scratch_with(a, stack):
     """Scratch for runs, with a `workspace()`."""
-    return Scratch(a, stack, np.zeros(10 + MEMORY + 16), np.zeros(_RULES + RULES, dtype=np.int64), np.zeros(MODES, dtype=np.bool_))
+    return Scratch(
+        a,
+        stack,
+        np.zeros(10 + MEMORY + 16),
+        np.zeros(_RULES + RULES, dtype=np.int64),
+        np.zeros(MODES, dtype=np.bool_),
+    )
 
 
 @inner_kernel
 def march(b, gh, gv, z, t_end, control, yields, records, scratch):
     """Simulates as `run` does, in `Scratch` that another run may have used; returns a Tally.
 
-    Where arrays are made, or parts of them, their references are counted one by one, unless that is in an inner kernel.
+    Where arrays are made, or parts of them, their references are counted one by one, unless that is
+    in an inner kernel.
     """
     a, stack, reals, whole, tried = scratch
     reals[:] = 0.0
@@ -195,8 +218,25 @@ def march(b, gh, gv, z, t_end, control, yields, records, scratch):
     if ending == DONE and not control.until_decided:
         _sample_rest(r, np.inf, control, records)
     at_rest = r.m[FAMILY] == FLAT and r.m[FLOOR] == STICK
-    steps, events, walls, rows = r.counts[STEPS], r.counts[EVENTS], r.counts[WALL_IMPACTS], r.counts[ROWS]
-    return Tally(ending, r.now[T], r.now[PEAK], at_rest, steps, events, walls, int(r.gains[0]), r.gains[1], rows, r.now[T_REST])
+    steps, events, walls, rows = (
+        r.counts[STEPS],
+        r.counts[EVENTS],
+        r.counts[WALL_IMPACTS],
+        r.counts[ROWS],
+    )
+    return Tally(
+        ending,
+        r.now[T],
+        r.now[PEAK],
+        at_rest,
+        steps,
+        events,
+        walls,
+        int(r.gains[0]),
+        r.gains[1],
+        rows,
+        r.now[T_REST],
+    )
 
 
 @inner_kernel
@@ -204,27 +244,44 @@ def _begin(b, gh, gv, r, control, a):
     """Prepares the first mode at t = 0."""
     z, now = r.z, r.now
     now[T_REST] = now[ZETA] = now[SWUNG] = now[PIVOT] = np.nan
-    now[PEAK], now[QUIET], now[STRIDE] = abs(z[THETA]), quiet_from(gh, gv, control.tolerance), np.inf
+    now[PEAK], now[QUIET], now[STRIDE] = (
+        abs(z[THETA]),
+        quiet_from(gh, gv, control.tolerance),
+        np.inf,
+    )
     no_impacts(r.rattle)
-    for k in range(a.shape[1]):  # the series of 1 + vertical acceleration: of a still base it stays as it is
+    for k in range(
+        a.shape[1]
+    ):  # the series of 1 + vertical acceleration: of a still base it stays as it is
         a[G, k] = 0.0
     a[G, 0] = 1.0
     forget(r.tried, r.memory, 0.0)
-    stands = z[THETA] == 0.0 and z[W] == 0.0 and z[VX] == 0.0 and z[VY] == 0.0 and closed_floor(b, z)
+    stands = (
+        z[THETA] == 0.0 and z[W] == 0.0 and z[VX] == 0.0 and z[VY] == 0.0 and closed_floor(b, z)
+    )
     return _change(r, LEAVES_REST if stands else NO_EVENT, 0)
 
 
 @inner_kernel
 def _in_rad(control, b):
-    """The control with its tolerance in rad, given in alpha: all that a block does before it topples happens within alpha.
+    """The control with its tolerance in rad, given in alpha: all that a block does before it
+    topples happens within alpha.
 
-    Terms fall like the powers of a ratio. If the last one is the tolerance, and the first one is 1, that ratio is known, and what is
-    left out is a geometric series. It may be half of the tolerance.
+    Terms fall like the powers of a ratio. If the last one is the tolerance, and the first one is 1,
+    that ratio is known, and what is left out is a geometric series. It may be half of the
+    tolerance.
     """
     ratio = control.tolerance ** (1.0 / ORDER)
     tolerance = control.tolerance * min(b.left.alpha, b.right.alpha)
     last_term = 0.5 * tolerance * (1.0 - ratio) / ratio
-    return Control(tolerance, control.most_steps, control.most_events, control.until_decided, control.output_step, last_term)
+    return Control(
+        tolerance,
+        control.most_steps,
+        control.most_events,
+        control.until_decided,
+        control.output_step,
+        last_term,
+    )
 
 
 @inner_kernel
@@ -236,7 +293,8 @@ def _change(r, kind, before):
 
 @inner_kernel
 def _follow(b, gh, gv, r, yields, records, a):
-    """Selects the mode that follows, and notes the event that ended the one before, unless it goes on."""
+    """Selects the mode that follows, and notes the event that ended the one before, unless it goes
+    on."""
     kind, ended = r.counts[KIND], code_of(r.m)
     if yields is not None:
         bouc_wen.begin(b, gh, gv, r, yields, a)
@@ -258,7 +316,12 @@ def _follow(b, gh, gv, r, yields, records, a):
 def _note_event(r, log, kind, before):
     """One row of the log, and one more where an impact ends in rest."""
     note(r, log, kind, before)
-    if FLOOR_IMPACT <= kind <= LANDS and kind != LIFT_OFF and mode_code(r) == 0 and log.shape[0] > r.counts[EVENTS]:
+    if (
+        FLOOR_IMPACT <= kind <= LANDS
+        and kind != LIFT_OFF
+        and mode_code(r) == 0
+        and log.shape[0] > r.counts[EVENTS]
+    ):
         note(r, log, SETTLED, before)
 
 
@@ -271,7 +334,9 @@ def _rest(b, gh, r, t_end, control, records):
         to_left, to_right = min(to_left, b.mu_s), min(to_right, b.mu_s)
     if math.isnan(now[T_REST]):
         now[T_REST] = now[T]
-    noise = 2.0 * r.memory[SLACK] * NOISE[FORCE] / b.height  # of an acceleration, for all guards of rest to see it
+    noise = (
+        2.0 * r.memory[SLACK] * NOISE[FORCE] / b.height
+    )  # of an acceleration, for all guards of rest to see it
     low, high = -np.inf if m[FAR] != 0 else -to_right, np.inf if m[TIP] != 0 else to_left
     until = next_exceedance(gh, now[T], low, high, noise, 0.5 * AHEAD)
     _sample_rest(r, min(until, t_end), control, records)
@@ -296,7 +361,8 @@ def _sample_rest(r, until, control, records):
 
 @inner_kernel
 def _may_go_on(b, gh, gv, r, t_end, control):
-    """GOING, or why the run ends here: its time is up, its outcome is certain, or it has taken too many steps."""
+    """GOING, or why the run ends here: its time is up, its outcome is certain, or it has taken too
+    many steps."""
     z, now = r.z, r.now
     if now[T] >= t_end:
         return DONE
@@ -323,7 +389,9 @@ def _step(b, gh, gv, r, t_end, control, yields, records, a, stack):
     t = now[T]
     end = min(min(next_kink(gh, t), next_kink(gv, t)), t_end)
     if yields is None:
-        order, pivot, h = _expand(b, m, z, gh, gv, t, min(end - t, _FARTHER * now[STRIDE]), control, a)
+        order, pivot, h = _expand(
+            b, m, z, gh, gv, t, min(end - t, _FARTHER * now[STRIDE]), control, a
+        )
     else:
         order, pivot, h = bouc_wen.expand(b, gh, gv, r, end - t, control, yields, a)
     if not h > 0.0:  # no step is good for a series that is not finite
@@ -341,7 +409,12 @@ def _step(b, gh, gv, r, t_end, control, yields, records, a, stack):
     now[T] = end if whole else t + tau
     if yields is not None:
         bouc_wen.wind_up(r, order, tau, control.tolerance, records.log, a)
-    if which < 0 or (which == G_PHI and gv.kind != STILL and not b.unilateral and _grazes(b, r, order, pivot, tau, h, control, a)):
+    if which < 0 or (
+        which == G_PHI
+        and gv.kind != STILL
+        and not b.unilateral
+        and _grazes(b, r, order, pivot, tau, h, control, a)
+    ):
         return GOING
     now[SWING] = 0.0
     if r.counts[EVENTS] + 1 >= control.most_events:
@@ -356,7 +429,8 @@ def _step(b, gh, gv, r, t_end, control, yields, records, a, stack):
 
 @inner_kernel
 def _expand(b, m, z, gh, gv, t, reach, control, a):
-    """Series of the mode's motion about t: their order, the place of a sticking pivot, and the step they are good for."""
+    """Series of the mode's motion about t: their order, the place of a sticking pivot, and the step
+    they are good for."""
     if m[FAMILY] == FLAT:
         order = flat_series(b, m, z, gh, gv, t, ORDER, a)
         return order, 0.0, step_size(a, U, G, order, control.last_term, reach)
@@ -368,16 +442,23 @@ def _expand(b, m, z, gh, gv, t, reach, control, a):
         last, before = size_of(a, PHI, COS, order), size_of(a, PHI, COS, order - 1)
         rocks = m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
         if not rocks:
-            last, before = max(last, size_of(a, XI, Y, order)), max(before, size_of(a, XI, Y, order - 1))
+            last, before = (
+                max(last, size_of(a, XI, Y, order)),
+                max(before, size_of(a, XI, Y, order - 1)),
+            )
         if not rocks or gv.kind != STILL:  # forces follow the base acceleration
-            last, before = max(last, size_of(a, U, G, order)), max(before, size_of(a, U, G, order - 1))
+            last, before = (
+                max(last, size_of(a, U, G, order)),
+                max(before, size_of(a, U, G, order - 1)),
+            )
         h = longest_step(last, before, order, control.last_term, reach)
     return order, m[S] * z[X] - a[SIN, 0], h
 
 
 @inner_kernel
 def _locate(b, m, order, pivot, h, slack, a, stack):
-    """The first time within the step at which a guard ends the mode, and which; h and -1 where none does."""
+    """The first time within the step at which a guard ends the mode, and which; h and -1 where none
+    does."""
     rocks = m[FAMILY] == TILT and m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0
     if rocks and m[PULL] > 0 and rock_guards_hold(b, m, pivot, order, h, a):
         tau = first_root(a, PHI, order, h, h, min(slack * NOISE[POSITION], CLOSED), AHEAD, stack)
@@ -433,9 +514,11 @@ def _advance(b, r, order, pivot, tau, control, a, stack):
 
 @inner_kernel
 def _grazes(b, r, order, pivot, tau, h, control, a):
-    """Whether a hanging block that comes down with less energy than a swing errs by does not land. It is then put where it turns back.
+    """Whether a hanging block that comes down with less energy than a swing errs by does not land.
+    It is then put where it turns back.
 
-    A block at rest whose floor falls away swings back to just where it started. That cannot be told from a touch.
+    A block at rest whose floor falls away swings back to just where it started. That cannot be told
+    from a touch.
     """
     z, m = r.z, r.m
     if m[TIP] != 0 or m[FAR] != 0 or value(a, G, order, tau) >= 0.0:
@@ -487,7 +570,13 @@ def _lies_along_wall(m, z, which, rules):
     Its gap goes with the square of the angle that is left.
     """
     rest = math.cos(z[THETA])
-    lies = which == G_TIP_GAP and m[FAMILY] == TILT and m[FLOOR] == STICK and rest * rest < CLOSED and m[S] * z[W] > 0.0
+    lies = (
+        which == G_TIP_GAP
+        and m[FAMILY] == TILT
+        and m[FLOOR] == STICK
+        and rest * rest < CLOSED
+        and m[S] * z[W] > 0.0
+    )
     rules[LANDS_ALONG] += lies
     return lies
 

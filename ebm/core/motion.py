@@ -1,24 +1,28 @@
-"""Motion of the block for a given set of contacts, as Taylor series: one formulation for every mode.
+"""Motion of the block for a given set of contacts, as Taylor series: one formulation for every
+mode.
 
-Natural units: lengths in R, accelerations in g, hence time in sqrt(R/g), unit mass; the moment of inertia of a homogeneous block is
-then 1/3. x, y are those of the mass's centre, x = 0 where the block stands first.
+Natural units: lengths in R, accelerations in g, hence time in sqrt(R/g), unit mass; the moment of
+inertia of a homogeneous block is then 1/3. x, y are those of the mass's centre, x = 0 where the
+block stands first.
 
-A mode says which contacts carry force. While the block is *tilted* everything is written in the frame of its pivot: with
-S the sign of theta, phi = S theta >= 0, xi = S x, u = S u_g, so that the pivot is always the lower-left corner and the
-block always tips to the left; the mirror image of a motion then passes through exactly the same arithmetic. With
-s = R sin(alpha - phi), c = R cos(alpha - phi) of the pivot, s' = R' sin(alpha' + phi), c' = R' cos(alpha' + phi) of the corner on
-a wall, R and alpha being a corner's distance from the mass's centre and its angle from the upright (for a homogeneous block 1 and
-its slenderness, whichever the corner), the contacts are
+A mode says which contacts carry force. While the block is *tilted* everything is written in the
+frame of its pivot: with S the sign of theta, phi = S theta >= 0, xi = S x, u = S u_g, so that the
+pivot is always the lower-left corner and the block always tips to the left; the mirror image of a
+motion then passes through exactly the same arithmetic. With s = R sin(alpha - phi), c = R cos(alpha
+- phi) of the pivot, s' = R' sin(alpha' + phi), c' = R' cos(alpha' + phi) of the corner on a wall, R
+and alpha being a corner's distance from the mass's centre and its angle from the upright (for a
+homogeneous block 1 and its slenderness, whichever the corner), the contacts are
 
     pivot on the floor, normal     gap  y - c                 force P along (0, 1, -s)
     pivot on the floor, tangent    slip xi - s                force Q along (1, 0, c)
     tip wall: top corner           gap  xi + delta_a - s'     force N_a along (1, 0, -c')     (case I)
     far wall: lifted bottom corner gap  delta_b - xi - s'     force N_b along (-1, 0, -c')    (case II)
 
-where a triple gives the force on xi, y and the moment about the centroid (relative to unit force), and also the row of the
-constraint. A slipping pivot adds Q = -mu_k d |P|. Newton-Euler with these forces and constraints *is* the paper's (3) in
-ROCK, (7) and (8) in SLIDE-ROCK and the equations of LEAN and LADDER; tests hold the closed forms against it. ROCK and
-SLIDE-ROCK are written out, for speed. While the block is *flat* (theta = 0, both corners down or both walls' corners touching) it
+where a triple gives the force on xi, y and the moment about the centroid (relative to unit force),
+and also the row of the constraint. A slipping pivot adds Q = -mu_k d |P|. Newton-Euler with these
+forces and constraints *is* the paper's (3) in ROCK, (7) and (8) in SLIDE-ROCK and the equations of
+LEAN and LADDER; tests hold the closed forms against it. ROCK and SLIDE-ROCK are written out, for
+speed. While the block is *flat* (theta = 0, both corners down or both walls' corners touching) it
 only translates.
 """
 
@@ -39,11 +43,13 @@ MOREAU, CLOSED_BRANCH, OPEN_BRANCH, FLOOR_FIRST, LEADING_FIRST, TRAILING_FIRST =
 
 
 class Side(NamedTuple):
-    """One side of the block as it stands: its lower corner, which is the pivot where the block tips to that side, and its top corner.
+    """One side of the block as it stands: its lower corner, which is the pivot where the block tips
+    to that side, and its top corner.
 
-    alpha and radius are a corner's angle from the upright and its distance, seen from the mass's centre. The arms of corners on a
-    wall, s' and c', are linear in those of the pivot, s' = S c - C s and c' = S s + C c, with (S, C) = (tip_sin, tip_cos) for the
-    top corner of this side and (far_sin, far_cos) for the lower corner of the other one.
+    alpha and radius are a corner's angle from the upright and its distance, seen from the mass's
+    centre. The arms of corners on a wall, s' and c', are linear in those of the pivot, s' = S c - C
+    s and c' = S s + C c, with (S, C) = (tip_sin, tip_cos) for the top corner of this side and
+    (far_sin, far_cos) for the lower corner of the other one.
     """
 
     alpha: float
@@ -82,30 +88,54 @@ class Setting(NamedTuple):
     unilateral: bool
     #: An impact that would add energy uses the largest restitution that does not, instead of e.
     energy_cap: bool
-    #: The law of impacts at several contacts, an index into LAWS. None with the bilateral pivot, which needs none: the event loop is
-    #: then compiled without it.
+    #: The law of impacts at several contacts, an index into LAWS. None with the bilateral pivot,
+    #: which needs none: the event loop is then compiled without it.
     law: int | None
 
 
-#: Static friction of a frictionless floor. With less, rounding in the tail of a base acceleration would move a resting block.
+#: Static friction of a frictionless floor. With less, rounding in the tail of a base acceleration
+#: would move a resting block.
 LEAST_FRICTION = 1e-9
 
 # A mode is a small integer vector.
 FAMILY, S, FLOOR, SLIP, PULL, TIP, FAR = range(7)
 MODE_SIZE = 7
-# m[FAMILY]: FLAT has theta = 0. m[S] is the sign of theta; at phi = 0, the sign that it is about to take.
+# m[FAMILY]: FLAT has theta = 0. m[S] is the sign of theta; at phi = 0, the sign that it is about to
+# take.
 FLAT, TILT = 0, 1
-# m[FLOOR]: what the pivot (or, flat, the base) does; m[SLIP] is the direction of slip (frame; world where flat).
+# m[FLOOR]: what the pivot (or, flat, the base) does; m[SLIP] is the direction of slip (frame; world
+# where flat).
 OFF, STICK, SLIPPING = 0, 1, 2
-# m[PULL]: sign assumed for the normal force P, which gives friction its sense; -1 only with the bilateral pivot.
-# m[TIP], m[FAR]: the corner rests on the wall it tips to, or on the other one. Where flat: the side rests on the left wall, on
-# the right wall; on the floor a block at rest is then held on that side, whatever the base does.
+# m[PULL]: sign assumed for the normal force P, which gives friction its sense; -1 only with the
+# bilateral pivot. m[TIP], m[FAR]: the corner rests on the wall it tips to, or on the other one.
+# Where flat: the side rests on the left wall, on the right wall; on the floor a block at rest is
+# then held on that side, whatever the base does.
 
 # Rows of the workspace that hold series.
-PHI, OMEGA, SIN, COS, U, G, XI, Y, P, Q, NA, NB, GUARD, KNOWN, FORCE, FLOOR_ARM, WALL_ARM, WALL_PUSH = range(18)
+(
+    PHI,
+    OMEGA,
+    SIN,
+    COS,
+    U,
+    G,
+    XI,
+    Y,
+    P,
+    Q,
+    NA,
+    NB,
+    GUARD,
+    KNOWN,
+    FORCE,
+    FLOOR_ARM,
+    WALL_ARM,
+    WALL_PUSH,
+) = range(18)
 # Rows in which the small linear system of the contacts is put together, three each.
 ROW, COLUMN, MATRIX, INVERSE = range(18, 30, 3)
-# The last angle whose sine and cosine were taken, and these: the end of a step is the start of the next one.
+# The last angle whose sine and cosine were taken, and these: the end of a step is the start of the
+# next one.
 ANGLE = 30
 # The guards of the mode, a row each: the weights of the series in it (see ebm.core.guards).
 TABLE = 31
@@ -119,7 +149,8 @@ X, HEIGHT, THETA, VX, VY, W = range(6)
 
 @kernel
 def workspace(rows=ROWS):
-    """Scratch for one trajectory: the series (G = 1: no vertical motion), and the stack of the root search."""
+    """Scratch for one trajectory: the series (G = 1: no vertical motion), and the stack of the root
+    search."""
     series = np.zeros((rows, WIDTH))
     series[G, 0] = series[ANGLE, 2] = 1.0
     return series, np.zeros((48, WIDTH))
@@ -148,10 +179,12 @@ def delta(b, m, tip):
 
 @inner_kernel
 def tilt_series(b, m, z, gh, gv, t, order, enough, reach, a):
-    """Fills the workspace with the series of a tilted block's motion about time t; returns their order.
+    """Fills the workspace with the series of a tilted block's motion about time t; returns their
+    order.
 
-    The order is `order`, or less where the terms fall below `enough` within `reach` (the longest step there can be).
-    ROCK, whose motion does not depend on P and Q, has them where the setting asks for a guard on them.
+    The order is `order`, or less where the terms fall below `enough` within `reach` (the longest
+    step there can be). ROCK, whose motion does not depend on P and Q, has them where the setting
+    asks for a guard on them.
     """
     sign = float(m[S])
     fill_series(gh, t, sign, order, a, U)
@@ -164,7 +197,9 @@ def tilt_series(b, m, z, gh, gv, t, order, enough, reach, a):
     sine, cosine = sine_cosine(side.alpha - a[PHI, 0], a)
     a[SIN, 0], a[COS, 0] = side.radius * sine, side.radius * cosine
     if m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0:
-        return _rock_series(side.share, gv.kind == STILL, order, enough, reach, b.unilateral or not b.no_slip, a)
+        return _rock_series(
+            side.share, gv.kind == STILL, order, enough, reach, b.unilateral or not b.no_slip, a
+        )
     a[XI, 0] = sign * z[X]
     a[XI, 1] = sign * z[VX]
     a[Y, 0] = z[HEIGHT]
@@ -178,7 +213,8 @@ def tilt_series(b, m, z, gh, gv, t, order, enough, reach, a):
 
 @inner_kernel
 def _products(a, x, y, first, last, n):
-    """The sum of x_j y_(n-j) for j from `first` to `last`. The ends, which are the newest coefficients, are added last:
+    """The sum of x_j y_(n-j) for j from `first` to `last`. The ends, which are the newest
+    coefficients, are added last:
 
     so the processor need not wait for them to begin with the sum.
     """
@@ -194,12 +230,14 @@ def _products(a, x, y, first, last, n):
 
 @inner_kernel
 def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
-    """ROCK, (3): theta'' = (u c - S s G0)/(I + R^2), the pivot sticking; xi and y are s and c up to a constant."""
+    """ROCK, (3): theta'' = (u c - S s G0)/(I + R^2), the pivot sticking; xi and y are s and c up to
+    a constant."""
     w0, s0, c0, u0 = a[OMEGA, 0], a[SIN, 0], a[COS, 0], a[U, 0]
     w, s, c = w0, s0, c0
     ds, dc, push = w0 * c0, w0 * s0, u0 * c0
-    # Lane i of `of_w` is w's coefficient i + 1. Lane i of `more_ds` is what is known of the sum that is needed i + 1 orders later: the
-    # products of all coefficients so far but the first ones. These are added where they are needed, so that no order waits for its lanes.
+    # Lane i of `of_w` is w's coefficient i + 1. Lane i of `more_ds` is what is known of the sum
+    # that is needed i + 1 orders later: the products of all coefficients so far but the first ones.
+    # These are added where they are needed, so that no order waits for its lanes.
     of_w = of_s = of_c = of_u = zeros()
     more_ds = more_dc = more_push = zeros()
     scale = 1.0
@@ -225,7 +263,9 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
         scale *= reach
         # A uniform rotation has no higher rates, but its sine and cosine do.
         small = small + 1 if (abs(w) + abs(s) + abs(c)) * scale < enough else 0
-        if not still_vertical and abs(a[G, k]) * scale >= enough:  # at its balance point only P feels the vertical motion
+        if (
+            not still_vertical and abs(a[G, k]) * scale >= enough
+        ):  # at its balance point only P feels the vertical motion
             small = 0
         if small == 3:
             order = k + 1
@@ -241,7 +281,8 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
 
 @inner_kernel
 def _slide_series(spin, kappa, order, enough, reach, a):
-    """SLIDE-ROCK, (7): of the contacts only the pivot's acts, with P and Q = -kappa P. The general solution, written out for speed."""
+    """SLIDE-ROCK, (7): of the contacts only the pivot's acts, with P and Q = -kappa P. The general
+    solution, written out for speed."""
     sine, cosine = a[SIN, 0], a[COS, 0]
     arm = sine + kappa * cosine
     share = 1.0 / (1.0 + spin * sine * arm)
@@ -249,13 +290,15 @@ def _slide_series(spin, kappa, order, enough, reach, a):
     w0, s, c = a[OMEGA, 0], a[SIN, 1], a[COS, 1]
     ds, dc, moment = -w0 * c, w0 * s, 0.0
     first_push = last_arm = 0.0
-    # As for ROCK. The products with P, which is known one order later than the others, are one order behind.
+    # As for ROCK. The products with P, which is known one order later than the others, are one
+    # order behind.
     of_w = of_s = of_c = of_arm = of_push = zeros()
     more_ds = more_dc = more_moment = zeros()
     scale = 1.0
     small = 0
     for k in range(order - 1):
-        # s, c: of order k + 1; ds, dc: their rates of that order, but for the term of phi's acceleration of order k, the unknown.
+        # s, c: of order k + 1; ds, dc: their rates of that order, but for the term of phi's
+        # acceleration of order k, the unknown.
         push = share * (dc * (k + 1.0) + a[G, k] + sine * spin * moment)
         turn, slide, rise = spin * (moment - arm * push), -a[U, k] - kappa * push, push - a[G, k]
         size = abs(turn) + abs(slide) + abs(rise) + abs(s) + abs(c) + abs(push) + abs(kappa * push)
@@ -292,11 +335,16 @@ def _slide_series(spin, kappa, order, enough, reach, a):
 def _lean_series(b, side, tip, order, a):
     """LEAN: nothing moves, and the wall takes the moment about the pivot.
 
-    Written out: the arm of a far wall can be so short that the general solution loses all its digits.
+    Written out: the arm of a far wall can be so short that the general solution loses all its
+    digits.
     """
     s, c = a[SIN, 0], a[COS, 0]
     wall = 1.0 if tip else -1.0
-    arm = c + side.tip_sin * s + side.tip_cos * c if tip else (b.left.arm + b.right.arm) * np.sin(a[PHI, 0])  # c - c'
+    arm = (
+        c + side.tip_sin * s + side.tip_cos * c
+        if tip
+        else (b.left.arm + b.right.arm) * np.sin(a[PHI, 0])
+    )  # c - c'
     push = NA if tip else NB
     for k in range(order + 1):
         a[P, k] = a[Q, k] = a[NA, k] = a[NB, k] = 0.0
@@ -312,7 +360,8 @@ def _lean_series(b, side, tip, order, a):
 
 @inner_kernel
 def _contact_rows(b, side, kappa, floor, stick, tip, far, a):
-    """Constraint rows, force columns (xi, y, moment) and the inverse of their matrix at the start; returns their number."""
+    """Constraint rows, force columns (xi, y, moment) and the inverse of their matrix at the start;
+    returns their number."""
     s, c = a[SIN, 0], a[COS, 0]
     tip_arm, far_arm = side.tip_sin * s + side.tip_cos * c, side.far_sin * s + side.far_cos * c
     n = 0
@@ -327,7 +376,9 @@ def _contact_rows(b, side, kappa, floor, stick, tip, far, a):
         else:
             along = 1.0 if which < 3 else -1.0
             a[ROW + n, 0] = a[COLUMN + n, 0] = along
-            a[ROW + n, 2] = a[COLUMN + n, 2] = c if which == 1 else (-tip_arm if which == 2 else -far_arm)
+            a[ROW + n, 2] = a[COLUMN + n, 2] = (
+                c if which == 1 else (-tip_arm if which == 2 else -far_arm)
+            )
         n += 1
     for i in range(n):
         for j in range(n):
@@ -339,7 +390,8 @@ def _contact_rows(b, side, kappa, floor, stick, tip, far, a):
 
 @inner_kernel
 def _contact_series(b, side, m, order, enough, reach, a):
-    """Newton-Euler with the mode's constraints, solved term by term: the matrix of the unknown forces is the same each time."""
+    """Newton-Euler with the mode's constraints, solved term by term: the matrix of the unknown
+    forces is the same each time."""
     floor, tip, far = m[FLOOR] != OFF, m[TIP] != 0, m[FAR] != 0
     static = tip and far
     stick = m[FLOOR] == STICK and not static  # wedged between two walls the block needs no friction
@@ -353,11 +405,14 @@ def _contact_series(b, side, m, order, enough, reach, a):
     a[PHI, 1], a[SIN, 1], a[COS, 1] = a[OMEGA, 0], -a[OMEGA, 0] * c0, a[OMEGA, 0] * s0
     for k in range(order - 1):
         i = k + 2
-        # The rates of sine and cosine at order k + 1 lack only the term of phi's acceleration at order k, the unknown.
+        # The rates of sine and cosine at order k + 1 lack only the term of phi's acceleration at
+        # order k, the unknown.
         ds = -_products(a, OMEGA, COS, 0, k, k + 1)
         dc = _products(a, OMEGA, SIN, 0, k, k + 1)
         moment = _moment_of_lower_orders(side, kappa, floor, stick, tip, far, k, a)
-        ax, ay, aphi = _accelerations(b, side, n, kappa, floor, stick, tip, far, ds * (i - 1.0), dc * (i - 1.0), moment, k, a)
+        ax, ay, aphi = _accelerations(
+            b, side, n, kappa, floor, stick, tip, far, ds * (i - 1.0), dc * (i - 1.0), moment, k, a
+        )
         if static:
             ax = aphi = 0.0
             ay = 0.0 if floor else ay
@@ -376,13 +431,16 @@ def _contact_series(b, side, m, order, enough, reach, a):
             break
     i = order
     a[OMEGA, i] = 0.0
-    a[P, i] = a[P, i - 1] = a[Q, i] = a[Q, i - 1] = a[NA, i] = a[NA, i - 1] = a[NB, i] = a[NB, i - 1] = 0.0
+    a[P, i] = a[P, i - 1] = a[Q, i] = a[Q, i - 1] = a[NA, i] = a[NA, i - 1] = a[NB, i] = a[
+        NB, i - 1
+    ] = 0.0
     return order
 
 
 @inner_kernel
 def _moment_of_lower_orders(side, kappa, floor, stick, tip, far, k, a):
-    """Coefficient k of the moment that the forces' coefficients below k give, by their arms' later terms; none where both walls hold it."""
+    """Coefficient k of the moment that the forces' coefficients below k give, by their arms' later
+    terms; none where both walls hold it."""
     moment = 0.0
     if floor:
         a[FLOOR_ARM, k] = a[SIN, k] + kappa * a[COS, k]
@@ -398,11 +456,16 @@ def _moment_of_lower_orders(side, kappa, floor, stick, tip, far, k, a):
 
 @inner_kernel
 def _accelerations(b, side, n, kappa, floor, stick, tip, far, ks, kc, moment, k, a):
-    """Coefficient k of the accelerations (xi, y, phi) and of the n contact forces, so that the constraints hold.
+    """Coefficient k of the accelerations (xi, y, phi) and of the n contact forces, so that the
+    constraints hold.
 
-    `ks`, `kc` are the accelerations of sine and cosine but for phi's own, `moment` that of the forces' lower coefficients.
+    `ks`, `kc` are the accelerations of sine and cosine but for phi's own, `moment` that of the
+    forces' lower coefficients.
     """
-    tip_reach, far_reach = side.tip_sin * kc - side.tip_cos * ks, side.far_sin * kc - side.far_cos * ks  # of s'
+    tip_reach, far_reach = (
+        side.tip_sin * kc - side.tip_cos * ks,
+        side.far_sin * kc - side.far_cos * ks,
+    )  # of s'
     s, c = a[SIN, 0], a[COS, 0]
     tip_arm, far_arm = side.tip_sin * s + side.tip_cos * c, side.far_sin * s + side.far_cos * c
     ax, ay, aphi = -a[U, k], -a[G, k], b.spin * moment
@@ -437,7 +500,8 @@ def _accelerations(b, side, n, kappa, floor, stick, tip, far, ks, kc, moment, k,
 
 @inner_kernel
 def inverse_of(a, matrix, inverse, n):
-    """Inverse of the n x n matrix (n <= 3) in the rows from `matrix` on, by cofactors, into the rows from `inverse` on.
+    """Inverse of the n x n matrix (n <= 3) in the rows from `matrix` on, by cofactors, into the
+    rows from `inverse` on.
 
     Its entries are infinite or NaN where the matrix is singular.
     """
@@ -453,7 +517,11 @@ def inverse_of(a, matrix, inverse, n):
             for j in range(3):
                 j1, j2 = (j + 1) % 3, (j + 2) % 3
                 a[inverse + j, i] = a[i1, j1] * a[i2, j2] - a[i1, j2] * a[i2, j1]
-        d = a[matrix, 0] * a[inverse, 0] + a[matrix, 1] * a[inverse + 1, 0] + a[matrix, 2] * a[inverse + 2, 0]
+        d = (
+            a[matrix, 0] * a[inverse, 0]
+            + a[matrix, 1] * a[inverse + 1, 0]
+            + a[matrix, 2] * a[inverse + 2, 0]
+        )
         for i in range(3):
             for j in range(3):
                 a[inverse + i, j] /= d
@@ -461,9 +529,11 @@ def inverse_of(a, matrix, inverse, n):
 
 @inner_kernel
 def flat_series(b, m, z, gh, gv, t, order, a):
-    """Fills the workspace with the series of a block that only translates (world frame); returns their order.
+    """Fills the workspace with the series of a block that only translates (world frame); returns
+    their order.
 
-    Q is the floor's friction, P its normal force on both corners together, N_a the force of a wall that presses.
+    Q is the floor's friction, P its normal force on both corners together, N_a the force of a wall
+    that presses.
     """
     fill_series(gh, t, 1.0, order, a, U)
     if gv.kind != STILL:  # otherwise G is 1 throughout, as the run has set it
@@ -506,7 +576,11 @@ def tilt_state(b, m, order, tau, pivot, a, z):
     elif m[TIP] != 0 or m[FAR] != 0:
         wall = 1.0 if m[TIP] != 0 else -1.0
         other = side_of(b, -m[S])
-        radius, angle = (side.top_radius, side.top_alpha + phi) if m[TIP] != 0 else (other.radius, other.alpha + phi)
+        radius, angle = (
+            (side.top_radius, side.top_alpha + phi)
+            if m[TIP] != 0
+            else (other.radius, other.alpha + phi)
+        )
         reach, reach_rate = radius * np.sin(angle), radius * np.cos(angle)
         xi, v = wall * (reach - delta(b, m, m[TIP] != 0)), wall * reach_rate * w
     else:

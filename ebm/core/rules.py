@@ -1,15 +1,19 @@
-"""The modelling choices of the event-based models, by name: where rigid-body mechanics, or rounding, leaves more than one answer or none.
+"""The modelling choices of the event-based models, by name: where rigid-body mechanics, or
+rounding, leaves more than one answer or none.
 
-Each has one home in the code, is counted in every run (`History.cost.rules`), and has a paragraph in docs/limits.md.
+Each has one home in the code, is counted in every run (`History.cost.rules`), and has a paragraph
+in docs/limits.md.
 """
 
 from __future__ import annotations
 
-#: The floor falls away faster than g under a flat block, and nothing favours left or right: it hangs flat, by both corners.
+#: The floor falls away faster than g under a flat block, and nothing favours left or right: it
+#: hangs flat, by both corners.
 HANGS = 0
 #: A mode is selected once at an instant. One that has just ended goes on only where no other fits.
 MODE_AGAIN = 1
-#: No mode, or no set of contacts at an impact, fits (rounding, or beyond Painleve's limit): the one that is wrong by least is taken.
+#: No mode, or no set of contacts at an impact, fits (rounding, or beyond Painleve's limit): the one
+#: that is wrong by least is taken.
 LEAST_CONTRADICTION = 2
 #: Impacts that go on at one instant become plastic.
 ENDLESS_STAGES = 3
@@ -23,7 +27,8 @@ WEDGED = 6
 FLUSH_LANDING = 7
 #: A hanging block that comes down with less energy than the tolerance has not touched the floor.
 GRAZES = 8
-#: A corner that meets the wall as the block lands, on its base or on its side, belongs to the landing.
+#: A corner that meets the wall as the block lands, on its base or on its side, belongs to the
+#: landing.
 LANDS_ALONG = 9
 #: Bouc-Wen: beyond Painleve's limit on a wall the motion goes on with the pull.
 PULLS = 10

@@ -1,4 +1,5 @@
-"""What a run is asked for, what it keeps from step to step, what it reports; the codes of modes and events."""
+"""What a run is asked for, what it keeps from step to step, what it reports; the codes of modes and
+events."""
 
 from __future__ import annotations
 
@@ -25,12 +26,34 @@ EVENT_NAMES = (
     "overturned left",
     "overturned right",
 )
-(UPLIFT, SLIPS, STICKS, FLOOR_IMPACT, WALL_IMPACT, LIFT_OFF, LANDS, RELEASE, SETTLED, LEFT, RIGHT) = range(11)
+(
+    UPLIFT,
+    SLIPS,
+    STICKS,
+    FLOOR_IMPACT,
+    WALL_IMPACT,
+    LIFT_OFF,
+    LANDS,
+    RELEASE,
+    SETTLED,
+    LEFT,
+    RIGHT,
+) = range(11)
 #: Not in the log; the end of rest, whose event depends on the next mode.
 NO_EVENT, LEAVES_REST = -1, -2
 
 # How a run ended; while it has not: GOING in its mode, or CHANGING it.
-DONE, OVERTURNED, TOO_MANY_STEPS, TOO_MANY_EVENTS, NO_MODE, NO_IMPACT, NOT_FINITE, GOING, CHANGING = range(9)
+(
+    DONE,
+    OVERTURNED,
+    TOO_MANY_STEPS,
+    TOO_MANY_EVENTS,
+    NO_MODE,
+    NO_IMPACT,
+    NOT_FINITE,
+    GOING,
+    CHANGING,
+) = range(9)
 FAILURES = {
     TOO_MANY_STEPS: "the cap on steps was reached",
     TOO_MANY_EVENTS: "the cap on events was reached",
@@ -51,7 +74,8 @@ class Control(NamedTuple):
     until_decided: bool
     #: Spacing of the rows of `out`; with no rows nothing is sampled.
     output_step: float
-    #: Inside the loop: how large the last term of a step's series may be, in rad, so that the terms left out stay below the tolerance.
+    #: Inside the loop: how large the last term of a step's series may be, in rad, so that the terms
+    #: left out stay below the tolerance.
     last_term: float = 0.0
 
 
@@ -72,7 +96,8 @@ class Tally(NamedTuple):
 
 
 class Run(NamedTuple):
-    """What a run keeps from step to step: state, mode, clock and counts, and what its parts remember."""
+    """What a run keeps from step to step: state, mode, clock and counts, and what its parts
+    remember."""
 
     z: NDArray[np.float64]
     m: NDArray[np.int64]
@@ -96,7 +121,8 @@ class Records(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """What a run works in, and the next one again: series, roots, and what it keeps besides its state (numbers, integers, modes tried)."""
+    """What a run works in, and the next one again: series, roots, and what it keeps besides its
+    state (numbers, integers, modes tried)."""
 
     a: NDArray[np.float64]
     stack: NDArray[np.float64]
@@ -105,9 +131,9 @@ class Scratch(NamedTuple):
     tried: NDArray[np.bool_]
 
 
-# The clock: time, largest |theta|, largest |omega| since the last event, since when it rests, from when the base is quiet; the
-# variable z of Bouc-Wen friction; energy and pivot of the last swing on a quiet base, and whether it was as the one before it; how long
-# the last steps were.
+# The clock: time, largest |theta|, largest |omega| since the last event, since when it rests, from
+# when the base is quiet; the variable z of Bouc-Wen friction; energy and pivot of the last swing on
+# a quiet base, and whether it was as the one before it; how long the last steps were.
 T, PEAK, SWING, T_REST, QUIET, ZETA, SWUNG, PIVOT, REPEATS, STRIDE = range(10)
 # The counts; with Bouc-Wen friction, whether the pivot has not yielded; the event
 # that has ended a mode, and that mode's code.

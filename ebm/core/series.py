@@ -1,9 +1,11 @@
-"""Taylor polynomials: evaluation and the first root. A polynomial is a row of a two-dimensional array: the
-coefficients a[row, 0..n] of 1, tau, tau^2, ..., n <= ORDER. (Rows are addressed in place; views of them would cost more than the
-sums.) They are worked on in two halves of eight, each at once (see ebm.core.lanes). What stands behind a[row, n] does not matter.
+"""Taylor polynomials: evaluation and the first root. A polynomial is a row of a two-dimensional
+array: the coefficients a[row, 0..n] of 1, tau, tau^2, ..., n <= ORDER. (Rows are addressed in
+place; views of them would cost more than the sums.) They are worked on in two halves of eight, each
+at once (see ebm.core.lanes). What stands behind a[row, n] does not matter.
 
-Everything that the event-based model follows in time (rotation, position, contact forces, gaps) is one such polynomial a
-step, so an event is the root of a polynomial and can be located to rounding, with a proof that no earlier one was missed.
+Everything that the event-based model follows in time (rotation, position, contact forces, gaps) is
+one such polynomial a step, so an event is the root of a polynomial and can be located to rounding,
+with a proof that no earlier one was missed.
 """
 
 from __future__ import annotations
@@ -12,17 +14,31 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.core.lanes import LANES, above, falls, first, load, powers, ramp, shifted, store, total, upto
+from rockcheck.ebm.core.lanes import (
+    LANES,
+    above,
+    falls,
+    first,
+    load,
+    powers,
+    ramp,
+    shifted,
+    store,
+    total,
+    upto,
+)
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
-#: Order of the series. From 14 to 20 the same error costs about the same, at all tolerances; 16 terms are two registers.
+#: Order of the series. From 14 to 20 the same error costs about the same, at all tolerances; 16
+#: terms are two registers.
 ORDER = 2 * LANES - 1
 #: Width of the rows that hold a polynomial, and behind it what else is kept with it.
 WIDTH = 32
 #: Natural time at which the first coefficients of a guard are compared.
 AHEAD = 2e-2
-#: Error bounds of a position, a velocity and a force: a coefficient below its bound is rounding. They are one bound, seen after AHEAD:
-#: a velocity or a force of this size moves a position by its bound. So a contact that pulls by more than noise opens by more, too.
+#: Error bounds of a position, a velocity and a force: a coefficient below its bound is rounding.
+#: They are one bound, seen after AHEAD: a velocity or a force of this size moves a position by its
+#: bound. So a contact that pulls by more than noise opens by more, too.
 POSITION, RATE, FORCE = range(3)
 _ERROR = 1e-13
 NOISE = np.array([_ERROR, _ERROR / AHEAD, 2.0 * _ERROR / AHEAD**2])
@@ -62,10 +78,11 @@ def slope(a, row, n, tau):
 
 @inner_kernel
 def least_change(low, high, h):
-    """A bound from below on c(tau) - c(0) for 0 <= tau <= h, at most 0; of the polynomial with these halves.
+    """A bound from below on c(tau) - c(0) for 0 <= tau <= h, at most 0; of the polynomial with
+    these halves.
 
-    Terms that fall count in full, those that rise count only where they make up for the ones behind them: c_1 for c_2 and all others,
-    c_2 for the others. What is no number gives none.
+    Terms that fall count in full, those that rise count only where they make up for the ones behind
+    them: c_1 for c_2 and all others, c_2 for the others. What is no number gives none.
     """
     low, high = low * powers(h), high * (eighth(h) * powers(h))
     least = total(above(falls(low), 2) + falls(high))
@@ -81,7 +98,8 @@ def least_change(low, high, h):
 def stays_below(a, row, n, tau, level):
     """Whether c is known to stay below a positive level between 0 and tau, both ends included.
 
-    Between values at a distance d, c rises above the larger one by at most d^2/8 of its largest curvature.
+    Between values at a distance d, c rises above the larger one by at most d^2/8 of its largest
+    curvature.
     """
     d = 0.25 * tau
     curvature = 0.0
@@ -102,15 +120,20 @@ def size_of(a, one, other, k):
 
 @inner_kernel
 def step_size(a, one, other, order, last_term, reach):
-    """The step at which the last two terms of two series stay below `last_term`, at most `reach`."""
-    return longest_step(size_of(a, one, other, order), size_of(a, one, other, order - 1), order, last_term, reach)
+    """The step at which the last two terms of two series stay below `last_term`, at most
+    `reach`."""
+    return longest_step(
+        size_of(a, one, other, order), size_of(a, one, other, order - 1), order, last_term, reach
+    )
 
 
 @inner_kernel
 def longest_step(last, before, order, last_term, reach):
-    """The step at which the last two terms of a series, of these sizes, stay below `last_term`, at most `reach`.
+    """The step at which the last two terms of a series, of these sizes, stay below `last_term`, at
+    most `reach`.
 
-    The term before the last one bounds it, as long as terms fall: the logarithm of the other is then not needed.
+    The term before the last one bounds it, as long as terms fall: the logarithm of the other is
+    then not needed.
     """
     longest = _step_of_term(before, order - 1, last_term)
     if not last * longest <= before:
@@ -122,7 +145,8 @@ def longest_step(last, before, order, last_term, reach):
 def _step_of_term(size, k, last_term):
     """The step at which the term of order k, of this size, is `last_term`.
 
-    In a step shorter than the unit of time the error of the velocity, h times fewer, is the larger one.
+    In a step shorter than the unit of time the error of the velocity, h times fewer, is the larger
+    one.
     """
     if not size > 0.0:
         return math.inf
@@ -132,21 +156,25 @@ def _step_of_term(size, k, last_term):
 
 @inner_kernel
 def force_step(a, row, order, tolerance, reach):
-    """The step at which the last two terms of a force stay below the tolerance, at most `reach`. An error of its rate moves nothing.
+    """The step at which the last two terms of a force stay below the tolerance, at most `reach`. An
+    error of its rate moves nothing.
 
-    Friction that winds up under a constant acceleration is a series of every fourth power. So the two terms before count, too: below
-    what the tolerance is for them where terms shrink alike.
+    Friction that winds up under a constant acceleration is a series of every fourth power. So the
+    two terms before count, too: below what the tolerance is for them where terms shrink alike.
     """
     longest, bound = math.inf, math.log(tolerance)  # logarithms
     for k in range(max(order - 3, 1), order + 1):
         if a[row, k] != 0.0:
-            longest = min(longest, (bound * min(k / (order - 1), 1.0) - math.log(abs(a[row, k]))) / k)
+            longest = min(
+                longest, (bound * min(k / (order - 1), 1.0) - math.log(abs(a[row, k]))) / k
+            )
     return min(reach, math.exp(longest))
 
 
 @inner_kernel
 def leading(a, row, n, floor, ahead):
-    """The sign with which c leaves tau = 0: +1, -1, or 0 where it is zero throughout the time `ahead`, at most AHEAD."""
+    """The sign with which c leaves tau = 0: +1, -1, or 0 where it is zero throughout the time
+    `ahead`, at most AHEAD."""
     k = _order_of_zero(a, row, n, floor, ahead)
     if k > n:
         return 0
@@ -155,7 +183,8 @@ def leading(a, row, n, floor, ahead):
 
 @inner_kernel
 def leads_up(begin, rate, half_bend, floor, ahead):
-    """Whether the first three coefficients show that c leaves tau = 0 upward: as `leading`, where c is positive beyond all noise."""
+    """Whether the first three coefficients show that c leaves tau = 0 upward: as `leading`, where c
+    is positive beyond all noise."""
     noise = _ERROR * max(begin, ahead * abs(rate), ahead * ahead * abs(half_bend))
     return max(floor, noise) < begin < math.inf
 
@@ -172,12 +201,15 @@ def contradiction(a, row, n, floor, ahead):
 def _order_of_zero(a, row, n, floor, ahead):
     """The index of the first coefficient of c that counts; n + 1 where there is none.
 
-    A coefficient counts as zero if it is rounding (below `floor`, see NOISE), alone or with the noise before it, or if the sign turns
-    within an INSTANT. So a guard that has just fired, and is zero by construction, does not fire again.
+    A coefficient counts as zero if it is rounding (below `floor`, see NOISE), alone or with the
+    noise before it, or if the sign turns within an INSTANT. So a guard that has just fired, and is
+    zero by construction, does not fire again.
     """
     noise = floor
     scale = _ERROR
-    for k in range(min(n, 2) + 1):  # later terms may grow without bound where friction nearly jams the pivot (Painleve)
+    for k in range(
+        min(n, 2) + 1
+    ):  # later terms may grow without bound where friction nearly jams the pivot (Painleve)
         noise = max(noise, abs(a[row, k]) * scale)
         scale *= ahead
     scale = 1.0
@@ -186,7 +218,9 @@ def _order_of_zero(a, row, n, floor, ahead):
         total += a[row, k] * scale
         if abs(a[row, k]) * scale > noise and math.copysign(total, total * a[row, k]) > noise:
             soon = a[row, k] + (k + 1) * a[row, k + 1] * INSTANT if k < n else a[row, k]
-            turns = a[row, k] * soon < 0.0 and (k > 1 or soon > 0.0)  # a gap that a rebound opens ends in an impact, however soon
+            turns = a[row, k] * soon < 0.0 and (
+                k > 1 or soon > 0.0
+            )  # a gap that a rebound opens ends in an impact, however soon
             if not turns:
                 return k
         scale *= ahead
@@ -195,11 +229,13 @@ def _order_of_zero(a, row, n, floor, ahead):
 
 @called_kernel
 def first_root(a, row, n, h, until, floor, ahead, stack):
-    """The first tau in [0, h] at which c turns negative, or NO_ROOT; where that is after `until`, either.
+    """The first tau in [0, h] at which c turns negative, or NO_ROOT; where that is after `until`,
+    either.
 
-    A zero at tau = 0 (within `floor`) is divided out: 0.0 comes back only where c leaves it downward. `stack` is scratch of shape
-    (>= 48, WIDTH). The search is complete: an interval is dropped only where a bound on the polynomial, or on its
-    slope and end value, shows that it holds no root. Touching zero without crossing is no root.
+    A zero at tau = 0 (within `floor`) is divided out: 0.0 comes back only where c leaves it
+    downward. `stack` is scratch of shape (>= 48, WIDTH). The search is complete: an interval is
+    dropped only where a bound on the polynomial, or on its slope and end value, shows that it holds
+    no root. Touching zero without crossing is no root.
     """
     if a[row, 0] > floor:
         low, high = halves(a, row, n)
@@ -225,7 +261,8 @@ def first_root(a, row, n, h, until, floor, ahead, stack):
 
 @inner_kernel
 def _isolate(stack, n):
-    """First root on [0, 1] of the polynomial in stack[0], positive at 0; halves intervals, left ones first. NaN if it is not finite.
+    """First root on [0, 1] of the polynomial in stack[0], positive at 0; halves intervals, left
+    ones first. NaN if it is not finite.
 
     Below the top, the stack holds left halves whose right halves are still to be looked at.
     """
@@ -267,16 +304,23 @@ def _isolate(stack, n):
 
 @inner_kernel
 def _falling_root(stack, row, n, end):
-    """The root in [0, 1] of a polynomial that falls from positive to `end` <= 0: Newton from a parabola's, kept inside its bracket.
+    """The root in [0, 1] of a polynomial that falls from positive to `end` <= 0: Newton from a
+    parabola's, kept inside its bracket.
 
-    It ends where the step after the next one, if they go on shrinking quadratically, would be below rounding.
+    It ends where the step after the next one, if they go on shrinking quadratically, would be below
+    rounding.
     """
     low, high = halves(stack, row, n)
     low_slope = upto(load(stack, row, 1), n - 1) * (ramp() + 1.0)
     high_slope = upto(load(stack, row, LANES + 1), n - 1 - LANES) * (ramp() + 9.0)
     a, b = 0.0, 1.0
     begin, fall = stack[row, 0], -stack[row, 1]
-    z = min(2.0 * begin / (fall + math.sqrt(max(fall * fall - 4.0 * begin * (end - begin + fall), 0.0))), 1.0)
+    z = min(
+        2.0
+        * begin
+        / (fall + math.sqrt(max(fall * fall - 4.0 * begin * (end - begin + fall), 0.0))),
+        1.0,
+    )
     last = 0.0
     for _ in range(100):
         terms, far = powers(z), eighth(z)

@@ -1,4 +1,5 @@
-"""What `.plot()` draws. Imports matplotlib, and is therefore imported only where something is drawn."""
+"""What `.plot()` draws. Imports matplotlib, and is therefore imported only where something is
+drawn."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ TRACKS = {"wall impact": "v", "floor impact": "^", "slip": "_", "landing": "x", 
 
 
 class NotebookFigure(Figure):
-    """A matplotlib figure that a notebook shows without a display and without pyplot, which would keep it for ever."""
+    """A matplotlib figure that a notebook shows without a display and without pyplot, which would
+    keep it for ever."""
 
     def _repr_png_(self) -> bytes:
         png = io.BytesIO()
@@ -42,9 +44,13 @@ def scene_figure(scene: Scene) -> Figure:
     sketch, base = figure.subplots(1, 2, width_ratios=(1, 2))
     draw_block(sketch, scene)
     time = np.linspace(0.0, scene.duration, 2001)
-    base.plot(time, scene.excitation.acceleration(time), color=INK, linewidth=0.8, label="horizontal")
+    base.plot(
+        time, scene.excitation.acceleration(time), color=INK, linewidth=0.8, label="horizontal"
+    )
     if scene.vertical.kind != "rest":
-        base.plot(time, scene.vertical.acceleration(time), color=ACCENT, linewidth=0.8, label="vertical")
+        base.plot(
+            time, scene.vertical.acceleration(time), color=ACCENT, linewidth=0.8, label="vertical"
+        )
         base.legend(frameon=False)
     base.set(xlabel="t, s", ylabel="acceleration of the base, m/s²", title=scene.name)
     base.grid(color=SHADE, linewidth=0.5)
@@ -67,7 +73,12 @@ def draw_block(axes: Any, scene: Scene) -> None:
         place = block.half_width + wall.gap
         left = -place - thick if wall.side == "left" else place
         axes.add_patch(Rectangle((left, 0.0), thick, 2.4 * block.half_height, facecolor=INK))
-    axes.set(xlim=(-reach, reach), ylim=(-0.1 * block.half_height, 2.4 * block.half_height), aspect="equal", xlabel="m")
+    axes.set(
+        xlim=(-reach, reach),
+        ylim=(-0.1 * block.half_height, 2.4 * block.half_height),
+        aspect="equal",
+        xlabel="m",
+    )
     axes.tick_params(labelsize="small")
 
 
@@ -92,8 +103,16 @@ def rotation_lines(axes: Any, histories: list[History], colours: list[str]) -> N
     known = all(history.alpha is not None for history in histories)
     for history, colour in zip(histories, colours, strict=True):
         unit = (history.alpha if known else None) or 1.0
-        axes.plot(history.channels["t"], history.channels["theta"] / unit, color=colour, linewidth=0.9, label=history.model)
-    if known and any(history.overturned_at is not None for history in histories):  # beyond the balance point it only falls
+        axes.plot(
+            history.channels["t"],
+            history.channels["theta"] / unit,
+            color=colour,
+            linewidth=0.9,
+            label=history.model,
+        )
+    if known and any(
+        history.overturned_at is not None for history in histories
+    ):  # beyond the balance point it only falls
         low, high = axes.get_ylim()
         axes.set_ylim(max(low, -FALLEN), min(high, FALLEN))
     axes.set_ylabel("θ / α" if known else "θ, rad")
@@ -111,7 +130,8 @@ def _tracks(axes: Any, history: History) -> None:
 
 
 def discrepancy_figure(found: Discrepancy) -> Figure:
-    """Rotation of both histories, and their difference over the time that was compared. Raises `InputError` where they were not kept."""
+    """Rotation of both histories, and their difference over the time that was compared. Raises
+    `InputError` where they were not kept."""
     if found.histories is None:
         raise InputError("this comparison has not kept its histories")
     reference, candidate = found.histories
@@ -131,16 +151,24 @@ def discrepancy_figure(found: Discrepancy) -> Figure:
 
 
 def recordings_figure(recordings: list[tuple[str, Recording]]) -> Figure:
-    """Acceleration (g) and velocity (m/s) of each recording over time, and its spectral acceleration at 5 % damping."""
+    """Acceleration (g) and velocity (m/s) of each recording over time, and its spectral
+    acceleration at 5 % damping."""
     figure = new_figure(9.0, 1.9 * len(recordings) + 0.4)
     for (name, record), (acceleration, velocity, spectrum) in zip(
-        recordings, figure.subplots(len(recordings), 3, squeeze=False, width_ratios=(3, 3, 2)), strict=True
+        recordings,
+        figure.subplots(len(recordings), 3, squeeze=False, width_ratios=(3, 3, 2)),
+        strict=True,
     ):
         time = record.time_step * np.arange(len(record.samples))
         acceleration.plot(time, record.samples / GRAVITY_OF_RECORDS, color=INK, linewidth=0.6)
         velocity.plot(time, intensity.velocity(record), color=ACCENT, linewidth=0.8)
         periods = np.geomspace(intensity.PERIODS[0], intensity.PERIODS[-1], 40)
-        spectrum.plot(periods, [intensity.spectral_acceleration(record, float(period)) for period in periods], color=INK, linewidth=0.9)
+        spectrum.plot(
+            periods,
+            [intensity.spectral_acceleration(record, float(period)) for period in periods],
+            color=INK,
+            linewidth=0.9,
+        )
         acceleration.set_title(name.replace("$", "\\$"), loc="left", fontsize=8)
         for axes, label, below in (
             (acceleration, "acceleration, g", "time, s"),

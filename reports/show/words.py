@@ -1,4 +1,5 @@
-"""How scenes, histories and whatever else holds figures show themselves in a notebook: escaped HTML, and a few words."""
+"""How scenes, histories and whatever else holds figures show themselves in a notebook: escaped
+HTML, and a few words."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number for people: a few digits, a true minus sign, powers of ten where it is very large or small."""
+    """A number for people: a few digits, a true minus sign, powers of ten where it is very large or
+    small."""
     if value is None:
         return "–"
     text = f"{value:.{digits}g}"
@@ -32,7 +34,10 @@ def html_table(caption: str, rows: Iterable[Sequence[object]], head: Sequence[ob
 
     def line(row: Sequence[object], first: str, other: str) -> str:
         tags = [first, *[other] * (len(row) - 1)]
-        texts = (f'<{tag} style="text-align: left">{escape(inert(str(cell)))}</{tag[:2]}>' for cell, tag in zip(row, tags, strict=True))
+        texts = (
+            f'<{tag} style="text-align: left">{escape(inert(str(cell)))}</{tag[:2]}>'
+            for cell, tag in zip(row, tags, strict=True)
+        )
         return f"<tr>{''.join(texts)}</tr>"
 
     column, row_name = 'th scope="col"', 'th scope="row"'
@@ -61,15 +66,25 @@ def scene_facts(scene: Scene) -> list[tuple[str, str]]:
         floor += f" (static {number(scene.floor.mu_s)})"
     if scene.floor.restitution:
         floor += f", restitution {number(scene.floor.restitution)}"
-    walls = ", ".join(f"{wall.side}, gap {number(1e3 * wall.gap)} mm, restitution {number(wall.restitution)}" for wall in scene.walls)
+    walls = ", ".join(
+        f"{wall.side}, gap {number(1e3 * wall.gap)} mm, restitution {number(wall.restitution)}"
+        for wall in scene.walls
+    )
     facts = [
-        ("block", f"{number(2 * block.half_width, 4)} m × {number(2 * block.half_height, 4)} m, α = {number(block.alpha)} rad"),
+        (
+            "block",
+            f"{number(2 * block.half_width, 4)} m × {number(2 * block.half_height, 4)} m, α ="
+            f" {number(block.alpha)} rad",
+        ),
         *mass_facts(block),
         ("p", f"{number(scene.frequency_parameter)} rad/s"),
         ("floor", floor),
         ("wall" if len(scene.walls) < 2 else "walls", walls or "none"),
         ("base", excitation_words(scene.excitation)),
-        ("duration", f"{number(scene.duration)} s, a row each {number(1e3 * scene.output_step)} ms"),
+        (
+            "duration",
+            f"{number(scene.duration)} s, a row each {number(1e3 * scene.output_step)} ms",
+        ),
     ]
     if scene.vertical.kind != "rest":
         facts.insert(5, ("vertical", excitation_words(scene.vertical)))
@@ -94,8 +109,15 @@ def mass_facts(block: Block) -> list[tuple[str, str]]:
 def history_facts(history: History) -> list[tuple[str, str]]:
     """A history in a few words: outcome, peak, impacts, time, cost, notes."""
     time, alpha = history.channels["t"], history.alpha
-    peak = f"{number(history.peak_rotation)} rad" if alpha is None else f"{number(history.peak_rotation / alpha)} α"
-    impacts = {kind: sum(event.kind == kind for event in history.event_list) for kind in ("floor impact", "wall impact")}
+    peak = (
+        f"{number(history.peak_rotation)} rad"
+        if alpha is None
+        else f"{number(history.peak_rotation / alpha)} α"
+    )
+    impacts = {
+        kind: sum(event.kind == kind for event in history.event_list)
+        for kind in ("floor impact", "wall impact")
+    }
     facts = [
         ("outcome", history.fate),
         *([("peak rotation", peak)] if history.overturned_at is None else []),
@@ -103,9 +125,13 @@ def history_facts(history: History) -> list[tuple[str, str]]:
         ("time", f"{number(float(time[0]))} to {number(float(time[-1]), 4)} s, {len(time)} rows"),
     ]
     if history.settings:
-        facts.append(("settings", ", ".join(f"{key} {value}" for key, value in history.settings.items())))
+        facts.append(
+            ("settings", ", ".join(f"{key} {value}" for key, value in history.settings.items()))
+        )
     if history.cost.steps:
-        facts.append(("cost", f"{number(1e3 * history.cost.wall_seconds)} ms, {history.cost.steps} steps"))
+        facts.append(
+            ("cost", f"{number(1e3 * history.cost.wall_seconds)} ms, {history.cost.steps} steps")
+        )
     return facts + [("note", note) for note in history.notes]
 
 
@@ -123,13 +149,23 @@ def discrepancy_html(found: Discrepancy) -> str:
     """A comparison as a notebook shows it."""
     rows = [(f.label, number(f.value), f.unit, f.note) for f in found.figures]
     caption = f"{found.candidate} against {found.reference}, {found.start:g} to {found.end:g} s"
-    return html_table(f"{caption}; not the whole time: {found.gap}" if found.gap else caption, rows, ("measure", "value", "unit", ""))
+    return html_table(
+        f"{caption}; not the whole time: {found.gap}" if found.gap else caption,
+        rows,
+        ("measure", "value", "unit", ""),
+    )
 
 
 def spectrum_html(spectrum: Spectrum) -> str:
     """A spectrum as a notebook shows it."""
-    shares = (f"{number(100.0 * float(np.mean(spectrum.outcomes == side)))} %" for side in (SAFE, LEFT, RIGHT))
+    shares = (
+        f"{number(100.0 * float(np.mean(spectrum.outcomes == side)))} %"
+        for side in (SAFE, LEFT, RIGHT)
+    )
     facts = [*zip(("safe", "overturned left", "overturned right"), shares, strict=True)]
-    facts += [("nodes", f"{spectrum.outcomes.size}, from {spectrum.evaluations} runs"), ("undecided", str(len(spectrum.undecided)))]
+    facts += [
+        ("nodes", f"{spectrum.outcomes.size}, from {spectrum.evaluations} runs"),
+        ("undecided", str(len(spectrum.undecided))),
+    ]
     about = scene_facts(spectrum.scene)[: 4 + len(mass_facts(spectrum.scene.block))]
     return html_table(f"Overturning spectrum: {spectrum.scene.name}", [*facts, *about])

@@ -1,1 +1,1 @@
-"""Pages and figures of the studies: benchmark, convergence, spectra, stress."""
+"""Pages and figures of the studies: benchmark, convergence, spectra."""

@@ -11,7 +11,8 @@ from rockcheck.validation.execute.study import Study
 
 
 def write_study(found: Study, folder: Path, template: str, **context: Any) -> Path:
-    """Writes `index.html` from a template that extends `study.html`; returns it. A report in the folder above is linked."""
+    """Writes `index.html` from a template that extends `study.html`; returns it. A report in the
+    folder above is linked."""
     above = (("Report", "../index.html"),) if (folder.parent / "index.html").exists() else ()
     site = Site(folder, f"rockcheck: {found.suite}", above)
     site.assets()

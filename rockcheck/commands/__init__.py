@@ -1,4 +1,5 @@
-"""The commands of `rockcheck`, a module each, and what they share: options, tables on stdout, progress on stderr, JSON."""
+"""The commands of `rockcheck`, a module each, and what they share: options, tables on stdout,
+progress on stderr, JSON."""
 
 from __future__ import annotations
 
@@ -17,7 +18,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 from rockcheck.scenes import History, InputError, named_scenes
 from rockcheck.scenes.errors import inert, printable
@@ -40,13 +48,23 @@ def out_option(page: str = "index.html") -> Any:
 
 
 OutOption = Annotated[Path, out_option()]
-JobsOption = Annotated[int | None, typer.Option("--jobs", min=1, help="Worker processes (default: one a core).")]
+JobsOption = Annotated[
+    int | None, typer.Option("--jobs", min=1, help="Worker processes (default: one a core).")
+]
 SchedulerOption = Annotated[
-    str | None, typer.Option("--scheduler", help="Run on a Dask cluster instead: its address, or local:N for N local workers.")
+    str | None,
+    typer.Option(
+        "--scheduler",
+        help="Run on a Dask cluster instead: its address, or local:N for N local workers.",
+    ),
 ]
 AllowCodeOption = Annotated[
     list[str] | None,
-    typer.Option("--allow-code", metavar="MODULE:CLASS", help="A model of your own that may be run: its code is imported; repeatable."),
+    typer.Option(
+        "--allow-code",
+        metavar="MODULE:CLASS",
+        help="A model of your own that may be run: its code is imported; repeatable.",
+    ),
 ]
 
 PlotOption = Annotated[Path | None, typer.Option("--plot", metavar="FILE.png", help="PNG to draw.")]
@@ -60,7 +78,9 @@ _voice: ContextVar[Voice] = ContextVar("voice", default="tables")
 def speaking(voice: Voice) -> Iterator[None]:
     """Within this block commands speak like that."""
     token = _voice.set(voice)
-    say = (lambda words: print(f"rockcheck: {words}", file=sys.stderr)) if voice == "tables" else None
+    say = (
+        (lambda words: print(f"rockcheck: {words}", file=sys.stderr)) if voice == "tables" else None
+    )
     try:
         with announcing(say):
             yield
@@ -84,7 +104,8 @@ def begun(when: float) -> Iterator[None]:
 
 @contextmanager
 def total_told() -> Iterator[None]:
-    """A last line says how long the command took in all, whatever its verdict: its user waits for more than the simulations."""
+    """A last line says how long the command took in all, whatever its verdict: its user waits for
+    more than the simulations."""
     began = _began.get() or time.perf_counter()
     try:
         yield
@@ -99,14 +120,16 @@ def _tell_total(began: float) -> None:
 
 
 class _Screen(Console):
-    """A console whose text steers no terminal: paths, and names in files that somebody sent, may hold any characters."""
+    """A console whose text steers no terminal: paths, and names in files that somebody sent, may
+    hold any characters."""
 
     def print(self, *objects: Any, **options: Any) -> None:
         super().print(*(inert(one) if isinstance(one, str) else one for one in objects), **options)
 
 
 def console() -> Console:
-    """Where tables go: stdout, at most as wide as the terminal, 80 columns where there is none; coloured on a terminal only."""
+    """Where tables go: stdout, at most as wide as the terminal, 80 columns where there is none;
+    coloured on a terminal only."""
     return _Screen(markup=False, highlight=False, quiet=_voice.get() != "tables")
 
 
@@ -126,7 +149,8 @@ def tell_notes(history: History, of: str = "") -> None:
 
 
 def tell_left_out(names: Sequence[str], hint: str = "") -> None:
-    """Names what of a set of records is not played: vertical components (`hint`: what plays them), and files that are no records."""
+    """Names what of a set of records is not played: vertical components (`hint`: what plays them),
+    and files that are no records."""
     vertical = [name for name in names if not isinstance(name, Odd)]
     said = f"vertical; {hint}" if hint else "vertical"
     lines = [f"{', '.join(vertical)} ({said})"] if vertical else []
@@ -135,14 +159,16 @@ def tell_left_out(names: Sequence[str], hint: str = "") -> None:
 
 
 def answer(value: Any) -> None:
-    """The command's result as JSON on stdout, where `--json` asks for it; numbers that are not finite become null."""
+    """The command's result as JSON on stdout, where `--json` asks for it; numbers that are not
+    finite become null."""
     if _voice.get() == "json":
         print(json_text(value))
 
 
 @contextmanager
 def progress(title: str) -> Iterator[OnProgress]:
-    """How far the work is and the time left, on stderr: a bar on a terminal, elsewhere lines; nothing where a command is quiet."""
+    """How far the work is and the time left, on stderr: a bar on a terminal, elsewhere lines;
+    nothing where a command is quiet."""
     screen = Console(stderr=True)
     if _voice.get() == "tables" and screen.is_terminal:
         with _bar(title, screen) as on_progress:
@@ -157,16 +183,20 @@ def progress(title: str) -> Iterator[OnProgress]:
         over.set()
 
 
-#: Between two lines on a long work, s; and when the first one comes, if the work will then last longer than that.
+#: Between two lines on a long work, s; and when the first one comes, if the work will then last
+#: longer than that.
 EVERY, EARLY = 10.0, 2.0
 
 
 class _Lines:
-    """Lines on how far the work is, for a log or whoever reads no terminal; none on a work of a few seconds."""
+    """Lines on how far the work is, for a log or whoever reads no terminal; none on a work of a few
+    seconds."""
 
     def __init__(self, title: str) -> None:
         self.title, self.began = title, time.monotonic()
-        self.first: tuple[float, float] | None = None  # when something was told for the first time, and how much was done then
+        self.first: tuple[float, float] | None = (
+            None  # when something was told for the first time, and how much was done then
+        )
         self.done, self.total, self.what = 0.0, 0.0, ""
 
     def on_progress(self, done: float, total: float, what: str = "") -> None:
@@ -178,7 +208,9 @@ class _Lines:
         """Expected time left, s; infinite where nothing is done yet."""
         when, before = self.first or (0.0, self.done)
         gone = self.done - before
-        return (time.monotonic() - when) * (self.total - self.done) / gone if gone > 0.0 else math.inf
+        return (
+            (time.monotonic() - when) * (self.total - self.done) / gone if gone > 0.0 else math.inf
+        )
 
     def watch(self, over: threading.Event) -> None:
         """Writes the lines until it is `over`."""
@@ -190,7 +222,9 @@ class _Lines:
     def say(self) -> None:
         """Writes one line."""
         left = self.left()
-        seconds, words = (left, "left") if left < math.inf else (time.monotonic() - self.began, "so far")
+        seconds, words = (
+            (left, "left") if left < math.inf else (time.monotonic() - self.began, "so far")
+        )
         parts = f"{self.done:.0f} of {self.total:.0f}, " if self.total else ""
         what = f" ({printable(self.what, 60)})" if self.what else ""
         told = f"{self.title}: {parts}{int(seconds) // 60}:{int(seconds) % 60:02d} {words}{what}"
@@ -213,7 +247,12 @@ def _bar(title: str, screen: Console) -> Iterator[OnProgress]:
         task = bar.add_task(title, total=None)
 
         def on_progress(done: float, total: float, what: str = "") -> None:
-            bar.update(task, completed=done, total=total, description=f"{title}: {printable(what, 24)}" if what else title)
+            bar.update(
+                task,
+                completed=done,
+                total=total,
+                description=f"{title}: {printable(what, 24)}" if what else title,
+            )
 
         yield on_progress
 
@@ -272,7 +311,8 @@ def save_picture(figure: Figure, path: Path) -> None:
 
 
 def report_file(text: str) -> str:
-    """Write a traceback into a file that only the user can read; returns its path, "" where that cannot be done."""
+    """Write a traceback into a file that only the user can read; returns its path, "" where that
+    cannot be done."""
     try:
         handle, path = tempfile.mkstemp(prefix="rockcheck-fault-", suffix=".txt")
         with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as stream:
@@ -283,12 +323,15 @@ def report_file(text: str) -> str:
 
 
 def usable_folder(folder: Path, *parts: str) -> Path:
-    """A folder, or one within it, made if need be; raises `InputError` where it cannot be written, or lies behind a link in `folder`."""
+    """A folder, or one within it, made if need be; raises `InputError` where it cannot be written,
+    or lies behind a link in `folder`."""
     path = folder.joinpath(*parts)
     try:
         made(folder, *parts)
     except OSError as error:
-        raise InputError(f"{printable(path)}: cannot be used as a folder: {error.strerror}") from None
+        raise InputError(
+            f"{printable(path)}: cannot be used as a folder: {error.strerror}"
+        ) from None
     if not os.access(path, os.W_OK | os.X_OK):
         raise InputError(f"{printable(path)}: not writable")
     return path

@@ -6,7 +6,17 @@ from typing import Annotated
 
 import typer
 
-from rockcheck.commands import OUT, AllowCodeOption, JobsOption, OutOption, SchedulerOption, answer, console, tell_left_out, usable_folder
+from rockcheck.commands import (
+    OUT,
+    AllowCodeOption,
+    JobsOption,
+    OutOption,
+    SchedulerOption,
+    answer,
+    console,
+    tell_left_out,
+    usable_folder,
+)
 from rockcheck.commands.validate import SuiteArgument, play, tell_faults
 from rockcheck.validation.suite.acceptance import accept
 from rockcheck.validation.suite.suites import load_suite
@@ -15,12 +25,18 @@ from rockcheck.validation.suite.suites import load_suite
 def run(
     suite: SuiteArgument = None,
     reason: Annotated[
-        str | None, typer.Option("--reason", help="Why limits are loosened or figures moved; it is written into the file.")
+        str | None,
+        typer.Option(
+            "--reason",
+            help="Why limits are loosened or figures moved; it is written into the file.",
+        ),
     ] = None,
     out: OutOption = OUT,
     jobs: JobsOption = None,
     scheduler: SchedulerOption = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Show the changes, write none.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Show the changes, write none.")
+    ] = False,
     allow_code: AllowCodeOption = None,
 ) -> None:
     """Make today's figures the expected ones.
@@ -41,7 +57,14 @@ def run(
     screen.print(f"{len(changes)} changes {done} {finished.tolerances_file}", soft_wrap=True)
     for line in refused:
         screen.print(f"not accepted: {line}", style="red", soft_wrap=True)
-    answer({"changes": changes, "refused": refused, "file": finished.tolerances_file, "written": not dry_run})
+    answer(
+        {
+            "changes": changes,
+            "refused": refused,
+            "file": finished.tolerances_file,
+            "written": not dry_run,
+        }
+    )
     tell_faults(finished, folder)
     failed = finished.exit_code if finished.verdict == "error" else 0
     raise typer.Exit(failed or int(bool(refused)))

@@ -11,7 +11,10 @@ from rockcheck.scenes.errors import unknown_name
 
 WhatArgument = Annotated[
     str,
-    typer.Argument(metavar="[WHAT]", help="all, ebm (batches), models (work and precision), skipping, or convergence."),
+    typer.Argument(
+        metavar="[WHAT]",
+        help="all, ebm (batches), models (work and precision), skipping, or convergence.",
+    ),
 ]
 
 
@@ -20,7 +23,9 @@ def run(
     out: OutOption = OUT / "benchmark",
     quick: Annotated[bool, typer.Option("--quick", help="Fewer scenes and settings.")] = False,
     jobs: JobsOption = None,
-    minutes: Annotated[float, typer.Option("--minutes", min=0.1, help="Start nothing later than this.")] = 25.0,
+    minutes: Annotated[
+        float, typer.Option("--minutes", min=0.1, help="Start nothing later than this.")
+    ] = 25.0,
 ) -> None:
     """Run time against error, for every model.
 

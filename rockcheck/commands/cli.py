@@ -1,4 +1,5 @@
-"""The command `rockcheck`: one module a command under rockcheck.commands; here they meet, and errors become one line."""
+"""The command `rockcheck`: one module a command under rockcheck.commands; here they meet, and
+errors become one line."""
 
 from __future__ import annotations
 
@@ -24,14 +25,21 @@ from rockcheck.scenes import InputError, ModelFailure
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.suite.results import FAULT
 
-#: The commands, in the order of the help: where each has its function `run` below this package, and an example.
+#: The commands, in the order of the help: where each has its function `run` below this package, and
+#: an example.
 COMMANDS = {
     "scenes": ("scenes", "rockcheck scenes"),
     "new": ("new", "rockcheck new bookcase.toml"),
     "record": ("record", "rockcheck record station.V2 --read component=1 --plot station.png"),
-    "simulate": ("simulate", "rockcheck simulate fig5a --model mujoco --set time_step=1e-3 -o mujoco.csv"),
+    "simulate": (
+        "simulate",
+        "rockcheck simulate fig5a --model mujoco --set time_step=1e-3 -o mujoco.csv",
+    ),
     "compare": ("compare", "rockcheck compare ebm.csv mujoco.csv --until 8"),
-    "uncertainty": ("uncertainty", "rockcheck uncertainty fig5a --model mujoco --set time_step=1e-3"),
+    "uncertainty": (
+        "uncertainty",
+        "rockcheck uncertainty fig5a --model mujoco --set time_step=1e-3",
+    ),
     "validate": ("validate", "rockcheck validate smoke --out rockcheck-report"),
     "accept": ("accept", 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"'),
     "spectrum": ("spectrum", "rockcheck spectrum fig8 --size 50 --refine"),
@@ -71,15 +79,23 @@ EXIT_CODES = {
     INTERRUPTED: "interrupted by Ctrl-C",
 }
 
-QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only; the exit code is the answer.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="The result as JSON on stdout, instead of tables.")]
+QuietOption = Annotated[
+    bool, typer.Option("--quiet", "-q", help="Print errors only; the exit code is the answer.")
+]
+JsonOption = Annotated[
+    bool, typer.Option("--json", help="The result as JSON on stdout, instead of tables.")
+]
 
 
 def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
-    """A command with the options that all of them have, --quiet and --json; one that is `timed` says how long it took."""
+    """A command with the options that all of them have, --quiet and --json; one that is `timed`
+    says how long it took."""
 
     def command(*, quiet: bool, as_json: bool, **arguments: Any) -> None:
-        with speaking("json" if as_json else "quiet" if quiet else "tables"), total_told() if timed else contextlib.nullcontext():
+        with (
+            speaking("json" if as_json else "quiet" if quiet else "tables"),
+            total_told() if timed else contextlib.nullcontext(),
+        ):
             does(**arguments)
 
     signature = inspect.signature(does, eval_str=True)
@@ -89,7 +105,10 @@ def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
     ]
     command.__doc__ = does.__doc__
     command.__signature__ = signature.replace(parameters=[*signature.parameters.values(), *common])  # type: ignore[attr-defined]
-    command.__annotations__ = {parameter.name: parameter.annotation for parameter in (*signature.parameters.values(), *common)}
+    command.__annotations__ = {
+        parameter.name: parameter.annotation
+        for parameter in (*signature.parameters.values(), *common)
+    }
     return command
 
 
@@ -100,7 +119,8 @@ def _with_value(word: str, after: str) -> str:
 
 
 class _EachOnce(typer.core.TyperCommand):
-    """A command whose options may be given once, but for those that gather several values: the last would silently win.
+    """A command whose options may be given once, but for those that gather several values: the last
+    would silently win.
 
     An option of `BARE` may be given without its value.
     """
@@ -110,14 +130,17 @@ class _EachOnce(typer.core.TyperCommand):
             args = [_with_value(*pair) for pair in itertools.pairwise([*args, ""])]
         _, _, order = self.make_parser(ctx).parse_args(args=list(args))
         for option in order:
-            single = isinstance(option, typer.core.TyperOption) and not (option.multiple or option.is_flag or option.count)
+            single = isinstance(option, typer.core.TyperOption) and not (
+                option.multiple or option.is_flag or option.count
+            )
             if single and sum(one is option for one in order) > 1:
                 raise InputError("is given twice: give one value", option.opts[-1])
         return super().parse_args(ctx, args)
 
 
 class _Loaded(Mapping[str, Any]):
-    """The commands by name. Only that which is asked for is imported: half of them need the compiler, or what draws."""
+    """The commands by name. Only that which is asked for is imported: half of them need the
+    compiler, or what draws."""
 
     def __getitem__(self, name: str) -> Any:
         return _loaded(name)
@@ -134,7 +157,9 @@ def _loaded(name: str) -> Any:
     module, example = COMMANDS[name]
     does = importlib.import_module(f"rockcheck.commands.{module}").run
     alone = typer.Typer(rich_markup_mode=None, add_completion=False)
-    alone.command(name=name, cls=_EachOnce, epilog=f"Example: {example}")(spoken(does, timed=name not in AT_ONCE))
+    alone.command(name=name, cls=_EachOnce, epilog=f"Example: {example}")(
+        spoken(does, timed=name not in AT_ONCE)
+    )
     return typer.main.get_command(alone)
 
 
@@ -157,7 +182,8 @@ app = typer.Typer(
     cls=_Commands,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
-    epilog="\b\nExit codes:\n" + "\n".join(f"{code:5}  {meaning}" for code, meaning in EXIT_CODES.items()),
+    epilog="\b\nExit codes:\n"
+    + "\n".join(f"{code:5}  {meaning}" for code, meaning in EXIT_CODES.items()),
 )
 
 
@@ -169,37 +195,66 @@ def _version(asked: bool) -> None:
 
 @app.callback()
 def common(
-    _: Annotated[bool, typer.Option("--version", is_eager=True, callback=_version, help="Show the version and exit.")] = False,
+    _: Annotated[
+        bool,
+        typer.Option(
+            "--version", is_eager=True, callback=_version, help="Show the version and exit."
+        ),
+    ] = False,
 ) -> None:
-    """Simulate a rigid block on a shaking floor with several models, compare them, and judge them against tolerances."""
+    """Simulate a rigid block on a shaking floor with several models, compare them, and judge them
+    against tolerances."""
 
 
 def main(arguments: Sequence[str] | None = None, *, began: float | None = None) -> int:
-    """Run the command line; returns the exit code, one of `EXIT_CODES`. The program `began` then (of `time.perf_counter`; None: now)."""
+    """Run the command line; returns the exit code, one of `EXIT_CODES`. The program `began` then
+    (of `time.perf_counter`; None: now)."""
     with _readers_may_go(), begun(time.perf_counter() if began is None else began):
         try:
-            code = app(args=list(sys.argv[1:] if arguments is None else arguments), prog_name="rockcheck", standalone_mode=False)
+            code = app(
+                args=list(sys.argv[1:] if arguments is None else arguments),
+                prog_name="rockcheck",
+                standalone_mode=False,
+            )
         except (typer.TyperException, InputError) as error:
-            return _told(error.format_message() if isinstance(error, typer.TyperException) else str(error), 2)
+            return _told(
+                error.format_message() if isinstance(error, typer.TyperException) else str(error), 2
+            )
         except ModelFailure as error:
             return _told(str(error), 3)
         except (KeyboardInterrupt, typer.Abort):
             return _told("interrupted; what was finished is kept", INTERRUPTED)
-        except OSError as error:  # a disk that is full, a folder that has gone: what was written before is whole
-            return _told(f"{printable(Path(os.fsdecode(error.filename or 'output')))}: cannot be used: {error.strerror or error}", 2)
+        except (
+            OSError
+        ) as error:  # a disk that is full, a folder that has gone: what was written before is whole
+            return _told(
+                f"{printable(Path(os.fsdecode(error.filename or 'output')))}: cannot be used:"
+                f" {error.strerror or error}",
+                2,
+            )
         except MemoryError:
             return _told("out of memory; what was finished is kept", 3)
         except Exception as error:
-            trace = "".join([f"rockcheck {version('rockcheck')}, Python {sys.version}\n", *traceback.format_exception(error)])
+            trace = "".join(
+                [
+                    f"rockcheck {version('rockcheck')}, Python {sys.version}\n",
+                    *traceback.format_exception(error),
+                ]
+            )
             where = report_file(trace) or f"this: {error}"
-            return _told(f"a fault of rockcheck itself, {type(error).__name__}: please report it with {where}", FAULT)
+            return _told(
+                f"a fault of rockcheck itself, {type(error).__name__}: please report it with"
+                f" {where}",
+                FAULT,
+            )
         if code == INTERRUPTED:  # Typer has caught it
             return _told("interrupted; what was finished is kept", INTERRUPTED)
         return code if isinstance(code, int) else 0
 
 
 class _Pipe:
-    """A text stream whose reader may go, as that of `rockcheck scenes | head -1` does: the rest is then written to nobody."""
+    """A text stream whose reader may go, as that of `rockcheck scenes | head -1` does: the rest is
+    then written to nobody."""
 
     def __init__(self, stream: Any) -> None:
         self._stream = stream

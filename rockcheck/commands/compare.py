@@ -8,7 +8,16 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from rockcheck.commands import PlotOption, answer, check_picture, console, save_picture, scene_names, tell_notes, told
+from rockcheck.commands import (
+    PlotOption,
+    answer,
+    check_picture,
+    console,
+    save_picture,
+    scene_names,
+    tell_notes,
+    told,
+)
 from rockcheck.scenes import load_scene
 from rockcheck.validation.discrepancy.compare import Discrepancy, compare
 from rockcheck.validation.discrepancy.figures import value_words
@@ -23,21 +32,50 @@ SHOWN = 20
 
 
 def run(
-    reference: Annotated[Path, typer.Argument(metavar="A", help="History of the reference, CSV; or a finished run's folder.")],
-    candidate: Annotated[Path, typer.Argument(metavar="B", help="History of the candidate, CSV; or a later run's folder.")],
-    offset: Annotated[float, typer.Option("--offset", help="Added to the candidate's times, s, to align a measured history.")] = 0.0,
-    align: Annotated[bool, typer.Option("--align", help="Shift the candidate in time to where the rotations agree best.")] = False,
-    until: Annotated[float | None, typer.Option("--until", help="End of the window, s (default: the whole common time).")] = None,
-    scene: Annotated[str | None, typer.Option("--scene", help="Scene of both: its block and gravity.", autocompletion=scene_names)] = None,
+    reference: Annotated[
+        Path,
+        typer.Argument(
+            metavar="A", help="History of the reference, CSV; or a finished run's folder."
+        ),
+    ],
+    candidate: Annotated[
+        Path,
+        typer.Argument(metavar="B", help="History of the candidate, CSV; or a later run's folder."),
+    ],
+    offset: Annotated[
+        float,
+        typer.Option(
+            "--offset", help="Added to the candidate's times, s, to align a measured history."
+        ),
+    ] = 0.0,
+    align: Annotated[
+        bool,
+        typer.Option(
+            "--align", help="Shift the candidate in time to where the rotations agree best."
+        ),
+    ] = False,
+    until: Annotated[
+        float | None,
+        typer.Option("--until", help="End of the window, s (default: the whole common time)."),
+    ] = None,
+    scene: Annotated[
+        str | None,
+        typer.Option(
+            "--scene", help="Scene of both: its block and gravity.", autocompletion=scene_names
+        ),
+    ] = None,
     plot: PlotOption = None,
-    everything: Annotated[bool, typer.Option("--all", help=f"Of two runs: all figures that moved, not only {SHOWN}.")] = False,
+    everything: Annotated[
+        bool, typer.Option("--all", help=f"Of two runs: all figures that moved, not only {SHOWN}.")
+    ] = False,
 ) -> None:
     """Compare two histories, or two finished runs.
 
-    Two folders: what changed between runs of a suite, or of `conformance`, exit 1 where a verdict or a cell changed.
+    Two folders: what changed between runs of a suite, or of `conformance`, exit 1 where a verdict
+    or a cell changed.
 
-    Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg, time_ms, x_mm, ...).
-    --plot draws both rotations and their difference.
+    Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg,
+    time_ms, x_mm, ...). --plot draws both rotations and their difference.
     """
     if reference.is_dir() or reference.suffix == ".json":
         from rockcheck.validation.studies.conformance import study
@@ -59,7 +97,12 @@ def run(
         table.add_column(name, justify=justify)  # type: ignore[arg-type]
     for figure in found.figures:
         yes_no = DIFFERENCES[figure.measure].yes_no
-        table.add_row(figure.label, value_words(figure.value, yes_no=yes_no), "" if yes_no else figure.unit, figure.note)
+        table.add_row(
+            figure.label,
+            value_words(figure.value, yes_no=yes_no),
+            "" if yes_no else figure.unit,
+            figure.note,
+        )
     out.print(f"{found.candidate} against {found.reference}, {found.start:g} to {found.end:g} s")
     out.print(table)
     if align:
@@ -80,35 +123,60 @@ def run(
             "gap": found.gap,
             "headline": headline(found),
             "notes": {"reference": given.notes, "candidate": other.notes},
-            "figures": [{"measure": f.measure, "value": f.value, "unit": f.unit, "note": f.note} for f in found.figures],
+            "figures": [
+                {"measure": f.measure, "value": f.value, "unit": f.unit, "note": f.note}
+                for f in found.figures
+            ],
         }
     )
 
 
 def headline(found: Discrepancy) -> str:
-    """The comparison in one sentence: whether the outcomes agree, and how far the rotations are apart."""
+    """The comparison in one sentence: whether the outcomes agree, and how far the rotations are
+    apart."""
     assert found.histories is not None
     reference, candidate = (history.fate for history in found.histories)
     same = found["outcome_agrees"] == 1.0
-    fate = f"same outcome, {candidate}" if same else f"outcomes differ, {candidate} against {reference}"
+    fate = (
+        f"same outcome, {candidate}"
+        if same
+        else f"outcomes differ, {candidate} against {reference}"
+    )
     rms = found.figure("theta_rms")
     apart = "" if rms.value is None else f"; rotations {rms.value:.3g} {rms.unit} apart (RMS)"
     return f"{fate}{apart}"
 
 
 def two_runs(before: Path, after: Path, *, everything: bool) -> None:
-    """What changed between two finished runs of a suite; exit 1 where a verdict or a cell changed."""
+    """What changed between two finished runs of a suite; exit 1 where a verdict or a cell
+    changed."""
     old, new = Run.load(before), Run.load(after)
     found = changes(old, new)
-    versions = {name: (old.versions.get(name), new.versions.get(name)) for name in sorted({*old.versions, *new.versions})}
+    versions = {
+        name: (old.versions.get(name), new.versions.get(name))
+        for name in sorted({*old.versions, *new.versions})
+    }
     versions = {name: pair for name, pair in versions.items() if pair[0] != pair[1]}
     screen = console()
-    counts = {what: sum(change.what == what for change in found) for what in ("verdict", "cell", "outcome", "figure")}
-    words = ", ".join(f"{count} {what}{'s' if count > 1 else ''}" for what, count in counts.items() if count)
-    screen.print(f"{old.suite}: {f'{words} changed' if words else 'nothing changed'}", style="bold", soft_wrap=True)
+    counts = {
+        what: sum(change.what == what for change in found)
+        for what in ("verdict", "cell", "outcome", "figure")
+    }
+    words = ", ".join(
+        f"{count} {what}{'s' if count > 1 else ''}" for what, count in counts.items() if count
+    )
+    screen.print(
+        f"{old.suite}: {f'{words} changed' if words else 'nothing changed'}",
+        style="bold",
+        soft_wrap=True,
+    )
     for name, (was, now) in versions.items():
         screen.print(f"{name} {was or 'absent'} -> {now or 'absent'}")
-    shown = found if everything else [change for change in found if change.what != "figure"] + _figures(found)[:SHOWN]
+    shown = (
+        found
+        if everything
+        else [change for change in found if change.what != "figure"] + _figures(found)[:SHOWN]
+    )
     if shown:
         screen.print(_table(shown))
     if len(found) > len(shown):
@@ -135,6 +203,11 @@ def _table(found: list[Change]) -> Table:
     for name in ("scene", "model", "what", "before", "after"):
         table.add_column(name, overflow="fold")
     for change in found:
-        values = (f"{value:.6g}" if isinstance(value, float) else value or "-" for value in (change.before, change.after))
-        table.add_row(change.scene or "the run", change.model, f"{change.what} {change.name}".strip(), *values)
+        values = (
+            f"{value:.6g}" if isinstance(value, float) else value or "-"
+            for value in (change.before, change.after)
+        )
+        table.add_row(
+            change.scene or "the run", change.model, f"{change.what} {change.name}".strip(), *values
+        )
     return table

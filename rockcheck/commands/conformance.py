@@ -16,10 +16,10 @@ from rockcheck.commands import (
     answer,
     console,
     model_names,
+    setting_of,
     studied,
     usable_folder,
 )
-from rockcheck.commands.simulate import setting_of
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable, unknown_name
 from rockcheck.scenes.writing import write_whole

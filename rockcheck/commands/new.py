@@ -14,14 +14,21 @@ from rockcheck.scenes.errors import printable
 from rockcheck.scenes.writing import write_new
 
 
-def run(path: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write; it must not exist yet.")]) -> None:
+def run(
+    path: Annotated[
+        Path, typer.Argument(metavar="FILE.toml", help="File to write; it must not exist yet.")
+    ],
+) -> None:
     """Write a scene file to start from.
 
-    It is ready to run, and has a remark on every setting. A file that is there already is left as it is.
+    It is ready to run, and has a remark on every setting. A file that is there already is left as
+    it is.
     """
     if path.suffix.lower() != ".toml":
         raise InputError(f"{printable(path)}: give the name of a .toml file")
-    text = (resources.files("rockcheck.validation") / "data" / "new_scene.toml").read_text(encoding="utf-8")
+    text = (resources.files("rockcheck.validation") / "data" / "new_scene.toml").read_text(
+        encoding="utf-8"
+    )
     try:
         write_new(path, text)
     except FileExistsError:
@@ -29,6 +36,9 @@ def run(path: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to 
     except OSError as error:
         raise InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
     scene = load_scene(path)
-    console().print(f"{path}: a block of {2 * scene.block.half_width:g} m x {2 * scene.block.half_height:g} m", soft_wrap=True)
+    console().print(
+        f"{path}: a block of {2 * scene.block.half_width:g} m x {2 * scene.block.half_height:g} m",
+        soft_wrap=True,
+    )
     console().print(f"next: rockcheck simulate {path} --model ebm-unilateral", soft_wrap=True)
     answer({"file": path})

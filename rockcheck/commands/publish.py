@@ -21,13 +21,15 @@ from rockcheck.validation.suite.tables import checks_csv, figures_csv
 from rockcheck.validation.suite.verdicts import junit, markdown
 
 LOCK, HOLDER = ".lock", ".lock.holder"
-#: How long a run waits for another one that writes the same folder: before it says so, and in all, s.
+#: How long a run waits for another one that writes the same folder: before it says so, and in all,
+#: s.
 SILENT, PATIENCE = 2.0, 600.0
 
 
 @contextmanager
 def _turn(folder: Path) -> Iterator[None]:
-    """Within this block no other run writes into `folder`. A run that waits says for which one, and gives up after `PATIENCE` s."""
+    """Within this block no other run writes into `folder`. A run that waits says for which one, and
+    gives up after `PATIENCE` s."""
     lock = FileLock(no_link(folder / LOCK))
     try:
         lock.acquire(timeout=SILENT)
@@ -37,7 +39,10 @@ def _turn(folder: Path) -> Iterator[None]:
         try:
             lock.acquire(timeout=PATIENCE)
         except Timeout:
-            raise InputError(f"{printable(folder)}: waited {PATIENCE:g} s for {whom}: end it, or give another --out") from None
+            raise InputError(
+                f"{printable(folder)}: waited {PATIENCE:g} s for {whom}: end it, or give another"
+                " --out"
+            ) from None
     try:
         write_whole(folder / HOLDER, f"process {os.getpid()} on {platform.node()}")
         yield
@@ -54,7 +59,8 @@ def _holder(folder: Path) -> str:
 
 
 def keep(run: Run, folder: Path) -> Path:
-    """Write run.json, its schema and the tables (the histories are there already); returns run.json. Two runs take turns."""
+    """Write run.json, its schema and the tables (the histories are there already); returns
+    run.json. Two runs take turns."""
     with _turn(folder):
         write_whole(folder / "checks.csv", checks_csv(run))
         write_whole(folder / "figures.csv", figures_csv(run))
@@ -64,15 +70,26 @@ def keep(run: Run, folder: Path) -> Path:
 
 
 def publish(
-    folder: Path, *, jobs: int | None = None, afresh: bool = False, wanted: Sequence[str] = (), on_progress: OnProgress = unheard
+    folder: Path,
+    *,
+    jobs: int | None = None,
+    afresh: bool = False,
+    wanted: Sequence[str] = (),
+    on_progress: OnProgress = unheard,
 ) -> Path:
     """Write the pages of the run that was kept in `folder`; returns the page to open.
 
-    Unless `afresh`, only those that would show something else than they do. `jobs` processes draw, by default one a core. Scenes
-    that are `wanted` have a page in a large run, too.
+    Unless `afresh`, only those that would show something else than they do. `jobs` processes draw,
+    by default one a core. Scenes that are `wanted` have a page in a large run, too.
     """
     from rockcheck import reports
 
     with _turn(folder):
-        written = reports.write_site(folder, jobs=jobs or os.cpu_count() or 1, afresh=afresh, wanted=wanted, on_progress=on_progress)
+        written = reports.write_site(
+            folder,
+            jobs=jobs or os.cpu_count() or 1,
+            afresh=afresh,
+            wanted=wanted,
+            on_progress=on_progress,
+        )
         return Path(written)

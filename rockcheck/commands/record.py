@@ -9,7 +9,14 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from rockcheck.commands import answer, check_picture, console, save_picture, setting_of, tell_left_out
+from rockcheck.commands import (
+    answer,
+    check_picture,
+    console,
+    save_picture,
+    setting_of,
+    tell_left_out,
+)
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.recordings import UNITS, Reading, Recording, intensity, read_components
@@ -35,7 +42,8 @@ RecordsArgument = Annotated[
     ),
 ]
 
-#: Parts of the line that pictures a motion, and its marks from the smallest acceleration to the largest.
+#: Parts of the line that pictures a motion, and its marks from the smallest acceleration to the
+#: largest.
 _PARTS, _MARKS = 60, " ▁▂▃▄▅▆▇█"
 
 
@@ -51,7 +59,8 @@ def run(
 ) -> None:
     """Show what files of recorded ground motions hold.
 
-    Reads PEER AT2, COSMOS and CSMIP V2, ESM, K-NET and KiK-net, CSV and columns of text; what a file does not say is given by --read.
+    Reads PEER AT2, COSMOS and CSMIP V2, ESM, K-NET and KiK-net, CSV and columns of text; what a
+    file does not say is given by --read.
     """
     check_picture(plot)
     reading = reading_of(read)

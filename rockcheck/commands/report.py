@@ -18,21 +18,31 @@ def run(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a finished run.")],
     scene: Annotated[
         list[str] | None,
-        typer.Option("--scene", metavar="NAME", help="A scene that gets a page, too (repeatable), or that -o draws."),
+        typer.Option(
+            "--scene",
+            metavar="NAME",
+            help="A scene that gets a page, too (repeatable), or that -o draws.",
+        ),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Draw one scene or ensemble, and stop: .svg, .png or .pdf."),
+        typer.Option(
+            "-o", "--output", help="Draw one scene or ensemble, and stop: .svg, .png or .pdf."
+        ),
     ] = None,
     against: Annotated[
         str | None,
-        typer.Option("--against", help="With -o: the model whose differences are shown (default: the first reference)."),
+        typer.Option(
+            "--against",
+            help="With -o: the model whose differences are shown (default: the first reference).",
+        ),
     ] = None,
 ) -> None:
     """Render the pages of a finished run again.
 
-    A run of more than 200 scenes has pages of 200: those that are not within tolerance, then the nearest to a limit.
-    With --scene NAME -o FILE.pdf: that figure alone, all models over time with their differences and tolerances.
+    A run of more than 200 scenes has pages of 200: those that are not within tolerance, then the
+    nearest to a limit. With --scene NAME -o FILE.pdf: that figure alone, all models over time with
+    their differences and tolerances.
     """
     Run.load(folder)
     if output is not None:

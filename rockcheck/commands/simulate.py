@@ -37,18 +37,32 @@ REFERENCE = "ebm-unilateral"
 
 
 def run(
-    scene: Annotated[str, typer.Argument(help="A named scene or a .toml file.", autocompletion=scene_names)],
-    model: Annotated[str, typer.Option("--model", help=f"One of {', '.join(FAMILIES)}.", autocompletion=model_names)] = REFERENCE,
+    scene: Annotated[
+        str, typer.Argument(help="A named scene or a .toml file.", autocompletion=scene_names)
+    ],
+    model: Annotated[
+        str,
+        typer.Option("--model", help=f"One of {', '.join(FAMILIES)}.", autocompletion=model_names),
+    ] = REFERENCE,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="File to write: .csv, .csv.gz, .json or .mat (default: SCENE--MODEL.csv).")
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            help="File to write: .csv, .csv.gz, .json or .mat (default: SCENE--MODEL.csv).",
+        ),
     ] = None,
-    settings: Annotated[list[str] | None, typer.Option("--set", help="A setting of the model, such as time_step=1e-4; repeatable.")] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="A setting of the model, such as time_step=1e-4; repeatable."),
+    ] = None,
     plot: PlotOption = None,
     allow_code: AllowCodeOption = None,
 ) -> None:
     """Simulate one scene with one model.
 
-    Writes the history as CSV, its events to a second file beside it; or both to one .json or .mat. --plot draws rotation, slip and impacts.
+    Writes the history as CSV, its events to a second file beside it; or both to one .json or .mat.
+    --plot draws rotation, slip and impacts.
     """
     check_allowed(model, allow_code or ())
     given = dict(setting_of(text) for text in settings or [])
@@ -65,7 +79,9 @@ def run(
     try:
         history.save(path)
     except OSError as error:
-        raise InputError(f"{printable(path)}: cannot be written: {error.strerror}", "--output") from None
+        raise InputError(
+            f"{printable(path)}: cannot be written: {error.strerror}", "--output"
+        ) from None
     peak = None if history.overturned_at is not None else history.peak_rotation / what.block.alpha
     reached = "" if peak is None else f", peak rotation {peak:.4g} alpha"
     took = f"simulated in {history.cost.wall_seconds:.2g} s"
@@ -91,7 +107,9 @@ def run(
 
 def _played_apart(scene: Scene, model: str, settings: dict[str, Any]) -> History:
     """The history by a model of the user's own, whose code is imported by a process of its own."""
-    task = workers.Task(label=model, family=model, settings=settings, search_path=(str(Path.cwd()),), scene=scene)
+    task = workers.Task(
+        label=model, family=model, settings=settings, search_path=(str(Path.cwd()),), scene=scene
+    )
     with Pool(1) as pool:
         (ended,) = pool.run(deque([Call(guarded, (workers.play, task))]))
     result = Failure(ended.fault) if ended.error else ended.result

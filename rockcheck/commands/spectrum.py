@@ -13,10 +13,10 @@ from rockcheck.commands import (
     SchedulerOption,
     model_names,
     scene_names,
+    setting_of,
     studied,
     tell_missing,
 )
-from rockcheck.commands.simulate import setting_of
 from rockcheck.scenes import InputError, load_scene
 from rockcheck.validation.execute.store import name_of
 from rockcheck.validation.paper.panels import (

@@ -41,8 +41,8 @@ def run(
 ) -> None:
     """Give the uncertainty of a scene's figures.
 
-    The numerical error comes from runs at three coarser steps (or a finer tolerance). Numbers that the
-    scene file gives as { value = 0.3, sd = 0.03 } are drawn at random, run by the event-based
+    The numerical error comes from runs at three coarser steps (or a finer tolerance). Numbers that
+    the scene file gives as { value = 0.3, sd = 0.03 } are drawn at random, run by the event-based
     model, and ranked by their effect.
 
     Exit 0: converged. 1: not converged.

@@ -55,58 +55,106 @@ Strictness = Literal["worse", "both"]
 ALL = "all"
 SuiteArgument = Annotated[
     str | None,
-    typer.Argument(metavar="[SUITE]", help="A named suite or a .toml file (default: paper).", autocompletion=suite_names),
+    typer.Argument(
+        metavar="[SUITE]",
+        help="A named suite or a .toml file (default: paper).",
+        autocompletion=suite_names,
+    ),
 ]
 WhatArgument = Annotated[
     str | None,
-    typer.Argument(metavar="[SUITE or SCENE]", help="Named, or a .toml file (default: suite paper).", autocompletion=suite_names),
+    typer.Argument(
+        metavar="[SUITE or SCENE]",
+        help="Named, or a .toml file (default: suite paper).",
+        autocompletion=suite_names,
+    ),
 ]
 
 
 def run(
     what: WhatArgument = None,
     models: Annotated[
-        str, typer.Option("--models", help="Of a scene: all that are installed, or names with commas between.", autocompletion=model_names)
+        str,
+        typer.Option(
+            "--models",
+            help="Of a scene: all that are installed, or names with commas between.",
+            autocompletion=model_names,
+        ),
     ] = ALL,
     settings: Annotated[
-        list[str] | None, typer.Option("--set", help="Of a scene: a model's setting, such as mujoco.time_step=1e-3; repeatable.")
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="Of a scene: a model's setting, such as mujoco.time_step=1e-3; repeatable.",
+        ),
     ] = None,
     records: Annotated[
         list[str] | None,
-        typer.Option("--records", help="Of a scene: files, folders or patterns, each played in place of its excitation; repeatable."),
+        typer.Option(
+            "--records",
+            help="Of a scene: files, folders or patterns, each played in place of its excitation; repeatable.",
+        ),
     ] = None,
     read: ReadOption = None,
     out: OutOption = OUT,
     jobs: JobsOption = None,
-    force: Annotated[bool, typer.Option("--force", help="Run every cell, also those whose results are up to date.")] = False,
+    force: Annotated[
+        bool,
+        typer.Option("--force", help="Run every cell, also those whose results are up to date."),
+    ] = False,
     strict: Annotated[
         Strictness | None,
-        typer.Option("--strict", help="Figures that left their drift band for the worse fail; with `--strict both` better ones, too."),
+        typer.Option(
+            "--strict",
+            help="Figures that left their drift band for the worse fail; with `--strict both` better ones, too.",
+        ),
     ] = None,
     scheduler: SchedulerOption = None,
     allow_code: AllowCodeOption = None,
     history: Annotated[
-        Path | None, typer.Option("--history", metavar="FILE", help="Append this run to FILE (a JSON line a run), and show the trend.")
+        Path | None,
+        typer.Option(
+            "--history",
+            metavar="FILE",
+            help="Append this run to FILE (a JSON line a run), and show the trend.",
+        ),
     ] = None,
-    report: Annotated[bool, typer.Option("--report/--no-report", help="Render the pages; without them only run.json and tables.")] = True,
+    report: Annotated[
+        bool,
+        typer.Option(
+            "--report/--no-report", help="Render the pages; without them only run.json and tables."
+        ),
+    ] = True,
 ) -> None:
     """Run a suite, compare, judge, write the report.
 
-    Every model on every scene; cells whose results are up to date are read back. A scene in place of a suite is played by all models,
-    perhaps under records, and nothing is judged. --read also takes scale=1.2 and vertical=true for its records.
+    Every model on every scene; cells whose results are up to date are read back. A scene in place
+    of a suite is played by all models, perhaps under records, and nothing is judged. --read also
+    takes scale=1.2 and vertical=true for its records.
 
-    Exit 0: within tolerance. 1: out of tolerance. 2: bad input. 3: a model failed. 70: a fault of rockcheck itself.
+    Exit 0: within tolerance. 1: out of tolerance. 2: bad input. 3: a model failed. 70: a fault of
+    rockcheck itself.
     """
     if what is not None and is_scene(what):
         if strict:
-            raise InputError(f"{printable(what)} is a scene, and nothing of it is judged: give a suite", "--strict")
+            raise InputError(
+                f"{printable(what)} is a scene, and nothing of it is judged: give a suite",
+                "--strict",
+            )
         sets = _record_sets(records or (), read or ())
-        suite = scene_suite(what, chosen_models(models, settings or ()), records=sets, allow_code=allow_code or ())
+        suite = scene_suite(
+            what, chosen_models(models, settings or ()), records=sets, allow_code=allow_code or ()
+        )
         folder = usable_folder(out)
         if models == ALL:
             tell_missing()
         play_scene(suite, folder, jobs=jobs, force=force, scheduler=scheduler, report=report)
-    for name, given in (("--models", models != ALL), ("--set", settings), ("--records", records), ("--read", read)):
+    for name, given in (
+        ("--models", models != ALL),
+        ("--set", settings),
+        ("--records", records),
+        ("--read", read),
+    ):
         if given:
             raise InputError("is for a scene: a suite says which models play what", name)
     folder = usable_folder(out)
@@ -117,13 +165,19 @@ def run(
     kept = keep(finished, folder)
     show(finished, console())
     tell_faults(finished, folder)
-    moments = [] if history is None else remember(history, moment_of(finished, Path(finished.tolerances_file).parent))
+    moments = (
+        []
+        if history is None
+        else remember(history, moment_of(finished, Path(finished.tolerances_file).parent))
+    )
     if history is not None:
         tell_trend(moments, history)
     if history is not None and report:
         from rockcheck.reports.studies.trend import write_trend
 
-        console().print(f"trend: {write_trend(moments, usable_folder(folder, TREND))}", soft_wrap=True)
+        console().print(
+            f"trend: {write_trend(moments, usable_folder(folder, TREND))}", soft_wrap=True
+        )
     page = published(folder, jobs) if report else kept
     console().print(f"report: {page}", soft_wrap=True)
     answer(summary(finished) | {"report": page})
@@ -144,43 +198,71 @@ def _record_sets(records: Sequence[str], read: Sequence[str]) -> list[RecordSet]
 
 
 def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
-    """The models by name, each with its settings; of all, those that are installed. Raises `InputError` for an unknown one."""
+    """The models by name, each with its settings; of all, those that are installed. Raises
+    `InputError` for an unknown one."""
     if names == ALL:
-        found: dict[str, dict[str, Any]] = {name: {} for name in FAMILIES if name != "measured" and not not_installed(name)}
+        found: dict[str, dict[str, Any]] = {
+            name: {} for name in FAMILIES if name != "measured" and not not_installed(name)
+        }
     else:
         found = {name.strip(): {} for name in names.split(",") if name.strip()}
         for name in found:
             family(name)
         if not found or "measured" in found:
-            raise InputError(f"{printable(names)!r} is not allowed: models that play, with commas between, or all", "--models")
+            raise InputError(
+                f"{printable(names)!r} is not allowed: models that play, with commas between, or"
+                " all",
+                "--models",
+            )
     for text in settings:
         model, dot, rest = text.partition(".")
         if not dot or model not in found:
-            raise InputError(f"{printable(text)!r}: write MODEL.key=value, with MODEL one of {', '.join(found)}", "--set")
+            raise InputError(
+                f"{printable(text)!r}: write MODEL.key=value, with MODEL one of {', '.join(found)}",
+                "--set",
+            )
         key, value = setting_of(rest)
         found[model][key] = value
     return found
 
 
-def play_scene(suite: Suite, folder: Path, *, jobs: int | None, force: bool, scheduler: str | None, report: bool) -> None:
+def play_scene(
+    suite: Suite,
+    folder: Path,
+    *,
+    jobs: int | None,
+    force: bool,
+    scheduler: str | None,
+    report: bool,
+) -> None:
     """Play a suite that judges nothing; a table, the report, and exit 3 where a model failed.
 
-    Raises `InputError` where `folder` holds a judged run, whose pages and tables this one would overwrite.
+    Raises `InputError` where `folder` holds a judged run, whose pages and tables this one would
+    overwrite.
     """
     before = None
     with suppress(InputError):  # no run there, or none that can be read
         before = Run.load(folder)
     if before is not None and before.judged:
-        raise InputError(f"{printable(folder)} holds the judged run of suite {before.suite!r}: give another folder", "--out")
+        raise InputError(
+            f"{printable(folder)} holds the judged run of suite {before.suite!r}: give another"
+            " folder",
+            "--out",
+        )
     finished = play(suite, folder, jobs, force, False, scheduler)
     kept = keep(finished, folder)
     screen = console()
-    tell_left_out(suite.left_out, "--read vertical=true plays such a component together with the horizontal ones")
+    tell_left_out(
+        suite.left_out,
+        "--read vertical=true plays such a component together with the horizontal ones",
+    )
     for name, table in outcome_tables(finished):
         screen.print(name, style="bold", soft_wrap=True)
         screen.print(table)
     screen.print(
-        "peak: largest rotation; apart: RMS difference from the reference, to the horizon of predictability; in alpha", soft_wrap=True
+        "peak: largest rotation; apart: RMS difference from the reference, to the horizon of"
+        " predictability; in alpha",
+        soft_wrap=True,
     )
     for line in verdict_lines(finished):
         screen.print(line, style="red" if finished.exit_code else "yellow", soft_wrap=True)
@@ -202,33 +284,57 @@ def play_scene(suite: Suite, folder: Path, *, jobs: int | None, force: bool, sch
     raise typer.Exit(finished.exit_code)
 
 
-def play(suite: Suite, folder: Path, jobs: int | None, force: bool, strict: Strict, scheduler: str | None) -> Run:
+def play(
+    suite: Suite, folder: Path, jobs: int | None, force: bool, strict: Strict, scheduler: str | None
+) -> Run:
     """Run a suite with a progress bar on stderr."""
-    compiles = ", a first run compiles" if any(not is_own(one.family_name) and one.family.compiled for one in suite.models.values()) else ""
+    compiles = (
+        ", a first run compiles"
+        if any(not is_own(one.family_name) and one.family.compiled for one in suite.models.values())
+        else ""
+    )
     with progress(f"{suite.name}{compiles}") as on_progress:
-        return run_suite(suite, folder, jobs=jobs, force=force, strict=strict, scheduler=scheduler, on_progress=on_progress)
+        return run_suite(
+            suite,
+            folder,
+            jobs=jobs,
+            force=force,
+            strict=strict,
+            scheduler=scheduler,
+            on_progress=on_progress,
+        )
 
 
 def published(folder: Path, jobs: int | None) -> Path:
-    """The pages of the run that was kept in `folder`, with a progress bar; returns the page to open."""
+    """The pages of the run that was kept in `folder`, with a progress bar; returns the page to
+    open."""
     with progress("pages") as on_progress:
         return publish(folder, jobs=jobs, on_progress=on_progress)
 
 
 def tell_faults(finished: Run, folder: Path) -> None:
-    """A line on stderr for each exception that no model may raise: of rockcheck's own models to report, of one's own to mend."""
+    """A line on stderr for each exception that no model may raise: of rockcheck's own models to
+    report, of one's own to mend."""
     for cell in finished.cells:
         if not cell.traceback:
             continue
         where, path = f"{cell.scene}, {cell.model}: {cell.reason}", folder / cell.traceback
-        said = f"a fault of rockcheck itself, {where}: please report it with {path}" if cell.unexpected else f"{where}: traceback in {path}"
+        said = (
+            f"a fault of rockcheck itself, {where}: please report it with {path}"
+            if cell.unexpected
+            else f"{where}: traceback in {path}"
+        )
         print(printable(f"rockcheck: {said}", 1400), file=sys.stderr)
 
 
 def tell_trend(moments: Sequence[Moment], path: Path) -> None:
     """How many runs a history has, and the figures that moved since the one before."""
     moved = [trend for trend in trends(moments) if trend.moved]
-    since = f", {len(moved)} figures moved since {moments[-2].commit or moments[-2].created}" if len(moments) > 1 else ""
+    since = (
+        f", {len(moved)} figures moved since {moments[-2].commit or moments[-2].created}"
+        if len(moments) > 1
+        else ""
+    )
     console().print(f"{path}: {len(moments)} runs{since}", soft_wrap=True)
     for trend in moved[:MOST_MOVED]:
         was, now = ("-" if value is None else f"{value:.6g}" for value in trend.values[-2:])
@@ -248,6 +354,12 @@ def show(finished: Run, out: Console) -> None:
     for line in better:
         out.print(line, style="red" if finished.strict == "both" else "green")
     if finished.without_tolerance:
-        out.print(f"{finished.without_tolerance} figures have no tolerance yet: `rockcheck accept` makes today's the expected ones")
-    out.print(f"{finished.up_to_date} of {len(finished.cells)} simulations were up to date; {finished.wall_seconds:.1f} s")
+        out.print(
+            f"{finished.without_tolerance} figures have no tolerance yet: `rockcheck accept` makes"
+            " today's the expected ones"
+        )
+    out.print(
+        f"{finished.up_to_date} of {len(finished.cells)} simulations were up to date;"
+        f" {finished.wall_seconds:.1f} s"
+    )
     out.print(f"verdict: {finished.words}", style="bold")

@@ -13,8 +13,9 @@ from rockcheck.scenes.progress import announcing
 def run(jobs: JobsOption = None) -> None:
     """Compile the models' code ahead.
 
-    Models compile their code on their first run on a machine, and once more after an update of rockcheck; what is compiled already is
-    only looked up. Afterwards no command waits for a compiler.
+    Models compile their code on their first run on a machine, and once more after an update of
+    rockcheck; what is compiled already is only looked up. Afterwards no command waits for a
+    compiler.
     """
     from rockcheck.validation.execute.warming import PARTS, warm
 

@@ -9,8 +9,8 @@
 | CSV | any | columns `time_s` and `acceleration_g`, `_m_s2`, `_cm_s2`, `_gal`, `_mm_s2` or `_ft_s2` |
 | columns of text | any | whatever is not there is an option of `Reading` |
 
-A format is known by what the file holds; `.AT2` and `.csv` by the name. Every reader takes time in proportion to the file.
-ObsPy reads K-NET among these, but neither PEER, V2, ESM nor tables.
+A format is known by what the file holds; `.AT2` and `.csv` by the name. Every reader takes time in
+proportion to the file. ObsPy reads K-NET among these, but neither PEER, V2, ESM nor tables.
 """
 
 from __future__ import annotations
@@ -19,8 +19,21 @@ from pathlib import Path
 
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.reading import read_text
-from rockcheck.scenes.recordings.headed import AT2_HEADER, AT2_HEADER_PLAIN, read_at2, read_esm, read_knet
-from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS, UNITS, Reading, Recording, fault, option
+from rockcheck.scenes.recordings.headed import (
+    AT2_HEADER,
+    AT2_HEADER_PLAIN,
+    read_at2,
+    read_esm,
+    read_knet,
+)
+from rockcheck.scenes.recordings.recording import (
+    GRAVITY_OF_RECORDS,
+    UNITS,
+    Reading,
+    Recording,
+    fault,
+    option,
+)
 from rockcheck.scenes.recordings.tables import read_table
 from rockcheck.scenes.recordings.volumes import is_volume, read_volume
 
@@ -33,9 +46,10 @@ _LOOKED_AT = 100
 def read_components(path: Path, reading: Reading | None = None) -> list[Recording]:
     """All components of a record file, or the one that `reading` names; at least one.
 
-    Raises `InputError`, naming the file and the line, where the file is missing, is in no known format, has another count than it
-    says, a time step that is not positive or not uniform, a value that is not finite, or where something is not known: then the
-    message shows the option that says it.
+    Raises `InputError`, naming the file and the line, where the file is missing, is in no known
+    format, has another count than it says, a time step that is not positive or not uniform, a value
+    that is not finite, or where something is not known: then the message shows the option that says
+    it.
     """
     asked = reading or Reading()
     lines = read_text(path, latin=True).split("\n")
@@ -50,10 +64,13 @@ def read_components(path: Path, reading: Reading | None = None) -> list[Recordin
 
 
 def read_record(path: Path, reading: Reading | None = None) -> Recording:
-    """The one component of a record file, or the one that `reading` names. Raises as `read_components`."""
+    """The one component of a record file, or the one that `reading` names. Raises as
+    `read_components`."""
     found = read_components(path, reading)
     if len(found) > 1:
-        raise fault(path, f"{len(found)} components, {_listed(found)}; give one: {option('component', 1)}")
+        raise fault(
+            path, f"{len(found)} components, {_listed(found)}; give one: {option('component', 1)}"
+        )
     return found[0]
 
 
@@ -68,7 +85,11 @@ def _format_of(path: Path, lines: list[str]) -> str:
         return "esm"
     if any(map(is_volume, head)):
         return "v2"
-    return "at2" if any(AT2_HEADER.search(line) or AT2_HEADER_PLAIN.search(line) for line in head[:20]) else "table"
+    return (
+        "at2"
+        if any(AT2_HEADER.search(line) or AT2_HEADER_PLAIN.search(line) for line in head[:20])
+        else "table"
+    )
 
 
 def _chosen(path: Path, found: list[Recording], component: int | str) -> Recording:
@@ -77,8 +98,15 @@ def _chosen(path: Path, found: list[Recording], component: int | str) -> Recordi
     named = [one for one in found if one.component == component]
     if len(named) == 1:
         return named[0]
-    raise fault(path, f"no single component {printable(repr(component))}; there are {_listed(found)}")
+    raise fault(
+        path, f"no single component {printable(repr(component))}; there are {_listed(found)}"
+    )
 
 
 def _listed(found: list[Recording]) -> str:
-    return printable(", ".join(f"{n} {one.component!r}" if one.component else str(n) for n, one in enumerate(found, 1)), 300)
+    return printable(
+        ", ".join(
+            f"{n} {one.component!r}" if one.component else str(n) for n, one in enumerate(found, 1)
+        ),
+        300,
+    )

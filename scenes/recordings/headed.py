@@ -1,4 +1,5 @@
-"""Formats of one component with a header of its own: PEER AT2, ESM (DYNA) and K-NET/KiK-net ASCII."""
+"""Formats of one component with a header of its own: PEER AT2, ESM (DYNA) and K-NET/KiK-net
+ASCII."""
 
 from __future__ import annotations
 
@@ -28,14 +29,18 @@ from rockcheck.scenes.recordings.recording import (
 
 AT2_HEADER = re.compile(rf"NPTS\s*+=\s*+(\d++)\s*+(?:,\s*+)?DT\s*+=\s*+({NUMBER})", re.IGNORECASE)
 AT2_HEADER_PLAIN = re.compile(rf"^\s*+(\d++)\s++({NUMBER})\s++NPTS\s*+(?:,\s*+)?DT", re.IGNORECASE)
-_UNITS = re.compile(r"UNITS?(?:\s++|\s*+:\s*+)(?:(?:OF|IN|ARE|:)\s*+)?\(?([A-Z0-9^*'²]++(?:\s*+/\s*+[A-Z0-9^*²]++)*+)", re.IGNORECASE)
+_UNITS = re.compile(
+    r"UNITS?(?:\s++|\s*+:\s*+)(?:(?:OF|IN|ARE|:)\s*+)?\(?([A-Z0-9^*'²]++(?:\s*+/\s*+[A-Z0-9^*²]++)*+)",
+    re.IGNORECASE,
+)
 _ESM_LINE = re.compile(r"([A-Z][A-Z0-9_^/]*+)\s*+:(.*+)")
 _KNET_SCALE = re.compile(rf"({NUMBER})\s*+\(gal\)\s*+/\s*+({NUMBER})", re.IGNORECASE)
 _KNET_RATE = re.compile(rf"({NUMBER})\s*+(?:Hz)?", re.IGNORECASE)
 
 
 def read_at2(path: Path, lines: list[str], reading: Reading) -> Recording:
-    """PEER: header lines, one of which says the units and one NPTS and DT, then accelerations in g."""
+    """PEER: header lines, one of which says the units and one NPTS and DT, then accelerations in
+    g."""
     only_for_tables(path, reading, "a PEER file")
     header = match = None
     for index, line in enumerate(lines[:20]):
@@ -44,20 +49,37 @@ def read_at2(path: Path, lines: list[str], reading: Reading) -> Recording:
             break
     if header is None or match is None:
         raise fault(path, "no header line with NPTS and DT within the first 20 lines")
-    stated = next(filter(None, (known_unit(word) for line in lines[: header + 1] for word in _UNITS.findall(line))), "")
+    stated = next(
+        filter(
+            None,
+            (known_unit(word) for line in lines[: header + 1] for word in _UNITS.findall(line)),
+        ),
+        "",
+    )
     if not stated and reading.unit is None:
-        raise fault(path, f"no header line that states UNITS OF G or another; give the unit: {option('unit', 'cm/s2')}")
+        raise fault(
+            path,
+            "no header line that states UNITS OF G or another; give the unit:"
+            f" {option('unit', 'cm/s2')}",
+        )
     unit = settled_unit(path, stated, reading)
     count = checked_count(path, header + 1, "NPTS", match[1])
     step = settled_step(path, checked_step(path, header + 1, "DT", match[2]), reading)
     values = numbers(path, enumerate(lines[header + 1 :], header + 2), count)
     if len(values) != count:
         raise fault(path, f"NPTS says {count}, the file has {len(values)} samples", header + 1)
-    return Recording(samples=np.array(values) * UNITS[unit], time_step=step, unit=unit, form="PEER AT2", component=_at2_component(lines))
+    return Recording(
+        samples=np.array(values) * UNITS[unit],
+        time_step=step,
+        unit=unit,
+        form="PEER AT2",
+        component=_at2_component(lines),
+    )
 
 
 def _at2_component(lines: list[str]) -> str:
-    """What the second line ends in: event, date, station, component; "" where it is another line."""
+    """What the second line ends in: event, date, station, component; "" where it is another
+    line."""
     fields = lines[1].split(",") if len(lines) > 1 else []
     name = fields[-1].strip()[:10] if len(fields) > 2 else ""
     return printable(name) if re.fullmatch(r"[0-9A-Za-z-]{1,6}", name) else ""
@@ -81,26 +103,38 @@ def read_esm(path: Path, lines: list[str], reading: Reading) -> Recording:
 
     kind = header.get("DATA_TYPE", (0, "ACCELERATION"))
     if kind[1].upper() != "ACCELERATION":
-        raise fault(path, f"DATA_TYPE {printable(kind[1], 30)!r}; only ACCELERATION can be read", kind[0])
+        raise fault(
+            path, f"DATA_TYPE {printable(kind[1], 30)!r}; only ACCELERATION can be read", kind[0]
+        )
     place, count_word = stated("NDATA")
     if not re.fullmatch(r"[0-9]++", count_word):
         raise fault(path, f"NDATA {printable(count_word, 30)!r} is not a count", place)
     count = checked_count(path, place, "NDATA", count_word)
     step_line, step_word = stated("SAMPLING_INTERVAL_S")
-    step = settled_step(path, checked_step(path, step_line, "SAMPLING_INTERVAL_S", step_word), reading)
+    step = settled_step(
+        path, checked_step(path, step_line, "SAMPLING_INTERVAL_S", step_word), reading
+    )
     units = header.get("UNITS", (0, ""))
     unit = settled_unit(path, known_unit(units[1]), reading)
     values = numbers(path, enumerate(lines[first - 1 :], first))
     if len(values) != count:
         raise fault(path, f"NDATA says {count}, the file has {len(values)} samples", place)
     stream = printable(header.get("STREAM", (0, ""))[1], 30)
-    return Recording(samples=np.array(values) * UNITS[unit], time_step=step, unit=unit, form="ESM ASCII", component=stream)
+    return Recording(
+        samples=np.array(values) * UNITS[unit],
+        time_step=step,
+        unit=unit,
+        form="ESM ASCII",
+        component=stream,
+    )
 
 
 def read_knet(path: Path, lines: list[str], reading: Reading) -> Recording:
-    """K-NET and KiK-net: 17 header lines with their names in the first 18 columns, then counts of the digitiser.
+    """K-NET and KiK-net: 17 header lines with their names in the first 18 columns, then counts of
+    the digitiser.
 
-    The counts have an offset: their mean is taken out, as it is for the Max. Acc. that such a file states.
+    The counts have an offset: their mean is taken out, as it is for the Max. Acc. that such a file
+    states.
     """
     only_for_tables(path, reading, "a K-NET file")
     header: dict[str, tuple[int, str]] = {}
@@ -113,7 +147,10 @@ def read_knet(path: Path, lines: list[str], reading: Reading) -> Recording:
     scale = _KNET_SCALE.match(header.get("Scale Factor", (0, ""))[1])
     rate = _KNET_RATE.match(header.get("Sampling Freq(Hz)", (0, ""))[1])
     if not scale or not rate:
-        raise fault(path, f"no header line that states {'Sampling Freq(Hz)' if scale else 'Scale Factor in gal'}")
+        raise fault(
+            path,
+            f"no header line that states {'Sampling Freq(Hz)' if scale else 'Scale Factor in gal'}",
+        )
     place = header["Scale Factor"][0]
     factor, counts = number(path, place, scale[1]), number(path, place, scale[2])
     if counts == 0.0 or not LEAST <= abs(factor / counts) <= MOST:
@@ -132,7 +169,9 @@ def read_knet(path: Path, lines: list[str], reading: Reading) -> Recording:
         form="K-NET ASCII",
         component=printable(header.get("Dir.", (0, ""))[1], 30),
     )
-    return found.noted(f"the mean, {mean / UNITS[unit]:.4g} gal, is taken out: the offset of the digitiser")
+    return found.noted(
+        f"the mean, {mean / UNITS[unit]:.4g} gal, is taken out: the offset of the digitiser"
+    )
 
 
 def _check_duration(path: Path, stated: tuple[int, str] | None, hertz: float, found: int) -> None:
@@ -141,4 +180,8 @@ def _check_duration(path: Path, stated: tuple[int, str] | None, hertz: float, fo
     if stated:
         expected = number(path, stated[0], stated[1]) * hertz
         if abs(expected - found) > 0.5:
-            raise fault(path, f"Duration Time(s) {stated[1]} is {expected:.10g} samples, the file has {found}", stated[0])
+            raise fault(
+                path,
+                f"Duration Time(s) {stated[1]} is {expected:.10g} samples, the file has {found}",
+                stated[0],
+            )

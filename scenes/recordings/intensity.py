@@ -21,7 +21,8 @@ def peak_acceleration(record: Recording) -> float:
 
 
 def velocity(record: Recording) -> NDArray[np.float64]:
-    """Ground velocity at the samples in m/s, from rest, exact for straight lines between samples; no baseline correction."""
+    """Ground velocity at the samples in m/s, from rest, exact for straight lines between samples;
+    no baseline correction."""
     from scipy.integrate import cumulative_trapezoid
 
     return np.asarray(cumulative_trapezoid(record.samples, dx=record.time_step, initial=0.0))
@@ -35,14 +36,18 @@ def peak_velocity(record: Recording) -> float:
 def arias(record: Recording) -> float:
     """Arias intensity pi/(2 g) int a^2 dt in m/s, exact for straight lines between samples."""
     before, after = record.samples[:-1], record.samples[1:]
-    squares = float(np.sum(before * before + before * after + after * after)) / 3.0 * record.time_step
+    squares = (
+        float(np.sum(before * before + before * after + after * after)) / 3.0 * record.time_step
+    )
     return math.pi / (2.0 * GRAVITY_OF_RECORDS) * squares
 
 
 def spectral_acceleration(record: Recording, period: float, damping: float = 0.05) -> float:
-    """Pseudo-spectral acceleration of an oscillator of `period` (s) and `damping` (of critical) in g.
+    """Pseudo-spectral acceleration of an oscillator of `period` (s) and `damping` (of critical) in
+    g.
 
-    The oscillator is exact for straight lines between samples (first-order hold), and goes on for a period after the last.
+    The oscillator is exact for straight lines between samples (first-order hold), and goes on for a
+    period after the last.
     """
     from scipy.signal import cont2discrete, lfilter
 
@@ -51,8 +56,12 @@ def spectral_acceleration(record: Recording, period: float, damping: float = 0.0
     parts = max(min(parts, _MOST_STEPS // len(record.samples)), 1)
     step = record.time_step / parts
     count = (len(record.samples) - 1) * parts + 1
-    ground = np.interp(step * np.arange(count), record.time_step * np.arange(len(record.samples)), record.samples)
+    ground = np.interp(
+        step * np.arange(count), record.time_step * np.arange(len(record.samples)), record.samples
+    )
     tail = np.zeros(min(math.ceil(period / step), _MOST_STEPS))
-    above, below, _ = cont2discrete(([rate * rate], [1.0, 2.0 * damping * rate, rate * rate]), step, method="foh")
+    above, below, _ = cont2discrete(
+        ([rate * rate], [1.0, 2.0 * damping * rate, rate * rate]), step, method="foh"
+    )
     response = lfilter(np.ravel(above), below, np.concatenate([ground, tail]))
     return float(np.max(np.abs(response))) / GRAVITY_OF_RECORDS

@@ -21,14 +21,24 @@ MOST_SAMPLES = 10_000_000
 
 Unit = Literal["g", "m/s2", "cm/s2", "gal", "mm/s2", "ft/s2"]
 #: m/s^2 in each unit that a record may have.
-UNITS: dict[str, float] = {"g": GRAVITY_OF_RECORDS, "m/s2": 1.0, "cm/s2": 0.01, "gal": 0.01, "mm/s2": 0.001, "ft/s2": 0.3048}
+UNITS: dict[str, float] = {
+    "g": GRAVITY_OF_RECORDS,
+    "m/s2": 1.0,
+    "cm/s2": 0.01,
+    "gal": 0.01,
+    "mm/s2": 0.001,
+    "ft/s2": 0.3048,
+}
 
 # Whatever repeats is possessive: what does not match ends after one pass, however long the line.
 NUMBER = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eEdD][-+]?\d++)?"
 _NUMBER = re.compile(NUMBER)
 _EXPONENT = str.maketrans("dD", "ee")
 _PER_SECOND_SQUARED = r"/s(?:ec)?(?:/s(?:ec)?|(?:\^|\*\*)?2)"
-_SPELLINGS = {unit: unit.replace("/s2", _PER_SECOND_SQUARED) for unit in UNITS} | {"g": r"g(?:'?s)?", "gal": r"gals?"}
+_SPELLINGS = {unit: unit.replace("/s2", _PER_SECOND_SQUARED) for unit in UNITS} | {
+    "g": r"g(?:'?s)?",
+    "gal": r"gals?",
+}
 _SPELT = {unit: re.compile(pattern, re.IGNORECASE) for unit, pattern in _SPELLINGS.items()}
 
 Word = Annotated[str, StringConstraints(min_length=1, max_length=100)]
@@ -36,7 +46,8 @@ Place = Annotated[int, Strict(), Field(ge=1, le=1000)]
 
 
 class Reading(Frozen):
-    """What a record file does not say of itself, and which part of it is wanted; None: as the file says.
+    """What a record file does not say of itself, and which part of it is wanted; None: as the file
+    says.
 
     | option | meaning |
     |---|---|
@@ -58,10 +69,11 @@ class Reading(Frozen):
 
 @dataclass(frozen=True, kw_only=True)
 class Recording:
-    """One component of a record: samples in m/s^2 every `time_step` s, the first at t = 0, none of them scaled.
+    """One component of a record: samples in m/s^2 every `time_step` s, the first at t = 0, none of
+    them scaled.
 
-    `unit` is that of the file, `form` its format, `component` the direction or channel ("" where the file names none), `notes`
-    what was done to the samples or taken for granted.
+    `unit` is that of the file, `form` its format, `component` the direction or channel ("" where
+    the file names none), `notes` what was done to the samples or taken for granted.
     """
 
     samples: NDArray[np.float64]
@@ -78,7 +90,9 @@ class Recording:
 
 def fault(path: Path, said: str, line: int | None = None) -> InputError:
     """What is wrong with a file, and in which line."""
-    return InputError(f"{printable(path)}, line {line}: {said}" if line else f"{printable(path)}: {said}")
+    return InputError(
+        f"{printable(path)}, line {line}: {said}" if line else f"{printable(path)}: {said}"
+    )
 
 
 def option(name: str, value: str | float) -> str:
@@ -88,7 +102,8 @@ def option(name: str, value: str | float) -> str:
 
 
 def number(path: Path, line: int, word: str) -> float:
-    """The finite number that `word` is, in Fortran's notation or C's. Raises `InputError` where it is none."""
+    """The finite number that `word` is, in Fortran's notation or C's. Raises `InputError` where it
+    is none."""
     if _NUMBER.fullmatch(word):
         value = float(word.translate(_EXPONENT))
         if abs(value) <= MOST:
@@ -104,7 +119,8 @@ def is_number(word: str) -> bool:
 
 
 def numbers(path: Path, lines: Iterable[tuple[int, str]], count: int = 0) -> list[float]:
-    """All numbers of numbered lines, between blanks; where some have run together and there are `count`, in columns of one width."""
+    """All numbers of numbered lines, between blanks; where some have run together and there are
+    `count`, in columns of one width."""
     rows = [(n, line.rstrip()) for n, line in lines if not line.isspace() and line]
     cells = [(n, word) for n, line in rows for word in line.split()]
     if count and not all(is_number(word) for _, word in cells):
@@ -113,12 +129,17 @@ def numbers(path: Path, lines: Iterable[tuple[int, str]], count: int = 0) -> lis
 
 
 def _columns(rows: list[tuple[int, str]], count: int) -> list[tuple[int, str]]:
-    """The cells of so many numbers in columns of one width, as Fortran writes them; [] where the lines are not cut so."""
+    """The cells of so many numbers in columns of one width, as Fortran writes them; [] where the
+    lines are not cut so."""
     width, rest = divmod(sum(len(line) for _, line in rows), count)
-    uneven = len({len(line) for _, line in rows[:-1]}) > 1 or any(len(line) % width for _, line in rows if width)
+    uneven = len({len(line) for _, line in rows[:-1]}) > 1 or any(
+        len(line) % width for _, line in rows if width
+    )
     if rest or uneven or not width:
         return []
-    return [(n, line[k : k + width].strip()) for n, line in rows for k in range(0, len(line), width)]
+    return [
+        (n, line[k : k + width].strip()) for n, line in rows for k in range(0, len(line), width)
+    ]
 
 
 def known_unit(text: str) -> str:
@@ -128,26 +149,44 @@ def known_unit(text: str) -> str:
 
 
 def settled_unit(path: Path, stated: str, reading: Reading) -> str:
-    """The unit that the file states or the reader was told; raises `InputError` where neither is, or both and they differ."""
+    """The unit that the file states or the reader was told; raises `InputError` where neither is,
+    or both and they differ."""
     if not stated and reading.unit is None:
-        raise fault(path, f"the unit of acceleration is not stated; give it: {option('unit', 'g')}, or one of {', '.join(UNITS)}")
+        raise fault(
+            path,
+            f"the unit of acceleration is not stated; give it: {option('unit', 'g')}, or one of"
+            f" {', '.join(UNITS)}",
+        )
     if stated and reading.unit and UNITS[stated] != UNITS[reading.unit]:
-        raise fault(path, f"the file states the unit {stated}, not {reading.unit}; leave the option unit out")
+        raise fault(
+            path,
+            f"the file states the unit {stated}, not {reading.unit}; leave the option unit out",
+        )
     return stated or str(reading.unit)
 
 
 def settled_step(path: Path, stated: float, reading: Reading) -> float:
-    """The time step in s that a header states; raises `InputError` where the reader was told another."""
+    """The time step in s that a header states; raises `InputError` where the reader was told
+    another."""
     if reading.time_step is not None and abs(stated - reading.time_step) > 1e-6 * stated:
-        raise fault(path, f"the file states a time step of {stated:g} s, not {reading.time_step:g} s; leave the option time_step out")
+        raise fault(
+            path,
+            f"the file states a time step of {stated:g} s, not {reading.time_step:g} s; leave the"
+            " option time_step out",
+        )
     return stated
 
 
 def only_for_tables(path: Path, reading: Reading, form: str) -> None:
-    """Raises `InputError` where an option is given that means nothing to a format with a header of its own."""
+    """Raises `InputError` where an option is given that means nothing to a format with a header of
+    its own."""
     for name in ("column", "header_lines", "decimal"):
         if getattr(reading, name) is not None:
-            raise fault(path, f"is {form}, which says by itself where its numbers stand; leave the option {name} out")
+            raise fault(
+                path,
+                f"is {form}, which says by itself where its numbers stand; leave the option {name}"
+                " out",
+            )
 
 
 def checked_count(path: Path, line: int, name: str, count: str) -> int:
@@ -162,5 +201,7 @@ def checked_step(path: Path, line: int, name: str, word: str) -> float:
     """A time step that a header states, s."""
     value = number(path, line, word)
     if value < LEAST:
-        raise fault(path, f"{name} {word} is {'not positive' if value <= 0.0 else f'below {LEAST:g}'}", line)
+        raise fault(
+            path, f"{name} {word} is {'not positive' if value <= 0.0 else f'below {LEAST:g}'}", line
+        )
     return value

@@ -40,7 +40,8 @@ NumberedLines = list[tuple[int, str]]
 
 @dataclass(frozen=True)
 class _Layout:
-    """How the lines of a table are cut: at `separator` (None: at blanks), with a comma before the decimals or not."""
+    """How the lines of a table are cut: at `separator` (None: at blanks), with a comma before the
+    decimals or not."""
 
     separator: str | None
     decimal_comma: bool
@@ -51,18 +52,32 @@ class _Layout:
             words = line.split()
         else:
             try:
-                words = [word.strip() for word in next(csv.reader([line], delimiter=self.separator))]
+                words = [
+                    word.strip() for word in next(csv.reader([line], delimiter=self.separator))
+                ]
             except csv.Error as error:
                 raise fault(path, f"not a line of a CSV table: {printable(error)}", n) from None
-        return [word.replace(",", ".", 1) if _DECIMAL_COMMA.fullmatch(word) else word for word in words] if self.decimal_comma else words
+        return (
+            [
+                word.replace(",", ".", 1) if _DECIMAL_COMMA.fullmatch(word) else word
+                for word in words
+            ]
+            if self.decimal_comma
+            else words
+        )
 
 
 def read_table(path: Path, lines: list[str], reading: Reading) -> Recording:
-    """A column of times and one of accelerations, or accelerations alone; lines that start with # or % are remarks."""
+    """A column of times and one of accelerations, or accelerations alone; lines that start with #
+    or % are remarks."""
     if reading.component is not None:
         raise fault(path, "a table has columns; give the option column in place of component")
     skipped = reading.header_lines or 0
-    rows: NumberedLines = [(n, line) for n, line in enumerate(lines, 1) if n > skipped and line.strip() and line[0] not in "#%"]
+    rows: NumberedLines = [
+        (n, line)
+        for n, line in enumerate(lines, 1)
+        if n > skipped and line.strip() and line[0] not in "#%"
+    ]
     if not rows:
         raise fault(path, "empty")
     layout = _layout_of(path, rows, reading)
@@ -87,7 +102,14 @@ def read_table(path: Path, lines: list[str], reading: Reading) -> Recording:
             notes.append(f"column {time + 1} is taken as the time in s")
     form = "table" if layout.separator is None else "CSV"
     name = printable(names[place], 30) if names else f"column {place + 1}" if width > 1 else ""
-    return Recording(samples=samples * UNITS[unit], time_step=step, unit=unit, form=form, component=name, notes=tuple(notes))
+    return Recording(
+        samples=samples * UNITS[unit],
+        time_step=step,
+        unit=unit,
+        form=form,
+        component=name,
+        notes=tuple(notes),
+    )
 
 
 @dataclass(frozen=True)
@@ -106,7 +128,11 @@ class _Cells:
         for n, line in self.rows:
             cells = self.layout.words(self.path, n, line)
             if len(cells) != self.width:
-                said = f"the header names {self.width}" if self.names else f"the first line has {self.width}"
+                said = (
+                    f"the header names {self.width}"
+                    if self.names
+                    else f"the first line has {self.width}"
+                )
                 raise fault(self.path, f"{len(cells)} fields where {said}", n)
             if time is not None:
                 number(self.path, n, cells[time])
@@ -118,7 +144,9 @@ class _Cells:
 def _layout_of(path: Path, rows: NumberedLines, reading: Reading) -> _Layout:
     """How the table is cut, from its first line of numbers, else from its first line."""
     head = [line for _, line in rows[:_MOST_HEADER]]
-    with_digits = next((line for line in head if re.match(r"[\s\"]*+[-+.]?[-+.\d]", line)), head[0])[:10_000]
+    with_digits = next(
+        (line for line in head if re.match(r"[\s\"]*+[-+.]?[-+.\d]", line)), head[0]
+    )[:10_000]
     if ";" in with_digits:
         separator: str | None = ";"
     elif "\t" in with_digits:
@@ -128,12 +156,24 @@ def _layout_of(path: Path, rows: NumberedLines, reading: Reading) -> _Layout:
         # Numbers between blanks, each with its comma, cannot be fields between commas.
         if len(words) > 1 and all(_DECIMAL_COMMA.fullmatch(word) for word in words):
             return _Layout(None, True)
-        if "." not in with_digits and len(words) == 1 and reading.decimal is None and _ambiguous(rows):
-            raise fault(path, f"a comma between columns or before the decimals? {option('decimal', ',')}, or decimal .", rows[-1][0])
+        if (
+            "." not in with_digits
+            and len(words) == 1
+            and reading.decimal is None
+            and _ambiguous(rows)
+        ):
+            raise fault(
+                path,
+                f"a comma between columns or before the decimals? {option('decimal', ',')}, or"
+                " decimal .",
+                rows[-1][0],
+            )
         return _Layout(",", False)
     else:
         separator = None
-    comma = reading.decimal == "," or (reading.decimal is None and "." not in with_digits and "," in with_digits)
+    comma = reading.decimal == "," or (
+        reading.decimal is None and "." not in with_digits and "," in with_digits
+    )
     return _Layout(separator, comma)
 
 
@@ -142,7 +182,9 @@ def _ambiguous(rows: NumberedLines) -> bool:
     return all(_DECIMAL_COMMA.fullmatch(line.strip()[:60]) for _, line in rows[:_MOST_HEADER])
 
 
-def _names_of(path: Path, rows: NumberedLines, layout: _Layout, reading: Reading) -> tuple[list[str], NumberedLines]:
+def _names_of(
+    path: Path, rows: NumberedLines, layout: _Layout, reading: Reading
+) -> tuple[list[str], NumberedLines]:
     """The columns' names, [] where no line names them, and the lines of data."""
     first = layout.words(path, *rows[0])
     if any(word in NAMED or word == "time_s" for word in first):
@@ -150,19 +192,33 @@ def _names_of(path: Path, rows: NumberedLines, layout: _Layout, reading: Reading
     for index, (n, line) in enumerate(rows[:_MOST_HEADER]):
         words = layout.words(path, n, line)
         if all(map(is_number, words)):
-            above = layout.words(path, rows[index - 1][0], rows[index - 1][1].replace(" [", "[").replace(" (", "(")) if index else []
+            above = (
+                layout.words(
+                    path,
+                    rows[index - 1][0],
+                    rows[index - 1][1].replace(" [", "[").replace(" (", "("),
+                )
+                if index
+                else []
+            )
             return (above if len(above) == len(words) else []), rows[index:]
         if reading.header_lines is not None and index > 0:
             break
     if len(first) > 1 and len(rows) > 1 and len(layout.words(path, *rows[1])) == len(first):
-        return first, rows[1:]  # a column of words beside those of numbers, or a first line of data that is wrong
+        return first, rows[
+            1:
+        ]  # a column of words beside those of numbers, or a first line of data that is wrong
     raise fault(
-        path, f"no line of numbers within the first {_MOST_HEADER}; give the lines to leave out: {option('header_lines', 3)}", rows[0][0]
+        path,
+        f"no line of numbers within the first {_MOST_HEADER}; give the lines to leave out:"
+        f" {option('header_lines', 3)}",
+        rows[0][0],
     )
 
 
 def _columns(cells: _Cells, reading: Reading) -> tuple[int | None, tuple[int, str]]:
-    """The column of times, None where there is none, and that of accelerations with the unit that its name states."""
+    """The column of times, None where there is none, and that of accelerations with the unit that
+    its name states."""
     names = cells.names
     times = [index for index, name in enumerate(names) if _TIMES.fullmatch(name)]
     time: int | None = times[0] if len(times) == 1 else None
@@ -173,7 +229,11 @@ def _columns(cells: _Cells, reading: Reading) -> tuple[int | None, tuple[int, st
         return (None if time == place else time), (place, _unit_of(names[place]) if names else "")
     stated = [index for index, name in enumerate(names) if name in NAMED]
     if not stated:
-        stated = [index for index, name in enumerate(names) if index != time and name.lower().startswith("acc") and _unit_of(name)]
+        stated = [
+            index
+            for index, name in enumerate(names)
+            if index != time and name.lower().startswith("acc") and _unit_of(name)
+        ]
     rest = [index for index in range(cells.width) if index != time]
     chosen = stated if names and stated else rest
     if len(chosen) == 1 and (time is not None or reading.time_step is not None or cells.width == 1):
@@ -183,12 +243,17 @@ def _columns(cells: _Cells, reading: Reading) -> tuple[int | None, tuple[int, st
 
 def _unclear(cells: _Cells) -> InputError:
     if not cells.names:
-        return fault(cells.path, f"{cells.width} columns; give that of the accelerations: {option('column', 2)}", cells.rows[0][0])
+        return fault(
+            cells.path,
+            f"{cells.width} columns; give that of the accelerations: {option('column', 2)}",
+            cells.rows[0][0],
+        )
     line = cells.rows[0][0] - 1 if cells.rows else 1
     shown = printable(", ".join(cells.names))
     return fault(
         cells.path,
-        f"columns {shown!r}; name them time_s and exactly one of {', '.join(NAMED)}, or give the column: {option('column', 2)}",
+        f"columns {shown!r}; name them time_s and exactly one of {', '.join(NAMED)}, or give the"
+        f" column: {option('column', 2)}",
         line,
     )
 
@@ -216,11 +281,15 @@ def _decimals(word: str) -> int:
     return len(mantissa.partition(".")[2]) - max(min(int(exponent[:5] or 0), 300), -300)
 
 
-def _step_of(path: Path, words: Sequence[str], lines: Sequence[int], reading: Reading) -> tuple[float, list[str]]:
-    """The time step of a column of times, judged by the digits that they are printed with; and what to know of it.
+def _step_of(
+    path: Path, words: Sequence[str], lines: Sequence[int], reading: Reading
+) -> tuple[float, list[str]]:
+    """The time step of a column of times, judged by the digits that they are printed with; and what
+    to know of it.
 
-    The step is, of these, the first that all times agree with: the mean step as printed; a whole number of samples a second,
-    where each time is that within its last digit; the mean step, where each is that within its last digit or 1 % of a step.
+    The step is, of these, the first that all times agree with: the mean step as printed; a whole
+    number of samples a second, where each time is that within its last digit; the mean step, where
+    each is that within its last digit or 1 % of a step.
     """
     if len(words) < 2:
         raise fault(path, f"{len(words)} sample(s); at least 2 are needed to know the time step")
@@ -239,7 +308,11 @@ def _step_of(path: Path, words: Sequence[str], lines: Sequence[int], reading: Re
     rounding = 1e-9 * max(1.0, float(np.max(np.abs(time))))
     printed = float(f"{round(mean / digit) * digit:.12g}") if digit > 1e-12 else mean
     rate = 1.0 / max(round(1.0 / mean), 1)
-    candidates = [(printed, min(rounding, 0.01 * mean)), (rate, slack), (mean, max(0.01 * mean, slack) + 1e-9)]
+    candidates = [
+        (printed, min(rounding, 0.01 * mean)),
+        (rate, slack),
+        (mean, max(0.01 * mean, slack) + 1e-9),
+    ]
     if reading.time_step is not None:
         candidates = [(reading.time_step, max(0.01 * reading.time_step, slack) + 1e-9)]
     for step, most in candidates:
@@ -249,6 +322,8 @@ def _step_of(path: Path, words: Sequence[str], lines: Sequence[int], reading: Re
     else:
         first = int(uneven[0])
         hint = "" if tells else f"; times of {digit:g} s may hide it: {option('time_step', 0.005)}"
-        raise fault(path, f"time {words[first]} s is off the uniform step {step:.6g} s{hint}", lines[first])
+        raise fault(
+            path, f"time {words[first]} s is off the uniform step {step:.6g} s{hint}", lines[first]
+        )
     notes = [f"the first time is {time[0]:g} s; it is 0 here"] if abs(time[0]) > rounding else []
     return float(f"{step:.12g}") if step == mean and reading.time_step is None else step, notes

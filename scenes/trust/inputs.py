@@ -7,8 +7,9 @@
 | `{ value = 0.3, sd = 0.03, distribution = "uniform" }` | uniform with that mean and standard deviation |
 | `{ low = 0.0, high = 0.1 }` | uniform between two bounds; `value` is the middle unless it is given |
 
-Any number of a scene can be written so. `load_scene` takes the values; `load_uncertain_scene` also says what is not known.
-Numbers are independent unless a table `[correlation]` says otherwise: `"block.half_width, block.half_height" = 0.8`.
+Any number of a scene can be written so. `load_scene` takes the values; `load_uncertain_scene` also
+says what is not known. Numbers are independent unless a table `[correlation]` says otherwise:
+`"block.half_width, block.half_height" = 0.8`.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ CORRELATION = "correlation"
 
 
 class Spread(Frozen):
-    """What is known of a number: its value, and how it is distributed. See the module for the forms."""
+    """What is known of a number: its value, and how it is distributed. See the module for the
+    forms."""
 
     value: Finite | None = None
     sd: Positive | None = None
@@ -51,11 +53,18 @@ class Spread(Frozen):
             if self.value is None:
                 raise InputError("is missing beside sd", "value")
             if self.distribution == "lognormal" and self.value <= 0.0:
-                raise InputError(f"{self.value:g} is not allowed: a lognormal number is positive", "value")
+                raise InputError(
+                    f"{self.value:g} is not allowed: a lognormal number is positive", "value"
+                )
         elif self.low is None or self.high is None:
-            raise InputError("is missing: give value and sd, or low and high", "high" if self.low is not None else "low")
+            raise InputError(
+                "is missing: give value and sd, or low and high",
+                "high" if self.low is not None else "low",
+            )
         elif not self.low < self.high:
-            raise InputError(f"{self.high:g} is not allowed: must be more than low, {self.low:g}", "high")
+            raise InputError(
+                f"{self.high:g} is not allowed: must be more than low, {self.low:g}", "high"
+            )
         return self
 
     @property
@@ -82,13 +91,16 @@ class Spread(Frozen):
             return stats.uniform(mean - half, 2.0 * half)
         if self.distribution == "lognormal":
             log_variance = math.log1p((self.sd / mean) ** 2)
-            return stats.lognorm(math.sqrt(log_variance), scale=mean * math.exp(-0.5 * log_variance))
+            return stats.lognorm(
+                math.sqrt(log_variance), scale=mean * math.exp(-0.5 * log_variance)
+            )
         return stats.norm(mean, self.sd)
 
 
 @dataclass(frozen=True)
 class UncertainScene:
-    """A scene and what is not known of it: `spreads` by the place of the number, such as "floor.friction" or "walls.left.gap"."""
+    """A scene and what is not known of it: `spreads` by the place of the number, such as
+    "floor.friction" or "walls.left.gap"."""
 
     scene: Scene
     spreads: Mapping[str, Spread]
@@ -106,52 +118,75 @@ class UncertainScene:
         return bool(np.array_equal(self.correlation, np.eye(len(self.spreads))))
 
     def values(self, uniform: FloatArray) -> FloatArray:
-        """Numbers for points of the unit cube (n x count), by a Gaussian copula with the correlation."""
+        """Numbers for points of the unit cube (n x count), by a Gaussian copula with the
+        correlation."""
         from scipy import stats
 
         if not self.independent:
-            uniform = stats.norm.cdf(stats.norm.ppf(uniform) @ np.linalg.cholesky(self.correlation).T)
-        return np.column_stack([spread.law.ppf(uniform[:, k]) for k, spread in enumerate(self.spreads.values())])
+            uniform = stats.norm.cdf(
+                stats.norm.ppf(uniform) @ np.linalg.cholesky(self.correlation).T
+            )
+        return np.column_stack(
+            [spread.law.ppf(uniform[:, k]) for k, spread in enumerate(self.spreads.values())]
+        )
 
     def at(self, values: Sequence[float]) -> Scene:
-        """The scene with these values of its uncertain numbers. Raises `InputError` where one is not allowed."""
+        """The scene with these values of its uncertain numbers. Raises `InputError` where one is
+        not allowed."""
         try:
-            return with_numbers(self.scene, dict(zip(self.names, (float(value) for value in values), strict=True)))
+            return with_numbers(
+                self.scene, dict(zip(self.names, (float(value) for value in values), strict=True))
+            )
         except InputError as error:
-            raise InputError(f'{error}; a sample of the scene\'s inputs: distribution = "lognormal" or bounds keep it inside') from None
+            raise InputError(
+                f'{error}; a sample of the scene\'s inputs: distribution = "lognormal" or bounds keep it inside'
+            ) from None
 
 
 def split(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Spread], Mapping[str, Any]]:
-    """The tables of a scene file with plain numbers, the spread of each uncertain one, and the table of correlations."""
+    """The tables of a scene file with plain numbers, the spread of each uncertain one, and the
+    table of correlations."""
     spreads: dict[str, Spread] = {}
     tables = {key: value for key, value in data.items() if key != CORRELATION}
     plain = _plain(tables, (), spreads)
     return plain, spreads, data.get(CORRELATION, {})
 
 
-def uncertain_scene(scene: Scene, spreads: Mapping[str, Spread], correlations: Mapping[str, Any]) -> UncertainScene:
-    """A scene with what is not known of it; `correlations` maps "a, b" to a number between -1 and 1. Raises `InputError`."""
+def uncertain_scene(
+    scene: Scene, spreads: Mapping[str, Spread], correlations: Mapping[str, Any]
+) -> UncertainScene:
+    """A scene with what is not known of it; `correlations` maps "a, b" to a number between -1 and
+    1. Raises `InputError`."""
     names = list(spreads)
     matrix = np.eye(len(names))
     for key, value in correlations.items():
         pair = [part.strip() for part in key.split(",")]
         where = f"{CORRELATION}.{key}"
         if len(pair) != 2 or pair[0] == pair[1]:
-            raise InputError("give two uncertain numbers, as in 'floor.friction, walls.left.gap'", where)
+            raise InputError(
+                "give two uncertain numbers, as in 'floor.friction, walls.left.gap'", where
+            )
         for name in pair:
             if name not in names:
-                raise InputError(f"{name!r} is not an uncertain number of the scene{suggestion(name, names)}", where)
+                raise InputError(
+                    f"{name!r} is not an uncertain number of the scene{suggestion(name, names)}",
+                    where,
+                )
         if isinstance(value, bool) or not isinstance(value, int | float) or not -1.0 < value < 1.0:
             raise InputError(f"{value!r} is not allowed: give a number between -1 and 1", where)
         i, j = (names.index(name) for name in pair)
         matrix[i, j] = matrix[j, i] = float(value)
     if names and np.linalg.eigvalsh(matrix)[0] <= 0.0:
-        raise InputError("these correlations contradict each other: the matrix is not positive definite", CORRELATION)
+        raise InputError(
+            "these correlations contradict each other: the matrix is not positive definite",
+            CORRELATION,
+        )
     return UncertainScene(scene, dict(spreads), matrix)
 
 
 def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
-    """The scene with some of its numbers changed, by their places; validated. Raises `InputError`."""
+    """The scene with some of its numbers changed, by their places; validated. Raises
+    `InputError`."""
     change: dict[str, Any] = {}
     walls = list(scene.walls)
     for place, value in numbers.items():
@@ -169,7 +204,9 @@ def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
 
 def _changed(part: Part, name: str, value: float, place: str) -> Part:
     try:
-        return type(part)(**{**{field: getattr(part, field) for field in type(part).model_fields}, name: value})
+        return type(part)(
+            **{**{field: getattr(part, field) for field in type(part).model_fields}, name: value}
+        )
     except InputError as error:
         raise InputError(error.reason, f"{place}.{error.key}") from None
 
@@ -181,11 +218,16 @@ def _plain(value: Any, place: Place, spreads: dict[str, Spread]) -> Any:
             try:
                 spreads[name] = Spread(**value)
             except InputError as error:
-                raise InputError(error.reason, f"{name}.{error.key}" if error.key else name) from None
+                raise InputError(
+                    error.reason, f"{name}.{error.key}" if error.key else name
+                ) from None
             return spreads[name].nominal
         return {key: _plain(item, (*place, key), spreads) for key, item in value.items()}
     if isinstance(value, list):
-        return [_plain(item, (*place, part), spreads) for part, item in zip(_labels(value), value, strict=True)]
+        return [
+            _plain(item, (*place, part), spreads)
+            for part, item in zip(_labels(value), value, strict=True)
+        ]
     return value
 
 

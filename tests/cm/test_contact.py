@@ -26,7 +26,14 @@ def integrated_restitution(xi: float) -> float:
         return q[0] + 2.0 * xi * q[1]
 
     force_gone.terminal, force_gone.direction = True, -1
-    run = solve_ivp(lambda _t, q: [q[1], -q[0] - 2.0 * xi * q[1]], (0.0, 50.0), [0.0, 1.0], events=force_gone, rtol=1e-11, atol=1e-13)
+    run = solve_ivp(
+        lambda _t, q: [q[1], -q[0] - 2.0 * xi * q[1]],
+        (0.0, 50.0),
+        [0.0, 1.0],
+        events=force_gone,
+        rtol=1e-11,
+        atol=1e-13,
+    )
     return -run.y_events[0][0][1]
 
 
@@ -60,7 +67,9 @@ def test_the_least_restitution_vanishes_with_the_length_of_a_contact():
 @pytest.mark.parametrize("e", [0.25, 0.5, 0.75, 1.0])
 def test_damping_ratio_of_paper_suits_the_contact_that_may_pull(e):
     xi = damping_ratio_of_paper(e)
-    assert math.exp(-math.pi * xi / math.sqrt(1.0 - xi * xi)) == pytest.approx(e, rel=1e-12)  # after half a damped wave
+    assert math.exp(-math.pi * xi / math.sqrt(1.0 - xi * xi)) == pytest.approx(
+        e, rel=1e-12
+    )  # after half a damped wave
     assert restitution_of(xi) >= e  # so the clamped contact rebounds faster
 
 
@@ -82,7 +91,10 @@ def test_normal_forces_feel_each_other():
     force1, force2 = normal_forces(f1, f2, d1, d2, k11, k12, k21, k22)
     assert force1 + d1 * (k11 * force1 + k12 * force2) == pytest.approx(f1)
     assert force2 + d2 * (k21 * force1 + k22 * force2) == pytest.approx(f2)
-    assert normal_forces(0.1, 9.0, d1, d2, k11, k12, k21, k22) == (0.0, pytest.approx(9.0 / (1.0 + d2 * k22)))
+    assert normal_forces(0.1, 9.0, d1, d2, k11, k12, k21, k22) == (
+        0.0,
+        pytest.approx(9.0 / (1.0 + d2 * k22)),
+    )
 
 
 @pytest.mark.parametrize("x", [0.01, 0.3, 2.0, 100.0])
@@ -94,7 +106,15 @@ def test_damper_stops_a_corner_without_overshoot(x):
 
 
 def test_friction_sticks_up_to_static_and_slips_at_kinetic_friction():
-    law = {"stiffness": 100.0, "damping": 0.0, "mobility": 0.0, "mu_s": 0.5, "mu_k": 0.3, "normal": 10.0, "rate": 0.0}
+    law = {
+        "stiffness": 100.0,
+        "damping": 0.0,
+        "mobility": 0.0,
+        "mu_s": 0.5,
+        "mu_k": 0.3,
+        "normal": 10.0,
+        "rate": 0.0,
+    }
     assert friction_force(stretch=0.04, slipping=False, **law) == (pytest.approx(-4.0), False)
     assert friction_force(stretch=0.04, slipping=True, **law) == (pytest.approx(-3.0), True)
     assert friction_force(stretch=-0.06, slipping=False, **law) == (pytest.approx(3.0), True)
@@ -109,7 +129,8 @@ def test_stiff_friction_stops_the_corner_at_once():
 
 
 def impact_velocity(k_n, k_t, k_c, normal, tangential, mu, e):
-    """Push of the rigid impact with Newton's restitution by sweeping (Gauss-Seidel) over the two unknown impulses."""
+    """Push of the rigid impact with Newton's restitution by sweeping (Gauss-Seidel) over the two
+    unknown impulses."""
     push = shear = 0.0
     for _ in range(500):
         push = max(0.0, (-(1.0 + e) * normal - k_c * shear) / k_n)
@@ -122,12 +143,18 @@ def impact_velocity(k_n, k_t, k_c, normal, tangential, mu, e):
 def test_effective_mass_is_the_impulse_of_the_rigid_impact(mu, k_c):
     k_n, k_t, e = 1.2, 3.8, 0.5
     push = impact_velocity(k_n, k_t, k_c, -1.0, 0.0, mu, e)
-    assert effective_mass(k_n, k_t, k_c, -1.0, 0.0, mu, e) == pytest.approx(push / (1.0 + e), rel=1e-9)
+    assert effective_mass(k_n, k_t, k_c, -1.0, 0.0, mu, e) == pytest.approx(
+        push / (1.0 + e), rel=1e-9
+    )
 
 
 def test_effective_mass_of_a_corner_that_slides_on():
-    assert effective_mass(1.2, 3.8, 0.7, -1.0, 50.0, 0.3, 0.5) == pytest.approx(1.0 / (1.2 - 0.3 * 0.7))
-    assert effective_mass(1.2, 3.8, 0.7, -1.0, -50.0, 0.3, 0.5) == pytest.approx(1.0 / (1.2 + 0.3 * 0.7))
+    assert effective_mass(1.2, 3.8, 0.7, -1.0, 50.0, 0.3, 0.5) == pytest.approx(
+        1.0 / (1.2 - 0.3 * 0.7)
+    )
+    assert effective_mass(1.2, 3.8, 0.7, -1.0, -50.0, 0.3, 0.5) == pytest.approx(
+        1.0 / (1.2 + 0.3 * 0.7)
+    )
 
 
 def test_two_corners_share_the_mass_as_the_impulses_of_the_rigid_impact():

@@ -1,4 +1,5 @@
-"""The Continuous Model tends to the rigid block whose floor can only push, at the order that its contact says."""
+"""The Continuous Model tends to the rigid block whose floor can only push, at the order that its
+contact says."""
 
 import csv
 import math
@@ -19,8 +20,13 @@ CASES = Path(__file__).parents[1] / "data" / "unilateral_ricker_cases.csv"
 
 def rms(history, theta):
     """RMS difference of theta from the array, in alpha."""
-    rows = min(len(theta), len(history.channels["theta"]))  # one may overturn a step before the other
-    return float(np.sqrt(np.mean((history.channels["theta"][:rows] - theta[:rows]) ** 2))) / PAPER_BLOCK.alpha
+    rows = min(
+        len(theta), len(history.channels["theta"])
+    )  # one may overturn a step before the other
+    return (
+        float(np.sqrt(np.mean((history.channels["theta"][:rows] - theta[:rows]) ** 2)))
+        / PAPER_BLOCK.alpha
+    )
 
 
 def rigid(scene):
@@ -28,7 +34,8 @@ def rigid(scene):
 
 
 def rocking(scene, tilt):
-    """theta of a block that rocks without slip from rest at `tilt`, with Housner's impacts; adaptive steps to 1e-12."""
+    """theta of a block that rocks without slip from rest at `tilt`, with Housner's impacts;
+    adaptive steps to 1e-12."""
     radius, alpha = PAPER_BLOCK.radius, PAPER_BLOCK.alpha
     ratio = 1.0 - 1.5 * math.sin(alpha) ** 2
 
@@ -44,7 +51,16 @@ def rocking(scene, tilt):
     grid = scene.output_times
     theta, start, q, pivot = np.zeros_like(grid), 0.0, [tilt, 0.0], tilt
     while start < grid[-1]:
-        run = solve_ivp(motion, (start, grid[-1] + 1e-9), q, method="DOP853", rtol=1e-12, atol=1e-14, events=upright, dense_output=True)
+        run = solve_ivp(
+            motion,
+            (start, grid[-1] + 1e-9),
+            q,
+            method="DOP853",
+            rtol=1e-12,
+            atol=1e-14,
+            events=upright,
+            dense_output=True,
+        )
         inside = (grid >= start) & (grid <= run.t[-1])
         theta[inside] = run.sol(grid[inside])[0]
         start, q, pivot = run.t[-1], [0.0, ratio * run.y[1][-1]], -pivot
@@ -61,18 +77,34 @@ def test_error_falls_with_the_penetration_in_rocking():
         duration=3.0,
     )
     exact = rocking(scene, 0.4 * PAPER_BLOCK.alpha)
-    errors = [rms(ContinuousModel(penetration=depth).simulate(scene), exact) for depth in (1e-6, 1e-7, 1e-8, 1e-9)]
+    errors = [
+        rms(ContinuousModel(penetration=depth).simulate(scene), exact)
+        for depth in (1e-6, 1e-7, 1e-8, 1e-9)
+    ]
     orders = -np.diff(np.log10(errors))
     assert errors[-1] < 1e-7
     assert np.all(orders > 0.8), errors
 
 
 def test_error_falls_with_the_duration_of_a_wall_contact():
-    pulse = Ricker(amplitude=3.0 * G * math.tan(PAPER_BLOCK.alpha), period=2.0 * math.pi / (6.0 * PAPER_BLOCK.frequency_parameter))
+    pulse = Ricker(
+        amplitude=3.0 * G * math.tan(PAPER_BLOCK.alpha),
+        period=2.0 * math.pi / (6.0 * PAPER_BLOCK.frequency_parameter),
+    )
     walls = [Wall(side="left", gap=0.003, restitution=0.5)]
-    scene = Scene(name="wall", block=PAPER_BLOCK, floor=Floor(friction=0.6), walls=walls, excitation=pulse, duration=4.0)
+    scene = Scene(
+        name="wall",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=0.6),
+        walls=walls,
+        excitation=pulse,
+        duration=4.0,
+    )
     exact = rigid(scene)
-    errors = [rms(ContinuousModel(penetration=depth).simulate(scene), exact) for depth in (1e-5, 1e-7, 1e-9)]
+    errors = [
+        rms(ContinuousModel(penetration=depth).simulate(scene), exact)
+        for depth in (1e-5, 1e-7, 1e-9)
+    ]
     orders = -np.diff(np.log10(errors)) / 2.0
     assert np.all(orders > 0.35), errors
     assert errors[-1] < 2e-4
@@ -96,13 +128,18 @@ def test_el_centro_without_a_wall(name):
 def test_paper_rule_is_further_off():
     scene = load_scene("fig4a").replace(duration=12.0)
     exact = rigid(scene)
-    paper, calibrated = (rms(ContinuousModel(stiffness=9e6, damping_rule=rule).simulate(scene), exact) for rule in ("paper", "calibrated"))
+    paper, calibrated = (
+        rms(ContinuousModel(stiffness=9e6, damping_rule=rule).simulate(scene), exact)
+        for rule in ("paper", "calibrated")
+    )
     assert paper > 5.0 * calibrated
 
 
 @pytest.mark.parametrize("gap", [0.003, 0.053, 0.103])
 @pytest.mark.parametrize("e", [0.0, 0.5])
-@pytest.mark.parametrize(("omega", "amplitude", "mu"), [(4.5, 2.5, 0.3), (6.0, 2.5, 0.6), (3.0, 1.8, 0.3)])
+@pytest.mark.parametrize(
+    ("omega", "amplitude", "mu"), [(4.5, 2.5, 0.3), (6.0, 2.5, 0.6), (3.0, 1.8, 0.3)]
+)
 def test_pulses_beside_a_wall(gap, e, omega, amplitude, mu):
     period = 2.0 * math.pi / (omega * PAPER_BLOCK.frequency_parameter)
     scene = Scene(
@@ -118,18 +155,25 @@ def test_pulses_beside_a_wall(gap, e, omega, amplitude, mu):
 
 
 def peak_errors(rows):
-    """Errors of the peak rotation (alpha) where the block stays, and the rows whose outcome is another."""
+    """Errors of the peak rotation (alpha) where the block stays, and the rows whose outcome is
+    another."""
     model, errors, missed = ContinuousModel(), [], []
     names = {"overturned left": "ccw", "overturned right": "cw"}
     for row in rows:
         period = 2.0 * math.pi / (float(row["wp_over_p"]) * PAPER_BLOCK.frequency_parameter)
-        walls = [] if row["side"] == "none" else [Wall(side=row["side"], gap=float(row["gap"]), restitution=float(row["e_w"]))]
+        walls = (
+            []
+            if row["side"] == "none"
+            else [Wall(side=row["side"], gap=float(row["gap"]), restitution=float(row["e_w"]))]
+        )
         scene = Scene(
             name="case",
             block=PAPER_BLOCK,
             floor=Floor(friction=float(row["mu"])),
             walls=walls,
-            excitation=Ricker(amplitude=float(row["ap_ratio"]) * G * math.tan(PAPER_BLOCK.alpha), period=period),
+            excitation=Ricker(
+                amplitude=float(row["ap_ratio"]) * G * math.tan(PAPER_BLOCK.alpha), period=period
+            ),
             duration=4.0 * period + 8.0,
             output_step=0.0005,
         )
@@ -137,7 +181,9 @@ def peak_errors(rows):
         if names.get(history.outcome, "safe") != row["outcome"]:
             missed.append(row)
         elif row["outcome"] == "safe":
-            errors.append(abs(history.peak_rotation / PAPER_BLOCK.alpha - float(row["peak_theta_over_alpha"])))
+            errors.append(
+                abs(history.peak_rotation / PAPER_BLOCK.alpha - float(row["peak_theta_over_alpha"]))
+            )
     return np.array(errors), missed
 
 
@@ -154,7 +200,9 @@ def test_peaks_without_a_wall_are_those_of_the_unilateral_model():
 
 
 def test_peaks_beside_walls_are_those_of_the_unilateral_model():
-    errors, missed = peak_errors([row for row in unambiguous_cases() if row["side"] != "none"][::10])
+    errors, missed = peak_errors(
+        [row for row in unambiguous_cases() if row["side"] != "none"][::10]
+    )
     assert missed == []
     assert len(errors) > 30
     assert np.median(errors) < 2e-5
@@ -163,7 +211,8 @@ def test_peaks_beside_walls_are_those_of_the_unilateral_model():
 
 @pytest.mark.slow
 def test_peaks_and_outcomes_of_all_cases():
-    # Outcome missed in one: two corners strike 25 microseconds apart, which a contact of 0.1 ms takes for one impact.
+    # Outcome missed in one: two corners strike 25 microseconds apart, which a contact of 0.1 ms
+    # takes for one impact.
     errors, missed = peak_errors(unambiguous_cases())
     assert len(missed) <= 1
     assert len(errors) > 340

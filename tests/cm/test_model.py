@@ -9,7 +9,18 @@ import pytest
 from scipy.integrate import quad
 
 from rockcheck.cm import ContinuousModel
-from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Ricker, Scene, Sine, Wall, load_scene
+from rockcheck.scenes import (
+    Block,
+    Floor,
+    InputError,
+    ModelFailure,
+    Record,
+    Ricker,
+    Scene,
+    Sine,
+    Wall,
+    load_scene,
+)
 from rockcheck.scenes.kinematics import energy
 from rockcheck.scenes.scene import PAPER_BLOCK
 
@@ -17,7 +28,16 @@ G = 9.81
 
 
 def scene(**change):
-    return Scene(**{"name": "test", "block": PAPER_BLOCK, "floor": Floor(friction=0.3), "duration": 2.0, "output_step": 0.001} | change)
+    return Scene(
+        **{
+            "name": "test",
+            "block": PAPER_BLOCK,
+            "floor": Floor(friction=0.3),
+            "duration": 2.0,
+            "output_step": 0.001,
+        }
+        | change
+    )
 
 
 def strikes(history, kind):
@@ -27,7 +47,10 @@ def strikes(history, kind):
 def test_import_is_light():
     heavy = "numba", "pandas", "matplotlib", "mujoco", "pybullet"
     check = f"import sys, cm; sys.exit(','.join(set({heavy!r}) & set(sys.modules)))"
-    assert subprocess.run([sys.executable, "-c", check], capture_output=True, text=True).stderr.strip() == ""
+    assert (
+        subprocess.run([sys.executable, "-c", check], capture_output=True, text=True).stderr.strip()
+        == ""
+    )
 
 
 # Settings
@@ -63,12 +86,22 @@ def test_stiffness_and_step_follow_from_the_penetration():
 
 def test_depth_under_own_weight_is_the_target_penetration():
     history = ContinuousModel(penetration=2e-6).simulate(scene(duration=0.2))
-    assert PAPER_BLOCK.half_height - history.channels["y"][-1] == pytest.approx(1e-6, rel=1e-6)  # two corners share the weight
+    assert PAPER_BLOCK.half_height - history.channels["y"][-1] == pytest.approx(
+        1e-6, rel=1e-6
+    )  # two corners share the weight
 
 
-@pytest.mark.parametrize("walls", [[], [Wall(side="left", gap=0.0, restitution=1.0), Wall(side="right", gap=0.0, restitution=0.5)]])
+@pytest.mark.parametrize(
+    "walls",
+    [
+        [],
+        [Wall(side="left", gap=0.0, restitution=1.0), Wall(side="right", gap=0.0, restitution=0.5)],
+    ],
+)
 def test_block_left_alone_stays(walls):
-    history = ContinuousModel(penetration=1e-5).simulate(scene(duration=60.0, output_step=0.1, walls=walls))
+    history = ContinuousModel(penetration=1e-5).simulate(
+        scene(duration=60.0, output_step=0.1, walls=walls)
+    )
     assert history.outcome == "at rest"
     assert history.event_list == ()
     for channel in ("x", "theta", "x_dot", "y_dot", "theta_dot", "slip"):
@@ -78,7 +111,9 @@ def test_block_left_alone_stays(walls):
 
 def test_block_shaken_below_slip_and_uplift_does_not_creep():
     penetration = 1e-5
-    shaking = Record.from_samples(0.9 * 0.2 * G * np.sin(np.arange(3000) * 0.1) + 0.05 * 0.2 * G, 0.02)
+    shaking = Record.from_samples(
+        0.9 * 0.2 * G * np.sin(np.arange(3000) * 0.1) + 0.05 * 0.2 * G, 0.02
+    )
     history = ContinuousModel(penetration=penetration).simulate(
         scene(floor=Floor(friction=0.2), excitation=shaking, duration=61.0, output_step=0.005)
     )
@@ -95,13 +130,17 @@ def test_block_shaken_below_slip_and_uplift_does_not_creep():
 def test_slide_stops_where_coulomb_says(speed):
     mu = 0.2
     history = ContinuousModel().simulate(scene(floor=Floor(friction=mu), initial_velocity=speed))
-    assert history.channels["x"][-1] == pytest.approx(math.copysign(speed**2 / (2.0 * mu * G), speed), rel=1e-5)
+    assert history.channels["x"][-1] == pytest.approx(
+        math.copysign(speed**2 / (2.0 * mu * G), speed), rel=1e-5
+    )
     assert history.outcome == "at rest"
 
 
 def test_static_friction_holds_until_its_own_limit():
     ramp = Record.from_samples([0.0, -0.3 * G], 3.0)
-    history = ContinuousModel().simulate(scene(floor=Floor(friction=0.1, static_friction=0.2), excitation=ramp, duration=2.99))
+    history = ContinuousModel().simulate(
+        scene(floor=Floor(friction=0.1, static_friction=0.2), excitation=ramp, duration=2.99)
+    )
     t, slip = history.channels["t"], history.channels["slip"]
     start = 2.0  # u = 0.2 g
     assert np.max(np.abs(slip[t < start])) < 1e-7
@@ -111,7 +150,9 @@ def test_static_friction_holds_until_its_own_limit():
 
 
 def test_frictionless_block_is_left_behind_by_its_base():
-    history = ContinuousModel().simulate(scene(floor=Floor(friction=0.0), excitation=Record.from_samples([2.0, 2.0], 3.0)))
+    history = ContinuousModel().simulate(
+        scene(floor=Floor(friction=0.0), excitation=Record.from_samples([2.0, 2.0], 3.0))
+    )
     assert history.channels["x"] == pytest.approx(-(history.channels["t"] ** 2), abs=1e-8)
     assert np.max(np.abs(history.channels["theta"])) < 1e-9
 
@@ -121,7 +162,9 @@ def test_frictionless_block_is_left_behind_by_its_base():
 
 @pytest.mark.parametrize("mu", [0.2, 0.3, 0.6, 1.0])
 def test_floor_impact_has_housners_ratio_and_does_not_slip(mu):
-    history = ContinuousModel().simulate(scene(floor=Floor(friction=mu), initial_rotation=0.5 * PAPER_BLOCK.alpha))
+    history = ContinuousModel().simulate(
+        scene(floor=Floor(friction=mu), initial_rotation=0.5 * PAPER_BLOCK.alpha)
+    )
     c = history.channels
     e = energy(PAPER_BLOCK, G, c["y"], c["theta"], c["x_dot"], c["y_dot"], c["theta_dot"])
     ratio = 1.0 - 1.5 * math.sin(PAPER_BLOCK.alpha) ** 2
@@ -134,28 +177,43 @@ def test_floor_impact_has_housners_ratio_and_does_not_slip(mu):
 
 
 def test_first_floor_impact_comes_at_housners_quarter_period_with_his_impulse():
-    # theta'' = -p^2 sin(alpha - theta) from rest at `tilt`: w^2 = 2 p^2 (cos(alpha - tilt) - cos(alpha - theta)), theta = tilt (1 - z^2)
-    tilt, alpha, p = 0.6 * PAPER_BLOCK.alpha, PAPER_BLOCK.alpha, math.sqrt(0.75 * G / PAPER_BLOCK.radius)
+    # theta'' = -p^2 sin(alpha - theta) from rest at `tilt`: w^2 = 2 p^2 (cos(alpha - tilt) -
+    # cos(alpha - theta)), theta = tilt (1 - z^2)
+    tilt, alpha, p = (
+        0.6 * PAPER_BLOCK.alpha,
+        PAPER_BLOCK.alpha,
+        math.sqrt(0.75 * G / PAPER_BLOCK.radius),
+    )
 
     def spin(theta):
         return math.sqrt(2.0 * p * p * (math.cos(alpha - tilt) - math.cos(alpha - theta)))
 
     quarter = quad(lambda z: 2.0 * tilt * z / spin(tilt * (1.0 - z * z)), 0.0, 1.0, epsabs=1e-12)[0]
-    history = ContinuousModel().simulate(scene(floor=Floor(friction=0.6), initial_rotation=tilt, duration=quarter + 0.01))
+    history = ContinuousModel().simulate(
+        scene(floor=Floor(friction=0.6), initial_rotation=tilt, duration=quarter + 0.01)
+    )
     (strike,) = strikes(history, "floor impact")
     assert strike.t == pytest.approx(quarter, abs=1e-6)
     impulse = PAPER_BLOCK.radius * math.sin(alpha) * (2.0 - 1.5 * math.sin(alpha) ** 2) * spin(0.0)
-    assert strike.impulse == pytest.approx(impulse + G * 2e-3, abs=0.2 * G * 2e-3)  # and the weight that it carries for 2 ms
+    assert strike.impulse == pytest.approx(
+        impulse + G * 2e-3, abs=0.2 * G * 2e-3
+    )  # and the weight that it carries for 2 ms
 
 
 def test_uplift_asks_for_more_than_tan_alpha():
     def peak(ratio):
         push = Record.from_samples([ratio * math.tan(PAPER_BLOCK.alpha) * G] * 2, 0.2)
-        return ContinuousModel().simulate(scene(floor=Floor(friction=0.6), excitation=push, duration=0.2)).peak_rotation
+        return (
+            ContinuousModel()
+            .simulate(scene(floor=Floor(friction=0.6), excitation=push, duration=0.2))
+            .peak_rotation
+        )
 
     assert peak(0.999) < 1e-7
     # theta'' = (3/(4R)) (u cos(alpha - theta) - g sin(alpha - theta)), to second order in the time
-    assert peak(1.1) == pytest.approx(0.75 / PAPER_BLOCK.radius * 0.1 * G * math.sin(PAPER_BLOCK.alpha) * 0.2**2 / 2.0, rel=0.05)
+    assert peak(1.1) == pytest.approx(
+        0.75 / PAPER_BLOCK.radius * 0.1 * G * math.sin(PAPER_BLOCK.alpha) * 0.2**2 / 2.0, rel=0.05
+    )
 
 
 def test_energy_never_rises_without_excitation():
@@ -178,7 +236,9 @@ def test_energy_never_rises_without_excitation():
 @pytest.mark.parametrize("e", [0.5, 1.0])
 def test_dropped_block_bounces_to_its_height(e):
     height = 0.01
-    history = ContinuousModel().simulate(scene(floor=Floor(friction=0.3, restitution=e), initial_height=height, duration=0.2))
+    history = ContinuousModel().simulate(
+        scene(floor=Floor(friction=0.3, restitution=e), initial_height=height, duration=0.2)
+    )
     c = history.channels
     fall = math.sqrt(2.0 * height / G)
     first = strikes(history, "floor impact")[:2]
@@ -193,7 +253,12 @@ def test_dropped_block_bounces_to_its_height(e):
 def test_block_that_slides_flat_rebounds_from_the_wall(e):
     speed = 0.4
     history = ContinuousModel().simulate(
-        scene(floor=Floor(friction=0.0), walls=[Wall(side="right", gap=0.1, restitution=e)], initial_velocity=speed, duration=0.5)
+        scene(
+            floor=Floor(friction=0.0),
+            walls=[Wall(side="right", gap=0.1, restitution=e)],
+            initial_velocity=speed,
+            duration=0.5,
+        )
     )
     assert history.channels["x_dot"][-1] == pytest.approx(-e * speed, abs=2e-3 * speed)
     impacts = strikes(history, "wall impact")
@@ -203,8 +268,13 @@ def test_block_that_slides_flat_rebounds_from_the_wall(e):
 
 
 def test_block_goes_to_and_fro_between_two_walls():
-    walls = [Wall(side="left", gap=0.05, restitution=1.0), Wall(side="right", gap=0.15, restitution=1.0)]
-    history = ContinuousModel().simulate(scene(floor=Floor(friction=0.0), walls=walls, initial_velocity=0.5, duration=2.0))
+    walls = [
+        Wall(side="left", gap=0.05, restitution=1.0),
+        Wall(side="right", gap=0.15, restitution=1.0),
+    ]
+    history = ContinuousModel().simulate(
+        scene(floor=Floor(friction=0.0), walls=walls, initial_velocity=0.5, duration=2.0)
+    )
     times = [event.t for event in strikes(history, "wall impact")[::2]]
     assert times == pytest.approx([0.3, 0.7, 1.1, 1.5, 1.9], abs=1e-3)
     assert np.max(history.channels["x"]) == pytest.approx(0.15, abs=1e-4)
@@ -218,9 +288,13 @@ def test_record_is_linear_between_its_samples():
     rng = np.random.default_rng(7)
     samples = rng.normal(0.0, 4.0, 40)
     coarse = Record.from_samples(samples, 0.05)
-    fine = Record.from_samples(np.interp(np.arange(1951) * 0.001, np.arange(40) * 0.05, samples), 0.001)
+    fine = Record.from_samples(
+        np.interp(np.arange(1951) * 0.001, np.arange(40) * 0.05, samples), 0.001
+    )
     model = ContinuousModel()
-    one, two = (model.simulate(scene(excitation=record)).channels["theta"] for record in (coarse, fine))
+    one, two = (
+        model.simulate(scene(excitation=record)).channels["theta"] for record in (coarse, fine)
+    )
     assert np.max(np.abs(one)) > 0.01
     assert one == pytest.approx(two, abs=1e-9)
 
@@ -230,12 +304,16 @@ def test_vertical_acceleration_is_added_gravity():
     lifted = scene(vertical=Record.from_samples([0.5 * G, 0.5 * G], 3.0), **tilted)
     heavier = scene(gravity=1.5 * G, **tilted)
     model = ContinuousModel(stiffness=1e9)
-    assert model.simulate(lifted).channels["theta"] == pytest.approx(model.simulate(heavier).channels["theta"], abs=1e-7)
+    assert model.simulate(lifted).channels["theta"] == pytest.approx(
+        model.simulate(heavier).channels["theta"], abs=1e-7
+    )
 
 
 def test_mirrored_scene_has_the_mirrored_motion():
     pulse = Ricker(amplitude=6.0, period=0.8)
-    one = scene(excitation=pulse, walls=[Wall(side="left", gap=0.03, restitution=0.5)], duration=3.0)
+    one = scene(
+        excitation=pulse, walls=[Wall(side="left", gap=0.03, restitution=0.5)], duration=3.0
+    )
     left, right = (ContinuousModel().simulate(s) for s in (one, one.mirrored()))
     assert left.peak_rotation > 0.02
     assert left.channels["theta"] == pytest.approx(-right.channels["theta"], abs=1e-7)
@@ -247,15 +325,22 @@ def test_mirrored_scene_has_the_mirrored_motion():
 
 @pytest.mark.parametrize(("amplitude", "side"), [(6.3, "left"), (-6.3, "right")])
 def test_overturned_block_ends_the_run(amplitude, side):
-    history = ContinuousModel().simulate(scene(excitation=Ricker(amplitude=amplitude, period=3.0), duration=20.0))
+    history = ContinuousModel().simulate(
+        scene(excitation=Ricker(amplitude=amplitude, period=3.0), duration=20.0)
+    )
     assert history.outcome == f"overturned {side}"
     assert history.event_list[-1].kind == f"overturned {side}"
     assert np.max(np.abs(history.channels["theta"])) < math.pi / 2
-    assert history.channels["t"][-1] <= history.event_list[-1].t < history.channels["t"][-1] + 0.001 + 1e-9
+    assert (
+        history.channels["t"][-1]
+        <= history.event_list[-1].t
+        < history.channels["t"][-1] + 0.001 + 1e-9
+    )
 
 
 def test_blow_up_is_a_failure():
-    """The paper's damping, constant whatever the contact, with a step far above what its stiffness stands."""
+    """The paper's damping, constant whatever the contact, with a step far above what its stiffness
+    stands."""
     shaken = scene(
         floor=Floor(friction=0.6),
         walls=(Wall(side="left", gap=0.05, restitution=0.5),),
@@ -268,7 +353,11 @@ def test_blow_up_is_a_failure():
 
 
 def test_steps_far_too_long_do_not_add_energy():
-    tilted = scene(initial_rotation=0.5 * PAPER_BLOCK.alpha, floor=Floor(friction=0.6, restitution=0.5), output_step=0.02)
+    tilted = scene(
+        initial_rotation=0.5 * PAPER_BLOCK.alpha,
+        floor=Floor(friction=0.6, restitution=0.5),
+        output_step=0.02,
+    )
     for step in (1e-3, 5e-3, 2e-2):
         history = ContinuousModel(time_step=step).simulate(tilted)
         assert history.peak_rotation == pytest.approx(0.5 * PAPER_BLOCK.alpha)
@@ -280,7 +369,10 @@ def test_endless_run_is_refused():
 
 
 def test_short_block_and_rattling_walls_come_to_an_end():
-    walls = [Wall(side="left", gap=0.0, restitution=1.0), Wall(side="right", gap=0.001, restitution=1.0)]
+    walls = [
+        Wall(side="left", gap=0.0, restitution=1.0),
+        Wall(side="right", gap=0.001, restitution=1.0),
+    ]
     small = scene(
         block=Block(half_width=0.05, half_height=0.04),
         floor=Floor(friction=0.3, restitution=0.9),
@@ -290,7 +382,10 @@ def test_short_block_and_rattling_walls_come_to_an_end():
     )
     history = ContinuousModel().simulate(small)
     assert len(history.channels["t"]) == len(small.output_times)
-    assert all(np.all(np.isfinite(history.channels[c])) for c in ("x", "y", "theta", "x_dot", "y_dot", "theta_dot"))
+    assert all(
+        np.all(np.isfinite(history.channels[c]))
+        for c in ("x", "y", "theta", "x_dot", "y_dot", "theta_dot")
+    )
 
 
 @pytest.mark.parametrize("name", ["fig4a", "fig5b"])
@@ -299,6 +394,12 @@ def test_named_scene_runs(name):
     history = ContinuousModel().simulate(shown)
     assert history.outcome == "at rest"
     assert np.array_equal(history.channels["t"], shown.output_times)
-    assert history.cost.evaluations >= history.cost.steps > 36.0 / ContinuousModel().time_step_in(shown)
+    assert (
+        history.cost.evaluations
+        >= history.cost.steps
+        > 36.0 / ContinuousModel().time_step_in(shown)
+    )
     assert bool(strikes(history, "wall impact")) == bool(shown.walls)
-    assert [event.t for event in history.event_list] == sorted(event.t for event in history.event_list)
+    assert [event.t for event in history.event_list] == sorted(
+        event.t for event in history.event_list
+    )

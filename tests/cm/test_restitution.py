@@ -17,23 +17,51 @@ RESTITUTIONS = [0.0, 0.25, 0.5, 0.75, 1.0]
 def scene(*, friction=0.3, floor=0.0, wall=None, gap=0.03, side="left", **change):
     walls = [] if wall is None else [Wall(side=side, gap=gap, restitution=wall)]
     floor = Floor(friction=friction, restitution=floor)
-    return Scene(**{"name": "strike", "block": PAPER_BLOCK, "floor": floor, "walls": walls, "duration": 0.7, "output_step": 0.001} | change)
+    return Scene(
+        **{
+            "name": "strike",
+            "block": PAPER_BLOCK,
+            "floor": floor,
+            "walls": walls,
+            "duration": 0.7,
+            "output_step": 0.001,
+        }
+        | change
+    )
 
 
 FLOOR = {
     "flat": {"initial_height": 0.02},
-    "offset corner, frictionless": {"friction": 0.0, "initial_height": 0.02, "initial_rotation": 0.1},
+    "offset corner, frictionless": {
+        "friction": 0.0,
+        "initial_height": 0.02,
+        "initial_rotation": 0.1,
+    },
     "offset corner, slipping": {"friction": 0.1, "initial_height": 0.02, "initial_rotation": 0.2},
     "offset corner, sticking": {"friction": 1.0, "initial_height": 0.02, "initial_rotation": -0.2},
-    "corner below the centroid": {"friction": 0.3, "initial_height": 0.02, "initial_rotation": PAPER_BLOCK.alpha},
-    "sliding corner": {"friction": 0.3, "initial_height": 0.02, "initial_rotation": 0.1, "initial_velocity": -1.0},
+    "corner below the centroid": {
+        "friction": 0.3,
+        "initial_height": 0.02,
+        "initial_rotation": PAPER_BLOCK.alpha,
+    },
+    "sliding corner": {
+        "friction": 0.3,
+        "initial_height": 0.02,
+        "initial_rotation": 0.1,
+        "initial_velocity": -1.0,
+    },
     "rocking block": {"friction": 0.3, "initial_rotation": 0.1},
 }
 WALL = {
     "top corner": {"gap": 0.05, "initial_angular_velocity": 0.5},
     "top corner, right wall": {"gap": 0.05, "side": "right", "initial_angular_velocity": -0.5},
     "bottom corner": {"gap": 0.01, "initial_angular_velocity": -0.3, "initial_velocity": -1.0},
-    "bottom corner, rough floor": {"friction": 1.0, "gap": 0.01, "initial_angular_velocity": -0.3, "initial_velocity": -1.0},
+    "bottom corner, rough floor": {
+        "friction": 1.0,
+        "gap": 0.01,
+        "initial_angular_velocity": -0.3,
+        "initial_velocity": -1.0,
+    },
     "flat side, sliding": {"friction": 0.1, "initial_velocity": -0.7},
     "in flight": {"initial_velocity": -0.7, "initial_height": 0.2, "initial_rotation": -0.05},
 }
@@ -42,29 +70,40 @@ WALL = {
 @pytest.mark.parametrize("e", RESTITUTIONS)
 @pytest.mark.parametrize("case", FLOOR)
 def test_floor_has_the_restitution_asked_for(case, e):
-    assert measured_restitution(ContinuousModel(), scene(floor=e, **FLOOR[case])) == pytest.approx(e, abs=1e-3)
+    assert measured_restitution(ContinuousModel(), scene(floor=e, **FLOOR[case])) == pytest.approx(
+        e, abs=1e-3
+    )
 
 
 @pytest.mark.parametrize("e", RESTITUTIONS)
 @pytest.mark.parametrize("case", WALL)
 def test_wall_has_the_restitution_asked_for(case, e):
-    assert measured_restitution(ContinuousModel(), scene(wall=e, **WALL[case])) == pytest.approx(e, abs=1e-3)
+    assert measured_restitution(ContinuousModel(), scene(wall=e, **WALL[case])) == pytest.approx(
+        e, abs=1e-3
+    )
 
 
 @pytest.mark.parametrize("e", RESTITUTIONS)
 def test_restitution_of_a_soft_contact_is_within_a_hundredth(e):
     model = ContinuousModel(penetration=1e-6)
-    assert measured_restitution(model, scene(floor=e, **FLOOR["rocking block"])) == pytest.approx(e, abs=0.01)
-    assert measured_restitution(model, scene(wall=e, **WALL["top corner"])) == pytest.approx(e, abs=0.01)
+    assert measured_restitution(model, scene(floor=e, **FLOOR["rocking block"])) == pytest.approx(
+        e, abs=0.01
+    )
+    assert measured_restitution(model, scene(wall=e, **WALL["top corner"])) == pytest.approx(
+        e, abs=0.01
+    )
 
 
 @pytest.mark.parametrize("e", RESTITUTIONS)
 def test_paper_rule_misses_as_its_formula_says(e):
-    # (33) takes the whole mass, the corner has less of it, and the contact lets go when its force does.
+    # (33) takes the whole mass, the corner has less of it, and the contact lets go when its force
+    # does.
     drop = scene(friction=0.0, floor=e, initial_height=0.02, initial_rotation=0.1)
     lever = PAPER_BLOCK.radius * math.sin(PAPER_BLOCK.alpha - 0.1)
     xi = damping_ratio_of_paper(e) * math.sqrt(1.0 + 3.0 * (lever / PAPER_BLOCK.radius) ** 2)
-    assert measured_restitution(ContinuousModel(damping_rule="paper"), drop) == pytest.approx(restitution_of(xi), abs=1e-3)
+    assert measured_restitution(ContinuousModel(damping_rule="paper"), drop) == pytest.approx(
+        restitution_of(xi), abs=1e-3
+    )
 
 
 def test_scene_without_an_impact_has_no_restitution():
@@ -75,25 +114,41 @@ def test_scene_without_an_impact_has_no_restitution():
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("e", RESTITUTIONS)
 def test_both_corners_of_a_side_leave_as_asked_wherever_the_mass_lies(e, side):
-    """A side that strikes a wall flat leaves as flat, whatever the stiffness: unlike springs do not turn the block."""
+    """A side that strikes a wall flat leaves as flat, whatever the stiffness: unlike springs do not
+    turn the block."""
     block = Block(half_width=0.3, half_height=1.0, centre_of_mass=(0.0, 0.3))
     toward = -0.6 if side == "left" else 0.6
-    strikes = scene(wall=e, gap=0.02, side=side, friction=0.2, block=block, initial_velocity=toward, duration=0.1)
+    strikes = scene(
+        wall=e,
+        gap=0.02,
+        side=side,
+        friction=0.2,
+        block=block,
+        initial_velocity=toward,
+        duration=0.1,
+    )
     history = ContinuousModel(penetration=1e-10).simulate(strikes)
     speed = math.sqrt(0.6**2 - 2.0 * 0.2 * 9.81 * 0.02)
     assert np.max(np.abs(history.channels["theta_dot"])) < 1e-4
     if e:
         struck = next(event.t for event in history.event_list if event.kind == "wall impact")
         row = math.ceil(struck / strikes.output_step) + 1
-        left = abs(history.channels["x_dot"][row]) + 0.2 * 9.81 * (row * strikes.output_step - struck)
+        left = abs(history.channels["x_dot"][row]) + 0.2 * 9.81 * (
+            row * strikes.output_step - struck
+        )
         assert left == pytest.approx(e * speed, rel=1e-3)
 
 
 def test_a_loaded_block_moves_beside_a_bouncing_wall_as_the_rigid_one():
-    """Its mass lies to one side, so that the flush impact turns it over the floor; equal springs gave 0.1045 alpha."""
+    """Its mass lies to one side, so that the flush impact turns it over the floor; equal springs
+    gave 0.1045 alpha."""
     block = Block(half_width=0.3, half_height=1.0, centre_of_mass=(0.1, 0.3))
-    loaded = scene(wall=0.6, gap=0.02, friction=0.2, block=block, initial_velocity=-0.6, duration=2.0)
-    rigid, soft = (model.simulate(loaded) for model in (EventBasedModel(pivot="unilateral"), ContinuousModel()))
+    loaded = scene(
+        wall=0.6, gap=0.02, friction=0.2, block=block, initial_velocity=-0.6, duration=2.0
+    )
+    rigid, soft = (
+        model.simulate(loaded) for model in (EventBasedModel(pivot="unilateral"), ContinuousModel())
+    )
     assert soft.peak_rotation == pytest.approx(rigid.peak_rotation, rel=1e-3)
     apart = (soft.channels["theta"] - rigid.channels["theta"]) / block.alpha
     assert np.sqrt(np.mean(apart**2)) < 1e-4

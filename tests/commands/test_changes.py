@@ -1,4 +1,5 @@
-"""What changed: `rockcheck compare` between two finished runs, and `validate --history` over many."""
+"""What changed: `rockcheck compare` between two finished runs, and `validate --history` over
+many."""
 
 from __future__ import annotations
 
@@ -70,7 +71,11 @@ def test_a_figure_that_moves_within_its_limits_is_told_and_no_fault(diff):
     code, changes = diff("a", "b")
     assert code == 0
     assert {change["what"] for change in changes} == {"figure"}
-    moved = {change["name"]: (change["before"], change["after"]) for change in changes if change["model"] == "near"}
+    moved = {
+        change["name"]: (change["before"], change["after"])
+        for change in changes
+        if change["model"] == "near"
+    }
     before, after = moved["theta_peak against still"]
     assert after / before == pytest.approx(1.02, rel=1e-6)
 
@@ -79,7 +84,11 @@ def test_a_verdict_that_changes_is_exit_1_and_comes_first(diff, capsys):
     ran("b", 0.002, code=1)
     code, changes = diff("a", "b")
     assert code == 1
-    verdicts = [(c["scene"], c["model"], c["name"], c["before"], c["after"]) for c in changes if c["what"] == "verdict"]
+    verdicts = [
+        (c["scene"], c["model"], c["name"], c["before"], c["after"])
+        for c in changes
+        if c["what"] == "verdict"
+    ]
     assert verdicts == [
         ("", "", "", "pass", "fail"),
         ("short", "near", "", "pass", "fail"),
@@ -100,7 +109,9 @@ def test_a_cell_that_is_gone_is_a_change(diff):
     run.model_copy(update={"cells": run.cells[:1]}).save(Path("b"))
     code, changes = diff("a", "b")
     assert code == 1
-    assert [(c["model"], c["before"], c["after"]) for c in changes if c["what"] == "cell"] == [("near", "there", None)]
+    assert [(c["model"], c["before"], c["after"]) for c in changes if c["what"] == "cell"] == [
+        ("near", "there", None)
+    ]
 
 
 def test_runs_of_two_suites_are_not_compared(capsys):
@@ -118,11 +129,15 @@ def test_the_peak_of_a_block_that_fell_is_no_figure_that_changes():
     near = run.cell("short", "near")
 
     def reached(peak: float, note: str) -> Run:
-        figure = Figure(measure="peak_rotation", label="peak rotation", unit="alpha", value=peak, note=note)
+        figure = Figure(
+            measure="peak_rotation", label="peak rotation", unit="alpha", value=peak, note=note
+        )
         others = tuple(one for one in near.figures if one.measure != "peak_rotation")
         check = near.checks[0].model_copy(update={"figure": figure})
         cell = near.model_copy(update={"figures": (*others, figure), "checks": (check,)})
-        return run.model_copy(update={"cells": tuple(cell if one is near else one for one in run.cells)})
+        return run.model_copy(
+            update={"cells": tuple(cell if one is near else one for one in run.cells)}
+        )
 
     fell = "the block overturned at 1 s"
     assert [one.name for one in changes(reached(0.3, ""), reached(0.4, ""))] == ["peak_rotation"]
@@ -133,7 +148,11 @@ def test_the_peak_of_a_block_that_fell_is_no_figure_that_changes():
 
 @pytest.mark.skipif(shutil.which("git") is None, reason="needs POSIX tools: git")
 def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys):
-    for words in (["init", "-q"], ["add", "mine.toml"], ["-c", "user.name=a", "-c", "user.email=a@b", "commit", "-qm", "one"]):
+    for words in (
+        ["init", "-q"],
+        ["add", "mine.toml"],
+        ["-c", "user.name=a", "-c", "user.email=a@b", "commit", "-qm", "one"],
+    ):
         subprocess.run(["git", *words], check=True)
     ran("a", 0.001, "--history", "runs.jsonl")
     ran("a", 0.00105, "--history", "runs.jsonl")
@@ -141,7 +160,9 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys):
     assert main(["validate", "mine.toml", *CODE, "--out", "a", "--history", "runs.jsonl"]) == 0
     assert "runs.jsonl: 3 runs, 0 figures moved since " in capsys.readouterr().out
     moments = read_history(Path("runs.jsonl"))
-    head = subprocess.run(["git", "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
+    head = subprocess.run(
+        ["git", "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True
+    ).stdout.strip()
     assert [one.commit for one in moments] == [head, f"{head}-dirty", f"{head}-dirty"]
     name = "short, near: theta_peak against still"
     values = [one.figures[name] for one in moments]
@@ -156,9 +177,14 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys):
     assert f"  {name}: " in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("line", ["{", "[]", '{"suite": 3}', '{"created": "x", "suite": "mine", "verdict": "pass", "more": 1}'])
+@pytest.mark.parametrize(
+    "line",
+    ["{", "[]", '{"suite": 3}', '{"created": "x", "suite": "mine", "verdict": "pass", "more": 1}'],
+)
 def test_a_history_that_is_none_is_named_with_its_line(capsys, line):
     Path("runs.jsonl").write_text(f"\n{line}\n", encoding="utf-8")
     ran("a", 0.001, "--history", "runs.jsonl", code=2)
-    assert capsys.readouterr().err.startswith("rockcheck: runs.jsonl, line 2: not a run of a history")
+    assert capsys.readouterr().err.startswith(
+        "rockcheck: runs.jsonl, line 2: not a run of a history"
+    )
     assert Path("runs.jsonl").read_text(encoding="utf-8") == f"\n{line}\n"

@@ -12,7 +12,9 @@ from rockcheck.scenes import History
 
 STILL = "faulty:Still", "--allow-code", "faulty:Still"
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
-SCENE = "duration = 0.2\nblock = { half_width = 0.4, half_height = 1.5 }\nfloor = { friction = 0.5 }\n"
+SCENE = (
+    "duration = 0.2\nblock = { half_width = 0.4, half_height = 1.5 }\nfloor = { friction = 0.5 }\n"
+)
 
 
 def write(name, text):
@@ -34,7 +36,10 @@ def write(name, text):
         (["simulate", "scene.toml", "--model", "ebm", "--set", "tolerance"], "key=value"),
         (["simulate", "scene.toml", "--model", "ebm", "--set", "tolerance=tight"], "ebm.tolerance"),
         (["simulate", "scene.toml", "--model", "ebm", "-o", "no/such/out.csv"], "no such folder"),
-        (["simulate", "negative.toml", "--model", "ebm"], "negative.toml: block.half_width: -0.4 is not allowed"),
+        (
+            ["simulate", "negative.toml", "--model", "ebm"],
+            "negative.toml: block.half_width: -0.4 is not allowed",
+        ),
         (["simulate", "unknown.toml", "--model", "ebm"], "unknown.toml: colour: unknown key"),
         (["simulate", "slippery.toml", "--model", "ebm"], "must be below 4/3"),
         (["simulate", "gone.toml", "--model", "ebm"], "gone.toml: cannot be read"),
@@ -51,7 +56,10 @@ def test_bad_input_is_one_line_and_exit_2(words, said, capsys):
     write("unknown.toml", "colour = 1\n" + SCENE)
     write("slippery.toml", SCENE.replace("0.5", "1.4"))
     write("record.toml", SCENE + '[excitation]\nkind = "record"\nfile = "short.AT2"\n')
-    write("short.AT2", "PEER\nNAME\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 3, DT= .01 SEC\n 0.1 0.2\n")
+    write(
+        "short.AT2",
+        "PEER\nNAME\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 3, DT= .01 SEC\n 0.1 0.2\n",
+    )
     assert main(words) == 2
     captured = capsys.readouterr()
     assert said in captured.err
@@ -61,14 +69,22 @@ def test_bad_input_is_one_line_and_exit_2(words, said, capsys):
 
 def test_simulate_writes_a_history(capsys):
     write("scene.toml", SCENE)
-    assert main(["simulate", "scene.toml", "--model", *STILL, "--set", "offset=0.001", "-o", "out.csv"]) == 0
+    assert (
+        main(
+            ["simulate", "scene.toml", "--model", *STILL, "--set", "offset=0.001", "-o", "out.csv"]
+        )
+        == 0
+    )
     assert History.load("out.csv").channels["theta"][0] == 0.001
     assert "out.csv" in capsys.readouterr().out
 
 
 def test_a_model_that_fails_is_exit_3(capsys):
     write("scene.toml", SCENE)
-    assert main(["simulate", "scene.toml", "--model", "faulty:Fails", "--allow-code", "faulty:Fails"]) == 3
+    assert (
+        main(["simulate", "scene.toml", "--model", "faulty:Fails", "--allow-code", "faulty:Fails"])
+        == 3
+    )
     assert capsys.readouterr().err == "rockcheck: more than 10 events\n"
     assert not Path("scene--faulty_Fails.csv").exists()
 
@@ -108,12 +124,16 @@ def test_histories_of_two_blocks_are_not_compared_unless_a_scene_says_how(capsys
     assert "half_width = 0.4," in said
     assert "half_width = 0.5," in said
     assert main(["compare", "one.csv", "other.csv", "--scene", "one.toml", "-q"]) == 0
-    write("plain.csv", "t,theta\n" + "".join(f"{0.005 * k},0\n" for k in range(41)))  # of a block that nothing is known of
+    write(
+        "plain.csv", "t,theta\n" + "".join(f"{0.005 * k},0\n" for k in range(41))
+    )  # of a block that nothing is known of
     assert main(["compare", "one.csv", "plain.csv", "-q"]) == 0
 
 
 def test_a_run_without_a_verdict_overwrites_none_with_one(capsys):
-    suite = 'reference = "still"\n[models.still]\nmodel = "faulty:Still"\n[[scene]]\nname = "short"\n'
+    suite = (
+        'reference = "still"\n[models.still]\nmodel = "faulty:Still"\n[[scene]]\nname = "short"\n'
+    )
     write("suite.toml", suite + SCENE)
     write("scene.toml", SCENE)
     alone = ["validate", "scene.toml", "--models", STILL[0], *STILL[1:], "--jobs", "1", "-q"]
@@ -124,7 +144,9 @@ def test_a_run_without_a_verdict_overwrites_none_with_one(capsys):
     assert Path("rockcheck-report/index.html") in before
     capsys.readouterr()
     assert main(alone) == 2
-    assert capsys.readouterr().err.startswith("rockcheck: --out: rockcheck-report holds the judged run of suite 'suite'")
+    assert capsys.readouterr().err.startswith(
+        "rockcheck: --out: rockcheck-report holds the judged run of suite 'suite'"
+    )
     assert {path: path.read_bytes() for path in Path("rockcheck-report").glob("*.*")} == before
     assert main([*alone, "--out", "other"]) == 0
 
@@ -147,7 +169,20 @@ floor = { friction = 0.5 }
     expected = {"0.01": 0, "0.001": 1}
     for limit, code in expected.items():
         write("mine.toml", suite + line % limit)
-        assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1"]) == code
+        assert (
+            main(
+                [
+                    "validate",
+                    "mine.toml",
+                    "--allow-code",
+                    "faulty:Still",
+                    "--no-report",
+                    "--jobs",
+                    "1",
+                ]
+            )
+            == code
+        )
         out = capsys.readouterr().out
         assert max(map(len, out.splitlines())) <= 80
         assert f"verdict: {'pass' if code == 0 else 'fail'}" in out
@@ -159,11 +194,61 @@ floor = { friction = 0.5 }
         "summary.md",
     }
     assert 'failures="1"' in Path("rockcheck-report/junit.xml").read_text()
-    assert "theta_peak against still: 0.003837 is more than 0.001" in Path("rockcheck-report/summary.md").read_text()
+    assert (
+        "theta_peak against still: 0.003837 is more than 0.001"
+        in Path("rockcheck-report/summary.md").read_text()
+    )
     write("mine.toml", suite.replace("offset = 1e-3", "offset = 1.2e-3") + line % "0.01")
-    assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1"]) == 0
-    assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1", "--strict"]) == 1
+    assert (
+        main(
+            ["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1"]
+        )
+        == 0
+    )
+    assert (
+        main(
+            [
+                "validate",
+                "mine.toml",
+                "--allow-code",
+                "faulty:Still",
+                "--no-report",
+                "--jobs",
+                "1",
+                "--strict",
+            ]
+        )
+        == 1
+    )
     assert "verdict: changed" in capsys.readouterr().out
     assert main(["accept", "mine.toml", "--allow-code", "faulty:Still", "--jobs", "1"]) == 1
-    assert main(["accept", "mine.toml", "--allow-code", "faulty:Still", "--jobs", "1", "--reason", "it leans more"]) == 0
-    assert main(["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1", "--strict"]) == 0
+    assert (
+        main(
+            [
+                "accept",
+                "mine.toml",
+                "--allow-code",
+                "faulty:Still",
+                "--jobs",
+                "1",
+                "--reason",
+                "it leans more",
+            ]
+        )
+        == 0
+    )
+    assert (
+        main(
+            [
+                "validate",
+                "mine.toml",
+                "--allow-code",
+                "faulty:Still",
+                "--no-report",
+                "--jobs",
+                "1",
+                "--strict",
+            ]
+        )
+        == 0
+    )

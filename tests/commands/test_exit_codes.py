@@ -29,7 +29,9 @@ def test_a_fault_inside_has_a_code_of_its_own(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("tempfile.tempdir", None)
     assert main(["scenes"]) == 70
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("rockcheck: a fault of rockcheck itself, ZeroDivisionError: please report it with ")
+    assert line.startswith(
+        "rockcheck: a fault of rockcheck itself, ZeroDivisionError: please report it with "
+    )
     report = Path(line.rpartition(" ")[2])
     assert report.parent == tmp_path
     assert "in broken" in report.read_text()
@@ -49,7 +51,10 @@ def test_a_fault_that_cannot_be_written_down_is_told(monkeypatch, capsys):
     monkeypatch.setattr("tempfile.mkstemp", full)
     assert main(["scenes"]) == 70
     (line,) = capsys.readouterr().err.splitlines()
-    assert line == "rockcheck: a fault of rockcheck itself, RecursionError: please report it with this: too deep"
+    assert (
+        line
+        == "rockcheck: a fault of rockcheck itself, RecursionError: please report it with this: too deep"
+    )
 
 
 def test_the_exit_codes_are_told_by_the_help_and_by_the_documentation(capsys):
@@ -64,13 +69,27 @@ def test_the_exit_codes_are_told_by_the_help_and_by_the_documentation(capsys):
 @pytest.mark.skipif(os.name != "posix", reason="pipes of a POSIX shell")
 @pytest.mark.parametrize(
     ("words", "expected"),
-    [("scenes", 0), ("scenes --json", 0), ("--help", 0), ("simulate --help", 0), ("no-such-command", 2), ("compare a.csv b.csv", 2)],
+    [
+        ("scenes", 0),
+        ("scenes --json", 0),
+        ("--help", 0),
+        ("simulate --help", 0),
+        ("no-such-command", 2),
+        ("compare a.csv b.csv", 2),
+    ],
 )
 @pytest.mark.parametrize("reader", ["head -1", "true"])
 def test_a_reader_that_goes_changes_no_exit_code(tmp_path, words, expected, reader):
     """`rockcheck scenes | head -1` ends with 0, and in silence."""
     script = f"{' '.join(ROCKCHECK)} {words} | {reader}; echo ${{PIPESTATUS[0]}}"
-    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, cwd=tmp_path, timeout=120, check=False)
+    done = subprocess.run(
+        ["bash", "-c", script],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        timeout=120,
+        check=False,
+    )
     assert done.stdout.splitlines()[-1] == str(expected)
     assert "Broken" not in done.stderr
     assert "Traceback" not in done.stderr
@@ -78,16 +97,34 @@ def test_a_reader_that_goes_changes_no_exit_code(tmp_path, words, expected, read
 
 
 def a_run() -> Run:
-    return Run(suite="s", created="2026-01-01T00:00:00", reference="ebm", scenes={}, models=("ebm",), cells=())
+    return Run(
+        suite="s",
+        created="2026-01-01T00:00:00",
+        reference="ebm",
+        scenes={},
+        models=("ebm",),
+        cells=(),
+    )
 
 
 def test_a_held_lock_says_for_whom_it_waits_and_for_how_long(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(publish, "SILENT", 0.0)
     monkeypatch.setattr(publish, "PATIENCE", 0.1)
-    with FileLock(tmp_path / ".lock"), pytest.raises(publish.InputError, match=r"waited 0\.1 s for another run, which holds .*lock"):
+    with (
+        FileLock(tmp_path / ".lock"),
+        pytest.raises(
+            publish.InputError, match=r"waited 0\.1 s for another run, which holds .*lock"
+        ),
+    ):
         publish.keep(a_run(), tmp_path)
-    assert re.fullmatch(r"rockcheck: waiting up to 0\.1 s for another run, which holds .*\.lock\n", capsys.readouterr().err)
-    with publish._turn(tmp_path), pytest.raises(publish.InputError, match=rf"waited 0\.1 s for process {os.getpid()} on "):
+    assert re.fullmatch(
+        r"rockcheck: waiting up to 0\.1 s for another run, which holds .*\.lock\n",
+        capsys.readouterr().err,
+    )
+    with (
+        publish._turn(tmp_path),
+        pytest.raises(publish.InputError, match=rf"waited 0\.1 s for process {os.getpid()} on "),
+    ):
         publish.keep(a_run(), tmp_path)
     capsys.readouterr()
     publish.keep(a_run(), tmp_path)

@@ -1,4 +1,5 @@
-"""What a user types on the first day with a block, a wall and a test of one's own: what goes wrong is named, and mended by what is said."""
+"""What a user types on the first day with a block, a wall and a test of one's own: what goes wrong
+is named, and mended by what is said."""
 
 from __future__ import annotations
 
@@ -46,7 +47,11 @@ LINE = """
 outcome_agrees = { expected = 1.0, limit = 0.0, drift = 0.0, why = "a test" }
 theta_rms = { expected = 0.0, limit = 0.1, drift = 0.1, why = "a test" }
 """
-CODE = [word for name in ("Still", "Falls", "Bug", "Nothing") for word in ("--allow-code", f"faulty:{name}")]
+CODE = [
+    word
+    for name in ("Still", "Falls", "Bug", "Nothing")
+    for word in ("--allow-code", f"faulty:{name}")
+]
 
 
 def write(name: str, text: str) -> str:
@@ -60,7 +65,8 @@ def suite(other: str = "faulty:Still") -> str:
 
 @pytest.fixture
 def type_(capsys):
-    """What a line typed at the prompt says on stdout and stderr, once its exit code is as expected."""
+    """What a line typed at the prompt says on stdout and stderr, once its exit code is as
+    expected."""
 
     def typed(*words: str, code: int = 0) -> tuple[str, str]:
         assert main(list(words)) == code
@@ -70,7 +76,16 @@ def type_(capsys):
 
 
 def simulated(type_, model: str, output: str, *words: str) -> str:
-    return type_("simulate", write("rack.toml", SCENE), "--model", f"faulty:{model}", *CODE, "-o", output, *words)[0]
+    return type_(
+        "simulate",
+        write("rack.toml", SCENE),
+        "--model",
+        f"faulty:{model}",
+        *CODE,
+        "-o",
+        output,
+        *words,
+    )[0]
 
 
 @pytest.mark.parametrize(
@@ -79,7 +94,10 @@ def simulated(type_, model: str, output: str, *words: str) -> str:
         (("[floor]", '[walls]\nside = "left"\ngap = 0.1\n[floor]'), "[[walls]], not [walls]"),
         (("half_width", "halfwidth"), "block.halfwidth: unknown key; did you mean 'half_width'"),
         (("[block]", "[blok]"), "blok: unknown key; did you mean 'block'"),
-        (("[floor]", '[excitation]\nkind = "record"\nfile = "a.csv"\nunit = "kg"\n[floor]'), "excitation.unit"),
+        (
+            ("[floor]", '[excitation]\nkind = "record"\nfile = "a.csv"\nunit = "kg"\n[floor]'),
+            "excitation.unit",
+        ),
     ],
 )
 def test_a_slip_in_a_scene_file_is_named(type_, change, said):
@@ -98,16 +116,25 @@ def test_a_scene_is_no_suite(type_):
         " and a suite is a file with scenes = ['rack.toml'], and tables [models.NAME]\n"
     )
     _, err = type_("validate", "rack.toml", "--strict", code=2)
-    assert err == "rockcheck: --strict: rack.toml is a scene, and nothing of it is judged: give a suite\n"
+    assert (
+        err
+        == "rockcheck: --strict: rack.toml is a scene, and nothing of it is judged: give a suite\n"
+    )
 
 
 @pytest.mark.parametrize(
     "words",
-    [("simulate", "fig5a", "--model", "ebm", "--model", "cm"), ("compare", "a.csv", "b.csv", "--until", "1", "--until=2")],
+    [
+        ("simulate", "fig5a", "--model", "ebm", "--model", "cm"),
+        ("compare", "a.csv", "b.csv", "--until", "1", "--until=2"),
+    ],
 )
 def test_an_option_given_twice_is_refused(type_, words):
     _, err = type_(*words, code=2)
-    assert err == f"rockcheck: {words[3] if words[0] == 'compare' else words[2]}: is given twice: give one value\n"
+    assert (
+        err
+        == f"rockcheck: {words[3] if words[0] == 'compare' else words[2]}: is given twice: give one value\n"
+    )
 
 
 def test_without_a_model_the_reference_plays(type_):
@@ -119,7 +146,10 @@ def test_without_a_model_the_reference_plays(type_):
 
 def test_what_is_no_format_of_a_history_is_refused_before_the_run(type_):
     _, err = type_("simulate", "fig5a", "-o", "x.xlsx", code=2)
-    assert err == "rockcheck: x.xlsx: a history is written as .csv, .csv.gz, .json, .mat or .parquet, not as .xlsx\n"
+    assert (
+        err
+        == "rockcheck: x.xlsx: a history is written as .csv, .csv.gz, .json, .mat or .parquet, not as .xlsx\n"
+    )
     assert not Path("x.xlsx").exists()
 
 
@@ -139,7 +169,9 @@ def test_a_history_as_parquet_is_that_of_the_csv(type_):
     for name in plain.columns:
         np.testing.assert_array_equal(plain[name], table.channels[name])
     assert plain.attrs["rockcheck_history"]["outcome"] == table.outcome
-    assert list(pd.read_parquet("a.events.parquet")["kind"]) == [event.kind for event in table.event_list]
+    assert list(pd.read_parquet("a.events.parquet")["kind"]) == [
+        event.kind for event in table.event_list
+    ]
 
 
 def test_a_history_as_json_and_mat_is_that_of_the_csv(type_):
@@ -154,7 +186,11 @@ def test_a_history_as_json_and_mat_is_that_of_the_csv(type_):
     for name in ("t", "theta", "x_dot"):
         np.testing.assert_array_equal(plain["channels"][name], table.channels[name])
         np.testing.assert_array_equal(matrix["channels"][name], table.channels[name])
-    assert plain["channels"]["mode"] == list(matrix["channels"]["mode"]) == list(table.channels["mode"])
+    assert (
+        plain["channels"]["mode"]
+        == list(matrix["channels"]["mode"])
+        == list(table.channels["mode"])
+    )
     assert plain["events"]["kind"] == [event.kind for event in table.event_list]
 
 
@@ -165,7 +201,9 @@ def test_of_a_fallen_block_the_time_is_told_not_the_peak(type_):
     assert "note: made to fall" in out
     told = json.loads(simulated(type_, "Falls", "a.csv", "--json"))
     assert told["peak_rotation_alpha"] is None
-    assert told["overturned_at_s"] == History.load("a.csv").overturned_at == pytest.approx(np.pi / 2)
+    assert (
+        told["overturned_at_s"] == History.load("a.csv").overturned_at == pytest.approx(np.pi / 2)
+    )
 
 
 def test_compare_says_first_what_matters(type_):
@@ -192,9 +230,21 @@ def test_simulate_and_compare_draw(type_):
         assert Path(name).stat().st_size > 5000
 
 
-@pytest.mark.parametrize(("name", "said"), [("a.pdf", "a.pdf: give a name that ends in .png"), ("no/a.png", "no: no such folder")])
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("a.pdf", "a.pdf: give a name that ends in .png"), ("no/a.png", "no: no such folder")],
+)
 def test_a_picture_that_cannot_be_written_is_refused_before_the_run(type_, name, said):
-    _, err = type_("simulate", write("rack.toml", SCENE), "--model", "faulty:Still", *CODE, "--plot", name, code=2)
+    _, err = type_(
+        "simulate",
+        write("rack.toml", SCENE),
+        "--model",
+        "faulty:Still",
+        *CODE,
+        "--plot",
+        name,
+        code=2,
+    )
     assert err == f"rockcheck: --plot: {said}\n"
     assert not Path("rack--faulty_Still.csv").exists()
 
@@ -230,26 +280,40 @@ def test_a_no_is_no_share_of_a_limit(type_):
 
 def test_a_no_that_is_accepted_may_be_either():
     measure = DIFFERENCES["outcome_agrees"]
-    figure = Figure(measure="outcome_agrees", label=measure.label, unit="1", value=0.0, against="ebm")
+    figure = Figure(
+        measure="outcome_agrees", label=measure.label, unit="1", value=0.0, against="ebm"
+    )
     line = _accepted(judge(figure, None, kind="model form", measure=measure), None)
     assert line == {"expected": 0.0, "limit": 1.0, "drift": 0.0, "why": "first accepted figure"}
     check = judge(figure, Tolerance(**line), kind="model form", measure=measure)
     assert (check.verdict, used(check), percent(check)) == ("pass", 0.0, "no")
-    turned = judge(figure.model_copy(update={"value": 1.0}), Tolerance(**line), kind="model form", measure=measure)
+    turned = judge(
+        figure.model_copy(update={"value": 1.0}),
+        Tolerance(**line),
+        kind="model form",
+        measure=measure,
+    )
     assert turned.verdict == "changed"
 
 
 def test_accept_writes_nothing_that_validate_refuses(type_):
     t = np.linspace(0.5, 2.0, 151)
     write("table.csv", "t,theta\n" + "\n".join(f"{x:.3f},0.0" for x in t) + "\n")
-    text = SUITE.format(other="measured").replace("[require]", 'files = { short = "table.csv" }\n[require]')
+    text = SUITE.format(other="measured").replace(
+        "[require]", 'files = { short = "table.csv" }\n[require]'
+    )
     words = (write("mine.toml", text), *CODE, "--jobs", "1")
     out, _ = type_("accept", *words, code=1)
-    assert "not accepted: [short.other.still] theta_rms: other starts only at 0.5 s; `offset` of the measured model" in out
+    assert (
+        "not accepted: [short.other.still] theta_rms: other starts only at 0.5 s; `offset` of the"
+        " measured model" in out
+    )
     assert not Path("mine.tolerances.toml").exists()
     write(
         "mine.toml",
-        text.replace("[require]", "offset = -0.5\n[require]").replace('difference = ["theta_rms"', 'difference = ["theta_rms@1s"'),
+        text.replace("[require]", "offset = -0.5\n[require]").replace(
+            'difference = ["theta_rms"', 'difference = ["theta_rms@1s"'
+        ),
     )
     Path("mine.toml").write_text(Path("mine.toml").read_text().replace(', "outcome_agrees"', ""))
     type_("accept", *words)
@@ -260,7 +324,9 @@ def test_accept_writes_nothing_that_validate_refuses(type_):
 def test_a_model_of_ones_own_that_returns_no_history_is_told_so(type_, command):
     suite("faulty:Nothing")
     words = (
-        ("mine.toml", "--no-report", "--jobs", "1") if command == "validate" else (write("rack.toml", SCENE), "--model", "faulty:Nothing")
+        ("mine.toml", "--no-report", "--jobs", "1")
+        if command == "validate"
+        else (write("rack.toml", SCENE), "--model", "faulty:Nothing")
     )
     out, err = type_(command, *words, *CODE, code=3)
     assert "faulty:Nothing returned NoneType" in out + err

@@ -1,4 +1,5 @@
-"""A model that comes nearer to its reference, where next to nothing rotates: from `accept` over `validate --strict` to `accept`."""
+"""A model that comes nearer to its reference, where next to nothing rotates: from `accept` over
+`validate --strict` to `accept`."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ def lean(offset: str) -> None:
 
 @pytest.mark.usefixtures("in_an_empty_folder")
 def test_a_better_step_passes_and_is_accepted_without_a_reason(capsys):
-    """The peak falls from 3.1e-4 to 7.7e-5 alpha, nearer to that of a reference that stands: to which no ratio is defined."""
+    """The peak falls from 3.1e-4 to 7.7e-5 alpha, nearer to that of a reference that stands: to
+    which no ratio is defined."""
     lean("8e-5")
     assert main(["accept", *WORDS]) == 0
     first = Path("mine.tolerances.toml").read_text()
@@ -47,7 +49,9 @@ def test_a_better_step_passes_and_is_accepted_without_a_reason(capsys):
     for better in ("theta_rms against still", "peak_rotation", "last_rotation"):
         assert f"short, leans: {better}: 7.67" in out
     assert main(["validate", *WORDS, "--no-report", "--strict", "both"]) == 1
-    assert main(["validate", "--strict", *WORDS, "--no-report"]) == 0, "the suite is no value of --strict"
+    assert main(["validate", "--strict", *WORDS, "--no-report"]) == 0, (
+        "the suite is no value of --strict"
+    )
     capsys.readouterr()
     assert main(["accept", *WORDS]) == 0
     out = capsys.readouterr().out

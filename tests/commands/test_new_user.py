@@ -1,4 +1,5 @@
-"""A new user: an own block, an own wall and a record of three components, to a report with several models and an IDA curve."""
+"""A new user: an own block, an own wall and a record of three components, to a report with several
+models and an IDA curve."""
 
 from __future__ import annotations
 
@@ -20,7 +21,9 @@ pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 
 def makers() -> ModuleType:
     """What makes files of records: that of the readers' tests."""
-    spec = importlib.util.spec_from_file_location("made_records", Path(__file__).parents[1] / "scenes" / "test_recordings.py")
+    spec = importlib.util.spec_from_file_location(
+        "made_records", Path(__file__).parents[1] / "scenes" / "test_recordings.py"
+    )
     assert spec
     assert spec.loader
     module = importlib.util.module_from_spec(spec)
@@ -36,7 +39,8 @@ def type_(capsys):
     def typed(line: str) -> str:
         assert main(line.split()) == 0
         heard = capsys.readouterr()
-        assert heard.err == ""
+        slow = "rockcheck: ida: "  # how far a long work is, on a slow machine
+        assert all(line.startswith(slow) for line in heard.err.splitlines())
         return str(heard.out)
 
     return typed
@@ -48,7 +52,8 @@ def test_from_a_v2_record_to_a_report_and_a_curve_in_four_commands(type_):
     type_("new rack.toml")
     text = Path("rack.toml").read_text(encoding="utf-8")
     Path("rack.toml").write_text(
-        text.replace("half_width = 0.20", "half_width = 0.25").replace("gap = 0.03", "gap = 0.05"), encoding="utf-8"
+        text.replace("half_width = 0.20", "half_width = 0.25").replace("gap = 0.03", "gap = 0.05"),
+        encoding="utf-8",
     )
     scene = load_scene("rack.toml")
     assert (scene.block.half_width, scene.walls[0].gap) == (0.25, 0.05)
@@ -56,19 +61,31 @@ def test_from_a_v2_record_to_a_report_and_a_curve_in_four_commands(type_):
     understood = type_("record station.V2")
     assert [f"PGA         {peak} g" in understood for peak in (0.31, 0.27, 0.15)] == [True] * 3
 
-    told = type_("run rack.toml station.V2 --models ebm,ebm-unilateral,cm,mujoco --set mujoco.time_step=1e-3")
+    told = type_(
+        "run rack.toml station.V2 --models ebm,ebm-unilateral,cm,mujoco --set mujoco.time_step=1e-3"
+    )
     assert "left out: station.V2 up (vertical" in told
     assert "report: rockcheck-report/index.html\n" in told
     run = Run.load("rockcheck-report")
     assert run.places == ("rack, station 360 deg", "rack, station 90 deg")
     assert [cell.status for cell in run.cells] == ["done"] * 8
-    assert [run.load_scene(name).excitation.peak for name in run.places] == pytest.approx([0.31, 0.27], abs=1e-7)
+    assert [run.load_scene(name).excitation.peak for name in run.places] == pytest.approx(
+        [0.31, 0.27], abs=1e-7
+    )
     for place in run.places:
-        assert (Path("rockcheck-report") / "pages" / f"{place.replace(', ', '-').replace(' ', '-')}.html").exists()
+        assert (
+            Path("rockcheck-report")
+            / "pages"
+            / f"{place.replace(', ', '-').replace(' ', '-')}.html"
+        ).exists()
 
     told = type_("ida rack.toml station.V2 --levels 0.05:2:8")
     assert "report: rockcheck-report/ida/index.html\n" in told
-    rows = list(csv.DictReader(Path("rockcheck-report/ida/ida.csv").read_text(encoding="utf-8").splitlines()))
+    rows = list(
+        csv.DictReader(
+            Path("rockcheck-report/ida/ida.csv").read_text(encoding="utf-8").splitlines()
+        )
+    )
     assert len(rows) == 2 * 2 * 8  # components, directions, intensities
     assert {row["record"] for row in rows} == {"station.V2 360 deg", "station.V2 90 deg"}
 
@@ -85,8 +102,11 @@ def test_a_folder_of_24_files_in_eight_formats_shakes_the_rack(type_):
     for record in told["tables"]["motions"]:
         (peak,) = (abs(peak) for name, peak in made.PEAKS.items() if name in record["motion"])
         assert record["own"] == pytest.approx(peak, abs=3e-4), record["motion"]
-    least = [row for row in told["tables"]["ida"] if row["direction"] == 1 and row["intensity"] == 0.1]
-    # Every format holds one motion, so that the block does the same under all of them (K-NET's takes out its mean).
+    least = [
+        row for row in told["tables"]["ida"] if row["direction"] == 1 and row["intensity"] == 0.1
+    ]
+    # Every format holds one motion, so that the block does the same under all of them (K-NET's
+    # takes out its mean).
     for component in ("N-S", "E-W"):
         peaks = [row["peak_rotation_alpha"] for row in least if component in row["record"]]
         assert peaks == pytest.approx([peaks[0]] * 8, abs=5e-3)

@@ -42,14 +42,21 @@ def test_unknown(rockcheck_check):
 
 
 def test_check_holds_a_cell_against_its_suite(pytester):
-    shutil.copy(Path(__file__).parents[1] / "validation" / "models" / "faulty.py", pytester.path / "faulty.py")
+    shutil.copy(
+        Path(__file__).parents[1] / "validation" / "models" / "faulty.py",
+        pytester.path / "faulty.py",
+    )
     (pytester.path / "rockcheck.toml").write_text(SUITE, encoding="utf-8")
     pytester.makepyfile(TESTS)
     result = pytester.runpytest_subprocess("-p", "no:randomly", "-rf")
     result.assert_outcomes(failed=5)
-    result.stdout.fnmatch_lines(["*models.still: 'faulty:Still' is code of your own; it runs only if*"])
+    result.stdout.fnmatch_lines(
+        ["*models.still: 'faulty:Still' is code of your own; it runs only if*"]
+    )
     pytester.makeini("[pytest]\nrockcheck_allow_code = faulty:Still\n")
-    result = pytester.runpytest_subprocess("-p", "no:randomly", "-rf", "--rockcheck-allow-code", "faulty:Fails")
+    result = pytester.runpytest_subprocess(
+        "-p", "no:randomly", "-rf", "--rockcheck-allow-code", "faulty:Fails"
+    )
     result.assert_outcomes(passed=1, failed=4)
     result.stdout.fnmatch_lines(
         [
@@ -70,10 +77,16 @@ def check():
 
 
 def test_the_old_name_warns_and_leaves_other_plugins_theirs(pytester, monkeypatch):
-    """`check` was its name; pytest-check has a fixture of that name, which is the one to have where it is installed."""
-    shutil.copy(Path(__file__).parents[1] / "validation" / "models" / "faulty.py", pytester.path / "faulty.py")
+    """`check` was its name; pytest-check has a fixture of that name, which is the one to have where
+    it is installed."""
+    shutil.copy(
+        Path(__file__).parents[1] / "validation" / "models" / "faulty.py",
+        pytester.path / "faulty.py",
+    )
     (pytester.path / "rockcheck.toml").write_text(SUITE, encoding="utf-8")
-    pytester.makepyfile('def test_old(check):\n    assert check("my-scene", model="near").figures\n')
+    pytester.makepyfile(
+        'def test_old(check):\n    assert check("my-scene", model="near").figures\n'
+    )
     pytester.makeini("[pytest]\nrockcheck_allow_code = faulty:Still faulty:Fails\n")
     result = pytester.runpytest_subprocess("-W", "default::DeprecationWarning")
     result.assert_outcomes(passed=1, warnings=1)

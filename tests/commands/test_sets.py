@@ -1,4 +1,5 @@
-"""Sets of records: one scene by all models under each of them, however the files are named; nothing is judged."""
+"""Sets of records: one scene by all models under each of them, however the files are named; nothing
+is judged."""
 
 from __future__ import annotations
 
@@ -68,11 +69,15 @@ def told(capsys):
     ],
 )
 def test_files_folders_and_patterns_each_shake_the_scene(told, words):
-    found = told("validate", "rack.toml", *(part for word in words for part in ("--records", word)), *STILL)
+    found = told(
+        "validate", "rack.toml", *(part for word in words for part in ("--records", word)), *STILL
+    )
     assert [cell["scene"] for cell in found["cells"]] == ["rack, RSN1_H1", "rack, RSN1_H2"]
     assert [cell["outcome"] for cell in found["cells"]] == ["at rest"] * 2
     assert not found["judged"]
-    assert found["left_out"] == (["RSN1_V.AT2"] if words[-1].startswith("records/RSN1_*") or words[-1] == "records" else [])
+    assert found["left_out"] == (
+        ["RSN1_V.AT2"] if words[-1].startswith("records/RSN1_*") or words[-1] == "records" else []
+    )
 
 
 def test_a_record_takes_the_place_of_the_excitation_and_lasts(told):
@@ -89,7 +94,16 @@ def test_a_chosen_component_is_played_though_it_is_vertical(told):
     Path("up.csv").write_text("time_s,acceleration_g\n" + rows, encoding="utf-8")
     assert main(["validate", "rack.toml", "--records", "up.csv", *STILL]) == 2
     assert [
-        c["scene"] for c in told("validate", "rack.toml", "--records", "up.csv", "--read", "column=acceleration_g", *STILL)["cells"]
+        c["scene"]
+        for c in told(
+            "validate",
+            "rack.toml",
+            "--records",
+            "up.csv",
+            "--read",
+            "column=acceleration_g",
+            *STILL,
+        )["cells"]
     ] == ["rack, up"]
 
 
@@ -97,10 +111,10 @@ def test_the_vertical_component_of_a_file_goes_with_its_others(told, capsys):
     """Two channels in one file (CSMIP): the base moves to the side and upward at once."""
     text = ""
     for name, gain in (("90 Deg", 0.1), ("Up", 0.05)):
-        values = "".join(f"{981 * a:10.4f}" + "\n" * (n % 8 == 7) for n, a in enumerate(motion(gain)))
-        text += (
-            f"Corrected data\nChan  1: {name}\n  101 points of accel data equally spaced at   .020 sec, in cm/sec2. (8f10.4)\n{values}\n"
+        values = "".join(
+            f"{981 * a:10.4f}" + "\n" * (n % 8 == 7) for n, a in enumerate(motion(gain))
         )
+        text += f"Corrected data\nChan  1: {name}\n  101 points of accel data equally spaced at   .020 sec, in cm/sec2. (8f10.4)\n{values}\n"
     Path("two.v2").write_text(text, encoding="utf-8")
     words = ("validate", "rack.toml", "--records", "two.v2", "--read", "scale=2", *STILL)
     assert told(*words)["left_out"] == ["two.v2 Up"]
@@ -108,25 +122,57 @@ def test_the_vertical_component_of_a_file_goes_with_its_others(told, capsys):
     scene = Run.load("rockcheck-report").load_scene("rack, two 90 Deg")
     assert scene.excitation.peak == pytest.approx(2 * 0.1 * 981 / 980.665, rel=1e-3)
     assert scene.vertical.peak == pytest.approx(2 * 0.05 * 981 / 980.665, rel=1e-3)
-    assert main(["validate", "rack.toml", "--records", "records/RSN1_H1.AT2", "--read", "vertical=true", *STILL]) == 2
-    assert "RSN1_H1.AT2: 0 vertical components in it or in a file of the set that is named alike" in capsys.readouterr().err
+    assert (
+        main(
+            [
+                "validate",
+                "rack.toml",
+                "--records",
+                "records/RSN1_H1.AT2",
+                "--read",
+                "vertical=true",
+                *STILL,
+            ]
+        )
+        == 2
+    )
+    assert (
+        "RSN1_H1.AT2: 0 vertical components in it or in a file of the set that is named alike"
+        in capsys.readouterr().err
+    )
 
 
 def test_the_vertical_component_may_be_a_file_of_its_own(told, capsys):
     at2("records/RSN2_H1.AT2", 0.15, "180")
     at2("records/RSN2_V.AT2", 0.05, "UP")
     found = told("validate", "rack.toml", "--records", "records", "--read", "vertical=true", *STILL)
-    assert [cell["scene"] for cell in found["cells"]] == ["rack, RSN1_H1", "rack, RSN1_H2", "rack, RSN2_H1"]
+    assert [cell["scene"] for cell in found["cells"]] == [
+        "rack, RSN1_H1",
+        "rack, RSN1_H2",
+        "rack, RSN2_H1",
+    ]
     assert found["left_out"] == []
-    peaks = [Run.load("rockcheck-report").load_scene(cell["scene"]).vertical.peak for cell in found["cells"]]
+    peaks = [
+        Run.load("rockcheck-report").load_scene(cell["scene"]).vertical.peak
+        for cell in found["cells"]
+    ]
     assert peaks == pytest.approx([0.3, 0.3, 0.05], rel=1e-2)
     Path("records/RSN2_H1.AT2").unlink()
-    assert main(["validate", "rack.toml", "--records", "records", "--read", "vertical=true", *STILL]) == 2
-    assert "RSN2_V.AT2: a vertical component, and no horizontal one is named alike" in capsys.readouterr().err
+    assert (
+        main(["validate", "rack.toml", "--records", "records", "--read", "vertical=true", *STILL])
+        == 2
+    )
+    assert (
+        "RSN2_V.AT2: a vertical component, and no horizontal one is named alike"
+        in capsys.readouterr().err
+    )
 
 
 def test_a_scene_that_there_is_not_is_the_only_line(capsys, monkeypatch):
-    monkeypatch.setattr("rockcheck.validation.execute.models.not_installed", lambda name: "not installed" if name == "drake" else "")
+    monkeypatch.setattr(
+        "rockcheck.validation.execute.models.not_installed",
+        lambda name: "not installed" if name == "drake" else "",
+    )
     assert main(["validate", "nothere"]) == 2
     said = capsys.readouterr()
     assert said.out == ""
@@ -134,7 +180,16 @@ def test_a_scene_that_there_is_not_is_the_only_line(capsys, monkeypatch):
 
 
 def test_all_models_are_those_that_are_installed(told):
-    found = told("validate", "rack.toml", "--models", "all", "--set", "mujoco.time_step=1e-3", "--no-report", "--json")
+    found = told(
+        "validate",
+        "rack.toml",
+        "--models",
+        "all",
+        "--set",
+        "mujoco.time_step=1e-3",
+        "--no-report",
+        "--json",
+    )
     models = [cell["model"] for cell in found["cells"]]
     assert models == [name for name in FAMILIES if name != "measured" and not not_installed(name)]
     assert {"ebm", "ebm-unilateral", "cm", "mujoco"} <= set(models)
@@ -146,24 +201,59 @@ def test_all_models_are_those_that_are_installed(told):
 
 def test_what_falls_is_told_with_its_time_and_without_a_peak(capsys):
     assert (
-        main(["validate", "rack.toml", "--records", "records/RSN1_H1.AT2", "--models", "faulty:Falls,faulty:Still", *CODE, "--jobs", "1"])
+        main(
+            [
+                "validate",
+                "rack.toml",
+                "--records",
+                "records/RSN1_H1.AT2",
+                "--models",
+                "faulty:Falls,faulty:Still",
+                *CODE,
+                "--jobs",
+                "1",
+            ]
+        )
         == 0
     )
     out = capsys.readouterr().out
     (line,) = (line for line in out.splitlines() if "Falls" in line)
-    assert line.split() == ["faulty:Falls", "overturned", "left", "at", "1.57", "s", "ref.", "0.0", "s"]
+    assert line.split() == [
+        "faulty:Falls",
+        "overturned",
+        "left",
+        "at",
+        "1.57",
+        "s",
+        "ref.",
+        "0.0",
+        "s",
+    ]
     assert max(map(len, out.splitlines())) <= 130
     page = Path("rockcheck-report/index.html").read_text(encoding="utf-8")
     assert "Nothing is judged." in page
     (scene,) = Path("rockcheck-report/pages").glob("*.html")
     for text in (page, scene.read_text(encoding="utf-8")):
-        assert "ithin tolerance" not in text.replace('<option value="pass">within tolerance</option>', "")
+        assert "ithin tolerance" not in text.replace(
+            '<option value="pass">within tolerance</option>', ""
+        )
         assert "overturned left at 1.57 s" in text
-    assert "overturned left at 1.57 s" in Path("rockcheck-report/summary.md").read_text(encoding="utf-8")
+    assert "overturned left at 1.57 s" in Path("rockcheck-report/summary.md").read_text(
+        encoding="utf-8"
+    )
 
 
 def test_a_model_that_fails_is_exit_3(told):
-    found = told("validate", "rack.toml", "--models", "faulty:Bug,faulty:Still", *CODE, "--no-report", "--json", code=3)
+    found = told(
+        "validate",
+        "rack.toml",
+        "--models",
+        "faulty:Bug,faulty:Still",
+        *CODE,
+        "--no-report",
+        "--json",
+        code=3,
+    )
     assert [cell["status"] for cell in found["cells"]] == ["failed", "done"]
 
 
@@ -202,29 +292,46 @@ def test_a_suite_has_tables_of_records():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("validate", "rack.toml", "--models", "ebm,mujcoo"), "unknown model 'mujcoo'; did you mean 'mujoco'"),
+        (
+            ("validate", "rack.toml", "--models", "ebm,mujcoo"),
+            "unknown model 'mujcoo'; did you mean 'mujoco'",
+        ),
         (("validate", "rack.toml", "--models", "measured"), "--models: 'measured' is not allowed"),
         (
             ("validate", "rack.toml", "--models", "ebm", "--set", "cm.tolerance=1"),
             "--set: 'cm.tolerance=1': write MODEL.key=value, with MODEL one of ebm",
         ),
-        (("validate", "rack.toml", "--models", "ebm", "--set", "ebm.tol=1"), "ebm.tol: unknown key"),
+        (
+            ("validate", "rack.toml", "--models", "ebm", "--set", "ebm.tol=1"),
+            "ebm.tol: unknown key",
+        ),
         (("validate", "rack.toml", "--read", "unit=g"), "--read: needs --records"),
         (("validate", "rack.toml", "--records", "records/X*.AT2"), "X*.AT2: no such files"),
         (("validate", "rakc.toml"), "rakc.toml: cannot be read"),
-        (("validate", "rack.toml", "--records", "records/RSN1_V.AT2"), "RSN1_V.AT2: a vertical component, and no horizontal one is given"),
+        (
+            ("validate", "rack.toml", "--records", "records/RSN1_V.AT2"),
+            "RSN1_V.AT2: a vertical component, and no horizontal one is given",
+        ),
         (("validate", "wrong.toml"), "records.scenes: unknown scene 'rakk'; did you mean 'rack'"),
     ],
 )
 def test_slips_are_named(capsys, words, said):
-    Path("wrong.toml").write_text(SUITE.replace(', "other.toml"', "").replace('["rack"]', '["rakk"]'), encoding="utf-8")
+    Path("wrong.toml").write_text(
+        SUITE.replace(', "other.toml"', "").replace('["rack"]', '["rakk"]'), encoding="utf-8"
+    )
     assert main([*words, *(CODE if words[0] == "validate" else ())]) == 2
     err = capsys.readouterr().err
     assert said in err
     assert err.count("\n") == 1
 
 
-@pytest.mark.parametrize("words", [("records/RSN1_H*.AT2",), ("records/RSN1_H1.AT2", "records/RSN1_H2.AT2", "records/RSN1_V.AT2")])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("records/RSN1_H*.AT2",),
+        ("records/RSN1_H1.AT2", "records/RSN1_H2.AT2", "records/RSN1_V.AT2"),
+    ],
+)
 def test_a_population_takes_the_same_sets(told, words):
     found = told("ida", "rack.toml", "--levels", "1:2:2", *words, "--json")
     assert [one["motion"] for one in found["tables"]["motions"]] == ["RSN1_H1.AT2", "RSN1_H2.AT2"]

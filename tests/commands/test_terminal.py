@@ -1,4 +1,5 @@
-"""The terminal: help with examples, --quiet, --json, progress, width, colour, completion, new scene files, nearest names."""
+"""The terminal: help with examples, --quiet, --json, progress, width, colour, completion, new scene
+files, nearest names."""
 
 from __future__ import annotations
 
@@ -39,19 +40,35 @@ floor = { friction = 0.5 }
 def rockcheck(*words, **environment):
     """The command in a process of its own, without a terminal."""
     line = [sys.executable, "-m", "rockcheck", *words]
-    return subprocess.run(line, capture_output=True, text=True, env={**os.environ, **environment}, timeout=300, check=False)
+    return subprocess.run(
+        line,
+        capture_output=True,
+        text=True,
+        env={**os.environ, **environment},
+        timeout=300,
+        check=False,
+    )
 
 
 def on_a_terminal(*words, columns=80):
     """What the command writes to a terminal of that width: stdout and stderr together."""
     code = (
         "import fcntl, struct, sys, termios; from rockcheck.commands.cli import main;"
-        f"fcntl.ioctl(1, termios.TIOCSWINSZ, struct.pack('HHHH', 40, {columns}, 0, 0)); sys.exit(main(sys.argv[1:]))"
+        f"fcntl.ioctl(1, termios.TIOCSWINSZ, struct.pack('HHHH', 40, {columns}, 0, 0));"
+        " sys.exit(main(sys.argv[1:]))"
     )
     terminal, inside = pty.openpty()
-    environment = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "COLUMNS", "CI")}
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("NO_COLOR", "COLUMNS", "CI")
+    }
     with subprocess.Popen(
-        [sys.executable, "-c", code, *words], stdin=inside, stdout=inside, stderr=inside, env={**environment, "TERM": "xterm-256color"}
+        [sys.executable, "-c", code, *words],
+        stdin=inside,
+        stdout=inside,
+        stderr=inside,
+        env={**environment, "TERM": "xterm-256color"},
     ) as process:
         os.close(inside)
         said = b""
@@ -75,7 +92,9 @@ def test_help_has_an_example_that_the_command_understands(name, capsys):
     example = text.partition("Example: ")[2]
     assert example.startswith(f"rockcheck {name}")
     for option in re.findall(r"--[a-z]+", example):
-        assert option in text.partition("Example: ")[0], f"the example has {option}, the command has not"
+        assert option in text.partition("Example: ")[0], (
+            f"the example has {option}, the command has not"
+        )
     assert "--quiet" in text
     assert "--json" in text
 
@@ -83,7 +102,9 @@ def test_help_has_an_example_that_the_command_understands(name, capsys):
 def test_the_list_of_commands_is_not_cut_off(capsys):
     main(["--help"])
     out = capsys.readouterr().out
-    assert all(re.search(rf"^  {name} +\S", out, re.MULTILINE) for name in NAMES if name not in HIDDEN)
+    assert all(
+        re.search(rf"^  {name} +\S", out, re.MULTILINE) for name in NAMES if name not in HIDDEN
+    )
     assert "..." not in out.partition("Commands:")[2]
 
 
@@ -101,13 +122,19 @@ def test_settings_shown_as_remarks_are_the_defaults():
     main(["new", "mine.toml"])
     text = Path("mine.toml").read_text()
     head, rest = text.split("[excitation]", 1)
-    loud = re.sub(r"^# (?=[a-z_]+ += )", "", head, flags=re.MULTILINE).replace("mass = 60.0", "").replace("moment_of_inertia = 0.35", "")
+    loud = (
+        re.sub(r"^# (?=[a-z_]+ += )", "", head, flags=re.MULTILINE)
+        .replace("mass = 60.0", "")
+        .replace("moment_of_inertia = 0.35", "")
+    )
     tables = tomllib.loads(loud)
     assert tables["initial_height"] == 0.0
     assert tables["floor"]["static_friction"] == tables["floor"]["friction"]
     Path("loud.toml").write_text(loud + "[excitation]" + rest)
     same = {"name": "same"}
-    assert load_scene("loud.toml").replace(floor=Floor(friction=0.4), **same) == load_scene("mine.toml").replace(**same)
+    assert load_scene("loud.toml").replace(floor=Floor(friction=0.4), **same) == load_scene(
+        "mine.toml"
+    ).replace(**same)
 
 
 def test_new_overwrites_nothing(capsys):
@@ -125,7 +152,20 @@ def test_quiet_says_nothing_but_errors(capsys):
     assert main(["simulate", "mine.toml", "--model", *STILL, "--quiet", "-o", "a.csv"]) == 0
     assert capsys.readouterr() == ("", "")
     assert Path("a.csv").exists()
-    assert main(["simulate", "mine.toml", "--model", "faulty:Fails", "--allow-code", "faulty:Fails", "-q"]) == 3
+    assert (
+        main(
+            [
+                "simulate",
+                "mine.toml",
+                "--model",
+                "faulty:Fails",
+                "--allow-code",
+                "faulty:Fails",
+                "-q",
+            ]
+        )
+        == 3
+    )
     assert capsys.readouterr() == ("", "rockcheck: more than 10 events\n")
 
 
@@ -136,21 +176,45 @@ def test_json_is_all_that_is_on_stdout(capsys):
 
     assert result("new", "mine.toml") == {"file": "mine.toml"}
     assert "fig4a" in result("scenes")["scenes"]
-    history = result("simulate", "mine.toml", "--model", *STILL, "--set", "offset=0.001", "-o", "a.csv")
+    history = result(
+        "simulate", "mine.toml", "--model", *STILL, "--set", "offset=0.001", "-o", "a.csv"
+    )
     assert history["history"] == "a.csv"
     assert history["scene"] == "mine"
     main(["simulate", "mine.toml", "--model", *STILL, "-o", "b.csv", "-q"])
     found = result("compare", "b.csv", "a.csv")
     rms = next(figure for figure in found["figures"] if figure["measure"] == "theta_rms")
     assert rms["value"] == pytest.approx(0.001 / load_scene("mine.toml").block.alpha)
-    assert result("spectrum", "mine.toml", "--size", "3")["report"] == "rockcheck-report/spectrum/index.html"
+    assert (
+        result("spectrum", "mine.toml", "--size", "3")["report"]
+        == "rockcheck-report/spectrum/index.html"
+    )
     Path("suite.toml").write_text(SUITE)
-    run = result("validate", "suite.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1", code=1)
+    run = result(
+        "validate",
+        "suite.toml",
+        "--allow-code",
+        "faulty:Still",
+        "--no-report",
+        "--jobs",
+        "1",
+        code=1,
+    )
     assert run["verdict"] == "fail"
     assert len(run["reasons"]) == 1
-    nothing = {"overturned_at_s": None, "checks": 0, "verdict": None, "converged": None, "impact_law": None, "explanations": []}
+    nothing = {
+        "overturned_at_s": None,
+        "checks": 0,
+        "verdict": None,
+        "converged": None,
+        "impact_law": None,
+        "explanations": [],
+    }
     assert run["cells"] == [{"scene": "short", "model": "still", "outcome": "at rest", **nothing}]
-    assert result("accept", "suite.toml", "--allow-code", "faulty:Still", "--jobs", "1")["refused"] == []
+    assert (
+        result("accept", "suite.toml", "--allow-code", "faulty:Still", "--jobs", "1")["refused"]
+        == []
+    )
 
 
 def test_without_a_terminal_no_colour_and_no_progress():
@@ -167,7 +231,8 @@ def test_without_a_terminal_no_colour_and_no_progress():
 
 @pytest.mark.parametrize("voice", ["tables", "json", "quiet"])
 def test_a_long_work_tells_a_log_how_far_it_is(voice, monkeypatch, capsys):
-    """A tenth of 40 parts in 0.1 s: about 0.9 s are left, more than `EVERY`, so a line comes early; then one every `EVERY` s."""
+    """A tenth of 40 parts in 0.1 s: about 0.9 s are left, more than `EVERY`, so a line comes early;
+    then one every `EVERY` s."""
     monkeypatch.setattr(commands, "EVERY", 0.2)
     monkeypatch.setattr(commands, "EARLY", 0.15)
     with commands.speaking(voice), commands.progress("validate") as on_progress:
@@ -179,7 +244,10 @@ def test_a_long_work_tells_a_log_how_far_it_is(voice, monkeypatch, capsys):
     assert out == ""
     lines = err.splitlines()
     assert (len(lines) >= 2) == (voice != "quiet")
-    assert all(re.fullmatch(r"rockcheck: validate: 4 of 40, \d+:\d\d left \(fig4a\?, cm\)", line) for line in lines)
+    assert all(
+        re.fullmatch(r"rockcheck: validate: 4 of 40, \d+:\d\d left \(fig4a\?, cm\)", line)
+        for line in lines
+    )
 
 
 def test_a_work_of_unknown_length_tells_how_long_it_has_gone_on(monkeypatch, capsys):
@@ -194,7 +262,8 @@ def test_a_work_of_unknown_length_tells_how_long_it_has_gone_on(monkeypatch, cap
 
 
 def test_the_time_left_counts_what_is_done_here(monkeypatch):
-    """30 of 40 cells were read back at once: the others take as long as the first of them say. Minutes are told, not hours."""
+    """30 of 40 cells were read back at once: the others take as long as the first of them say.
+    Minutes are told, not hours."""
     clock = [100.0]
     monkeypatch.setattr(commands.time, "monotonic", lambda: clock[0])
     lines = commands._Lines("validate")
@@ -206,7 +275,10 @@ def test_the_time_left_counts_what_is_done_here(monkeypatch):
     assert lines.left() == pytest.approx(40.0)
 
 
-@pytest.mark.parametrize(("name", "page"), [("ida", "ida/index.html"), ("spectrum", "index.html"), ("validate", "index.html")])
+@pytest.mark.parametrize(
+    ("name", "page"),
+    [("ida", "ida/index.html"), ("spectrum", "index.html"), ("validate", "index.html")],
+)
 def test_the_help_names_the_page_that_is_written(name, page, capsys):
     main([name, "--help"])
     assert f"the page to open is {page} in it" in " ".join(capsys.readouterr().out.split())
@@ -214,7 +286,9 @@ def test_the_help_names_the_page_that_is_written(name, page, capsys):
 
 def test_on_a_terminal_colour_progress_and_its_width():
     main(["new", "mine.toml", "-q"])
-    said = on_a_terminal("simulate", "mine.toml", "--model", "pybullet", "--set", "time_step=1e-3", "-o", "a.csv")
+    said = on_a_terminal(
+        "simulate", "mine.toml", "--model", "pybullet", "--set", "time_step=1e-3", "-o", "a.csv"
+    )
     assert "left" in said
     assert "mine, pybullet" in said
     assert "\x1b[" in said
@@ -227,7 +301,13 @@ def test_on_a_terminal_colour_progress_and_its_width():
 def test_models_tell_how_far_they_are():
     from rockcheck.engines import PyBullet
 
-    scene = Scene(name="short", block=Block(half_width=0.4, half_height=1.5), floor=Floor(friction=0.5), duration=4.0, initial_rotation=0.1)
+    scene = Scene(
+        name="short",
+        block=Block(half_width=0.4, half_height=1.5),
+        floor=Floor(friction=0.5),
+        duration=4.0,
+        initial_rotation=0.1,
+    )
     heard: list[float] = []
     for step in (1e-3, "adaptive"):
         heard.clear()
@@ -253,7 +333,9 @@ def test_models_tell_how_far_they_are():
 def test_completion(line, offered):
     main(["new", "mine.toml", "-q"])
     words = line.split()
-    done = rockcheck(COMP_WORDS=line, COMP_CWORD=str(len(words) - 1), _ROCKCHECK_COMPLETE="complete_bash")
+    done = rockcheck(
+        COMP_WORDS=line, COMP_CWORD=str(len(words) - 1), _ROCKCHECK_COMPLETE="complete_bash"
+    )
     assert set(done.stdout.split()) == offered
 
 
@@ -271,17 +353,32 @@ def test_completion_can_be_installed(capsys):
 @pytest.mark.parametrize(
     ("tables", "said"),
     [
-        ({"blok": {}}, "blok: unknown key; did you mean 'block'? allowed: block, description, duration"),
+        (
+            {"blok": {}},
+            "blok: unknown key; did you mean 'block'? allowed: block, description, duration",
+        ),
         (
             {"block": {"half_widht": 1.0, "half_width": 1.0, "half_height": 2.0}},
             "block.half_widht: unknown key; did you mean 'half_width'",
         ),
-        ({"excitation": {"kind": "rickr"}}, "excitation: unknown kind 'rickr'; did you mean 'ricker'? allowed: record, rest, ricker, sine"),
-        ({"walls": [{"side": "lft", "gap": 0.1}]}, "walls.0.side: lft is not allowed: input should be 'left' or 'right'"),
+        (
+            {"excitation": {"kind": "rickr"}},
+            "excitation: unknown kind 'rickr'; did you mean 'ricker'? allowed: record, rest,"
+            " ricker, sine",
+        ),
+        (
+            {"walls": [{"side": "lft", "gap": 0.1}]},
+            "walls.0.side: lft is not allowed: input should be 'left' or 'right'",
+        ),
     ],
 )
 def test_nearest_names_in_scene_files(tables, said):
-    given = {"name": "a", "duration": 1.0, "block": {"half_width": 0.4, "half_height": 1.5}, "floor": {"friction": 0.5}} | tables
+    given = {
+        "name": "a",
+        "duration": 1.0,
+        "block": {"half_width": 0.4, "half_height": 1.5},
+        "floor": {"friction": 0.5},
+    } | tables
     with pytest.raises(InputError) as caught:
         Scene(**given)
     assert said in str(caught.value)

@@ -2,11 +2,14 @@
 
 - python: executed; the blocks of a page share their names, as in a notebook.
 - a block with `title="file"`: written to that file, and loaded as what it is.
-- bash, and indented commands: run; one that fails, fails the page. `make` targets are looked up instead of run.
-- an HTML comment that begins with `check`: executed after the blocks before it, and not shown to a reader. It computes figures that the
+- bash, and indented commands: run; one that fails, fails the page. `make` targets are looked up
+  instead of run.
+- an HTML comment that begins with `check`: executed after the blocks before it, and not shown to a
+  reader. It computes figures that the
   page states: `said("within 0.008")` holds the page to its words, an assertion holds the words to what comes out.
 
-Pages of studies hold commands of many minutes; these are run with `@pytest.mark.slow`, the longest in their `--quick` form.
+Pages of studies hold commands of many minutes; these are run with `@pytest.mark.slow`, the longest
+in their `--quick` form.
 """
 
 from __future__ import annotations
@@ -54,19 +57,27 @@ def blocks_of(page: Path) -> Iterator[Block]:
         elif token.type == "code_block":
             yield Block("bash", "", token.content, line)
         elif token.type == "html_block" and token.content.startswith(CHECK):
-            yield Block("python", "", token.content.removeprefix(CHECK).strip().removesuffix("-->"), line)
+            yield Block(
+                "python", "", token.content.removeprefix(CHECK).strip().removesuffix("-->"), line
+            )
 
 
 def commands_of(text: str) -> list[str]:
-    """The commands of a shell block, without their remarks; a word list after two spaces is a remark, too."""
+    """The commands of a shell block, without their remarks; a word list after two spaces is a
+    remark, too."""
     lines = (line.split(" #")[0].rstrip() for line in text.splitlines())
     return [re.split(r"(?<=\S)  +", line)[0] for line in lines if line and not line.startswith("#")]
 
 
 def is_long(command: str) -> bool:
-    """Whether a command takes minutes: a study, or a named suite; a page's own suites and scenes are short."""
+    """Whether a command takes minutes: a study, or a named suite; a page's own suites and scenes
+    are short."""
     words = shlex.split(command)
-    return words[0] == "rockcheck" and words[1] in LONG and not any(word.endswith(".toml") for word in words)
+    return (
+        words[0] == "rockcheck"
+        and words[1] in LONG
+        and not any(word.endswith(".toml") for word in words)
+    )
 
 
 def said(phrase: str, page: Path) -> None:
@@ -88,7 +99,12 @@ def run_shell(command: str, folder: Path) -> None:
         return
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     done = subprocess.run(
-        ["bash", "-c", command], cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True, check=False
+        ["bash", "-c", command],
+        cwd=folder,
+        env={**os.environ, "PATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, f"{command}: exit {done.returncode}: {done.stderr or done.stdout}"
 
@@ -113,7 +129,9 @@ def show_file(block: Block, folder: Path) -> None:
 def test_every_block_has_a_language(page):
     for block in blocks_of(page):
         assert block.language in LANGUAGES, f"{page.name}, line {block.line}: {block.language!r}"
-        assert block.file or block.language in ("python", "bash"), f"{page.name}, line {block.line}: a file without a name is not run"
+        assert block.file or block.language in ("python", "bash"), (
+            f"{page.name}, line {block.line}: a file without a name is not run"
+        )
 
 
 @pytest.mark.long
@@ -125,7 +143,11 @@ def test_blocks_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.syspath_prepend(ROOT / "docs" / "site_tools")
-    names: dict[str, object] = {"__name__": "__main__", "DOCS": ROOT / "docs", "said": lambda phrase, where=page: said(phrase, where)}
+    names: dict[str, object] = {
+        "__name__": "__main__",
+        "DOCS": ROOT / "docs",
+        "said": lambda phrase, where=page: said(phrase, where),
+    }
     for block in blocks:
         if block.file:
             show_file(block, tmp_path)

@@ -1,4 +1,5 @@
-"""The documentation as a site: builds strictly, and a real browser opens every page from the file system."""
+"""The documentation as a site: builds strictly, and a real browser opens every page from the file
+system."""
 
 from __future__ import annotations
 
@@ -24,7 +25,14 @@ SOURCES = sorted(path.stem for path in (ROOT / "docs").glob("*.md"))
 def site(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env={**os.environ, "NO_MKDOCS_2_WARNING": "1"}, check=False)
+    done = subprocess.run(
+        command,
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -44,9 +52,18 @@ def test_names_of_the_glossary_are_in_the_code():
     text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
     rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| **")]
     assert len(rows) >= 20
-    paths = [path for folder in ("scenes", "ebm", "engines", "validation") for path in (ROOT / folder).rglob("*.py")]
+    paths = [
+        path
+        for folder in ("scenes", "ebm", "engines", "validation")
+        for path in (ROOT / folder).rglob("*.py")
+    ]
     words = {
-        word for path in paths for word in (*path.relative_to(ROOT).with_suffix("").parts, *re.findall(r"\w+", path.read_text("utf-8")))
+        word
+        for path in paths
+        for word in (
+            *path.relative_to(ROOT).with_suffix("").parts,
+            *re.findall(r"\w+", path.read_text("utf-8")),
+        )
     }
     for *_, place in rows:
         for name in re.findall(r"`([^`]+)`", place):
@@ -58,7 +75,9 @@ def test_names_of_the_glossary_are_in_the_code():
 def test_pages_open_from_the_file_system_and_ask_for_nothing(site, page, name):
     page.goto((site / f"{name}.html").as_uri())
     assert page.locator("h1").count() == 1
-    broken = page.evaluate("[...document.images].filter(i => !i.complete || !i.naturalWidth).map(i => i.src)")
+    broken = page.evaluate(
+        "[...document.images].filter(i => !i.complete || !i.naturalWidth).map(i => i.src)"
+    )
     assert broken == []
 
 
@@ -75,7 +94,9 @@ def test_pages_fit_a_phone(site, page, name):
 def test_pictures_are_no_white_slabs_on_a_dark_page(site, page):
     page.emulate_media(color_scheme="dark")
     page.goto((site / "gallery.html").as_uri())
-    filters = page.evaluate("[...document.querySelectorAll('article img')].map(image => getComputedStyle(image).filter)")
+    filters = page.evaluate(
+        "[...document.querySelectorAll('article img')].map(image => getComputedStyle(image).filter)"
+    )
     assert filters
     assert all(one.startswith("invert") for one in filters)
 
@@ -85,7 +106,10 @@ def test_no_number_breaks_at_its_hyphen(site, page):
     """In the narrowest column, too; and what only the tests need is not published."""
     page.set_viewport_size({"width": 320, "height": 800})
     page.goto((site / "choosing.html").as_uri())
-    held = page.evaluate("[...document.querySelectorAll('article .unbroken')].map(one => [one.textContent, one.getClientRects().length])")
+    held = page.evaluate(
+        "[...document.querySelectorAll('article .unbroken')].map(one => [one.textContent,"
+        " one.getClientRects().length])"
+    )
     assert {"1e-12", "ebm-unilateral"} <= {text for text, _ in held}
     assert {lines for _, lines in held} == {1}
     assert "<!-- check" not in page.content()
@@ -97,7 +121,10 @@ def test_the_sample_report_is_one_click_away(site, page):
     page.get_by_role("link", name="See a sample report").click()
     assert page.url == (site / "sample" / "index.html").as_uri()
     assert "smoke" in page.inner_text("body")
-    links = page.evaluate("[...document.links].map(a => a.href).filter(h => h.startsWith('file:')).map(h => h.split(/[?#]/)[0])")
+    links = page.evaluate(
+        "[...document.links].map(a => a.href).filter(h => h.startsWith('file:')).map(h =>"
+        " h.split(/[?#]/)[0])"
+    )
     missing = [link for link in links if not Path(unquote(urlsplit(link).path)).exists()]
     assert len(links) > 5
     assert missing == []
@@ -106,7 +133,10 @@ def test_the_sample_report_is_one_click_away(site, page):
 @pytest.mark.browser
 def test_equations_are_drawn(site, page):
     page.goto((site / "theory.html").as_uri())
-    shapes = page.evaluate("[...document.querySelectorAll('math')].map(m => [m.textContent, m.getBoundingClientRect().height])")
+    shapes = page.evaluate(
+        "[...document.querySelectorAll('math')].map(m => [m.textContent,"
+        " m.getBoundingClientRect().height])"
+    )
     assert len(shapes) > 100
     assert all(height > 5 for _, height in shapes)
     left_over = [text for text, _ in shapes if "\\" in text]
@@ -117,7 +147,8 @@ def test_equations_are_drawn(site, page):
 @pytest.mark.browser
 def test_the_search_finds_without_a_server(site, page):
     page.goto((site / "index.html").as_uri())
-    # Keys, as a reader has them: the theme reads the field on keyup and focus, not on the input event that `fill` sends.
+    # Keys, as a reader has them: the theme reads the field on keyup and focus, not on the input
+    # event that `fill` sends.
     page.locator("input[name=query]").press_sequentially("Housner")
     page.wait_for_selector(".md-search-result__link")
     assert "Theory" in page.inner_text(".md-search-result__list")
@@ -142,5 +173,10 @@ def test_pictures_of_the_gallery_are_those_that_the_code_makes(monkeypatch):
 
 @pytest.mark.slow
 def test_the_gallery_can_be_made(tmp_path):
-    subprocess.run([sys.executable, str(ROOT / "docs" / "site_tools" / "gallery.py"), str(tmp_path)], check=True)
-    assert len(list(tmp_path.iterdir())) == len(list((ROOT / "docs" / "images" / "gallery").iterdir()))
+    subprocess.run(
+        [sys.executable, str(ROOT / "docs" / "site_tools" / "gallery.py"), str(tmp_path)],
+        check=True,
+    )
+    assert len(list(tmp_path.iterdir())) == len(
+        list((ROOT / "docs" / "images" / "gallery").iterdir())
+    )

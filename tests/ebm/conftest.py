@@ -32,7 +32,9 @@ class Run:
         """As the reference tables name it."""
         if self.ending == 0:
             return "safe"
-        return ("ccw" if self.theta > 0.0 else "cw") if self.ending == 1 else f"failed ({self.ending})"
+        return (
+            ("ccw" if self.theta > 0.0 else "cw") if self.ending == 1 else f"failed ({self.ending})"
+        )
 
 
 Runner = Callable[..., Run]
@@ -46,19 +48,36 @@ def block() -> Block:
 
 @pytest.fixture(scope="session")
 def run_to_end() -> Runner:
-    """Runs a scene to its end without sampling it; the compiled loop is called as the model calls it."""
+    """Runs a scene to its end without sampling it; the compiled loop is called as the model calls
+    it."""
     from rockcheck.ebm import natural
     from rockcheck.ebm.core import march, motion
 
     scratch = motion.workspace()
 
-    def run(scene: Scene, *, pivot: str = "bilateral", tolerance: float = 1e-12, impacts: str = "moreau") -> Run:
-        setting = natural.setting_of(scene, unilateral=pivot == "unilateral", no_slip=False, energy_cap=False, impacts=impacts)
+    def run(
+        scene: Scene, *, pivot: str = "bilateral", tolerance: float = 1e-12, impacts: str = "moreau"
+    ) -> Run:
+        setting = natural.setting_of(
+            scene,
+            unilateral=pivot == "unilateral",
+            no_slip=False,
+            energy_cap=False,
+            impacts=impacts,
+        )
         state = natural.state_of(scene)
         control = march.Control(tolerance, 1_000_000, 200_000, False, 1.0)
         unit, radius = natural.time_unit(scene), scene.block.radius
         nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
-        tally, _ = march.run(setting, *natural.grounds_of(scene), state, scene.duration / unit, control, *nothing, *scratch)
+        tally, _ = march.run(
+            setting,
+            *natural.grounds_of(scene),
+            state,
+            scene.duration / unit,
+            control,
+            *nothing,
+            *scratch,
+        )
         return Run(
             ending=tally.ending,
             t=tally.t * unit,
@@ -75,13 +94,31 @@ def run_to_end() -> Runner:
 
 @pytest.fixture(scope="session")
 def pulse_scene(block: Block) -> Callable[..., Scene]:
-    """Makes a scene of the paper's block under a Ricker pulse of omega_p = `frequency` p and a_p = `amplitude` g tan(alpha)."""
+    """Makes a scene of the paper's block under a Ricker pulse of omega_p = `frequency` p and a_p =
+    `amplitude` g tan(alpha)."""
 
-    def scene(frequency: float, amplitude: float, mu: float, wall: tuple[str, float, float] | None = None, **more: object) -> Scene:
+    def scene(
+        frequency: float,
+        amplitude: float,
+        mu: float,
+        wall: tuple[str, float, float] | None = None,
+        **more: object,
+    ) -> Scene:
         walls = [Wall(side=wall[0], gap=wall[1], restitution=wall[2])] if wall else []
-        pulse = Ricker(amplitude=amplitude * 9.81 * math.tan(block.alpha), period=2.0 * math.pi / (frequency * block.frequency_parameter))
+        pulse = Ricker(
+            amplitude=amplitude * 9.81 * math.tan(block.alpha),
+            period=2.0 * math.pi / (frequency * block.frequency_parameter),
+        )
         return Scene(
-            **{"name": "pulse", "block": block, "floor": Floor(friction=mu), "walls": walls, "excitation": pulse, "duration": 5.0} | more
+            **{
+                "name": "pulse",
+                "block": block,
+                "floor": Floor(friction=mu),
+                "walls": walls,
+                "excitation": pulse,
+                "duration": 5.0,
+            }
+            | more
         )
 
     return scene

@@ -1,8 +1,9 @@
-"""The bilateral model by another method: the paper's closed-form equations, integrated by scipy's DOP853 at 1e-13.
+"""The bilateral model by another method: the paper's closed-form equations, integrated by scipy's
+DOP853 at 1e-13.
 
-Nothing of `ebm` is used on this side. Equations of motion are written out mode by mode, (3), (7), (8), LEAN and LADDER;
-impacts are solved from the balances of momentum and the laws of restitution and friction, not from the paper's solved forms.
-SI units, unit mass, signs as in a Scene.
+Nothing of `ebm` is used on this side. Equations of motion are written out mode by mode, (3), (7),
+(8), LEAN and LADDER; impacts are solved from the balances of momentum and the laws of restitution
+and friction, not from the paper's solved forms. SI units, unit mass, signs as in a Scene.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ def sign(value: float) -> int:
 
 @dataclass(frozen=True)
 class Mode:
-    """Pivot S (+1 left corner), direction d of its slip (0: sticks), wall Sw that a corner rests on (0: none), sign of G or P."""
+    """Pivot S (+1 left corner), direction d of its slip (0: sticks), wall Sw that a corner rests on
+    (0: none), sign of G or P."""
 
     S: int
     d: int = 0
@@ -45,7 +47,8 @@ class Mode:
 
 @dataclass
 class PaperModel:
-    """The event-based model of one scene, with a pivot that never leaves the floor and at most one wall."""
+    """The event-based model of one scene, with a pivot that never leaves the floor and at most one
+    wall."""
 
     scene: Scene
     max_step: float = 5e-3
@@ -53,7 +56,11 @@ class PaperModel:
     pieces: list[tuple[float, float, Callable[[float], State]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.alpha, self.R, self.g = self.scene.block.alpha, self.scene.block.radius, self.scene.gravity
+        self.alpha, self.R, self.g = (
+            self.scene.block.alpha,
+            self.scene.block.radius,
+            self.scene.gravity,
+        )
         self.mu_s, self.mu_k = self.scene.floor.mu_s, self.scene.floor.friction
         self.wall = self.scene.walls[0] if self.scene.walls else None
         self.side = {"left": 1, "right": -1}[self.wall.side] if self.wall else 0
@@ -67,7 +74,12 @@ class PaperModel:
 
     def geometry(self, theta: float) -> tuple[float, float, float, float]:
         a = abs(theta)
-        return math.sin(self.alpha - a), math.cos(self.alpha - a), math.sin(self.alpha + a), math.cos(self.alpha + a)
+        return (
+            math.sin(self.alpha - a),
+            math.cos(self.alpha - a),
+            math.sin(self.alpha + a),
+            math.cos(self.alpha + a),
+        )
 
     def motion(self, m: Mode, t: float, y: State) -> tuple[float, float, float, float, float]:
         """x'', theta'', P, Q, N of a mode."""
@@ -134,8 +146,16 @@ class PaperModel:
             return rock
         if not closed:
             return self.with_sense(Mode(S, -sign(Q)), t, y)
-        found = [ladder for ladder in (Mode(S, 1, Sw), Mode(S, -1, Sw)) if self.starts_down_the_wall(ladder, t, y)]
-        found += [sliding for sliding in (Mode(S, 1), Mode(S, -1)) if self.starts_off_the_wall(sliding, t, y)]
+        found = [
+            ladder
+            for ladder in (Mode(S, 1, Sw), Mode(S, -1, Sw))
+            if self.starts_down_the_wall(ladder, t, y)
+        ]
+        found += [
+            sliding
+            for sliding in (Mode(S, 1), Mode(S, -1))
+            if self.starts_off_the_wall(sliding, t, y)
+        ]
         assert len(found) == 1, found
         return found[0]
 
@@ -150,7 +170,9 @@ class PaperModel:
         return m.d * self.slip_rate_change(m, t, y) > 0.0 and self.gap_change(m, t, y) > 0.0
 
     def with_sense(self, m: Mode, t: float, y: State) -> Mode:
-        return Mode(m.S, m.d, m.Sw, sign(self.G0(t) - self.R * math.cos(self.alpha - abs(y[1])) * y[3] ** 2))
+        return Mode(
+            m.S, m.d, m.Sw, sign(self.G0(t) - self.R * math.cos(self.alpha - abs(y[1])) * y[3] ** 2)
+        )
 
     def guards(self, m: Mode) -> dict[str, Callable[[float, State], float]]:
         """Functions that fall through zero where the mode ends."""
@@ -163,7 +185,9 @@ class PaperModel:
         elif self.wall:
             out["wall impact"] = lambda t, y: self.gap(y)
         if not m.d:
-            out["slip"] = lambda t, y: self.mu_s * abs(self.motion(m, t, y)[2]) - abs(self.motion(m, t, y)[3])
+            out["slip"] = lambda t, y: (
+                self.mu_s * abs(self.motion(m, t, y)[2]) - abs(self.motion(m, t, y)[3])
+            )
         elif not m.Sw:
             out["stick"] = lambda t, y: m.d * self.slip(y)
             out["sense"] = lambda t, y: m.sense * self.motion(m, t, y)[2]
@@ -171,11 +195,21 @@ class PaperModel:
             out["stick"] = lambda t, y: m.d * self.slip(y)
         return out
 
-    def impact(self, S: int, y: State, vertical: float, *, e: float | None = None, slips: int = 0, sense: int = 1) -> list[float]:
-        """Momentum balance of one impact at a speed `vertical` of the centroid: dx/dt, w after it, impulses P, Q, N.
+    def impact(
+        self,
+        S: int,
+        y: State,
+        vertical: float,
+        *,
+        e: float | None = None,
+        slips: int = 0,
+        sense: int = 1,
+    ) -> list[float]:
+        """Momentum balance of one impact at a speed `vertical` of the centroid: dx/dt, w after it,
+        impulses P, Q, N.
 
-        The pivot sticks or, with `slips` its direction, slips under a P of sign `sense`; the corner on the wall rebounds with e
-        or, with None, receives nothing.
+        The pivot sticks or, with `slips` its direction, slips under a P of sign `sense`; the corner
+        on the wall rebounds with e or, with None, receives nothing.
         """
         s, c, _, _ = self.geometry(y[1])
         R, C, Sw = self.R, self.C(S, y) if self.wall else 0.0, self.side
@@ -184,7 +218,11 @@ class PaperModel:
         a[0], b[0] = [1.0, 0.0, 0.0, -1.0, -Sw], v1
         a[1], b[1] = [0.0, S * R * s, -1.0, 0.0, 0.0], vertical
         a[2], b[2] = [0.0, R * R / 3.0, S * R * s, -R * c, R * C * Sw], R * R / 3.0 * w1
-        a[3] = [0.0, 0.0, self.mu_k * slips * sense, 1.0, 0.0] if slips else [1.0, R * c, 0.0, 0.0, 0.0]
+        a[3] = (
+            [0.0, 0.0, self.mu_k * slips * sense, 1.0, 0.0]
+            if slips
+            else [1.0, R * c, 0.0, 0.0, 0.0]
+        )
         if e is None:
             a[4] = [0.0, 0.0, 0.0, 0.0, 1.0]
         else:
@@ -198,7 +236,9 @@ class PaperModel:
         v, w, P, Q, _ = self.impact(S2, y, vertical)
         if S2 * w < 0.0 or P < 0.0 or abs(Q) > self.mu_s * P:
             slides = [(d, *self.impact(S2, y, vertical, slips=d)[:2]) for d in (1, -1)]
-            ((v, w),) = [(v, w) for d, v, w in slides if S2 * w >= 0.0 and d * (v + self.R * c * w) >= 0.0]
+            ((v, w),) = [
+                (v, w) for d, v, w in slides if S2 * w >= 0.0 and d * (v + self.R * c * w) >= 0.0
+            ]
         return np.array([y[0], 0.0, v, w])
 
     def hit_wall(self, m: Mode, y: State) -> tuple[State, bool]:
@@ -223,12 +263,14 @@ class PaperModel:
         ((v, w, N, k),) = found
         if N >= 0.0:  # D
             return np.array([y[0], y[1], v, w]), e == 0.0
-        # E: no impulse from the wall, whose corner neither rebounds nor enters; the moment is what is left over.
+        # E: no impulse from the wall, whose corner neither rebounds nor enters; the moment is what
+        # is left over.
         w = (k * vertical - y[2]) / (k * S * R * s - R * C)
         return np.array([y[0], y[1], R * C * w, w]), False
 
     def uplift(self, t: float, x: float) -> tuple[float, Mode | None, State]:
-        """From rest: when and how the block starts to move. Only blocks whose friction lets them tilt."""
+        """From rest: when and how the block starts to move. Only blocks whose friction lets them
+        tilt."""
         slope, end = math.tan(self.alpha), self.scene.duration
         assert self.mu_s >= slope
         y = np.array([x, 0.0, 0.0, 0.0])
@@ -243,7 +285,9 @@ class PaperModel:
             return end, None, y
         t = brentq(excess, fine[first - 1], fine[first], xtol=1e-15, rtol=1e-15) if first else t
         S = sign(self.u(t))
-        sticks = self.mu_s >= (slope * (1.0 + 4.0 * slope**2) + 3.0 * slope) / (4.0 + slope**2 + 3.0 * slope**2)
+        sticks = self.mu_s >= (slope * (1.0 + 4.0 * slope**2) + 3.0 * slope) / (
+            4.0 + slope**2 + 3.0 * slope**2
+        )
         return t, (Mode(S) if sticks else Mode(S, -S)), y
 
     def run(self) -> PaperModel:
@@ -300,7 +344,11 @@ class PaperModel:
             return self.with_sense(Mode(mode.S, mode.d), t, y), y
         Q = self.motion(Mode(mode.S), t, y)[3]
         P = self.motion(Mode(mode.S), t, y)[2]
-        return (Mode(mode.S) if abs(Q) <= self.mu_s * abs(P) else self.with_sense(Mode(mode.S, -sign(Q)), t, y)), y
+        return (
+            Mode(mode.S)
+            if abs(Q) <= self.mu_s * abs(P)
+            else self.with_sense(Mode(mode.S, -sign(Q)), t, y)
+        ), y
 
     def on_pivot(self, y: State) -> State:
         """Slip that is only rounding is taken out."""
@@ -316,7 +364,9 @@ class PaperModel:
         for a, b in pairwise(times):
             for which in ("release", "slip"):
                 if margin(which, b) < 0.0:
-                    root = brentq(lambda s, which=which: margin(which, s), a, b, xtol=1e-15, rtol=1e-15)
+                    root = brentq(
+                        lambda s, which=which: margin(which, s), a, b, xtol=1e-15, rtol=1e-15
+                    )
                     self.pieces.append((t, root, lambda _, y=y: y))
                     return root, y, which
         self.pieces.append((t, self.scene.duration, lambda _, y=y: y))
@@ -333,7 +383,9 @@ class PaperModel:
         events = []
         for function in named.values():
 
-            def falls(t: float, y: State, function: Callable[[float, State], float] = function) -> float:
+            def falls(
+                t: float, y: State, function: Callable[[float, State], float] = function
+            ) -> float:
                 return function(t, y)
 
             falls.terminal = True  # type: ignore[attr-defined]
@@ -342,15 +394,29 @@ class PaperModel:
         ends = [self.scene.duration]
         excitation = self.scene.excitation
         if isinstance(excitation, Record):  # stop at the samples, where the motion has kinks
-            ends = [s for s in excitation.time_step * np.arange(1, len(excitation.unscaled)) if s > t + 1e-12 and s < ends[0]] + ends
+            ends = [
+                s
+                for s in excitation.time_step * np.arange(1, len(excitation.unscaled))
+                if s > t + 1e-12 and s < ends[0]
+            ] + ends
         for end in ends:
             run = solve_ivp(
-                rates, (t, end), y, method="DOP853", rtol=1e-13, atol=1e-15, max_step=self.max_step, events=events, dense_output=True
+                rates,
+                (t, end),
+                y,
+                method="DOP853",
+                rtol=1e-13,
+                atol=1e-15,
+                max_step=self.max_step,
+                events=events,
+                dense_output=True,
             )
             self.pieces.append((t, run.t[-1], run.sol))
             t, y = run.t[-1], run.y[:, -1]
             if run.status == 1:
-                (kind,) = (name for name, found in zip(named, run.t_events, strict=True) if found.size)
+                (kind,) = (
+                    name for name, found in zip(named, run.t_events, strict=True) if found.size
+                )
                 return t, y, kind
         return t, y, "end"
 
@@ -371,7 +437,10 @@ SLOPE = 9.81 * math.tan(PAPER_BLOCK.alpha)
 
 def pulse(frequency_ratio: float, amplitude_ratio: float) -> Ricker:
     """A pulse of omega_p = ratio p and a_p = ratio g tan(alpha)."""
-    return Ricker(amplitude=amplitude_ratio * SLOPE, period=2.0 * math.pi / (frequency_ratio * PAPER_BLOCK.frequency_parameter))
+    return Ricker(
+        amplitude=amplitude_ratio * SLOPE,
+        period=2.0 * math.pi / (frequency_ratio * PAPER_BLOCK.frequency_parameter),
+    )
 
 
 def beside(side: str, gap: float, e: float) -> list[Wall]:
@@ -390,7 +459,13 @@ def scene(
 ) -> Scene:
     floor = Floor(friction=mu, static_friction=static)
     return Scene(
-        name=name, block=PAPER_BLOCK, floor=floor, walls=walls or [], excitation=excitation, vertical=vertical or Rest(), duration=duration
+        name=name,
+        block=PAPER_BLOCK,
+        floor=floor,
+        walls=walls or [],
+        excitation=excitation,
+        vertical=vertical or Rest(),
+        duration=duration,
     )
 
 
@@ -398,12 +473,20 @@ SCENES = [
     scene("rocking", pulse(2.0, 1.1), 5.0, 1.0),
     scene("slide-rock", pulse(4.5, 4.0), 6.0, 0.3),
     scene("static above kinetic friction", pulse(4.5, 4.0), 5.0, 0.28, static=0.45),
-    scene("vertical shaking", pulse(4.5, 4.0), 4.0, 0.3, vertical=Sine(amplitude=4.0, period=0.4, cycles=8)),
+    scene(
+        "vertical shaking",
+        pulse(4.5, 4.0),
+        4.0,
+        0.3,
+        vertical=Sine(amplitude=4.0, period=0.4, cycles=8),
+    ),
     scene("plastic left wall", pulse(4.5, 4.0), 5.0, 0.3, beside("left", 0.053, 0.0)),
     scene("plastic right wall", pulse(3.0, 2.5), 5.0, 0.6, beside("right", 0.053, 0.0)),
     scene("leaning on the wall", pulse(1.0, 1.1), 5.6, 0.3, beside("left", 0.003, 0.0)),
     scene("left wall, half restitution", pulse(4.5, 4.0), 5.0, 0.3, beside("left", 0.053, 0.5)),
-    scene("elastic right wall, overturning", pulse(3.0, 2.5), 5.0, 0.3, beside("right", 0.103, 1.0)),
+    scene(
+        "elastic right wall, overturning", pulse(3.0, 2.5), 5.0, 0.3, beside("right", 0.103, 1.0)
+    ),
     scene("grazing the wall", pulse(3.0, 6.0), 6.0, 0.3, beside("right", 0.003, 1.0)),
     scene("recorded", load_scene("fig4a").excitation, 5.0, 0.3),
 ]
@@ -417,9 +500,11 @@ CONTACTS = ("uplift", "floor impact", "wall impact", "overturned left", "overtur
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
 def test_motion_and_events(scene):
-    """Motion within 1e-10 (rad, m, rad/s, m/s), at every row; contacts in the same order, within 1e-9 s.
+    """Motion within 1e-10 (rad, m, rad/s, m/s), at every row; contacts in the same order, within
+    1e-9 s.
 
-    Events are compared as long as impacts are not yet tiny (1e-3 m/s), since an instant is worth the less the slower its event is.
+    Events are compared as long as impacts are not yet tiny (1e-3 m/s), since an instant is worth
+    the less the slower its event is.
 
     """
     other = PaperModel(scene).run()
@@ -428,19 +513,31 @@ def test_motion_and_events(scene):
     assert len(motion) == len(ours.channels["t"])
     for column, name in enumerate(("x", "theta")):
         np.testing.assert_allclose(ours.channels[name], motion[:, column], rtol=0.0, atol=1e-10)
-    struck = np.abs(ours.channels["t"][:, None] - np.array([t for t, _ in other.events])).min(axis=1) < 1e-8
+    struck = (
+        np.abs(ours.channels["t"][:, None] - np.array([t for t, _ in other.events])).min(axis=1)
+        < 1e-8
+    )
     for column, name in enumerate(("x_dot", "theta_dot"), 2):
-        np.testing.assert_allclose(ours.channels[name][~struck], motion[~struck, column], rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(
+            ours.channels[name][~struck], motion[~struck, column], rtol=0.0, atol=1e-9
+        )
     mine = [e for e in ours.event_list if e.kind in CONTACTS]
     theirs = [(t, kind) for t, kind in other.events if kind in CONTACTS or kind == "overturned"]
-    slow = next((k for k, e in enumerate(mine) if "impact" in e.kind and e.impulse < 1e-3), len(mine))
-    assert [e.kind.split()[0] for e in mine[:slow]] == [kind.split()[0] for _, kind in theirs[:slow]]
-    np.testing.assert_allclose([e.t for e in mine[:slow]], [t for t, _ in theirs[:slow]], rtol=0.0, atol=1e-9)
+    slow = next(
+        (k for k, e in enumerate(mine) if "impact" in e.kind and e.impulse < 1e-3), len(mine)
+    )
+    assert [e.kind.split()[0] for e in mine[:slow]] == [
+        kind.split()[0] for _, kind in theirs[:slow]
+    ]
+    np.testing.assert_allclose(
+        [e.t for e in mine[:slow]], [t for t, _ in theirs[:slow]], rtol=0.0, atol=1e-9
+    )
     assert MODES.get(scene.name, set()) <= set(ours.channels["mode"])
 
 
 def test_the_fifth_wall_contact():
-    """The one row of the bilateral table that differs: `GRAZING_ROW` of test_reference_rows.py. There are five wall contacts."""
+    """The one row of the bilateral table that differs: `GRAZING_ROW` of test_reference_rows.py.
+    There are five wall contacts."""
     grazing = next(scene for scene in SCENES if scene.name == "grazing the wall")
     contacts = [t for t, kind in PaperModel(grazing).run().events if kind == "wall impact"]
     assert len(contacts) == 5
@@ -465,7 +562,8 @@ def random_scene(rng: np.random.Generator, side: str) -> Scene:
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("name", ["rock", "slide-rock", "lean", "ladder"])
 def test_series_begin_with_the_closed_forms(name, side, case):
-    """x'', theta'', P, Q and N of the models' series are the paper's, at 200 random blocks and states, to 1e-12."""
+    """x'', theta'', P, Q and N of the models' series are the paper's, at 200 random blocks and
+    states, to 1e-12."""
     from rockcheck.ebm import natural
     from rockcheck.ebm.core import motion
 
@@ -475,7 +573,12 @@ def test_series_begin_with_the_closed_forms(name, side, case):
         scene = random_scene(rng, side)
         paper = PaperModel(scene)
         b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
-        t, unit, R, g = rng.uniform(0.5, 3.5), natural.time_unit(scene), scene.block.radius, scene.gravity
+        t, unit, R, g = (
+            rng.uniform(0.5, 3.5),
+            natural.time_unit(scene),
+            scene.block.radius,
+            scene.gravity,
+        )
         d = 0 if name in ("rock", "lean") else int(rng.choice([-1, 1]))
         S = case * paper.side
         theta, w = S * paper.alpha * rng.uniform(0.01, 1.2), rng.uniform(-1.0, 1.0) / unit
@@ -494,7 +597,12 @@ def test_series_begin_with_the_closed_forms(name, side, case):
         expected = np.array(paper.motion(mode, t, y)) / [g, g / R, g, g, g]
 
         m = np.zeros(motion.MODE_SIZE, dtype=np.int64)
-        m[motion.FAMILY], m[motion.S], m[motion.SLIP], m[motion.PULL] = motion.TILT, S, S * d, mode.sense
+        m[motion.FAMILY], m[motion.S], m[motion.SLIP], m[motion.PULL] = (
+            motion.TILT,
+            S,
+            S * d,
+            mode.sense,
+        )
         m[motion.FLOOR] = motion.SLIPPING if d else motion.STICK
         m[motion.TIP], m[motion.FAR] = mode.Sw == S, mode.Sw == -S
         s = math.sin(paper.alpha - abs(theta))
@@ -505,6 +613,8 @@ def test_series_begin_with_the_closed_forms(name, side, case):
         push = a[motion.NA, 0] + a[motion.NB, 0] if mode.Sw else 0.0
         found = [x2, S * a[motion.OMEGA, 1], a[motion.P, 0], S * a[motion.Q, 0], push]
         scale = 1.0 + np.abs(expected).max()
-        if name == "lean":  # the forces of a block that leans on its own pivot's side are as ill-conditioned as 1/(c + C)
+        if (
+            name == "lean"
+        ):  # the forces of a block that leans on its own pivot's side are as ill-conditioned as 1/(c + C)
             scale /= c + paper.C(S, y)
         np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * scale)

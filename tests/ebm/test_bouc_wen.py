@@ -1,4 +1,5 @@
-"""ebm-bouc-wen: the regularised friction (9) against an independent stiff integration, the exact model and its own limits."""
+"""ebm-bouc-wen: the regularised friction (9) against an independent stiff integration, the exact
+model and its own limits."""
 
 import math
 
@@ -7,7 +8,18 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Block, Floor, InputError, Record, Ricker, Scene, Sine, Wall, kinematics, load_scene
+from rockcheck.scenes import (
+    Block,
+    Floor,
+    InputError,
+    Record,
+    Ricker,
+    Scene,
+    Sine,
+    Wall,
+    kinematics,
+    load_scene,
+)
 from rockcheck.scenes.errors import ModelFailure
 from rockcheck.scenes.scene import PAPER_BLOCK
 
@@ -17,12 +29,21 @@ G = 9.81
 def pulse(a_ratio=4.0, w_ratio=4.5, mu=0.3, walls=(), block=PAPER_BLOCK, **more):
     period = 2.0 * math.pi / (w_ratio * block.frequency_parameter)
     excitation = Ricker(amplitude=a_ratio * G * math.tan(block.alpha), period=period)
-    fields = {"name": "pulse", "block": block, "floor": Floor(friction=mu), "walls": walls, "excitation": excitation, "duration": 10.0}
+    fields = {
+        "name": "pulse",
+        "block": block,
+        "floor": Floor(friction=mu),
+        "walls": walls,
+        "excitation": excitation,
+        "duration": 10.0,
+    }
     return Scene(**fields | more)
 
 
 def bouc_wen(scene, yield_displacement=1e-5, **settings):
-    return EventBasedModel(friction="bouc-wen", yield_displacement=yield_displacement, **settings).simulate(scene)
+    return EventBasedModel(
+        friction="bouc-wen", yield_displacement=yield_displacement, **settings
+    ).simulate(scene)
 
 
 def peak(history):
@@ -41,7 +62,8 @@ def test_the_paper_s_yield_displacement_is_not_converged_but_smaller_ones_conver
 
 
 def integrated(scene, yield_displacement, z, t_end):
-    """(7), (8) and (9) with z for d in SI units, integrated by an implicit Runge-Kutta method from the scene's initial state."""
+    """(7), (8) and (9) with z for d in SI units, integrated by an implicit Runge-Kutta method from
+    the scene's initial state."""
     block, mu, spin = scene.block, scene.floor.friction, math.copysign(1.0, scene.initial_rotation)
     x, _, theta, v, _, w = scene.initial_state
 
@@ -58,14 +80,24 @@ def integrated(scene, yield_displacement, z, t_end):
 
     start = (x, theta, v, w, z)
     return solve_ivp(
-        rates, (0.0, t_end), start, method="Radau", rtol=1e-10, atol=1e-13, t_eval=scene.output_times[: int(t_end / 0.005) + 1]
+        rates,
+        (0.0, t_end),
+        start,
+        method="Radau",
+        rtol=1e-10,
+        atol=1e-13,
+        t_eval=scene.output_times[: int(t_end / 0.005) + 1],
     )
 
 
 @pytest.mark.parametrize(("slip", "vertical"), [(0.6, 0.0), (-0.4, 4.0)])
 def test_slip_yield_and_stick_agree_with_an_implicit_integration(slip, vertical):
     scene = pulse(
-        a_ratio=1.0, initial_rotation=0.12, initial_velocity=slip, vertical=Ricker(amplitude=vertical, period=0.7), output_step=0.005
+        a_ratio=1.0,
+        initial_rotation=0.12,
+        initial_velocity=slip,
+        vertical=Ricker(amplitude=vertical, period=0.7),
+        output_step=0.005,
     )
     history = bouc_wen(scene, 1e-3, tolerance=1e-12)
     landing = next(event.t for event in history.event_list if event.kind == "floor impact")
@@ -79,19 +111,25 @@ def test_slip_yield_and_stick_agree_with_an_implicit_integration(slip, vertical)
 def test_tolerance_controls_the_error_of_the_steps():
     scene = pulse(duration=4.0)
     truth = bouc_wen(scene, tolerance=1e-14).channels["theta"]
-    errors = [np.max(np.abs(bouc_wen(scene, tolerance=tolerance).channels["theta"] - truth)) for tolerance in (1e-7, 1e-9, 1e-11)]
+    errors = [
+        np.max(np.abs(bouc_wen(scene, tolerance=tolerance).channels["theta"] - truth))
+        for tolerance in (1e-7, 1e-9, 1e-11)
+    ]
     assert errors[2] < 1e-6 * PAPER_BLOCK.alpha
     assert errors[2] < 0.1 * errors[1] < 0.01 * errors[0]
 
 
 @pytest.mark.parametrize("mu", [0.2, 0.25])
 def test_flat_sliding_tends_to_the_exact_model_with_the_root_of_the_yield_displacement(mu):
-    # After each reversal the friction turns only while the base slips some u_y, which takes a time of sqrt(u_y/acceleration).
+    # After each reversal the friction turns only while the base slips some u_y, which takes a time
+    # of sqrt(u_y/acceleration).
     scene = pulse(a_ratio=2.0, mu=mu)
     exact = EventBasedModel().simulate(scene)
     histories = [bouc_wen(scene, u) for u in (1e-4, 1e-5, 1e-6)]
     errors = np.array([np.max(np.abs(h.channels["x"] - exact.channels["x"])) for h in histories])
-    assert all(h.peak_rotation == 0.0 and h.outcome == exact.outcome == "at rest" for h in histories)
+    assert all(
+        h.peak_rotation == 0.0 and h.outcome == exact.outcome == "at rest" for h in histories
+    )
     assert errors[:-1] / errors[1:] == pytest.approx(math.sqrt(10.0), rel=0.05)
 
 
@@ -108,15 +146,25 @@ def test_el_centro_tends_to_the_exact_model(name):
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_walls_hold_the_block_and_the_motion_tends_to_the_exact_one(side, restitution):
-    scene = pulse(a_ratio=3.0, w_ratio=3.0, walls=[Wall(side=side, gap=0.053, restitution=restitution)])
+    scene = pulse(
+        a_ratio=3.0, w_ratio=3.0, walls=[Wall(side=side, gap=0.053, restitution=restitution)]
+    )
     exact, fine = EventBasedModel().simulate(scene), bouc_wen(scene, 1e-7)
     gap = kinematics.wall_gap(scene, side, fine.channels["x"], fine.channels["theta"])
     assert [e.kind for e in fine.event_list].count("wall impact") >= 1
     assert gap.min() > -1e-9
     assert fine.outcome == exact.outcome
-    assert np.max(np.abs(kinematics.pivot_height(PAPER_BLOCK, fine.channels["y"], fine.channels["theta"]))) < 1e-12
+    assert (
+        np.max(
+            np.abs(kinematics.pivot_height(PAPER_BLOCK, fine.channels["y"], fine.channels["theta"]))
+        )
+        < 1e-12
+    )
     rows = min(len(fine.channels["theta"]), len(exact.channels["theta"]), 600)
-    assert np.max(np.abs(fine.channels["theta"][:rows] - exact.channels["theta"][:rows])) < 2e-3 * PAPER_BLOCK.alpha
+    assert (
+        np.max(np.abs(fine.channels["theta"][:rows] - exact.channels["theta"][:rows]))
+        < 2e-3 * PAPER_BLOCK.alpha
+    )
 
 
 def test_the_mirror_image_is_exact():
@@ -153,12 +201,16 @@ def test_overturning_ends_the_run():
 
 
 def test_beyond_painleve_the_sign_of_the_push_that_is_wrong_by_least_goes_on():
-    """On a wall, friction 1.333 is beyond Painleve's limit: neither a push nor a pull of the floor solves the equations."""
+    """On a wall, friction 1.333 is beyond Painleve's limit: neither a push nor a pull of the floor
+    solves the equations."""
     scene = Scene(
         name="painleve",
         block=Block(half_width=1.1228, half_height=1.0681),
         floor=Floor(friction=1.333),
-        walls=[Wall(side="left", gap=0.20385, restitution=0.0), Wall(side="right", gap=0.64593, restitution=0.53577)],
+        walls=[
+            Wall(side="left", gap=0.20385, restitution=0.0),
+            Wall(side="right", gap=0.64593, restitution=0.53577),
+        ],
         excitation=Record.from_samples([9.3] * 8 + [9.4] * 8 + [12.0] * 6, 0.0622598),
         initial_angular_velocity=1.74098,
         initial_velocity=1.400567,
@@ -167,7 +219,10 @@ def test_beyond_painleve_the_sign_of_the_push_that_is_wrong_by_least_goes_on():
     )
     history = bouc_wen(scene, yield_displacement=1.54969e-3)
     assert history.cost.rules["least contradiction"] > 0
-    assert kinematics.wall_gap(scene, "left", history.channels["x"], history.channels["theta"]).min() > -1e-9 * scene.block.radius
+    assert (
+        kinematics.wall_gap(scene, "left", history.channels["x"], history.channels["theta"]).min()
+        > -1e-9 * scene.block.radius
+    )
 
 
 def test_what_it_cannot_do_is_refused():
@@ -183,7 +238,8 @@ def test_what_it_cannot_do_is_refused():
 
 @pytest.mark.parametrize("share", [1.0, 1.0 + 2e-16, 1.0 + 1e-9])
 def test_friction_at_the_blocks_slope_slides_at_its_limit(share):
-    """Just where a block slips as it tips, z is +-1 but for rounding, and no tilt grows: it slides when Coulomb's does, not later."""
+    """Just where a block slips as it tips, z is +-1 but for rounding, and no tilt grows: it slides
+    when Coulomb's does, not later."""
     scene = Scene(
         name="slope",
         block=Block(half_width=0.25, half_height=1.0),
@@ -192,7 +248,10 @@ def test_friction_at_the_blocks_slope_slides_at_its_limit(share):
         duration=3.0,
         output_step=0.01,
     )
-    exact, smooth = EventBasedModel().simulate(scene), EventBasedModel(friction="bouc-wen").simulate(scene)
+    exact, smooth = (
+        EventBasedModel().simulate(scene),
+        EventBasedModel(friction="bouc-wen").simulate(scene),
+    )
     assert np.max(np.abs(exact.channels["x"])) > 0.01
     np.testing.assert_allclose(smooth.channels["x"], exact.channels["x"], rtol=0.0, atol=1e-10)
     assert smooth.cost.rules == {}

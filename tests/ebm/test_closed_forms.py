@@ -17,7 +17,10 @@ PIVOTS = ["bilateral", "unilateral"]
 
 
 def scene_of(block: Block, mu: float, duration: float, **more: object) -> Scene:
-    return Scene(**{"name": "closed form", "block": block, "floor": Floor(friction=mu), "duration": duration} | more)
+    return Scene(
+        **{"name": "closed form", "block": block, "floor": Floor(friction=mu), "duration": duration}
+        | more
+    )
 
 
 def block_of(alpha: float, radius: float = 1.0) -> Block:
@@ -28,13 +31,20 @@ def block_of(alpha: float, radius: float = 1.0) -> Block:
 
 
 def quarter_period(block: Block, tilt: float) -> float:
-    """Time in s from rest at `tilt` to theta = 0, without approximation: an elliptic integral; tilt = angle - z^2 makes it smooth."""
+    """Time in s from rest at `tilt` to theta = 0, without approximation: an elliptic integral; tilt
+    = angle - z^2 makes it smooth."""
     alpha, rate = block.alpha, 1.5 * GRAVITY / block.radius
 
     def integrand(z: float) -> float:
-        # w^2 = rate (cos(alpha - tilt) - cos(alpha - theta)), written as a product so that nothing cancels
+        # w^2 = rate (cos(alpha - tilt) - cos(alpha - theta)), written as a product so that nothing
+        # cancels
         half = 0.5 * z * z
-        shape = 2.0 * math.sin(alpha - tilt + half) * (math.sin(half) / half if half > 0.0 else 1.0) * 0.5
+        shape = (
+            2.0
+            * math.sin(alpha - tilt + half)
+            * (math.sin(half) / half if half > 0.0 else 1.0)
+            * 0.5
+        )
         return 2.0 / math.sqrt(rate * shape)
 
     return quad(integrand, 0.0, math.sqrt(tilt), epsabs=1e-13, epsrel=1e-13)[0]
@@ -51,9 +61,9 @@ def first_impact(scene: Scene, **settings: object) -> float:
 def test_quarter_period(alpha, tilt, pivot):
     block = block_of(alpha, 1.6)
     scene = scene_of(block, 1.3, 8.0, initial_rotation=tilt * alpha)
-    assert first_impact(scene, pivot=pivot, friction="no-slip" if pivot == "bilateral" else "coulomb") == pytest.approx(
-        quarter_period(block, abs(tilt) * alpha), abs=1e-9
-    )
+    assert first_impact(
+        scene, pivot=pivot, friction="no-slip" if pivot == "bilateral" else "coulomb"
+    ) == pytest.approx(quarter_period(block, abs(tilt) * alpha), abs=1e-9)
 
 
 @pytest.mark.parametrize("tilt", [0.1, 0.5, 0.9])
@@ -61,23 +71,30 @@ def test_quarter_period_of_a_needle_is_housners(tilt):
     """acosh(1/(1 - theta/alpha))/p, which is exact for alpha -> 0."""
     block = block_of(1e-5, 2.0)
     scene = scene_of(block, 0.5, 3.0, initial_rotation=tilt * block.alpha)
-    assert first_impact(scene) == pytest.approx(math.acosh(1.0 / (1.0 - tilt)) / scene.frequency_parameter, abs=1e-9)
+    assert first_impact(scene) == pytest.approx(
+        math.acosh(1.0 / (1.0 - tilt)) / scene.frequency_parameter, abs=1e-9
+    )
 
 
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_housners_ratio(pivot, block):
-    """Angular velocity after over before an impact, 1 - 1.5 sin^2 alpha, from the energy of the rows around it."""
+    """Angular velocity after over before an impact, 1 - 1.5 sin^2 alpha, from the energy of the
+    rows around it."""
     scene = scene_of(block, 1.0, 4.0, initial_rotation=0.6 * block.alpha)
     history = EventBasedModel(tolerance=1e-14, pivot=pivot).simulate(scene)
     motion = history.channels
-    energy = kinematics.energy(block, GRAVITY, *(motion[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")))
+    energy = kinematics.energy(
+        block, GRAVITY, *(motion[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
+    )
     impacts = [e.t for e in history.event_list if e.kind == "floor impact"][:4]
     for k, t in enumerate(impacts[:-1]):
         before = energy[motion["t"] < t][-1]
         after = energy[motion["t"] > t][0]
         assert motion["t"][motion["t"] > t][0] < impacts[k + 1]
         assert math.sqrt(after / before) == pytest.approx(0.9082115316, abs=6e-11)
-        assert math.sqrt(after / before) == pytest.approx(1.0 - 1.5 * math.sin(block.alpha) ** 2, abs=1e-12)
+        assert math.sqrt(after / before) == pytest.approx(
+            1.0 - 1.5 * math.sin(block.alpha) ** 2, abs=1e-12
+        )
 
 
 @pytest.mark.parametrize("pivot", PIVOTS)
@@ -85,7 +102,9 @@ def test_energy_is_conserved_between_impacts(pivot, block):
     scene = scene_of(block, 1.0, 10.0, initial_rotation=0.95 * block.alpha)
     history = EventBasedModel(tolerance=1e-14, pivot=pivot).simulate(scene)
     motion = history.channels
-    energy = kinematics.energy(block, GRAVITY, *(motion[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")))
+    energy = kinematics.energy(
+        block, GRAVITY, *(motion[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
+    )
     edges = [0.0, *(e.t for e in history.event_list if e.kind == "floor impact"), 10.0]
     compared = 0
     for a, b in pairwise(edges):
@@ -99,10 +118,12 @@ def test_energy_is_conserved_between_impacts(pivot, block):
 @pytest.mark.parametrize("ratio", [1.05, 1.5, 3.0, 10.0])
 @pytest.mark.parametrize("alpha", [0.05, 0.25, 0.5])
 def test_least_rectangular_pulse_that_overturns(alpha, ratio):
-    """A constant acceleration of `ratio` g tan(alpha) overturns if it lasts longer than a time that energy gives.
+    """A constant acceleration of `ratio` g tan(alpha) overturns if it lasts longer than a time that
+    energy gives.
 
-    After the pulse the block must be able to reach its balance: a (sin alpha - sin(alpha - theta)) = g (1 - cos alpha) at its
-    end. For slender blocks that is Housner's cosh(p t) = 1 + 1/(2 r (r - 1)), r = a/(g alpha).
+    After the pulse the block must be able to reach its balance: a (sin alpha - sin(alpha - theta))
+    = g (1 - cos alpha) at its end. For slender blocks that is Housner's cosh(p t) = 1 + 1/(2 r (r -
+    1)), r = a/(g alpha).
     """
     block = block_of(alpha, 1.6)
     a = ratio * GRAVITY * math.tan(alpha)
@@ -110,7 +131,11 @@ def test_least_rectangular_pulse_that_overturns(alpha, ratio):
 
     def integrand(z: float) -> float:  # theta = z^2
         half = 0.5 * z * z
-        work = 2.0 * (math.sin(half) / half if half > 0.0 else 1.0) * (a * math.cos(alpha - half) - GRAVITY * math.sin(alpha - half))
+        work = (
+            2.0
+            * (math.sin(half) / half if half > 0.0 else 1.0)
+            * (a * math.cos(alpha - half) - GRAVITY * math.sin(alpha - half))
+        )
         return 2.0 / math.sqrt(0.75 / block.radius * work)
 
     least = quad(integrand, 0.0, math.sqrt(at_end), epsabs=1e-13, epsrel=1e-13)[0]
@@ -132,9 +157,13 @@ def test_least_rectangular_pulse_that_overturns(alpha, ratio):
 @pytest.mark.parametrize(("mu", "speed"), [(0.1, 1.0), (0.2, -3.0), (0.05, 0.01)])
 def test_sliding_distance(mu, speed, pivot, block):
     """v^2/(2 mu g), in the time v/(mu g)."""
-    history = EventBasedModel(pivot=pivot).simulate(scene_of(block, mu, 4.0, initial_velocity=speed))
+    history = EventBasedModel(pivot=pivot).simulate(
+        scene_of(block, mu, 4.0, initial_velocity=speed)
+    )
     assert history.outcome == "at rest"
-    assert history.channels["x"][-1] == pytest.approx(math.copysign(speed**2 / (2.0 * mu * GRAVITY), speed), rel=1e-12)
+    assert history.channels["x"][-1] == pytest.approx(
+        math.copysign(speed**2 / (2.0 * mu * GRAVITY), speed), rel=1e-12
+    )
     assert not history.channels["theta"].any()
     (stop,) = [e for e in history.event_list if e.kind == "stick"]
     assert stop.t == pytest.approx(abs(speed) / (mu * GRAVITY), rel=1e-12)
@@ -142,9 +171,12 @@ def test_sliding_distance(mu, speed, pivot, block):
 
 @pytest.mark.parametrize("restitution", [0.3, 0.7, 0.9])
 def test_bounce_heights(restitution, block):
-    """A flat drop from h rises to e^(2n) h after its n-th bounce, and hits the floor when a ball would."""
+    """A flat drop from h rises to e^(2n) h after its n-th bounce, and hits the floor when a ball
+    would."""
     drop = 0.1
-    scene = scene_of(block, 0.5, 3.0, initial_height=drop).replace(floor=Floor(friction=0.5, restitution=restitution))
+    scene = scene_of(block, 0.5, 3.0, initial_height=drop).replace(
+        floor=Floor(friction=0.5, restitution=restitution)
+    )
     history = EventBasedModel(pivot="unilateral").simulate(scene)
     motion = history.channels
     height = motion["y_dot"] ** 2 / (2.0 * GRAVITY) + motion["y"] - block.half_height
@@ -163,7 +195,8 @@ def test_bounce_heights(restitution, block):
 
 
 def first_mode_by_shenton(mu_s: float, mu_k: float, slope: float, a: float) -> str:
-    """The mode into which a block at rest goes under a constant base acceleration a (in g); `slope` is tan(alpha)."""
+    """The mode into which a block at rest goes under a constant base acceleration a (in g); `slope`
+    is tan(alpha)."""
     if a <= min(slope, mu_s):
         return "rest"
     if mu_s < slope:
@@ -176,18 +209,29 @@ def first_mode_by_shenton(mu_s: float, mu_k: float, slope: float, a: float) -> s
 @pytest.mark.parametrize("pivot", PIVOTS)
 @pytest.mark.parametrize("friction", ["equal", "static above kinetic"])
 def test_shentons_map(friction, pivot):
-    """1,000 random frictions, slendernesses and accelerations, both ways, for each pivot and kind of friction.
+    """1,000 random frictions, slendernesses and accelerations, both ways, for each pivot and kind
+    of friction.
 
-    Static above kinetic friction: a block that starts under an acceleration at which it can stick and rock does not slide.
+    Static above kinetic friction: a block that starts under an acceleration at which it can stick
+    and rock does not slide.
     """
     rng = np.random.default_rng(1996)
     model = EventBasedModel(pivot=pivot)
     seen = set()
     for _ in range(1000):
-        mu_s, alpha, a = rng.uniform(0.0, 1.33), rng.uniform(0.02, 1.2), 10.0 ** rng.uniform(-1.5, 0.5)
+        mu_s, alpha, a = (
+            rng.uniform(0.0, 1.33),
+            rng.uniform(0.02, 1.2),
+            10.0 ** rng.uniform(-1.5, 0.5),
+        )
         mu_k = mu_s if friction == "equal" else mu_s * rng.uniform(0.3, 1.0)
         side = rng.choice([-1.0, 1.0])
-        scene = scene_of(block_of(alpha), mu_k, 0.02, excitation=Record.from_samples([side * a * GRAVITY] * 2, time_step=1.0))
+        scene = scene_of(
+            block_of(alpha),
+            mu_k,
+            0.02,
+            excitation=Record.from_samples([side * a * GRAVITY] * 2, time_step=1.0),
+        )
         history = model.simulate(scene.replace(floor=Floor(friction=mu_k, static_friction=mu_s)))
         found = history.channels["mode"][1]
         expected = first_mode_by_shenton(mu_s, mu_k, math.tan(alpha), a)
@@ -212,7 +256,13 @@ def setting_with(block: Block, **floor: float):
 def loaded(rng: np.random.Generator, block: Block) -> Block:
     """The box with its mass somewhere in its middle half, and some moment of inertia."""
     place = (rng.uniform(-0.5, 0.5) * block.half_width, rng.uniform(-0.5, 0.5) * block.half_height)
-    return Block(**block.model_dump() | {"centre_of_mass": place, "moment_of_inertia": rng.uniform(0.2, 0.6) * block.half_diagonal**2})
+    return Block(
+        **block.model_dump()
+        | {
+            "centre_of_mass": place,
+            "moment_of_inertia": rng.uniform(0.2, 0.6) * block.half_diagonal**2,
+        }
+    )
 
 
 def random_floor_impacts(count: int, least: float, most: float, lopsided: bool):
@@ -232,9 +282,11 @@ def random_floor_impacts(count: int, least: float, most: float, lopsided: bool):
 @pytest.mark.parametrize("lopsided", [False, True], ids=["homogeneous", "loaded"])
 @pytest.mark.parametrize(("least", "most"), [(0.02, 0.6), (0.6, 1.2)], ids=["slender", "squat"])
 def test_floor_impact_balances_momentum(least, most, lopsided):
-    """Vertical, horizontal and angular momentum about the mass's centre, Coulomb's law, and a block that turns onto its new pivot.
+    """Vertical, horizontal and angular momentum about the mass's centre, Coulomb's law, and a block
+    that turns onto its new pivot.
 
-    Squat blocks: where sticking asks for more friction than there is, and slipping cannot turn the block, it lands flat.
+    Squat blocks: where sticking asks for more friction than there is, and slipping cannot turn the
+    block, it lands flat.
     """
     from rockcheck.ebm.core.laws import impacts
 
@@ -247,7 +299,9 @@ def test_floor_impact_balances_momentum(least, most, lopsided):
         if form == impacts.FLAT_END:
             xdot1 = v1 - c * w1
             assert w2 == 0.0
-            assert abs(v2) == pytest.approx(max(0.0, abs(xdot1) - mu_k * p) if abs(xdot1) > mu_s * p else 0.0, abs=1e-14)
+            assert abs(v2) == pytest.approx(
+                max(0.0, abs(xdot1) - mu_k * p) if abs(xdot1) > mu_s * p else 0.0, abs=1e-14
+            )
             assert p == pytest.approx(s1 * abs(w1), abs=1e-15)
             continue
         q = (v2 - c * w2) - (v1 - c * w1)
@@ -276,7 +330,8 @@ def test_floor_impact_sticks_above_its_friction(alpha):
 
 @pytest.mark.parametrize("lopsided", [False, True], ids=["homogeneous", "loaded"])
 def test_wall_impact_balances_momentum(lopsided):
-    """The cascade of Fig. 3 at 4,000 random blocks and approaches: momentum, restitution, Coulomb's law, no pull of the wall."""
+    """The cascade of Fig. 3 at 4,000 random blocks and approaches: momentum, restitution, Coulomb's
+    law, no pull of the wall."""
     from rockcheck.ebm.core.laws import impacts
 
     rng = np.random.default_rng(4)
@@ -286,7 +341,12 @@ def test_wall_impact_balances_momentum(lopsided):
         phi = alpha * rng.uniform(0.01, 1.0)
         s, c, cp, spin = math.sin(alpha - phi), math.cos(alpha - phi), math.cos(alpha + phi), 3.0
         if lopsided:
-            s, c, cp, spin = s * rng.uniform(0.5, 1.0), c * rng.uniform(0.5, 1.0), cp * rng.uniform(0.5, 1.5), rng.uniform(2.0, 5.0)
+            s, c, cp, spin = (
+                s * rng.uniform(0.5, 1.0),
+                c * rng.uniform(0.5, 1.0),
+                cp * rng.uniform(0.5, 1.5),
+                rng.uniform(2.0, 5.0),
+            )
         share = 1.0 / (1.0 / spin + s * s + c * c)
         S, Sw = (float(rng.choice([-1, 1])) for _ in range(2))
         C = S * Sw * cp
@@ -296,7 +356,9 @@ def test_wall_impact_balances_momentum(lopsided):
         if Sw * (xdot1 - C * w1) >= 0.0:
             w1, xdot1 = -w1, -xdot1
         e, mu_k = rng.choice([0.0, 1.0, rng.uniform()]), rng.uniform(0.0, 1.2)
-        branch, w2, xdot2, n, p, v2 = impacts.wall_impact(S, Sw, s, c, cp, share, spin, w1, xdot1, e, mu_k, mu_k, False)
+        branch, w2, xdot2, n, p, v2 = impacts.wall_impact(
+            S, Sw, s, c, cp, share, spin, w1, xdot1, e, mu_k, mu_k, False
+        )
         branches.add(branch)
         assert n >= 0.0
         approach, parting = xdot1 - C * w1, xdot2 - C * w2
@@ -324,14 +386,19 @@ def test_wall_impact_balances_momentum(lopsided):
 @pytest.mark.parametrize("lopsided", [False, True], ids=["homogeneous", "loaded"])
 @pytest.mark.parametrize("e", [0.0, 0.5])
 def test_contact_impact_leaves_no_approach(e, lopsided):
-    """Unilateral impacts at 1,000 random states: no touched contact still closes, and without restitution no energy is gained."""
+    """Unilateral impacts at 1,000 random states: no touched contact still closes, and without
+    restitution no energy is gained."""
     from rockcheck.ebm.core.laws import contact_impacts as ci
 
     rng = np.random.default_rng(5)
     for _ in range(1000):
         alpha = rng.uniform(0.05, 0.9)
         block = loaded(rng, block_of(alpha)) if lopsided else block_of(alpha)
-        b = setting_with(block, friction=rng.uniform(0.0, min(1.2, 0.95 * block.least_painleve_friction)), restitution=e)
+        b = setting_with(
+            block,
+            friction=rng.uniform(0.0, min(1.2, 0.95 * block.least_painleve_friction)),
+            restitution=e,
+        )
         flat, sense = bool(rng.integers(0, 2)), 1.0 if not lopsided or rng.integers(0, 2) else -1.0
         phi = 0.0 if flat else alpha * rng.uniform(0.01, 0.9)
         touching = np.zeros(ci.CONTACTS, dtype=bool)
@@ -342,7 +409,9 @@ def test_contact_impact_leaves_no_approach(e, lopsided):
         v = rng.normal(0.0, 0.3, 3)
         before = ci.kinetic_energy(b.spin, v)
         impulse, tally = np.zeros(2), np.zeros(2)
-        assert ci.contact_impact(b, sense, phi, touching, e, e, 1e-9, v, impulse, tally, np.full((ci.WORK, 6), np.nan))
+        assert ci.contact_impact(
+            b, sense, phi, touching, e, e, 1e-9, v, impulse, tally, np.full((ci.WORK, 6), np.nan)
+        )
         rows = np.empty((7, 3))
         ci.contact_rows(b, sense, phi, rows)
         speeds = rows[:6] @ v

@@ -22,17 +22,25 @@ CASES = {
 def distance(a: History, b: History) -> float:
     """Largest difference of rotation (rad) and place (m) over all rows."""
     assert len(a.channels["t"]) == len(b.channels["t"])
-    return max(float(np.max(np.abs(a.channels[name] - b.channels[name]))) for name in ("theta", "x"))
+    return max(
+        float(np.max(np.abs(a.channels[name] - b.channels[name]))) for name in ("theta", "x")
+    )
 
 
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
 def test_error_falls_with_the_tolerance(pivot, case, pulse_scene):
-    """From 1e-6 to 1e-12, against a run at 1e-14: the error stays below 200 tolerances, and loses five decades."""
+    """From 1e-6 to 1e-12, against a run at 1e-14: the error stays below 200 tolerances, and loses
+    five decades."""
     scene = pulse_scene(*CASES[case], output_step=0.01)
     truth = EventBasedModel(pivot=pivot, tolerance=1e-14).simulate(scene)
     tolerances = 10.0 ** -np.arange(6.0, 13.0)
-    errors = np.array([distance(EventBasedModel(pivot=pivot, tolerance=float(t)).simulate(scene), truth) for t in tolerances])
+    errors = np.array(
+        [
+            distance(EventBasedModel(pivot=pivot, tolerance=float(t)).simulate(scene), truth)
+            for t in tolerances
+        ]
+    )
     assert np.all(errors <= 200.0 * tolerances)
     assert errors[-1] <= 1e-5 * errors[0]
     assert np.polyfit(np.log10(tolerances), np.log10(errors), 1)[0] == pytest.approx(1.0, abs=0.2)
@@ -40,7 +48,8 @@ def test_error_falls_with_the_tolerance(pivot, case, pulse_scene):
 
 @pytest.mark.parametrize("alpha", [0.02, 0.05, 0.1, 0.25, 0.5])
 def test_a_slender_block_is_as_exact_as_a_stout_one(alpha):
-    """The tolerance is in alpha: the same motion in theta/alpha has the same error in tolerances, until the block overturns."""
+    """The tolerance is in alpha: the same motion in theta/alpha has the same error in tolerances,
+    until the block overturns."""
     scene = Scene(
         name="slenderness",
         block=Block(half_width=math.sin(alpha), half_height=math.cos(alpha)),
@@ -56,11 +65,14 @@ def test_a_slender_block_is_as_exact_as_a_stout_one(alpha):
 
 
 def test_error_estimate_is_the_error(pulse_scene):
-    """`cost.error_estimate` (in alpha) is the distance to a tighter run, hence the error to within a factor of two."""
+    """`cost.error_estimate` (in alpha) is the distance to a tighter run, hence the error to within
+    a factor of two."""
     scene = pulse_scene(4.5, 4.0, 0.3)
     model = EventBasedModel(tolerance=1e-7, estimate_error=True)
     estimated, truth = model.simulate(scene), EventBasedModel(tolerance=1e-14).simulate(scene)
-    error = np.max(np.abs(estimated.channels["theta"] - truth.channels["theta"])) / scene.block.alpha
+    error = (
+        np.max(np.abs(estimated.channels["theta"] - truth.channels["theta"])) / scene.block.alpha
+    )
     assert 0.5 * error <= estimated.cost.error_estimate <= 2.0 * error
     assert EventBasedModel(tolerance=1e-7).simulate(scene).cost.error_estimate is None
 
@@ -68,13 +80,17 @@ def test_error_estimate_is_the_error(pulse_scene):
 def test_work_grows_with_accuracy(pulse_scene):
     """Steps of a Taylor method grow with the number of digits, not with their power."""
     scene = pulse_scene(4.5, 4.0, 0.3)
-    steps = [EventBasedModel(tolerance=tolerance).simulate(scene).cost.steps for tolerance in (1e-6, 1e-9, 1e-12)]
+    steps = [
+        EventBasedModel(tolerance=tolerance).simulate(scene).cost.steps
+        for tolerance in (1e-6, 1e-9, 1e-12)
+    ]
     assert steps[0] <= steps[2] <= 2 * steps[0]
 
 
 @pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
 def test_a_run_leaves_no_trace(pivot, pulse_scene):
-    """The same scene gives the same bits before and after another one, and when its output grid is finer."""
+    """The same scene gives the same bits before and after another one, and when its output grid is
+    finer."""
     scene = pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0), output_step=0.01)
     model = EventBasedModel(pivot=pivot)
     first = model.simulate(scene)
@@ -101,12 +117,23 @@ def test_compiled_scratch_is_scratch(pulse_scene):
         a[:], stack[:] = filling, filling
         state = natural.state_of(scene)
         nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
-        tally, _ = march.run(setting, *natural.grounds_of(scene), state, scene.duration / unit, control, *nothing, a, stack)
+        tally, _ = march.run(
+            setting,
+            *natural.grounds_of(scene),
+            state,
+            scene.duration / unit,
+            control,
+            *nothing,
+            a,
+            stack,
+        )
         found.append((tally.peak, tally.steps, tally.events, tally.t, *state))
     assert found[0] == found[1] == found[2]
 
 
-@pytest.mark.parametrize(("cap", "said"), [({"most_steps": 3}, "steps"), ({"most_events": 3}, "events")])
+@pytest.mark.parametrize(
+    ("cap", "said"), [({"most_steps": 3}, "steps"), ({"most_events": 3}, "events")]
+)
 def test_a_cap_ends_in_a_failure(cap, said, pulse_scene):
     with pytest.raises(ModelFailure, match=f"the cap on {said} was reached at t = "):
         EventBasedModel(**cap).simulate(pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0)))

@@ -8,7 +8,18 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from rockcheck.scenes import (
+    Block,
+    Floor,
+    History,
+    Record,
+    Rest,
+    Ricker,
+    Scene,
+    Sine,
+    Wall,
+    kinematics,
+)
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 SLOPE = PAPER_BLOCK.half_width / PAPER_BLOCK.half_height
@@ -18,7 +29,16 @@ pivots = pytest.mark.parametrize("pivot", PIVOTS)
 
 
 def scene_of(**change: object) -> Scene:
-    return Scene(**{"name": "edge", "block": PAPER_BLOCK, "floor": Floor(friction=0.8), "duration": 3.0, "output_step": 0.01} | change)
+    return Scene(
+        **{
+            "name": "edge",
+            "block": PAPER_BLOCK,
+            "floor": Floor(friction=0.8),
+            "duration": 3.0,
+            "output_step": 0.01,
+        }
+        | change
+    )
 
 
 def play(scene: Scene, pivot: str = "bilateral", **settings: object) -> History:
@@ -41,7 +61,8 @@ def assert_contacts_hold(scene: Scene, history: History) -> None:
 
 
 def grazing_gap(tilt: float) -> float:
-    """Gap at which the top corner of a block that is released from `tilt` (to the right) just reaches the left wall.
+    """Gap at which the top corner of a block that is released from `tilt` (to the right) just
+    reaches the left wall.
 
     Its next rotation follows from Housner's impact, r = 1 - 3/2 sin^2 alpha, and energy.
     """
@@ -49,17 +70,24 @@ def grazing_gap(tilt: float) -> float:
     # Height of the centroid, R cos(alpha - phi), is all the energy there is at a turning point.
     depth = r**2 * (math.cos(PAPER_BLOCK.alpha - tilt) - math.cos(PAPER_BLOCK.alpha))
     peak = PAPER_BLOCK.alpha - math.acos(math.cos(PAPER_BLOCK.alpha) + depth)
-    return PAPER_BLOCK.radius * (math.sin(PAPER_BLOCK.alpha + peak) - math.sin(PAPER_BLOCK.alpha - peak))
+    return PAPER_BLOCK.radius * (
+        math.sin(PAPER_BLOCK.alpha + peak) - math.sin(PAPER_BLOCK.alpha - peak)
+    )
 
 
 @pivots
 def test_grazing_wall_contact(pivot):
-    """A corner that turns back a billionth of the gap before the wall does not touch it; a billionth after, it does, softly."""
+    """A corner that turns back a billionth of the gap before the wall does not touch it; a
+    billionth after, it does, softly."""
     tilt, gap = 0.15, grazing_gap(0.15)
     start = {"initial_rotation": -tilt, "duration": 2.5}
     free = play(scene_of(**start), pivot, tolerance=1e-13)
-    misses = play(scene_of(**start, walls=[Wall(side="left", gap=gap * (1.0 + 1e-9))]), pivot, tolerance=1e-13)
-    touches = play(scene_of(**start, walls=[Wall(side="left", gap=gap * (1.0 - 1e-9))]), pivot, tolerance=1e-13)
+    misses = play(
+        scene_of(**start, walls=[Wall(side="left", gap=gap * (1.0 + 1e-9))]), pivot, tolerance=1e-13
+    )
+    touches = play(
+        scene_of(**start, walls=[Wall(side="left", gap=gap * (1.0 - 1e-9))]), pivot, tolerance=1e-13
+    )
     assert "wall impact" not in kinds(misses)
     np.testing.assert_array_equal(misses.channels["theta"], free.channels["theta"])
     (impact,) = [event for event in touches.event_list if event.kind == "wall impact"]
@@ -76,7 +104,9 @@ def test_impact_on_floor_and_wall_at_once(pivot, e):
     assert_contacts_hold(scene, history)
     motion = history.channels
     assert np.max(motion["theta"]) < 1e-9
-    energy = kinematics.energy(PAPER_BLOCK, G, *(motion[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")))
+    energy = kinematics.energy(
+        PAPER_BLOCK, G, *(motion[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
+    )
     assert np.max(np.diff(energy)) < 1e-8
     if e == 0.0:
         assert history.outcome == "at rest"
@@ -90,9 +120,11 @@ def test_impact_on_floor_and_wall_at_once(pivot, e):
 
 @pivots
 def test_uplift_at_exactly_the_slope(pivot):
-    """|u| = g tan alpha is the limit itself: less does not lift, more does, and at the limit nothing happens in a hurry."""
+    """|u| = g tan alpha is the limit itself: less does not lift, more does, and at the limit
+    nothing happens in a hurry."""
     below, at, barely, above = (
-        play(scene_of(excitation=constant(factor * G * SLOPE)), pivot) for factor in (1.0 - 1e-12, 1.0, 1.0 + 1e-12, 1.0 + 1e-7)
+        play(scene_of(excitation=constant(factor * G * SLOPE)), pivot)
+        for factor in (1.0 - 1e-12, 1.0, 1.0 + 1e-12, 1.0 + 1e-7)
     )
     assert not kinds(below)
     assert not below.channels["theta"].any()
@@ -105,7 +137,8 @@ def test_uplift_at_exactly_the_slope(pivot):
 def test_slip_at_exactly_the_friction(pivot):
     floor = Floor(friction=0.2)
     below, at, barely, above = (
-        play(scene_of(floor=floor, excitation=constant(factor * G * 0.2)), pivot) for factor in (1.0 - 1e-12, 1.0, 1.0 + 1e-12, 1.0 + 1e-7)
+        play(scene_of(floor=floor, excitation=constant(factor * G * 0.2)), pivot)
+        for factor in (1.0 - 1e-12, 1.0, 1.0 + 1e-12, 1.0 + 1e-7)
     )
     assert not kinds(below)
     assert kinds(above)[0] == "slip"
@@ -115,10 +148,17 @@ def test_slip_at_exactly_the_friction(pivot):
 
 
 def test_what_cannot_slip_waits_for_the_slope():
-    """The base's acceleration grows evenly: Coulomb's block slips as it passes the friction, Housner's stands up to the slope."""
+    """The base's acceleration grows evenly: Coulomb's block slips as it passes the friction,
+    Housner's stands up to the slope."""
     floor = Floor(friction=0.5 * SLOPE)
-    growing = scene_of(floor=floor, excitation=Record.from_samples([0.0, 2.0 * SLOPE * G], time_step=1.0), duration=0.6)
-    slips, tips = (play(growing, **settings).event_list[0] for settings in ({}, {"friction": "no-slip"}))
+    growing = scene_of(
+        floor=floor,
+        excitation=Record.from_samples([0.0, 2.0 * SLOPE * G], time_step=1.0),
+        duration=0.6,
+    )
+    slips, tips = (
+        play(growing, **settings).event_list[0] for settings in ({}, {"friction": "no-slip"})
+    )
     assert (slips.kind, tips.kind) == ("slip", "uplift")
     assert abs(slips.t - 0.25) < 1e-9
     assert abs(tips.t - 0.5) < 1e-9
@@ -126,15 +166,19 @@ def test_what_cannot_slip_waits_for_the_slope():
 
 @pivots
 def test_balance_point(pivot):
-    """At theta = alpha the block stands on its corner for ever; a little less and it comes back, a little more and it falls."""
+    """At theta = alpha the block stands on its corner for ever; a little less and it comes back, a
+    little more and it falls."""
     back, on, over = (
-        play(scene_of(initial_rotation=PAPER_BLOCK.alpha * factor, duration=20.0), pivot) for factor in (1.0 - 1e-6, 1.0, 1.0 + 1e-6)
+        play(scene_of(initial_rotation=PAPER_BLOCK.alpha * factor, duration=20.0), pivot)
+        for factor in (1.0 - 1e-6, 1.0, 1.0 + 1e-6)
     )
     assert on.outcome == "moving"  # it stands, but not on its base
     assert not kinds(on)
     np.testing.assert_allclose(on.channels["theta"], PAPER_BLOCK.alpha, rtol=0.0, atol=1e-9)
     assert back.outcome == "at rest"
-    assert np.min(back.channels["theta"]) < -0.1 * PAPER_BLOCK.alpha  # it came back through the upright
+    assert (
+        np.min(back.channels["theta"]) < -0.1 * PAPER_BLOCK.alpha
+    )  # it came back through the upright
     assert over.outcome == "overturned left"
     assert np.all(np.diff(over.channels["theta"]) > 0.0)
 
@@ -152,7 +196,9 @@ def test_start_past_the_balance_point(pivot):
 def test_wall_that_is_touched_from_the_start(pivot, e):
     for amplitude in (3.0 * G * SLOPE, -3.0 * G * SLOPE):
         scene = scene_of(
-            walls=[Wall(side="left", gap=0.0, restitution=e)], excitation=Ricker(amplitude=amplitude, period=0.8), duration=5.0
+            walls=[Wall(side="left", gap=0.0, restitution=e)],
+            excitation=Ricker(amplitude=amplitude, period=0.8),
+            duration=5.0,
         )
         history = play(scene, pivot)
         assert_contacts_hold(scene, history)
@@ -163,7 +209,9 @@ def test_wall_that_is_touched_from_the_start(pivot, e):
 def test_walls_on_both_sides_at_no_distance(pivot):
     """It cannot move, however hard it is shaken."""
     walls = [Wall(side="left", gap=0.0), Wall(side="right", gap=0.0)]
-    history = play(scene_of(walls=walls, excitation=Sine(amplitude=30.0, period=0.7, cycles=4)), pivot)
+    history = play(
+        scene_of(walls=walls, excitation=Sine(amplitude=30.0, period=0.7, cycles=4)), pivot
+    )
     for name in ("x", "theta", "slip"):
         assert np.max(np.abs(history.channels[name])) < 1e-9
     assert history.outcome == "at rest"
@@ -181,10 +229,16 @@ def test_rattling_at_restitution_one(pivot):
 
 
 def test_zeno_sequence_of_a_bouncing_block():
-    """Dropped flat at e = 0.999 it bounces sqrt(2 h/g) (1 + e)/(1 - e) s, thousands of times, and then rests."""
+    """Dropped flat at e = 0.999 it bounces sqrt(2 h/g) (1 + e)/(1 - e) s, thousands of times, and
+    then rests."""
     height, e = 1e-4, 0.999
     end = math.sqrt(2.0 * height / G) * (1.0 + e) / (1.0 - e)
-    scene = scene_of(floor=Floor(friction=0.5, restitution=e), initial_height=height, duration=1.2 * end, output_step=0.1)
+    scene = scene_of(
+        floor=Floor(friction=0.5, restitution=e),
+        initial_height=height,
+        duration=1.2 * end,
+        output_step=0.1,
+    )
     history = play(scene, "unilateral")
     assert history.outcome == "at rest"
     landings = [event.t for event in history.event_list if event.impulse > 0.0]
@@ -196,20 +250,33 @@ def test_zeno_sequence_of_a_bouncing_block():
 
 @pivots
 def test_zeno_sequence_of_a_rocking_block(pivot):
-    """A slender block loses little at an impact; its hundreds of impacts pile up at a time, and it rests after it."""
+    """A slender block loses little at an impact; its hundreds of impacts pile up at a time, and it
+    rests after it."""
     block = Block(half_width=0.1, half_height=1.0)
-    history = play(scene_of(block=block, initial_rotation=0.5 * block.alpha, duration=200.0, floor=Floor(friction=0.5)), pivot)
+    history = play(
+        scene_of(
+            block=block,
+            initial_rotation=0.5 * block.alpha,
+            duration=200.0,
+            floor=Floor(friction=0.5),
+        ),
+        pivot,
+    )
     impacts = [event.t for event in history.event_list if event.kind == "floor impact"]
     assert history.outcome == "at rest"
     assert len(impacts) > 500
-    # Quarter periods fall by the ratio of speeds where rotations are small: t_n+1/t_n tends to 1 - 3/2 sin^2 alpha.
+    # Quarter periods fall by the ratio of speeds where rotations are small: t_n+1/t_n tends to 1 -
+    # 3/2 sin^2 alpha.
     late = np.diff(impacts)[400:500]
-    np.testing.assert_allclose(late[1:] / late[:-1], 1.0 - 1.5 * math.sin(block.alpha) ** 2, atol=2e-4)
+    np.testing.assert_allclose(
+        late[1:] / late[:-1], 1.0 - 1.5 * math.sin(block.alpha) ** 2, atol=2e-4
+    )
 
 
 @pivots
 def test_record_of_one_sample(pivot):
-    """One sample lasts no time: nothing happens. Found by `rockcheck stress`: no mode was consistent at t = 0."""
+    """One sample lasts no time: nothing happens. Found by `rockcheck stress`: no mode was
+    consistent at t = 0."""
     for strength in (0.1, 20.0, -20.0):
         shaken = play(scene_of(excitation=Record.from_samples([strength], time_step=0.01)), pivot)
         assert shaken.outcome == "at rest"
@@ -220,10 +287,14 @@ def test_record_of_one_sample(pivot):
 def test_record_that_ends_with_a_jump(pivot):
     """After its last sample the base is at rest at once."""
     scene = scene_of(excitation=constant(3.0 * G * SLOPE, 0.4))
-    longer = scene.replace(excitation=Record.from_samples([3.0 * G * SLOPE, 3.0 * G * SLOPE, 0.0], time_step=0.4))
+    longer = scene.replace(
+        excitation=Record.from_samples([3.0 * G * SLOPE, 3.0 * G * SLOPE, 0.0], time_step=0.4)
+    )
     ends, falls = play(scene, pivot, tolerance=1e-12), play(longer, pivot, tolerance=1e-12)
     rows = int(0.4 / 0.01)
-    np.testing.assert_allclose(ends.channels["theta"][:rows], falls.channels["theta"][:rows], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(
+        ends.channels["theta"][:rows], falls.channels["theta"][:rows], rtol=0.0, atol=1e-12
+    )
     assert ends.channels["theta"][rows + 5] < falls.channels["theta"][rows + 5]
 
 
@@ -233,14 +304,17 @@ def test_record_that_ends_with_a_jump(pivot):
 def test_pulse_that_is_shorter_than_a_step(pivot, vertical, symmetric):
     """A pulse of a thousandth of the block's time is not stepped over, at rest nor in rocking.
 
-    Found by `rockcheck stress`: the tail of a symmetric pulse is too thin for a Taylor series to tell that it is there.
+    Found by `rockcheck stress`: the tail of a symmetric pulse is too thin for a Taylor series to
+    tell that it is there.
     """
     pulse = Ricker(amplitude=4000.0 * G * SLOPE, period=2e-3, symmetric=symmetric)
     more = {"vertical": Sine(amplitude=0.5, period=1.0, cycles=3)} if vertical else {}
     for start in ({}, {"initial_rotation": 0.3 * PAPER_BLOCK.alpha}):
         scene = scene_of(floor=Floor(friction=1.2), excitation=pulse, duration=0.5, **start, **more)
         usual, fine = play(scene, pivot), play(scene, pivot, tolerance=1e-13)
-        np.testing.assert_allclose(usual.channels["theta"], fine.channels["theta"], rtol=0.0, atol=1e-7)
+        np.testing.assert_allclose(
+            usual.channels["theta"], fine.channels["theta"], rtol=0.0, atol=1e-7
+        )
         without = play(scene.replace(excitation=Rest()), pivot)
         assert np.max(np.abs(fine.channels["theta"] - without.channels["theta"])) > 1e-6
 
@@ -249,8 +323,16 @@ def test_pulse_that_is_shorter_than_a_step(pivot, vertical, symmetric):
 def test_duration_that_ends_at_an_impact(pivot):
     """Whether the run stops just before, at or just after an impact: it ends, with all its rows."""
     scene = scene_of(initial_rotation=0.1, output_step=0.05)
-    impact = next(event.t for event in play(scene, pivot).event_list if event.kind == "floor impact")
-    for end in (math.nextafter(impact, 0.0), impact, math.nextafter(impact, 9.0), impact * (1.0 - 1e-13), impact * (1.0 + 1e-13)):
+    impact = next(
+        event.t for event in play(scene, pivot).event_list if event.kind == "floor impact"
+    )
+    for end in (
+        math.nextafter(impact, 0.0),
+        impact,
+        math.nextafter(impact, 9.0),
+        impact * (1.0 - 1e-13),
+        impact * (1.0 + 1e-13),
+    ):
         stops = scene.replace(duration=end, output_step=end / 8.0)
         history = play(stops, pivot)
         assert len(history.channels["t"]) == 9
@@ -270,7 +352,12 @@ def test_mirror_image_of_sliding_between_walls():
         Wall(side="right", gap=0.00013319196436825637, restitution=0.7813616),
     ]
     scene = scene_of(
-        block=block, floor=Floor(friction=0.0772), walls=walls, initial_velocity=1.0375582304532138, duration=0.08, output_step=1e-3
+        block=block,
+        floor=Floor(friction=0.0772),
+        walls=walls,
+        initial_velocity=1.0375582304532138,
+        duration=0.08,
+        output_step=1e-3,
     )
     for pivot in PIVOTS:
         a, b = play(scene, pivot).channels, play(scene.mirrored(), pivot).channels

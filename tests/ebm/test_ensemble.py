@@ -52,7 +52,10 @@ def test_as_one_at_a_time(scenes):
 
 @pytest.mark.parametrize("jobs", [1, 2, 5])
 def test_threads_change_nothing(scenes, jobs):
-    once, again = play_ensemble(scenes, MODEL, rows=50), play_ensemble(scenes * 5, MODEL, rows=50, jobs=jobs)
+    once, again = (
+        play_ensemble(scenes, MODEL, rows=50),
+        play_ensemble(scenes * 5, MODEL, rows=50, jobs=jobs),
+    )
     assert np.array_equal(np.tile(once.theta, (5, 1)), again.theta)
     assert np.array_equal(np.tile(once.peak, 5), again.peak)
 

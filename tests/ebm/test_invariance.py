@@ -8,7 +8,19 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall, kinematics, load_scene
+from rockcheck.scenes import (
+    Block,
+    Floor,
+    History,
+    Record,
+    Rest,
+    Ricker,
+    Scene,
+    Sine,
+    Wall,
+    kinematics,
+    load_scene,
+)
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 ODD = ("x", "theta", "x_dot", "theta_dot", "slip", "slip_rate")
@@ -19,12 +31,23 @@ RICKER = Ricker(amplitude=4.0 * SLOPE, period=0.65)
 
 
 def scene_of(**change: object) -> Scene:
-    return Scene(**{"name": "symmetry", "block": PAPER_BLOCK, "floor": Floor(friction=0.3), "excitation": RICKER, "duration": 5.0} | change)
+    return Scene(
+        **{
+            "name": "symmetry",
+            "block": PAPER_BLOCK,
+            "floor": Floor(friction=0.3),
+            "excitation": RICKER,
+            "duration": 5.0,
+        }
+        | change
+    )
 
 
 def walls(left: float | None = None, right: float | None = None, e: float = 0.0) -> list[Wall]:
     gaps = {"left": left, "right": right}
-    return [Wall(side=side, gap=gap, restitution=e) for side, gap in gaps.items() if gap is not None]
+    return [
+        Wall(side=side, gap=gap, restitution=e) for side, gap in gaps.items() if gap is not None
+    ]
 
 
 SCENES = {
@@ -33,13 +56,25 @@ SCENES = {
     "elastic right wall": scene_of(walls=walls(right=0.103, e=1.0)),
     "both walls": scene_of(walls=walls(left=0.053, right=0.02, e=0.5)),
     "walls at no distance": scene_of(walls=walls(left=0.0, right=0.0)),
-    "symmetric pulse": scene_of(excitation=Ricker(amplitude=3.0 * SLOPE, period=0.8, symmetric=True), walls=walls(left=0.1, e=0.5)),
+    "symmetric pulse": scene_of(
+        excitation=Ricker(amplitude=3.0 * SLOPE, period=0.8, symmetric=True),
+        walls=walls(left=0.1, e=0.5),
+    ),
     "sine": scene_of(excitation=Sine(amplitude=2.0 * SLOPE, period=0.7, cycles=3)),
     "record": load_scene("fig5b").replace(duration=8.0),
-    "vertical record": load_scene("fig4a").replace(vertical=load_scene("fig4b").excitation, duration=6.0),
-    "tilted": scene_of(excitation=Rest(), initial_rotation=0.7 * PAPER_BLOCK.alpha, initial_angular_velocity=0.1, initial_velocity=0.05),
+    "vertical record": load_scene("fig4a").replace(
+        vertical=load_scene("fig4b").excitation, duration=6.0
+    ),
+    "tilted": scene_of(
+        excitation=Rest(),
+        initial_rotation=0.7 * PAPER_BLOCK.alpha,
+        initial_angular_velocity=0.1,
+        initial_velocity=0.05,
+    ),
     "squat": scene_of(
-        block=Block(half_width=2.0, half_height=1.0), floor=Floor(friction=1.2), excitation=Ricker(amplitude=30.0, period=1.0)
+        block=Block(half_width=2.0, half_height=1.0),
+        floor=Floor(friction=1.2),
+        excitation=Ricker(amplitude=30.0, period=1.0),
     ),
 }
 
@@ -51,9 +86,10 @@ def assert_mirror_images(a: History, b: History) -> None:
         np.testing.assert_array_equal(a.channels[name], -b.channels[name], err_msg=name)
     swap = {"overturned left": "overturned right", "overturned right": "overturned left"}
     assert b.outcome == swap.get(a.outcome, a.outcome)
-    assert [(e.t, swap.get(e.kind, e.kind), e.mode_before, e.mode_after, e.impulse) for e in a.event_list] == [
-        (e.t, e.kind, e.mode_before, e.mode_after, e.impulse) for e in b.event_list
-    ]
+    assert [
+        (e.t, swap.get(e.kind, e.kind), e.mode_before, e.mode_after, e.impulse)
+        for e in a.event_list
+    ] == [(e.t, e.kind, e.mode_before, e.mode_after, e.impulse) for e in b.event_list]
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -66,15 +102,20 @@ def test_mirror_image_to_the_bit(pivot, name):
 
 
 @pytest.mark.parametrize(
-    "scale", [1e-3 / PAPER_BLOCK.radius, 0.25, 3.0, 1e3 / PAPER_BLOCK.radius], ids=["R = 1 mm", "1/4", "3", "R = 1 km"]
+    "scale",
+    [1e-3 / PAPER_BLOCK.radius, 0.25, 3.0, 1e3 / PAPER_BLOCK.radius],
+    ids=["R = 1 mm", "1/4", "3", "R = 1 km"],
 )
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_dynamic_similarity(pivot, scale):
-    """Lengths by k and times by sqrt(k): the same motion, to 1e-12 of R and of the rotation's scale."""
+    """Lengths by k and times by sqrt(k): the same motion, to 1e-12 of R and of the rotation's
+    scale."""
     model, scene = EventBasedModel(pivot=pivot, tolerance=1e-14), SCENES["left wall"]
     root = math.sqrt(scale)
     scaled = scene.replace(
-        block=Block(half_width=scale * PAPER_BLOCK.half_width, half_height=scale * PAPER_BLOCK.half_height),
+        block=Block(
+            half_width=scale * PAPER_BLOCK.half_width, half_height=scale * PAPER_BLOCK.half_height
+        ),
         walls=[Wall(side="left", gap=scale * 0.053)],
         excitation=Ricker(amplitude=RICKER.amplitude, period=root * RICKER.period),
         duration=root * scene.duration,
@@ -95,9 +136,14 @@ def test_constant_vertical_acceleration_is_gravity(pivot):
     vertical = Record.from_samples([a, a], time_step=duration + 1.0)
     scene = scene_of(walls=walls(left=0.053, e=0.5), duration=duration)
     model = EventBasedModel(pivot=pivot, tolerance=1e-13)
-    shaken, heavy = model.simulate(scene.replace(vertical=vertical)), model.simulate(scene.replace(gravity=9.81 + a))
+    shaken, heavy = (
+        model.simulate(scene.replace(vertical=vertical)),
+        model.simulate(scene.replace(gravity=9.81 + a)),
+    )
     assert np.max(np.abs(heavy.channels["theta"])) > 0.01
-    np.testing.assert_allclose(shaken.channels["theta"], heavy.channels["theta"], rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(
+        shaken.channels["theta"], heavy.channels["theta"], rtol=0.0, atol=1e-9
+    )
     np.testing.assert_allclose(shaken.channels["x"], heavy.channels["x"], rtol=0.0, atol=1e-9)
 
 
@@ -107,8 +153,12 @@ def test_rows_of_a_shaken_block_at_rest(pivot):
 
     Such rows once held whatever the memory had held.
     """
-    scene = scene_of(excitation=Rest(), vertical=Sine(amplitude=4.0, period=0.4, cycles=8), duration=1.0)
-    EventBasedModel(pivot=pivot).simulate(scene_of(duration=1.5, initial_velocity=1.0))  # leaves other numbers in the memory
+    scene = scene_of(
+        excitation=Rest(), vertical=Sine(amplitude=4.0, period=0.4, cycles=8), duration=1.0
+    )
+    EventBasedModel(pivot=pivot).simulate(
+        scene_of(duration=1.5, initial_velocity=1.0)
+    )  # leaves other numbers in the memory
     motion = EventBasedModel(pivot=pivot).simulate(scene).channels
     assert set(motion["mode"]) == {"rest"}
     for name in ("x", "theta", "x_dot", "y_dot", "theta_dot", "slip"):
@@ -117,7 +167,8 @@ def test_rows_of_a_shaken_block_at_rest(pivot):
 
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_floor_that_falls_away(pivot):
-    """A floor that falls faster than g: the block flies freely (unilateral), or hangs: by both corners, and by one once it is pushed."""
+    """A floor that falls faster than g: the block flies freely (unilateral), or hangs: by both
+    corners, and by one once it is pushed."""
     drop = Record.from_samples([-12.0, -12.0], time_step=0.1)
     falls = scene_of(excitation=Rest(), vertical=drop, duration=0.1, output_step=0.01)
     motion = EventBasedModel(pivot=pivot).simulate(falls).channels
@@ -133,14 +184,21 @@ def test_floor_that_falls_away(pivot):
 
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_sampled_pulse_tends_to_the_pulse(pivot):
-    """A record linear between samples of a Ricker pulse: the error goes with the square of its time step."""
+    """A record linear between samples of a Ricker pulse: the error goes with the square of its time
+    step."""
     scene = scene_of(duration=3.0, walls=walls(left=0.053))
     model = EventBasedModel(pivot=pivot, tolerance=1e-13)
     truth = model.simulate(scene).channels["theta"]
     errors = []
     for step in (0.004, 0.001, 0.00025):
-        record = Record.from_samples(RICKER.acceleration(np.arange(0.0, 3.0 + step, step)), time_step=step)
-        errors.append(np.max(np.abs(model.simulate(scene.replace(excitation=record)).channels["theta"] - truth)))
+        record = Record.from_samples(
+            RICKER.acceleration(np.arange(0.0, 3.0 + step, step)), time_step=step
+        )
+        errors.append(
+            np.max(
+                np.abs(model.simulate(scene.replace(excitation=record)).channels["theta"] - truth)
+            )
+        )
     assert errors[2] < 1e-5
     orders = np.log(np.array(errors[:-1]) / errors[1:]) / math.log(4.0)
     np.testing.assert_allclose(orders, 2.0, atol=0.35)
@@ -149,7 +207,10 @@ def test_sampled_pulse_tends_to_the_pulse(pivot):
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_walls_out_of_reach_do_not_matter(pivot):
     far = scene_of(walls=walls(left=50.0, right=50.0, e=1.0))
-    with_walls, without = EventBasedModel(pivot=pivot).simulate(far), EventBasedModel(pivot=pivot).simulate(scene_of())
+    with_walls, without = (
+        EventBasedModel(pivot=pivot).simulate(far),
+        EventBasedModel(pivot=pivot).simulate(scene_of()),
+    )
     for name in (*ODD, *EVEN):
         np.testing.assert_array_equal(with_walls.channels[name], without.channels[name])
 
@@ -158,7 +219,11 @@ def test_walls_out_of_reach_do_not_matter(pivot):
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_walls_and_floor_are_not_entered(pivot, e):
     """Between two walls, under a strong pulse: every row keeps its distance, to 1e-9 m."""
-    scene = scene_of(walls=walls(left=0.03, right=0.05, e=e), excitation=Ricker(amplitude=6.0 * SLOPE, period=0.9), duration=6.0)
+    scene = scene_of(
+        walls=walls(left=0.03, right=0.05, e=e),
+        excitation=Ricker(amplitude=6.0 * SLOPE, period=0.9),
+        duration=6.0,
+    )
     history = EventBasedModel(pivot=pivot).simulate(scene)
     motion = history.channels
     for side in ("left", "right"):
@@ -179,7 +244,8 @@ def test_sticking_floor_holds_the_pivot(pivot, name):
     assert np.max(np.abs(motion["slip_rate"][holds])) < 1e-12
     together = holds[1:] & holds[:-1]
     starts = np.abs(np.diff(motion["slip"]))[together]
-    # The other corner becomes the pivot at an impact: the slip of the lower corner is continuous there too.
+    # The other corner becomes the pivot at an impact: the slip of the lower corner is continuous
+    # there too.
     assert np.max(starts) < 1e-12
 
 
@@ -187,7 +253,8 @@ def test_sticking_floor_holds_the_pivot(pivot, name):
 @pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_needles_and_slabs_from_a_millimetre_to_a_kilometre(pivot, radius, alpha):
-    """Any block ends its run; energy left over after a plastic pulse of the floor is never more than it had, and it rests."""
+    """Any block ends its run; energy left over after a plastic pulse of the floor is never more
+    than it had, and it rests."""
     block = Block(half_width=radius * math.sin(alpha), half_height=radius * math.cos(alpha))
     unit = math.sqrt(radius / 9.81)
     scene = scene_of(
@@ -200,14 +267,17 @@ def test_needles_and_slabs_from_a_millimetre_to_a_kilometre(pivot, radius, alpha
     )
     history = EventBasedModel(pivot=pivot).simulate(scene)
     motion = history.channels
-    energy = kinematics.energy(block, 9.81, *(motion[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")))
+    energy = kinematics.energy(
+        block, 9.81, *(motion[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
+    )
     assert np.all(np.diff(energy) <= 1e-9 * 9.81 * radius)
     assert np.max(np.abs(motion["theta"])) == pytest.approx(0.5 * alpha, rel=1e-12)
     assert history.outcome == "at rest" or alpha < 0.1
 
 
 def test_initial_state_is_where_it_was_put():
-    """Row 0 is the scene's own initial state; a pivot that slips, a spin from upright, a lifted block."""
+    """Row 0 is the scene's own initial state; a pivot that slips, a spin from upright, a lifted
+    block."""
     for change in (
         {"initial_rotation": 0.1, "initial_angular_velocity": -0.3, "initial_velocity": 0.2},
         {"initial_angular_velocity": 0.2},
@@ -218,20 +288,29 @@ def test_initial_state_is_where_it_was_put():
         motion = EventBasedModel().simulate(scene).channels
         row = [motion[name][0] for name in ("x", "y", "theta", "x_dot", "y_dot", "theta_dot")]
         np.testing.assert_allclose(row, scene.initial_state, rtol=1e-14, atol=1e-15)
-        assert motion["slip_rate"][0] == pytest.approx(change.get("initial_velocity", 0.0), abs=1e-14)
+        assert motion["slip_rate"][0] == pytest.approx(
+            change.get("initial_velocity", 0.0), abs=1e-14
+        )
     lifted = scene_of(excitation=Rest(), initial_height=0.05, initial_rotation=0.05)
-    assert EventBasedModel(pivot="unilateral").simulate(lifted).channels["y"][0] == pytest.approx(lifted.initial_state[1], rel=1e-14)
+    assert EventBasedModel(pivot="unilateral").simulate(lifted).channels["y"][0] == pytest.approx(
+        lifted.initial_state[1], rel=1e-14
+    )
 
 
 def test_static_friction_only_decides_when_slip_begins():
-    """A higher static friction delays the slip; with less than the slope, a block at rest slides when mu_s is exceeded."""
+    """A higher static friction delays the slip; with less than the slope, a block at rest slides
+    when mu_s is exceeded."""
     pulse = Record.from_samples([0.0, 9.81], time_step=1.0)
     floor = Floor(friction=0.1, static_friction=0.2)
     history = EventBasedModel().simulate(scene_of(floor=floor, excitation=pulse, duration=1.0))
     (begin,) = [e for e in history.event_list if e.kind == "slip"]
     assert begin.t == pytest.approx(0.2, abs=1e-12)
     t = history.channels["t"]
-    expected = np.where(t > 0.2, -9.81 * ((t**3 - 0.2**3) / 6.0 - 0.1 * (t - 0.2) ** 2 / 2.0 - 0.02 * (t - 0.2)), 0.0)
+    expected = np.where(
+        t > 0.2,
+        -9.81 * ((t**3 - 0.2**3) / 6.0 - 0.1 * (t - 0.2) ** 2 / 2.0 - 0.02 * (t - 0.2)),
+        0.0,
+    )
     np.testing.assert_allclose(history.channels["x"], expected, rtol=0.0, atol=1e-12)
 
 

@@ -1,7 +1,8 @@
-"""Blocks whose mass is not where the box's centre is: two pivots, against closed forms, Lagrange's equations and Newton-Euler.
+"""Blocks whose mass is not where the box's centre is: two pivots, against closed forms, Lagrange's
+equations and Newton-Euler.
 
-The other side is written from the positions of corners and mass's centre in the world, by rotation matrices; it shares nothing
-with the models but the scene.
+The other side is written from the positions of corners and mass's centre in the world, by rotation
+matrices; it shares nothing with the models but the scene.
 """
 
 from __future__ import annotations
@@ -18,22 +19,41 @@ from rockcheck.scenes import Block, Floor, Record, Rest, Ricker, Scene, Sine, Wa
 
 G = 9.81
 #: A rack loaded low and to the right: its right pivot is the weaker one.
-RACK = Block(half_width=0.3, half_height=1.0, mass=400.0, centre_of_mass=(0.08, -0.25), moment_of_inertia=110.0)
+RACK = Block(
+    half_width=0.3,
+    half_height=1.0,
+    mass=400.0,
+    centre_of_mass=(0.08, -0.25),
+    moment_of_inertia=110.0,
+)
 
 
 def scene_of(block: Block = RACK, mu: float = 0.6, duration: float = 4.0, **more: object) -> Scene:
-    return Scene(**{"name": "loaded", "block": block, "floor": Floor(friction=mu), "duration": duration, "output_step": 0.002} | more)
+    return Scene(
+        **{
+            "name": "loaded",
+            "block": block,
+            "floor": Floor(friction=mu),
+            "duration": duration,
+            "output_step": 0.002,
+        }
+        | more
+    )
 
 
 class Lagrangian:
-    """The block turning about its lower corner, which keeps its place: one coordinate, theta, and Lagrange's equation for it.
+    """The block turning about its lower corner, which keeps its place: one coordinate, theta, and
+    Lagrange's equation for it.
 
-    T = I w^2/2 + |dr/dtheta|^2 w^2/2 and V = g y + u x, with r = (x, y) the place of the mass's centre from the corner.
+    T = I w^2/2 + |dr/dtheta|^2 w^2/2 and V = g y + u x, with r = (x, y) the place of the mass's
+    centre from the corner.
     """
 
     def __init__(self, block: Block, side: str) -> None:
         dx, dz = block.offset
-        corner = np.array([-block.half_width if side == "left" else block.half_width, -block.half_height])
+        corner = np.array(
+            [-block.half_width if side == "left" else block.half_width, -block.half_height]
+        )
         self.arm, self.inertia = np.array([dx, dz]) - corner, block.moment_of_inertia / block.mass
         self.sense = 1.0 if side == "left" else -1.0
 
@@ -54,7 +74,9 @@ class Lagrangian:
 
     def energy(self, theta: float, w: float) -> float:
         first = self.place(theta, 1)
-        return 0.5 * (self.inertia + first @ first) * w * w + G * (self.place(theta)[1] - self.place(0.0)[1])
+        return 0.5 * (self.inertia + first @ first) * w * w + G * (
+            self.place(theta)[1] - self.place(0.0)[1]
+        )
 
     def momentum_about(self, point: np.ndarray, w: float) -> float:
         """Angular momentum at theta = 0 about a point that is given from the corner."""
@@ -63,7 +85,8 @@ class Lagrangian:
 
 
 def rocking_by_lagrange(scene: Scene) -> Callable[[np.ndarray], np.ndarray]:
-    """theta(t) of a block that sticks to its pivots and conserves angular momentum about the new one where it lands."""
+    """theta(t) of a block that sticks to its pivots and conserves angular momentum about the new
+    one where it lands."""
     theta, w, t = scene.initial_rotation, 0.0, 0.0
     pieces = []
     side = "left" if theta > 0.0 else "right"
@@ -76,35 +99,58 @@ def rocking_by_lagrange(scene: Scene) -> Callable[[np.ndarray], np.ndarray]:
         lands.terminal, lands.direction = True, -body.sense  # type: ignore[attr-defined]
         motion = body.motion(lambda t: float(scene.excitation.acceleration(t)))
         found = solve_ivp(
-            motion, (t, scene.duration), [theta, w], "DOP853", rtol=1e-13, atol=1e-14, events=lands, dense_output=True, max_step=0.05
+            motion,
+            (t, scene.duration),
+            [theta, w],
+            "DOP853",
+            rtol=1e-13,
+            atol=1e-14,
+            events=lands,
+            dense_output=True,
+            max_step=0.05,
         )
         pieces.append((t, found.t[-1], found.sol))
         t = found.t[-1]
         side = "right" if side == "left" else "left"
         other = Lagrangian(scene.block, side)
-        theta, w = 0.0, body.momentum_about(body.arm - other.arm, float(found.y[1, -1])) / (other.inertia + other.arm @ other.arm)
-    return lambda times: np.array([next(sol(t)[0] for _, end, sol in pieces if t <= end + 1e-12) for t in times])
+        theta, w = (
+            0.0,
+            body.momentum_about(body.arm - other.arm, float(found.y[1, -1]))
+            / (other.inertia + other.arm @ other.arm),
+        )
+    return lambda times: np.array(
+        [next(sol(t)[0] for _, end, sol in pieces if t <= end + 1e-12) for t in times]
+    )
 
 
 @pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
 @pytest.mark.parametrize("tilt", [0.1, -0.1])
 def test_free_rocking_is_lagranges(tilt, pivot):
-    """1.2 s of free rocking over several landings, to 1e-9 rad, whichever pivot comes first; energy is kept between impacts."""
+    """1.2 s of free rocking over several landings, to 1e-9 rad, whichever pivot comes first; energy
+    is kept between impacts."""
     scene = scene_of(duration=1.2, initial_rotation=tilt)
     history = EventBasedModel(pivot=pivot, tolerance=1e-13).simulate(scene)
     c = history.channels
     assert len([e for e in history.event_list if e.kind == "floor impact"]) >= 2
     np.testing.assert_allclose(c["theta"], rocking_by_lagrange(scene)(c["t"]), atol=1e-9)
-    energy = kinematics.energy(RACK, G, *(c[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")))
+    energy = kinematics.energy(
+        RACK, G, *(c[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
+    )
     first = c["t"] < history.event_list[0].t
     assert np.ptp(energy[first]) < 1e-11
-    assert energy[0] == pytest.approx(Lagrangian(RACK, "left" if tilt > 0 else "right").energy(tilt, 0.0), abs=1e-12)
+    assert energy[0] == pytest.approx(
+        Lagrangian(RACK, "left" if tilt > 0 else "right").energy(tilt, 0.0), abs=1e-12
+    )
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_a_pulse_is_lagranges(sense):
     """Rocking on both pivots and landings under a pulse, to 1e-8 rad."""
-    scene = scene_of(duration=1.4, excitation=Sine(amplitude=sense * 6.0, period=0.7), initial_rotation=-0.05 * sense)
+    scene = scene_of(
+        duration=1.4,
+        excitation=Sine(amplitude=sense * 6.0, period=0.7),
+        initial_rotation=-0.05 * sense,
+    )
     history = EventBasedModel(friction="no-slip", tolerance=1e-13).simulate(scene)
     theta = history.channels["theta"]
     assert min(np.max(theta), -np.min(theta)) > 0.02
@@ -113,15 +159,22 @@ def test_a_pulse_is_lagranges(sense):
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_quarter_period_and_impact_ratio_of_each_pivot(side):
-    """Housner's quarter period with the pivot's own p and alpha, and the ratio that angular momentum about the new pivot gives."""
+    """Housner's quarter period with the pivot's own p and alpha, and the ratio that angular
+    momentum about the new pivot gives."""
     old, new = Lagrangian(RACK, side), Lagrangian(RACK, "right" if side == "left" else "left")
     tilt = 0.25 * math.atan2(abs(old.arm[0]), old.arm[1])
     scene = scene_of(duration=3.0, output_step=2e-4, initial_rotation=old.sense * tilt)
     history = EventBasedModel(tolerance=1e-13).simulate(scene)
 
     def pace(root: float) -> float:
-        height = old.energy(old.sense * tilt, 0.0) - old.energy(old.sense * (tilt - root * root), 0.0)
-        return 2.0 * root / math.sqrt(2.0 * height / (old.inertia + old.arm @ old.arm)) if root > 0.0 else 0.0
+        height = old.energy(old.sense * tilt, 0.0) - old.energy(
+            old.sense * (tilt - root * root), 0.0
+        )
+        return (
+            2.0 * root / math.sqrt(2.0 * height / (old.inertia + old.arm @ old.arm))
+            if root > 0.0
+            else 0.0
+        )
 
     quarter = quad(pace, 1e-7, math.sqrt(tilt), epsabs=1e-12, epsrel=1e-12, limit=200)[0]
     impacts = [event.t for event in history.event_list if event.kind == "floor impact"]
@@ -136,12 +189,17 @@ def test_quarter_period_and_impact_ratio_of_each_pivot(side):
 
 
 def test_pivots_of_a_block():
-    """p, alpha and R of both pivots; the weaker one's are the block's, and those of a homogeneous block Housner's."""
+    """p, alpha and R of both pivots; the weaker one's are the block's, and those of a homogeneous
+    block Housner's."""
     for side in ("left", "right"):
         body, pivot = Lagrangian(RACK, side), RACK.pivot(side)
         radius = float(np.hypot(*body.arm))
-        assert (pivot.alpha, pivot.radius) == pytest.approx((math.atan2(abs(body.arm[0]), body.arm[1]), radius), rel=1e-15)
-        assert pivot.frequency_parameter(G) == pytest.approx(math.sqrt(G * radius / (body.inertia + radius**2)), rel=1e-14)
+        assert (pivot.alpha, pivot.radius) == pytest.approx(
+            (math.atan2(abs(body.arm[0]), body.arm[1]), radius), rel=1e-15
+        )
+        assert pivot.frequency_parameter(G) == pytest.approx(
+            math.sqrt(G * radius / (body.inertia + radius**2)), rel=1e-14
+        )
     assert RACK.alpha == RACK.pivot("right").alpha < RACK.pivot("left").alpha
     plain = Block(half_width=0.3, half_height=1.0)
     assert plain.pivot("left") == plain.pivot("right")
@@ -151,25 +209,35 @@ def test_pivots_of_a_block():
 @pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_uplift_at_the_least_acceleration_of_each_side(sense, pivot):
-    """On a base whose acceleration rises evenly the block leaves the floor where it passes g tan alpha of that side's pivot."""
+    """On a base whose acceleration rises evenly the block leaves the floor where it passes g tan
+    alpha of that side's pivot."""
     side = RACK.pivot("left" if sense > 0.0 else "right")
     ramp = Record.from_samples(sense * np.linspace(0.0, 0.6 * G, 601), 0.01)
-    history = EventBasedModel(pivot=pivot, tolerance=1e-12).simulate(scene_of(mu=0.9, duration=6.0, excitation=ramp))
+    history = EventBasedModel(pivot=pivot, tolerance=1e-12).simulate(
+        scene_of(mu=0.9, duration=6.0, excitation=ramp)
+    )
     uplift = history.event_list[0]
     assert uplift.kind == "uplift"
     assert uplift.t == pytest.approx(side.arm / side.height / 0.6 * 6.0, abs=1e-9)
 
 
-def newton_euler(block: Block, state: np.ndarray, u: float, mode: str, S: int, d: int, wall: int, mu: float) -> np.ndarray:
-    """x'', y'', theta'' of the mass's centre, P, Q, N by the balances of force and moment and the contacts' accelerations, in the world.
+def newton_euler(
+    block: Block, state: np.ndarray, u: float, mode: str, S: int, d: int, wall: int, mu: float
+) -> np.ndarray:
+    """x'', y'', theta'' of the mass's centre, P, Q, N by the balances of force and moment and the
+    contacts' accelerations, in the world.
 
-    `wall` is +1 where a corner rests on a left wall, -1 on a right one, 0 on none; S the pivot, d the sense of its slip.
+    `wall` is +1 where a corner rests on a left wall, -1 on a right one, 0 on none; S the pivot, d
+    the sense of its slip.
     """
     theta, w = state[2], state[5]
     dx, dz = block.offset
     rotation = np.array([[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]])
     pivot = rotation @ [-S * block.half_width - dx, -block.half_height - dz]
-    corner = rotation @ [-wall * block.half_width - dx, (block.half_height if wall == S else -block.half_height) - dz]
+    corner = rotation @ [
+        -wall * block.half_width - dx,
+        (block.half_height if wall == S else -block.half_height) - dz,
+    ]
     inertia = block.gyration_squared
     # Unknowns: ax, ay, spin, P, Q, N (the wall pushes to the right where it is the left one).
     rows = [
@@ -177,16 +245,21 @@ def newton_euler(block: Block, state: np.ndarray, u: float, mode: str, S: int, d
         ([0, 1, 0, -1, 0, 0], -G),
         ([0, 0, inertia, -pivot[0], pivot[1], wall * corner[1]], 0.0),
         ([0, 1, pivot[0], 0, 0, 0], w * w * pivot[1]),
-        ([1, 0, -pivot[1], 0, 0, 0], w * w * pivot[0]) if mode in ("rock", "lean") else ([0, 0, 0, mu * d, 1, 0], 0.0),
+        ([1, 0, -pivot[1], 0, 0, 0], w * w * pivot[0])
+        if mode in ("rock", "lean")
+        else ([0, 0, 0, mu * d, 1, 0], 0.0),
         ([1, 0, -corner[1], 0, 0, 0], w * w * corner[0]) if wall else ([0, 0, 0, 0, 0, 1], 0.0),
     ]
-    return np.linalg.solve(np.array([row for row, _ in rows], dtype=float), np.array([right for _, right in rows]))
+    return np.linalg.solve(
+        np.array([row for row, _ in rows], dtype=float), np.array([right for _, right in rows])
+    )
 
 
 @pytest.mark.parametrize("case", [1, -1], ids=["tip wall", "far wall"])
 @pytest.mark.parametrize("mode", ["rock", "slide-rock", "lean", "ladder"])
 def test_series_begin_with_newton_and_euler(mode, case):
-    """Accelerations and forces of the models' series in every mode at 200 random loaded blocks and states, to 1e-10."""
+    """Accelerations and forces of the models' series in every mode at 200 random loaded blocks and
+    states, to 1e-10."""
     from rockcheck.ebm.core import motion
 
     rng = np.random.default_rng(11)
@@ -194,10 +267,18 @@ def test_series_begin_with_newton_and_euler(mode, case):
     for _ in range(200):
         b, h = rng.uniform(0.1, 0.5), rng.uniform(0.5, 1.5)
         place = (rng.uniform(-0.6, 0.6) * b, rng.uniform(-0.6, 0.6) * h)
-        block = Block(half_width=b, half_height=h, centre_of_mass=place, moment_of_inertia=rng.uniform(0.25, 0.5) * (b * b + h * h))
+        block = Block(
+            half_width=b,
+            half_height=h,
+            centre_of_mass=place,
+            moment_of_inertia=rng.uniform(0.25, 0.5) * (b * b + h * h),
+        )
         S, d = int(rng.choice([-1, 1])), int(rng.choice([-1, 1]))
         wall = S * case if mode in ("lean", "ladder") else 0
-        mu, level = rng.uniform(0.05, min(1.0, 0.5 * block.least_painleve_friction)), rng.uniform(-3.0, 3.0)
+        mu, level = (
+            rng.uniform(0.05, min(1.0, 0.5 * block.least_painleve_friction)),
+            rng.uniform(-3.0, 3.0),
+        )
         walls = [Wall(side="left", gap=0.1), Wall(side="right", gap=0.1)]
         ramp = Record.from_samples(np.full(3, level), 10.0)
         scene = scene_of(block, mu, excitation=ramp, walls=walls)
@@ -207,9 +288,17 @@ def test_series_begin_with_newton_and_euler(mode, case):
             block.radius,
         )
         pivot = block.pivot("left" if S > 0 else "right")
-        theta, w = S * rng.uniform(0.01, 0.9) * pivot.alpha, 0.0 if mode == "lean" else rng.uniform(-1.0, 1.0)
-        s, c = pivot.radius * math.sin(pivot.alpha - abs(theta)), pivot.radius * math.cos(pivot.alpha - abs(theta))
-        if mode == "ladder":  # the corner keeps to the wall: the centre's velocity is that of the turn, and the slip's sense too
+        theta, w = (
+            S * rng.uniform(0.01, 0.9) * pivot.alpha,
+            0.0 if mode == "lean" else rng.uniform(-1.0, 1.0),
+        )
+        s, c = (
+            pivot.radius * math.sin(pivot.alpha - abs(theta)),
+            pivot.radius * math.cos(pivot.alpha - abs(theta)),
+        )
+        if (
+            mode == "ladder"
+        ):  # the corner keeps to the wall: the centre's velocity is that of the turn, and the slip's sense too
             dx, dz = block.offset
             top = h - dz if wall == S else -h - dz
             vx = w * (math.sin(theta) * (-wall * b - dx) + math.cos(theta) * top)
@@ -217,21 +306,39 @@ def test_series_begin_with_newton_and_euler(mode, case):
             d = 1 if slip > 0.0 else -1
         else:
             vx = -c * w + (0.0 if mode in ("rock", "lean") else d * rng.uniform(0.1, 1.0))
-        expected = newton_euler(block, np.array([0.0, c, theta, vx, S * s * w, w]), level, mode, S, d, wall, mu)
+        expected = newton_euler(
+            block, np.array([0.0, c, theta, vx, S * s * w, w]), level, mode, S, d, wall, mu
+        )
         if mode in ("slide-rock", "ladder") and expected[3] < 0.0:
             continue  # the floor pulls: friction acts the other way
         m = np.zeros(motion.MODE_SIZE, dtype=np.int64)
-        m[motion.FAMILY], m[motion.S], m[motion.SLIP], m[motion.PULL] = motion.TILT, S, S * d if mode in ("slide-rock", "ladder") else 0, 1
+        m[motion.FAMILY], m[motion.S], m[motion.SLIP], m[motion.PULL] = (
+            motion.TILT,
+            S,
+            S * d if mode in ("slide-rock", "ladder") else 0,
+            1,
+        )
         m[motion.FLOOR] = motion.STICK if mode in ("rock", "lean") else motion.SLIPPING
         m[motion.TIP], m[motion.FAR] = wall == S, wall == -S
         z = np.array([0.0, c / R, theta, vx * unit / R, S * s * w * unit / R, w * unit])
         motion.tilt_series(setting, m, z, *natural.grounds_of(scene), 0.0, 12, 0.0, 0.0, a)
         push = a[motion.NA, 0] - a[motion.NB, 0]
-        found = np.array([0.0, 0.0, S * a[motion.OMEGA, 1] / unit**2, a[motion.P, 0] * G, S * a[motion.Q, 0] * G, S * push * G])
+        found = np.array(
+            [
+                0.0,
+                0.0,
+                S * a[motion.OMEGA, 1] / unit**2,
+                a[motion.P, 0] * G,
+                S * a[motion.Q, 0] * G,
+                S * push * G,
+            ]
+        )
         wanted = expected * [0.0, 0.0, 0.0 if mode == "lean" else 1.0, 1.0, 1.0, wall]
         found[2] = 0.0 if mode == "lean" else found[2]
         if mode == "lean":  # at rest: what the block would do is prevented
-            static = newton_euler(block, np.array([0.0, c, theta, 0.0, 0.0, 0.0]), level, "lean", S, d, wall, mu)
+            static = newton_euler(
+                block, np.array([0.0, c, theta, 0.0, 0.0, 0.0]), level, "lean", S, d, wall, mu
+            )
             assert static[:3] == pytest.approx(0.0, abs=1e-9)
         assert found == pytest.approx(wanted, rel=1e-9, abs=1e-9), (mode, case, S)
 
@@ -240,21 +347,37 @@ def random_scene(rng: np.random.Generator) -> Scene:
     """A loaded block beside walls or not, under a pulse."""
     b, h = rng.uniform(0.1, 0.5), rng.uniform(0.4, 1.5)
     place = (rng.uniform(-0.6, 0.6) * b, rng.uniform(-0.6, 0.6) * h)
-    block = Block(half_width=b, half_height=h, centre_of_mass=place, moment_of_inertia=rng.uniform(0.2, 0.5) * (b * b + h * h))
+    block = Block(
+        half_width=b,
+        half_height=h,
+        centre_of_mass=place,
+        moment_of_inertia=rng.uniform(0.2, 0.5) * (b * b + h * h),
+    )
     mu = rng.uniform(0.1, 0.9) * block.least_painleve_friction
     walls = [
-        Wall(side=side, gap=float(rng.choice([0.0, rng.uniform(0.0, 0.1)])), restitution=float(rng.choice([0.0, 0.5])))
+        Wall(
+            side=side,
+            gap=float(rng.choice([0.0, rng.uniform(0.0, 0.1)])),
+            restitution=float(rng.choice([0.0, 0.5])),
+        )
         for side in ("left", "right")
         if rng.uniform() < 0.6
     ]
     pulse = Ricker(amplitude=G * block.slope * rng.uniform(1.0, 4.0), period=rng.uniform(0.4, 1.5))
-    return scene_of(block, min(mu, 1.0), walls=walls, excitation=pulse, duration=3.0, output_step=0.01)
+    return scene_of(
+        block, min(mu, 1.0), walls=walls, excitation=pulse, duration=3.0, output_step=0.01
+    )
 
 
 @pytest.mark.parametrize("model", ["bilateral", "unilateral", "bouc-wen"])
 def test_the_mirror_image_is_the_same_to_the_bit(model):
-    """Thirty loaded blocks: left and right exchanged, with record, walls and mass, give the mirrored history."""
-    player = EventBasedModel(friction="bouc-wen", tolerance=1e-7) if model == "bouc-wen" else EventBasedModel(pivot=model)
+    """Thirty loaded blocks: left and right exchanged, with record, walls and mass, give the
+    mirrored history."""
+    player = (
+        EventBasedModel(friction="bouc-wen", tolerance=1e-7)
+        if model == "bouc-wen"
+        else EventBasedModel(pivot=model)
+    )
     rng = np.random.default_rng(12)
     for _ in range(30):
         scene = random_scene(rng)
@@ -266,22 +389,30 @@ def test_the_mirror_image_is_the_same_to_the_bit(model):
 
 
 def test_the_homogeneous_block_is_the_symmetric_instance():
-    """Given as one that has its mass in the middle and a homogeneous box's inertia, it moves as ever but for rounding."""
+    """Given as one that has its mass in the middle and a homogeneous box's inertia, it moves as
+    ever but for rounding."""
     block = Block(half_width=0.3, half_height=1.0)
-    same = Block(half_width=0.3, half_height=1.0, mass=3.0, moment_of_inertia=3.0 * (0.3**2 + 1.0) / 3.0)
+    same = Block(
+        half_width=0.3, half_height=1.0, mass=3.0, moment_of_inertia=3.0 * (0.3**2 + 1.0) / 3.0
+    )
     near = Block(half_width=0.3, half_height=1.0, centre_of_mass=(1e-13, 0.0))
     assert Block(half_width=0.3, half_height=1.0, centre_of_mass=(0.0, 0.0)) == block
     walls = [Wall(side="left", gap=0.03, restitution=0.4)]
-    scene = scene_of(block, 0.4, excitation=Ricker(amplitude=7.0, period=0.9), walls=walls, duration=3.0)
+    scene = scene_of(
+        block, 0.4, excitation=Ricker(amplitude=7.0, period=0.9), walls=walls, duration=3.0
+    )
     for pivot in ("bilateral", "unilateral"):
         model = EventBasedModel(pivot=pivot, tolerance=1e-12)
         plain = model.simulate(scene).channels["theta"]
         for again in (same, near):
-            np.testing.assert_allclose(model.simulate(scene.replace(block=again)).channels["theta"], plain, atol=1e-8)
+            np.testing.assert_allclose(
+                model.simulate(scene.replace(block=again)).channels["theta"], plain, atol=1e-8
+            )
 
 
 def test_what_is_decided_early_is_what_comes():
-    """Outcomes and peaks of 60 loaded blocks by a batch that stops when all is certain, and by runs to the end."""
+    """Outcomes and peaks of 60 loaded blocks by a batch that stops when all is certain, and by runs
+    to the end."""
     from rockcheck.ebm.batch import pack, run_batch
 
     rng, model = np.random.default_rng(13), EventBasedModel(tolerance=1e-10)
@@ -295,9 +426,15 @@ def test_what_is_decided_early_is_what_comes():
 
 
 def test_unilateral_walls_conserve_momentum_about_the_right_corners():
-    """A block that leans against a wall at rest: its push is what the moment about the pivot asks for, by the box's far-off corner."""
+    """A block that leans against a wall at rest: its push is what the moment about the pivot asks
+    for, by the box's far-off corner."""
     wall = [Wall(side="left", gap=0.05)]
-    scene = scene_of(mu=0.6, walls=wall, duration=12.0, excitation=Record.from_samples(np.full(13, 0.56 * G), 1.0))
+    scene = scene_of(
+        mu=0.6,
+        walls=wall,
+        duration=12.0,
+        excitation=Record.from_samples(np.full(13, 0.56 * G), 1.0),
+    )
     history = EventBasedModel(pivot="unilateral").simulate(scene)
     assert history.channels["mode"][-1] == "lean"
     theta, x = float(history.channels["theta"][-1]), float(history.channels["x"][-1])
@@ -307,13 +444,16 @@ def test_unilateral_walls_conserve_momentum_about_the_right_corners():
 
 @pytest.mark.parametrize("case", [1, -1], ids=["tip wall", "far wall"])
 def test_bouc_wens_series_keep_the_corner_on_its_wall(case):
-    """x follows the corner's reach, +-s', in every term of the series, for 100 loaded blocks that turn along a wall."""
+    """x follows the corner's reach, +-s', in every term of the series, for 100 loaded blocks that
+    turn along a wall."""
     from rockcheck.ebm.core import bouc_wen, motion
 
     rng, order = np.random.default_rng(14), 8
     a, _ = bouc_wen.friction_workspace()
     for _ in range(100):
-        scene = random_scene(rng).replace(walls=(Wall(side="left", gap=0.01), Wall(side="right", gap=0.01)))
+        scene = random_scene(rng).replace(
+            walls=(Wall(side="left", gap=0.01), Wall(side="right", gap=0.01))
+        )
         b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
         S = int(rng.choice([-1, 1]))
         side = b.left if S > 0 else b.right
@@ -329,8 +469,12 @@ def test_bouc_wens_series_keep_the_corner_on_its_wall(case):
             1 if w > 0 else -1,
         )
         m[motion.TIP], m[motion.FAR] = case > 0, case < 0
-        z = np.array([0.0, c, S * phi, S * case * (sine * s + cosine * c) * w, S * S * s * w, S * w])
-        bouc_wen.friction_series(b, m, z, 0.3, False, 0.1, *natural.grounds_of(scene), 1.0, order, a)
+        z = np.array(
+            [0.0, c, S * phi, S * case * (sine * s + cosine * c) * w, S * S * s * w, S * w]
+        )
+        bouc_wen.friction_series(
+            b, m, z, 0.3, False, 0.1, *natural.grounds_of(scene), 1.0, order, a
+        )
         for k in range(1, order - 1):
             reach = case * (sine * a[motion.COS, k] - cosine * a[motion.SIN, k])
             assert a[motion.XI, k] == pytest.approx(reach, rel=1e-10, abs=1e-10), k

@@ -15,16 +15,34 @@ from rockcheck.scenes.scene import PAPER_BLOCK
 
 
 def scene_of(**change: object) -> Scene:
-    rest = {"name": "model", "block": PAPER_BLOCK, "floor": Floor(friction=0.3), "excitation": Rest(), "duration": 1.0}
+    rest = {
+        "name": "model",
+        "block": PAPER_BLOCK,
+        "floor": Floor(friction=0.3),
+        "excitation": Rest(),
+        "duration": 1.0,
+    }
     return Scene(**(rest | change))
 
 
 @pytest.mark.parametrize(
     ("settings", "change", "said"),
     [
-        ({}, {"floor": Floor(friction=0.3, restitution=0.4)}, "floor.restitution: 0.4 is not allowed with the bilateral pivot"),
-        ({}, {"initial_height": 0.1}, "initial_height: 0.1 is not allowed with the bilateral pivot"),
-        ({"pivot": "unilateral"}, {"floor": Floor(friction=0.3, restitution=1.0)}, "floor.restitution: 1 is not allowed"),
+        (
+            {},
+            {"floor": Floor(friction=0.3, restitution=0.4)},
+            "floor.restitution: 0.4 is not allowed with the bilateral pivot",
+        ),
+        (
+            {},
+            {"initial_height": 0.1},
+            "initial_height: 0.1 is not allowed with the bilateral pivot",
+        ),
+        (
+            {"pivot": "unilateral"},
+            {"floor": Floor(friction=0.3, restitution=1.0)},
+            "floor.restitution: 1 is not allowed",
+        ),
     ],
 )
 def test_physics_that_is_refused(settings, change, said):
@@ -58,7 +76,11 @@ def test_settings_that_are_refused(settings, key):
 
 @pytest.mark.parametrize(
     ("settings", "name"),
-    [({}, "ebm"), ({"pivot": "unilateral"}, "ebm-unilateral"), ({"friction": "bouc-wen"}, "ebm-bouc-wen")],
+    [
+        ({}, "ebm"),
+        ({"pivot": "unilateral"}, "ebm-unilateral"),
+        ({"friction": "bouc-wen"}, "ebm-bouc-wen"),
+    ],
 )
 def test_names(settings, name):
     assert EventBasedModel(**settings).name == name
@@ -72,7 +94,18 @@ def test_history_of_a_paper_scene():
     assert history.name == "fig4a"
     assert history.outcome == "at rest"
     assert history.peak_rotation / scene.block.alpha == pytest.approx(0.329, abs=5e-4)
-    assert list(history.frame.columns) == ["t", "x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate", "mode"]
+    assert list(history.frame.columns) == [
+        "t",
+        "x",
+        "y",
+        "theta",
+        "x_dot",
+        "y_dot",
+        "theta_dot",
+        "slip",
+        "slip_rate",
+        "mode",
+    ]
     assert len(history.frame) == len(scene.output_times) == 7201
     assert list(history.events.columns) == ["t", "kind", "mode_before", "mode_after", "impulse"]
     assert history.events["t"].is_monotonic_increasing
@@ -82,24 +115,35 @@ def test_history_of_a_paper_scene():
     assert history.cost.steps > 0
     assert history.cost.evaluations >= history.cost.steps
     assert history.settings == EventBasedModel().model_dump()
-    assert history.notes == ("the horizontal record ends at 31.18 s, before the scene's 36 s; the base is at rest after it",)
+    assert history.notes == (
+        "the horizontal record ends at 31.18 s, before the scene's 36 s; the base is at rest after"
+        " it",
+    )
 
 
 def test_note_where_a_record_is_short():
-    """One note for each direction that ends early, none where the record lasts; after its end the base rests."""
+    """One note for each direction that ends early, none where the record lasts; after its end the
+    base rests."""
     record = Record.from_samples(np.full(11, 0.2), time_step=0.1)
     model = EventBasedModel()
     assert model.simulate(scene_of(excitation=record, duration=0.9)).notes == ()
     notes = model.simulate(scene_of(excitation=record, vertical=record, duration=2.0)).notes
     assert [note.split()[1] for note in notes] == ["horizontal", "vertical"]
-    assert all("ends at 1 s, before the scene's 2 s; the base is at rest after it" in note for note in notes)
+    assert all(
+        "ends at 1 s, before the scene's 2 s; the base is at rest after it" in note
+        for note in notes
+    )
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
 def test_overturning_ends_the_history(pivot, side):
     sign = 1.0 if side == "left" else -1.0
-    scene = scene_of(initial_rotation=sign * 0.99 * PAPER_BLOCK.alpha, initial_angular_velocity=sign * 0.3, duration=30.0)
+    scene = scene_of(
+        initial_rotation=sign * 0.99 * PAPER_BLOCK.alpha,
+        initial_angular_velocity=sign * 0.3,
+        duration=30.0,
+    )
     history = EventBasedModel(pivot=pivot).simulate(scene)
     assert history.outcome == f"overturned {side}"
     last = history.event_list[-1]
@@ -113,22 +157,35 @@ def test_events_of_a_flight_are_not_floor_impacts():
     """A floor impact has an impulse. A block that flies through theta = 0 strikes nothing."""
     scene = load_scene("fig5b")
     history = EventBasedModel(pivot="unilateral").simulate(scene)
-    empty = [e for e in history.event_list if e.kind in ("floor impact", "wall impact") and e.impulse == 0.0]
+    empty = [
+        e
+        for e in history.event_list
+        if e.kind in ("floor impact", "wall impact") and e.impulse == 0.0
+    ]
     assert empty == []
 
 
 @pytest.mark.parametrize("mu", [0.0, 1e-12])
 @pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
 def test_ice(pivot, mu):
-    """On a floor without friction the centroid keeps its place above the shaking ground: x = -(ground displacement)."""
+    """On a floor without friction the centroid keeps its place above the shaking ground: x =
+    -(ground displacement)."""
     record = Record.from_samples([1.0, 1.0], time_step=2.0)
-    history = EventBasedModel(pivot=pivot).simulate(scene_of(floor=Floor(friction=mu), excitation=record))
-    np.testing.assert_allclose(history.channels["x"], -0.5 * history.channels["t"] ** 2, rtol=0.0, atol=1e-10)
+    history = EventBasedModel(pivot=pivot).simulate(
+        scene_of(floor=Floor(friction=mu), excitation=record)
+    )
+    np.testing.assert_allclose(
+        history.channels["x"], -0.5 * history.channels["t"] ** 2, rtol=0.0, atol=1e-10
+    )
 
 
 def test_restitution_of_one_and_walls_that_touch():
-    """A block that slides to and fro between elastic walls on ice keeps its speed, and hits them when it must."""
-    walls = [Wall(side="left", gap=0.1, restitution=1.0), Wall(side="right", gap=0.3, restitution=1.0)]
+    """A block that slides to and fro between elastic walls on ice keeps its speed, and hits them
+    when it must."""
+    walls = [
+        Wall(side="left", gap=0.1, restitution=1.0),
+        Wall(side="right", gap=0.3, restitution=1.0),
+    ]
     scene = scene_of(floor=Floor(friction=0.0), walls=walls, initial_velocity=1.0, duration=2.0)
     for pivot in ("bilateral", "unilateral"):
         history = EventBasedModel(pivot=pivot).simulate(scene)

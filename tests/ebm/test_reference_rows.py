@@ -1,4 +1,5 @@
-"""The models against 960 runs of independent programs (tests/data/README.md says what the columns mean)."""
+"""The models against 960 runs of independent programs (tests/data/README.md says what the columns
+mean)."""
 
 from __future__ import annotations
 
@@ -24,13 +25,15 @@ def rows_of(name: str) -> list[Row]:
 BILATERAL = rows_of("ebm_ricker_cases.csv")
 UNILATERAL = rows_of("unilateral_ricker_cases.csv")
 
-#: Right wall, gap 3 mm, e = 1, mu = 0.3, omega_p = 3 p, a_p = 6 g tan(alpha). The table has four wall contacts; there are
-#: five: before the last one the block grazes the wall (closing speed below 1 mm/s), which the table's program passed over.
-#: `test_another_method.py` finds the fifth contact, and our motion, by another way.
+#: Right wall, gap 3 mm, e = 1, mu = 0.3, omega_p = 3 p, a_p = 6 g tan(alpha). The table has four
+#: wall contacts; there are five: before the last one the block grazes the wall (closing speed below
+#: 1 mm/s), which the table's program passed over. `test_another_method.py` finds the fifth contact,
+#: and our motion, by another way.
 GRAZING_ROW = 265
 
-#: Left wall, gap 0.103 m, e = 1, mu = 0.3, omega_p = 4.5 p, a_p = 2.5 g tan(alpha), floor that can only push. Two seconds
-#: after its peak the block lands flush at the wall, where it depends on the law of impacts whether it stays there.
+#: Left wall, gap 0.103 m, e = 1, mu = 0.3, omega_p = 4.5 p, a_p = 2.5 g tan(alpha), floor that can
+#: only push. Two seconds after its peak the block lands flush at the wall, where it depends on the
+#: law of impacts whether it stays there.
 FLUSH_ROW = 162
 
 
@@ -45,13 +48,19 @@ def numbered(rows: list[Row]) -> list[object]:
 
 def scene_of(row: Row, block: Block, gravity: float = 9.81) -> Scene:
     period = 2.0 * math.pi / (float(row["wp_over_p"]) * block.frequency_parameter)
-    wall = [Wall(side=row["side"], gap=float(row["gap"]), restitution=float(row["e_w"]))] if row["gap"] else []
+    wall = (
+        [Wall(side=row["side"], gap=float(row["gap"]), restitution=float(row["e_w"]))]
+        if row["gap"]
+        else []
+    )
     return Scene(
         name="reference",
         block=block,
         floor=Floor(friction=float(row["mu"])),
         walls=wall,
-        excitation=Ricker(amplitude=float(row["ap_ratio"]) * gravity * math.tan(block.alpha), period=period),
+        excitation=Ricker(
+            amplitude=float(row["ap_ratio"]) * gravity * math.tan(block.alpha), period=period
+        ),
         duration=4.0 * period + 20.0,
     )
 
@@ -71,9 +80,10 @@ def test_the_tables_are_whole():
 def test_bilateral_row(line, row, block, run_to_end):
     """Outcome, final place and time of overturning within 1e-6.
 
-    The table's peak was sampled, so that it may lie below the true one, by up to 3.2e-5 alpha, and never above it. Rows
-    with more than 20 contacts with an elastic wall are only asked for 1e-3, and not for the time at which they overturn: by
-    then a perturbation has been multiplied at every contact.
+    The table's peak was sampled, so that it may lie below the true one, by up to 3.2e-5 alpha, and
+    never above it. Rows with more than 20 contacts with an elastic wall are only asked for 1e-3,
+    and not for the time at which they overturn: by then a perturbation has been multiplied at every
+    contact.
     """
     scene = scene_of(row, block)
     run = run_to_end(scene)
@@ -94,7 +104,8 @@ def test_bilateral_row(line, row, block, run_to_end):
 
 @pytest.mark.parametrize(("line", "row"), numbered(UNILATERAL))
 def test_unilateral_row(line, row, block, run_to_end):
-    """Outcome; peak, final place and (plastic walls) time of overturning within 1e-5; the hop, which both programs sample, within 5 %."""
+    """Outcome; peak, final place and (plastic walls) time of overturning within 1e-5; the hop,
+    which both programs sample, within 5 %."""
     scene = scene_of(row, block)
     impacts = "floor-first" if row["depends_on_rule"] == "1" or line == FLUSH_ROW else "moreau"
     run = run_to_end(scene, pivot="unilateral", impacts=impacts)
@@ -102,7 +113,11 @@ def test_unilateral_row(line, row, block, run_to_end):
     assert run.peak == pytest.approx(float(row["peak_theta_over_alpha"]), abs=1e-5)
     if row["outcome"] == "safe":
         assert run.x == pytest.approx(float(row["x_final"]), abs=1e-5)
-        motion = EventBasedModel(tolerance=1e-12, pivot="unilateral", impacts=impacts).simulate(scene.replace(output_step=1e-3)).channels
+        motion = (
+            EventBasedModel(tolerance=1e-12, pivot="unilateral", impacts=impacts)
+            .simulate(scene.replace(output_step=1e-3))
+            .channels
+        )
         hop = np.max(kinematics.pivot_height(block, motion["y"], motion["theta"]))
         assert hop == pytest.approx(float(row["max_hop_m"]), rel=0.05, abs=3e-5)
     elif row["e_w"] == "0":
@@ -110,13 +125,16 @@ def test_unilateral_row(line, row, block, run_to_end):
 
 
 def test_pivots_agree_where_nothing_leaves_the_floor(block, run_to_end):
-    """The bilateral peak of safe runs that touch no wall is the unilateral table's, where that run never hopped."""
+    """The bilateral peak of safe runs that touch no wall is the unilateral table's, where that run
+    never hopped."""
     flights = {key_of(row): row for row in UNILATERAL}
     compared = 0
     for row in BILATERAL:
         other = flights[key_of(row)]
         if row["n_wall"] != "0" or row["outcome"] != "safe" or float(other["max_hop_m"]) > 1e-9:
             continue
-        assert run_to_end(scene_of(row, block)).peak == pytest.approx(float(other["peak_theta_over_alpha"]), abs=1e-6)
+        assert run_to_end(scene_of(row, block)).peak == pytest.approx(
+            float(other["peak_theta_over_alpha"]), abs=1e-6
+        )
         compared += 1
     assert compared == 103

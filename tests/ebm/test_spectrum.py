@@ -1,4 +1,5 @@
-"""Overturning spectra: against reference runs at their nodes, refinement against the full grid, records, and bad input."""
+"""Overturning spectra: against reference runs at their nodes, refinement against the full grid,
+records, and bad input."""
 
 from __future__ import annotations
 
@@ -22,7 +23,14 @@ SIDES = {"safe": 0, "ccw": -1, "cw": 1}
 
 def scene(*walls, friction=0.3, excitation=None):
     pulse = excitation or Ricker(amplitude=1.0, period=1.0)
-    return Scene(name="spectrum", block=PAPER_BLOCK, floor=Floor(friction=friction), walls=walls, excitation=pulse, duration=1.0)
+    return Scene(
+        name="spectrum",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=friction),
+        walls=walls,
+        excitation=pulse,
+        duration=1.0,
+    )
 
 
 def reference_runs():
@@ -35,11 +43,17 @@ def reference_runs():
     return [(key, list(group)) for key, group in groupby(sorted(rows, key=setting), key=setting)]
 
 
-@pytest.mark.parametrize(("setting", "rows"), reference_runs(), ids=["-".join(filter(None, key)) for key, _ in reference_runs()])
+@pytest.mark.parametrize(
+    ("setting", "rows"),
+    reference_runs(),
+    ids=["-".join(filter(None, key)) for key, _ in reference_runs()],
+)
 def test_outcomes_agree_with_reference_runs(setting, rows):
     side, gap, e, mu = setting
     walls = [] if side == "none" else [Wall(side=side, gap=float(gap), restitution=float(e))]
-    frequencies, amplitudes = (sorted({float(row[name]) for row in rows}) for name in ("wp_over_p", "ap_ratio"))
+    frequencies, amplitudes = (
+        sorted({float(row[name]) for row in rows}) for name in ("wp_over_p", "ap_ratio")
+    )
     spectrum = overturning_spectrum(scene(*walls, friction=float(mu)), frequencies, amplitudes)
     for row in rows:
         i, j = amplitudes.index(float(row["ap_ratio"])), frequencies.index(float(row["wp_over_p"]))
@@ -69,7 +83,9 @@ def test_refinement_of_a_disc(shape):
 
     amplitudes, frequencies = np.linspace(1.0, 9.0, shape[0]), np.linspace(1.0, 9.0, shape[1])
     spectrum = overturning_spectrum(scene(), frequencies, amplitudes, refine=True, play=disc)
-    np.testing.assert_array_equal(spectrum.outcomes, np.hypot(amplitudes[:, None] - 5.0, frequencies - 5.0) < 3.0)
+    np.testing.assert_array_equal(
+        spectrum.outcomes, np.hypot(amplitudes[:, None] - 5.0, frequencies - 5.0) < 3.0
+    )
     assert spectrum.evaluations == len(played) == len(set(played))
     if shape[0] > 200:
         assert spectrum.evaluations < 0.12 * spectrum.outcomes.size
@@ -81,13 +97,17 @@ def test_refinement_follows_a_thin_tongue_to_its_tip():
 
     axis = np.linspace(1.0, 9.0, 257)
     spectrum = overturning_spectrum(scene(), axis, axis, refine=True, play=tongue)
-    np.testing.assert_array_equal(spectrum.outcomes, tongue(None, *np.broadcast_arrays(axis[:, None], axis))[0])
+    np.testing.assert_array_equal(
+        spectrum.outcomes, tongue(None, *np.broadcast_arrays(axis[:, None], axis))[0]
+    )
     assert spectrum.evaluations < 0.15 * spectrum.outcomes.size
 
 
 def test_refinement_finds_the_dots_of_a_hair():
     def hair(scene, a, f):
-        return ((a < 2.0) | ((np.abs(a - 1.5 - 0.36 * f) < 0.006) & (a < 4.0))).astype(np.int8), np.zeros(len(a), dtype=bool)
+        return ((a < 2.0) | ((np.abs(a - 1.5 - 0.36 * f) < 0.006) & (a < 4.0))).astype(
+            np.int8
+        ), np.zeros(len(a), dtype=bool)
 
     axis = np.linspace(1.0, 9.0, 257)
     spectrum = overturning_spectrum(scene(), axis, axis, refine=True, play=hair)
@@ -102,13 +122,22 @@ def test_a_node_is_what_the_model_simulates():
     a, f = np.array([1.2, 2.0, 3.0, 6.0]), np.array([0.8, 2.5, 4.0, 5.0])
     sides, failed = play_nodes(scene(wall), a, f, model=EventBasedModel())
     assert not failed.any()
-    outcomes = [EventBasedModel().simulate(node_scene(scene(wall), *node, settle=20.0)).outcome for node in zip(a, f, strict=True)]
-    assert [{"overturned left": -1, "overturned right": 1}.get(outcome, 0) for outcome in outcomes] == sides.tolist()
+    outcomes = [
+        EventBasedModel().simulate(node_scene(scene(wall), *node, settle=20.0)).outcome
+        for node in zip(a, f, strict=True)
+    ]
+    assert [
+        {"overturned left": -1, "overturned right": 1}.get(outcome, 0) for outcome in outcomes
+    ] == sides.tolist()
     assert len(set(sides.tolist())) > 1
 
 
 def test_a_run_that_fails_is_made_again_at_a_finer_tolerance(monkeypatch):
-    a, f, model = np.array([2.0, 4.0, 6.0]), np.array([1.0, 2.0, 2.0]), EventBasedModel(tolerance=1e-8)
+    a, f, model = (
+        np.array([2.0, 4.0, 6.0]),
+        np.array([1.0, 2.0, 2.0]),
+        EventBasedModel(tolerance=1e-8),
+    )
     whole, _ = play_nodes(scene(), a, f, model=model)
     run, tolerances = batch.run_batch, []
 
@@ -129,9 +158,16 @@ def test_a_run_that_fails_is_made_again_at_a_finer_tolerance(monkeypatch):
 
 @pytest.mark.parametrize("tolerance", [1e-7, 1e-8, 1e-9, 1e-11, 1e-13, 1e-15])
 def test_a_block_that_rocks_for_ever_beside_an_elastic_wall_is_safe(tolerance):
-    """It stands along the wall, loses nothing, and has so much energy that no bound calls it safe: each swing is the one before it."""
-    wall, model = Wall(side="left", gap=0.003, restitution=1.0), EventBasedModel(tolerance=tolerance)
-    a, f = np.array([1.0 + 11.0 * i / 99 for i in (6, 7, 7)]), np.array([0.5 + 7.5 * j / 99 for j in (17, 19, 20)])
+    """It stands along the wall, loses nothing, and has so much energy that no bound calls it safe:
+    each swing is the one before it."""
+    wall, model = (
+        Wall(side="left", gap=0.003, restitution=1.0),
+        EventBasedModel(tolerance=tolerance),
+    )
+    a, f = (
+        np.array([1.0 + 11.0 * i / 99 for i in (6, 7, 7)]),
+        np.array([0.5 + 7.5 * j / 99 for j in (17, 19, 20)]),
+    )
     sides, failed = play_nodes(scene(wall), a, f, model=model)
     assert not failed.any()
     assert not sides.any()
@@ -141,9 +177,13 @@ def test_a_block_that_rocks_for_ever_beside_an_elastic_wall_is_safe(tolerance):
     whole = batch.run_batch(batch.pack(nodes, fine), fine, until_decided=False)
     assert early.series.max() < 500 < whole.series.min()
     assert (whole.t_end / early.t_end).min() > 20.0
-    np.testing.assert_allclose(early.peak, whole.peak, rtol=100.0 * tolerance + 1e-9)  # errors before the wall grow
+    np.testing.assert_allclose(
+        early.peak, whole.peak, rtol=100.0 * tolerance + 1e-9
+    )  # errors before the wall grow
     energy = np.cos(PAPER_BLOCK.alpha - early.peak) - np.cos(PAPER_BLOCK.alpha)
-    assert (energy / (1.0 - np.cos(PAPER_BLOCK.alpha))).max() > 0.9  # where impacts might add what is missing
+    assert (
+        energy / (1.0 - np.cos(PAPER_BLOCK.alpha))
+    ).max() > 0.9  # where impacts might add what is missing
     mirrored, failed = play_nodes(scene(wall).mirrored(), -a, f, model=model)
     assert not failed.any()
     assert not mirrored.any()
@@ -152,20 +192,34 @@ def test_a_block_that_rocks_for_ever_beside_an_elastic_wall_is_safe(tolerance):
 @pytest.mark.parametrize("restitution", [0.9, 0.99, 1.0])
 def test_no_swing_that_loses_or_gains_is_taken_for_the_one_before(restitution):
     """Peaks decided early against those of runs that go on, beside walls that return nearly all."""
-    wall, model = Wall(side="right", gap=0.053, restitution=restitution), EventBasedModel(tolerance=1e-9)
-    a, f = (axis.ravel() for axis in np.meshgrid(np.linspace(1.0, 9.0, 9), np.linspace(0.5, 6.0, 9)))
+    wall, model = (
+        Wall(side="right", gap=0.053, restitution=restitution),
+        EventBasedModel(tolerance=1e-9),
+    )
+    a, f = (
+        axis.ravel() for axis in np.meshgrid(np.linspace(1.0, 9.0, 9), np.linspace(0.5, 6.0, 9))
+    )
     nodes = [node_scene(scene(wall), *node, settle=60.0) for node in zip(a, f, strict=True)]
-    early, whole = (batch.run_batch(batch.pack(nodes, model), model, until_decided=decided) for decided in (True, False))
+    early, whole = (
+        batch.run_batch(batch.pack(nodes, model), model, until_decided=decided)
+        for decided in (True, False)
+    )
     np.testing.assert_array_equal(early.side, whole.side)
     np.testing.assert_allclose(early.peak, whole.peak, rtol=1e-6)
 
 
 def test_beside_a_wall_a_safe_block_is_known_before_the_pulse_is_over():
-    """What is left of the pulse bounds the energy that it can still bring; peaks are those of runs that go on."""
+    """What is left of the pulse bounds the energy that it can still bring; peaks are those of runs
+    that go on."""
     wall, model = Wall(side="left", gap=0.003), EventBasedModel(tolerance=1e-9)
-    a, f = (axis.ravel() for axis in np.meshgrid(np.linspace(1.0, 5.0, 9), np.linspace(0.5, 6.0, 9)))
+    a, f = (
+        axis.ravel() for axis in np.meshgrid(np.linspace(1.0, 5.0, 9), np.linspace(0.5, 6.0, 9))
+    )
     nodes = [node_scene(scene(wall), *node, settle=60.0) for node in zip(a, f, strict=True)]
-    early, whole = (batch.run_batch(batch.pack(nodes, model), model, until_decided=decided) for decided in (True, False))
+    early, whole = (
+        batch.run_batch(batch.pack(nodes, model), model, until_decided=decided)
+        for decided in (True, False)
+    )
     np.testing.assert_array_equal(early.side, whole.side)
     np.testing.assert_allclose(early.peak, whole.peak, rtol=1e-6)
     quiet = np.array([quiet_from(*natural.grounds_of(node), model.tolerance) for node in nodes])
@@ -177,13 +231,20 @@ def test_a_record_is_scaled_and_the_block_resized():
     record = Record.from_samples(3.0 * np.sin(2.0 * np.pi * np.arange(0.0, 2.0, 0.02)), 0.02)
     start = scene(excitation=record)
     node = node_scene(start, 2.0, 0.5)
-    assert (node.block.half_width, node.block.half_height) == (0.5 * PAPER_BLOCK.half_width, 0.5 * PAPER_BLOCK.half_height)
+    assert (node.block.half_width, node.block.half_height) == (
+        0.5 * PAPER_BLOCK.half_width,
+        0.5 * PAPER_BLOCK.half_height,
+    )
     np.testing.assert_allclose(node.excitation.samples, 2.0 * record.samples)
     sizes, scales = np.array([0.3, 0.6, 1.2]), np.array([0.5, 1.0, 2.0, 4.0])
     spectrum = overturning_spectrum(start, sizes, scales)
     for i, scale in enumerate(scales):
         for j, size in enumerate(sizes):
-            outcome = EventBasedModel(tolerance=1e-9).simulate(node_scene(start, scale, size, settle=20.0)).outcome
+            outcome = (
+                EventBasedModel(tolerance=1e-9)
+                .simulate(node_scene(start, scale, size, settle=20.0))
+                .outcome
+            )
             assert outcome.startswith("overturned") == bool(spectrum.outcomes[i, j])
     assert 0 < np.count_nonzero(spectrum.outcomes) < spectrum.outcomes.size
 
@@ -193,10 +254,14 @@ def test_motions_at_nodes_are_those_that_the_model_simulates():
     model, seen = EventBasedModel(tolerance=1e-10), set()
     a, f = np.array([1.2, 2.0, 4.0, 9.0]), np.array([0.8, 0.5, 1.0, 2.5])
     for start in (scene(Wall(side="left", gap=0.053, restitution=0.5)), scene(excitation=record)):
-        for motion, *node in zip(play_motions(start, a, f, model=model, parts=50), a, f, strict=True):
+        for motion, *node in zip(
+            play_motions(start, a, f, model=model, parts=50), a, f, strict=True
+        ):
             one = node_scene(start, *node)
             history = model.simulate(one.replace(output_step=one.duration / 50))
-            expected = np.column_stack([history.channels[name] for name in ("t", "theta", "x", "y")])
+            expected = np.column_stack(
+                [history.channels[name] for name in ("t", "theta", "x", "y")]
+            )
             assert motion.rows.shape == expected.shape
             np.testing.assert_allclose(motion.rows, expected, atol=1e-8)
             assert (motion.outcome, motion.block) == (history.outcome, one.block)
@@ -211,7 +276,9 @@ def test_a_motion_that_fails_is_none():
 
 def test_the_mirror_image_and_the_number_of_threads():
     wall = Wall(side="left", gap=0.053, restitution=1.0)
-    a, f = (axis.ravel() for axis in np.meshgrid(np.linspace(1.0, 12.0, 12), np.linspace(0.5, 8.0, 12)))
+    a, f = (
+        axis.ravel() for axis in np.meshgrid(np.linspace(1.0, 12.0, 12), np.linspace(0.5, 8.0, 12))
+    )
     model = EventBasedModel(tolerance=1e-8)
     sides, _ = play_nodes(scene(wall), a, f, model=model, jobs=1)
     again, _ = play_nodes(scene(wall), a, f, model=model, jobs=3)

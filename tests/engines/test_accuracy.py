@@ -14,15 +14,26 @@ from rockcheck.scenes import Floor, Ricker, Scene, Wall
 
 CASES = Path(__file__).parents[1] / "data" / "unilateral_ricker_cases.csv"
 TILTS = (0.3, -0.4, 0.5, 0.6, 0.7, -0.8, 0.9)
-PULSES = ((1.5, 3.0), (3.0, 5.0), (4.0, 6.0), (-2.5, 4.5), (2.2, 3.8))  # amplitude in g tan(alpha), frequency in p
+PULSES = (
+    (1.5, 3.0),
+    (3.0, 5.0),
+    (4.0, 6.0),
+    (-2.5, 4.5),
+    (2.2, 3.8),
+)  # amplitude in g tan(alpha), frequency in p
 
 
 def test_fixed_steps_are_of_first_order(engine, free_rocking, rotation_error):
-    """One run may be lucky by a factor of five: it is the median of several starts that falls with the step."""
+    """One run may be lucky by a factor of five: it is the median of several starts that falls with
+    the step."""
     errors = {}
     for step in (2e-3, 2e-4):
-        histories = [(engine(time_step=step).simulate(scene), scene) for scene in map(free_rocking, TILTS)]
-        errors[step] = np.median([rotation_error(history.channels["theta"], scene) for history, scene in histories])
+        histories = [
+            (engine(time_step=step).simulate(scene), scene) for scene in map(free_rocking, TILTS)
+        ]
+        errors[step] = np.median(
+            [rotation_error(history.channels["theta"], scene) for history, scene in histories]
+        )
     assert errors[2e-4] < 2e-3
     assert 5.0 < errors[2e-3] / errors[2e-4] < 30.0
 
@@ -31,7 +42,12 @@ def test_adaptive_steps_are_of_third_order(varying_engine, pulse, rotation_error
     errors = {}
     for step in (1.6e-2, 8e-3, 4e-3, 1e-3):
         model = varying_engine(time_step="adaptive", largest_step=step)
-        errors[step] = np.median([rotation_error(model.simulate(scene).channels["theta"], scene) for scene in (pulse(*p) for p in PULSES)])
+        errors[step] = np.median(
+            [
+                rotation_error(model.simulate(scene).channels["theta"], scene)
+                for scene in (pulse(*p) for p in PULSES)
+            ]
+        )
     assert errors[1.6e-2] / errors[8e-3] > 5.0
     assert errors[8e-3] < 1e-5
     assert errors[4e-3] < 3e-6
@@ -39,10 +55,15 @@ def test_adaptive_steps_are_of_third_order(varying_engine, pulse, rotation_error
 
 
 def test_no_error_is_left_that_no_step_changes(varying_engine, pulse, rotation_error):
-    """With impacts a hundred times as long, the error grows: neither the corners' size nor the table of the base motion shows."""
+    """With impacts a hundred times as long, the error grows: neither the corners' size nor the
+    table of the base motion shows."""
     scene = pulse(1.6, 1.96, duration=4.5)
     usual, long = (
-        rotation_error(varying_engine(time_step="adaptive", short_steps=k).simulate(scene).channels["theta"], scene) for k in (1, 100)
+        rotation_error(
+            varying_engine(time_step="adaptive", short_steps=k).simulate(scene).channels["theta"],
+            scene,
+        )
+        for k in (1, 100)
     )
     print(usual, long)
     assert usual < 5e-8
@@ -67,12 +88,18 @@ def test_a_stock_engine_is_far_off(stock, free_rocking, rotation_error):
     """What "default" is there to show: contacts as they come do not get better with the step."""
     scene = free_rocking(0.7)
     for step in (1e-3, 2e-4):
-        assert rotation_error(stock(time_step=step, settings="default").simulate(scene).channels["theta"], scene) > 2e-3
+        assert (
+            rotation_error(
+                stock(time_step=step, settings="default").simulate(scene).channels["theta"], scene
+            )
+            > 2e-3
+        )
     assert rotation_error(stock(time_step=2e-4).simulate(scene).channels["theta"], scene) < 1e-3
 
 
 def cases(every: int) -> list[dict[str, str]]:
-    """Rows of the table of an independent event-driven implementation, those left out where rigid bodies have no answer."""
+    """Rows of the table of an independent event-driven implementation, those left out where rigid
+    bodies have no answer."""
     with CASES.open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["depends_on_rule"] == "0"]
     return rows[::every]
@@ -83,13 +110,19 @@ def peak_errors(engine, block, rows) -> list[float]:
     errors = []
     for row in rows:
         period = 2 * math.pi / (float(row["wp_over_p"]) * block.frequency_parameter)
-        walls = [] if row["side"] == "none" else [Wall(side=row["side"], gap=float(row["gap"]), restitution=float(row["e_w"]))]
+        walls = (
+            []
+            if row["side"] == "none"
+            else [Wall(side=row["side"], gap=float(row["gap"]), restitution=float(row["e_w"]))]
+        )
         scene = Scene(
             name="case",
             block=block,
             floor=Floor(friction=float(row["mu"])),
             walls=walls,
-            excitation=Ricker(amplitude=float(row["ap_ratio"]) * 9.81 * math.tan(block.alpha), period=period),
+            excitation=Ricker(
+                amplitude=float(row["ap_ratio"]) * 9.81 * math.tan(block.alpha), period=period
+            ),
             duration=4 * period + 20.0,
             output_step=1e-3,  # peaks at a wall are sharp
         )
@@ -97,13 +130,17 @@ def peak_errors(engine, block, rows) -> list[float]:
         outcome = {"overturned left": "ccw", "overturned right": "cw"}.get(history.outcome, "safe")
         assert outcome == row["outcome"], row
         if outcome == "safe":
-            errors.append(abs(history.peak_rotation / block.alpha - float(row["peak_theta_over_alpha"])))
+            errors.append(
+                abs(history.peak_rotation / block.alpha - float(row["peak_theta_over_alpha"]))
+            )
     return errors
 
 
 def test_walls_and_slip(varying_engine, block):
     """Outcomes and peaks beside walls with e = 0, 0.5 and 1, with and without slip."""
-    errors = peak_errors(varying_engine(time_step="adaptive", largest_step=2e-3), block, cases(every=41))
+    errors = peak_errors(
+        varying_engine(time_step="adaptive", largest_step=2e-3), block, cases(every=41)
+    )
     assert len(errors) >= 7
     assert np.median(errors) < 2e-5
     assert np.max(errors) < 5e-4
@@ -111,7 +148,9 @@ def test_walls_and_slip(varying_engine, block):
 
 @pytest.mark.slow
 def test_walls_and_slip_throughout(varying_engine, block):
-    errors = peak_errors(varying_engine(time_step="adaptive", largest_step=2e-3), block, cases(every=5))
+    errors = peak_errors(
+        varying_engine(time_step="adaptive", largest_step=2e-3), block, cases(every=5)
+    )
     assert np.median(errors) < 1e-5
     assert np.quantile(errors, 0.95) < 1.5e-4
     assert np.max(errors) < 1e-3
@@ -126,14 +165,22 @@ def test_the_engines_agree(pulse):
     ]
     for scene in scenes:
         one, other = (engine(time_step="adaptive").simulate(scene) for engine in (MuJoCo, PyBullet))
-        assert np.max(np.abs(one.channels["theta"] - other.channels["theta"])) < 1e-4 * scene.block.alpha
-        assert [event.kind for event in one.event_list][:12] == [event.kind for event in other.event_list][:12]
+        assert (
+            np.max(np.abs(one.channels["theta"] - other.channels["theta"]))
+            < 1e-4 * scene.block.alpha
+        )
+        assert [event.kind for event in one.event_list][:12] == [
+            event.kind for event in other.event_list
+        ][:12]
 
 
 @pytest.mark.parametrize("step", [1e-4, "adaptive"])
 def test_cone_correction(pulse, step):
-    """MuJoCo's own cone lifts a slipping pivot at mu times its slip rate, whatever the step; 0.3162 is exact here."""
-    scene = pulse(3.0, 6.0, friction=0.6, walls=[Wall(side="left", gap=0.053, restitution=1.0)], duration=2.0)
+    """MuJoCo's own cone lifts a slipping pivot at mu times its slip rate, whatever the step; 0.3162
+    is exact here."""
+    scene = pulse(
+        3.0, 6.0, friction=0.6, walls=[Wall(side="left", gap=0.053, restitution=1.0)], duration=2.0
+    )
     mended = MuJoCo(time_step=step).simulate(scene)
     plain = MuJoCo(time_step=step, cone_correction=False).simulate(scene)
     assert mended.peak_rotation / scene.block.alpha == pytest.approx(0.3162, abs=3e-4)
@@ -141,7 +188,9 @@ def test_cone_correction(pulse, step):
 
 
 def test_a_corrected_block_slides_without_lifting(block):
-    scene = Scene(name="slide", block=block, floor=Floor(friction=0.2), initial_velocity=1.0, duration=0.3)
+    scene = Scene(
+        name="slide", block=block, floor=Floor(friction=0.2), initial_velocity=1.0, duration=0.3
+    )
     for cone_correction, lifted in ((True, False), (False, True)):
         history = MuJoCo(time_step=1e-3, cone_correction=cone_correction).simulate(scene)
         assert (np.max(history.channels["y"]) - block.half_height > 1e-5) == lifted

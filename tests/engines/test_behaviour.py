@@ -13,13 +13,26 @@ import pytest
 from rockcheck.ebm import EventBasedModel
 from rockcheck.engines import Drake, MuJoCo, PyBullet
 from rockcheck.engines.engine import Engine
-from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Ricker, Scene, Sine, Wall, load_scene
+from rockcheck.scenes import (
+    Block,
+    Floor,
+    InputError,
+    ModelFailure,
+    Record,
+    Ricker,
+    Scene,
+    Sine,
+    Wall,
+    load_scene,
+)
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
 
 
 def run(code: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True)
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True
+    )
 
 
 def test_import_loads_no_engine():
@@ -34,7 +47,9 @@ def test_a_missing_package_is_named(varying_engine, monkeypatch):
     monkeypatch.setitem(sys.modules, varying_engine.module, None)
     monkeypatch.setattr("rockcheck.engines.engine.find_spec", lambda name: None)
     with pytest.raises(InputError, match=f"not installed: pip install {varying_engine.package}$"):
-        varying_engine().simulate(Scene(name="a", block=PAPER_BLOCK, floor=Floor(friction=0.3), duration=0.1))
+        varying_engine().simulate(
+            Scene(name="a", block=PAPER_BLOCK, floor=Floor(friction=0.3), duration=0.1)
+        )
 
 
 def test_steps_that_cannot_vary_are_refused_with_the_reason(engine):
@@ -91,23 +106,34 @@ def test_steps_are_adaptive_unless_something_else_is_asked_for(varying_engine):
 @pytest.mark.slow
 @pytest.mark.skipif(not Drake.installed(), reason="Drake is not installed")
 def test_drake_goes_on_where_its_solver_stumbles(monkeypatch):
-    """Two steps of this record are not solved as they stand: the run ends all the same, and does so again."""
+    """Two steps of this record are not solved as they stand: the run ends all the same, and does so
+    again."""
     scene = load_scene("fig4a").replace(duration=8.0)
     history = Drake(time_step=1e-3).simulate(scene)
     reference = EventBasedModel(pivot="unilateral").simulate(scene)
-    assert np.sqrt(np.mean((history.channels["theta"] - reference.channels["theta"]) ** 2)) < 0.02 * scene.block.alpha
-    np.testing.assert_array_equal(Drake(time_step=1e-3).simulate(scene).channels["theta"], history.channels["theta"])
+    assert (
+        np.sqrt(np.mean((history.channels["theta"] - reference.channels["theta"]) ** 2))
+        < 0.02 * scene.block.alpha
+    )
+    np.testing.assert_array_equal(
+        Drake(time_step=1e-3).simulate(scene).channels["theta"], history.channels["theta"]
+    )
     monkeypatch.setattr("rockcheck.engines.drake_engine.COARSEST_STICTION", 0.0)
     with pytest.raises(ModelFailure, match="failed to converge"):
         Drake(time_step=1e-3).simulate(scene)
 
 
 def test_an_engine_whose_steps_cannot_vary_has_a_fixed_one():
-    assert (Drake().time_step, Drake(settings="default").time_step, Drake(time_step=1e-3).time_step) == (1e-4, 1e-4, 1e-3)
+    assert (
+        Drake().time_step,
+        Drake(settings="default").time_step,
+        Drake(time_step=1e-3).time_step,
+    ) == (1e-4, 1e-4, 1e-3)
 
 
 def test_a_default_run_of_the_readmes_scene_is_converged(varying_engine):
-    """A wall that the block strikes at 5.95 alpha and comes back from: at fixed steps of 1e-4 s it is not."""
+    """A wall that the block strikes at 5.95 alpha and comes back from: at fixed steps of 1e-4 s it
+    is not."""
     scene = Scene(
         name="bookcase",
         block=PAPER_BLOCK,
@@ -119,14 +145,19 @@ def test_a_default_run_of_the_readmes_scene_is_converged(varying_engine):
     model = varying_engine()
     history = model.simulate(scene)
     reference = EventBasedModel(pivot="unilateral").simulate(scene)
-    error = np.sqrt(np.mean((history.channels["theta"] - reference.channels["theta"]) ** 2)) / scene.block.alpha
+    error = (
+        np.sqrt(np.mean((history.channels["theta"] - reference.channels["theta"]) ** 2))
+        / scene.block.alpha
+    )
     found = numerical_uncertainty(model, scene, history)
     assert found is not None
     assert found.converged
     assert error < found.u_num("theta_rms") < 1e-3
 
 
-@pytest.mark.parametrize("settings", [{"time_step": 1e-9}, {"time_step": "adaptive", "largest_step": 1e-9}])
+@pytest.mark.parametrize(
+    "settings", [{"time_step": 1e-9}, {"time_step": "adaptive", "largest_step": 1e-9}]
+)
 def test_too_many_steps_are_refused_at_once(varying_engine, settings, free_rocking):
     with pytest.raises(InputError, match="5000000 steps"):
         varying_engine(**settings).simulate(free_rocking(0.5))
@@ -146,33 +177,46 @@ def test_history_says_how_it_came_about(engine, free_rocking):
 
 def test_what_an_engine_cannot_do_is_noted(engine, free_rocking):
     scene = free_rocking(0.5).replace(duration=0.1, floor=Floor(friction=0.5, static_friction=0.7))
-    assert any("kinetic 0.5 is used for static 0.7" in note for note in engine(time_step=1e-3).simulate(scene).notes)
+    assert any(
+        "kinetic 0.5 is used for static 0.7" in note
+        for note in engine(time_step=1e-3).simulate(scene).notes
+    )
 
 
 @pytest.mark.parametrize("settings", ["best", "default"])
 def test_an_engine_says_that_it_has_no_restitution(engine, settings, free_rocking):
     scene = free_rocking(0.5).replace(duration=0.1, floor=Floor(friction=0.5, restitution=0.5))
     notes = engine(time_step=1e-3, settings=settings).simulate(scene).notes
-    assert any("no coefficient of restitution" in note for note in notes) == (settings not in engine.bounces_with)
+    assert any("no coefficient of restitution" in note for note in notes) == (
+        settings not in engine.bounces_with
+    )
 
 
 @pytest.mark.parametrize("step", [1e-3, "adaptive"])
 def test_scene_shorter_than_its_output_step(varying_engine, step, free_rocking):
-    history = varying_engine(time_step=step).simulate(free_rocking(0.5).replace(duration=1e-3, output_step=5e-3))
+    history = varying_engine(time_step=step).simulate(
+        free_rocking(0.5).replace(duration=1e-3, output_step=5e-3)
+    )
     assert history.channels["t"].tolist() == [0.0]
 
 
 @pytest.mark.parametrize("step", [7e-4, "adaptive"])
 def test_output_grid_need_not_fit_the_steps(varying_engine, step, free_rocking):
-    coarse = varying_engine(time_step=step).simulate(free_rocking(0.5).replace(duration=2.0, output_step=3.1e-3))
-    fine = varying_engine(time_step=step).simulate(free_rocking(0.5).replace(duration=2.0, output_step=1e-4))
+    coarse = varying_engine(time_step=step).simulate(
+        free_rocking(0.5).replace(duration=2.0, output_step=3.1e-3)
+    )
+    fine = varying_engine(time_step=step).simulate(
+        free_rocking(0.5).replace(duration=2.0, output_step=1e-4)
+    )
     again = np.interp(coarse.channels["t"], fine.channels["t"], fine.channels["theta"])
     assert np.max(np.abs(coarse.channels["theta"] - again)) < (1e-7 if step == 7e-4 else 1e-5)
 
 
 def test_events_of_a_pulse_beside_a_wall(varying_engine, pulse):
     """Times from an event-driven implementation of the unilateral model."""
-    scene = pulse(3.0, 6.0, friction=0.6, walls=[Wall(side="left", gap=0.053, restitution=1.0)], duration=1.9)
+    scene = pulse(
+        3.0, 6.0, friction=0.6, walls=[Wall(side="left", gap=0.053, restitution=1.0)], duration=1.9
+    )
     history = varying_engine(time_step="adaptive").simulate(scene)
     expected = [
         ("uplift", 0.783060),
@@ -192,14 +236,24 @@ def test_events_of_a_pulse_beside_a_wall(varying_engine, pulse):
 
 
 def test_slip_and_stick_events(varying_engine, pulse):
-    history = varying_engine(time_step="adaptive").simulate(pulse(4.0, 4.5, friction=0.3, duration=1.6))
+    history = varying_engine(time_step="adaptive").simulate(
+        pulse(4.0, 4.5, friction=0.3, duration=1.6)
+    )
     found = {event.kind: event.t for event in history.event_list if event.kind in ("slip", "stick")}
-    assert found["slip"] == pytest.approx(1.057406, abs=1.1e-3)  # of the unilateral model; known to one step
+    assert found["slip"] == pytest.approx(
+        1.057406, abs=1.1e-3
+    )  # of the unilateral model; known to one step
     assert found["stick"] == pytest.approx(1.366917, abs=1e-4)
 
 
 def test_a_rocking_block_comes_to_rest_once(varying_engine, block):
-    scene = Scene(name="decay", block=block, floor=Floor(friction=1.0), initial_rotation=0.1 * block.alpha, duration=8.0)
+    scene = Scene(
+        name="decay",
+        block=block,
+        floor=Floor(friction=1.0),
+        initial_rotation=0.1 * block.alpha,
+        duration=8.0,
+    )
     history = varying_engine(time_step="adaptive").simulate(scene)
     kinds = [event.kind for event in history.event_list]
     assert kinds.count("settled") == 1
@@ -214,7 +268,9 @@ def test_small_and_large_blocks_move_alike(pulse):
     large = pulse(2.0, 4.0, friction=0.3, walls=walls, duration=4.0)
     excitation = Ricker(amplitude=large.excitation.amplitude, period=0.1 * large.excitation.period)
     small = large.replace(
-        block=Block(half_width=0.01 * large.block.half_width, half_height=0.01 * large.block.half_height),
+        block=Block(
+            half_width=0.01 * large.block.half_width, half_height=0.01 * large.block.half_height
+        ),
         walls=[Wall(side="left", gap=0.00053, restitution=0.5)],
         excitation=excitation,
         duration=0.1 * large.duration,
@@ -225,11 +281,15 @@ def test_small_and_large_blocks_move_alike(pulse):
         other = engine(time_step="adaptive", largest_step=2e-4).simulate(small)
         assert np.max(np.abs(one.channels["theta"] - other.channels["theta"])) < 1e-6
         assert np.max(np.abs(one.channels["x"] - 100 * other.channels["x"])) < 1e-5
-        assert [e.kind for e in one.event_list if "impact" in e.kind][:6] == [e.kind for e in other.event_list if "impact" in e.kind][:6]
+        assert [e.kind for e in one.event_list if "impact" in e.kind][:6] == [
+            e.kind for e in other.event_list if "impact" in e.kind
+        ][:6]
 
 
 def test_mirrored_adaptive_run(pulse):
-    scene = pulse(2.0, 4.0, friction=0.3, walls=[Wall(side="left", gap=0.053, restitution=0.5)], duration=3.0)
+    scene = pulse(
+        2.0, 4.0, friction=0.3, walls=[Wall(side="left", gap=0.053, restitution=0.5)], duration=3.0
+    )
     one, other = (MuJoCo(time_step="adaptive").simulate(s) for s in (scene, scene.mirrored()))
     assert np.max(np.abs(one.channels["theta"] + other.channels["theta"])) < 1e-6
 
@@ -256,7 +316,10 @@ HARD = [
         name="rattle between walls",
         block=PAPER_BLOCK,
         floor=Floor(friction=0.3),
-        walls=[Wall(side="left", gap=0.0, restitution=0.9), Wall(side="right", gap=0.001, restitution=1.0)],
+        walls=[
+            Wall(side="left", gap=0.0, restitution=0.9),
+            Wall(side="right", gap=0.001, restitution=1.0),
+        ],
         excitation=Sine(amplitude=8.0, period=0.7, cycles=2),
         duration=2.0,
     ),
@@ -293,7 +356,8 @@ HARD = [
 @pytest.mark.parametrize("scene", HARD, ids=lambda scene: scene.name)
 @pytest.mark.parametrize("step", [1e-3, 1e-2, "adaptive"])
 def test_hard_scenes_end(varying_engine, scene, step):
-    """Rattling, bouncing and flush contacts: bounded work, finite states, nothing through a wall."""
+    """Rattling, bouncing and flush contacts: bounded work, finite states, nothing through a
+    wall."""
     history = varying_engine(time_step=step).simulate(scene)
     assert history.cost.steps < 40_000
     for channel in ("x", "y", "theta", "x_dot", "y_dot", "theta_dot"):
@@ -301,10 +365,15 @@ def test_hard_scenes_end(varying_engine, scene, step):
     if step == "adaptive":
         block, theta = scene.block, history.channels["theta"]
         reach = block.radius * np.sin(block.alpha + np.abs(theta))
-        assert np.min(history.channels["y"] - block.radius * np.cos(block.alpha - np.abs(theta))) > -1e-5
+        assert (
+            np.min(history.channels["y"] - block.radius * np.cos(block.alpha - np.abs(theta)))
+            > -1e-5
+        )
         for wall in scene.walls:
             outward = -1.0 if wall.side == "left" else 1.0
-            assert np.max(outward * history.channels["x"] + reach) < block.half_width + wall.gap + 1e-5
+            assert (
+                np.max(outward * history.channels["x"] + reach) < block.half_width + wall.gap + 1e-5
+            )
 
 
 @pytest.mark.parametrize("step", [1e-3, "adaptive"])
@@ -312,7 +381,11 @@ def test_blow_up_is_a_failure(varying_engine, step, block, tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     blast = Record.from_samples([1e30] * 50, time_step=0.01)
     with pytest.raises(ModelFailure):
-        varying_engine(time_step=step).simulate(Scene(name="blast", block=block, floor=Floor(friction=0.3), vertical=blast, duration=0.4))
+        varying_engine(time_step=step).simulate(
+            Scene(
+                name="blast", block=block, floor=Floor(friction=0.3), vertical=blast, duration=0.4
+            )
+        )
     assert list(tmp_path.iterdir()) == []  # no log of the engine's own
 
 
@@ -329,24 +402,34 @@ class Scripted(Engine):
 
 
 def test_states_that_are_not_finite_are_a_failure(free_rocking):
-    engine = Scripted(time_step=1e-3, answers={"march": lambda felt, dt: np.full((len(felt), 6), np.nan)})
+    engine = Scripted(
+        time_step=1e-3, answers={"march": lambda felt, dt: np.full((len(felt), 6), np.nan)}
+    )
     with pytest.raises(ModelFailure, match="blew up"):
         engine.simulate(free_rocking(0.5))
-    engine = Scripted(time_step="adaptive", answers={"push": lambda pose, velocity, dt, felt, bouncing: (math.nan,) * 3})
+    engine = Scripted(
+        time_step="adaptive",
+        answers={"push": lambda pose, velocity, dt, felt, bouncing: (math.nan,) * 3},
+    )
     with pytest.raises(ModelFailure, match="blew up"):
         engine.simulate(free_rocking(0.5))
 
 
 def test_a_fall_through_the_floor_is_a_failure(free_rocking):
     fallen = np.array([0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
-    engine = Scripted(time_step=1e-3, answers={"march": lambda felt, dt: np.tile(fallen, (len(felt), 1))})
+    engine = Scripted(
+        time_step=1e-3, answers={"march": lambda felt, dt: np.tile(fallen, (len(felt), 1))}
+    )
     with pytest.raises(ModelFailure, match="fell through the floor"):
         engine.simulate(free_rocking(0.5))
 
 
 def test_endless_events_are_a_failure(block):
     """A contact that never stops what approaches: one impact step after the other."""
-    engine = Scripted(time_step="adaptive", answers={"push": lambda pose, velocity, dt, felt, bouncing: (0.0, -1.0, 0.0)})
+    engine = Scripted(
+        time_step="adaptive",
+        answers={"push": lambda pose, velocity, dt, felt, bouncing: (0.0, -1.0, 0.0)},
+    )
     with pytest.raises(ModelFailure, match="no end to the events"):
         engine.simulate(Scene(name="falling", block=block, floor=Floor(friction=0.3), duration=1.0))
 
@@ -357,6 +440,8 @@ def test_mujocos_floor_is_where_it_is_said_to_be(friction, above):
     block = Block(half_width=0.3, half_height=math.sqrt(1.0 - 0.09))  # R = 1 m
     scene = Scene(name="a", block=block, floor=Floor(friction=friction), duration=0.1)
     world = MuJoCo().rigid_world(scene)
-    _, falls, _ = world.push((0.0, block.half_height + above, 0.0), (0.0, 0.0, 0.0), 2e-5, (0.0, -9.81), False)
+    _, falls, _ = world.push(
+        (0.0, block.half_height + above, 0.0), (0.0, 0.0, 0.0), 2e-5, (0.0, -9.81), False
+    )
     world.close()
     assert falls == pytest.approx(-9.81 * 2e-5 if above > 0.0 else 0.0, abs=1e-9)

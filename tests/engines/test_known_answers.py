@@ -15,7 +15,9 @@ SQUAT = Block(half_width=1.0, half_height=0.5)
 
 
 def test_rest_stays_at_rest(model, block):
-    history = model.simulate(Scene(name="rest", block=block, floor=Floor(friction=0.3), duration=1.0))
+    history = model.simulate(
+        Scene(name="rest", block=block, floor=Floor(friction=0.3), duration=1.0)
+    )
     assert history.outcome == "at rest"
     assert history.peak_rotation < 2e-8
     assert np.max(np.abs(history.channels["x"])) < 1e-7
@@ -28,12 +30,15 @@ def test_impact_obeys_housner(model, free_rocking):
     history = model.simulate(scene)
     impact = next(event for event in history.event_list if event.kind == "floor impact")
     t, w = history.channels["t"], history.channels["theta_dot"]
-    acceleration = 0.75 * 9.81 / scene.block.radius * math.sin(scene.block.alpha)  # of theta, near zero, either side
+    acceleration = (
+        0.75 * 9.81 / scene.block.radius * math.sin(scene.block.alpha)
+    )  # of theta, near zero, either side
     before = np.interp(impact.t - 0.005, t, w) - acceleration * 0.005
     after = np.interp(impact.t + 0.005, t, w) - acceleration * 0.005
     alpha, speed = scene.block.alpha, abs(before)
     assert after / before == pytest.approx(1.0 - 1.5 * math.sin(alpha) ** 2, abs=4e-4)
-    # The new pivot takes up all of the vertical momentum, and carries the block for the 2 ms that are counted.
+    # The new pivot takes up all of the vertical momentum, and carries the block for the 2 ms that
+    # are counted.
     upward = scene.block.radius * math.sin(alpha) * (1.0 + after / before) * speed
     assert impact.impulse == pytest.approx(upward + 9.81 * 2e-3, rel=0.02)
 
@@ -43,44 +48,68 @@ def test_quarter_period(model, free_rocking):
     history = model.simulate(scene)
     impact = next(event for event in history.event_list if event.kind == "floor impact")
     alpha, tilt = scene.block.alpha, scene.initial_rotation
-    # Energy integral of theta'' = -p^2 sin(alpha - theta), with theta = tilt - v^2 to take out the end's singularity.
+    # Energy integral of theta'' = -p^2 sin(alpha - theta), with theta = tilt - v^2 to take out the
+    # end's singularity.
     nodes, weights = np.polynomial.legendre.leggauss(60)
     v = 0.5 * math.sqrt(tilt) * (nodes + 1.0)
-    speed = np.sqrt(2.0 * (np.cos(alpha - tilt) - np.cos(alpha - tilt + v**2))) * scene.frequency_parameter
+    speed = (
+        np.sqrt(2.0 * (np.cos(alpha - tilt) - np.cos(alpha - tilt + v**2)))
+        * scene.frequency_parameter
+    )
     quarter = 0.5 * math.sqrt(tilt) * float(np.sum(weights * 2.0 * v / speed))
     assert impact.t == pytest.approx(quarter, abs=2e-4)
 
 
 @pytest.mark.parametrize(("speed", "friction"), [(1.0, 0.2), (-1.5, 0.5)])
 def test_sliding_distance(model, speed, friction):
-    scene = Scene(name="slide", block=SQUAT, floor=Floor(friction=friction), initial_velocity=speed, duration=1.0)
+    scene = Scene(
+        name="slide",
+        block=SQUAT,
+        floor=Floor(friction=friction),
+        initial_velocity=speed,
+        duration=1.0,
+    )
     history = model.simulate(scene)
-    assert history.channels["x"][-1] == pytest.approx(math.copysign(speed**2 / (2 * friction * 9.81), speed), rel=5e-4)
+    assert history.channels["x"][-1] == pytest.approx(
+        math.copysign(speed**2 / (2 * friction * 9.81), speed), rel=5e-4
+    )
     assert history.peak_rotation < 1e-5
     stick = next(event for event in history.event_list if event.kind == "stick")
-    assert stick.t == pytest.approx(abs(speed) / (friction * 9.81), abs=0.003)  # the event is told at 1 mm/s
+    assert stick.t == pytest.approx(
+        abs(speed) / (friction * 9.81), abs=0.003
+    )  # the event is told at 1 mm/s
     assert history.outcome == "at rest"
     assert [event.kind for event in history.event_list] == ["stick", "settled"]
 
 
 def test_sliding_without_friction(model):
-    history = model.simulate(Scene(name="ice", block=SQUAT, floor=Floor(friction=0.0), initial_velocity=0.5, duration=1.0))
+    history = model.simulate(
+        Scene(
+            name="ice", block=SQUAT, floor=Floor(friction=0.0), initial_velocity=0.5, duration=1.0
+        )
+    )
     assert history.channels["x"][-1] == pytest.approx(0.5, abs=1e-5)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 0.8])
 def test_bounce_height(bouncing_model, restitution):
     floor = Floor(friction=0.3, restitution=restitution)
-    scene = Scene(name="drop", block=SQUAT, floor=floor, initial_height=0.2, duration=0.6, output_step=1e-3)
+    scene = Scene(
+        name="drop", block=SQUAT, floor=floor, initial_height=0.2, duration=0.6, output_step=1e-3
+    )
     history = bouncing_model.simulate(scene)
     fall = math.sqrt(2 * 0.2 / 9.81)
-    later = (history.channels["t"] > fall + 1e-3) & (history.channels["t"] < fall * (1 + 2 * restitution) + 0.02)
+    later = (history.channels["t"] > fall + 1e-3) & (
+        history.channels["t"] < fall * (1 + 2 * restitution) + 0.02
+    )
     bounce = np.max(history.channels["y"][later]) - SQUAT.half_height
     assert bounce == pytest.approx(0.2 * restitution**2, abs=3e-4)
     impacts = [event for event in history.event_list if event.kind == "floor impact"][:2]
     assert impacts[0].t == pytest.approx(fall, abs=2e-4)
     carried = 9.81 * 2e-3 if restitution == 0.0 else 0.0
-    assert sum(event.impulse for event in impacts) == pytest.approx((1 + restitution) * math.sqrt(2 * 9.81 * 0.2) + carried, rel=4e-3)
+    assert sum(event.impulse for event in impacts) == pytest.approx(
+        (1 + restitution) * math.sqrt(2 * 9.81 * 0.2) + carried, rel=4e-3
+    )
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
@@ -88,7 +117,14 @@ def test_bounce_height(bouncing_model, restitution):
 def test_flush_impact_on_a_wall(bouncing_model, side, restitution):
     outward = -1.0 if side == "left" else 1.0
     wall = Wall(side=side, gap=0.050737, restitution=restitution)
-    scene = Scene(name="flush", block=SQUAT, floor=Floor(friction=0.0), walls=[wall], initial_velocity=outward, duration=0.1)
+    scene = Scene(
+        name="flush",
+        block=SQUAT,
+        floor=Floor(friction=0.0),
+        walls=[wall],
+        initial_velocity=outward,
+        duration=0.1,
+    )
     history = bouncing_model.simulate(scene)
     assert history.channels["x_dot"][-1] == pytest.approx(-restitution * outward, abs=1e-3)
     assert history.peak_rotation < 1e-6
@@ -99,8 +135,18 @@ def test_flush_impact_on_a_wall(bouncing_model, side, restitution):
 
 
 def test_both_walls(bouncing_model):
-    walls = [Wall(side="left", gap=0.030037, restitution=1.0), Wall(side="right", gap=0.050537, restitution=1.0)]
-    scene = Scene(name="between", block=SQUAT, floor=Floor(friction=0.0), walls=walls, initial_velocity=-1.0, duration=0.4)
+    walls = [
+        Wall(side="left", gap=0.030037, restitution=1.0),
+        Wall(side="right", gap=0.050537, restitution=1.0),
+    ]
+    scene = Scene(
+        name="between",
+        block=SQUAT,
+        floor=Floor(friction=0.0),
+        walls=walls,
+        initial_velocity=-1.0,
+        duration=0.4,
+    )
     history = bouncing_model.simulate(scene)
     assert np.min(history.channels["x"]) == pytest.approx(-0.030037, abs=1e-3)
     assert np.max(history.channels["x"]) == pytest.approx(0.050537, abs=1e-3)
@@ -118,29 +164,43 @@ def test_both_walls(bouncing_model):
     ids=lambda excitation: excitation.kind,
 )
 def test_the_base_gains_what_its_acceleration_gives(excitation):
-    """The velocity of the base against an integral of its own, to rounding; it stays when the shaking has ended."""
+    """The velocity of the base against an integral of its own, to rounding; it stays when the
+    shaking has ended."""
     velocity = BaseVelocity(excitation)
     for share in (0.1, 0.37, 0.5, 0.81, 1.0, 1.3):
         t = share * excitation.quiet_after
         kinks = 0.2 * np.arange(1, 5) if excitation.kind == "record" else None
-        gained = quad(lambda s: float(excitation.acceleration(s)), 0.0, t, points=kinks, epsabs=1e-13, limit=500)[0]
+        gained = quad(
+            lambda s: float(excitation.acceleration(s)),
+            0.0,
+            t,
+            points=kinks,
+            epsabs=1e-13,
+            limit=500,
+        )[0]
         assert velocity(t) == pytest.approx(gained, abs=1e-10)
 
 
 def test_base_motion_moves_the_floor_under_a_loose_block(model):
     shake = Sine(amplitude=2.0, period=0.5, cycles=2)
-    scene = Scene(name="loose", block=SQUAT, floor=Floor(friction=0.0), excitation=shake, duration=1.0)
+    scene = Scene(
+        name="loose", block=SQUAT, floor=Floor(friction=0.0), excitation=shake, duration=1.0
+    )
     history = model.simulate(scene)
     omega = 2 * math.pi / 0.5
     t = history.channels["t"]
-    exact = -2.0 / omega * (t - np.sin(omega * t) / omega)  # the block stays in space, so that it moves against the floor
+    exact = (
+        -2.0 / omega * (t - np.sin(omega * t) / omega)
+    )  # the block stays in space, so that it moves against the floor
     assert np.max(np.abs(history.channels["x"] - exact)) < 1e-4
 
 
 def test_vertical_acceleration_adds_to_gravity(model):
     """A base that falls with more than g leaves the block behind."""
     falling = Record.from_samples([-15.0] * 101, time_step=1e-3)
-    scene = Scene(name="falling base", block=SQUAT, floor=Floor(friction=0.3), vertical=falling, duration=0.1)
+    scene = Scene(
+        name="falling base", block=SQUAT, floor=Floor(friction=0.3), vertical=falling, duration=0.1
+    )
     history = model.simulate(scene)
     height = history.channels["y"] - SQUAT.half_height
     assert np.max(np.abs(height - 0.5 * (15.0 - 9.81) * history.channels["t"] ** 2)) < 1e-4
@@ -148,7 +208,13 @@ def test_vertical_acceleration_adds_to_gravity(model):
 
 @pytest.mark.parametrize("amplitude", [6.0, -6.0])
 def test_overturning_ends_the_run(model, block, amplitude):
-    scene = Scene(name="over", block=block, floor=Floor(friction=1.0), excitation=Ricker(amplitude=amplitude, period=2.0), duration=20.0)
+    scene = Scene(
+        name="over",
+        block=block,
+        floor=Floor(friction=1.0),
+        excitation=Ricker(amplitude=amplitude, period=2.0),
+        duration=20.0,
+    )
     history = model.simulate(scene)
     assert history.outcome.startswith("overturned")
     assert history.event_list[-1].kind == history.outcome
@@ -169,7 +235,11 @@ def test_mirrored_scene_gives_mirrored_motion(model, block):
     )
     history, mirrored = model.simulate(scene), model.simulate(scene.mirrored())
     for channel in ("x", "theta", "x_dot", "theta_dot", "slip"):
-        assert np.max(np.abs(history.channels[channel] + mirrored.channels[channel])) < 2e-3, channel
+        assert np.max(np.abs(history.channels[channel] + mirrored.channels[channel])) < 2e-3, (
+            channel
+        )
     assert history.peak_rotation > 0.2 * block.alpha
     assert "wall impact" in [event.kind for event in history.event_list]
-    assert [event.kind for event in history.event_list][:4] == [event.kind for event in mirrored.event_list][:4]
+    assert [event.kind for event in history.event_list][:4] == [
+        event.kind for event in mirrored.event_list
+    ][:4]

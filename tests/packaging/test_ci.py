@@ -1,4 +1,5 @@
-"""What CI installs and what a night tells: the lock file, `.ci/nightly.py`, and the page that shows its last results."""
+"""What CI installs and what a night tells: the lock file, `.ci/nightly.py`, and the page that shows
+its last results."""
 
 from __future__ import annotations
 
@@ -41,17 +42,31 @@ def test_all_that_ci_installs_is_locked_by_hash():
     assert "://" not in lock
     locked = {entry.partition("==")[0] for entry in entries}
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    asked = [*project["dependencies"], *(one for extra in ("test", "docs", "lint") for one in project["optional-dependencies"][extra])]
-    names = {re.split(r"[\[<>=!~; ]", text)[0].lower().replace("_", "-") for text in asked} | {"setuptools"}
+    asked = [
+        *project["dependencies"],
+        *(
+            one
+            for extra in ("test", "docs", "lint")
+            for one in project["optional-dependencies"][extra]
+        ),
+    ]
+    names = {re.split(r"[\[<>=!~; ]", text)[0].lower().replace("_", "-") for text in asked} | {
+        "setuptools"
+    }
     assert names <= locked, f"`make lock` is due: {names - locked}"
 
 
 def test_a_night_runs_all_parts_whatever_one_does(nightly, monkeypatch, tmp_path):
-    """A part that fails fails the night, after all others; what cannot be run is told as such, and never as passed."""
+    """A part that fails fails the night, after all others; what cannot be run is told as such, and
+    never as passed."""
     python = sys.executable
     parts = [
-        nightly.Part("broken", (python, "-c", "print('1 failed'); raise SystemExit(3)"), nightly.last_line),
-        nightly.Part("absent", (python, "-c", "print()"), nightly.last_line, "a_module_that_nobody_has"),
+        nightly.Part(
+            "broken", (python, "-c", "print('1 failed'); raise SystemExit(3)"), nightly.last_line
+        ),
+        nightly.Part(
+            "absent", (python, "-c", "print()"), nightly.last_line, "a_module_that_nobody_has"
+        ),
         nightly.Part("fine", (python, "-c", "print('=== 5 passed in 2 s ===')"), nightly.last_line),
     ]
     monkeypatch.setattr(nightly, "parts", lambda *_: parts)
@@ -75,14 +90,26 @@ def test_a_night_runs_all_parts_whatever_one_does(nightly, monkeypatch, tmp_path
 
 def test_parts_cover_the_readers_and_the_stress_run(nightly, tmp_path):
     names = [part.name for part in nightly.parts(False, 7, tmp_path)]
-    assert {"slow tests", "stress", "known weaknesses of dependencies", *(f"fuzz {reader}" for reader in nightly.READERS)} <= set(names)
+    assert {
+        "slow tests",
+        "stress",
+        "known weaknesses of dependencies",
+        *(f"fuzz {reader}" for reader in nightly.READERS),
+    } <= set(names)
     source = (ROOT / "tests/stress/test_hostile_input.py").read_text(encoding="utf-8")
     assert all(f'    "{reader}": (' in source for reader in nightly.READERS)
 
 
 def test_an_audit_that_reaches_no_list_has_not_passed(nightly, tmp_path):
-    found = {"dependencies": [{"name": "a", "skip_reason": "not found"}, {"name": "b", "version": "1", "vulns": [{"id": "X-1"}]}]}
+    found = {
+        "dependencies": [
+            {"name": "a", "skip_reason": "not found"},
+            {"name": "b", "version": "1", "vulns": [{"id": "X-1"}]},
+        ]
+    }
     assert nightly.audited("words\n" + json.dumps(found)) == "1 of 2 packages looked up; b 1: X-1"
     nothing = json.dumps({"dependencies": found["dependencies"][:1]})
-    part = nightly.Part("known weaknesses", (sys.executable, "-c", f"print({nothing!r})"), nightly.audited)
+    part = nightly.Part(
+        "known weaknesses", (sys.executable, "-c", f"print({nothing!r})"), nightly.audited
+    )
     assert nightly.play(part, tmp_path).result == "not run"

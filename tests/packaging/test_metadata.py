@@ -1,4 +1,5 @@
-"""What goes into the wheel, and what it needs. That it installs and runs elsewhere is what `.ci/wheel` shows."""
+"""What goes into the wheel, and what it needs. That it installs and runs elsewhere is what
+`.ci/wheel` shows."""
 
 from __future__ import annotations
 
@@ -18,8 +19,15 @@ import rockcheck
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-PACKAGES = find_packages(str(ROOT), **{key: PROJECT["tool"]["setuptools"]["packages"]["find"][key] for key in ["include"]})
-FOLDERS = {f"rockcheck.{link.name}": link.name for link in (ROOT / "rockcheck").iterdir() if link.is_symlink()} | {"rockcheck": "rockcheck"}
+PACKAGES = find_packages(
+    str(ROOT),
+    **{key: PROJECT["tool"]["setuptools"]["packages"]["find"][key] for key in ["include"]},
+)
+FOLDERS = {
+    f"rockcheck.{link.name}": link.name
+    for link in (ROOT / "rockcheck").iterdir()
+    if link.is_symlink()
+} | {"rockcheck": "rockcheck"}
 
 
 def names_of(requirements: list[str]) -> set[str]:
@@ -40,7 +48,9 @@ def test_every_data_file_is_in_the_wheel():
     """Files that are not code lie in data/, which package-data names."""
     for name, folder in FOLDERS.items():
         others = [
-            path for path in (ROOT / folder).rglob("*") if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts
+            path
+            for path in (ROOT / folder).rglob("*")
+            if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts
         ]
         assert all(path.relative_to(ROOT).parts[1] == "data" for path in others), others
         assert not others or PROJECT["tool"]["setuptools"]["package-data"][name] == ["data/**/*"]
@@ -52,7 +62,11 @@ def test_nothing_but_rockcheck_is_installed():
 
 def test_the_command_the_plugin_and_the_views_are_there():
     points = PROJECT["project"]["entry-points"]
-    for point in (PROJECT["project"]["scripts"]["rockcheck"], points["pytest11"]["rockcheck"], points["rockcheck.views"]["rockcheck"]):
+    for point in (
+        PROJECT["project"]["scripts"]["rockcheck"],
+        points["pytest11"]["rockcheck"],
+        points["rockcheck.views"]["rockcheck"],
+    ):
         module, _, name = point.partition(":")
         assert not name or hasattr(importlib.import_module(module), name)
         importlib.import_module(module)
@@ -60,8 +74,14 @@ def test_the_command_the_plugin_and_the_views_are_there():
 
 def imported(tree: ast.AST) -> set[str]:
     """Top-level names of modules that a file imports, wherever in it."""
-    found = {name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names}
-    found |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module and not node.level}
+    found = {
+        name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names
+    }
+    found |= {
+        node.module
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module and not node.level
+    }
     return {name.partition(".")[0] for name in found}
 
 
@@ -73,7 +93,9 @@ def imported_at_once(tree: ast.Module) -> set[str]:
 
 def sources(top: str) -> dict[Path, ast.Module]:
     """The files of a folder, parsed; there are some."""
-    found = {path: ast.parse(path.read_text(encoding="utf-8")) for path in (ROOT / top).rglob("*.py")}
+    found = {
+        path: ast.parse(path.read_text(encoding="utf-8")) for path in (ROOT / top).rglob("*.py")
+    }
     assert found
     return found
 
@@ -85,13 +107,19 @@ ELSEWHERE = {"pydrake": "drake"}
 
 def owners_of(name: str) -> set[str]:
     """Distributions that install a module of this name."""
-    return {owner.lower().replace("_", "-") for owner in DISTRIBUTIONS.get(name, [ELSEWHERE.get(name, name)])}
+    return {
+        owner.lower().replace("_", "-")
+        for owner in DISTRIBUTIONS.get(name, [ELSEWHERE.get(name, name)])
+    }
 
 
 @pytest.mark.parametrize("top", sorted(FOLDERS.values()))
 def test_every_import_is_a_declared_dependency(top):
-    """What a module needs to be imported comes with every installation; an extra is imported by the function that needs it."""
-    everywhere = [one for one in PROJECT["project"]["dependencies"] if ";" not in one]  # not of some versions of Python only
+    """What a module needs to be imported comes with every installation; an extra is imported by the
+    function that needs it."""
+    everywhere = [
+        one for one in PROJECT["project"]["dependencies"] if ";" not in one
+    ]  # not of some versions of Python only
     declared = names_of(everywhere) | {"llvmlite"}  # which is numba's
     extras = {
         name
@@ -101,47 +129,92 @@ def test_every_import_is_a_declared_dependency(top):
     for path, tree in sources(top).items():
         of_pytest = {"pytest"} if path.name == "plugin.py" else set()  # which pytest loads
         for name in imported(tree) - {"rockcheck"} - set(sys.stdlib_module_names):
-            allowed = declared | of_pytest | (extras if name not in imported_at_once(tree) else set())
-            assert owners_of(name) & allowed, f"{path.relative_to(ROOT)} imports {name}, of {owners_of(name)}"
+            allowed = (
+                declared | of_pytest | (extras if name not in imported_at_once(tree) else set())
+            )
+            assert owners_of(name) & allowed, (
+                f"{path.relative_to(ROOT)} imports {name}, of {owners_of(name)}"
+            )
 
 
 def test_hints_name_packages_that_there_are():
-    """Nothing called rockcheck is released: who asks for it by name, or for an extra of it, may get a stranger's package."""
-    texts = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(path for top in FOLDERS.values() for path in (ROOT / top).rglob("*.py"))]
-    assert [str(path) for path in texts if re.search(r"pip install [^`\n]*rockcheck\[", path.read_text(encoding="utf-8"))] == []
-    for engine in (getattr(rockcheck, name) for name in importlib.import_module("rockcheck.engines").__all__):
+    """Nothing called rockcheck is released: who asks for it by name, or for an extra of it, may get
+    a stranger's package."""
+    texts = [
+        *ROOT.glob("*.md"),
+        *(ROOT / "docs").rglob("*.md"),
+        *(path for top in FOLDERS.values() for path in (ROOT / top).rglob("*.py")),
+    ]
+    assert [
+        str(path)
+        for path in texts
+        if re.search(r"pip install [^`\n]*rockcheck\[", path.read_text(encoding="utf-8"))
+    ] == []
+    for engine in (
+        getattr(rockcheck, name) for name in importlib.import_module("rockcheck.engines").__all__
+    ):
         if engine.module:
-            assert engine.package in names_of(one for extra in PROJECT["project"]["optional-dependencies"].values() for one in extra)
+            assert engine.package in names_of(
+                one
+                for extra in PROJECT["project"]["optional-dependencies"].values()
+                for one in extra
+            )
             assert engine.package in owners_of(engine.module)
 
 
 def test_every_package_has_its_layer():
     """A folder that no layer names could import anything: `lint-imports` would not notice."""
-    (layers,) = (one["layers"] for one in PROJECT["tool"]["importlinter"]["contracts"] if one["type"] == "layers")
+    (layers,) = (
+        one["layers"]
+        for one in PROJECT["tool"]["importlinter"]["contracts"]
+        if one["type"] == "layers"
+    )
     named = {name for line in layers for name in re.split(r" *[:|] *", line)}
     parents = {name.rpartition(".")[0] for name in named}
-    left_out = {name for name in PACKAGES if not any(name == one or name.startswith(f"{one}.") for one in named) and name not in parents}
+    left_out = {
+        name
+        for name in PACKAGES
+        if not any(name == one or name.startswith(f"{one}.") for one in named)
+        and name not in parents
+    }
     assert left_out == set()
-    modules = {name for name in named if ROOT.joinpath(*name.split(".")).with_suffix(".py").is_file()}
+    modules = {
+        name for name in named if ROOT.joinpath(*name.split(".")).with_suffix(".py").is_file()
+    }
     assert named <= {*PACKAGES, *modules}
 
 
 @pytest.mark.parametrize("requirement", sorted(names_of(PROJECT["project"]["dependencies"])))
 def test_every_dependency_is_imported(requirement):
-    used = {name for top in FOLDERS.values() for tree in sources(top).values() for name in imported(tree)}
-    assert requirement in {owner for name in used for owner in owners_of(name)}, f"nothing imports {requirement}"
+    used = {
+        name
+        for top in FOLDERS.values()
+        for tree in sources(top).values()
+        for name in imported(tree)
+    }
+    assert requirement in {owner for name in used for owner in owners_of(name)}, (
+        f"nothing imports {requirement}"
+    )
 
 
 def test_the_changelog_is_of_this_version():
-    newest = re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
+    newest = re.search(
+        r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
     assert newest
     assert newest[1] == PROJECT["project"]["version"]
 
 
 def test_the_facade_has_every_public_name():
-    """`import rockcheck` gives what its parts call public, and loads none of them until it is asked for."""
-    parts = {name: importlib.import_module(f"rockcheck.{name}") for name in ("scenes", "ebm", "cm", "engines", "validation")}
-    assert set(rockcheck.__all__) == {"__version__"} | {name for part in parts.values() for name in part.__all__}
+    """`import rockcheck` gives what its parts call public, and loads none of them until it is asked
+    for."""
+    parts = {
+        name: importlib.import_module(f"rockcheck.{name}")
+        for name in ("scenes", "ebm", "cm", "engines", "validation")
+    }
+    assert set(rockcheck.__all__) == {"__version__"} | {
+        name for part in parts.values() for name in part.__all__
+    }
     for part in parts.values():
         assert all(getattr(rockcheck, name) is getattr(part, name) for name in part.__all__)
     assert rockcheck.__version__ == PROJECT["project"]["version"]
@@ -151,7 +224,12 @@ def test_the_facade_has_every_public_name():
 
 def test_the_facade_shows_what_is_public():
     code = "import rockcheck; print(dir(rockcheck) == sorted(rockcheck.__all__))"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "True"
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout.strip()
+        == "True"
+    )
 
 
 @pytest.mark.parametrize(
@@ -172,10 +250,17 @@ def test_what_is_no_scene_or_history_is_named(call, key, wanted):
 
 def test_importing_rockcheck_loads_nothing_heavy():
     code = "import sys, rockcheck; print(sorted({'numpy', 'numba', 'pandas', 'pydantic', 'mujoco'} & set(sys.modules)))"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout.strip()
+        == "[]"
+    )
 
 
 def test_the_plugin_loads_nothing_of_rockcheck():
     code = "import sys, rockcheck.plugin; print(sorted(m for m in sys.modules if m.startswith('rockcheck')))"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.strip()
     assert loaded == "['rockcheck', 'rockcheck.plugin']"

@@ -1,4 +1,5 @@
-"""What is skipped in CI is a failure, unless `tests/conftest.py` lists its reason: the hook, in a pytest of its own."""
+"""What is skipped in CI is a failure, unless `tests/conftest.py` lists its reason: the hook, in a
+pytest of its own."""
 
 from __future__ import annotations
 
@@ -39,7 +40,10 @@ def test_fine(): pass
 @pytest.fixture
 def project(pytester):
     pytester.makeconftest(CONFTEST.read_text(encoding="utf-8"))
-    pytester.makepyfile(test_some=SKIPS, test_file='import pytest\npytest.importorskip("another_one_that_nobody_has")\n')
+    pytester.makepyfile(
+        test_some=SKIPS,
+        test_file='import pytest\npytest.importorskip("another_one_that_nobody_has")\n',
+    )
     return pytester
 
 
@@ -60,6 +64,8 @@ def test_in_ci_a_skip_that_is_not_listed_fails(project, monkeypatch):
     chosen = project.runpytest_subprocess("-rs", "-p", "no:cacheprovider", "-n0", "test_some.py")
     listed = int(sys.version_info >= (3, 12))
     chosen.assert_outcomes(passed=1, xfailed=1, skipped=listed, failed=1, errors=3 - listed)
-    chosen.stdout.fnmatch_lines_random(["*lists no such reason: no mood", "*lists no such reason: no mood either"])
+    chosen.stdout.fnmatch_lines_random(
+        ["*lists no such reason: no mood", "*lists no such reason: no mood either"]
+    )
     assert result.ret != 0
     assert chosen.ret != 0

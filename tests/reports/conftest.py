@@ -1,4 +1,5 @@
-"""A finished run made up without any model: closed-form motions, checks of every verdict, a failed cell, hostile names."""
+"""A finished run made up without any model: closed-form motions, checks of every verdict, a failed
+cell, hostile names."""
 
 from __future__ import annotations
 
@@ -44,7 +45,8 @@ def scene(name: str, wall: bool, duration: float = 12.0) -> Scene:
 
 
 def motion(scene: Scene, model: str, delay: float, *, falls: bool = False) -> Any:
-    """A decaying rocking motion about pivots that stand still, `delay` s late; hops a little beside a wall."""
+    """A decaying rocking motion about pivots that stand still, `delay` s late; hops a little beside
+    a wall."""
     block, t = scene.block, scene.output_times
     late = np.maximum(t - delay, 0.0)
     if falls:
@@ -54,23 +56,61 @@ def motion(scene: Scene, model: str, delay: float, *, falls: bool = False) -> An
     else:
         size, decay, omega = 0.3 * block.alpha, 0.15, 3.0
         theta = size * np.exp(-decay * late) * np.sin(omega * late)
-        rate = size * np.exp(-decay * late) * (omega * np.cos(omega * late) - decay * np.sin(omega * late))
+        rate = (
+            size
+            * np.exp(-decay * late)
+            * (omega * np.cos(omega * late) - decay * np.sin(omega * late))
+        )
     pivot = np.where(theta < 0, -1.0, 1.0)
     s, c = np.sin(block.alpha - np.abs(theta)), np.cos(block.alpha - np.abs(theta))
     slip_rate = 0.004 * np.exp(-0.2 * late) * np.sin(0.7 * late)
     x = pivot * (block.radius * s - block.half_width) + np.cumsum(slip_rate) * scene.output_step
-    hop = 0.004 * np.maximum(0.0, np.sin(3.0 * late)) ** 8 if scene.walls and model != "ebm" else 0.0
-    state = np.column_stack([x, block.radius * c + hop, theta, slip_rate - block.radius * c * rate, pivot * block.radius * s * rate, rate])
+    hop = (
+        0.004 * np.maximum(0.0, np.sin(3.0 * late)) ** 8 if scene.walls and model != "ebm" else 0.0
+    )
+    state = np.column_stack(
+        [
+            x,
+            block.radius * c + hop,
+            theta,
+            slip_rate - block.radius * c * rate,
+            pivot * block.radius * s * rate,
+            rate,
+        ]
+    )
     zeros = [k * math.pi / 3.0 + delay for k in range(1, 11)]
-    events = [Event(t=zero, kind="floor impact", mode_before="rock", mode_after="rock", impulse=0.4 / (1 + zero)) for zero in zeros]
+    events = [
+        Event(
+            t=zero,
+            kind="floor impact",
+            mode_before="rock",
+            mode_after="rock",
+            impulse=0.4 / (1 + zero),
+        )
+        for zero in zeros
+    ]
     if scene.walls:
         events += [
-            Event(t=zero + 0.4, kind="wall impact", mode_before="rock", mode_after="slide-rock", impulse=0.2) for zero in zeros[1::2]
+            Event(
+                t=zero + 0.4,
+                kind="wall impact",
+                mode_before="rock",
+                mode_after="slide-rock",
+                impulse=0.2,
+            )
+            for zero in zeros[1::2]
         ]
     if falls:
         events.append(Event(t=float(late[-1]), kind="overturned left"))
     cost = Cost(wall_seconds=0.01 * (1 + 10 * delay), set_up=0.1, steps=1000, evaluations=4000)
-    return observe(scene, model, state, events=sorted(events, key=lambda e: e.t), cost=cost, settings=MODELS[model])
+    return observe(
+        scene,
+        model,
+        state,
+        events=sorted(events, key=lambda e: e.t),
+        cost=cost,
+        settings=MODELS[model],
+    )
 
 
 def figure(measure: str, value: float | None, unit: str = "alpha", **more: Any) -> Figure:
@@ -107,7 +147,9 @@ def cell_of(folder: Path, scene: Scene, model: str, delay: float, falls: bool = 
                 figure=figure("theta_rms", value, against=against, window="8s", until=8.0),
                 kind="model form" if form else "numerical",
                 verdict=verdict,
-                reason={"pass": "", "changed": "0.0015 was 0.0001"}.get(verdict, f"{value:.3g} is more than 0.002 {NASTY}"),
+                reason={"pass": "", "changed": "0.0015 was 0.0001"}.get(
+                    verdict, f"{value:.3g} is more than 0.002 {NASTY}"
+                ),
                 ideal=0.0,
                 expected=1e-4,
                 limit=2e-3,
@@ -117,7 +159,13 @@ def cell_of(folder: Path, scene: Scene, model: str, delay: float, falls: bool = 
         )
         figures += [
             checks[-1].figure,
-            figure("events_agree_until", 12.0 - 100 * delay, "s", against=against, note="floor impact only in " + model),
+            figure(
+                "events_agree_until",
+                12.0 - 100 * delay,
+                "s",
+                against=against,
+                note="floor impact only in " + model,
+            ),
             figure("theta_rms", value, against=against, window="horizon", until=10.0),
         ]
     return Cell(
@@ -135,15 +183,25 @@ def cell_of(folder: Path, scene: Scene, model: str, delay: float, falls: bool = 
     )
 
 
-DELAYS = {"ebm-unilateral": 0.0, "ebm": 0.0005, "cm": 0.001, "mujoco": 0.002, "pybullet": 0.005, "mine:Model": 0.02}
+DELAYS = {
+    "ebm-unilateral": 0.0,
+    "ebm": 0.0005,
+    "cm": 0.001,
+    "mujoco": 0.002,
+    "pybullet": 0.005,
+    "mine:Model": 0.02,
+}
 
 
 def crowd(scatter: float) -> tuple[EnsembleRecord, list[Cell]]:
-    """An ensemble of 40 scenes by three models: peaks from 0.02 to 2 alpha, the largest fall; one scatters, one has failed."""
+    """An ensemble of 40 scenes by three models: peaks from 0.02 to 2 alpha, the largest fall; one
+    scatters, one has failed."""
     peaks = np.geomspace(0.02, 2.0, 40)
     other = peaks * np.exp(scatter * np.sin(np.arange(40.0)))
     samples = {
-        model: Sample(values, tuple("overturned left" if value > 1.0 else "at rest" for value in values))
+        model: Sample(
+            values, tuple("overturned left" if value > 1.0 else "at rest" for value in values)
+        )
         for model, values in (("ebm-unilateral", peaks), ("cm", other))
     }
     record = EnsembleRecord(
@@ -154,29 +212,71 @@ def crowd(scatter: float) -> tuple[EnsembleRecord, list[Cell]]:
             "count": 40,
             "friction": {"uniform": [0.3, 0.8]},
             "pulse": {"period": {"uniform": [0.4, 1.5]}, "amplitude": {"lognormal": [6.0, 0.4]}},
-            "scene": {"duration": 6.0, "block": {"half_width": 0.4, "half_height": 1.5}, "floor": {"friction": 0.5}},
+            "scene": {
+                "duration": 6.0,
+                "block": {"half_width": 0.4, "half_height": 1.5},
+                "floor": {"friction": 0.5},
+            },
         },
-        peaks={model: tuple(map(float, sample.peaks)) for model, sample in samples.items()} | {"mujoco": (None,) * 40},
-        outcomes={model: tuple(sample.outcomes) for model, sample in samples.items()} | {"mujoco": (NASTY,) * 40},
+        peaks={model: tuple(map(float, sample.peaks)) for model, sample in samples.items()}
+        | {"mujoco": (None,) * 40},
+        outcomes={model: tuple(sample.outcomes) for model, sample in samples.items()}
+        | {"mujoco": (NASTY,) * 40},
     )
     pair = Samples(samples["ebm-unilateral"], samples["cm"])
-    figures = tuple(evaluate(measure, pair, "alpha", against="ebm-unilateral") for measure in STATISTICS.values())
-    checks = (Check(figure=figures[0], kind="numerical", verdict="pass", ideal=0.0, expected=0.0, limit=0.5, drift=0.5, why="made up"),)
+    figures = tuple(
+        evaluate(measure, pair, "alpha", against="ebm-unilateral")
+        for measure in STATISTICS.values()
+    )
+    checks = (
+        Check(
+            figure=figures[0],
+            kind="numerical",
+            verdict="pass",
+            ideal=0.0,
+            expected=0.0,
+            limit=0.5,
+            drift=0.5,
+            why="made up",
+        ),
+    )
     cells = [
         Cell(scene="crowd", model="ebm-unilateral", status="done", outcome="6 of 40 overturned"),
-        Cell(scene="crowd", model="cm", status="done", outcome="6 of 40 overturned", figures=figures, checks=checks),
-        Cell(scene="crowd", model="mujoco", status="failed", reason=f"40 of 40 scenes failed {NASTY}"),
+        Cell(
+            scene="crowd",
+            model="cm",
+            status="done",
+            outcome="6 of 40 overturned",
+            figures=figures,
+            checks=checks,
+        ),
+        Cell(
+            scene="crowd", model="mujoco", status="failed", reason=f"40 of 40 scenes failed {NASTY}"
+        ),
     ]
     return record, cells
 
 
 def make_run(folder: Path, duration: float = 12.0) -> Run:
-    """Write a finished run of three scenes into `folder`: one passes, one fails, one has failed cells and a falling block."""
-    scenes = [scene("free", False, duration), scene("beside a wall", True, duration), scene("Free", False, duration)]
-    cells = [cell_of(folder, scenes[0], model, 0.5 * DELAYS[model] if model in ("cm", "mujoco") else 0.0) for model in list(MODELS)[:5]]
+    """Write a finished run of three scenes into `folder`: one passes, one fails, one has failed
+    cells and a falling block."""
+    scenes = [
+        scene("free", False, duration),
+        scene("beside a wall", True, duration),
+        scene("Free", False, duration),
+    ]
+    cells = [
+        cell_of(folder, scenes[0], model, 0.5 * DELAYS[model] if model in ("cm", "mujoco") else 0.0)
+        for model in list(MODELS)[:5]
+    ]
     cells += [cell_of(folder, scenes[1], model, delay) for model, delay in DELAYS.items()]
-    cells += [cell_of(folder, scenes[2], model, DELAYS[model], falls=True) for model in ("ebm-unilateral", "ebm")]
-    cells.append(Cell(scene="Free", model="mujoco", status="failed", reason=f"blew up at 3.2 s {NASTY}"))
+    cells += [
+        cell_of(folder, scenes[2], model, DELAYS[model], falls=True)
+        for model in ("ebm-unilateral", "ebm")
+    ]
+    cells.append(
+        Cell(scene="Free", model="mujoco", status="failed", reason=f"blew up at 3.2 s {NASTY}")
+    )
     ensemble, of_ensemble = crowd(0.2)
     run = Run(
         suite="made-up",
@@ -191,7 +291,12 @@ def make_run(folder: Path, duration: float = 12.0) -> Run:
         ensembles=(ensemble,),
         faults=("tolerance [old.cm.ebm: theta_rms] has no cell in the suite",),
         measures=(
-            MeasureRecord(name="theta_rms", label="RMS difference of rotation", unit="angle", formula="sqrt <d^2> of theta, in alpha."),
+            MeasureRecord(
+                name="theta_rms",
+                label="RMS difference of rotation",
+                unit="angle",
+                formula="sqrt <d^2> of theta, in alpha.",
+            ),
         ),
         versions={"rockcheck": "0.1.0", "python": "3.11", "mujoco": "4.0.0"},
         hardware={"processor": f"made up {NASTY}", "cores": "2"},

@@ -43,10 +43,13 @@ Visits = Callable[..., Visit]
 
 @pytest.fixture
 def visits(visitor: Callable[..., playwright.Page], site: Path) -> Visits:
-    """`visits(**settings)` is a visit; in the end its page must have complained of nothing and asked for nothing elsewhere."""
+    """`visits(**settings)` is a visit; in the end its page must have complained of nothing and
+    asked for nothing elsewhere."""
     for name in ("checks.csv", "figures.csv"):  # validation writes them beside the pages
         (site / name).touch()
-    return lambda **settings: Visit(visitor(site, **{"viewport": {"width": 1280, "height": 900}, **settings}), site)
+    return lambda **settings: Visit(
+        visitor(site, **{"viewport": {"width": 1280, "height": 900}, **settings}), site
+    )
 
 
 @pytest.fixture
@@ -56,7 +59,8 @@ def visit(visits: Visits) -> Visit:
 
 
 def until(page: playwright.Page, expression: str, seconds: float = 10.0) -> None:
-    """Wait for an expression to hold; the pages' policy forbids what playwright's own waiting does."""
+    """Wait for an expression to hold; the pages' policy forbids what playwright's own waiting
+    does."""
     for _ in range(int(seconds / 0.05)):
         if page.evaluate(expression):
             return
@@ -196,10 +200,14 @@ def test_animation_moves_the_block_with_the_cursor(visit: Visit) -> None:
     page.get_by_role("button", name="Pause").click()
     time = page.evaluate("rockcheckPage.store.time")
     assert block.get_attribute("transform") != start
-    expected = page.evaluate("(m => rockcheckPage.store.at(m, 'theta', rockcheckPage.store.time))(rockcheck.models[0])")
+    expected = page.evaluate(
+        "(m => rockcheckPage.store.at(m, 'theta', rockcheckPage.store.time))(rockcheck.models[0])"
+    )
     angle = re.search(r"rotate\((\S+)\)", block.get_attribute("transform") or "")
     assert angle is not None
-    assert float(angle[1]) == pytest.approx(expected * page.evaluate("rockcheck.alpha") * 180.0 / 3.141592653589793)
+    assert float(angle[1]) == pytest.approx(
+        expected * page.evaluate("rockcheck.alpha") * 180.0 / 3.141592653589793
+    )
     until(page, f"document.getElementById('now').textContent === '{time:.3f} s'")
     page.locator("#time").fill("2000")
     assert page.evaluate("rockcheckPage.store.time") == pytest.approx(10.0)
@@ -232,8 +240,15 @@ def test_a_falling_block_stays_where_it_fell(visit: Visit) -> None:
 def test_accessible(visits: Visits, address: str, scheme: str) -> None:
     page = visits(color_scheme=scheme, bypass_csp=True).open(address)
     page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
-    found = Axe().run(page, options={"preload": False}).response["violations"]  # it would ask for style sheets, which a file may not
-    serious = [f"{v['id']}: {n['html'][:120]}" for v in found if v["impact"] in ("serious", "critical") for n in v["nodes"][:3]]
+    found = (
+        Axe().run(page, options={"preload": False}).response["violations"]
+    )  # it would ask for style sheets, which a file may not
+    serious = [
+        f"{v['id']}: {n['html'][:120]}"
+        for v in found
+        if v["impact"] in ("serious", "critical")
+        for n in v["nodes"][:3]
+    ]
     assert serious == []
 
 
@@ -248,13 +263,18 @@ def test_print_shows_the_figures_and_no_controls(visit: Visit) -> None:
     page.emulate_media(media="print")
     assert not page.locator("#explore").is_visible()
     playwright.expect(page.locator("#paper")).to_have_attribute("open", "")
-    page.locator("#paper figcaption").first.scroll_into_view_if_needed()  # an image is loaded when it comes near
+    page.locator(
+        "#paper figcaption"
+    ).first.scroll_into_view_if_needed()  # an image is loaded when it comes near
     playwright.expect(page.locator(".paper img").first).to_be_visible()
 
 
 @pytest.mark.parametrize(("kind", "begins"), [("svg", b"<svg"), ("png", b"\x89PNG")])
-def test_the_plots_can_be_taken_as_a_picture(visit: Visit, tmp_path, kind: str, begins: bytes) -> None:
-    """What is shown: the window of time, the models that are on; drawn by itself, with nothing of the page around it."""
+def test_the_plots_can_be_taken_as_a_picture(
+    visit: Visit, tmp_path, kind: str, begins: bytes
+) -> None:
+    """What is shown: the window of time, the models that are on; drawn by itself, with nothing of
+    the page around it."""
     page = visit.open(WALL)
     page.evaluate("rockcheckPage.store.change({ window: [1, 5] })")
     page.get_by_label("CM", exact=True).uncheck()
@@ -268,7 +288,10 @@ def test_the_plots_can_be_taken_as_a_picture(visit: Visit, tmp_path, kind: str, 
         return
     root = ElementTree.fromstring(content)
     said = [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")]
-    assert (said.count("MuJoCo"), said.count("CM")) == (2, 1)  # in the key, and as a row of the events
+    assert (said.count("MuJoCo"), said.count("CM")) == (
+        2,
+        1,
+    )  # in the key, and as a row of the events
     paths = [path.get("d") for path in root.iter("{http://www.w3.org/2000/svg}path")]
     assert max(d.count("L") for d in paths) > 500
     assert "NaN" not in content.decode()
@@ -283,7 +306,10 @@ def test_without_scripts_the_figures_remain(visits: Visits) -> None:
 
 def test_a_page_opens_on_the_time_in_which_something_happens(visit: Visit) -> None:
     page = visit.open("pages/Free-2.html")
-    shown, drawn = window(page), page.evaluate("rockcheckPage.drawn.slice(1).map(u => [u.scales.x.min, u.scales.x.max])")
+    shown, drawn = (
+        window(page),
+        page.evaluate("rockcheckPage.drawn.slice(1).map(u => [u.scales.x.min, u.scales.x.max])"),
+    )
     assert page.evaluate("rockcheck.window") == pytest.approx(shown)
     assert shown[1] < 6.0 < 12.0  # the block lies then
     assert all(ends == pytest.approx(shown) for ends in drawn)
@@ -293,7 +319,9 @@ def test_a_page_opens_on_the_time_in_which_something_happens(visit: Visit) -> No
 
 def test_a_fall_is_marked_and_ends_the_scale(visit: Visit) -> None:
     page = visit.open("pages/Free-2.html")
-    scale = page.evaluate("[rockcheckPage.drawn[2].scales.y.min, rockcheckPage.drawn[2].scales.y.max]")
+    scale = page.evaluate(
+        "[rockcheckPage.drawn[2].scales.y.min, rockcheckPage.drawn[2].scales.y.max]"
+    )
     assert max(map(abs, scale)) < 1.8
     assert "✕ fell" in page.locator("#plots").inner_text()
     assert page.locator("#result").get_by_text("fell").count() == 2
@@ -302,7 +330,9 @@ def test_a_fall_is_marked_and_ends_the_scale(visit: Visit) -> None:
 def test_the_running_rms_is_drawn_below_its_limit(visit: Visit) -> None:
     page = visit.open(WALL)
     assert "RMS so far" in page.locator("#plots").inner_text()
-    running = page.evaluate("rockcheckPage.drawn[3].data[9].filter(v => v !== null)")  # 6 models: the third's running RMS
+    running = page.evaluate(
+        "rockcheckPage.drawn[3].data[9].filter(v => v !== null)"
+    )  # 6 models: the third's running RMS
     judged = "b => b.model === 'cm' && b.channel === 'theta' && b.against === 'ebm-unilateral'"
     band = page.evaluate(f"rockcheck.bands.find({judged})")
     assert len(running) == round(band["until"] / page.evaluate("rockcheck.step")) + 1
@@ -325,12 +355,16 @@ def test_by_night_no_figure_is_white(visits: Visits) -> None:
     for address in ("index.html", WALL):
         page = visits(color_scheme="dark").open(address)
         page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
-        assert set(page.eval_on_selector_all("main img", "all => all.map(one => getComputedStyle(one).filter)")) <= {
-            "invert(0.91) hue-rotate(180deg)"
-        }
+        assert set(
+            page.eval_on_selector_all(
+                "main img", "all => all.map(one => getComputedStyle(one).filter)"
+            )
+        ) <= {"invert(0.91) hue-rotate(180deg)"}
 
 
-def test_a_measured_history_is_dots(visitor: Callable[..., playwright.Page], tmp_path: Path, finished: Run) -> None:
+def test_a_measured_history_is_dots(
+    visitor: Callable[..., playwright.Page], tmp_path: Path, finished: Run
+) -> None:
     history = History.load(tmp_path / (finished.cell("free", "cm").history or ""))
     every = slice(None, None, 10)
     table = dataclasses.replace(
@@ -343,12 +377,21 @@ def test_a_measured_history_is_dots(visitor: Callable[..., playwright.Page], tmp
     table.save(tmp_path / "histories" / "table.csv")
     cell = finished.cell("free", "cm")
     assert cell is not None
-    cells = (cell.model_copy(update={"model": "table", "history": "histories/table.csv"}), *finished.cells)
-    finished.model_copy(update={"models": ("table", *finished.models), "cells": cells}).save(tmp_path)
+    cells = (
+        cell.model_copy(update={"model": "table", "history": "histories/table.csv"}),
+        *finished.cells,
+    )
+    finished.model_copy(update={"models": ("table", *finished.models), "cells": cells}).save(
+        tmp_path
+    )
     write_site(tmp_path)
-    page = visitor(tmp_path, viewport={"width": 1280, "height": 900})  # in the end it must have complained of nothing
+    page = visitor(
+        tmp_path, viewport={"width": 1280, "height": 900}
+    )  # in the end it must have complained of nothing
     page.goto((tmp_path / "pages" / "free.html").as_uri())
-    assert page.evaluate("rockcheckPage.drawn[2].data[1].filter(v => v !== null).length") == len(table.channels["t"])
+    assert page.evaluate("rockcheckPage.drawn[2].data[1].filter(v => v !== null).length") == len(
+        table.channels["t"]
+    )
     assert page.evaluate("rockcheckPage.drawn[2].series[1].points.show(rockcheckPage.drawn[2], 1)")
     page.evaluate("rockcheckPage.store.change({time: 3})")
     assert not page.locator('#block [data-model="table"]').is_visible()

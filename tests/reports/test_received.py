@@ -1,4 +1,5 @@
-"""A run's folder that somebody sent: nothing of it is written through, waited for, or shown as anything but text."""
+"""A run's folder that somebody sent: nothing of it is written through, waited for, or shown as
+anything but text."""
 
 from __future__ import annotations
 
@@ -37,13 +38,28 @@ def published(folder: Path) -> None:
 
 @POSIX
 def test_no_file_of_a_run_is_written_through(tmp_path: Path, received: Path) -> None:
-    """Every file that a run writes (tables, pages, data, figures, scripts), as a link and as a pipe."""
+    """Every file that a run writes (tables, pages, data, figures, scripts), as a link and as a
+    pipe."""
     shutil.copytree(received, tmp_path / "whole")
     published(tmp_path / "whole")
-    written = [path.relative_to(tmp_path / "whole") for path in (tmp_path / "whole").rglob("*") if path.is_file()]
+    written = [
+        path.relative_to(tmp_path / "whole")
+        for path in (tmp_path / "whole").rglob("*")
+        if path.is_file()
+    ]
     written = [name for name in written if name.parts[0] not in (HISTORIES, RUN_FILE, LOCK)]
     assert len(written) > 40
-    assert {name.suffix for name in written} >= {".csv", ".xml", ".md", ".html", ".js", ".svg", ".css", ".toml", ".json"}
+    assert {name.suffix for name in written} >= {
+        ".csv",
+        ".xml",
+        ".md",
+        ".html",
+        ".js",
+        ".svg",
+        ".css",
+        ".toml",
+        ".json",
+    }
     victim = tmp_path / "victim"
     victim.write_text("mine")
     for number, name in enumerate(written):
@@ -51,10 +67,16 @@ def test_no_file_of_a_run_is_written_through(tmp_path: Path, received: Path) -> 
         (received / name).symlink_to(victim) if number % 2 else os.mkfifo(received / name)
     published(received)
     assert victim.read_text() == "mine"
-    assert not [name for name in written if (received / name).is_symlink() or not (received / name).is_file()]
+    assert not [
+        name
+        for name in written
+        if (received / name).is_symlink() or not (received / name).is_file()
+    ]
 
 
-@pytest.mark.parametrize("part", ["pages", "pages/assets", "pages/figures", "pages/data", "pages/scene-files", LOCK])
+@pytest.mark.parametrize(
+    "part", ["pages", "pages/assets", "pages/figures", "pages/data", "pages/scene-files", LOCK]
+)
 def test_no_folder_of_a_run_is_written_through(tmp_path: Path, received: Path, part: str) -> None:
     (tmp_path / "elsewhere").mkdir()
     (received / part).parent.mkdir(parents=True, exist_ok=True)
@@ -77,7 +99,9 @@ def test_no_folder_of_kept_results_is_a_link(tmp_path: Path, part: str) -> None:
 @POSIX
 @pytest.mark.parametrize("trap", ["a pipe", "a link out", "a folder"])
 @pytest.mark.parametrize("suffix", [".json", ".csv.gz", ".events.csv.gz"])
-def test_a_kept_result_that_is_no_file_of_the_folder_is_none(tmp_path: Path, trap: str, suffix: str) -> None:
+def test_a_kept_result_that_is_no_file_of_the_folder_is_none(
+    tmp_path: Path, trap: str, suffix: str
+) -> None:
     """It is neither read nor waited for; what takes its place is written beside, not through it."""
     store = Store(tmp_path / "run")
     files = {".csv.gz": b"1", ".events.csv.gz": b"2"}
@@ -87,7 +111,9 @@ def test_a_kept_result_that_is_no_file_of_the_folder_is_none(tmp_path: Path, tra
     kept = tmp_path / "kept"
     path.rename(kept)
     before = kept.read_bytes(), kept.stat().st_mtime_ns
-    {"a pipe": os.mkfifo, "a link out": lambda one: one.symlink_to(kept), "a folder": Path.mkdir}[trap](path)
+    {"a pipe": os.mkfifo, "a link out": lambda one: one.symlink_to(kept), "a folder": Path.mkdir}[
+        trap
+    ](path)
     assert store.get("a") is None
     if trap != "a folder":
         store.put("a", files, {"n": 1})
@@ -110,15 +136,21 @@ def without_reference(folder: Path) -> str:
 
 
 SLIPS = {
-    "no such reference": lambda folder: changed(folder, reference="nobody") and "reference: 'nobody' is not in the run",
-    "an empty reference": lambda folder: changed(folder, reference="") and "reference: '' is not in the run",
+    "no such reference": lambda folder: (
+        changed(folder, reference="nobody") and "reference: 'nobody' is not in the run"
+    ),
+    "an empty reference": lambda folder: (
+        changed(folder, reference="") and "reference: '' is not in the run"
+    ),
     "a reference that is no model": without_reference,
     "cells of other scenes": lambda folder: changed(folder, scenes={}) and "cells.scene",
 }
 
 
 @pytest.mark.parametrize("slip", SLIPS)
-def test_a_run_that_names_what_it_has_not_is_bad_input(received: Path, capsys: pytest.CaptureFixture[str], slip: str) -> None:
+def test_a_run_that_names_what_it_has_not_is_bad_input(
+    received: Path, capsys: pytest.CaptureFixture[str], slip: str
+) -> None:
     said = SLIPS[slip](received)
     assert main(["report", str(received)]) == 2
     told = capsys.readouterr().err
@@ -134,23 +166,61 @@ def test_text_that_turns_around_reaches_no_page(received: Path, sign: str) -> No
     run = Run.load(received)
     scenes = {name: {**scene, "description": evil} for name, scene in run.scenes.items()}
     cells = [
-        {**cell.model_dump(mode="json"), "reason": evil, "notes": [evil], "settings": {evil: evil}, "outcome": evil} for cell in run.cells
+        {
+            **cell.model_dump(mode="json"),
+            "reason": evil,
+            "notes": [evil],
+            "settings": {evil: evil},
+            "outcome": evil,
+        }
+        for cell in run.cells
     ]
-    changed(received, suite=evil, description=evil, created=evil, scenes=scenes, cells=cells, faults=[evil], versions={evil: evil})
+    changed(
+        received,
+        suite=evil,
+        description=evil,
+        created=evil,
+        scenes=scenes,
+        cells=cells,
+        faults=[evil],
+        versions={evil: evil},
+    )
     published(received)
     code = f"{ord(sign):04x}"
     for path in received.rglob("*"):
-        if path.suffix in (".html", ".js", ".csv", ".md", ".xml", ".svg", ".toml", ".json") and path.parent.name != "assets":
+        if (
+            path.suffix in (".html", ".js", ".csv", ".md", ".xml", ".svg", ".toml", ".json")
+            and path.parent.name != "assets"
+        ):
             text = path.read_text(encoding="utf-8").lower()
             assert sign not in text, path
             assert f"\\u{code}" not in text, path
     assert "gnp?.exe" in (received / "index.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(("key", "name"), [("name", "../../a"), ("model", "/tmp/a"), ("model", "a\\b"), ("model", "ebm")])
+@pytest.mark.parametrize(
+    ("key", "name"), [("name", "../../a"), ("model", "/tmp/a"), ("model", "a\\b"), ("model", "ebm")]
+)
 def test_a_list_of_spectra_names_no_file_elsewhere(tmp_path: Path, key: str, name: str) -> None:
     """Names of figures and tables are made of it."""
-    record = {"name": "a", "title": "", "figure": None, "scene": {}, "model": "ebm", "settings": {}, "refined": False, "evaluations": 0}
-    record |= {"frequency_ratios": [], "amplitude_ratios": [], "undecided": 0, "safe": 0.0, "left": 0.0, "right": 0.0, key: name}
+    record = {
+        "name": "a",
+        "title": "",
+        "figure": None,
+        "scene": {},
+        "model": "ebm",
+        "settings": {},
+        "refined": False,
+        "evaluations": 0,
+    }
+    record |= {
+        "frequency_ratios": [],
+        "amplitude_ratios": [],
+        "undecided": 0,
+        "safe": 0.0,
+        "left": 0.0,
+        "right": 0.0,
+        key: name,
+    }
     (tmp_path / "spectra.json").write_text(json.dumps({"spectra": [record]}))
     assert len(read_index(tmp_path).spectra) == (name == "ebm")

@@ -1,4 +1,5 @@
-"""Pages of a finished run: complete, escaped, offline; the scene file plays the same scene; figures are reproducible."""
+"""Pages of a finished run: complete, escaped, offline; the scene file plays the same scene; figures
+are reproducible."""
 
 from __future__ import annotations
 
@@ -27,7 +28,17 @@ from rockcheck.reports.style import LOOKS, SPARE, looks, save
 from rockcheck.reports.tables import overrun, run_times, worst_first
 from rockcheck.reports.view import FALL, scene_views, slugs_of
 from rockcheck.reports.words import number, ratio, readable
-from rockcheck.scenes import Block, Floor, History, InputError, Record, Scene, Sine, Wall, load_scene
+from rockcheck.scenes import (
+    Block,
+    Floor,
+    History,
+    InputError,
+    Record,
+    Scene,
+    Sine,
+    Wall,
+    load_scene,
+)
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.discrepancy.measures import Pair, theta_rms
@@ -71,7 +82,13 @@ def lines_of(text: str, rows: int) -> np.ndarray:
 
 
 def test_every_scene_has_a_page(site: Path) -> None:
-    assert [page.stem for page in pages_of(site)] == ["index", "Free-2", "beside-a-wall", "crowd", "free"]
+    assert [page.stem for page in pages_of(site)] == [
+        "index",
+        "Free-2",
+        "beside-a-wall",
+        "crowd",
+        "free",
+    ]
 
 
 def test_every_address_is_a_file_of_the_folder(site: Path) -> None:
@@ -93,26 +110,41 @@ def test_hostile_text_stays_text(site: Path) -> None:
     for page in pages_of(site):
         read = Addresses(page.read_text(encoding="utf-8"))
         assert "x" not in read.found
-        assert any("<img src=x onerror=alert(1)>&\"'</script>" in words for words in read.words), page.name
+        assert any("<img src=x onerror=alert(1)>&\"'</script>" in words for words in read.words), (
+            page.name
+        )
     for script in (site / PAGES / "data").glob("*.js"):
         assert "<" not in script.read_text(encoding="utf-8")
 
 
 def test_wall_scenes_say_what_the_ebm_forbids(site: Path) -> None:
-    said = {page.stem: "forbids the hop" in page.read_text(encoding="utf-8") for page in pages_of(site)}
-    assert said == {"index": False, "crowd": False, "free": False, "Free-2": False, "beside-a-wall": True}
+    said = {
+        page.stem: "forbids the hop" in page.read_text(encoding="utf-8") for page in pages_of(site)
+    }
+    assert said == {
+        "index": False,
+        "crowd": False,
+        "free": False,
+        "Free-2": False,
+        "beside-a-wall": True,
+    }
     text = (site / PAGES / "beside-a-wall.html").read_text(encoding="utf-8")
     assert "model form, not numerical error" in re.sub(r"\s+", " ", text)
 
 
 def test_index_lists_what_is_wrong_worst_first(site: Path) -> None:
     run = Run.load(site)
-    order = [("error", cell.model) if check is None else (check.verdict, overrun(check)) for cell, check in worst_first(run)]
+    order = [
+        ("error", cell.model) if check is None else (check.verdict, overrun(check))
+        for cell, check in worst_first(run)
+    ]
     assert order[0] == ("error", "mujoco")
     failing = [value for verdict, value in order if verdict == "fail"]
     assert failing == sorted(failing, reverse=True)
     assert len(failing) == sum(check.verdict == "fail" for _, check in run.checks()) > 0
-    assert [verdict for verdict, _ in order] == sorted((v for v, _ in order), key=["error", "fail", "changed"].index)
+    assert [verdict for verdict, _ in order] == sorted(
+        (v for v, _ in order), key=["error", "fail", "changed"].index
+    )
     index = (site / "index.html").read_text(encoding="utf-8")
     assert "A model failed" in index
     assert "tolerance [old.cm.ebm: theta_rms] has no cell in the suite" in index
@@ -130,7 +162,9 @@ def test_index_says_how_far_each_model_is(site: Path) -> None:
     assert rows["free"]["mine:Model"] is None
     falling = rows["Free"]["ebm"]
     assert falling is not None
-    assert falling.apart == (run.cell("Free", "ebm").outcome != run.cell("Free", "ebm-unilateral").outcome)
+    assert falling.apart == (
+        run.cell("Free", "ebm").outcome != run.cell("Free", "ebm-unilateral").outcome
+    )
     lost = next(row for row in matrix(run) if row.scene == "Free")
     assert lost.worst == 1e9
     assert "error" in lost.verdicts
@@ -143,38 +177,70 @@ def test_index_answers_three_questions_first(site: Path) -> None:
     found = glance(run)
     assert found.farthest is not None
     assert (found.farthest.cell.scene, found.farthest.cell.model) == ("beside a wall", "mine:Model")
-    assert [row.scene for row in found.apart] == [row.scene for row in matrix(run) if any(one and one.apart for one in row.entries)]
+    assert [row.scene for row in found.apart] == [
+        row.scene for row in matrix(run) if any(one and one.apart for one in row.entries)
+    ]
     accepted = [check for _, check in run.checks() if check.expected is not None]
     assert found.judged == len(accepted)
     assert len(found.changed) == sum(check.verdict != "pass" for check in accepted) > 0
     shares = [overrun(check) for _, check in found.changed]
     assert shares == sorted(shares, reverse=True)
     index = (site / "index.html").read_text(encoding="utf-8")
-    told = " ".join(" ".join(Addresses(index.partition('<dl class="glance"')[2].partition("</dl>")[0]).words).split())
-    assert "mine:Model in beside a wall : 0.006 α RMS (first 8 s), convergence not looked at" in told
+    told = " ".join(
+        " ".join(
+            Addresses(index.partition('<dl class="glance"')[2].partition("</dl>")[0]).words
+        ).split()
+    )
+    assert (
+        "mine:Model in beside a wall : 0.006 α RMS (first 8 s), convergence not looked at" in told
+    )
     assert f"{len(found.changed)} of {found.judged} figures" in told
-    assert index.index('<dl class="glance"') < index.index('id="worst"') < index.index('id="matrix"')
+    assert (
+        index.index('<dl class="glance"') < index.index('id="worst"') < index.index('id="matrix"')
+    )
 
 
-def test_a_figure_that_is_as_it_was_accepted_has_not_changed_though_its_limit_is_tighter(finished: Run) -> None:
+def test_a_figure_that_is_as_it_was_accepted_has_not_changed_though_its_limit_is_tighter(
+    finished: Run,
+) -> None:
     def tighter(check: Check) -> Check:
-        return check.model_copy(update={"expected": check.figure.value, "limit": 1e-12, "drift": 1e-6, "verdict": "fail"})
+        return check.model_copy(
+            update={
+                "expected": check.figure.value,
+                "limit": 1e-12,
+                "drift": 1e-6,
+                "verdict": "fail",
+            }
+        )
 
-    cells = tuple(cell.model_copy(update={"checks": tuple(map(tighter, cell.checks))}) for cell in finished.cells)
+    cells = tuple(
+        cell.model_copy(update={"checks": tuple(map(tighter, cell.checks))})
+        for cell in finished.cells
+    )
     found = glance(finished.model_copy(update={"cells": cells}))
     assert found.judged > 0
     assert found.changed == ()
 
 
 def test_a_run_that_ends_during_a_fall_says_so(finished: Run) -> None:
-    """Two models fall to one side, one of them after the scene's end: the outcome does not depend on the model."""
+    """Two models fall to one side, one of them after the scene's end: the outcome does not depend
+    on the model."""
 
     def ending(cell: Cell, last: float) -> Cell:
         figure = Figure(measure="last_rotation", label="last rotation", unit="alpha", value=last)
-        return cell.model_copy(update={"outcome": "moving", "overturned_at": None, "figures": (*cell.figures, figure)})
+        return cell.model_copy(
+            update={"outcome": "moving", "overturned_at": None, "figures": (*cell.figures, figure)}
+        )
 
-    for last, outcome, apart in ((5.8, "falling left", False), (-5.8, "falling right", True), (0.4, "moving", True)):
-        cells = tuple(ending(cell, last) if (cell.scene, cell.model) == ("Free", "ebm") else cell for cell in finished.cells)
+    for last, outcome, apart in (
+        (5.8, "falling left", False),
+        (-5.8, "falling right", True),
+        (0.4, "moving", True),
+    ):
+        cells = tuple(
+            ending(cell, last) if (cell.scene, cell.model) == ("Free", "ebm") else cell
+            for cell in finished.cells
+        )
         found = entry(finished.model_copy(update={"cells": cells}), "Free", "ebm")
         assert found is not None
         assert (found.outcome, found.apart) == (outcome, apart)
@@ -193,16 +259,32 @@ def test_index_shows_peaks_against_the_reference_s(site: Path) -> None:
 def test_index_says_what_the_models_are(site: Path) -> None:
     index = re.sub(r"\s+", " ", (site / "index.html").read_text(encoding="utf-8"))
     assert f"{FAMILIES['ebm-unilateral'].summary}. <strong>The reference</strong>" in index
-    assert f"{FAMILIES['ebm'].summary}. What separates it from the reference is <strong>model form</strong>" in index
+    assert (
+        f"{FAMILIES['ebm'].summary}. What separates it from the reference is <strong>model"
+        " form</strong>" in index
+    )
 
 
 def test_a_run_without_tolerances_says_how_to_get_them(tmp_path: Path, finished: Run) -> None:
-    missing = {"limit": None, "expected": None, "drift": None, "verdict": "fail", "reason": "no tolerance yet"}
+    missing = {
+        "limit": None,
+        "expected": None,
+        "drift": None,
+        "verdict": "fail",
+        "reason": "no tolerance yet",
+    }
     cells = [
-        cell.model_copy(update={"checks": tuple(check.model_copy(update=missing) for check in cell.checks)})
+        cell.model_copy(
+            update={"checks": tuple(check.model_copy(update=missing) for check in cell.checks)}
+        )
         for cell in finished.of_scene("free")
     ]
-    alone = {"scenes": {"free": finished.scenes["free"]}, "cells": tuple(cells), "ensembles": (), "faults": ()}
+    alone = {
+        "scenes": {"free": finished.scenes["free"]},
+        "cells": tuple(cells),
+        "ensembles": (),
+        "faults": (),
+    }
     finished.model_copy(update=alone).save(tmp_path)
     index = write_site(tmp_path).read_text(encoding="utf-8")
     assert "No tolerance yet" in index
@@ -225,11 +307,15 @@ def test_data_are_the_histories(site: Path) -> None:
         history = view.histories[model["name"]]
         theta = lines[model["values"]["theta"]]
         assert theta == pytest.approx(history.channels["theta"] / view.scene.block.alpha, rel=1e-7)
-        assert [event[1] for event in model["events"]] == [event.kind for event in history.event_list]
+        assert [event[1] for event in model["events"]] == [
+            event.kind for event in history.event_list
+        ]
     assert data["horizon"] == 10.0
-    assert {(band["model"], band["limit"], band["until"]) for band in data["bands"] if band["against"] == "ebm"} == {
-        (model, 2e-3, 8.0) for model in run.models if model != "ebm"
-    }
+    assert {
+        (band["model"], band["limit"], band["until"])
+        for band in data["bands"]
+        if band["against"] == "ebm"
+    } == {(model, 2e-3, 8.0) for model in run.models if model != "ebm"}
 
 
 def test_a_history_that_ends_early_is_padded(site: Path) -> None:
@@ -249,18 +335,26 @@ def test_a_large_run_shows_every_nth_row(run_folder: Path) -> None:
 
 
 def test_the_running_rms_ends_at_the_measure(run_folder: Path) -> None:
-    view = next(view for view in scene_views(Run.load(run_folder), run_folder) if view.name == "beside a wall")
+    view = next(
+        view
+        for view in scene_views(Run.load(run_folder), run_folder)
+        if view.name == "beside a wall"
+    )
     bands = [band for band in view.bands("ebm-unilateral") if band.model == "mujoco"]
     assert [(band.kind, band.until) for band in bands] == [("rms", 8.0)]
     running, t = view.running_rms(bands[0]), view.t[view.t <= 8.0 + 1e-9]
     apart = view.differences("theta", "ebm-unilateral")["mujoco"][: len(t)]
     pair = Pair(view.histories["ebm-unilateral"], view.histories["mujoco"], view.scene, until=8.0)
     assert running[-1] == pytest.approx(theta_rms(pair), rel=1e-12)
-    assert running[400] == pytest.approx(np.sqrt(np.trapezoid(apart[:401] ** 2, t[:401]) / t[400]), rel=1e-12)
+    assert running[400] == pytest.approx(
+        np.sqrt(np.trapezoid(apart[:401] ** 2, t[:401]) / t[400]), rel=1e-12
+    )
 
 
 def test_a_fall_is_drawn_up_to_one_and_a_half_alpha(run_folder: Path) -> None:
-    view = next(view for view in scene_views(Run.load(run_folder), run_folder) if view.name == "Free")
+    view = next(
+        view for view in scene_views(Run.load(run_folder), run_folder) if view.name == "Free"
+    )
     whole, drawn = view.values["ebm"]["theta"], view.drawn["ebm"]["theta"]
     row = int(np.flatnonzero(np.abs(whole) > FALL)[0])
     assert view.falls["ebm"] == view.t[row]
@@ -272,13 +366,17 @@ def test_a_fall_is_drawn_up_to_one_and_a_half_alpha(run_folder: Path) -> None:
     assert [line.get_marker() for line in theta.get_lines()].count("x") == len(view.falls) == 2
 
 
-def test_plots_open_where_something_happens(tmp_path: Path, run_of: Callable[[Path, float], Run]) -> None:
+def test_plots_open_where_something_happens(
+    tmp_path: Path, run_of: Callable[[Path, float], Run]
+) -> None:
     run = run_of(tmp_path, 60.0)
     view = next(view for view in scene_views(run, tmp_path) if view.name == "free")
     start, end = view.active
     assert start == 0.0
     assert 25.0 < end < 35.0  # the motion decays as exp(-0.15 t), to a hundredth after 31 s
-    short = next(view for view in scene_views(run_of(tmp_path, 12.0), tmp_path) if view.name == "free")
+    short = next(
+        view for view in scene_views(run_of(tmp_path, 12.0), tmp_path) if view.name == "free"
+    )
     assert short.active == (0.0, 12.0)
 
 
@@ -292,7 +390,9 @@ def test_the_hop_is_the_trusted_model_s(site: Path) -> None:
     assert "here 4 mm high" in text
 
 
-def test_the_command_of_the_page_runs_as_it_stands(site: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_command_of_the_page_runs_as_it_stands(
+    site: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     text = (site / PAGES / "beside-a-wall.html").read_text(encoding="utf-8")
     found = re.search(r"<code>rockcheck (simulate [^<]+)</code>", text)
     assert found is not None
@@ -309,7 +409,11 @@ def test_numbers_in_sentences_do_not_break() -> None:
 def test_missing_and_foreign_histories_are_told(tmp_path: Path, run_folder: Path) -> None:
     run = Run.load(run_folder)
     [one, two, *rest] = run.cells
-    cells = (one.model_copy(update={"history": "histories/gone.csv"}), two.model_copy(update={"history": "../../etc/passwd"}), *rest)
+    cells = (
+        one.model_copy(update={"history": "histories/gone.csv"}),
+        two.model_copy(update={"history": "../../etc/passwd"}),
+        *rest,
+    )
     [view, *_] = scene_views(run.model_copy(update={"cells": cells}), run_folder)
     assert "gone.csv: cannot be read" in view.missing[one.model]
     assert "outside the run's folder" in view.missing[two.model]
@@ -350,7 +454,9 @@ def test_scene_file_plays_the_same_scene(tmp_path: Path, scene: Scene) -> None:
     again = load_scene(tmp_path / next(iter(files)))
     t = np.linspace(0.0, 3.0, 1000)
     for which in ("excitation", "vertical"):
-        assert np.array_equal(getattr(again, which).acceleration(t), getattr(scene, which).acceleration(t))
+        assert np.array_equal(
+            getattr(again, which).acceleration(t), getattr(scene, which).acceleration(t)
+        )
     hidden = {"excitation", "vertical"}
     assert again.model_dump(exclude=hidden) == scene.model_dump(exclude=hidden)
 
@@ -358,7 +464,10 @@ def test_scene_file_plays_the_same_scene(tmp_path: Path, scene: Scene) -> None:
 def test_slugs_differ_whatever_the_file_system() -> None:
     slugs = slugs_of(["a b", "a,b", "A b", "a-b-2", "..", "x/../y"])
     assert len({slug.lower() for slug in slugs.values()}) == 6
-    assert all(re.fullmatch(r"[A-Za-z0-9._-]+", slug) and slug not in (".", "..") for slug in slugs.values())
+    assert all(
+        re.fullmatch(r"[A-Za-z0-9._-]+", slug) and slug not in (".", "..")
+        for slug in slugs.values()
+    )
 
 
 def test_figures_are_reproducible_and_undated(tmp_path: Path, run_folder: Path) -> None:
@@ -371,9 +480,16 @@ def test_figures_are_reproducible_and_undated(tmp_path: Path, run_folder: Path) 
 
 
 def test_differences_are_candidate_minus_reference(run_folder: Path) -> None:
-    view = next(view for view in scene_views(Run.load(run_folder), run_folder) if view.name == "beside a wall")
+    view = next(
+        view
+        for view in scene_views(Run.load(run_folder), run_folder)
+        if view.name == "beside a wall"
+    )
     difference = view.differences("theta", "ebm-unilateral")["pybullet"]
-    expected = view.histories["pybullet"].channels["theta"] - view.histories["ebm-unilateral"].channels["theta"]
+    expected = (
+        view.histories["pybullet"].channels["theta"]
+        - view.histories["ebm-unilateral"].channels["theta"]
+    )
     assert difference == pytest.approx(expected / view.scene.block.alpha, abs=1e-12)
     assert view.figure_references == ("ebm-unilateral", "ebm")
 
@@ -388,7 +504,11 @@ def test_run_times_are_ratios_to_the_reference(run_folder: Path) -> None:
 def test_how_much_of_its_limit_a_check_uses() -> None:
     def check(value: float | None, **more: object) -> Check:
         figure = Figure(measure="m", label="m", unit="1", value=value)
-        return Check(figure=figure, kind="numerical", **{"verdict": "fail", "ideal": 0.0, "limit": 2.0, **more})
+        return Check(
+            figure=figure,
+            kind="numerical",
+            **{"verdict": "fail", "ideal": 0.0, "limit": 2.0, **more},
+        )
 
     assert overrun(check(5.0)) == 2.5
     assert overrun(check(5.0, ideal=4.0)) == 0.5
@@ -402,7 +522,9 @@ def contrast(first: str, second: str) -> float:
 
     def luminance(colour: str) -> float:
         channels = (int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
-        red, green, blue = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels)
+        red, green, blue = (
+            c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels
+        )
         return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
     dark, bright = sorted((luminance(first), luminance(second)))
@@ -416,39 +538,70 @@ def test_models_can_be_seen_and_told_apart() -> None:
     assert len({look.light for look in shown}) == len(shown)
     many = looks(["ebm", "a", "cm", "b", "mujoco-coarse"])
     assert many["ebm"] is LOOKS["ebm"]
-    assert [many[name].key for name in ("a", "b", "mujoco-coarse")] == ["spare-1", "spare-2", "spare-3"]
+    assert [many[name].key for name in ("a", "b", "mujoco-coarse")] == [
+        "spare-1",
+        "spare-2",
+        "spare-3",
+    ]
 
 
 def test_numbers_for_people() -> None:
-    assert [number(v) for v in (None, 0.0, -0.5, 1.23456e-7, 5300.0)] == ["–", "0", "−0.5", "1.23·10⁻⁷", "5.3·10³"]
+    assert [number(v) for v in (None, 0.0, -0.5, 1.23456e-7, 5300.0)] == [
+        "–",
+        "0",
+        "−0.5",
+        "1.23·10⁻⁷",
+        "5.3·10³",
+    ]
     assert [ratio(v) for v in (None, 1.0, 0.054, 5876.0)] == ["–", "1×", "0.054×", "5\u202f876×"]
     assert base64.b64decode(packed([1.0])) == b"\x00\x00\x80\x3f"
 
 
 def test_lines_of_values_are_packed_and_unpacked() -> None:
     lines = [[1.0, -2.5, 3e-9], [math.nan, 0.0, 1e30], [2.0, 3.0, math.nan]]
-    assert zlib.decompress(base64.b64decode(packed_lines([[1.0, 1.0]]))) == b"\x00\x00\x00\x00\x80\x80\x3f\x3f"
-    assert lines_of(packed_lines([*lines[:2], lines[2][:2]]), 3) == pytest.approx(np.array(lines, dtype="<f4"), abs=0.0, nan_ok=True)
+    assert (
+        zlib.decompress(base64.b64decode(packed_lines([[1.0, 1.0]])))
+        == b"\x00\x00\x00\x00\x80\x80\x3f\x3f"
+    )
+    assert lines_of(packed_lines([*lines[:2], lines[2][:2]]), 3) == pytest.approx(
+        np.array(lines, dtype="<f4"), abs=0.0, nan_ok=True
+    )
 
 
 def files_of(site: Path) -> dict[str, tuple[int, bytes]]:
-    """By name: time of writing and content of all that belongs to the scenes' pages, not to the index."""
-    found = (path for path in (site / PAGES).rglob("*") if path.is_file() and path.parent.name != "assets" and path.stem != PEAKS)
-    return {path.relative_to(site / PAGES).as_posix(): (path.stat().st_mtime_ns, path.read_bytes()) for path in found}
+    """By name: time of writing and content of all that belongs to the scenes' pages, not to the
+    index."""
+    found = (
+        path
+        for path in (site / PAGES).rglob("*")
+        if path.is_file() and path.parent.name != "assets" and path.stem != PEAKS
+    )
+    return {
+        path.relative_to(site / PAGES).as_posix(): (path.stat().st_mtime_ns, path.read_bytes())
+        for path in found
+    }
 
 
-def test_only_what_would_show_something_else_is_written_again(tmp_path: Path, site: Path, finished: Run) -> None:
+def test_only_what_would_show_something_else_is_written_again(
+    tmp_path: Path, site: Path, finished: Run
+) -> None:
     write_site(tmp_path, jobs=2)
     first = files_of(tmp_path)
-    assert {name: content for name, (_, content) in first.items()} == {name: content for name, (_, content) in files_of(site).items()}
+    assert {name: content for name, (_, content) in first.items()} == {
+        name: content for name, (_, content) in files_of(site).items()
+    }
 
     cells = tuple(cell.model_copy(update={"read_back": True}) for cell in finished.cells)
-    finished.model_copy(update={"created": "2026-01-02T00:00:00+00:00", "wall_seconds": 1.0, "cells": cells}).save(tmp_path)
+    finished.model_copy(
+        update={"created": "2026-01-02T00:00:00+00:00", "wall_seconds": 1.0, "cells": cells}
+    ).save(tmp_path)
     write_site(tmp_path, afresh=False)
     assert files_of(tmp_path) == first
     assert "2026-01-02" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
-    slower = finished.cells[0].model_copy(update={"cost": finished.cells[0].cost.model_copy(update={"wall_seconds": 9.0})})
+    slower = finished.cells[0].model_copy(
+        update={"cost": finished.cells[0].cost.model_copy(update={"wall_seconds": 9.0})}
+    )
     finished.model_copy(update={"cells": (slower, *finished.cells[1:])}).save(tmp_path)
     write_site(tmp_path, afresh=False)
     again = files_of(tmp_path)
@@ -460,7 +613,8 @@ def test_only_what_would_show_something_else_is_written_again(tmp_path: Path, si
 def test_a_large_run_has_pages_of_the_scenes_that_are_shown_and_of_those_that_are_wanted(
     tmp_path: Path, finished: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The index names the others where it has to, without a link, and says how to get their pages."""
+    """The index names the others where it has to, without a link, and says how to get their
+    pages."""
     monkeypatch.setattr("rockcheck.reports.site.shown", lambda run: ("free",))
     index = write_site(tmp_path).read_text(encoding="utf-8")
     assert f"1 of {len(finished.scenes)} scenes have a page" in index
@@ -478,7 +632,14 @@ def test_a_large_run_has_pages_of_the_scenes_that_are_shown_and_of_those_that_ar
 
 def test_a_scene_that_no_model_plays_has_no_page(tmp_path: Path, finished: Run) -> None:
     """No suite makes such a run, but a file may say so."""
-    finished.model_copy(update={"scenes": {**finished.scenes, "nobody's": {**finished.scenes["free"], "name": "nobody's"}}}).save(tmp_path)
+    finished.model_copy(
+        update={
+            "scenes": {
+                **finished.scenes,
+                "nobody's": {**finished.scenes["free"], "name": "nobody's"},
+            }
+        }
+    ).save(tmp_path)
     index = write_site(tmp_path).read_text(encoding="utf-8")
     assert f"{len(finished.scenes)} of {len(finished.scenes) + 1} scenes have a page" in index
     assert not (tmp_path / PAGES / "nobody-s.html").exists()
@@ -487,19 +648,29 @@ def test_a_scene_that_no_model_plays_has_no_page(tmp_path: Path, finished: Run) 
 def test_pages_of_scenes_that_are_gone_go(tmp_path: Path, finished: Run) -> None:
     write_site(tmp_path)
     (tmp_path / PAGES / "figures" / "study.svg").touch()  # of another command, in the same folder
-    left = {"scenes": {"free": finished.scenes["free"]}, "cells": finished.of_scene("free"), "ensembles": ()}
+    left = {
+        "scenes": {"free": finished.scenes["free"]},
+        "cells": finished.of_scene("free"),
+        "ensembles": (),
+    }
     finished.model_copy(update=left).save(tmp_path)
     write_site(tmp_path, afresh=False)
     assert sorted(files_of(tmp_path)) == [
         "data/free.js",
-        *(f"figures/{name}" for name in ("free-small.svg", "free.pdf", "free.png", "free.svg", "study.svg")),
+        *(
+            f"figures/{name}"
+            for name in ("free-small.svg", "free.pdf", "free.png", "free.svg", "study.svg")
+        ),
         "free.html",
         "scene-files/free.toml",
     ]
 
 
-def test_figures_for_print_are_drawn_where_the_run_asks_for_them(tmp_path: Path, finished: Run, capsys) -> None:
-    """The page of a scene without them says how to get one, and the command draws it: the same figure."""
+def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
+    tmp_path: Path, finished: Run, capsys
+) -> None:
+    """The page of a scene without them says how to get one, and the command draws it: the same
+    figure."""
     write_site(tmp_path)
     drawn = (tmp_path / PAGES / "figures" / "free.svg").read_bytes()
     finished.model_copy(update={"printed": ("beside a wall",)}).save(tmp_path)
@@ -507,21 +678,54 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(tmp_path: Path,
     assert not list((tmp_path / PAGES / "figures").glob("free.*"))
     assert (tmp_path / PAGES / "figures" / "free-small.svg").exists()
     assert len(list((tmp_path / PAGES / "figures").glob("beside-a-wall.*"))) == 3
-    assert "rockcheck report DIR --scene free -o free.pdf" in (tmp_path / PAGES / "free.html").read_text(encoding="utf-8")
+    assert "rockcheck report DIR --scene free -o free.pdf" in (
+        tmp_path / PAGES / "free.html"
+    ).read_text(encoding="utf-8")
     for ending, begins in ((".svg", b"<?xml"), (".png", b"\x89PNG"), (".pdf", b"%PDF")):
-        assert main(["report", str(tmp_path), "--scene", "free", "-o", str(tmp_path / f"one{ending}")]) == 0
+        assert (
+            main(["report", str(tmp_path), "--scene", "free", "-o", str(tmp_path / f"one{ending}")])
+            == 0
+        )
         assert (tmp_path / f"one{ending}").read_bytes().startswith(begins)
     assert (tmp_path / "one.svg").read_bytes() == drawn
-    assert main(["report", str(tmp_path), "--scene", "crowd", "-o", str(tmp_path / "crowd.svg")]) == 0
-    assert main(["report", str(tmp_path), "--scene", "free", "--against", "ebm", "-o", str(tmp_path / "other.svg")]) == 0
+    assert (
+        main(["report", str(tmp_path), "--scene", "crowd", "-o", str(tmp_path / "crowd.svg")]) == 0
+    )
+    assert (
+        main(
+            [
+                "report",
+                str(tmp_path),
+                "--scene",
+                "free",
+                "--against",
+                "ebm",
+                "-o",
+                str(tmp_path / "other.svg"),
+            ]
+        )
+        == 0
+    )
     assert (tmp_path / "other.svg").read_bytes() != drawn
     capsys.readouterr()
     for words, said in (
-        (["--scene", "nowhere", "-o", "one.pdf"], "unknown scene of the run 'nowhere'; allowed: Free, beside a wall, crowd, free"),
-        (["--scene", "free", "-o", "free.gif"], "free.gif: a figure is written as .svg, .png, .pdf, not as '.gif'"),
+        (
+            ["--scene", "nowhere", "-o", "one.pdf"],
+            "unknown scene of the run 'nowhere'; allowed: Free, beside a wall, crowd, free",
+        ),
+        (
+            ["--scene", "free", "-o", "free.gif"],
+            "free.gif: a figure is written as .svg, .png, .pdf, not as '.gif'",
+        ),
         (["--scene", "free", "-o", "none/free.svg"], "--output: none: no such folder"),
-        (["--scene", "free", "-o", "one.pdf", "--against", "drake"], "unknown model with a history of this scene 'drake'"),
-        (["--scene", "crowd", "-o", "one.pdf", "--against", "ebm"], "--against: an ensemble's figure shows differences from its reference"),
+        (
+            ["--scene", "free", "-o", "one.pdf", "--against", "drake"],
+            "unknown model with a history of this scene 'drake'",
+        ),
+        (
+            ["--scene", "crowd", "-o", "one.pdf", "--against", "ebm"],
+            "--against: an ensemble's figure shows differences from its reference",
+        ),
     ):
         assert main(["report", str(tmp_path), *words]) == 2
         assert said in capsys.readouterr().err
@@ -531,18 +735,40 @@ def test_an_ensemble_is_shown_by_its_distributions(site: Path) -> None:
     run = Run.load(site)
     view = ensemble_views(run, site, {"crowd": "crowd"})[0]
     falls = view.overturning("cm", "ebm-unilateral")
-    reference, other = (np.array(run.ensembles[0].peaks[model]) > 1.0 for model in ("ebm-unilateral", "cm"))
-    assert (falls.both, falls.only_reference) == (np.sum(reference & other), np.sum(reference & ~other))
+    reference, other = (
+        np.array(run.ensembles[0].peaks[model]) > 1.0 for model in ("ebm-unilateral", "cm")
+    )
+    assert (falls.both, falls.only_reference) == (
+        np.sum(reference & other),
+        np.sum(reference & ~other),
+    )
     assert falls.both + falls.only_reference + falls.only_candidate + falls.neither == 40
     words = " ".join(Addresses((site / PAGES / "crowd.html").read_text(encoding="utf-8")).words)
-    for said in ("uniform 0.3 to 0.8", "lognormal, median 6, σ 0.4", "KS distance", "p = ", "precision", "recall", "scatter"):
+    for said in (
+        "uniform 0.3 to 0.8",
+        "lognormal, median 6, σ 0.4",
+        "KS distance",
+        "p = ",
+        "precision",
+        "recall",
+        "scatter",
+    ):
         assert said in words, said
     for measure in ("overturning_accuracy", "peak_bias", "peak_scatter"):
         figure = view.figure("cm", measure, "ebm-unilateral")
         assert number(figure.value) in words
         assert readable(figure.note.replace("], ", "]\n")) in words, "its confidence interval"
     rows = (site / PAGES / "data" / "crowd.csv").read_text(encoding="utf-8").splitlines()
-    assert rows[0] == ",".join(["scene", *(f"{what} {m}" for m in run.ensembles[0].peaks for what in ("peak_rotation_alpha", "outcome"))])
+    assert rows[0] == ",".join(
+        [
+            "scene",
+            *(
+                f"{what} {m}"
+                for m in run.ensembles[0].peaks
+                for what in ("peak_rotation_alpha", "outcome")
+            ),
+        ]
+    )
     assert len(rows) == 41
     assert float(rows[1].split(",")[1]) == run.ensembles[0].peaks["ebm-unilateral"][0]
 

@@ -69,7 +69,9 @@ def test_the_papers_colours():
 
 def test_a_figure_has_the_papers_panels():
     figure = figure_of(plot_of(9))
-    assert [axes.get_title(loc="left") for axes in figure.axes] == [panel.title for panel in paper_panels(9)]
+    assert [axes.get_title(loc="left") for axes in figure.axes] == [
+        panel.title for panel in paper_panels(9)
+    ]
     assert figure.get_suptitle() == "Fig. 9: Wall on the right, μ = 0.6"
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.texts] == [

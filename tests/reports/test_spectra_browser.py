@@ -30,8 +30,13 @@ FREQUENCIES, AMPLITUDES = np.linspace(0.5, 8.0, SIZE), np.linspace(1.0, 12.0, SI
 
 def written(study: Spectra, folder: Path, letters: str) -> Path:
     """The page of a study whose outcomes are made up; its histories are the model's own."""
-    done = {task: Played(letters) if task.what == "outcomes" else study.play(task) for task in study.tasks({})}
-    made = Made(created="2031-01-02T00:00:00+00:00", jobs=1, wall_seconds=1.0, versions={}, hardware={})
+    done = {
+        task: Played(letters) if task.what == "outcomes" else study.play(task)
+        for task in study.tasks({})
+    }
+    made = Made(
+        created="2031-01-02T00:00:00+00:00", jobs=1, wall_seconds=1.0, versions={}, hardware={}
+    )
     return publish(replace(study.gather(done), made=made), folder, formats=("svg",))
 
 
@@ -58,7 +63,9 @@ def place(page: playwright.Page, panel: int, row: int, column: int) -> tuple[flo
     box = canvas.bounding_box()
     assert box is not None
     wide, high = box["width"] - 48.0, box["height"] - 30.0
-    return box["x"] + 42.0 + (column + 0.5) / SIZE * wide, box["y"] + 4.0 + (1.0 - (row + 0.5) / SIZE) * high
+    return box["x"] + 42.0 + (column + 0.5) / SIZE * wide, box["y"] + 4.0 + (
+        1.0 - (row + 0.5) / SIZE
+    ) * high
 
 
 def test_the_panels_stand_as_in_the_paper_and_are_painted(page: playwright.Page) -> None:
@@ -86,7 +93,9 @@ def test_the_panels_stand_as_in_the_paper_and_are_painted(page: playwright.Page)
 def test_pointing_at_a_node_names_it_in_every_panel(page: playwright.Page) -> None:
     page.mouse.move(*place(page, 3, 10, 7))
     said = page.locator("output.node").inner_text()
-    assert said.startswith(f"ωₚ/p {FREQUENCIES[7]:.3g}, aₚ / (g tan α) {AMPLITUDES[10]:.3g}: a pulse of ")
+    assert said.startswith(
+        f"ωₚ/p {FREQUENCIES[7]:.3g}, aₚ / (g tan α) {AMPLITUDES[10]:.3g}: a pulse of "
+    )
     assert page.locator(".panel .said").all_inner_texts() == [
         "overturned clockwise",
         *["overturned"] * 6,
@@ -95,7 +104,9 @@ def test_pointing_at_a_node_names_it_in_every_panel(page: playwright.Page) -> No
     assert page.locator(".panel .said").all_inner_texts() == ["safe"] * 7
 
 
-def test_ones_own_block_is_told_in_hertz_and_g(visitor: Callable[..., playwright.Page], tmp_path: Path) -> None:
+def test_ones_own_block_is_told_in_hertz_and_g(
+    visitor: Callable[..., playwright.Page], tmp_path: Path
+) -> None:
     panel = Panel("shelf", "shelf", paper_panels(8)[1].scene)
     page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
     page.goto(written(Spectra((panel,), Request(SIZE)), tmp_path, "S" * SIZE**2).as_uri())
@@ -108,8 +119,12 @@ def test_ones_own_block_is_told_in_hertz_and_g(visitor: Callable[..., playwright
     said = page.locator("output.node").inner_text()
     g, hertz = map(float, re.search(r"a pulse of ([\d.]+) g .*, ([\d.]+) Hz", said).groups())
     scene, block = panel.scene, panel.scene.block
-    assert g == pytest.approx(AMPLITUDES[4] * scene.gravity / 9.80665 * block.half_width / block.half_height, rel=0.01)
-    assert hertz == pytest.approx(FREQUENCIES[7] * scene.frequency_parameter / (2.0 * np.pi), rel=0.01)
+    assert g == pytest.approx(
+        AMPLITUDES[4] * scene.gravity / 9.80665 * block.half_width / block.half_height, rel=0.01
+    )
+    assert hertz == pytest.approx(
+        FREQUENCIES[7] * scene.frequency_parameter / (2.0 * np.pi), rel=0.01
+    )
 
 
 def test_a_click_plays_the_kept_history_that_ends_the_same_way(page: playwright.Page) -> None:
@@ -142,39 +157,62 @@ def test_keys_do_what_the_mouse_does(page: playwright.Page) -> None:
 
 
 def page_of(folder: Path, blocks: list[Block]) -> Path:
-    made = Made(created="2026-11-24T00:00:00+00:00", jobs=1, wall_seconds=1.0, versions={}, hardware={})
-    return publish(Finding("made", "Made up", "20 records.", blocks, made=made), folder, formats=("svg",))
+    made = Made(
+        created="2026-11-24T00:00:00+00:00", jobs=1, wall_seconds=1.0, versions={}, hardware={}
+    )
+    return publish(
+        Finding("made", "Made up", "20 records.", blocks, made=made), folder, formats=("svg",)
+    )
 
 
 def fragility_page(folder: Path) -> Path:
     level = np.linspace(0.5, 5.0, 10)
     fell = np.random.default_rng(1).random((20, 2, 1)) < np.linspace(0.0, 1.0, 10)
-    curves = [curve_of(label, fell, np.zeros_like(fell), level) for label in ("with the wall", "without a wall")]
+    curves = [
+        curve_of(label, fell, np.zeros_like(fell), level)
+        for label in ("with the wall", "without a wall")
+    ]
     other = {"per_unit": 0.2, "other_unit": "g", "other_label": "peak acceleration, g"}
-    return page_of(folder, blocks_of(curves, Column("intensity", "peak acceleration / (g tan α)"), other))
+    return page_of(
+        folder, blocks_of(curves, Column("intensity", "peak acceleration / (g tan α)"), other)
+    )
 
 
 def ida_page(folder: Path) -> Path:
     level = np.linspace(0.1, 1.0, 10)
     peaks = 0.2 * np.arange(1, 5)[:, None, None] * level * np.ones((4, 2, 1))
     peaks[peaks > 0.7] = np.inf
-    return page_of(folder, lines_of([f"r{k}" for k in range(4)], peaks, level, Column("intensity", "PGA", "g")))
+    return page_of(
+        folder, lines_of([f"r{k}" for k in range(4)], peaks, level, Column("intensity", "PGA", "g"))
+    )
 
 
-def test_fragility_is_read_under_the_pointer(visitor: Callable[..., playwright.Page], tmp_path: Path) -> None:
+def test_fragility_is_read_under_the_pointer(
+    visitor: Callable[..., playwright.Page], tmp_path: Path
+) -> None:
     page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
     page.goto(fragility_page(tmp_path).as_uri())
     assert page.locator(".key span").all_inner_texts() == ["with the wall", "without a wall"]
     page.locator("[data-curves] .u-over").hover()
     said = page.locator("[data-curves] output").inner_text()
-    across, in_g = re.fullmatch(r"peak acceleration / \(g tan α\) ([\d.]+) \(([\d.]+) g\): with the wall 0\..*", said, re.DOTALL).groups()
+    across, in_g = re.fullmatch(
+        r"peak acceleration / \(g tan α\) ([\d.]+) \(([\d.]+) g\): with the wall 0\..*",
+        said,
+        re.DOTALL,
+    ).groups()
     assert float(in_g) == pytest.approx(0.2 * float(across), rel=0.01)
     cells = page.locator("table tbody tr").first.locator("td")
-    assert float(cells.last.inner_text()) == pytest.approx(0.2 * float(cells.first.inner_text()), rel=0.01)
-    assert page.evaluate("rockcheckCharts.fragility.axes.map(axis => [axis.scale, axis.label])")[2] == ["x", "peak acceleration, g"]
+    assert float(cells.last.inner_text()) == pytest.approx(
+        0.2 * float(cells.first.inner_text()), rel=0.01
+    )
+    assert page.evaluate("rockcheckCharts.fragility.axes.map(axis => [axis.scale, axis.label])")[
+        2
+    ] == ["x", "peak acceleration, g"]
 
 
-def test_the_lines_of_an_ida_are_named_under_the_pointer(visitor: Callable[..., playwright.Page], tmp_path: Path) -> None:
+def test_the_lines_of_an_ida_are_named_under_the_pointer(
+    visitor: Callable[..., playwright.Page], tmp_path: Path
+) -> None:
     page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
     page.goto(ida_page(tmp_path).as_uri())
     page.locator('[data-curves="lines"] .u-over').hover(position={"x": 500, "y": 200})
@@ -187,7 +225,9 @@ def test_the_lines_of_an_ida_are_named_under_the_pointer(visitor: Callable[..., 
 @pytest.mark.long
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("what", ["spectra", "ida"])
-def test_accessible(visitor: Callable[..., playwright.Page], folder: Path, tmp_path: Path, what: str, scheme: str) -> None:
+def test_accessible(
+    visitor: Callable[..., playwright.Page], folder: Path, tmp_path: Path, what: str, scheme: str
+) -> None:
     address = folder / "index.html" if what == "spectra" else ida_page(tmp_path)
     page = visitor(
         address.parent,
@@ -201,11 +241,18 @@ def test_accessible(visitor: Callable[..., playwright.Page], folder: Path, tmp_p
         playwright.expect(page.locator(".played")).to_be_visible()
     page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
     found = Axe().run(page, options={"preload": False}).response["violations"]
-    serious = [f"{v['id']}: {n['html'][:120]}" for v in found if v["impact"] in ("serious", "critical") for n in v["nodes"][:3]]
+    serious = [
+        f"{v['id']}: {n['html'][:120]}"
+        for v in found
+        if v["impact"] in ("serious", "critical")
+        for n in v["nodes"][:3]
+    ]
     assert serious == []
 
 
-def test_a_phone_needs_no_sideways_scrolling(visitor: Callable[..., playwright.Page], folder: Path) -> None:
+def test_a_phone_needs_no_sideways_scrolling(
+    visitor: Callable[..., playwright.Page], folder: Path
+) -> None:
     page = visitor(folder, viewport={"width": 390, "height": 800})
     page.goto((folder / "index.html").as_uri())
     assert page.evaluate("document.documentElement.scrollWidth") == 390

@@ -9,7 +9,18 @@ from axe_playwright_python.sync_playwright import Axe
 
 from rockcheck.reports.document import publish
 from rockcheck.validation.execute.pool import Failure as Lost
-from rockcheck.validation.finding import Axis, Column, Finding, Mark, Panel, Plot, Series, Table, Text, text
+from rockcheck.validation.finding import (
+    Axis,
+    Column,
+    Finding,
+    Mark,
+    Panel,
+    Plot,
+    Series,
+    Table,
+    Text,
+    text,
+)
 from rockcheck.validation.studies.work_precision.runs import BenchmarkRun, Play
 from rockcheck.validation.studies.work_precision.savings import Saving
 from rockcheck.validation.studies.work_precision.study import Measure, Measured, WorkPrecision
@@ -20,10 +31,31 @@ PHONE = {"viewport": {"width": 390, "height": 800}}
 
 
 def benchmark_page(folder: Path) -> Path:
-    lines = (("ebm", 1e-6, 1e-6, 1e-5), ("ebm", 1e-8, 1e-8, 2e-5), ("cm", 1e-5, 1e-3, 1e-3), ("cm", 1e-6, 1e-4, 3e-3))
+    lines = (
+        ("ebm", 1e-6, 1e-6, 1e-5),
+        ("ebm", 1e-8, 1e-8, 2e-5),
+        ("cm", 1e-5, 1e-3, 1e-3),
+        ("cm", 1e-6, 1e-4, 3e-3),
+    )
     done: dict[object, object] = {
         Play(family, member, line, value): Measured(
-            run=BenchmarkRun(family, member, line, value, 3.0, error, 2.0 * error, error, 0.1 * error, 0.1, 1e-3, cpu, cpu, 0.1, 1000)
+            run=BenchmarkRun(
+                family,
+                member,
+                line,
+                value,
+                3.0,
+                error,
+                2.0 * error,
+                error,
+                0.1 * error,
+                0.1,
+                1e-3,
+                cpu,
+                cpu,
+                0.1,
+                1000,
+            )
         )
         for family in ("free", "wall 53 mm e 0", "long 53 mm e 0.5", "short 3 mm e 0")
         for member in range(3)
@@ -36,16 +68,31 @@ def benchmark_page(folder: Path) -> Path:
 
 
 def marked_page(folder: Path) -> Path:
-    """What the benchmark's page has none of: verdicts, links, folded blocks, failures, a curve to be read."""
-    rows = [["a", "ebm", Mark(1.0, "pass")], ["b", "cm", Mark(2.0, "fail", "too long", link="run.json")]]
+    """What the benchmark's page has none of: verdicts, links, folded blocks, failures, a curve to
+    be read."""
+    rows = [
+        ["a", "ebm", Mark(1.0, "pass")],
+        ["b", "cm", Mark(2.0, "fail", "too long", link="run.json")],
+    ]
     columns = [text("name"), Column("model", kind="model"), Column("x", "length", "m")]
-    curve = Panel("", [Series("a", [1.0, 2.0], [3.0, None], [2.0, None], [4.0, None]), Series("b", [1.0, 2.0], [1.0, 2.0], style="thin")])
+    curve = Panel(
+        "",
+        [
+            Series("a", [1.0, 2.0], [3.0, None], [2.0, None], [4.0, None]),
+            Series("b", [1.0, 2.0], [1.0, 2.0], style="thin"),
+        ],
+    )
     blocks = [
         Text("no mode is consistent", title="Words", items=["one"], verdict="fail"),
         Table("rows", columns, rows, "Rows", "A note.", folded=True),
         Plot("curve", "Curves", panels=[curve], x=Axis("t, s"), y=Axis("x, m"), live=True),
     ]
-    return publish(Finding("made", "Made up", "It fails.", blocks, verdict="fail", failures={"a": "it blew up"}), folder)
+    return publish(
+        Finding(
+            "made", "Made up", "It fails.", blocks, verdict="fail", failures={"a": "it blew up"}
+        ),
+        folder,
+    )
 
 
 STUDIES = {
@@ -83,4 +130,8 @@ def test_accessible(browser, studies, name):
         page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
         found = Axe().run(page).response["violations"]
         page.close()
-        assert [v["id"] + ": " + v["nodes"][0]["html"][:120] for v in found if v["impact"] in ("serious", "critical")] == []
+        assert [
+            v["id"] + ": " + v["nodes"][0]["html"][:120]
+            for v in found
+            if v["impact"] in ("serious", "critical")
+        ] == []

@@ -1,4 +1,5 @@
-"""The cache of compiled code: what lies in it is unpickled and run, so it must be the user's own, and whole."""
+"""The cache of compiled code: what lies in it is unpickled and run, so it must be the user's own,
+and whole."""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ from rockcheck.validation.execute.warming import PARTS
 
 posix = pytest.mark.skipif(os.name != "posix", reason="owners and modes as POSIX has them")
 
-#: A package of one kernel, played in a process of its own; says how many functions were read from the cache and how many compiled.
+#: A package of one kernel, played in a process of its own; says how many functions were read from
+#: the cache and how many compiled.
 _TINY = """
 import numpy as np
 from rockcheck.scenes.compiled import inner_kernel, kernel
@@ -60,9 +62,20 @@ def play(tmp_path):
 
     def play(said: str, **environment: str) -> str:
         """Play the kernel in a new process; returns its stderr."""
-        place = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "HOME": str(tmp_path), "XDG_CACHE_HOME": ""} | environment
+        place = {
+            "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+            "HOME": str(tmp_path),
+            "XDG_CACHE_HOME": "",
+        } | environment
         command = [sys.executable, str(tmp_path / "tiny" / "kernels.py")]
-        done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **place}, timeout=120, check=False)
+        done = subprocess.run(
+            command,
+            capture_output=True,
+            text=True,
+            env={**os.environ, **place},
+            timeout=120,
+            check=False,
+        )
         assert done.returncode == 0, done.stderr
         assert done.stdout == f"{said}\n"
         return done.stderr
@@ -74,7 +87,11 @@ def play(tmp_path):
 def test_an_inner_kernel_is_linked_and_no_machine_code_is_made_of_it_alone(monkeypatch):
     emitted = []
     finish = compiled.JITCodeLibrary._finalize_specific
-    monkeypatch.setattr(compiled.JITCodeLibrary, "_finalize_specific", lambda self: (emitted.append(type(self)), finish(self)))
+    monkeypatch.setattr(
+        compiled.JITCodeLibrary,
+        "_finalize_specific",
+        lambda self: (emitted.append(type(self)), finish(self)),
+    )
 
     @compiled.inner_kernel
     def lowest(x, y):
@@ -95,11 +112,12 @@ def test_an_inner_kernel_is_linked_and_no_machine_code_is_made_of_it_alone(monke
 
 
 def test_the_machine_code_for_some_types_is_the_kernel_that_is_kept(tmp_path, play):
-    """A loop in Python takes it once: found for the types of tuples and arrays, and read back by the next process."""
+    """A loop in Python takes it once: found for the types of tuples and arrays, and read back by
+    the next process."""
     (tmp_path / "tiny" / "kernels.py").write_text(
-        _TINY.replace("assert doubled(np", "assert for_types_of(doubled, np.ones(1))(np", 1).replace(
-            "import inner_kernel", "import for_types_of, inner_kernel"
-        )
+        _TINY.replace(
+            "assert doubled(np", "assert for_types_of(doubled, np.ones(1))(np", 1
+        ).replace("import inner_kernel", "import for_types_of, inner_kernel")
     )
     assert play("0 read, 2 compiled") == ""
     assert play("2 read, 0 compiled") == ""
@@ -131,7 +149,18 @@ def test_the_key_is_of_all_that_lies_below_the_package(tmp_path, monkeypatch):
     assert len(keys) == 2
 
 
-@pytest.mark.parametrize("damage", ["cut short", "a flipped bit", "empty", "a folder", "a pipe", "another's pickle", "a link to nowhere"])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        "cut short",
+        "a flipped bit",
+        "empty",
+        "a folder",
+        "a pipe",
+        "another's pickle",
+        "a link to nowhere",
+    ],
+)
 def test_a_damaged_file_is_compiled_again(tmp_path, play, damage):
     """And what the planted pickle would do is not done."""
     play("0 read, 2 compiled")
@@ -176,7 +205,9 @@ def test_the_folder_is_closed_to_others(tmp_path, play):
 
 
 @posix
-@pytest.mark.parametrize("fault", ["open to others", "a link", "below a folder that all may change"])
+@pytest.mark.parametrize(
+    "fault", ["open to others", "a link", "below a folder that all may change"]
+)
 def test_a_folder_that_others_may_change_is_not_used(tmp_path, play, fault):
     """The next place is taken, or none: then one line says so."""
     play("0 read, 2 compiled")
@@ -189,7 +220,10 @@ def test_a_folder_that_others_may_change_is_not_used(tmp_path, play, fault):
     else:
         folder.parent.chmod(0o777)
     said = play("0 read, 2 compiled")
-    assert said == "rockcheck: no private folder for compiled code, each run compiles anew: set NUMBA_CACHE_DIR to one of your own\n"
+    assert (
+        said
+        == "rockcheck: no private folder for compiled code, each run compiles anew: set NUMBA_CACHE_DIR to one of your own\n"
+    )
 
 
 @posix
@@ -203,12 +237,15 @@ def test_a_folder_of_another_user_is_not_used(tmp_path, monkeypatch):
 
 @posix
 def test_no_folder_that_could_be_foreseen(tmp_path, play):
-    """Where the package's folder cannot be written, the user's own cache is taken, never a common one."""
+    """Where the package's folder cannot be written, the user's own cache is taken, never a common
+    one."""
     (tmp_path / "tiny" / "__pycache__").write_text("not a folder")
     assert play("0 read, 2 compiled", NUMBA_CACHE_DIR="") == ""
     assert len(list((tmp_path / ".cache" / "rockcheck").glob("tiny-kernels-*/*.nbc"))) == 2
     assert play("2 read, 0 compiled", NUMBA_CACHE_DIR="") == ""
-    assert "no private folder" in play("0 read, 2 compiled", NUMBA_CACHE_DIR="", XDG_CACHE_HOME="/dev/null")
+    assert "no private folder" in play(
+        "0 read, 2 compiled", NUMBA_CACHE_DIR="", XDG_CACHE_HOME="/dev/null"
+    )
 
 
 def test_without_the_compiler(play):
@@ -220,7 +257,14 @@ def test_everything_can_be_imported_without_the_compiler():
     imports = "import rockcheck, rockcheck.ebm, rockcheck.cm, rockcheck.engines, rockcheck.ebm.core.bouc_wen"
     play = "scene = rockcheck.load_scene('fig4a').replace(duration=0.2); print(rockcheck.EventBasedModel().simulate(scene).outcome)"
     command = [sys.executable, "-c", f"{imports}; {play}"]
-    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, timeout=300, check=False)
+    done = subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        timeout=300,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr[-2000:]
     assert done.stdout == "at rest\n"
 
@@ -232,7 +276,9 @@ def test_the_wait_for_compiled_code_can_be_interrupted(tmp_path):
     script.write_text(_SLOW)
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     for how in ("one", "many"):
-        with subprocess.Popen([sys.executable, str(script), how], stdout=subprocess.PIPE, text=True, env=environment) as running:
+        with subprocess.Popen(
+            [sys.executable, str(script), how], stdout=subprocess.PIPE, text=True, env=environment
+        ) as running:
             try:
                 assert running.stdout is not None
                 assert running.stdout.readline() == "begins\n"
@@ -249,7 +295,8 @@ import os, signal, sys
 from rockcheck.scenes.compiled import kernel
 from rockcheck.scenes.threads import interruptible, threads
 
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs, and all that they start, ignore Ctrl-C
+# a shell's background jobs, and all that they start, ignore Ctrl-C
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 @kernel
 def spin(count):
@@ -298,7 +345,9 @@ def test_the_call_after_an_interrupted_one_works_while_that_one_goes_on():
     previous = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
-            threads.interruptible(lambda: (os.kill(os.getpid(), signal.SIGINT), released.wait(60.0)))
+            threads.interruptible(
+                lambda: (os.kill(os.getpid(), signal.SIGINT), released.wait(60.0))
+            )
         assert threads.interruptible(lambda: 3) == 3
         assert not released.is_set()
     finally:
@@ -307,8 +356,11 @@ def test_the_call_after_an_interrupted_one_works_while_that_one_goes_on():
 
 
 def compilation(compiling, module):
-    """A compilation of a function of that module, as numba tells of it, that takes a tenth of a second."""
-    event = SimpleNamespace(data={"dispatcher": SimpleNamespace(py_func=SimpleNamespace(__module__=module))})
+    """A compilation of a function of that module, as numba tells of it, that takes a tenth of a
+    second."""
+    event = SimpleNamespace(
+        data={"dispatcher": SimpleNamespace(py_func=SimpleNamespace(__module__=module))}
+    )
     compiling.on_start(event)
     compiling.on_start(event)  # of a function that it calls
     time.sleep(0.1)
@@ -317,7 +369,8 @@ def compilation(compiling, module):
 
 
 def test_a_long_compilation_is_announced_once_a_package(monkeypatch):
-    """Whoever waits knows for what; of one that is quick nothing is said, nor where nobody asked."""
+    """Whoever waits knows for what; of one that is quick nothing is said, nor where nobody
+    asked."""
     heard, compiling = [], compiled._Compiling()
     monkeypatch.setattr(compiled, "_SILENT", 60.0)
     with announcing(heard.append):
@@ -335,7 +388,8 @@ def test_a_long_compilation_is_announced_once_a_package(monkeypatch):
 
 
 def test_a_worker_announces_on_the_runs_own_stderr(capfd):
-    """Its output goes nowhere otherwise; and it says nothing where the run does not want to hear of it."""
+    """Its output goes nowhere otherwise; and it says nothing where the run does not want to hear of
+    it."""
     calls = [Call(announce, ("compiling",)), Call(print, ("noise",))]
     with announcing(lambda words: None), Pool(1) as pool:
         assert [ended.error for ended in pool.run(deque(calls))] == [None, None]
@@ -357,14 +411,18 @@ def test_what_is_compiled_ahead_is_not_compiled_again(capsys):
     code = (
         "from rockcheck.validation.execute.warming import PARTS;"
         "[run() for run in PARTS.values()];"
-        "from rockcheck.ebm.core import march; print(sum(march.run.stats.cache_misses.values()), len(march.run.signatures) <= 3)"
+        "from rockcheck.ebm.core import march; print(sum(march.run.stats.cache_misses.values()),"
+        " len(march.run.signatures) <= 3)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True
+    )
     assert done.stdout == "0 True\n"
 
 
 def test_each_kind_of_call_is_typed_once(monkeypatch):
-    """numba tries all that an operator may mean; for the same types what it found goes for all places. Afterwards numba is as it was."""
+    """numba tries all that an operator may mean; for the same types what it found goes for all
+    places. Afterwards numba is as it was."""
     plain, asked = numba.types.functions.BaseFunction.get_call_type, []
 
     def counted(self, context, args, kws):

@@ -50,14 +50,26 @@ def test_a_scene_file(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("duration = 8.0", "duration = -8.0", "duration: -8.0 is not allowed: input should be greater than 0"),
+        (
+            "duration = 8.0",
+            "duration = -8.0",
+            "duration: -8.0 is not allowed: input should be greater than 0",
+        ),
         ("duration = 8.0", "", "duration: is missing"),
         ("duration = 8.0", "durations = 8.0", "durations: unknown key; did you mean 'duration'"),
         ("duration = 8.0", "duration = 8.0\ncolour = 1", "colour: unknown key"),
         ("duration = 8.0", "duration = nan", "duration: nan is not allowed"),
-        ("half_width = 0.397", "half_width = -0.397", "block.half_width: -0.397 is not allowed: input should be greater than 0"),
+        (
+            "half_width = 0.397",
+            "half_width = -0.397",
+            "block.half_width: -0.397 is not allowed: input should be greater than 0",
+        ),
         ("half_width = 0.397", 'half_width = "0.397"', "block.half_width: 0.397 is not allowed"),
-        ("friction = 0.3", "friction = 1.4", "floor.friction: 1.4 is not allowed: must be below 4/3"),
+        (
+            "friction = 0.3",
+            "friction = 1.4",
+            "floor.friction: 1.4 is not allowed: must be below 4/3",
+        ),
         ('side = "left"', 'side = "top"', "walls.0.side: top is not allowed"),
         ('kind = "ricker"', 'kind = "morlet"', "excitation"),
         ("period = 0.98", "period = 0.98\nfile = 'a.AT2'", "excitation.file: unknown key"),
@@ -83,18 +95,28 @@ def test_files_that_cannot_be_read(tmp_path):
 
 
 def test_a_record_is_looked_up_beside_the_file_then_in_the_package(tmp_path):
-    text = TEXT.split("[excitation]")[0] + '[excitation]\nkind = "record"\nfile = "elcentro_1940_ns.csv"\nscale = 1.6\n'
+    text = (
+        TEXT.split("[excitation]")[0]
+        + '[excitation]\nkind = "record"\nfile = "elcentro_1940_ns.csv"\nscale = 1.6\n'
+    )
     path = written(tmp_path, text)
     assert len(load_scene(path).excitation.unscaled) > 1000
     (tmp_path / "elcentro_1940_ns.csv").write_text("time_s,acceleration_g\n0,0.1\n0.1,0.2\n")
     assert len(load_scene(path).excitation.unscaled) == 2
-    missing = written(tmp_path, text.replace("elcentro_1940_ns.csv", "../elcentro_1940_ns.csv"), "outside.toml")
+    missing = written(
+        tmp_path, text.replace("elcentro_1940_ns.csv", "../elcentro_1940_ns.csv"), "outside.toml"
+    )
     assert "cannot be read" in fault_of(missing)
 
 
 @pytest.mark.parametrize(
     ("name", "friction", "gap", "restitution"),
-    [("fig4a", 0.3, None, None), ("fig4b", 0.6, None, None), ("fig5a", 0.3, 0.053, 0.0), ("fig5b", 0.3, 0.053, 0.5)],
+    [
+        ("fig4a", 0.3, None, None),
+        ("fig4b", 0.6, None, None),
+        ("fig5a", 0.3, 0.053, 0.0),
+        ("fig5b", 0.3, 0.053, 0.5),
+    ],
 )
 def test_the_papers_scenes(name, friction, gap, restitution):
     assert name in named_scenes()

@@ -1,4 +1,5 @@
-"""The scenes that are not the paper's teach what their description, and docs/gallery.md, says they do: played by the reference."""
+"""The scenes that are not the paper's teach what their description, and docs/gallery.md, says they
+do: played by the reference."""
 
 from __future__ import annotations
 
@@ -53,8 +54,13 @@ def test_the_loaded_rack_falls_to_its_heavy_side_only():
     turned = scene.replace(excitation=scene.excitation.scaled(-1.0))
     assert [played(one).outcome for one in (scene, turned)] == ["overturned right", "at rest"]
     plain = load_scene("rack").block
-    assert (plain.half_width, plain.half_height) == (scene.block.half_width, scene.block.half_height)
-    assert not any(played(one.replace(block=plain)).outcome.startswith("overturned") for one in (scene, turned))
+    assert (plain.half_width, plain.half_height) == (
+        scene.block.half_width,
+        scene.block.half_height,
+    )
+    assert not any(
+        played(one.replace(block=plain)).outcome.startswith("overturned") for one in (scene, turned)
+    )
     assert [round(scene.block.pivot(side).alpha, 2) for side in ("left", "right")] == [0.47, 0.29]
 
 

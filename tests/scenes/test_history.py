@@ -55,7 +55,12 @@ def test_save_and_load_round_trip(history, tmp_path):
     path = tmp_path / "run.csv"
     history.save(path)
     again = History.load(path)
-    assert (again.name, again.model, again.outcome, again.notes) == ("observed", "model", "moving", ("a note, with a comma",))
+    assert (again.name, again.model, again.outcome, again.notes) == (
+        "observed",
+        "model",
+        "moving",
+        ("a note, with a comma",),
+    )
     assert (again.half_width, again.half_height, again.alpha) == (0.4, 1.6, SCENE.block.alpha)
     assert again.cost == history.cost
     assert again.settings == history.settings
@@ -67,12 +72,21 @@ def test_save_and_load_round_trip(history, tmp_path):
 
 
 def test_a_loaded_blocks_history_keeps_where_its_mass_is(tmp_path):
-    """The block comes back, its moment of inertia per unit mass; a history of a homogeneous one says nothing of it."""
-    block = Block(half_width=0.4, half_height=1.6, mass=20.0, centre_of_mass=(0.1, -0.3), moment_of_inertia=12.0)
+    """The block comes back, its moment of inertia per unit mass; a history of a homogeneous one
+    says nothing of it."""
+    block = Block(
+        half_width=0.4,
+        half_height=1.6,
+        mass=20.0,
+        centre_of_mass=(0.1, -0.3),
+        moment_of_inertia=12.0,
+    )
     path = tmp_path / "run.csv"
     observe(SCENE.replace(block=block), "model", states(np.zeros(11)), outcome="at rest").save(path)
     again = History.load(path)
-    assert again.block == Block(half_width=0.4, half_height=1.6, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.6)
+    assert again.block == Block(
+        half_width=0.4, half_height=1.6, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.6
+    )
     assert again.alpha == block.alpha == math.atan2(0.4 - 0.1, 1.6 - 0.3)
     observe(SCENE, "model", states(np.zeros(11)), outcome="at rest").save(path)
     assert "centre_of_mass" not in path.read_text(encoding="utf-8")
@@ -85,7 +99,12 @@ def test_a_compressed_history_is_the_same_and_opens_in_pandas(history, tmp_path)
     history.save(path)
     written = path.read_bytes()
     history.save(tmp_path / "run.csv")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["run.csv", "run.csv.gz", "run.events.csv", "run.events.csv.gz"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        "run.csv",
+        "run.csv.gz",
+        "run.events.csv",
+        "run.events.csv.gz",
+    ]
     assert {f"run{ending}": content for ending, content in history.packed().items()} == {
         p.name: p.read_bytes() for p in tmp_path.iterdir() if p.suffix == ".gz"
     }
@@ -106,8 +125,13 @@ def test_a_damaged_compressed_history(history, tmp_path, damage):
     content = bytearray(path.read_bytes())
     if damage == "flipped":
         content[len(content) // 2] ^= 0xFF
-    path.write_bytes(content[:5] if damage == "cut" else content[:-8] if damage == "no end" else content)
-    with pytest.raises(InputError, match=r"^[^\n]*run\.csv\.gz: (a compressed file that is damaged|not a CSV table)"):
+    path.write_bytes(
+        content[:5] if damage == "cut" else content[:-8] if damage == "no end" else content
+    )
+    with pytest.raises(
+        InputError,
+        match=r"^[^\n]*run\.csv\.gz: (a compressed file that is damaged|not a CSV table)",
+    ):
         History.load(path)
 
 
@@ -122,12 +146,25 @@ def test_a_compressed_table_is_bounded(tmp_path, monkeypatch):
 
 
 def test_another_compressed_file_is_refused(history, tmp_path):
-    with pytest.raises(InputError, match=r"written as \.csv, \.csv\.gz, \.json, \.mat or \.parquet"):
+    with pytest.raises(
+        InputError, match=r"written as \.csv, \.csv\.gz, \.json, \.mat or \.parquet"
+    ):
         history.save(tmp_path / "run.json.gz")
 
 
 def test_tables(history):
-    assert list(history.frame.columns) == ["t", "x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate", "mode"]
+    assert list(history.frame.columns) == [
+        "t",
+        "x",
+        "y",
+        "theta",
+        "x_dot",
+        "y_dot",
+        "theta_dot",
+        "slip",
+        "slip_rate",
+        "mode",
+    ]
     assert len(history.frame) == 11
     assert list(history.events["kind"]) == ["uplift", "floor impact"]
     assert history.peak_rotation == 0.1
@@ -139,7 +176,12 @@ def test_a_plain_table_is_a_measured_history(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text("time,theta,t\n9,0.0,0\n9,0.1,0.5\n9,0.00001,1\n")
     history = History.load(path)
-    assert (history.name, history.model, history.outcome, history.alpha) == ("table", "measured", "at rest", None)
+    assert (history.name, history.model, history.outcome, history.alpha) == (
+        "table",
+        "measured",
+        "at rest",
+        None,
+    )
     assert set(history.channels) == {"t", "theta"}
     assert list(history.event_list) == []
     path.write_text("t,theta\n0,0\n1,-1.57\n")
@@ -176,7 +218,10 @@ def rows_about(text: str) -> str:
         (rows_about('{"settings": []}'), "column 'rockcheck_history': not written by rockcheck"),
         (rows_about('{"notes": "x"}'), "column 'rockcheck_history': not written by rockcheck"),
         (rows_about('{"half_width": -1}'), "half_width: -1 is not allowed"),
-        (rows_about('{"half_width": 1, "half_height": 2, "centre_of_mass": [3, 0]}'), "centre_of_mass: (3, 0) is not allowed"),
+        (
+            rows_about('{"half_width": 1, "half_height": 2, "centre_of_mass": [3, 0]}'),
+            "centre_of_mass: (3, 0) is not allowed",
+        ),
         (rows_about('{"half_width": "1"}'), "half_width: 1 is not allowed"),
         (rows_about('{"half_height": true}'), "half_height: True is not allowed"),
         (rows_about('{"half_height": Infinity}'), "half_height: inf is not allowed"),
@@ -199,7 +244,9 @@ def test_pandas_reads_the_table_without_an_option(tmp_path):
     history = observe(scene, "model", states(0.1 * np.sin(scene.output_times)))
     history.save(tmp_path / "run.csv")
     frame = pd.read_csv(tmp_path / "run.csv")
-    pd.testing.assert_frame_equal(frame[list(COLUMNS)], history.frame, check_exact=False, rtol=1e-14)
+    pd.testing.assert_frame_equal(
+        frame[list(COLUMNS)], history.frame, check_exact=False, rtol=1e-14
+    )
     assert list(frame.columns) == [*COLUMNS, "rockcheck_history"]
     assert json.loads(frame["rockcheck_history"][0])["outcome"] == history.outcome
     assert set(frame["rockcheck_history"][1:]) == {"-"}
@@ -209,7 +256,9 @@ def test_pandas_reads_the_table_without_an_option(tmp_path):
 def test_hostile_events(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text(ROWS)
-    (tmp_path / "run.events.csv").write_text("t,kind,mode_before,mode_after,impulse\nsoon,uplift,,,0\n")
+    (tmp_path / "run.events.csv").write_text(
+        "t,kind,mode_before,mode_after,impulse\nsoon,uplift,,,0\n"
+    )
     with pytest.raises(InputError, match=r"run\.events\.csv: not an events table"):
         History.load(path)
 
@@ -244,7 +293,11 @@ def test_overturning_cuts_the_rows(side):
 
 
 def test_columns_as_csv_have_all_digits_and_no_word_for_what_is_not_a_number():
-    columns = {"a": [0.1 + 0.2, math.nan, -0.0], "b": ["x, y", "", "z"], "c": [1e-300, 1.0, math.inf]}
+    columns = {
+        "a": [0.1 + 0.2, math.nan, -0.0],
+        "b": ["x, y", "", "z"],
+        "c": [1e-300, 1.0, math.inf],
+    }
     assert columns_text(columns) == 'a,b,c\n0.30000000000000004,"x, y",1e-300\n,,1.0\n-0.0,z,inf\n'
     assert columns_text(columns) == pd.DataFrame(columns).to_csv(index=False, lineterminator="\n")
 
@@ -253,9 +306,16 @@ def test_columns_as_csv_have_all_digits_and_no_word_for_what_is_not_a_number():
 @pytest.mark.parametrize("column", ["t", "theta", "x", "half_width"])
 def test_what_is_too_large_to_square_is_bad_input(tmp_path, column, value):
     """Not warnings of the arithmetic later on."""
-    about = json.dumps({"half_width": float(value)}).replace('"', '""') if column == "half_width" else "{}"
+    about = (
+        json.dumps({"half_width": float(value)}).replace('"', '""')
+        if column == "half_width"
+        else "{}"
+    )
     cells = {"t": "1", "theta": "0", "x": "0", column: value}
     path = tmp_path / "h.csv"
-    path.write_text(f't,theta,x,rockcheck_history\n-1e300,0,0,"{about}"\n'.replace("-1e300", "-2") + "{t},{theta},{x},-\n".format(**cells))
+    path.write_text(
+        f't,theta,x,rockcheck_history\n-1e300,0,0,"{about}"\n'.replace("-1e300", "-2")
+        + "{t},{theta},{x},-\n".format(**cells)
+    )
     with pytest.raises(InputError, match=column):
         History.load(path)

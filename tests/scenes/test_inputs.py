@@ -1,4 +1,5 @@
-"""Numbers that are not known exactly: how they are distributed, what is refused, where they stand in a scene."""
+"""Numbers that are not known exactly: how they are distributed, what is refused, where they stand
+in a scene."""
 
 from __future__ import annotations
 
@@ -20,7 +21,10 @@ def test_a_lognormal_number_has_its_mean_and_standard_deviation(cv):
 
 
 def test_a_uniform_number_by_its_standard_deviation_or_its_bounds():
-    for law in (Spread(value=3.0, sd=0.5, distribution="uniform").law, Spread(low=3.0 - 0.75**0.5, high=3.0 + 0.75**0.5).law):
+    for law in (
+        Spread(value=3.0, sd=0.5, distribution="uniform").law,
+        Spread(low=3.0 - 0.75**0.5, high=3.0 + 0.75**0.5).law,
+    ):
         assert (law.mean(), law.std()) == pytest.approx((3.0, 0.5), rel=1e-12)
         assert law.support() == pytest.approx((3.0 - 0.5 * 3**0.5, 3.0 + 0.5 * 3**0.5), rel=1e-12)
     assert Spread(low=1.0, high=2.0).nominal == 1.5
@@ -70,7 +74,15 @@ def test_numbers_stand_where_they_were_written():
     scene, spreads = made()
     assert list(spreads) == ["duration", "block.half_width", "walls.right.gap"]
     assert (scene.duration, scene.block.half_width, scene.wall("right").gap) == (2.0, 0.4, 0.05)
-    other = with_numbers(scene, {"duration": 3.0, "block.half_width": 0.35, "block.half_height": 1.5, "walls.right.gap": 0.02})
+    other = with_numbers(
+        scene,
+        {
+            "duration": 3.0,
+            "block.half_width": 0.35,
+            "block.half_height": 1.5,
+            "walls.right.gap": 0.02,
+        },
+    )
     assert (other.duration, other.block.half_width, other.block.half_height) == (3.0, 0.35, 1.5)
     assert (other.wall("left").gap, other.wall("right").gap) == (0.06, 0.02)
 

@@ -71,7 +71,12 @@ NAMES = ("scene", "history", "discrepancy", "spectrum")
 def test_shows_itself_as_a_table(things, name):
     shown = Tags(things[name]._repr_html_())
     assert shown.tags <= {"table", "caption", "b", "tr", "th", "td"}
-    expected = {"scene": "4 m/s²", "history": "at rest", "discrepancy": "RMS difference of rotation", "spectrum": "6, from 6 runs"}
+    expected = {
+        "scene": "4 m/s²",
+        "history": "at rest",
+        "discrepancy": "RMS difference of rotation",
+        "spectrum": "6, from 6 runs",
+    }
     assert expected[name] in shown.text
 
 
@@ -94,7 +99,9 @@ def test_the_lines_are_the_history(history):
 def test_the_difference_is_the_candidate_less_the_reference(things):
     line = things["discrepancy"].plot().axes[1].lines[0]
     rms = float(np.sqrt(np.mean(np.square(line.get_ydata()))))
-    assert rms == pytest.approx(things["discrepancy"]["theta_rms"], rel=0.02)  # the measure integrates in time
+    assert rms == pytest.approx(
+        things["discrepancy"]["theta_rms"], rel=0.02
+    )  # the measure integrates in time
 
 
 def test_one_model_twice_has_two_colours(history):
@@ -105,7 +112,14 @@ def test_one_model_twice_has_two_colours(history):
 def test_of_a_fallen_block_the_way_to_the_balance_point_is_drawn_and_the_time():
     t = np.linspace(0.0, 1.6, 161)
     sizes = {"half_width": 0.4, "half_height": 1.6}
-    fallen = History(name="a", model="m", channels={"t": t, "theta": t}, event_list=(), outcome="overturned left", **sizes)
+    fallen = History(
+        name="a",
+        model="m",
+        channels={"t": t, "theta": t},
+        event_list=(),
+        outcome="overturned left",
+        **sizes,
+    )
     axes = fallen.plot().axes[0]
     assert axes.get_title() == "a, m: overturned left at 1.53 s"
     assert axes.get_ylim()[1] == pytest.approx(1.3)
@@ -113,22 +127,37 @@ def test_of_a_fallen_block_the_way_to_the_balance_point_is_drawn_and_the_time():
 
 
 def test_a_loaded_block_says_where_its_mass_is():
-    """Its table names both pivots, its picture marks the mass's centre; a homogeneous block's has neither."""
-    block = Block(half_width=0.3, half_height=1.0, mass=400.0, centre_of_mass=(0.08, -0.25), moment_of_inertia=110.0)
+    """Its table names both pivots, its picture marks the mass's centre; a homogeneous block's has
+    neither."""
+    block = Block(
+        half_width=0.3,
+        half_height=1.0,
+        mass=400.0,
+        centre_of_mass=(0.08, -0.25),
+        moment_of_inertia=110.0,
+    )
     loaded = Scene(name="rack", block=block, floor=Floor(friction=0.5), duration=1.0)
     plain = loaded.replace(block=Block(half_width=0.3, half_height=1.0))
     shown = " ".join(loaded._repr_html_().split())
     assert "0.08 m right of the box&#x27;s, 0.25 m below it; radius of gyration 0.524 m" in shown
     assert "left α = 0.469 rad, right α = 0.285 rad" in shown
     assert "pivots" not in plain._repr_html_()
-    marks, none = ([line.get_xydata() for line in one.plot().axes[0].lines if line.get_marker() == "+"] for one in (loaded, plain))
+    marks, none = (
+        [line.get_xydata() for line in one.plot().axes[0].lines if line.get_marker() == "+"]
+        for one in (loaded, plain)
+    )
     np.testing.assert_allclose(marks[0], [[0.08, 0.75]])
     assert none == []
 
 
 def test_text_is_escaped():
     made = History(
-        name=NASTY, model=NASTY, channels={"t": np.arange(3.0), "theta": np.zeros(3)}, event_list=(), outcome=NASTY, notes=(NASTY,)
+        name=NASTY,
+        model=NASTY,
+        channels={"t": np.arange(3.0), "theta": np.zeros(3)},
+        event_list=(),
+        outcome=NASTY,
+        notes=(NASTY,),
     )
     for thing in (made, compare(made, made)):
         shown = Tags(thing._repr_html_())
@@ -140,7 +169,14 @@ def test_text_is_escaped():
 def test_nothing_heavy_is_imported_to_show_a_table():
     code = (
         "import sys; from rockcheck import Block, Floor, Scene;"
-        "Scene(name='a', block=Block(half_width=1.0, half_height=2.0), floor=Floor(friction=0.5), duration=1.0)._repr_html_();"
-        "print(sorted({'matplotlib', 'pandas', 'numba', 'mujoco', 'pybullet'} & sys.modules.keys()))"
+        "Scene(name='a', block=Block(half_width=1.0, half_height=2.0), floor=Floor(friction=0.5),"
+        " duration=1.0)._repr_html_();"
+        "print(sorted({'matplotlib', 'pandas', 'numba', 'mujoco', 'pybullet'} &"
+        " sys.modules.keys()))"
     )
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout
+        == "[]\n"
+    )

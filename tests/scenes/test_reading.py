@@ -1,4 +1,5 @@
-"""Reading is bounded: whatever a file holds, and whatever it is, it is read or refused within seconds and with little memory."""
+"""Reading is bounded: whatever a file holds, and whatever it is, it is read or refused within
+seconds and with little memory."""
 
 from __future__ import annotations
 
@@ -27,12 +28,17 @@ LONG = {
     "digits.csv": "time_s,acceleration_g\n0,1\n0.1," + "1" * 100_000 + "x\n",
     "field.csv": 'time_s,acceleration_g\n0,1\n0.1,"' + "1" * 200_000 + '"\n',
     "count.V2": "1 points of accel data equally spaced at " + "1" * 100_000 + " sec\n1",
-    "blanks.V2": "1 points of accel data equally spaced at .01 sec" + " " * 100_000 + "\n" + " " * 100_000,
+    "blanks.V2": "1 points of accel data equally spaced at .01 sec"
+    + " " * 100_000
+    + "\n"
+    + " " * 100_000,
     "blocks.V2": "1 points of accel data equally spaced at .01 sec, in g\n1\n" * 20_000,
     "wide.V2": "9 Real-header values follow on 9 lines, Format= (999F999.1)\n" * 20_000,
     "keys.ASC": "SAMPLING_INTERVAL_S: 1\n" + "A" * 1_000_000,
     "lines.ASC": "SAMPLING_INTERVAL_S: 1\n" * 50_000,
-    "scale.NS": "Origin Time\nScale Factor      " + "1" * 1_000_000 + "\nSampling Freq(Hz) 1\nMemo.\n1",
+    "scale.NS": "Origin Time\nScale Factor      "
+    + "1" * 1_000_000
+    + "\nSampling Freq(Hz) 1\nMemo.\n1",
     "commas.txt": "1," * 500_000,
     "digits.txt": "1" * 1_000_000 + "," + "1" * 1_000_000,
     "words.txt": "a " * 500_000,
@@ -68,11 +74,19 @@ print("read or refused")
 """
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="limits of processor time are set as POSIX does")
+@pytest.mark.skipif(
+    sys.platform == "win32", reason="limits of processor time are set as POSIX does"
+)
 @pytest.mark.parametrize("name", LONG)
 def test_any_file_of_a_megabyte_is_read_or_refused_within_ten_seconds(tmp_path, name):
     (tmp_path / name).write_text(LONG[name])
-    done = subprocess.run([sys.executable, "-c", _READ, str(tmp_path / name)], capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", _READ, str(tmp_path / name)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr[-2000:]
     assert done.stdout == "read or refused\n"
 
@@ -133,26 +147,43 @@ def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
     scene = 'duration = 1.0\nblock = { half_width = 0.3, half_height = 1.0 }\nfloor = { friction = 0.4 }\nname = "a"\n'
     (tmp_path / "a.toml").write_text(scene, encoding="utf-8-sig")
     assert load_scene(tmp_path / "a.toml").name == "a"
-    (tmp_path / "a.csv").write_text("time_s,acceleration_m_s2\n0.0,0.1\n0.5,0.2\n", encoding="utf-8-sig")
+    (tmp_path / "a.csv").write_text(
+        "time_s,acceleration_m_s2\n0.0,0.1\n0.5,0.2\n", encoding="utf-8-sig"
+    )
     assert read_record(tmp_path / "a.csv").time_step == 0.5
     for remark in ("", '"{""name"": ""kept"", ""outcome"": ""at rest""}"'):
         path = tmp_path / "h.csv"
         path.write_text(
-            f"t,theta,rockcheck_history\n0,0.5,{remark}\n1,0.25,\n" if remark else "t,theta\n0,0.5\n1,0.25\n", encoding="utf-8-sig"
+            f"t,theta,rockcheck_history\n0,0.5,{remark}\n1,0.25,\n"
+            if remark
+            else "t,theta\n0,0.5\n1,0.25\n",
+            encoding="utf-8-sig",
         )
         history = History.load(path)
         assert history.channels["theta"].tolist() == [0.5, 0.25]
         assert history.outcome == ("at rest" if remark else "moving")
 
 
-@pytest.mark.parametrize("key", ["a" + ".a" * 50, "a" + " . a" * 50, '" "' + '." "' * 50, "[a" + ".a" * 50 + "]", '"a."' + ".'.'" * 50])
+@pytest.mark.parametrize(
+    "key",
+    [
+        "a" + ".a" * 50,
+        "a" + " . a" * 50,
+        '" "' + '." "' * 50,
+        "[a" + ".a" * 50 + "]",
+        '"a."' + ".'.'" * 50,
+    ],
+)
 def test_a_key_of_many_parts_is_refused(tmp_path, key):
     (tmp_path / "a.toml").write_text(key if key.startswith("[") else f"{key} = 1")
     with pytest.raises(InputError, match="a key of more than 50 parts"):
         read_toml(tmp_path / "a.toml")
 
 
-@pytest.mark.parametrize("line", ["a" + ".a" * 48 + " = 1", "a = [" + "0.1, " * 100 + "]", 'a = "' + "two words. " * 100 + '"'])
+@pytest.mark.parametrize(
+    "line",
+    ["a" + ".a" * 48 + " = 1", "a = [" + "0.1, " * 100 + "]", 'a = "' + "two words. " * 100 + '"'],
+)
 def test_a_key_of_few_parts_is_read(tmp_path, line):
     (tmp_path / "a.toml").write_text(line)
     assert read_toml(tmp_path / "a.toml")
@@ -167,7 +198,8 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path, monkeypatch):
 
 
 def test_arrays_are_read_whole_without_objects_and_bounded(tmp_path):
-    """What lies beside a spectrum may be anybody's: objects, which would be unpickled, half a file and a bomb are one line each."""
+    """What lies beside a spectrum may be anybody's: objects, which would be unpickled, half a file
+    and a bomb are one line each."""
     path = tmp_path / "a.npz"
     np.savez_compressed(path, x=np.arange(3.0), y=np.zeros(100_000))
     assert read_arrays(path)["x"].tolist() == [0.0, 1.0, 2.0]

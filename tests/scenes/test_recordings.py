@@ -1,4 +1,5 @@
-"""Records as they come: one motion of three components, whose peaks are known, in every format that is read."""
+"""Records as they come: one motion of three components, whose peaks are known, in every format that
+is read."""
 
 from __future__ import annotations
 
@@ -26,7 +27,8 @@ PEAKS = {"N-S": 0.31, "E-W": -0.27, "U-D": 0.15}
 
 
 def motion(component: str) -> NDArray[np.float64]:
-    """Accelerations in m/s^2, 401 of them: a burst without a mean, whose largest one stands at a sample."""
+    """Accelerations in m/s^2, 401 of them: a burst without a mean, whose largest one stands at a
+    sample."""
     t = STEP * np.arange(401)
     shape = np.sin(2 * np.pi * (t - 2.0) * 1.5 + np.pi / 2) * np.exp(-((t - 2.0) ** 2) / 0.4)
     return PEAKS[component] * G * shape
@@ -105,7 +107,8 @@ def esm(component: str) -> bytes:
     values = motion(component) * 100
     stream = {"N-S": "HNN", "E-W": "HNE", "U-D": "HNZ"}[component]
     text = (
-        f"EVENT_NAME: GREECE\nSTATION_NAME: Town Hall,Argos\nSAMPLING_INTERVAL_S: {STEP:.6f}\nNDATA: {len(values)}\nDURATION_S: 4.010\n"
+        "EVENT_NAME: GREECE\nSTATION_NAME: Town Hall,Argos\nSAMPLING_INTERVAL_S:"
+        f" {STEP:.6f}\nNDATA: {len(values)}\nDURATION_S: 4.010\n"
         f"STREAM: {stream}\nUNITS: cm/s^2\nPGA_CM/S^2: 304\nDATA_TYPE: ACCELERATION\nUSER5: \n"
     )
     return (text + _fixed(values, 1, ".6f")).encode()
@@ -127,7 +130,9 @@ def knet(component: str, direction: str = "") -> bytes:
         "Last Correction": "2011/03/11 14:46:21",
         "Memo.": "",
     }
-    return ("".join(f"{key:<18}{value}\n" for key, value in rows.items()) + _fixed(counts, 8, "9d")).encode()
+    return (
+        "".join(f"{key:<18}{value}\n" for key, value in rows.items()) + _fixed(counts, 8, "9d")
+    ).encode()
 
 
 def kiknet(component: str) -> bytes:
@@ -135,14 +140,20 @@ def kiknet(component: str) -> bytes:
 
 
 def csv_gal(component: str) -> bytes:
-    """As a spreadsheet saves it that writes commas before the decimals: semicolons, a mark, a start at 5 s."""
-    rows = "".join(f"{5 + STEP * n:.2f};{value * 100:.6f}\n".replace(".", ",") for n, value in enumerate(motion(component)))
+    """As a spreadsheet saves it that writes commas before the decimals: semicolons, a mark, a start
+    at 5 s."""
+    rows = "".join(
+        f"{5 + STEP * n:.2f};{value * 100:.6f}\n".replace(".", ",")
+        for n, value in enumerate(motion(component))
+    )
     return ("time_s;acceleration_gal\n" + rows).encode("utf-8-sig")
 
 
 def columns(component: str) -> bytes:
     """Blanks, a header of words, times and two columns."""
-    rows = "".join(f" {STEP * n:8.2f} {value:12.7f} {0.0:9.3f}\n" for n, value in enumerate(motion(component)))
+    rows = "".join(
+        f" {STEP * n:8.2f} {value:12.7f} {0.0:9.3f}\n" for n, value in enumerate(motion(component))
+    )
     return ("Shake table of the institute\n  t [s]   acc [m/s2]   displacement\n" + rows).encode()
 
 
@@ -188,8 +199,12 @@ def test_a_folder_of_24_files_in_eight_formats_is_read_whole(tmp_path):
         if "knet" in name:
             expected = expected - expected.mean()
         assert record.time_step == STEP, name
-        np.testing.assert_allclose(record.samples, expected, rtol=0, atol=form.digit * G * 1.01, err_msg=name)
-        assert intensity.peak_acceleration(record) == pytest.approx(abs(PEAKS[component]), abs=3e-4 if "knet" in name else form.digit), name
+        np.testing.assert_allclose(
+            record.samples, expected, rtol=0, atol=form.digit * G * 1.01, err_msg=name
+        )
+        assert intensity.peak_acceleration(record) == pytest.approx(
+            abs(PEAKS[component]), abs=3e-4 if "knet" in name else form.digit
+        ), name
         assert any("it is 0 here" in note for note in record.notes) == (form.start != 0.0), name
 
 
@@ -205,7 +220,10 @@ def test_the_command_reads_that_folder(tmp_path, capsys):
         assert one["samples"] == (400 if form.write is knet else 401)
 
 
-@pytest.mark.parametrize(("write", "names"), [(cosmos_three, ["360 deg", "90 deg", "up"]), (csmip_three, ["360 Deg", "90 Deg", "Up"])])
+@pytest.mark.parametrize(
+    ("write", "names"),
+    [(cosmos_three, ["360 deg", "90 deg", "up"]), (csmip_three, ["360 Deg", "90 Deg", "Up"])],
+)
 def test_several_components_in_one_file(write, names, tmp_path, capsys):
     path = tmp_path / "three.V2"
     path.write_bytes(write())
@@ -213,7 +231,10 @@ def test_several_components_in_one_file(write, names, tmp_path, capsys):
     assert [one.component for one in found] == names
     for one, component in zip(found, PEAKS, strict=True):
         np.testing.assert_allclose(one.samples, motion(component), atol=1.01e-7)
-    with pytest.raises(InputError, match=r"3 components, 1 '360 .eg', .* give one: --read component=1 \(in a scene file: component = 1\)"):
+    with pytest.raises(
+        InputError,
+        match=r"3 components, 1 '360 .eg', .* give one: --read component=1 \(in a scene file: component = 1\)",
+    ):
         Record.from_file(path)
     assert Record.from_file(path, component=2).peak == pytest.approx(0.27, abs=1e-7)
     assert Record.from_file(path, component=names[2]).peak == pytest.approx(0.15, abs=1e-7)
@@ -272,13 +293,23 @@ def test_k_net_takes_out_the_offset_and_says_so(tmp_path):
         ("time_s,acceleration_cm_s2\n0,100\n0.1,50\n", {}, [1.0, 0.5], 0.1),
         ("time_s,acceleration_gal\n0,100\n0.1,50\n", {}, [1.0, 0.5], 0.1),
         ("time_s,acceleration_mm_s2\n0,100\n0.1,50\n", {}, [0.1, 0.05], 0.1),
-        ("time_s,acceleration_g,acceleration_m_s2\n0,9,1\n1,9,2\n", {"column": "acceleration_m_s2"}, [1.0, 2.0], 1.0),
+        (
+            "time_s,acceleration_g,acceleration_m_s2\n0,9,1\n1,9,2\n",
+            {"column": "acceleration_m_s2"},
+            [1.0, 2.0],
+            1.0,
+        ),
         ("time (s);acc [cm/s^2]\n0;1\n1;2\n", {}, [0.01, 0.02], 1.0),
     ],
 )
 def test_tables(text, options, samples, step, tmp_path):
     path = tmp_path / "motion.txt"
-    for content in (text.encode(), text.encode("utf-8-sig"), text.encode("utf-16"), text.replace("\n", "\r\n").encode()):
+    for content in (
+        text.encode(),
+        text.encode("utf-8-sig"),
+        text.encode("utf-16"),
+        text.replace("\n", "\r\n").encode(),
+    ):
         path.write_bytes(content)
         record = read_record(path, Reading(**options))
         np.testing.assert_allclose(record.samples, samples, rtol=1e-14)
@@ -288,17 +319,40 @@ def test_tables(text, options, samples, step, tmp_path):
 @pytest.mark.parametrize(
     ("text", "options", "said"),
     [
-        ("0 1\n0.5 2\n", {}, 'the unit of acceleration is not stated; give it: --read unit=g (in a scene file: unit = "g")'),
-        ("1\n2\n", {"unit": "g"}, "no column of times; give the time step: --read time_step=0.01 (in a scene file: time_step = 0.01)"),
-        ("1 2 3\n4 5 6\n", {"unit": "g"}, "3 columns; give that of the accelerations: --read column=2 (in a scene file: column = 2)"),
+        (
+            "0 1\n0.5 2\n",
+            {},
+            'the unit of acceleration is not stated; give it: --read unit=g (in a scene file: unit = "g")',
+        ),
+        (
+            "1\n2\n",
+            {"unit": "g"},
+            "no column of times; give the time step: --read time_step=0.01 (in a scene file:"
+            " time_step = 0.01)",
+        ),
+        (
+            "1 2 3\n4 5 6\n",
+            {"unit": "g"},
+            "3 columns; give that of the accelerations: --read column=2 (in a scene file: column ="
+            " 2)",
+        ),
         ("1 2 3\n4 5 6\n", {"column": 4}, "no single column 4; there are 1 to 3"),
         (
             "words\nand more of them\n",
             {"unit": "g"},
-            "no line of numbers within the first 200; give the lines to leave out: --read header_lines",
+            "no line of numbers within the first 200; give the lines to leave out: --read"
+            " header_lines",
         ),
-        ("0,5\n1,5\n", {"unit": "g"}, "a comma between columns or before the decimals? --read decimal=,"),
-        ("time_s,acceleration_g\n0,1\n1,1\n", {"unit": "gal"}, "the file states the unit g, not gal"),
+        (
+            "0,5\n1,5\n",
+            {"unit": "g"},
+            "a comma between columns or before the decimals? --read decimal=,",
+        ),
+        (
+            "time_s,acceleration_g\n0,1\n1,1\n",
+            {"unit": "gal"},
+            "the file states the unit g, not gal",
+        ),
         ("0 1\n0.5\n", {"unit": "g"}, "line 2: 1 fields where the first line has 2"),
         ("0 1\n1 2\n", {"component": 1}, "a table has columns; give the option column"),
     ],
@@ -312,7 +366,10 @@ def test_what_is_not_known_is_asked_for(text, options, said, tmp_path):
     assert str(fault.value).isprintable()
 
 
-@pytest.mark.parametrize("option", [{"column": 1}, {"header_lines": 3}, {"decimal": ","}, {"unit": "gal"}, {"time_step": 0.02}])
+@pytest.mark.parametrize(
+    "option",
+    [{"column": 1}, {"header_lines": 3}, {"decimal": ","}, {"unit": "gal"}, {"time_step": 0.02}],
+)
 def test_options_do_not_overrule_a_header(option, tmp_path):
     path = tmp_path / "a.AT2"
     path.write_bytes(at2("N-S"))
@@ -320,14 +377,22 @@ def test_options_do_not_overrule_a_header(option, tmp_path):
         read_record(path, Reading(**option))
 
 
-@pytest.mark.parametrize(("rate", "decimals"), [(300, 3), (300, 4), (128, 4), (128, 3), (100, 2), (200, 3), (60, 3), (75, 2)])
+@pytest.mark.parametrize(
+    ("rate", "decimals"),
+    [(300, 3), (300, 4), (128, 4), (128, 3), (100, 2), (200, 3), (60, 3), (75, 2)],
+)
 def test_times_are_judged_by_their_digits(rate, decimals, tmp_path):
     path = tmp_path / "a.csv"
-    path.write_text("time_s,acceleration_g\n" + "".join(f"{n / rate:.{decimals}f},0.1\n" for n in range(1000)))
+    path.write_text(
+        "time_s,acceleration_g\n" + "".join(f"{n / rate:.{decimals}f},0.1\n" for n in range(1000))
+    )
     if 10.0**-decimals <= 0.5 / rate or rate in (100, 200):
         assert read_record(path).time_step == pytest.approx(1 / rate, rel=1e-12)
     else:
-        with pytest.raises(InputError, match=r"is off the uniform step .*; times of 0.01 s may hide it: --read time_step"):
+        with pytest.raises(
+            InputError,
+            match=r"is off the uniform step .*; times of 0.01 s may hide it: --read time_step",
+        ):
             read_record(path)
         assert read_record(path, Reading(time_step=1 / rate)).time_step == 1 / rate
 
@@ -343,7 +408,8 @@ def test_a_missing_sample_is_not_taken_for_rounding(tmp_path):
 def test_a_late_start_is_zero_for_the_scene_and_a_note_says_so(tmp_path):
     (tmp_path / "late.csv").write_text("time_s,acceleration_g\n5.0,0\n5.5,0.5\n6.0,0\n")
     (tmp_path / "a.toml").write_text(
-        "duration = 1.0\nblock = { half_width = 0.3, half_height = 1.0 }\nfloor = { friction = 0.4 }\n"
+        "duration = 1.0\nblock = { half_width = 0.3, half_height = 1.0 }\nfloor = { friction = 0.4"
+        " }\n"
         '[excitation]\nkind = "record"\nfile = "late.csv"\n'
     )
     scene = load_scene(tmp_path / "a.toml")
@@ -355,27 +421,37 @@ def test_a_late_start_is_zero_for_the_scene_and_a_note_says_so(tmp_path):
 
 
 def test_intensities_of_a_sine_are_its_closed_forms():
-    """a = A sin(w t) over ten cycles: PGV 2 A/w from rest, Arias pi/(2 g) A^2 T/2; resonance builds up as 1 - exp(-z w t)."""
+    """a = A sin(w t) over ten cycles: PGV 2 A/w from rest, Arias pi/(2 g) A^2 T/2; resonance builds
+    up as 1 - exp(-z w t)."""
     amplitude, rate, step = 2.0, 2 * math.pi, 1e-3
     samples = amplitude * np.sin(rate * step * np.arange(10_001))
     record = Recording(samples=samples, time_step=step, unit="m/s2", form="CSV")
     assert intensity.peak_acceleration(record) == pytest.approx(amplitude / G, rel=1e-9)
     assert intensity.peak_velocity(record) == pytest.approx(2 * amplitude / rate, rel=1e-5)
-    assert intensity.arias(record) == pytest.approx(math.pi / (2 * G) * amplitude**2 * 5.0, rel=1e-5)
+    assert intensity.arias(record) == pytest.approx(
+        math.pi / (2 * G) * amplitude**2 * 5.0, rel=1e-5
+    )
     built_up = amplitude / G / (2 * 0.05) * (1 - math.exp(-0.05 * rate * 10.0))
     assert intensity.spectral_acceleration(record, 1.0) == pytest.approx(built_up, rel=0.01)
     assert intensity.spectral_acceleration(record, 0.01) == pytest.approx(amplitude / G, rel=0.01)
 
 
 def test_spectral_accelerations_are_those_of_the_straight_lines_between_samples():
-    """Samples four periods apart, or all motion in the last one: as of the same lines with samples 4000 times as dense."""
+    """Samples four periods apart, or all motion in the last one: as of the same lines with samples
+    4000 times as dense."""
     samples = np.array([0.0, 1.0, -0.5, 0.0])
-    dense = Recording(samples=np.interp(np.arange(12_001) / 4000, np.arange(4), samples), time_step=1e-3, unit="m/s2", form="CSV")
+    dense = Recording(
+        samples=np.interp(np.arange(12_001) / 4000, np.arange(4), samples),
+        time_step=1e-3,
+        unit="m/s2",
+        form="CSV",
+    )
     for period in (1.0, 2.5):
         coarse = Recording(samples=samples, time_step=4.0, unit="m/s2", form="CSV")
         expected = intensity.spectral_acceleration(dense, period)
         assert intensity.spectral_acceleration(coarse, period) == pytest.approx(expected, rel=2e-3)
-    # A hat of a step's length is, to an oscillator of a far longer period, an impulse; the peak comes a quarter of a period later.
+    # A hat of a step's length is, to an oscillator of a far longer period, an impulse; the peak
+    # comes a quarter of a period later.
     last = Recording(samples=np.array([0.0, 0.0, 1.0]), time_step=1e-2, unit="m/s2", form="CSV")
     rate, damping = 2 * math.pi / 1.0, 0.05
     peak = rate * 1e-2 * math.exp(-damping / math.sqrt(1 - damping**2) * math.acos(damping))
@@ -394,7 +470,15 @@ def test_the_command_shows_and_draws(tmp_path, capsys, monkeypatch):
     Path("a.AT2").write_bytes(at2("N-S"))
     assert main(["record", "a.AT2", "--plot", "a.png"]) == 0
     said = capsys.readouterr().out
-    for part in ("PEER AT2, unit g", "401 every 0.01 s, 4 s", "0.31 g", "Sa(T)", "1 s: ", "█", "picture: a.png"):
+    for part in (
+        "PEER AT2, unit g",
+        "401 every 0.01 s, 4 s",
+        "0.31 g",
+        "Sa(T)",
+        "1 s: ",
+        "█",
+        "picture: a.png",
+    ):
         assert part in said, part
     assert Path("a.png").read_bytes().startswith(b"\x89PNG")
     assert main(["record", "a.AT2", "--plot", "a.jpg"]) == 2
@@ -431,7 +515,9 @@ def test_one_bad_file_does_not_hide_the_others(tmp_path, capsys):
     ],
 )
 def test_which_component_is_vertical(name, form, component, vertical):
-    recording = Recording(samples=np.zeros(3), time_step=0.01, unit="g", form=form, component=component)
+    recording = Recording(
+        samples=np.zeros(3), time_step=0.01, unit="g", form=form, component=component
+    )
     assert is_vertical(Path(name), recording) == vertical
 
 
@@ -453,9 +539,16 @@ def test_which_file_has_the_vertical_component(name, others, vertical):
     assert _vertical_file(Path(name), paths) == (None if vertical is None else paths[vertical])
 
 
-def run_together(across: int, count: int, width: int, form: str, unit: str = "G") -> tuple[str, NDArray[np.float64]]:
-    """A PEER file in Fortran's columns without a blank between them, and its numbers as they are printed."""
-    values = np.random.default_rng(3).uniform(1.0, 9.0, count) * np.where(np.arange(count) % 3, 1.0, -1.0) * 1e-2
+def run_together(
+    across: int, count: int, width: int, form: str, unit: str = "G"
+) -> tuple[str, NDArray[np.float64]]:
+    """A PEER file in Fortran's columns without a blank between them, and its numbers as they are
+    printed."""
+    values = (
+        np.random.default_rng(3).uniform(1.0, 9.0, count)
+        * np.where(np.arange(count) % 3, 1.0, -1.0)
+        * 1e-2
+    )
     words = [format(value, form)[-width:].rjust(width) for value in values]
     lines = ["".join(words[k : k + across]) for k in range(0, count, across)]
     head = f"PEER\nA, 1/1/2000, B, 180\nACCELERATION TIME SERIES IN UNITS OF {unit}\nNPTS= {count}, DT= .01 SEC\n"
@@ -463,7 +556,9 @@ def run_together(across: int, count: int, width: int, form: str, unit: str = "G"
 
 
 @pytest.mark.parametrize("count", [1, 4, 5, 6, 23, 25])
-@pytest.mark.parametrize(("across", "width", "form"), [(5, 11, ".5E"), (5, 12, ".5E"), (8, 8, ".5f"), (1, 11, ".5E")])
+@pytest.mark.parametrize(
+    ("across", "width", "form"), [(5, 11, ".5E"), (5, 12, ".5E"), (8, 8, ".5f"), (1, 11, ".5E")]
+)
 def test_columns_of_fortran_may_run_together(tmp_path, across, width, form, count):
     """E-011.19 is the end of one number and the beginning of the next."""
     text, values = run_together(across, count, width, form)
@@ -471,7 +566,14 @@ def test_columns_of_fortran_may_run_together(tmp_path, across, width, form, coun
     np.testing.assert_array_equal(read_record(tmp_path / "a.AT2").samples, values * G)
 
 
-@pytest.mark.parametrize("change", [lambda text: text[:-3] + "\n", lambda text: text.replace("E-0", "E0", 1), lambda text: text + " 1.0\n"])
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text[:-3] + "\n",
+        lambda text: text.replace("E-0", "E0", 1),
+        lambda text: text + " 1.0\n",
+    ],
+)
 def test_columns_that_are_not_as_the_header_says_are_a_fault(tmp_path, change):
     (tmp_path / "a.AT2").write_text(change(run_together(5, 23, 11, ".5E")[0]))
     with pytest.raises(InputError, match="not a finite number"):
@@ -487,12 +589,19 @@ SPELT = {
 }
 
 
-@pytest.mark.parametrize(("unit", "word"), [(unit, word) for unit, words in SPELT.items() for word in words])
+@pytest.mark.parametrize(
+    ("unit", "word"), [(unit, word) for unit, words in SPELT.items() for word in words]
+)
 def test_the_header_states_the_unit(tmp_path, unit, word):
-    (tmp_path / "a.AT2").write_text(f"A\nACCELERATION TIME SERIES IN UNITS OF {word}\nNPTS= 2, DT= .01 SEC\n 1.0 2.0\n")
+    (tmp_path / "a.AT2").write_text(
+        f"A\nACCELERATION TIME SERIES IN UNITS OF {word}\nNPTS= 2, DT= .01 SEC\n 1.0 2.0\n"
+    )
     found = read_record(tmp_path / "a.AT2")
     assert found.unit == unit
-    np.testing.assert_allclose(found.samples, np.array([1.0, 2.0]) * {"g": G, "cm/s2": 0.01, "gal": 0.01, "ft/s2": 0.3048}.get(unit, 1.0))
+    np.testing.assert_allclose(
+        found.samples,
+        np.array([1.0, 2.0]) * {"g": G, "cm/s2": 0.01, "gal": 0.01, "ft/s2": 0.3048}.get(unit, 1.0),
+    )
 
 
 def test_feet_are_a_unit_of_tables_too(tmp_path):
@@ -502,7 +611,9 @@ def test_feet_are_a_unit_of_tables_too(tmp_path):
 
 @pytest.mark.parametrize("word", ["CM/S", "CM", "INCHES"])
 def test_a_header_of_velocities_is_no_record(tmp_path, word):
-    (tmp_path / "a.AT2").write_text(f"A\nTIME SERIES IN UNITS OF {word}\nNPTS= 2, DT= .01 SEC\n 1.0 2.0\n")
+    (tmp_path / "a.AT2").write_text(
+        f"A\nTIME SERIES IN UNITS OF {word}\nNPTS= 2, DT= .01 SEC\n 1.0 2.0\n"
+    )
     with pytest.raises(InputError, match="UNITS OF G"):
         read_record(tmp_path / "a.AT2")
 

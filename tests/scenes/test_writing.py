@@ -1,4 +1,5 @@
-"""What is written goes through one door, which follows no link; text in a table is no formula and steers nothing."""
+"""What is written goes through one door, which follows no link; text in a table is no formula and
+steers nothing."""
 
 from __future__ import annotations
 
@@ -12,7 +13,16 @@ import pytest
 import rockcheck
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import inert
-from rockcheck.scenes.reading import head_of, open_regular, read_arrays, read_bytes, read_json, read_table, read_text, within
+from rockcheck.scenes.reading import (
+    head_of,
+    open_regular,
+    read_arrays,
+    read_bytes,
+    read_json,
+    read_table,
+    read_text,
+    within,
+)
 from rockcheck.scenes.writing import columns_text, made, table_text, write_together, write_whole
 
 POSIX = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with a name are POSIX")
@@ -53,7 +63,9 @@ def test_a_folder_of_results_is_no_link(tmp_path):
 
 
 @POSIX
-@pytest.mark.parametrize("read", [open_regular, read_bytes, read_text, read_json, read_table, read_arrays])
+@pytest.mark.parametrize(
+    "read", [open_regular, read_bytes, read_text, read_json, read_table, read_arrays]
+)
 @pytest.mark.parametrize("trap", ["a link to a device", "a link to itself", "a pipe"])
 def test_what_is_no_file_is_not_opened(tmp_path, monkeypatch, trap, read):
     path = tmp_path / "given"
@@ -75,14 +87,23 @@ def test_a_link_may_not_lead_out_of_a_folder_that_was_sent(tmp_path):
             within(folder, name)
 
 
-#: Where a file may be written or read without the doors: the doors themselves, the cache of machine code, a file that only the user
-#: can read, a history of runs that the user names, and files of the package itself.
+#: Where a file may be written or read without the doors: the doors themselves, the cache of machine
+#: code, a file that only the user can read, a history of runs that the user names, and files of the
+#: package itself.
 DOORS = {
-    "write_bytes|write_text|savefig|to_csv|os.replace": {"scenes/writing.py", "commands/simulate.py", "reports/style.py"}
+    "write_bytes|write_text|savefig|to_csv|os.replace": {
+        "scenes/writing.py",
+        "commands/simulate.py",
+        "reports/style.py",
+    }
     | {"reports/show/drawing.py"},
     r"\.open\(|\bopen\(": {"scenes/reading.py", "scenes/writing.py", "validation/suite/changes.py"},
     r"\.mkdir\(": {"scenes/writing.py", "scenes/compiled.py"},
-    r"\.read_text\(|\.read_bytes\(": {"scenes/compiled.py", "scenes/trust/experience.py", "validation/execute/provenance.py"}
+    r"\.read_text\(|\.read_bytes\(": {
+        "scenes/compiled.py",
+        "scenes/trust/experience.py",
+        "validation/execute/provenance.py",
+    }
     | {"commands/new.py", "validation/studies/work_precision/savings.py", "reports/site.py"}
     | {"reports/style.py", "reports/studies/spectra.py"},
 }
@@ -101,7 +122,10 @@ def test_files_are_written_and_read_by_the_doors_alone(calls):
 
 
 @pytest.mark.parametrize("lead", "=+-@＝")
-@pytest.mark.parametrize("table", [lambda text: table_text([text], [[text]]), lambda text: columns_text({text: [text, text]})])
+@pytest.mark.parametrize(
+    "table",
+    [lambda text: table_text([text], [[text]]), lambda text: columns_text({text: [text, text]})],
+)
 def test_no_cell_of_text_is_a_formula(lead, table):
     for line in table(f"{lead}1+1").splitlines():
         assert line == f"'{lead}1+1"
@@ -112,7 +136,18 @@ def test_numbers_and_signs_stay_as_they_are(plain):
     assert table_text(["x", "y"], [[plain, -1.5]]).splitlines()[1] == f"{plain},-1.5"
 
 
-_CODES = (*range(0x202A, 0x202F), *range(0x2066, 0x206A), 0x200B, 0x200F, 0x2028, 0x00AD, 0xFEFF, 0x1B, 0x9B, 0xD800)
+_CODES = (
+    *range(0x202A, 0x202F),
+    *range(0x2066, 0x206A),
+    0x200B,
+    0x200F,
+    0x2028,
+    0x00AD,
+    0xFEFF,
+    0x1B,
+    0x9B,
+    0xD800,
+)
 TURNING = [chr(code) for code in _CODES]
 
 

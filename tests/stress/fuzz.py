@@ -1,9 +1,10 @@
 """Coverage-guided fuzzing of one reader: `python tests/stress/fuzz.py scene_toml -runs=100000`.
 
-libFuzzer (through atheris: `pip install atheris`) breeds inputs that reach new lines of the readers, from a valid one and
-from the nasty words of `test_hostile_input`. An input that is answered with neither a result nor one clear line, takes longer than
-10 s or more than 1 GiB of memory ends the run with an error and is written to the working directory; options after the reader's name
-are libFuzzer's.
+libFuzzer (through atheris: `pip install atheris`) breeds inputs that reach new lines of the
+readers, from a valid one and from the nasty words of `test_hostile_input`. An input that is
+answered with neither a result nor one clear line, takes longer than 10 s or more than 1 GiB of
+memory ends the run with an error and is written to the working directory; options after the
+reader's name are libFuzzer's.
 """
 
 from __future__ import annotations
@@ -16,13 +17,19 @@ import atheris
 
 sys.path.insert(0, str(Path(__file__).parent))
 # What is compiled (ebm, cm) must not be instrumented.
-with atheris.instrument_imports(include=["rockcheck", "tomllib", "json", "csv"], exclude=["rockcheck.scenes.compiled"]):
+with atheris.instrument_imports(
+    include=["rockcheck", "tomllib", "json", "csv"], exclude=["rockcheck.scenes.compiled"]
+):
     from test_hostile_input import NASTY, READERS, WORDS
 
 
 def quoted(word: str) -> str:
     """As a line of libFuzzer's dictionary."""
-    return '"' + "".join(f"\\x{byte:02x}" for byte in word.encode("utf-8", "surrogatepass")[:64]) + '"\n'
+    return (
+        '"'
+        + "".join(f"\\x{byte:02x}" for byte in word.encode("utf-8", "surrogatepass")[:64])
+        + '"\n'
+    )
 
 
 def main(reader: str, *options: str) -> None:
@@ -35,7 +42,15 @@ def main(reader: str, *options: str) -> None:
         (corpus / "valid").write_text(valid(), encoding="utf-8")
         words.write_text("".join(map(quoted, filter(None, (*NASTY, *WORDS)))), encoding="ascii")
         feed(valid().encode(), folder)  # what it imports and compiles takes no part
-        arguments = ["fuzz.py", f"-dict={words}", "-timeout=10", "-rss_limit_mb=1024", "-max_len=20000", *options, str(corpus)]
+        arguments = [
+            "fuzz.py",
+            f"-dict={words}",
+            "-timeout=10",
+            "-rss_limit_mb=1024",
+            "-max_len=20000",
+            *options,
+            str(corpus),
+        ]
 
         def fed(content: bytes) -> None:
             try:

@@ -1,7 +1,8 @@
-"""Two hundred hostile cases: files, caches, environments, signals and limits. `python tests/stress/hostile.py` tries all of them.
+"""Two hundred hostile cases: files, caches, environments, signals and limits. `python
+tests/stress/hostile.py` tries all of them.
 
-Each ends within 60 s with an exit code that it may have, at most one line on stderr, no traceback, and no file where none belongs.
-`test_hostile.py` beside this file tries a tenth of them.
+Each ends within 60 s with an exit code that it may have, at most one line on stderr, no traceback,
+and no file where none belongs. `test_hostile.py` beside this file tries a tenth of them.
 """
 
 from __future__ import annotations
@@ -66,17 +67,43 @@ def _sparse(path: Path) -> None:
 #: Of each reader: the file, what is valid there, and the command that reads it.
 READERS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "scene": ("a.toml", SCENE, ("simulate", "a.toml", "--model", "ebm", "-o", "o.csv")),
-    "suite": ("s.toml", SUITE, ("validate", "s.toml", "--no-report", "--jobs", "1", "--out", "out")),
+    "suite": (
+        "s.toml",
+        SUITE,
+        ("validate", "s.toml", "--no-report", "--jobs", "1", "--out", "out"),
+    ),
     "history": ("h.csv", HISTORY, ("compare", "h.csv", "good.csv")),
     "AT2": ("r.AT2", AT2, ("simulate", "at2.toml", "--model", "ebm", "-o", "o.csv")),
     "record": ("r.csv", RECORD, ("simulate", "record.toml", "--model", "ebm", "-o", "o.csv")),
     "run": ("run/run.json", "{}", ("report", "run")),
 }
 #: Numbers and words in place of a scene's.
-VALUES = ("nan", "inf", "-1.0", "0.0", "1e308", "1e-308", "true", '"x"', "[]", "{}", "1979-05-27", "9" * 400)
+VALUES = (
+    "nan",
+    "inf",
+    "-1.0",
+    "0.0",
+    "1e308",
+    "1e-308",
+    "true",
+    '"x"',
+    "[]",
+    "{}",
+    "1979-05-27",
+    "9" * 400,
+)
 KEYS = ("duration", "half_width", "friction", "amplitude")
 #: Names of models that a suite or a command line may name, and that run nothing.
-CODE = ("os:system", "subprocess:Popen", "builtins:exec", "spy:Told", "a.b:C", "os:", ":system", "../spy:Told")
+CODE = (
+    "os:system",
+    "subprocess:Popen",
+    "builtins:exec",
+    "spy:Told",
+    "a.b:C",
+    "os:",
+    ":system",
+    "../spy:Told",
+)
 #: Environments in which `rockcheck scenes` and `--version` work, or say in a line why not.
 ENVIRONMENTS = (
     {"NUMBA_DISABLE_JIT": "1"},
@@ -103,7 +130,8 @@ SPY = "from pathlib import Path\n(Path(__file__).parent / 'imported').write_text
 
 @dataclass(frozen=True)
 class Case:
-    """A command in a prepared folder, the exit codes that it may have, and a signal that it gets after some seconds."""
+    """A command in a prepared folder, the exit codes that it may have, and a signal that it gets
+    after some seconds."""
 
     name: str
     words: tuple[str, ...]
@@ -118,22 +146,45 @@ def cases() -> Iterator[Case]:
     """All cases, always in the same order."""
     for reader, (file, valid, words) in READERS.items():
         for kind, spoil in WHOLE.items():
-            yield Case(f"{reader}: {kind}", words, lambda folder, f=file, v=valid, s=spoil: _replaced(folder / f, v, s))
+            yield Case(
+                f"{reader}: {kind}",
+                words,
+                lambda folder, f=file, v=valid, s=spoil: _replaced(folder / f, v, s),
+            )
     for key in KEYS:
         for value in VALUES:
             text = re.sub(rf"\b{key} = [^,}}\n]+", lambda _, k=key, v=value: f"{k} = {v}", SCENE)
             words = ("simulate", "a.toml", "--model", "ebm", "-o", "o.csv")
-            yield Case(f"scene: {key} = {value[:12]}", words, lambda folder, t=text: (folder / "a.toml").write_text(t))
+            yield Case(
+                f"scene: {key} = {value[:12]}",
+                words,
+                lambda folder, t=text: (folder / "a.toml").write_text(t),
+            )
     for name in CODE:
         text = f'reference = "ebm"\nscenes = ["a.toml"]\n[models.ebm]\n[models.x]\nmodel = "{name}"\ncommand = "touch imported"\n'
-        yield Case(f"code: {name}", ("validate", "s.toml"), lambda folder, t=text: (folder / "s.toml").write_text(t), (2,))
+        yield Case(
+            f"code: {name}",
+            ("validate", "s.toml"),
+            lambda folder, t=text: (folder / "s.toml").write_text(t),
+            (2,),
+        )
     for environment in ENVIRONMENTS:
-        yield Case(f"environment: {environment}", ("scenes",), environment=environment, codes=(0, 2))
+        yield Case(
+            f"environment: {environment}", ("scenes",), environment=environment, codes=(0, 2)
+        )
     for size in (0, 100, 3000):
-        yield Case(f"disk: {size} bytes", ("simulate", "a.toml", "--model", "ebm", "-o", "o.csv"), limit=("RLIMIT_FSIZE", str(size)))
+        yield Case(
+            f"disk: {size} bytes",
+            ("simulate", "a.toml", "--model", "ebm", "-o", "o.csv"),
+            limit=("RLIMIT_FSIZE", str(size)),
+        )
     for count in (12, 24):
-        yield Case(f"files: {count}", ("scenes",), limit=("RLIMIT_NOFILE", str(count)), codes=(0, 1, 2, 70))
-    fast = SCENE.replace("amplitude = 4.0, period = 0.7", "amplitude = 1e30, period = 1e-28").replace("ricker", "sine")
+        yield Case(
+            f"files: {count}", ("scenes",), limit=("RLIMIT_NOFILE", str(count)), codes=(0, 1, 2, 70)
+        )
+    fast = SCENE.replace(
+        "amplitude = 4.0, period = 0.7", "amplitude = 1e30, period = 1e-28"
+    ).replace("ricker", "sine")
     for wait in (1.5, 4.0):
         words = ("simulate", "a.toml", "--model", "ebm", "-o", "o.csv")
         spoil = lambda folder: (folder / "a.toml").write_text(fast)  # noqa: E731
@@ -159,7 +210,11 @@ def _folder(place: Path) -> Path:
     }.items():
         (place / name).write_text(text)
     for name, file in {"at2.toml": "r.AT2", "record.toml": "r.csv"}.items():
-        (place / name).write_text(re.sub(r"excitation = .*", f'excitation = {{ kind = "record", file = "{file}" }}', SCENE))
+        (place / name).write_text(
+            re.sub(
+                r"excitation = .*", f'excitation = {{ kind = "record", file = "{file}" }}', SCENE
+            )
+        )
     return place
 
 
@@ -168,9 +223,17 @@ def try_case(case: Case) -> str:
     with tempfile.TemporaryDirectory() as inside:
         folder = _folder(Path(inside))
         case.prepare(folder)
-        command = [sys.executable, "-B", "-c", LIMITED, *case.limit, *case.words] if case.limit else [*ROCKCHECK, *case.words]
+        command = (
+            [sys.executable, "-B", "-c", LIMITED, *case.limit, *case.words]
+            if case.limit
+            else [*ROCKCHECK, *case.words]
+        )
         running = subprocess.Popen(
-            command, cwd=folder, env={**os.environ, **case.environment}, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+            command,
+            cwd=folder,
+            env={**os.environ, **case.environment},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
         )
         try:
             if case.signal_after is not None:
@@ -182,10 +245,14 @@ def try_case(case: Case) -> str:
             running.communicate()
             return f"did not end within {SECONDS:g} s"
         text = said.decode("utf-8", "replace")
-        lines = [line for line in text.splitlines() if "no private folder for compiled code" not in line]
+        lines = [
+            line for line in text.splitlines() if "no private folder for compiled code" not in line
+        ]
         if running.returncode not in case.codes:
             return f"exit code {running.returncode}: {text[-300:]}"
-        if running.returncode != -2 and ("Traceback" in text or len(lines) > 1 or any(not line.isprintable() for line in lines)):
+        if running.returncode != -2 and (
+            "Traceback" in text or len(lines) > 1 or any(not line.isprintable() for line in lines)
+        ):
             return f"stderr: {text[-300:]}"
         if (folder / "imported").exists():
             return "code was run"
@@ -195,7 +262,9 @@ def try_case(case: Case) -> str:
 
 def main() -> int:
     """Try all; exit 1 where one is not as it should be."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs, and all that they start, ignore Ctrl-C
+    signal.signal(
+        signal.SIGINT, signal.default_int_handler
+    )  # a shell's background jobs, and all that they start, ignore Ctrl-C
     wrong = 0
     tried = list(cases())
     for case in tried:

@@ -1,6 +1,8 @@
-"""Scenes in which `rockcheck stress` once found a fault, by what is special in them; each keeps all invariants now.
+"""Scenes in which `rockcheck stress` once found a fault, by what is special in them; each keeps all
+invariants now.
 
-They are pinned as scene files with every digit: a new draw of the generator or of numpy's streams changes none of them.
+They are pinned as scene files with every digit: a new draw of the generator or of numpy's streams
+changes none of them.
 """
 
 from __future__ import annotations
@@ -26,7 +28,9 @@ def test_every_pinned_scene_is_listed():
 def test_a_fault_that_was_found(slug: str):
     entry = INDEX["faults"][slug]
     model = EventBasedModel(**INDEX["limits"] | entry["model"])
-    played = check_run(model, load_scene(FOLDER / f"{slug}.toml"), seed=entry["seed"], audit=entry["audited"])
+    played = check_run(
+        model, load_scene(FOLDER / f"{slug}.toml"), seed=entry["seed"], audit=entry["audited"]
+    )
     assert played.broken == [], (entry["fault"], played)
     assert ("energy" in played.figures) == entry["audited"]
     assert played.unjudged == ()

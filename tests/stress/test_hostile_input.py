@@ -1,7 +1,9 @@
-"""Files and command lines made up by a fuzzer: a result or one clear line, never a traceback, a hang, or a file elsewhere.
+"""Files and command lines made up by a fuzzer: a result or one clear line, never a traceback, a
+hang, or a file elsewhere.
 
-Each reader is a function of any bytes. Here Hypothesis makes a thousand inputs for each, from the shape that a valid one has;
-`fuzz.py` beside this file makes a hundred thousand each night, and follows which lines of the readers they reach.
+Each reader is a function of any bytes. Here Hypothesis makes a thousand inputs for each, from the
+shape that a valid one has; `fuzz.py` beside this file makes a hundred thousand each night, and
+follows which lines of the readers they reach.
 """
 
 from __future__ import annotations
@@ -37,7 +39,11 @@ fuzzed = settings(
     deadline=5000,
     database=None,
     derandomize=True,
-    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow, HealthCheck.data_too_large],
+    suppress_health_check=[
+        HealthCheck.function_scoped_fixture,
+        HealthCheck.too_slow,
+        HealthCheck.data_too_large,
+    ],
 )
 
 AT2 = """PEER NGA STRONG MOTION DATABASE RECORD
@@ -271,11 +277,28 @@ def stored_files() -> dict[str, bytes]:
         folder = Path(place)
         history.save(folder / "h.csv.gz")
         files = {suffix: (folder / f"h{suffix}").read_bytes() for suffix in SUFFIXES}
-        Store(folder).put("short--ebm--0", files, {"outcome": history.outcome, "cost": {}, "notes": [], "settings": {}})
+        Store(folder).put(
+            "short--ebm--0",
+            files,
+            {"outcome": history.outcome, "cost": {}, "notes": [], "settings": {}},
+        )
         record = (folder / "histories" / "short--ebm--0.json").read_bytes()
     scenes = {"short": scene.replace(excitation={"kind": "rest"}).model_dump(mode="json")}
-    cell = {"scene": "short", "model": "ebm", "status": "done", "history": "histories/short--ebm--0.csv.gz", "outcome": history.outcome}
-    run = Run(suite="s", created="2026-01-01T00:00:00", reference="ebm", scenes=scenes, models=("ebm",), cells=(cell,))
+    cell = {
+        "scene": "short",
+        "model": "ebm",
+        "status": "done",
+        "history": "histories/short--ebm--0.csv.gz",
+        "outcome": history.outcome,
+    }
+    run = Run(
+        suite="s",
+        created="2026-01-01T00:00:00",
+        reference="ebm",
+        scenes=scenes,
+        models=("ebm",),
+        cells=(cell,),
+    )
     return {"run.json": run.model_dump_json().encode(), "record": record, **files}
 
 
@@ -302,9 +325,17 @@ def feed_command_line(content: bytes, folder: Path) -> None:
         inside.mkdir()
         (inside / "a.toml").write_text(SCENE)
         (inside / "h.csv").write_text(HISTORY)
-        for model in ("ebm", "ebm-unilateral", "cm"):  # compiled now, not while an input has its time
+        for model in (
+            "ebm",
+            "ebm-unilateral",
+            "cm",
+        ):  # compiled now, not while an input has its time
             build(model, {}).simulate(load_scene(inside / "a.toml"))
-    words = [word for word in content.decode("utf-8", "replace").split(BETWEEN) if word not in LONG or word == "accept"]
+    words = [
+        word
+        for word in content.decode("utf-8", "replace").split(BETWEEN)
+        if word not in LONG or word == "accept"
+    ]
     if "accept" in words:
         words = ["accept", "no-such-suite", *[word for word in words if word != "accept"]]
     out, err = io.StringIO(), io.StringIO()
@@ -332,13 +363,18 @@ READERS: dict[str, tuple[Callable[[bytes, Path], None], Callable[[], str]]] = {
     "history_csv": (feed_history, lambda: HISTORY),
     "stored_run": (feed_stored_run, lambda: stored_files()["run.json"].decode()),
     "stored_record": (feed_stored_record, lambda: stored_files()["record"].decode()),
-    "command_line": (feed_command_line, lambda: BETWEEN.join(("simulate", "a.toml", "--model", "ebm", "-o", "out.csv"))),
+    "command_line": (
+        feed_command_line,
+        lambda: BETWEEN.join(("simulate", "a.toml", "--model", "ebm", "-o", "out.csv")),
+    ),
 }
 
 
 def mutated(valid: str) -> st.SearchStrategy[bytes]:
     """A valid text with some pieces cut out and nasty ones put in, or bytes of any kind."""
-    piece = st.one_of(st.sampled_from(NASTY), st.text(max_size=8), st.floats().map(str), st.integers().map(str))
+    piece = st.one_of(
+        st.sampled_from(NASTY), st.text(max_size=8), st.floats().map(str), st.integers().map(str)
+    )
     edit = st.tuples(st.integers(0, len(valid)), st.integers(0, 12), piece)
 
     def edited(edits: list[tuple[int, int, str]]) -> bytes:
@@ -350,15 +386,16 @@ def mutated(valid: str) -> st.SearchStrategy[bytes]:
     return st.one_of(st.lists(edit, min_size=1, max_size=4).map(edited), st.binary(max_size=200))
 
 
-COMMAND_LINES = st.lists(st.one_of(st.sampled_from(WORDS), st.sampled_from(NASTY), st.text(max_size=6)), max_size=7).map(
-    lambda words: BETWEEN.join(words).encode("utf-8", "surrogatepass")
-)
+COMMAND_LINES = st.lists(
+    st.one_of(st.sampled_from(WORDS), st.sampled_from(NASTY), st.text(max_size=6)), max_size=7
+).map(lambda words: BETWEEN.join(words).encode("utf-8", "surrogatepass"))
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("reader", READERS)
 def test_any_input(tmp_path, reader):
-    """A result or one clear line, which each `feed_...` asserts of what it is given; all else is raised."""
+    """A result or one clear line, which each `feed_...` asserts of what it is given; all else is
+    raised."""
     feed, valid = READERS[reader]
     feed(valid().encode(), tmp_path)
 
@@ -391,11 +428,17 @@ BOMBS = {
     "f.toml": SCENE.replace("period = 0.7", "period = 1e-300"),
     "g.toml": SCENE.replace("half_height = 1.0", "half_height = 1e300"),
     "h.toml": SCENE.replace("amplitude = 4.0", "amplitude = 1e300"),
-    "i.toml": SCENE.replace('kind = "ricker"\namplitude = 4.0\nperiod = 0.7', 'kind = "record"\nfile = "/dev/zero"'),
-    "j.toml": SCENE.replace(
-        'kind = "ricker"\namplitude = 4.0\nperiod = 0.7', 'kind = "sine"\namplitude = 1.0\nperiod = 1e-9\ncycles = 1000'
+    "i.toml": SCENE.replace(
+        'kind = "ricker"\namplitude = 4.0\nperiod = 0.7', 'kind = "record"\nfile = "/dev/zero"'
     ),
-    "k.toml": SCENE.replace('kind = "ricker"\namplitude = 4.0\nperiod = 0.7', 'kind = "record"\nunscaled = [1.0, 2.0]\ntime_step = 1e-320'),
+    "j.toml": SCENE.replace(
+        'kind = "ricker"\namplitude = 4.0\nperiod = 0.7',
+        'kind = "sine"\namplitude = 1.0\nperiod = 1e-9\ncycles = 1000',
+    ),
+    "k.toml": SCENE.replace(
+        'kind = "ricker"\namplitude = 4.0\nperiod = 0.7',
+        'kind = "record"\nunscaled = [1.0, 2.0]\ntime_step = 1e-320',
+    ),
     "l.toml": SCENE.replace("gap = 0.02", "gap = 1e-320"),
     "m.toml": SCENE + "gravity = 1e-300\n",
     "n.toml": "gravity = 1e300\n" + SCENE,
@@ -439,7 +482,17 @@ def test_bombs_stay_below_a_gigabyte_and_a_minute(tmp_path):
     assert all(len(line) < 600 for line in done.stderr.splitlines())
 
 
-HOSTILE_NAMES = ("../../outside", "<script>alert(1)</script>", "a\x1b[2Jb", "..", "/etc/x", "a" * 300, "x\ny", "{{7*7}}", "CON")
+HOSTILE_NAMES = (
+    "../../outside",
+    "<script>alert(1)</script>",
+    "a\x1b[2Jb",
+    "..",
+    "/etc/x",
+    "a" * 300,
+    "x\ny",
+    "{{7*7}}",
+    "CON",
+)
 
 
 @pytest.mark.parametrize("name", HOSTILE_NAMES)
@@ -470,10 +523,18 @@ def test_a_stored_path_does_not_leave_the_run(tmp_path, stored, capsys):
 
 
 def test_markup_in_a_stored_run_is_text_on_the_page(tmp_path, stored):
-    """Descriptions, reasons and versions of a run that somebody sent are escaped; no text of theirs is a tag."""
+    """Descriptions, reasons and versions of a run that somebody sent are escaped; no text of theirs
+    is a tag."""
     data = json.loads(stored["run.json"])
     evil = "</script><script>alert(1)</script><img src=x onerror=alert(1)>"
-    data |= {"description": evil, "suite": evil, "versions": {evil: evil}, "hardware": {evil: evil}, "faults": [evil], "created": evil}
+    data |= {
+        "description": evil,
+        "suite": evil,
+        "versions": {evil: evil},
+        "hardware": {evil: evil},
+        "faults": [evil],
+        "created": evil,
+    }
     data["cells"][0] |= {"reason": evil, "notes": [evil]}
     data["scenes"]["short"]["description"] = evil
     (tmp_path / "run.json").write_text(json.dumps(data))
@@ -490,7 +551,8 @@ def test_markup_in_a_stored_run_is_text_on_the_page(tmp_path, stored):
 
 
 def test_a_record_names_no_file_but_its_own(tmp_path, stored):
-    """Found by fuzzing: a record that names a file with a name too long, or elsewhere, is as good as none."""
+    """Found by fuzzing: a record that names a file with a name too long, or elsewhere, is as good
+    as none."""
     store = Store(tmp_path)
     store.put("a", {suffix: stored[suffix] for suffix in SUFFIXES}, {})
     assert store.get("a") == {}
@@ -502,14 +564,16 @@ def test_a_record_names_no_file_but_its_own(tmp_path, stored):
 
 
 def test_a_heading_in_quotes(tmp_path):
-    """Found by fuzzing: a measured history whose heading is quoted, as some programs write it, ended in a traceback."""
+    """Found by fuzzing: a measured history whose heading is quoted, as some programs write it,
+    ended in a traceback."""
     path = tmp_path / "h.csv"
     path.write_text('\ufeff"t_s","theta_deg" # a remark\n0.0,90.0\n0.5,0.0\n', encoding="utf-8")
     assert read_measured(path).channels["theta"].tolist() == [math.pi / 2, 0.0]
 
 
 def test_a_heading_with_control_characters(tmp_path):
-    """Found by fuzzing: what a heading has twice is told without the characters that would steer a terminal."""
+    """Found by fuzzing: what a heading has twice is told without the characters that would steer a
+    terminal."""
     path = tmp_path / "h.csv"
     path.write_bytes(b"t,theta,\x1b[2Jx,\x1b[2Jx\n0,0,0,0\n")
     with pytest.raises(InputError) as error:
@@ -518,7 +582,8 @@ def test_a_heading_with_control_characters(tmp_path):
 
 
 def test_rows_longer_than_the_heading(tmp_path):
-    """Found by fuzzing: their first value was left out, and all others were taken for the column before theirs."""
+    """Found by fuzzing: their first value was left out, and all others were taken for the column
+    before theirs."""
     path = tmp_path / "h.csv"
     path.write_text("t,theta\n0.0,0.1,7\n0.5,0.2,7\n")
     for read in (History.load, read_measured):
@@ -537,7 +602,8 @@ def test_a_column_that_is_there_twice(tmp_path):
 
 
 def test_a_path_does_not_steer_the_terminal(tmp_path, monkeypatch, capsys):
-    """Found by fuzzing: what a file is called was written to the terminal as it is; so was the name in a history's header."""
+    """Found by fuzzing: what a file is called was written to the terminal as it is; so was the name
+    in a history's header."""
     monkeypatch.chdir(tmp_path)
     assert main(["simulate", "fig4a", "--model", "ebm", "-o", "a\x1b]0;x\x07\udcff.csv"]) == 0
     said = '"{""name"": ""\\u001b[2J"", ""model"": ""\\u001b[2J""}"'

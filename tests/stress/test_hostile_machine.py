@@ -1,4 +1,5 @@
-"""Machines that fail: a full disk, folders that cannot be written, jumping clocks, lost workers, Ctrl-C.
+"""Machines that fail: a full disk, folders that cannot be written, jumping clocks, lost workers,
+Ctrl-C.
 
 Each time: a clear end in one line, nothing that was computed is lost, and the next run is right.
 """
@@ -61,13 +62,18 @@ def limited(size: int, *words: str) -> subprocess.CompletedProcess[str]:
     """rockcheck where no file can be larger than `size` bytes; without coverage.py and
     Python's own caches (-B), which would be cut off at that size."""
     command = [sys.executable, "-B", "-c", _LIMITED, str(size), *words]
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("COVERAGE_PROCESS")}
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=environment)
+    environment = {
+        name: value for name, value in os.environ.items() if not name.startswith("COVERAGE_PROCESS")
+    }
+    return subprocess.run(
+        command, capture_output=True, text=True, timeout=300, check=False, env=environment
+    )
 
 
 @posix
 def test_disk_full(tmp_path):
-    """A history that does not fit: one line that names the file, exit 2, and the old history with its events as they were."""
+    """A history that does not fit: one line that names the file, exit 2, and the old history with
+    its events as they were."""
     out, events = tmp_path / "out.csv", tmp_path / "out.events.csv"
     words = ("simulate", "fig4a", "--model", "ebm", "-o", str(out))
     for old in (False, True):
@@ -84,8 +90,12 @@ def test_disk_full(tmp_path):
 @posix
 @pytest.mark.parametrize("size", [100, 2000, 30_000])
 def test_disk_full_whatever_is_written(tmp_path, size):
-    """A scene file, figures and pages: nothing that is there is cut, and the line names the file that could not be written."""
-    for words in (["new", str(tmp_path / "a.toml")], ["validate", "smoke", "--out", str(tmp_path / "run")]):
+    """A scene file, figures and pages: nothing that is there is cut, and the line names the file
+    that could not be written."""
+    for words in (
+        ["new", str(tmp_path / "a.toml")],
+        ["validate", "smoke", "--out", str(tmp_path / "run")],
+    ):
         done = limited(size, *words)
         if words[0] == "validate" or size == 100:
             assert done.returncode == 2
@@ -100,20 +110,25 @@ def test_disk_full_whatever_is_written(tmp_path, size):
 def test_what_is_no_file_is_written_as_it_is(tmp_path):
     """A pipe, a device or a link is not replaced by a file."""
     (tmp_path / "link").symlink_to(tmp_path / "out.csv")
-    assert main(["simulate", "fig4a", "--model", "ebm", "-o", str(tmp_path / "link"), "--quiet"]) == 0
+    assert (
+        main(["simulate", "fig4a", "--model", "ebm", "-o", str(tmp_path / "link"), "--quiet"]) == 0
+    )
     assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "out.csv").read_text().startswith("t,x,y,theta,")
     command = [*ROCKCHECK, "simulate", "fig4a", "--model", "ebm", "-q", "-o", "/dev/stdout"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
     lines = (tmp_path / "out.csv").read_text().splitlines()
-    assert done.stdout.splitlines()[2:] == lines[2:]  # the first row also says how long the run took
+    assert (
+        done.stdout.splitlines()[2:] == lines[2:]
+    )  # the first row also says how long the run took
     assert done.stdout.splitlines()[0] == lines[0]
     assert Path("/dev/stdout").is_symlink()
 
 
 @posix
 def test_disk_full_while_a_study_is_written(tmp_path):
-    """Tables that were written stay whole; the file that does not fit leaves nothing; the next run writes all."""
+    """Tables that were written stay whole; the file that does not fit leaves nothing; the next run
+    writes all."""
     done = limited(7000, *SMALL_RUN, "--out", str(tmp_path))
     assert done.returncode == 2
     one_line(done.stderr)
@@ -172,14 +187,17 @@ def test_clock_that_jumps(tmp_path, monkeypatch):
 
 
 def test_two_versions_share_a_store(tmp_path):
-    """Each reads what it wrote; a record of another layout is as good as none, and a newer run.json is told."""
+    """Each reads what it wrote; a record of another layout is as good as none, and a newer run.json
+    is told."""
     old, new = Store(tmp_path), Store(tmp_path)
     old.put("s--ebm--1111", {".csv.gz": b"old"}, {"outcome": "at rest"})
     new.put("s--ebm--2222", {".csv.gz": b"new"}, {"outcome": "moving", "something": {"new": [1]}})
     assert old.get("s--ebm--1111") == {"outcome": "at rest"}
     assert new.get("s--ebm--1111") == {"outcome": "at rest"}
     assert old.history("s--ebm--1111").read_text() == "old"
-    (tmp_path / HISTORIES / "s--ebm--2222.json").write_text(json.dumps({"version": 9, "files": ["a", "list"]}))
+    (tmp_path / HISTORIES / "s--ebm--2222.json").write_text(
+        json.dumps({"version": 9, "files": ["a", "list"]})
+    )
     assert new.get("s--ebm--2222") is None
     (tmp_path / "run.json").write_text(json.dumps({"format": 99}))
     assert main(["report", str(tmp_path)]) == 2
@@ -200,28 +218,38 @@ def deadly(monkeypatch):
 
 
 def test_worker_lost_or_hanging(tmp_path, deadly):
-    """Of runs whose process dies or hangs only the one that does it fails; all others are played."""
+    """Of runs whose process dies or hangs only the one that does it fails; all others are
+    played."""
     found = run(deadly.Deadly("runs", models=("ebm",), runs=16), tmp_path, jobs=2)
     assert found.data["batches"]["ebm"]["counts"]["runs"] == 16
-    failures = {failure["number"]: failure["words"] for failure in found.table("failures").records()}
+    failures = {
+        failure["number"]: failure["words"] for failure in found.table("failures").records()
+    }
     assert failures == {3: "the process ended with code 9", 13: "did not end within 4 s"}
     assert all("not shrunk" in text for text in found.scenes.values())
 
 
 def test_shrinking_that_hangs(tmp_path, deadly):
-    """However long the trials of a failing scene take: shrinking ends, and each scene is as small as trials that end make it."""
+    """However long the trials of a failing scene take: shrinking ends, and each scene is as small
+    as trials that end make it."""
     began = time.monotonic()
     found = run(deadly.Stubborn("runs", models=("ebm",), runs=20), tmp_path, jobs=2)
     assert time.monotonic() - began < 90.0
     publish(found, tmp_path)
-    small = {number: load_scene(tmp_path / "failures" / f"ebm-mirror-1-{number}.toml") for number in deadly.FAILING}
+    small = {
+        number: load_scene(tmp_path / "failures" / f"ebm-mirror-1-{number}.toml")
+        for number in deadly.FAILING
+    }
     before = {number: PLAYERS["ebm"].scene(1, number) for number in deadly.FAILING}
     assert small[3].walls  # the trial without one is the one that hangs
     assert small[3].excitation.kind == "rest" != before[3].excitation.kind
     assert small[4].excitation != before[4].excitation
     assert small[5].duration < 0.1 * before[5].duration
     assert small[13].excitation == before[13].excitation
-    remarks = {number: found.scenes[f"ebm-mirror-1-{number}.toml"].partition("rockcheck simulate")[0] for number in deadly.FAILING}
+    remarks = {
+        number: found.scenes[f"ebm-mirror-1-{number}.toml"].partition("rockcheck simulate")[0]
+        for number in deadly.FAILING
+    }
     assert {number for number, said in remarks.items() if "not the smallest" in said} == {3, 4}
     assert {number for number, said in remarks.items() if "not shrunk" in said} == {13}
 
@@ -244,19 +272,23 @@ def test_shrinking_interrupted(tmp_path, monkeypatch):
     assert all("not shrunk" in text for text in found.scenes.values())
 
 
-linux = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs Linux: it tells the children")
+linux = pytest.mark.skipif(
+    not Path("/proc/self/task").exists(), reason="needs Linux: it tells the children"
+)
 
 
 @pytest.fixture
 def interruptible():
-    """What is started here hears SIGINT, also where these tests run in the background of a shell, which makes it ignore that."""
+    """What is started here hears SIGINT, also where these tests run in the background of a shell,
+    which makes it ignore that."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
 
 
 def workers(running: subprocess.Popen, settled: float = 3.0) -> list[str]:
-    """Process ids of the children, `settled` s after they were started: a worker, and multiprocessing's tracker."""
+    """Process ids of the children, `settled` s after they were started: a worker, and
+    multiprocessing's tracker."""
     children: list[str] = []
     until = time.monotonic() + 60.0
     while len(children) < 2 and time.monotonic() < until:
@@ -269,9 +301,28 @@ def workers(running: subprocess.Popen, settled: float = 3.0) -> list[str]:
 @linux
 @pytest.mark.usefixtures("interruptible")
 def test_interrupted(tmp_path):
-    """Ctrl-C ends a study in one line; what was finished is written, and says that it is not all."""
-    command = [*ROCKCHECK, "stress", "runs", "--model", "ebm no-slip", "--runs", "60000", "--jobs", "1", "--out", str(tmp_path)]
-    running = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, start_new_session=True)
+    """Ctrl-C ends a study in one line; what was finished is written, and says that it is not
+    all."""
+    command = [
+        *ROCKCHECK,
+        "stress",
+        "runs",
+        "--model",
+        "ebm no-slip",
+        "--runs",
+        "60000",
+        "--jobs",
+        "1",
+        "--out",
+        str(tmp_path),
+    ]
+    running = subprocess.Popen(
+        command,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+        start_new_session=True,
+    )
     try:
         workers(running)
         os.killpg(running.pid, signal.SIGINT)
@@ -291,9 +342,28 @@ def test_interrupted(tmp_path):
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize("later", [0.0, 0.2, 0.4, 0.6])
 def test_interrupted_while_a_worker_starts(tmp_path, later):
-    """Ctrl-C reaches a worker, too, before it can say that it is not meant: still one line, and no traceback of the worker."""
-    command = [*ROCKCHECK, "stress", "runs", "--model", "ebm no-slip", "--runs", "60000", "--jobs", "1", "--out", str(tmp_path)]
-    running = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, start_new_session=True)
+    """Ctrl-C reaches a worker, too, before it can say that it is not meant: still one line, and no
+    traceback of the worker."""
+    command = [
+        *ROCKCHECK,
+        "stress",
+        "runs",
+        "--model",
+        "ebm no-slip",
+        "--runs",
+        "60000",
+        "--jobs",
+        "1",
+        "--out",
+        str(tmp_path),
+    ]
+    running = subprocess.Popen(
+        command,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+        start_new_session=True,
+    )
     try:
         assert len(workers(running, settled=later)) >= 2
         os.killpg(running.pid, signal.SIGINT)
@@ -307,9 +377,24 @@ def test_interrupted_while_a_worker_starts(tmp_path, later):
 
 @linux
 def test_killed(tmp_path):
-    """A run that is killed leaves no worker behind, however busy, and the next run in its folder is whole."""
-    command = [*ROCKCHECK, "stress", "runs", "--model", "ebm no-slip", "--runs", "60000", "--jobs", "1", "--out", str(tmp_path)]
-    running = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True)
+    """A run that is killed leaves no worker behind, however busy, and the next run in its folder is
+    whole."""
+    command = [
+        *ROCKCHECK,
+        "stress",
+        "runs",
+        "--model",
+        "ebm no-slip",
+        "--runs",
+        "60000",
+        "--jobs",
+        "1",
+        "--out",
+        str(tmp_path),
+    ]
+    running = subprocess.Popen(
+        command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True
+    )
     try:
         children = workers(running)
     finally:

@@ -1,4 +1,5 @@
-"""What a stress run holds runs against: scenes that can be made again, invariants that notice faults."""
+"""What a stress run holds runs against: scenes that can be made again, invariants that notice
+faults."""
 
 from __future__ import annotations
 
@@ -43,18 +44,32 @@ def test_a_scene_of_a_seed_can_be_made_alone():
 
 
 def test_scenes_cover_what_a_user_could_write():
-    """The corners of the ranges are reached, and every kind of excitation, wall and start occurs."""
+    """The corners of the ranges are reached, and every kind of excitation, wall and start
+    occurs."""
     scenes = [random_scene(1, n) for n in range(2000)]
     alphas, radii, friction = (
-        np.array(one) for one in zip(*((s.block.box_angle, s.block.half_diagonal, s.floor.friction) for s in scenes), strict=True)
+        np.array(one)
+        for one in zip(
+            *((s.block.box_angle, s.block.half_diagonal, s.floor.friction) for s in scenes),
+            strict=True,
+        )
     )
     for values, (low, high) in ((alphas, ALPHA), (radii, RADIUS)):
         assert low * (1 - 1e-9) <= values.min() < 2.0 * low
         assert 0.9 * high < values.max() <= high * (1 + 1e-9)
     assert friction.min() == 0.0
     assert friction.max() > 0.98 * FRICTION[1]
-    assert {s.excitation.kind for s in scenes} == {s.vertical.kind for s in scenes} == {"rest", "ricker", "sine", "record"}
-    assert {tuple(w.side for w in s.walls) for s in scenes} == {(), ("left",), ("right",), ("left", "right")}
+    assert (
+        {s.excitation.kind for s in scenes}
+        == {s.vertical.kind for s in scenes}
+        == {"rest", "ricker", "sine", "record"}
+    )
+    assert {tuple(w.side for w in s.walls) for s in scenes} == {
+        (),
+        ("left",),
+        ("right",),
+        ("left", "right"),
+    }
     assert {w.restitution for s in scenes for w in s.walls} >= {0.0, 1.0}
     assert any(w.gap == 0.0 for s in scenes for w in s.walls)
     assert any(abs(s.initial_rotation) == pytest.approx(s.block.alpha) for s in scenes)
@@ -72,7 +87,8 @@ def test_scenes_cover_what_a_user_could_write():
 
 @pytest.mark.parametrize("make", [random_scene, exact_scene])
 def test_a_third_of_the_blocks_are_asymmetric(make):
-    """To either side, with a moment of inertia of their own or without, some with a load in the middle."""
+    """To either side, with a moment of inertia of their own or without, some with a load in the
+    middle."""
     scenes = [make(1, n) for n in range(1500)]
     off = np.array([scene.block.offset[0] for scene in scenes])
     assert 0.3 < np.mean(off != 0.0) < 0.37
@@ -81,19 +97,29 @@ def test_a_third_of_the_blocks_are_asymmetric(make):
     assert 0.4 < np.mean([block.moment_of_inertia is None for block in bear]) < 0.6
     assert any(block.offset[0] == 0.0 != block.offset[1] for block in bear)
     assert any(block.offset[1] == 0.0 != block.offset[0] for block in bear)
-    tilts = [(scene.initial_rotation, scene.block) for scene in scenes if not scene.block.homogeneous and scene.initial_rotation]
-    balanced = [tilt for tilt, block in tilts if abs(tilt) == block.pivot("left" if tilt > 0.0 else "right").alpha]
+    tilts = [
+        (scene.initial_rotation, scene.block)
+        for scene in scenes
+        if not scene.block.homogeneous and scene.initial_rotation
+    ]
+    balanced = [
+        tilt
+        for tilt, block in tilts
+        if abs(tilt) == block.pivot("left" if tilt > 0.0 else "right").alpha
+    ]
     assert min(balanced) < 0.0 < max(balanced)
 
 
 LOADED = SLIDES_AND_HITS.replace(
-    block=Block(half_width=0.4, half_height=1.2, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.4), floor=Floor(friction=0.25)
+    block=Block(half_width=0.4, half_height=1.2, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.4),
+    floor=Floor(friction=0.25),
 )
 
 
 @pytest.mark.parametrize("label", ["ebm", "ebm-unilateral", "ebm no-slip", "ebm-bouc-wen"])
 def test_a_loaded_block_keeps_all_invariants(label):
-    """It slides, rocks and hits the wall. The base works on its mass's centre, its contacts are the box's."""
+    """It slides, rocks and hits the wall. The base works on its mass's centre, its contacts are the
+    box's."""
     scene = LOADED
     played = PLAYERS[label].check(scene, 1, 0)  # run 0 is audited
     assert played.broken == []
@@ -110,9 +136,15 @@ def test_similar_and_disturbed_blocks_bear_the_same_load():
     changed = [scene.block for scene in invariants._disturbed(LOADED, 1)]
     assert len(changed) == invariants.DISTURBED
     for one in changed:
-        for new, old in ((one.offset[0], x), (one.offset[1], z), (one.moment_of_inertia, block.moment_of_inertia)):
+        for new, old in (
+            (one.offset[0], x),
+            (one.offset[1], z),
+            (one.moment_of_inertia, block.moment_of_inertia),
+        ):
             assert 0.0 < abs(new / old - 1.0) <= 1.01 * invariants.DISTURBANCE
-    full = LOADED.replace(block=block.replace(moment_of_inertia=0.4**2 + 1.2**2 - x * x - z * z))  # as much as there can be
+    full = LOADED.replace(
+        block=block.replace(moment_of_inertia=0.4**2 + 1.2**2 - x * x - z * z)
+    )  # as much as there can be
     assert 0 < len(list(invariants._disturbed(full, 1))) < invariants.DISTURBED
 
 
@@ -122,32 +154,44 @@ def test_forces_of_an_asymmetric_block():
     on, off, still = np.array([True]), np.array([False]), np.zeros(1, dtype=np.int8)
     for sign, side in ((1.0, "left"), (-1.0, "right")):
         pivot, phi, u = block.pivot(side), 0.1, 0.2
-        s, c = pivot.radius * math.sin(pivot.alpha - phi), pivot.radius * math.cos(pivot.alpha - phi)
+        s, c = (
+            pivot.radius * math.sin(pivot.alpha - phi),
+            pivot.radius * math.cos(pivot.alpha - phi),
+        )
         top = 2.0 * block.half_height * math.cos(phi)  # of the top corner over the floor
         at = arms(block, np.array([sign]), np.array([phi]))
         leans = tilted_forces(at, 0.3, np.zeros(1), np.array([u]), np.ones(1), (on, on, off), still)
         assert leans.tip[0] == pytest.approx((u * c - s) / top, rel=1e-13)
         assert leans.normal[0] == pytest.approx(1.0, rel=1e-13)
-        falls = tilted_forces(at, 0.3, np.zeros(1), np.array([u]), np.ones(1), (on, off, off), still)
+        falls = tilted_forces(
+            at, 0.3, np.zeros(1), np.array([u]), np.ones(1), (on, off, off), still
+        )
         spin = (u * c - s) / (block.gyration_squared + pivot.radius**2)
         assert falls.normal[0] == pytest.approx(1.0 + s * spin, rel=1e-13)
         assert falls.friction[0] == pytest.approx(u - c * spin, rel=1e-13)
 
 
 def test_forces_of_housners_block():
-    """ROCK: (3), and a block that stands on its corner without speed presses with what lifts its centroid."""
+    """ROCK: (3), and a block that stands on its corner without speed presses with what lifts its
+    centroid."""
     phi, u = np.array([0.1]), np.array([0.2])
     on, off = np.array([True]), np.array([False])
     alpha = PAPER_BLOCK.alpha
     at = arms(PAPER_BLOCK, np.ones(1), phi)
-    forces = tilted_forces(at, 0.3, np.zeros(1), u, np.ones(1), (on, off, off), np.zeros(1, dtype=np.int8))
+    forces = tilted_forces(
+        at, 0.3, np.zeros(1), u, np.ones(1), (on, off, off), np.zeros(1, dtype=np.int8)
+    )
     s, c = math.sin(alpha - 0.1), math.cos(alpha - 0.1)
     spin = 0.75 * (0.2 * c - s)
     assert forces.normal[0] == pytest.approx(1.0 + s * spin, rel=1e-13)
     assert forces.friction[0] == pytest.approx(0.2 - c * spin, rel=1e-13)
-    slips = tilted_forces(at, 0.3, np.zeros(1), u, np.ones(1), (on, off, off), np.ones(1, dtype=np.int8))
+    slips = tilted_forces(
+        at, 0.3, np.zeros(1), u, np.ones(1), (on, off, off), np.ones(1, dtype=np.int8)
+    )
     eta = 0.3
-    assert slips.normal[0] == pytest.approx(1.0 / (1.0 + 3.0 * s * s + 3.0 * eta * s * c), rel=1e-13)
+    assert slips.normal[0] == pytest.approx(
+        1.0 / (1.0 + 3.0 * s * s + 3.0 * eta * s * c), rel=1e-13
+    )
     assert slips.friction[0] == pytest.approx(-0.3 * slips.normal[0], rel=1e-13)
 
 
@@ -218,7 +262,12 @@ def test_each_invariant_notices_its_fault(name):
 def test_tension_in_a_floor_that_only_pushes_is_noticed():
     """The paper's pivot, judged as if the floor could only push: after a wall impact it pulls."""
     scene = SLIDES_AND_HITS.replace(
-        excitation=Rest(), walls=(), initial_rotation=0.02, initial_angular_velocity=3.2, duration=0.1, output_step=1e-3
+        excitation=Rest(),
+        walls=(),
+        initial_rotation=0.02,
+        initial_angular_velocity=3.2,
+        duration=0.1,
+        output_step=1e-3,
     )
     paper = EventBasedModel().simulate(scene)
 
@@ -236,14 +285,18 @@ def test_a_coarse_model_breaks_the_comparison_with_a_finer_one():
 
 
 def test_energy_balance_is_exact_to_rounding():
-    for scene in (SLIDES_AND_HITS, SLIDES_AND_HITS.replace(vertical=Sine(amplitude=3.0, period=0.4, cycles=5))):
+    for scene in (
+        SLIDES_AND_HITS,
+        SLIDES_AND_HITS.replace(vertical=Sine(amplitude=3.0, period=0.4, cycles=5)),
+    ):
         fine = audited(scene)
         model = EventBasedModel(tolerance=1e-13)
         assert energy_error(model, fine, model.simulate(fine)) < 1e-11
 
 
 def test_the_spring_of_bouc_wens_friction_gives_energy_only_where_the_floors_push_changes():
-    """(9) keeps z, not energy: its force mu |P| z grows with P. What it gives is less than it can hold."""
+    """(9) keeps z, not energy: its force mu |P| z grows with P. What it gives is less than it can
+    hold."""
     shakes = SLIDES_AND_HITS.replace(walls=(), vertical=Sine(amplitude=6.0, period=0.15, cycles=27))
     gains = {}
     for name, scene in (("shaken", shakes), ("steady", shakes.replace(vertical=Rest()))):
@@ -252,7 +305,9 @@ def test_the_spring_of_bouc_wens_friction_gives_energy_only_where_the_floors_pus
             model = EventBasedModel(friction="bouc-wen", yield_displacement=size, tolerance=1e-12)
             history = model.simulate(audited(scene))
             assert energy_error(model, audited(scene), history) < 1e-9
-            without = model.model_copy(update={"yield_displacement": 1e-30})  # as if it could hold nothing
+            without = model.model_copy(
+                update={"yield_displacement": 1e-30}
+            )  # as if it could hold nothing
             gains[name, yields] = energy_error(without, audited(scene), history)
     assert gains["steady", 1e-2] < 1e-9
     assert gains["steady", 1e-3] < 1e-9
@@ -260,10 +315,13 @@ def test_the_spring_of_bouc_wens_friction_gives_energy_only_where_the_floors_pus
 
 
 def test_energy_that_cannot_be_judged_is_not_said_to_hold(monkeypatch):
-    """A history of too few rows, and one whose work is resolved nowhere: neither has an error of 0, and the run is counted."""
+    """A history of too few rows, and one whose work is resolved nowhere: neither has an error of 0,
+    and the run is counted."""
     model, short = EventBasedModel(), SLIDES_AND_HITS.replace(duration=0.2)
     assert energy_error(model, short, model.simulate(short)) is None
-    rough = SLIDES_AND_HITS.replace(excitation=Record.from_samples(8.0 * np.sin(np.arange(500.0)), time_step=0.008))
+    rough = SLIDES_AND_HITS.replace(
+        excitation=Record.from_samples(8.0 * np.sin(np.arange(500.0)), time_step=0.008)
+    )
     assert energy_error(model, rough, model.simulate(rough)) is None  # five kinks between two rows
     assert energy_error(model, audited(rough), model.simulate(audited(rough))) < 1e-9
     monkeypatch.setattr(invariants, "RESOLVED", 0.0)
@@ -275,11 +333,21 @@ def test_energy_that_cannot_be_judged_is_not_said_to_hold(monkeypatch):
 
 
 def test_a_block_that_hangs_is_its_own_mirror_image():
-    """At rest, symmetric, and the floor falls away faster than g: the pivot that cannot let go has no corner to choose."""
+    """At rest, symmetric, and the floor falls away faster than g: the pivot that cannot let go has
+    no corner to choose."""
     hangs = SLIDES_AND_HITS.replace(
-        walls=(), excitation=Rest(), vertical=Record.from_samples([0.0, -20.0, -20.0], time_step=0.1), duration=0.3, output_step=0.01
+        walls=(),
+        excitation=Rest(),
+        vertical=Record.from_samples([0.0, -20.0, -20.0], time_step=0.1),
+        duration=0.3,
+        output_step=0.01,
     )
-    for settings in ({}, {"friction": "no-slip"}, {"friction": "bouc-wen"}, {"pivot": "unilateral"}):
+    for settings in (
+        {},
+        {"friction": "no-slip"},
+        {"friction": "bouc-wen"},
+        {"pivot": "unilateral"},
+    ):
         played = check_run(EventBasedModel(**settings), hangs)
         assert played.broken == [], settings
         assert played.figures["mirror"] == 0.0
@@ -306,7 +374,8 @@ def test_approximate_models_keep_what_they_state(label):
 
 
 def test_work_of_the_base_on_a_block_that_stands_or_flies():
-    """A record finer than the rows, with a jump where it ends: the energy of a block that feels only the base is the base's work."""
+    """A record finer than the rows, with a jump where it ends: the energy of a block that feels
+    only the base is the base's work."""
     scene = SLIDES_AND_HITS.replace(
         floor=Floor(friction=0.0),
         walls=(),
@@ -317,34 +386,51 @@ def test_work_of_the_base_on_a_block_that_stands_or_flies():
     slides = EventBasedModel().simulate(scene)
     assert np.ptp(slides.channels["x_dot"]) > 0.05
     assert abs(energy_without_source(scene, slides)) < 1e-14
-    faster = dataclasses.replace(slides, channels={**slides.channels, "x_dot": 1.1 * slides.channels["x_dot"]})
+    faster = dataclasses.replace(
+        slides, channels={**slides.channels, "x_dot": 1.1 * slides.channels["x_dot"]}
+    )
     assert energy_without_source(scene, faster) > 1e-5
-    drops = scene.replace(block=LOADED.block, initial_height=2.0, initial_angular_velocity=1.0)  # and turns about the load
+    drops = scene.replace(
+        block=LOADED.block, initial_height=2.0, initial_angular_velocity=1.0
+    )  # and turns about the load
     flies = EventBasedModel(pivot="unilateral").simulate(drops)
     assert set(flies.channels["mode"]) == {"flight"}
     assert abs(energy_without_source(drops, flies)) < 1e-13
 
 
 def test_of_an_engine_that_gains_energy_half_the_step_is_told(monkeypatch):
-    """Energy from nowhere that falls with the step is the step's; the words of the failure say so."""
+    """Energy from nowhere that falls with the step is the step's; the words of the failure say
+    so."""
     player = PLAYERS["mujoco"]
     scene = player.scene(1, 2)
-    monkeypatch.setattr(players, "energy_without_source", lambda played, history: 0.08 * played.output_step / scene.output_step)
+    monkeypatch.setattr(
+        players,
+        "energy_without_source",
+        lambda played, history: 0.08 * played.output_step / scene.output_step,
+    )
     played = player.check(scene, 1, 2)
     assert played.broken == ["source"]
     assert played.failure == "source 0.08, with half the step 0.04"
 
 
 def test_exact_scenes_are_the_same_for_a_seed_and_hold_what_they_are_for():
-    """Numbers of few digits, starts that are noise, walls on both sides, a vertical base that may take all weight, long rest."""
+    """Numbers of few digits, starts that are noise, walls on both sides, a vertical base that may
+    take all weight, long rest."""
     scenes = [exact_scene(5, number, "unilateral") for number in range(400)]
     assert scenes == [exact_scene(5, number, "unilateral") for number in range(400)]
     assert scenes[:50] != [exact_scene(6, number, "unilateral") for number in range(50)]
-    assert all(len(repr(scene.block.half_width)) < 8 and len(repr(scene.gravity)) < 8 for scene in scenes)
+    assert all(
+        len(repr(scene.block.half_width)) < 8 and len(repr(scene.gravity)) < 8 for scene in scenes
+    )
     assert any(0.0 < abs(scene.initial_rotation) < 1e-12 for scene in scenes)
     assert any(0.0 < abs(scene.initial_angular_velocity) < 1e-12 for scene in scenes)
-    assert any(len(scene.walls) == 2 and scene.walls[0].gap == scene.walls[1].gap for scene in scenes)
-    assert any(scene.vertical.kind == "record" and min(scene.vertical.samples) == -scene.gravity for scene in scenes)
+    assert any(
+        len(scene.walls) == 2 and scene.walls[0].gap == scene.walls[1].gap for scene in scenes
+    )
+    assert any(
+        scene.vertical.kind == "record" and min(scene.vertical.samples) == -scene.gravity
+        for scene in scenes
+    )
     assert any(scene.duration == 1e4 for scene in scenes)
     yielding = [exact_scene(5, number, "bouc-wen") for number in range(100)]
     assert all(scene.floor.static_friction is None for scene in yielding)

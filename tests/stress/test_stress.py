@@ -1,4 +1,5 @@
-"""The stress study: its work, what its runs add up to, failures with their smallest scenes, maps."""
+"""The stress study: its work, what its runs add up to, failures with their smallest scenes,
+maps."""
 
 from __future__ import annotations
 
@@ -40,7 +41,8 @@ from rockcheck.validation.study import run
 
 
 def test_a_load_is_dropped_only_if_it_does_not_matter():
-    """Shrinking tries a block without its load, or with it in the middle, and none that may not be."""
+    """Shrinking tries a block without its load, or with it in the middle, and none that may not
+    be."""
     loaded = random_scene(1, 0).replace(
         block=Block(
             half_width=0.4, half_height=1.2, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.4
@@ -62,7 +64,8 @@ def test_a_load_is_dropped_only_if_it_does_not_matter():
 
 
 def test_shrinking_drops_all_that_does_not_matter(tmp_path):
-    """Of a scene with everything in it, only what shows the "failure" is left, and the file is that scene again."""
+    """Of a scene with everything in it, only what shows the "failure" is left, and the file is that
+    scene again."""
     scene = random_scene(1, 0).replace(
         walls=(Wall(side="left", gap=0.5, restitution=0.3), Wall(side="right", gap=0.7)),
         vertical=Sine(amplitude=1.234567, period=1.0),
@@ -135,7 +138,8 @@ def broken_without_walls(
 
 
 def test_a_failure_is_shown_with_its_smallest_scene(tmp_path, monkeypatch):
-    """An event-based model that breaks an invariant: exit 1, counted, and a scene file that a user can play; kept for the next run."""
+    """An event-based model that breaks an invariant: exit 1, counted, and a scene file that a user
+    can play; kept for the next run."""
     monkeypatch.setattr(type(PLAYERS["ebm"]), "check", broken_without_walls)
     stale = tmp_path / "failures" / "old.toml"
     stale.parent.mkdir()
@@ -160,7 +164,8 @@ def test_a_failure_is_shown_with_its_smallest_scene(tmp_path, monkeypatch):
 
 
 def test_failures_of_the_program_and_of_engines():
-    """A run whose process was lost does not end, and is not shrunk; an engine's failure fails no command; most are only counted."""
+    """A run whose process was lost does not end, and is not shrunk; an engine's failure fails no
+    command; most are only counted."""
     study = Stress("runs", runs=30, models=("ebm", "cm"))
     lost, other = Chunk("ebm", 1, 7, 1), Chunk("cm", 1, 0, 30)
     failures = [Broken("cm", "source", 1, number, 0.1) for number in range(30)]
@@ -177,7 +182,8 @@ def test_failures_of_the_program_and_of_engines():
 
 
 def test_where_an_engine_breaks_is_found():
-    """MuJoCo's own contact lets a block of a millimetre sink; at its best it holds it. Creep under a push is seen, too."""
+    """MuJoCo's own contact lets a block of a millimetre sink; at its best it holds it. Creep under
+    a push is seen, too."""
     assert fault_of(SETUPS["mujoco default"], scene_at("size", 1e-3), 0.01) == "sinks"
     assert fault_of(SETUPS["mujoco"], scene_at("size", 1e-3), 0.01) == ""
     found = Place("mujoco default", "size", 1e-3, quick=True).play()

@@ -1,4 +1,5 @@
-"""The shape of every study: what the one runner does for a made-up one, and that the real ones have the shape."""
+"""The shape of every study: what the one runner does for a made-up one, and that the real ones have
+the shape."""
 
 from __future__ import annotations
 
@@ -13,7 +14,18 @@ from rockcheck.reports.document import block_markdown, csv, publish
 from rockcheck.scenes import InputError
 from rockcheck.scenes.progress import announcing
 from rockcheck.validation.execute.pool import Failure
-from rockcheck.validation.finding import Axis, Column, Finding, Mark, Panel, Plot, Series, Table, Text, text
+from rockcheck.validation.finding import (
+    Axis,
+    Column,
+    Finding,
+    Mark,
+    Panel,
+    Plot,
+    Series,
+    Table,
+    Text,
+    text,
+)
 from rockcheck.validation.study import FAULTS, Study, run
 
 MODELS = Path(__file__).parent / "models"
@@ -44,10 +56,17 @@ def played(log: Path) -> list[float]:
 
 
 @pytest.mark.parametrize("jobs", [0, 1, 2])
-def test_what_was_played_is_read_back_whatever_plays_it(tmp_path: Path, log: Path, jobs: int) -> None:
+def test_what_was_played_is_read_back_whatever_plays_it(
+    tmp_path: Path, log: Path, jobs: int
+) -> None:
     heard: list[tuple[float, float]] = []
     study = squares([2.0, 3.0, 3.0], log)
-    found = run(study, tmp_path / "out", jobs=jobs, on_progress=lambda done, of, what="": heard.append((done, of)))
+    found = run(
+        study,
+        tmp_path / "out",
+        jobs=jobs,
+        on_progress=lambda done, of, what="": heard.append((done, of)),
+    )
     again = run(study, tmp_path / "out", jobs=jobs)
     assert found.table("squares").rows == again.table("squares").rows == [[2.0, 4.0], [3.0, 9.0]]
     assert played(log) == [2.0, 3.0]
@@ -68,7 +87,9 @@ def test_a_wave_follows_from_what_was_found(tmp_path: Path, log: Path) -> None:
 def test_a_fault_of_one_task_takes_no_other_down(tmp_path: Path, log: Path) -> None:
     found = run(squares([2.0, 13.0, 14.0, 15.0], log), tmp_path / "out", jobs=1)
     assert found.data == {"count": 1}
-    assert {where.partition(",")[0]: why.partition(":")[0] for where, why in found.failures.items()} == {
+    assert {
+        where.partition(",")[0]: why.partition(":")[0] for where, why in found.failures.items()
+    } == {
         "13": "no square of 13",
         "14": "ZeroDivisionError",
         "15": "the process ended with code 3",
@@ -137,12 +158,27 @@ FOUND = Finding(
         Text("In words.", title="Words", items=["one", "two"]),
         Table(
             "numbers",
-            [text("name"), Column("model", kind="model"), Column("share", kind="percent"), Column("x", "length", "m")],
-            [["=1+1|", "mujoco", 0.25, 1.23456e-9], ["b", "mine", None, Mark(2.0, "fail", "too long")]],
+            [
+                text("name"),
+                Column("model", kind="model"),
+                Column("share", kind="percent"),
+                Column("x", "length", "m"),
+            ],
+            [
+                ["=1+1|", "mujoco", 0.25, 1.23456e-9],
+                ["b", "mine", None, Mark(2.0, "fail", "too long")],
+            ],
             "Numbers",
         ),
         Plot(
-            "curve", panels=[Panel("", [Series("a", [1.0, 2.0], [3.0, None]), Series("", y=[1.0], style="level")])], x=Axis("t"), live=True
+            "curve",
+            panels=[
+                Panel(
+                    "", [Series("a", [1.0, 2.0], [3.0, None]), Series("", y=[1.0], style="level")]
+                )
+            ],
+            x=Axis("t"),
+            live=True,
         ),
     ],
     verdict="fail",
@@ -174,8 +210,12 @@ def real_studies() -> list[tuple[Study, Any]]:
     return [(WorkPrecision("ebm", quick=True), lambda task: getattr(task, "size", 0) == 1)]
 
 
-@pytest.mark.parametrize(("study", "wanted"), real_studies(), ids=lambda one: getattr(one, "name", ""))
-def test_a_record_of_every_study_is_read_back_as_it_was(study: Study, wanted: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("study", "wanted"), real_studies(), ids=lambda one: getattr(one, "name", "")
+)
+def test_a_record_of_every_study_is_read_back_as_it_was(
+    study: Study, wanted: Any, tmp_path: Path
+) -> None:
     from rockcheck.validation.execute.store import Store
 
     task = next(task for task in study.tasks({}) if wanted(task))

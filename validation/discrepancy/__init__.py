@@ -1,4 +1,5 @@
-"""How far two histories differ: measures, `compare`, statistics, closed forms, measured histories."""
+"""How far two histories differ: measures, `compare`, statistics, closed forms, measured
+histories."""
 
 from rockcheck.validation.discrepancy.compare import Discrepancy, compare
 

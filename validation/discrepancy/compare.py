@@ -15,7 +15,15 @@ from rockcheck.scenes.base import Shown
 from rockcheck.scenes.errors import check_kind
 from rockcheck.validation.discrepancy import closed_forms as _closed_forms  # noqa: F401 - registers them
 from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, TURNS, Measure, Pair, Unavailable, WindowedHistory
+from rockcheck.validation.discrepancy.measures import (
+    DIFFERENCES,
+    FIGURES,
+    TURNS,
+    Measure,
+    Pair,
+    Unavailable,
+    WindowedHistory,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,9 +33,10 @@ if TYPE_CHECKING:
 class Discrepancy(Shown):
     """The figures of one comparison.
 
-    `start` and `end` (s) bound the time that was compared. `gap` says which part of the asked time could not be
-    compared, empty where all was; a comparison with a gap never passes a tolerance. `fall` says that the gap is there
-    because one of the two blocks fell: the models give different answers, which a difference of model form may explain.
+    `start` and `end` (s) bound the time that was compared. `gap` says which part of the asked time
+    could not be compared, empty where all was; a comparison with a gap never passes a tolerance.
+    `fall` says that the gap is there because one of the two blocks fell: the models give different
+    answers, which a difference of model form may explain.
     """
 
     reference: str
@@ -57,7 +66,10 @@ class Discrepancy(Shown):
         """One row a measure: measure, value (NaN where it could not be computed), unit, note."""
         import pandas as pd
 
-        rows = [(f.measure, math.nan if f.value is None else f.value, f.unit, f.note) for f in self.figures]
+        rows = [
+            (f.measure, math.nan if f.value is None else f.value, f.unit, f.note)
+            for f in self.figures
+        ]
         return pd.DataFrame(rows, columns=["measure", "value", "unit", "note"])
 
 
@@ -69,54 +81,108 @@ def compare(
     scene: Scene | None = None,
     measures: Collection[str] | None = None,
 ) -> Discrepancy:
-    """Compare two histories over their common time, up to `until` (s), by the `measures` of `validation.discrepancy.measures`.
+    """Compare two histories over their common time, up to `until` (s), by the `measures` of
+    `validation.discrepancy.measures`.
 
-    By default by all but those that are `on_request`. The candidate is interpolated linearly onto the reference's times.
-    `scene` adds its gravity (9.81 m/s^2 otherwise), and is the one both are measured by. A measure that cannot be computed is
-    NaN and says why. Raises `InputError` if the histories have no time in common, or, without a `scene`, two different blocks.
+    By default by all but those that are `on_request`. The candidate is interpolated linearly onto
+    the reference's times. `scene` adds its gravity (9.81 m/s^2 otherwise), and is the one both are
+    measured by. A measure that cannot be computed is NaN and says why. Raises `InputError` if the
+    histories have no time in common, or, without a `scene`, two different blocks.
     """
     for key, history in (("reference", reference), ("candidate", candidate)):
         check_kind(history, History, "simulate or History.load", key)
     if scene is None and not _same_block(reference.block, candidate.block):
-        raise InputError(f"is needed: the histories are of two blocks, {_words(reference.block)} and {_words(candidate.block)}", "scene")
+        raise InputError(
+            f"is needed: the histories are of two blocks, {_words(reference.block)} and"
+            f" {_words(candidate.block)}",
+            "scene",
+        )
     if until is not None and not until > 0.0:
         raise InputError(f"{until:g} is not allowed: give a positive time in s", "until")
     pair = Pair(reference, candidate, scene, math.inf if until is None else until)
     if len(pair.time) == 0:
         raise InputError(f"{reference.model} and {candidate.model} have no time in common")
     window = "" if until is None else f"{until:g}s"
-    chosen = [m for m in DIFFERENCES.values() if not m.on_request] if measures is None else [DIFFERENCES[name] for name in measures]
+    chosen = (
+        [m for m in DIFFERENCES.values() if not m.on_request]
+        if measures is None
+        else [DIFFERENCES[name] for name in measures]
+    )
     figures = tuple(
-        evaluate(measure, pair, "rad" if pair.alpha is None else "alpha", against=reference.model, window=window, until=until)
+        evaluate(
+            measure,
+            pair,
+            "rad" if pair.alpha is None else "alpha",
+            against=reference.model,
+            window=window,
+            until=until,
+        )
         for measure in chosen
     )
     gap, fall = _gap(pair, until)
-    return Discrepancy(reference.model, candidate.model, figures, pair.start, pair.end, gap, fall, histories=(reference, candidate))
+    return Discrepancy(
+        reference.model,
+        candidate.model,
+        figures,
+        pair.start,
+        pair.end,
+        gap,
+        fall,
+        histories=(reference, candidate),
+    )
 
 
 def _same_block(one: Block | None, other: Block | None) -> bool:
     """Whether nothing is known against it, to the digits of a file that was written by hand."""
     if one is None or other is None:
         return True
-    first, second = ((block.half_width, block.half_height, *block.offset, block.gyration_squared) for block in (one, other))
+    first, second = (
+        (block.half_width, block.half_height, *block.offset, block.gyration_squared)
+        for block in (one, other)
+    )
     return bool(np.allclose(first, second, rtol=1e-6, atol=1e-9 * one.radius))
 
 
 def _words(block: Block | None) -> str:
-    return "" if block is None else ", ".join(f"{name} = {value}" for name, value in block.model_dump().items() if value is not None)
+    return (
+        ""
+        if block is None
+        else ", ".join(
+            f"{name} = {value}" for name, value in block.model_dump().items() if value is not None
+        )
+    )
 
 
 def describe(
-    history: History, *, until: float | None = None, scene: Scene | None = None, measures: Collection[str] | None = None
+    history: History,
+    *,
+    until: float | None = None,
+    scene: Scene | None = None,
+    measures: Collection[str] | None = None,
 ) -> tuple[Figure, ...]:
-    """The figures of one history: peak rotation, last place, impacts, hop, penetration and so on; up to `until` (s)."""
+    """The figures of one history: peak rotation, last place, impacts, hop, penetration and so on;
+    up to `until` (s)."""
     motion = WindowedHistory(history, scene, math.inf if until is None else until)
     window = "" if until is None else f"{until:g}s"
-    chosen = [m for m in FIGURES.values() if not m.on_request] if measures is None else [FIGURES[name] for name in measures]
-    return tuple(evaluate(measure, motion, "alpha", window=window, until=until) for measure in chosen)
+    chosen = (
+        [m for m in FIGURES.values() if not m.on_request]
+        if measures is None
+        else [FIGURES[name] for name in measures]
+    )
+    return tuple(
+        evaluate(measure, motion, "alpha", window=window, until=until) for measure in chosen
+    )
 
 
-def evaluate(measure: Measure, what: object, angle: str, *, against: str = "", window: str = "", until: float | None = None) -> Figure:
+def evaluate(
+    measure: Measure,
+    what: object,
+    angle: str,
+    *,
+    against: str = "",
+    window: str = "",
+    until: float | None = None,
+) -> Figure:
     """One measure as a figure; what is not finite becomes None with a note."""
     try:
         result = measure.evaluate(what)
@@ -139,7 +205,8 @@ def evaluate(measure: Measure, what: object, angle: str, *, against: str = "", w
 
 
 def too_short(history: History, until: float | None) -> str:
-    """What is missing of a history up to `until`, empty where nothing is: one that ended by falling is whole."""
+    """What is missing of a history up to `until`, empty where nothing is: one that ended by falling
+    is whole."""
     end = float(history.channels["t"][-1])
     if until is None or history.outcome in TURNS or end >= until - 1.5 * _step(history):
         return ""
@@ -147,11 +214,14 @@ def too_short(history: History, until: float | None) -> str:
 
 
 def _gap(pair: Pair, until: float | None) -> tuple[str, bool]:
-    """What part of the asked time is missing from the comparison, and whether because one block fell.
+    """What part of the asked time is missing from the comparison, and whether because one block
+    fell.
 
     Nothing is missing where both fell to the same side.
     """
-    starts, ends = ([float(h.channels["t"][k]) for h in (pair.reference, pair.candidate)] for k in (0, -1))
+    starts, ends = (
+        [float(h.channels["t"][k]) for h in (pair.reference, pair.candidate)] for k in (0, -1)
+    )
     step = 1.5 * float(max(_step(pair.reference), _step(pair.candidate)))
     if max(starts) - min(starts) > step:
         late = pair.reference if starts[0] > starts[1] else pair.candidate
@@ -162,7 +232,10 @@ def _gap(pair: Pair, until: float | None) -> tuple[str, bool]:
     if asked - min(ends) > step:
         short = pair.reference if ends[0] < ends[1] else pair.candidate
         fall = short.outcome in TURNS
-        return f"{short.model} {'falls' if fall else 'ends'} at {min(ends):g} s, before {asked:g} s", fall
+        return (
+            f"{short.model} {'falls' if fall else 'ends'} at {min(ends):g} s, before {asked:g} s",
+            fall,
+        )
     return "", False
 
 

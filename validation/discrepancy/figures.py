@@ -17,7 +17,8 @@ class Stored(Frozen):
 
 
 def value_words(value: float | None, *, yes_no: bool) -> str:
-    """A figure's value for people: "-" where there is none, yes or no where the measure asks a question."""
+    """A figure's value for people: "-" where there is none, yes or no where the measure asks a
+    question."""
     if value is None:
         return "-"
     return ("yes" if value else "no") if yes_no else f"{value:.6g}"
@@ -36,9 +37,10 @@ class MeasureRecord(Stored):
 class Figure(Stored):
     """The value of one measure of one cell.
 
-    `against` names the reference model, "closed form" or, for a figure of the cell itself, is empty. `until` is the end of
-    the window in s, None for the whole common time; `window` says it as the tolerances do ("", "8s", "horizon"). `value`
-    is None where it could not be computed; `note` then says why. `note` also holds what a figure cannot (which event).
+    `against` names the reference model, "closed form" or, for a figure of the cell itself, is
+    empty. `until` is the end of the window in s, None for the whole common time; `window` says it
+    as the tolerances do ("", "8s", "horizon"). `value` is None where it could not be computed;
+    `note` then says why. `note` also holds what a figure cannot (which event).
     """
 
     measure: str
@@ -57,5 +59,6 @@ class Figure(Stored):
 
     @property
     def of_a_fall(self) -> bool:
-        """Whether it is the peak rotation of a block that has fallen, which is no peak: the measure's note says so."""
+        """Whether it is the peak rotation of a block that has fallen, which is no peak: the
+        measure's note says so."""
         return self.measure == "peak_rotation" and bool(self.note)

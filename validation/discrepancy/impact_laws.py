@@ -1,7 +1,7 @@
 """Which law of impacts a model followed where a block landed flush against a bouncing wall or flat.
 
-Rigid-body mechanics leaves several answers there (docs/theory.md, "Several impacts at one instant"). This names the one that a
-history took, without judging it.
+Rigid-body mechanics leaves several answers there (docs/theory.md, "Several impacts at one
+instant"). This names the one that a history took, without judging it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ FLUSH_LAWS: tuple[ImpactLaw, ...] = ("closed", "open", "floor-first")
 FLAT_LAWS: tuple[ImpactLaw, ...] = ("moreau", "leading-first", "trailing-first")
 #: How long (s) a history is looked at before and after such a landing.
 WINDOW = 0.1
-#: Rotations (alpha) nearer than this are one motion; laws whose motions stay nearer than TELLS are not distinguished.
+#: Rotations (alpha) nearer than this are one motion; laws whose motions stay nearer than TELLS are
+#: not distinguished.
 SAME, TELLS = 1e-6, 1e-3
 #: A history follows a law if it is nearer to it than this part of the distance to the next one.
 NEAR = 0.25
@@ -32,9 +33,10 @@ NEAR = 0.25
 class LawFollowed(Stored):
     """What a history did after the first landing at which the laws part, at `t` s.
 
-    `law` is the nearest one, or "closed or open" where such two cannot be told apart there, or "none" where the history is
-    farther from it than a quarter of the `spread`, its distance to the next law. `errors` are the history's distances from all
-    of them: RMS of the rotation up to WINDOW after the laws have parted, alpha.
+    `law` is the nearest one, or "closed or open" where such two cannot be told apart there, or
+    "none" where the history is farther from it than a quarter of the `spread`, its distance to the
+    next law. `errors` are the history's distances from all of them: RMS of the rotation up to
+    WINDOW after the laws have parted, alpha.
     """
 
     t: float
@@ -51,8 +53,8 @@ class LawFollowed(Stored):
 class Landing(Stored):
     """The first landing of a scene at which the laws of impacts part.
 
-    `branches` are the rotations (alpha) under each law in the output rows from `start` on. Up to the row `parts`, the one
-    before which is at `t` s, they are one motion.
+    `branches` are the rotations (alpha) under each law in the output rows from `start` on. Up to
+    the row `parts`, the one before which is at `t` s, they are one motion.
     """
 
     t: float
@@ -61,20 +63,33 @@ class Landing(Stored):
     branches: dict[ImpactLaw, tuple[float, ...]]
 
     def followed_by(self, history: History, scene: Scene) -> LawFollowed | None:
-        """The law that a history of the scene followed; None where it ends before, or was on its own way before."""
+        """The law that a history of the scene followed; None where it ends before, or was on its
+        own way before."""
         first = self.parts - self.start
-        rows = min(len(history.channels["theta"]) - self.start, *(len(motion) for motion in self.branches.values()))
+        rows = min(
+            len(history.channels["theta"]) - self.start,
+            *(len(motion) for motion in self.branches.values()),
+        )
         if rows < first + 2:
             return None
-        own = np.asarray(history.channels["theta"][self.start : self.start + rows], dtype=float) / scene.block.alpha
+        own = (
+            np.asarray(history.channels["theta"][self.start : self.start + rows], dtype=float)
+            / scene.block.alpha
+        )
         motions = {law: np.array(motion[:rows]) for law, motion in self.branches.items()}
         errors = {law: _rms((own - motion)[first:]) for law, motion in motions.items()}
         nearest: ImpactLaw = min(errors, key=lambda law: errors[law])
         apart = {law: motions[law] - motions[nearest] for law in motions}
-        others = [_rms(distance[first:]) for distance in apart.values() if np.max(np.abs(distance)) > TELLS]
+        others = [
+            _rms(distance[first:])
+            for distance in apart.values()
+            if np.max(np.abs(distance)) > TELLS
+        ]
         if not others or _rms((own - motions[nearest])[:first]) > NEAR * min(others):
             return None
-        known = (law for law in (*FLUSH_LAWS, *FLAT_LAWS) if law in apart)  # a store does not keep their order
+        known = (
+            law for law in (*FLUSH_LAWS, *FLAT_LAWS) if law in apart
+        )  # a store does not keep their order
         alike = [law for law in known if np.max(np.abs(apart[law])) <= TELLS]
         law = " or ".join(alike) if errors[nearest] < NEAR * min(others) else "none"
         return LawFollowed(t=self.t, law=law, errors=errors, spread=min(others))
@@ -84,7 +99,8 @@ def parting_landing(scene: Scene) -> Landing | None:
     """The first landing of a scene at which the laws part; None where there is no such landing.
 
     Played by the unilateral event-based model at tolerance 1e-13: under the laws of the one kind
-    where a wall bounces, under those of the other where the block lands flat. Raises what `simulate` raises.
+    where a wall bounces, under those of the other where the block lands flat. Raises what
+    `simulate` raises.
     """
     laws = [FLUSH_LAWS] if any(wall.restitution > 0.0 for wall in scene.walls) else []
     if may_fly(scene) and FLAT in _played(scene, "moreau").cost.rules:
@@ -95,7 +111,9 @@ def parting_landing(scene: Scene) -> Landing | None:
 
 def _parting(scene: Scene, laws: Sequence[ImpactLaw]) -> Landing | None:
     """The first landing at which these laws part."""
-    motions = {law: np.asarray(_played(scene, law).channels["theta"]) / scene.block.alpha for law in laws}
+    motions = {
+        law: np.asarray(_played(scene, law).channels["theta"]) / scene.block.alpha for law in laws
+    }
     rows = min(len(motion) for motion in motions.values())
     apart = np.ptp([motion[:rows] for motion in motions.values()], axis=0)
     if not (apart > TELLS).any():
@@ -104,12 +122,17 @@ def _parting(scene: Scene, laws: Sequence[ImpactLaw]) -> Landing | None:
     parts = int(np.flatnonzero(apart[:told] <= SAME)[-1]) + 1  # all start alike
     window = max(2, round(WINDOW / scene.output_step))
     start = max(0, parts - window)
-    branches = {law: tuple(motion[start : told + window].tolist()) for law, motion in motions.items()}
-    return Landing(t=float(scene.output_times[parts - 1]), start=start, parts=parts, branches=branches)
+    branches = {
+        law: tuple(motion[start : told + window].tolist()) for law, motion in motions.items()
+    }
+    return Landing(
+        t=float(scene.output_times[parts - 1]), start=start, parts=parts, branches=branches
+    )
 
 
 def law_followed(scene: Scene, history: History) -> LawFollowed | None:
-    """The law that a history of this scene followed; None where no landing tells laws apart, or the history parted or ended before."""
+    """The law that a history of this scene followed; None where no landing tells laws apart, or the
+    history parted or ended before."""
     landing = parting_landing(scene)
     return None if landing is None else landing.followed_by(history, scene)
 

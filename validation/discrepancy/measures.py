@@ -1,8 +1,9 @@
 """The measures: each defined once, by a function whose docstring is its formula and source.
 
-A *difference* is a function of a `Pair` (reference and candidate on one time axis), a *figure* one of a single history.
-Both return a number, or a number and a remark; they raise `Unavailable` where the histories do not hold what is needed.
-In the formulas r is the reference, c the candidate, d = c - r, and <.> the mean over the window, by the trapezoidal rule.
+A *difference* is a function of a `Pair` (reference and candidate on one time axis), a *figure* one
+of a single history. Both return a number, or a number and a remark; they raise `Unavailable` where
+the histories do not hold what is needed. In the formulas r is the reference, c the candidate, d = c
+- r, and <.> the mean over the window, by the trapezoidal rule.
 """
 
 from __future__ import annotations
@@ -46,10 +47,12 @@ class Undefined(Unavailable):
 
 @dataclass(frozen=True)
 class Measure:
-    """A measure: its name in tolerances and tables, its label for people, its unit and what a perfect candidate scores.
+    """A measure: its name in tolerances and tables, its label for people, its unit and what a
+    perfect candidate scores.
 
-    `unit` "angle" stands for alpha, or rad where the block is unknown. `sense` "at most": the distance from `ideal` is
-    limited (`ideal` None: from the expected value); "at least": the value itself must reach the limit.
+    `unit` "angle" stands for alpha, or rad where the block is unknown. `sense` "at most": the
+    distance from `ideal` is limited (`ideal` None: from the expected value); "at least": the value
+    itself must reach the limit.
     """
 
     name: str
@@ -64,7 +67,8 @@ class Measure:
     exact: bool = False
     #: 1 for yes, 0 for no: neither near a limit nor far from it.
     yes_no: bool = False
-    #: Changes below this mean nothing (in the measure's unit); 0 for what is counted. The least floor.
+    #: Changes below this mean nothing (in the measure's unit); 0 for what is counted. The least
+    #: floor.
     resolution: float = 1e-6
 
     @property
@@ -103,7 +107,8 @@ def difference(label: str, unit: str, **settings: Any) -> Definition:
 
 
 def figure(label: str, unit: str, **settings: Any) -> Definition:
-    """Register a function of one `WindowedHistory` as a figure; without an ideal value, so held against an expected one."""
+    """Register a function of one `WindowedHistory` as a figure; without an ideal value, so held
+    against an expected one."""
     return register(FIGURES, label, unit, **{"ideal": None, **settings})
 
 
@@ -119,7 +124,8 @@ def between_rows(unit: str, frequency_parameter: float, gravity: float, step: fl
 
 @dataclass(frozen=True)
 class WindowedHistory:
-    """One history as the figures see it: cut to a window, with the scene's gravity and walls where they are known."""
+    """One history as the figures see it: cut to a window, with the scene's gravity and walls where
+    they are known."""
 
     history: History
     scene: Scene | None = None
@@ -158,12 +164,17 @@ class WindowedHistory:
 
     def events(self, *kinds: str) -> list[Event]:
         """Events of these kinds within the window."""
-        return [event for event in _as_impacts(self.history.event_list) if event.kind in kinds and event.t <= self.until + 1e-9]
+        return [
+            event
+            for event in _as_impacts(self.history.event_list)
+            if event.kind in kinds and event.t <= self.until + 1e-9
+        ]
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Reference and candidate over their common time up to `until` (s), the candidate interpolated linearly.
+    """Reference and candidate over their common time up to `until` (s), the candidate interpolated
+    linearly.
 
     The time axis is the reference's; `start` and `end` bound the common time within the window.
     """
@@ -182,7 +193,11 @@ class Pair:
     @cached_property
     def end(self) -> float:
         """Last common time within the window, s."""
-        return min(float(self.reference.channels["t"][-1]), float(self.candidate.channels["t"][-1]), self.until)
+        return min(
+            float(self.reference.channels["t"][-1]),
+            float(self.candidate.channels["t"][-1]),
+            self.until,
+        )
 
     @cached_property
     def time(self) -> Array:
@@ -199,7 +214,11 @@ class Pair:
             if len(self.time) == 0:
                 raise Unavailable("the histories have no time in common")
             self.cache[name] = tuple(
-                np.interp(self.time, np.asarray(h.channels["t"], dtype=float), np.asarray(h.channels[name], dtype=float))
+                np.interp(
+                    self.time,
+                    np.asarray(h.channels["t"], dtype=float),
+                    np.asarray(h.channels[name], dtype=float),
+                )
                 for h in (self.reference, self.candidate)
             )
         return self.cache[name]
@@ -221,15 +240,23 @@ class Pair:
     @cached_property
     def known(self) -> WindowedHistory:
         """The one of the two whose block is known."""
-        return WindowedHistory(self.reference if self.reference.alpha is not None else self.candidate, self.scene)
+        return WindowedHistory(
+            self.reference if self.reference.alpha is not None else self.candidate, self.scene
+        )
 
     @property
     def rocking(self) -> tuple[Array, Array]:
-        """`theta` where there is something to have a ratio to: the reference's peak is no nothing."""
+        """`theta` where there is something to have a ratio to: the reference's peak is no
+        nothing."""
         floor = DIFFERENCES["theta_peak"].resolution
         if self.alpha is not None and len(self.time) > 1:
             g, step = self.known.gravity, float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
-            floor = max(floor, between_rows("angle", self.known.block.weaker_pivot.frequency_parameter(g), g, step))
+            floor = max(
+                floor,
+                between_rows(
+                    "angle", self.known.block.weaker_pivot.frequency_parameter(g), g, step
+                ),
+            )
         if np.max(np.abs(self.theta[0])) <= floor:
             raise Undefined("the reference does not rotate")
         return self.theta
@@ -239,7 +266,9 @@ class Pair:
         """Energy per unit mass of both, J/kg."""
         columns = [self.channels(name) for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")]
         block, gravity = self.known.block, self.known.gravity
-        first, second = (np.asarray(kinematics.energy(block, gravity, *(c[k] for c in columns))) for k in (0, 1))
+        first, second = (
+            np.asarray(kinematics.energy(block, gravity, *(c[k] for c in columns))) for k in (0, 1)
+        )
         return first, second
 
     def mean(self, values: Array) -> float:
@@ -255,7 +284,8 @@ class Pair:
 
     @cached_property
     def impacts(self) -> MatchedImpacts:
-        """The impacts of both within the common time, matched; a history without any event, unlike the other's, does not know them."""
+        """The impacts of both within the common time, matched; a history without any event, unlike
+        the other's, does not know them."""
         both = [self._within(history) for history in (self.reference, self.candidate)]
         for history, others in ((self.reference, both[1]), (self.candidate, both[0])):
             if others and not history.event_list:
@@ -263,12 +293,17 @@ class Pair:
         return match_impacts(*both)
 
     def _within(self, history: History) -> list[Event]:
-        return [e for e in _as_impacts(history.event_list) if e.kind in IMPACTS + TURNS and self.start - 1e-9 <= e.t <= self.end + 1e-9]
+        return [
+            e
+            for e in _as_impacts(history.event_list)
+            if e.kind in IMPACTS + TURNS and self.start - 1e-9 <= e.t <= self.end + 1e-9
+        ]
 
 
 @dataclass(frozen=True)
 class MatchedImpacts:
-    """Impacts of two histories: pairs (reference, candidate), and those of either that have no counterpart."""
+    """Impacts of two histories: pairs (reference, candidate), and those of either that have no
+    counterpart."""
 
     pairs: Sequence[tuple[Event, Event]]
     only_reference: Sequence[Event]
@@ -276,7 +311,8 @@ class MatchedImpacts:
 
 
 def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> MatchedImpacts:
-    """Match impacts of one kind within `SAME_IMPACT`, nearest first; weak ones (`WEAK_IMPACT`) need no counterpart.
+    """Match impacts of one kind within `SAME_IMPACT`, nearest first; weak ones (`WEAK_IMPACT`) need
+    no counterpart.
 
     A falling block's end counts as an event of its own kind.
     """
@@ -289,7 +325,9 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
         near = [
             (abs(times[1][j] - times[0][i]), i, j)
             for i in range(len(first))
-            for j in range(*np.searchsorted(times[1], [times[0][i] - SAME_IMPACT, times[0][i] + SAME_IMPACT]))
+            for j in range(
+                *np.searchsorted(times[1], [times[0][i] - SAME_IMPACT, times[0][i] + SAME_IMPACT])
+            )
         ]
         taken_first: set[int] = set()
         taken_second: set[int] = set()
@@ -299,15 +337,28 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
                 taken_second.add(j)
                 pairs.append((first[i], second[j]))
         weak = _weak(first), _weak(second)
-        left += [e for i, e in enumerate(first) if i not in taken_first and abs(e.impulse) >= weak[0]]
-        right += [e for j, e in enumerate(second) if j not in taken_second and abs(e.impulse) >= weak[1]]
+        left += [
+            e for i, e in enumerate(first) if i not in taken_first and abs(e.impulse) >= weak[0]
+        ]
+        right += [
+            e for j, e in enumerate(second) if j not in taken_second and abs(e.impulse) >= weak[1]
+        ]
     in_time = attrgetter("t")
-    return MatchedImpacts(sorted(pairs, key=lambda two: two[0].t), sorted(left, key=in_time), sorted(right, key=in_time))
+    return MatchedImpacts(
+        sorted(pairs, key=lambda two: two[0].t),
+        sorted(left, key=in_time),
+        sorted(right, key=in_time),
+    )
 
 
 def _as_impacts(events: Sequence[Event]) -> list[Event]:
     """A landing that strikes is a floor impact, whichever name the model has for it."""
-    return [replace(event, kind="floor impact") if event.kind == "landing" and event.impulse != 0.0 else event for event in events]
+    return [
+        replace(event, kind="floor impact")
+        if event.kind == "landing" and event.impulse != 0.0
+        else event
+        for event in events
+    ]
 
 
 def _weak(events: Sequence[Event]) -> float:
@@ -315,7 +366,8 @@ def _weak(events: Sequence[Event]) -> float:
     return WEAK_IMPACT * max((abs(event.impulse) for event in events), default=0.0)
 
 
-# --- differences -------------------------------------------------------------------------------------------------------
+# --- differences
+# -------------------------------------------------------------------------------------------------------
 
 
 @difference("RMS difference of rotation", "angle")
@@ -350,7 +402,8 @@ def slip_rate_rms(pair: Pair) -> float:
 
 @difference("peak difference of slip rate", "m/s")
 def slip_rate_peak(pair: Pair) -> float:
-    """max |d| of the pivot corner's horizontal velocity V, m/s; where the pivot changes it jumps, see `theta_hausdorff`."""
+    """max |d| of the pivot corner's horizontal velocity V, m/s; where the pivot changes it jumps,
+    see `theta_hausdorff`."""
     return _largest(pair.channels("slip_rate"))
 
 
@@ -377,7 +430,8 @@ def sprague_geers_m(pair: Pair) -> float:
 
 @difference("Sprague-Geers P (phase)", "1")
 def sprague_geers_p(pair: Pair) -> float:
-    """P = acos(<r c>/sqrt(<r^2><c^2>))/pi of theta: error of phase, blind to magnitude; 0 in phase, 1 in opposition.
+    """P = acos(<r c>/sqrt(<r^2><c^2>))/pi of theta: error of phase, blind to magnitude; 0 in phase,
+    1 in opposition.
 
     Source as for M.
     """
@@ -399,11 +453,12 @@ def peak_ratio(pair: Pair) -> float:
 
 @difference("Hausdorff distance of rotation's graphs", "1")
 def theta_hausdorff(pair: Pair) -> float:
-    """Hausdorff distance of the graphs of theta in the plane (p t, theta/alpha); p is of the scene's gravity, else of 9.81 m/s^2.
+    """Hausdorff distance of the graphs of theta in the plane (p t, theta/alpha); p is of the
+    scene's gravity, else of 9.81 m/s^2.
 
-    The largest distance from a sample of one graph to the other graph, a broken line, either way. An impact that comes
-    a millisecond late counts as a millisecond, not as the jump that it delays; used so for nonsmooth mechanics by the
-    authors of cardillo.
+    The largest distance from a sample of one graph to the other graph, a broken line, either way.
+    An impact that comes a millisecond late counts as a millisecond, not as the jump that it delays;
+    used so for nonsmooth mechanics by the authors of cardillo.
     """
     if pair.alpha is None:
         raise Unavailable("the block's size is not known")
@@ -416,18 +471,25 @@ def theta_hausdorff(pair: Pair) -> float:
 
 @difference("events agree until", "s", ideal=None, sense="at least")
 def events_agree_until(pair: Pair) -> tuple[float, str]:
-    """Time up to which each impact (and fall) of either has its counterpart in the other; the remark says what comes then.
+    """Time up to which each impact (and fall) of either has its counterpart in the other; the
+    remark says what comes then.
 
-    Counterparts are of one kind and within 20 ms; impacts below 1 % of the strongest need none. The window's end if all agree.
+    Counterparts are of one kind and within 20 ms; impacts below 1 % of the strongest need none. The
+    window's end if all agree.
     """
     matched = pair.impacts
-    alone = [(e.t, f"{e.kind} only in {h.model}") for h, found in _unmatched(pair, matched) for e in found]
+    alone = [
+        (e.t, f"{e.kind} only in {h.model}")
+        for h, found in _unmatched(pair, matched)
+        for e in found
+    ]
     return min(alone, default=(pair.end, "all events agree"))
 
 
 @difference("impacts without counterpart", "1", resolution=0.0)
 def unmatched_impacts(pair: Pair) -> tuple[float, str]:
-    """Number of impacts of either that have no counterpart in the other, matched as in `events_agree_until`."""
+    """Number of impacts of either that have no counterpart in the other, matched as in
+    `events_agree_until`."""
     matched = pair.impacts
     alone = len(matched.only_reference) + len(matched.only_candidate)
     return float(alone), f"{len(matched.pairs)} impacts matched"
@@ -435,7 +497,8 @@ def unmatched_impacts(pair: Pair) -> tuple[float, str]:
 
 @difference("largest impact-time error", "s")
 def impact_time(pair: Pair) -> tuple[float, str]:
-    """max |t_c - t_r| over the impacts that have a counterpart, matched as in `events_agree_until`, s."""
+    """max |t_c - t_r| over the impacts that have a counterpart, matched as in `events_agree_until`,
+    s."""
     pairs = pair.impacts.pairs
     if not pairs:
         return 0.0, "no impact has a counterpart"
@@ -446,13 +509,17 @@ def impact_time(pair: Pair) -> tuple[float, str]:
 @difference("difference of overturning time", "s")
 def overturning_time(pair: Pair) -> float:
     """|t_c - t_r| of |theta| = pi/2, s; 0 if neither overturns, infinite if only one does."""
-    first, second = (next((e.t for e in h.event_list if e.kind in TURNS), math.inf) for h in (pair.reference, pair.candidate))
+    first, second = (
+        next((e.t for e in h.event_list if e.kind in TURNS), math.inf)
+        for h in (pair.reference, pair.candidate)
+    )
     return 0.0 if first == second else abs(second - first)
 
 
 @difference("outcome agrees", "1", resolution=0.0, ideal=1.0, yes_no=True)
 def outcome_agrees(pair: Pair) -> tuple[float, str]:
-    """1 if both overturn to the same side or neither overturns, else 0; of the whole histories, whatever the window."""
+    """1 if both overturn to the same side or neither overturns, else 0; of the whole histories,
+    whatever the window."""
     first, second = pair.reference.outcome, pair.candidate.outcome
     fates = {outcome if outcome in TURNS else "stays" for outcome in (first, second)}
     return float(len(fates) == 1), first if first == second else f"{first} / {second}"
@@ -460,21 +527,29 @@ def outcome_agrees(pair: Pair) -> tuple[float, str]:
 
 @difference("ISO/TS 18571 rating", "1", ideal=1.0, on_request=True)
 def iso_18571(pair: Pair) -> float:
-    """ISO/TS 18571 overall rating of theta, 0 to 1 (corridor 0.4, phase 0.2, magnitude 0.2, slope 0.2), not rounded.
+    """ISO/TS 18571 overall rating of theta, 0 to 1 (corridor 0.4, phase 0.2, magnitude 0.2, slope
+    0.2), not rounded.
 
-    By the package objective-rating-metrics, which takes the square of the samples in time and memory, does
-    not look at their times and answers NaN where it has no answer; so both curves are put on one uniform grid of at most
-    4,000 samples, and curves that are constant or shorter than 20 samples have no rating.
+    By the package objective-rating-metrics, which takes the square of the samples in time and
+    memory, does not look at their times and answers NaN where it has no answer; so both curves are
+    put on one uniform grid of at most 4,000 samples, and curves that are constant or shorter than
+    20 samples have no rating.
     """
     try:
         from objective_rating_metrics.rating import ISO18571
     except ImportError:
-        raise Unavailable("needs the package objective-rating-metrics: pip install objective-rating-metrics") from None
+        raise Unavailable(
+            "needs the package objective-rating-metrics: pip install objective-rating-metrics"
+        ) from None
     curves = pair.rocking
-    if len(pair.time) < 20 or not all(np.all(np.isfinite(curve)) and np.ptp(curve) > 0.0 for curve in curves):
+    if len(pair.time) < 20 or not all(
+        np.all(np.isfinite(curve)) and np.ptp(curve) > 0.0 for curve in curves
+    ):
         raise Unavailable("too short, constant or not finite")
     grid = np.linspace(pair.time[0], pair.time[-1], min(len(pair.time), ISO_MOST_SAMPLES))
-    reference, candidate = (np.column_stack([grid, np.interp(grid, pair.time, curve)]) for curve in curves)
+    reference, candidate = (
+        np.column_stack([grid, np.interp(grid, pair.time, curve)]) for curve in curves
+    )
     rating = ISO18571(reference, candidate, dt=float(grid[1] - grid[0]))
     return float(rating.overall_rating(ndigits=-1))
 
@@ -485,11 +560,15 @@ def _largest(columns: tuple[Array, Array]) -> float:
 
 def _sprague_geers(pair: Pair) -> tuple[float, float]:
     reference, candidate = pair.rocking
-    rr, cc, rc = (pair.mean(product) for product in (reference**2, candidate**2, reference * candidate))
+    rr, cc, rc = (
+        pair.mean(product) for product in (reference**2, candidate**2, reference * candidate)
+    )
     if cc == 0.0:
         raise Unavailable("only one of the two rotates")
     cosine = rc / math.sqrt(rr * cc)
-    return math.sqrt(cc / rr) - 1.0, math.acos(max(-1.0, min(1.0, cosine))) / math.pi if math.isfinite(cosine) else math.nan
+    return math.sqrt(cc / rr) - 1.0, math.acos(
+        max(-1.0, min(1.0, cosine))
+    ) / math.pi if math.isfinite(cosine) else math.nan
 
 
 def _farthest(points: Array, line: Array) -> float:
@@ -515,7 +594,8 @@ def _unmatched(pair: Pair, matched: MatchedImpacts) -> list[tuple[History, Seque
     return [(pair.reference, matched.only_reference), (pair.candidate, matched.only_candidate)]
 
 
-# --- figures of one history ----------------------------------------------------------------------------------------------
+# --- figures of one history
+# ----------------------------------------------------------------------------------------------
 
 
 @figure("peak rotation", "angle")
@@ -540,7 +620,8 @@ def last_x(motion: WindowedHistory) -> float:
 
 @figure("last slip", "m")
 def last_slip(motion: WindowedHistory) -> float:
-    """Where the pivot corner stands along the floor in the window's last row, m from its first place."""
+    """Where the pivot corner stands along the floor in the window's last row, m from its first
+    place."""
     return float(motion.channel("slip")[-1])
 
 
@@ -570,18 +651,22 @@ def highest_hop(motion: WindowedHistory) -> float:
 
 @figure("deepest penetration", "m", ideal=0.0)
 def deepest_penetration(motion: WindowedHistory) -> float:
-    """Largest depth of a corner below the floor or behind a wall (walls where the scene is known), m."""
+    """Largest depth of a corner below the floor or behind a wall (walls where the scene is known),
+    m."""
     deepest = -_extreme(motion, np.min)
     if motion.scene is not None:
         for wall in motion.scene.walls:
-            gap = kinematics.wall_gap(motion.scene, wall.side, motion.channel("x"), motion.channel("theta"))
+            gap = kinematics.wall_gap(
+                motion.scene, wall.side, motion.channel("x"), motion.channel("theta")
+            )
             deepest = float(np.maximum(deepest, -np.min(gap)))
     return float(np.maximum(deepest, 0.0))
 
 
 @figure("largest energy gain at an impact", "1", ideal=0.0)
 def energy_gain(motion: WindowedHistory) -> float:
-    """Most kinetic energy that the impact law added at one impact, relative to that before it (`Cost.largest_energy_gain`)."""
+    """Most kinetic energy that the impact law added at one impact, relative to that before it
+    (`Cost.largest_energy_gain`)."""
     return motion.history.cost.largest_energy_gain
 
 

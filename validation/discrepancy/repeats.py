@@ -18,14 +18,17 @@ AVERAGED = ("x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate
 
 
 def time_shift(reference: History, candidate: History) -> float:
-    """The time in s to add to the candidate's for the best agreement of the rotations: the peak of their cross-correlation.
+    """The time in s to add to the candidate's for the best agreement of the rotations: the peak of
+    their cross-correlation.
 
-    Both are read on the finer of their mean steps; the peak is a parabola's through three lags. Raises `InputError` where one
-    does not rotate, so that nothing can be aligned.
+    Both are read on the finer of their mean steps; the peak is a parabola's through three lags.
+    Raises `InputError` where one does not rotate, so that nothing can be aligned.
     """
     from scipy.signal import correlate, correlation_lags
 
-    a, b = ((history.channels["t"], history.channels["theta"]) for history in (reference, candidate))
+    a, b = (
+        (history.channels["t"], history.channels["theta"]) for history in (reference, candidate)
+    )
     for history, (_, theta) in zip((reference, candidate), (a, b), strict=True):
         if len(theta) < 3 or not np.any(theta):
             raise InputError(f"{history.name}: no rotation by which it could be aligned", "align")
@@ -46,28 +49,43 @@ def time_shift(reference: History, candidate: History) -> float:
 def shifted(history: History, offset: float) -> History:
     """The same history `offset` s later."""
     events = tuple(dataclasses.replace(event, t=event.t + offset) for event in history.event_list)
-    return dataclasses.replace(history, channels={**history.channels, "t": history.channels["t"] + offset}, event_list=events)
+    return dataclasses.replace(
+        history,
+        channels={**history.channels, "t": history.channels["t"] + offset},
+        event_list=events,
+    )
 
 
 def mean_history(tests: Sequence[History]) -> History:
-    """The mean of some repeats of one test over their common time, on the first one's times, with its uncertainty u_D.
+    """The mean of some repeats of one test over their common time, on the first one's times, with
+    its uncertainty u_D.
 
-    `uncertainty` holds the 95 % interval of the mean, t s/sqrt(n) by Student: "theta_rms" (rad, the RMS over time), "peak_rotation"
-    (rad) and "last_slip" (m). Raises `InputError` where the tests have no time in common or do not all end alike.
+    `uncertainty` holds the 95 % interval of the mean, t s/sqrt(n) by Student: "theta_rms" (rad, the
+    RMS over time), "peak_rotation" (rad) and "last_slip" (m). Raises `InputError` where the tests
+    have no time in common or do not all end alike.
     """
     first, *others = tests
     if not others:
         return first
     outcomes = [outcome_of(test.channels).startswith("overturned") for test in tests]
     if len(set(outcomes)) > 1:
-        raise InputError(f"{sum(outcomes)} of {len(tests)} tests overturn: they have no mean; give each as a model of its own", "files")
-    start, end = (pick(test.channels["t"][side] for test in tests) for pick, side in ((max, 0), (min, -1)))
+        raise InputError(
+            f"{sum(outcomes)} of {len(tests)} tests overturn: they have no mean; give each as a"
+            " model of its own",
+            "files",
+        )
+    start, end = (
+        pick(test.channels["t"][side] for test in tests) for pick, side in ((max, 0), (min, -1))
+    )
     t = first.channels["t"]
     t = t[(t >= start) & (t <= end)]
     if len(t) < 2:
         raise InputError("the tests have no time in common", "files")
     columns = {name for name in AVERAGED if all(name in test.channels for test in tests)}
-    stacked = {name: np.array([np.interp(t, test.channels["t"], test.channels[name]) for test in tests]) for name in sorted(columns)}
+    stacked = {
+        name: np.array([np.interp(t, test.channels["t"], test.channels[name]) for test in tests])
+        for name in sorted(columns)
+    }
     channels = {"t": t, **{name: rows.mean(axis=0) for name, rows in stacked.items()}}
     return dataclasses.replace(
         first,

@@ -1,4 +1,5 @@
-"""The models by the names that suites and the command line use; what each is built from and depends on."""
+"""The models by the names that suites and the command line use; what each is built from and depends
+on."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ class Model(Protocol):
 
 @dataclass(frozen=True)
 class Family:
-    """A named kind of model: a class of a package, the settings that the name fixes, and the libraries its results depend on."""
+    """A named kind of model: a class of a package, the settings that the name fixes, and the
+    libraries its results depend on."""
 
     module: str
     class_name: str
@@ -31,7 +33,8 @@ class Family:
     libraries: tuple[str, ...] = ()
     #: Whether the block can leave the floor; a model that cannot differs in form from one that can.
     flies: bool = True
-    #: Whether its first run on a machine compiles for longer than any cell takes; the engines' steps compile in seconds.
+    #: Whether its first run on a machine compiles for longer than any cell takes; the engines'
+    #: steps compile in seconds.
     compiled: bool = False
 
 
@@ -66,20 +69,38 @@ FAMILIES: dict[str, Family] = {
         flies=False,
         compiled=True,
     ),
-    "cm": Family("rockcheck.cm", "ContinuousModel", "the paper's penalty-based continuous model", {}, COMPILED, compiled=True),
+    "cm": Family(
+        "rockcheck.cm",
+        "ContinuousModel",
+        "the paper's penalty-based continuous model",
+        {},
+        COMPILED,
+        compiled=True,
+    ),
     "mujoco": Family(ENGINES, "MuJoCo", "the physics engine MuJoCo", {}, ("mujoco", *STEPPED)),
-    "pybullet": Family(ENGINES, "PyBullet", "the physics engine PyBullet", {}, ("pybullet", *STEPPED)),
-    "pymunk": Family(ENGINES, "Pymunk", "the physics engine pymunk (Chipmunk, in two dimensions)", {}, ("pymunk", *STEPPED)),
+    "pybullet": Family(
+        ENGINES, "PyBullet", "the physics engine PyBullet", {}, ("pybullet", *STEPPED)
+    ),
+    "pymunk": Family(
+        ENGINES,
+        "Pymunk",
+        "the physics engine pymunk (Chipmunk, in two dimensions)",
+        {},
+        ("pymunk", *STEPPED),
+    ),
     "dart": Family(ENGINES, "Dart", "the physics engine DART", {}, ("dartpy", *STEPPED)),
     "drake": Family(ENGINES, "Drake", "the physics engine Drake", {}, ("drake", "numpy")),
     "measured": Family(
-        "rockcheck.validation.discrepancy.measured", "Measured", "a CSV history from a shake table, or from any other program"
+        "rockcheck.validation.discrepancy.measured",
+        "Measured",
+        "a CSV history from a shake table, or from any other program",
     ),
 }
 
 
 def family(name: str) -> Family:
-    """The family of that name, or of "module:Class" for a model of the user's own; raises `InputError` suggesting the nearest."""
+    """The family of that name, or of "module:Class" for a model of the user's own; raises
+    `InputError` suggesting the nearest."""
     module, colon, class_name = name.partition(":")
     if colon and module.isidentifier() and class_name.isidentifier():
         return Family(module, class_name, "a model of the user's own")
@@ -94,7 +115,8 @@ def engine_names() -> tuple[str, ...]:
 
 
 def not_installed(name: str) -> str:
-    """What to say where the engine of that model is not installed; empty where it is, or needs none."""
+    """What to say where the engine of that model is not installed; empty where it is, or needs
+    none."""
     if family(name).module != ENGINES:
         return ""
     engine = _class_of(name)
@@ -102,12 +124,14 @@ def not_installed(name: str) -> str:
 
 
 def is_own(name: str) -> bool:
-    """Whether that is a model of the user's own: code that may lie beside the suite or in the working directory."""
+    """Whether that is a model of the user's own: code that may lie beside the suite or in the
+    working directory."""
     return ":" in name
 
 
 def check_allowed(name: str, allow_code: Container[str]) -> None:
-    """Raises `InputError` for a model of the user's own that is not in `allow_code`, or cannot be one. Imports nothing.
+    """Raises `InputError` for a model of the user's own that is not in `allow_code`, or cannot be
+    one. Imports nothing.
 
     A suite is data: it may name code, but only who calls rockcheck says that it is run.
     """
@@ -115,13 +139,19 @@ def check_allowed(name: str, allow_code: Container[str]) -> None:
         return
     module = family(name).module
     if module in sys.stdlib_module_names:
-        raise InputError(f"{printable(name)!r} is no model: {module} is part of Python's standard library")
+        raise InputError(
+            f"{printable(name)!r} is no model: {module} is part of Python's standard library"
+        )
     if name not in allow_code:
-        raise InputError(f"{printable(name)!r} is code of your own; it runs only if you allow it: --allow-code {printable(name)}")
+        raise InputError(
+            f"{printable(name)!r} is code of your own; it runs only if you allow it: --allow-code"
+            f" {printable(name)}"
+        )
 
 
 def home(name: str) -> str:
-    """The module in which the model of that name is defined; for one of the user's own the one that it is named after."""
+    """The module in which the model of that name is defined; for one of the user's own the one that
+    it is named after."""
     return family(name).module if is_own(name) else str(_class_of(name).__module__)
 
 
@@ -130,29 +160,40 @@ def _class_of(name: str) -> Any:
     try:
         return getattr(importlib.import_module(kind.module), kind.class_name)
     except (ImportError, AttributeError) as error:
-        raise InputError(f"model {name!r} is not available in this installation: {printable(error)}") from None
+        raise InputError(
+            f"model {name!r} is not available in this installation: {printable(error)}"
+        ) from None
 
 
 def build(name: str, settings: Mapping[str, Any] | None = None) -> Model:
-    """The model of that name with these settings; raises `InputError` naming the setting that is not usable.
+    """The model of that name with these settings; raises `InputError` naming the setting that is
+    not usable.
 
     A model of the user's own is not built here but by the process that plays it: `build_own`.
     """
     if is_own(name):
-        raise InputError(f"model {printable(name)!r} is one of your own, which `validate` and `simulate` can play")
+        raise InputError(
+            f"model {printable(name)!r} is one of your own, which `validate` and `simulate` can"
+            " play"
+        )
     return _built(name, _class_of(name), settings)
 
 
 def build_own(name: str, settings: Mapping[str, Any] | None = None) -> Model:
-    """`build`, also for a model of the user's own, whose code is imported: for worker processes, of what was allowed."""
+    """`build`, also for a model of the user's own, whose code is imported: for worker processes, of
+    what was allowed."""
     if not is_own(name):
         return build(name, settings)
     check_allowed(name, (name,))
     kind = _class_of(name)
     if not isinstance(kind, type) or not callable(getattr(kind, "simulate", None)):
-        raise InputError(f"{printable(name)!r} is no model: it must be a class with a method `simulate`")
+        raise InputError(
+            f"{printable(name)!r} is no model: it must be a class with a method `simulate`"
+        )
     if kind.__module__.partition(".")[0] in sys.stdlib_module_names:
-        raise InputError(f"{printable(name)!r} is no model: it is part of Python's standard library")
+        raise InputError(
+            f"{printable(name)!r} is no model: it is part of Python's standard library"
+        )
     return _built(name, kind, settings)
 
 

@@ -1,4 +1,5 @@
-"""Calls in processes of their own, with limits of time and memory: for cells, spectra, studies and pages alike.
+"""Calls in processes of their own, with limits of time and memory: for cells, spectra, studies and
+pages alike.
 
 A process that crashes, hangs or runs out of memory loses its current call, and nothing else.
 """
@@ -25,7 +26,9 @@ from rockcheck.scenes.errors import InputError, ModelFailure, printable
 from rockcheck.scenes.progress import announce_by, announced
 
 #: One thread a process: the calls are what runs in parallel.
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+ONE_THREAD = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+)
 #: So many calls a process are given out: it begins the next while its last result is looked at.
 AHEAD = 2
 #: What the first call that uses compiled code may take in addition, to compile it, s.
@@ -38,8 +41,9 @@ THREADS: ContextVar[int] = ContextVar("threads", default=0)
 class Call:
     """A function of a module with arguments that can be pickled, for one process.
 
-    `seconds` limits its wall time. `compiles` names the code that it may have to compile: of the calls with the same name one
-    goes first, with `COMPILING` s more, and the others wait for it. `key` is the caller's own, to know the call again.
+    `seconds` limits its wall time. `compiles` names the code that it may have to compile: of the
+    calls with the same name one goes first, with `COMPILING` s more, and the others wait for it.
+    `key` is the caller's own, to know the call again.
     """
 
     function: Callable[..., Any]
@@ -108,7 +112,8 @@ class Ended:
 
     @property
     def unexpected(self) -> bool:
-        """Whether the call raised an unexpected exception: a fault of rockcheck's own, unless the call ran a user's code."""
+        """Whether the call raised an unexpected exception: a fault of rockcheck's own, unless the
+        call ran a user's code."""
         from pebble import ProcessExpired
 
         foreseen = (InputError, ModelFailure, OSError, TimeoutError, ProcessExpired, MemoryError)
@@ -157,7 +162,8 @@ class Pool:
                 os.environ.pop(key, None) if value is None else os.environ.update({key: value})
 
     def run(self, waiting: deque[Call], *, until: float = math.inf) -> Iterator[Ended]:
-        """Runs the calls and yields each as it ends. The caller may put calls into `waiting`, or take them out, meanwhile.
+        """Runs the calls and yields each as it ends. The caller may put calls into `waiting`, or
+        take them out, meanwhile.
 
         What has not ended at `until` (of `time.monotonic`) is ended and not yielded.
         """
@@ -165,7 +171,11 @@ class Pool:
         try:
             while waiting or running:
                 self._begin(waiting, running)
-                done = wait(running, None if until == math.inf else max(0.0, until - time.monotonic()), FIRST_COMPLETED).done
+                done = wait(
+                    running,
+                    None if until == math.inf else max(0.0, until - time.monotonic()),
+                    FIRST_COMPLETED,
+                ).done
                 if not done:
                     return
                 for future in done:
@@ -178,8 +188,11 @@ class Pool:
                 future.cancel()
 
     def _begin(self, waiting: deque[Call], running: dict[Future[Any], tuple[Call, float]]) -> None:
-        """Gives each process a call, and one ahead. A call that waits for another one to compile is passed over."""
-        compiling = {call.compiles for call, _ in running.values() if call.compiles} - self._compiled
+        """Gives each process a call, and one ahead. A call that waits for another one to compile is
+        passed over."""
+        compiling = {
+            call.compiles for call, _ in running.values() if call.compiles
+        } - self._compiled
         held: list[Call] = []
         while waiting and len(running) < AHEAD * self.jobs:
             call = waiting.popleft()
@@ -191,16 +204,21 @@ class Pool:
                 compiling.add(call.compiles)
                 seconds += COMPILING
             limit = None if seconds == math.inf else seconds
-            running[self._pool.schedule(call.function, args=call.arguments, timeout=limit)] = call, seconds
+            running[self._pool.schedule(call.function, args=call.arguments, timeout=limit)] = (
+                call,
+                seconds,
+            )
         waiting.extendleft(reversed(held))
 
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Ctrl-C waits for the end of this block, and never reaches processes and threads that are started in it.
+    """Ctrl-C waits for the end of this block, and never reaches processes and threads that are
+    started in it.
 
-    Ctrl-C goes to all processes of a terminal. One that starts would die of it, with a traceback, before `prepare` can say otherwise.
-    The pool's threads, which replace lost workers, keep this thread's mask.
+    Ctrl-C goes to all processes of a terminal. One that starts would die of it, with a traceback,
+    before `prepare` can say otherwise. The pool's threads, which replace lost workers, keep this
+    thread's mask.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
@@ -223,9 +241,11 @@ def _interrupts_held() -> Iterator[None]:
 
 
 def prepare(memory_mb: float | None, announces: bool = False) -> None:
-    """Make this process die with the run, and fail where it takes more memory than it may (where the system can say so).
+    """Make this process die with the run, and fail where it takes more memory than it may (where
+    the system can say so).
 
-    Its output goes nowhere but for what it `announces`, such as a long compilation, which goes to the run's standard error.
+    Its output goes nowhere but for what it `announces`, such as a long compilation, which goes to
+    the run's standard error.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run itself ends its processes
     if (run := multiprocessing.parent_process()) is not None:

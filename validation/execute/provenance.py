@@ -1,4 +1,5 @@
-"""What a result depends on: code, libraries, scene and settings, as one key; and what the run's machine was."""
+"""What a result depends on: code, libraries, scene and settings, as one key; and what the run's
+machine was."""
 
 from __future__ import annotations
 
@@ -19,20 +20,27 @@ from typing import Any
 from rockcheck.scenes import Scene
 from rockcheck.validation.execute.models import FAMILIES, family, home
 
-#: The package whose code counts where it can be reached; the package of the model itself always does.
+#: The package whose code counts where it can be reached; the package of the model itself always
+#: does.
 OWN_PACKAGE = "rockcheck"
 
 
-def cell_key(scene: Scene, name: str, settings: Mapping[str, Any], search_path: tuple[str, ...] = ()) -> str:
-    """Hash of all that a cell's history depends on: scene, settings, the code it can reach, and the libraries' versions.
+def cell_key(
+    scene: Scene, name: str, settings: Mapping[str, Any], search_path: tuple[str, ...] = ()
+) -> str:
+    """Hash of all that a cell's history depends on: scene, settings, the code it can reach, and the
+    libraries' versions.
 
-    `search_path` holds folders in which a model of the user's own may lie. Its source is read, not run.
+    `search_path` holds folders in which a model of the user's own may lie. Its source is read, not
+    run.
     """
     depends = {
         "scene": scene.model_dump(mode="json"),
         "model": name,
         "settings": dict(settings),
-        "files": [hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in _files(settings, scene)],
+        "files": [
+            hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in _files(settings, scene)
+        ],
         "code": code_digest(home(name), search_path),
         "libraries": {library: version_of(library) for library in family(name).libraries},
         "python": platform.python_version(),
@@ -54,11 +62,17 @@ def digest(text: str) -> str:
 
 @cache
 def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
-    """Hash of the code of a module and of all project modules that it imports, at its top or inside functions.
+    """Hash of the code of a module and of all project modules that it imports, at its top or inside
+    functions.
 
     Of the syntax trees without docstrings: comments, layout and documentation do not count.
     """
-    return digest("".join(f"{name}\n{_source_of(path).essence}\n" for name, path in sorted(reachable(module, search_path).items())))
+    return digest(
+        "".join(
+            f"{name}\n{_source_of(path).essence}\n"
+            for name, path in sorted(reachable(module, search_path).items())
+        )
+    )
 
 
 def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]:
@@ -81,17 +95,24 @@ def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]
         for depth in range(len(parents)):
             parent = ".".join(parents[: depth + 1])
             found.setdefault(parent, _source(parent, search_path) or path)
-        waiting += _imports(path, name if path.name == "__init__.py" else ".".join(parents), packages, search_path)
+        waiting += _imports(
+            path, name if path.name == "__init__.py" else ".".join(parents), packages, search_path
+        )
     return found
 
 
 @cache
 def _source(name: str, search_path: tuple[str, ...]) -> Path | None:
-    """The file of a module, None where there is none (a name inside a module). No code of `search_path` is run."""
+    """The file of a module, None where there is none (a name inside a module). No code of
+    `search_path` is run."""
     parts = name.split(".")
     for depth in range(min(2, len(parts)), 0, -1):  # rockcheck's folders do not lie in each other
         try:
-            spec = importlib.util.find_spec(".".join(parts[:depth])) if depth == 1 or parts[0] == OWN_PACKAGE else None
+            spec = (
+                importlib.util.find_spec(".".join(parts[:depth]))
+                if depth == 1 or parts[0] == OWN_PACKAGE
+                else None
+            )
         except (ModuleNotFoundError, ValueError):
             continue
         if spec is None and depth == 1:
@@ -101,22 +122,37 @@ def _source(name: str, search_path: tuple[str, ...]) -> Path | None:
         if depth == len(parts):
             return Path(spec.origin)
         base = Path(spec.origin).parent.joinpath(*parts[depth:])
-        return next((path for path in (base / "__init__.py", base.with_suffix(".py")) if path.is_file()), None)
+        return next(
+            (path for path in (base / "__init__.py", base.with_suffix(".py")) if path.is_file()),
+            None,
+        )
     return None
 
 
-def _imports(path: Path, package: str, packages: Container[str], search_path: tuple[str, ...]) -> Iterable[str]:
-    """Names of the modules that a file of `package` imports; of a package only where something that is no module is taken from it."""
+def _imports(
+    path: Path, package: str, packages: Container[str], search_path: tuple[str, ...]
+) -> Iterable[str]:
+    """Names of the modules that a file of `package` imports; of a package only where something that
+    is no module is taken from it."""
     for node in _source_of(path).imports:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         else:
             base = node.module or ""
             if node.level:
-                base = ".".join(filter(None, [*package.split(".")[: len(package.split(".")) - node.level + 1], base]))
+                base = ".".join(
+                    filter(
+                        None,
+                        [*package.split(".")[: len(package.split(".")) - node.level + 1], base],
+                    )
+                )
             for alias in node.names:
                 inner = f"{base}.{alias.name}"
-                yield inner if base.split(".")[0] in packages and _source(inner, search_path) else base
+                yield (
+                    inner
+                    if base.split(".")[0] in packages and _source(inner, search_path)
+                    else base
+                )
 
 
 @dataclass(frozen=True)
@@ -133,7 +169,9 @@ def _source_of(path: Path) -> _Source:
     for node in ast.walk(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
             imports.append(node)
-        elif isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and ast.get_docstring(node, clean=False):
+        elif isinstance(
+            node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+        ) and ast.get_docstring(node, clean=False):
             node.body = node.body[1:] or [ast.Pass()]
     return _Source(tuple(imports), ast.dump(tree))
 
@@ -149,7 +187,9 @@ def version_of(library: str) -> str:
 
 def versions() -> dict[str, str]:
     """Versions of everything installed that a run's figures may depend on."""
-    libraries = sorted({library for known in FAMILIES.values() for library in known.libraries} | {"pandas"})
+    libraries = sorted(
+        {library for known in FAMILIES.values() for library in known.libraries} | {"pandas"}
+    )
     found = {name: version_of(name) for name in libraries}
     own = {"rockcheck": version_of("rockcheck"), "python": platform.python_version()}
     return own | {name: version for name, version in found.items() if version != "absent"}
@@ -157,9 +197,15 @@ def versions() -> dict[str, str]:
 
 def hardware() -> dict[str, str]:
     """What ran it: processor, cores, memory, system."""
-    facts = {"system": f"{platform.system()} {platform.release()}", "processor": _processor(), "cores": str(os.cpu_count() or 1)}
+    facts = {
+        "system": f"{platform.system()} {platform.release()}",
+        "processor": _processor(),
+        "cores": str(os.cpu_count() or 1),
+    }
     if hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names:
-        facts["memory"] = f"{os.sysconf('SC_PHYS_PAGES') * os.sysconf('SC_PAGE_SIZE') / 2**30:.0f} GiB"
+        facts["memory"] = (
+            f"{os.sysconf('SC_PHYS_PAGES') * os.sysconf('SC_PAGE_SIZE') / 2**30:.0f} GiB"
+        )
     return facts
 
 

@@ -1,7 +1,9 @@
-"""The same cells on a Dask cluster: each in a process of its own beside the Dask worker, with the same limits as at home.
+"""The same cells on a Dask cluster: each in a process of its own beside the Dask worker, with the
+same limits as at home.
 
-A Dask worker is kept out of harm's way: a crash, a hang or a memory hog ends a child process, not the worker. The child is
-kept for the next task of the same run, since starting one takes as long as many a task.
+A Dask worker is kept out of harm's way: a crash, a hang or a memory hog ends a child process, not
+the worker. The child is kept for the next task of the same run, since starting one takes as long as
+many a task.
 """
 
 from __future__ import annotations
@@ -22,7 +24,15 @@ from typing import IO, Any, Self
 
 from rockcheck.scenes import ModelFailure
 from rockcheck.validation.execute.cluster import connected
-from rockcheck.validation.execute.pool import COMPILING, ONE_THREAD, Call, Ended, Failure, death, prepare
+from rockcheck.validation.execute.pool import (
+    COMPILING,
+    ONE_THREAD,
+    Call,
+    Ended,
+    Failure,
+    death,
+    prepare,
+)
 
 #: What a process that has closed its streams may take to end, s.
 PATIENCE = 10.0
@@ -43,7 +53,9 @@ class Cluster:
     memory_mb: float | None = None
     jobs: int = field(default=1, init=False)
     _client: Any = field(default=None, init=False, repr=False)
-    _stack: contextlib.ExitStack = field(default_factory=contextlib.ExitStack, init=False, repr=False)
+    _stack: contextlib.ExitStack = field(
+        default_factory=contextlib.ExitStack, init=False, repr=False
+    )
     _run: str = field(default_factory=lambda: uuid.uuid4().hex, init=False, repr=False)
     _compiled: set[str] = field(default_factory=set, init=False, repr=False)
     _calls: dict[Any, Call] = field(default_factory=dict, init=False, repr=False)
@@ -66,8 +78,9 @@ class Cluster:
     def run(self, waiting: deque[Call], *, until: float = math.inf) -> Iterator[Ended]:
         """Runs the calls and yields each as it ends. More may be put into `waiting` meanwhile.
 
-        Of the calls that may have to compile the same code, one goes first on each machine, with time for that, and the others
-        wait for it. What has not ended at `until` (of `time.monotonic`) is dropped.
+        Of the calls that may have to compile the same code, one goes first on each machine, with
+        time for that, and the others wait for it. What has not ended at `until` (of
+        `time.monotonic`) is dropped.
         """
         from distributed import as_completed
 
@@ -81,7 +94,11 @@ class Cluster:
             call = self._calls.pop(future)
             if call not in told:
                 told.add(call)
-                lost = None if future.status == "finished" else ModelFailure(f"the cluster lost it: {result}")
+                lost = (
+                    None
+                    if future.status == "finished"
+                    else ModelFailure(f"the cluster lost it: {result}")
+                )
                 yield Ended(call, None if lost else result, lost, call.seconds)
             self._leaders[call.compiles] -= 1
             if call.compiles in self._held and self._leaders[call.compiles] == 0:
@@ -103,7 +120,9 @@ class Cluster:
                     self._leaders[call.compiles] += 1
                     self._submit(call, running, COMPILING, machine)
 
-    def _submit(self, call: Call, running: Any, extra: float = 0.0, machine: str | None = None) -> None:
+    def _submit(
+        self, call: Call, running: Any, extra: float = 0.0, machine: str | None = None
+    ) -> None:
         # A worker that is lost must not hold its tasks back: the machine is a wish, not an order.
         where = {} if machine is None else {"workers": [machine], "allow_other_workers": True}
         given = call.function, call.arguments, call.seconds + extra, self.memory_mb, self._run
@@ -133,13 +152,16 @@ class _Child:
         )
 
     def call(self, function: Callable[..., Any], arguments: tuple[Any, ...], seconds: float) -> Any:
-        """What the function returns, or how the process ended; a process that takes longer is ended."""
+        """What the function returns, or how the process ended; a process that takes longer is
+        ended."""
         given, back = self.process.stdin, self.process.stdout
         assert given is not None
         assert back is not None
         results: list[Any] = []
         asked = function, arguments
-        listener = threading.Thread(target=_exchange, args=(asked, given, back, results, self.ready), daemon=True)
+        listener = threading.Thread(
+            target=_exchange, args=(asked, given, back, results, self.ready), daemon=True
+        )
         listener.start()
         while listener.is_alive() and not self.ready.wait(0.1) and time.monotonic() < self.latest:
             pass
@@ -149,7 +171,11 @@ class _Child:
         hangs = listener.is_alive()
         self.end(0.0 if hangs else PATIENCE)
         if hangs:
-            said = f"did not end within {seconds:g} s" if self.ready.is_set() else f"did not start within {STARTING:g} s"
+            said = (
+                f"did not end within {seconds:g} s"
+                if self.ready.is_set()
+                else f"did not start within {STARTING:g} s"
+            )
             return Failure(said)
         return Failure(death(self.process.returncode))
 
@@ -171,7 +197,9 @@ class _Child:
                     stream.close()
 
 
-def _exchange(asked: Any, given: IO[bytes], back: IO[bytes], results: list[Any], ready: threading.Event) -> None:
+def _exchange(
+    asked: Any, given: IO[bytes], back: IO[bytes], results: list[Any], ready: threading.Event
+) -> None:
     try:
         if not ready.is_set():
             if back.readline() != READY:
@@ -187,8 +215,15 @@ def _exchange(asked: Any, given: IO[bytes], back: IO[bytes], results: list[Any],
 _mine = threading.local()
 
 
-def alone(function: Callable[..., Any], arguments: tuple[Any, ...], seconds: float, memory_mb: float | None, run: str) -> Any:
-    """Call a function in a process apart: that of this thread's last call where it was of the same run, so of the same code.
+def alone(
+    function: Callable[..., Any],
+    arguments: tuple[Any, ...],
+    seconds: float,
+    memory_mb: float | None,
+    run: str,
+) -> Any:
+    """Call a function in a process apart: that of this thread's last call where it was of the same
+    run, so of the same code.
 
     Returns a `Failure` where the process ends without a result.
     """
@@ -216,6 +251,8 @@ def _serve(memory_mb: float | None) -> None:
 
 
 if __name__ == "__main__":
-    from rockcheck.validation.execute import remote  # what is pickled here must be known by its real name
+    from rockcheck.validation.execute import (
+        remote,
+    )  # what is pickled here must be known by its real name
 
     remote._serve(float(sys.argv[1]) if sys.argv[1] != "None" else None)

@@ -1,4 +1,5 @@
-"""The folder where results wait for the next run: written whole or not at all, read only if nothing they depend on changed.
+"""The folder where results wait for the next run: written whole or not at all, read only if nothing
+they depend on changed.
 
 | folder | a result |
 |---|---|
@@ -6,9 +7,10 @@
 | `comparisons/` | `.json`: the comparisons of a cell, peaks of an ensemble's batch, a horizon of predictability |
 | `records/` | `.json`: what a task of a study gave |
 
-A name contains the hash of everything that the content depends on. So runs that share a folder can only ever write the same
-thing, and a reader never meets a half-written or outdated result. Each record holds the hash of its own name and content: one
-that was damaged, edited or exchanged is as good as none.
+A name contains the hash of everything that the content depends on. So runs that share a folder can
+only ever write the same thing, and a reader never meets a half-written or outdated result. Each
+record holds the hash of its own name and content: one that was damaged, edited or exchanged is as
+good as none.
 """
 
 from __future__ import annotations
@@ -52,7 +54,9 @@ class Store:
 
     folder: Path
     kinds: tuple[str, ...] = (HISTORIES, COMPARISONS)
-    _recent: OrderedDict[str, History] = field(default_factory=OrderedDict, init=False, repr=False, compare=False)
+    _recent: OrderedDict[str, History] = field(
+        default_factory=OrderedDict, init=False, repr=False, compare=False
+    )
 
     def __post_init__(self) -> None:
         for kind in self.kinds:
@@ -62,17 +66,27 @@ class Store:
         """Path of a history's CSV."""
         return self.folder / HISTORIES / f"{name}{TABLE}"
 
-    def put(self, name: str, files: Mapping[str, bytes], record: Mapping[str, Any], history: History | None = None) -> None:
-        """Keep a history: its files by suffix (".csv.gz", ".events.csv.gz") and its record; `history` is what the files hold."""
+    def put(
+        self,
+        name: str,
+        files: Mapping[str, bytes],
+        record: Mapping[str, Any],
+        history: History | None = None,
+    ) -> None:
+        """Keep a history: its files by suffix (".csv.gz", ".events.csv.gz") and its record;
+        `history` is what the files hold."""
         for suffix, content in files.items():
             write_whole(self.folder / HISTORIES / f"{name}{suffix}", content)
         hashes = {suffix: _hash(content) for suffix, content in files.items()}
-        write_whole(self.folder / HISTORIES / f"{name}.json", _sealed(name, {**record, "files": hashes}))
+        write_whole(
+            self.folder / HISTORIES / f"{name}.json", _sealed(name, {**record, "files": hashes})
+        )
         if history is not None:
             self._remember(name, history)
 
     def load(self, name: str) -> History:
-        """The history of that name: from memory where it was put or loaded lately, else from its file. Raises `InputError`."""
+        """The history of that name: from memory where it was put or loaded lately, else from its
+        file. Raises `InputError`."""
         found = self._recent.get(name)
         if found is None:
             for suffix in SUFFIXES:
@@ -92,10 +106,18 @@ class Store:
         base = self.folder / HISTORIES
         record = self.get_record(HISTORIES, name)
         files = record.pop("files", None) if record else None
-        if record is None or not isinstance(files, dict) or TABLE not in files or not files.keys() <= SUFFIXES:
+        if (
+            record is None
+            or not isinstance(files, dict)
+            or TABLE not in files
+            or not files.keys() <= SUFFIXES
+        ):
             return None
         try:
-            whole = all(_hash(read_bytes(within(base, f"{name}{suffix}"))) == expected for suffix, expected in files.items())
+            whole = all(
+                _hash(read_bytes(within(base, f"{name}{suffix}"))) == expected
+                for suffix, expected in files.items()
+            )
         except InputError:
             return None
         return record if whole else None
@@ -119,19 +141,36 @@ class Store:
         return content if whole else None
 
     def prune(self, now: float | None = None) -> None:
-        """Remove results that no run has used for two weeks, and the leavings of killed runs after a day."""
+        """Remove results that no run has used for two weeks, and the leavings of killed runs after
+        a day."""
         now = time.time() if now is None else now
-        for path in [*(path for kind in self.kinds for path in (self.folder / kind).iterdir()), *self.folder.glob(".*.part")]:
-            record = path if path.suffix in (".json", ".part") else path.with_name(re.sub(r"(\.events)?\.csv(\.gz)?$", ".json", path.name))
+        for path in [
+            *(path for kind in self.kinds for path in (self.folder / kind).iterdir()),
+            *self.folder.glob(".*.part"),
+        ]:
+            record = (
+                path
+                if path.suffix in (".json", ".part")
+                else path.with_name(re.sub(r"(\.events)?\.csv(\.gz)?$", ".json", path.name))
+            )
             used = record if record.is_file() else path
-            with contextlib.suppress(OSError):  # another run was quicker, or it is a folder, which is nothing of ours
+            with contextlib.suppress(
+                OSError
+            ):  # another run was quicker, or it is a folder, which is nothing of ours
                 if now - used.lstat().st_mtime > (86400.0 if path.suffix == ".part" else KEEP):
                     path.unlink()
 
 
 def _sealed(name: str, content: Mapping[str, Any]) -> str:
     """A record with the hash of its name and content."""
-    return json.dumps({"content": content, "sha256": _seal(name, content)}, sort_keys=True, separators=(",", ":")) + "\n"
+    return (
+        json.dumps(
+            {"content": content, "sha256": _seal(name, content)},
+            sort_keys=True,
+            separators=(",", ":"),
+        )
+        + "\n"
+    )
 
 
 def _seal(name: str, content: Mapping[str, Any]) -> str:

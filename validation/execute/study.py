@@ -12,7 +12,8 @@ from rockcheck.validation.execute import provenance
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """A study's name, when it was made (UTC, ISO 8601), in how many processes and how long (s), with what, on what."""
+    """A study's name, when it was made (UTC, ISO 8601), in how many processes and how long (s),
+    with what, on what."""
 
     suite: str
     created: str

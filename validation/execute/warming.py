@@ -1,4 +1,5 @@
-"""Fills the cache of compiled code ahead, in processes side by side: a user then waits for no compiler."""
+"""Fills the cache of compiled code ahead, in processes side by side: a user then waits for no
+compiler."""
 
 from __future__ import annotations
 
@@ -46,10 +47,13 @@ def _engine_steps() -> None:
     from rockcheck.engines.marching import in_units_of
 
     scene = in_units_of(_scene().block.radius, _scene())
-    march_adaptively(scene, BaseMotion(scene), lambda pose, velocity, dt, felt, bouncing: velocity, longest=1e-3)
+    march_adaptively(
+        scene, BaseMotion(scene), lambda pose, velocity, dt, felt, bouncing: velocity, longest=1e-3
+    )
 
 
-#: What is compiled, the longest first. Batches share the loop of histories, so they come after it and in one process with it.
+#: What is compiled, the longest first. Batches share the loop of histories, so they come after it
+#: and in one process with it.
 PARTS: Mapping[str, Callable[[], None]] = {
     "the event-based models with the unilateral pivot": partial(_event_based, "unilateral"),
     "the event-based models: histories, batches, ensembles": partial(_event_based, "bilateral"),
@@ -60,7 +64,8 @@ PARTS: Mapping[str, Callable[[], None]] = {
 
 
 def warm(jobs: int, *, on_progress: OnProgress = unheard) -> dict[str, float]:
-    """Compile what is not in the cache, in up to `jobs` processes; returns the time of each part of `PARTS`, s.
+    """Compile what is not in the cache, in up to `jobs` processes; returns the time of each part of
+    `PARTS`, s.
 
     Raises what a part raises.
     """

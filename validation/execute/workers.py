@@ -20,7 +20,8 @@ from rockcheck.validation.uncertainty.numerical import failed, numerical_uncerta
 
 @dataclass(frozen=True, kw_only=True)
 class Work:
-    """What a worker anywhere needs to know of the model: its label in the suite, the name of its family, its settings.
+    """What a worker anywhere needs to know of the model: its label in the suite, the name of its
+    family, its settings.
 
     `search_path` holds folders in which a model of the user's own may lie.
     """
@@ -80,7 +81,8 @@ def play(task: Task | BatchTask) -> Played:
 
 
 def _play_batch(task: BatchTask, began: float) -> Played:
-    """Peak |theta| in alpha and outcome of each scene; None and the reason where the model failed."""
+    """Peak |theta| in alpha and outcome of each scene; None and the reason where the model
+    failed."""
     peaks: list[float | None] = []
     outcomes: list[str] = []
     cost = {"wall_seconds": 0.0, "cpu_seconds": 0.0, "set_up": 0.0, "steps": 0, "evaluations": 0}
@@ -103,7 +105,10 @@ def _simulate(task: Work, scene: Scene) -> History:
     """The history under the model's label in the suite."""
     returned: object = build_own(task.family, task.settings).simulate(scene)
     if not isinstance(returned, History):
-        raise ModelFailure(f"{task.family} returned {type(returned).__name__}; `simulate` must return a rockcheck.History")
+        raise ModelFailure(
+            f"{task.family} returned {type(returned).__name__}; `simulate` must return a"
+            " rockcheck.History"
+        )
     history = dataclasses.replace(returned, model=task.label)
     if fault := _not_finite(history):
         raise ModelFailure(fault)
@@ -111,7 +116,8 @@ def _simulate(task: Work, scene: Scene) -> History:
 
 
 def _numerical(task: Task, history: History) -> dict[str, Any] | None:
-    """The numerical uncertainty of a run, None for a model without a step; a coarser run that fails is not converged."""
+    """The numerical uncertainty of a run, None for a model without a step; a coarser run that fails
+    is not converged."""
     try:
         found = numerical_uncertainty(build_own(task.family, task.settings), task.scene, history)
     except (ModelFailure, InputError) as error:
@@ -131,5 +137,8 @@ def _not_finite(history: History) -> str:
 
 def _plain(settings: Any) -> dict[str, Any]:
     """Settings as JSON has them, in the order in which the store gives them back."""
-    plain = {str(key): value if isinstance(value, str | int | float | bool | None) else str(value) for key, value in settings.items()}
+    plain = {
+        str(key): value if isinstance(value, str | int | float | bool | None) else str(value)
+        for key, value in settings.items()
+    }
     return dict(sorted(plain.items()))

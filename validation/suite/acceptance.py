@@ -1,4 +1,5 @@
-"""`accept`: the figures of a run become the expected ones of the suite's tolerance file, which keeps its remarks and order."""
+"""`accept`: the figures of a run become the expected ones of the suite's tolerance file, which
+keeps its remarks and order."""
 
 from __future__ import annotations
 
@@ -17,20 +18,25 @@ from rockcheck.validation.suite.results import Check, Run
 from rockcheck.validation.suite.suites import Suite
 from rockcheck.validation.suite.tolerances import MEASURES, OWN_FIGURES, Tolerance, Windowed, judge
 
-#: Of a new line: limit and drift band, as shares of a difference from the perfect value, and of a cell's own figure.
+#: Of a new line: limit and drift band, as shares of a difference from the perfect value, and of a
+#: cell's own figure.
 ROOM, DRIFT = 2.0, 0.2
 OWN_ROOM, OWN_DRIFT = 0.02, 0.002
-#: The least limit and drift band of new lines: multiples of the measure's resolution, and a share of the limit.
+#: The least limit and drift band of new lines: multiples of the measure's resolution, and a share
+#: of the limit.
 LEAST_LIMIT, LEAST_DRIFT, LEAST_SHARE = 10.0, 1.0, 0.01
 
 
-def accept(suite: Suite, run: Run, reason: str | None, *, write: bool = True) -> tuple[list[str], list[str]]:
+def accept(
+    suite: Suite, run: Run, reason: str | None, *, write: bool = True
+) -> tuple[list[str], list[str]]:
     """Write the figures of `run` into the tolerance file of `suite`.
 
     Returns the changes and what was refused, a line each. A change is new, tightened (to what is
-    better), loosened (a wider limit) or moved (another expected value); the last two need a `reason`,
-    which goes into the file. A check without a figure, and a line that would not pass now, is always
-    refused; a figure that is not defined asks for no line. Without `write` the file stays as it is.
+    better), loosened (a wider limit) or moved (another expected value); the last two need a
+    `reason`, which goes into the file. A check without a figure, and a line that would not pass
+    now, is always refused; a figure that is not defined asks for no line. Without `write` the file
+    stays as it is.
     """
     changes: list[str] = []
     refused: list[str] = []
@@ -39,10 +45,14 @@ def accept(suite: Suite, run: Run, reason: str | None, *, write: bool = True) ->
     return changes, refused
 
 
-def _accept(suite: Suite, run: Run, reason: str | None, changes: list[str], refused: list[str], write: bool) -> None:
+def _accept(
+    suite: Suite, run: Run, reason: str | None, changes: list[str], refused: list[str], write: bool
+) -> None:
     path = suite.tolerances_path
     document = tomlkit.parse(read_text(path)) if path.exists() else tomlkit.document()
-    tables: Any = document.setdefault("tolerances", tomlkit.table()) if path == suite.path else document
+    tables: Any = (
+        document.setdefault("tolerances", tomlkit.table()) if path == suite.path else document
+    )
     before = len(changes)
     for cell, check in run.checks():
         if cell.scene not in suite.scenes and cell.scene not in suite.ensembles:
@@ -56,7 +66,16 @@ def _accept(suite: Suite, run: Run, reason: str | None, changes: list[str], refu
         if isinstance(line, str):
             refused.append(f"{where}: {line}")
             continue
-        old = None if check.limit is None else {"expected": check.expected, "limit": check.limit, "drift": check.drift, "why": check.why}
+        old = (
+            None
+            if check.limit is None
+            else {
+                "expected": check.expected,
+                "limit": check.limit,
+                "drift": check.drift,
+                "why": check.why,
+            }
+        )
         if line != old:
             table = _table(tables, (cell.scene, cell.model, against))
             changes.append(f"{where}: {_named(check, line)}: {_shown(old)} -> {_shown(line)}")
@@ -87,10 +106,19 @@ def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
         limit = stricter(check.limit, limit) if tighter else check.limit
     if check.drift is not None:
         drift = min(check.drift, drift) if tighter else check.drift
-    why = (reason or "first accepted figure") if new else (reason if worse and reason else check.why)
+    why = (
+        (reason or "first accepted figure") if new else (reason if worse and reason else check.why)
+    )
     expected = value if check.verdict != "pass" or check.expected is None else check.expected
-    line: dict[str, Any] = {"expected": _short(expected), "limit": limit, "drift": drift, "why": why}
-    again = judge(check.figure, Tolerance(**line), kind=check.kind, measure=measure, floor=check.floor)
+    line: dict[str, Any] = {
+        "expected": _short(expected),
+        "limit": limit,
+        "drift": drift,
+        "why": why,
+    }
+    again = judge(
+        check.figure, Tolerance(**line), kind=check.kind, measure=measure, floor=check.floor
+    )
     return line if again.verdict == "pass" else again.reason
 
 
@@ -104,7 +132,13 @@ def _room(check: Check, value: float) -> tuple[float, float]:
     limit = _round(max((OWN_ROOM if own else ROOM) * size, LEAST_LIMIT * measure.resolution))
     if measure.sense == "at least":
         limit = _round(0.9 * value, down=True)
-    return limit, _round(max((OWN_DRIFT if own else DRIFT) * size, LEAST_SHARE * limit, LEAST_DRIFT * measure.resolution))
+    return limit, _round(
+        max(
+            (OWN_DRIFT if own else DRIFT) * size,
+            LEAST_SHARE * limit,
+            LEAST_DRIFT * measure.resolution,
+        )
+    )
 
 
 def _named(check: Check, line: Mapping[str, Any]) -> str:
@@ -141,4 +175,7 @@ def _round(value: float, down: bool = False) -> float:
 def _shown(line: Mapping[str, Any] | None) -> str:
     if line is None:
         return "none"
-    return ", ".join(f"{name} {'-' if line[name] is None else line[name]}" for name in ("expected", "limit", "drift"))
+    return ", ".join(
+        f"{name} {'-' if line[name] is None else line[name]}"
+        for name in ("expected", "limit", "drift")
+    )

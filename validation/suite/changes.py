@@ -1,4 +1,5 @@
-"""What changed: between two finished runs of a suite (`rockcheck compare`), and over many (`rockcheck validate --history FILE`).
+"""What changed: between two finished runs of a suite (`rockcheck compare`), and over many
+(`rockcheck validate --history FILE`).
 
 A history of runs is a file of JSON lines, one a run: `Moment`.
 """
@@ -26,16 +27,19 @@ from rockcheck.validation.suite.tables import title
 from rockcheck.validation.suite.tolerances import MEASURES
 
 T = TypeVar("T")
-#: A figure has moved where it differs by more than this share, and by more than its measure's resolution.
+#: A figure has moved where it differs by more than this share, and by more than its measure's
+#: resolution.
 ROUNDING = 1e-9
 #: Where a continuous integration says which commit it runs.
 COMMITS = ("GITHUB_SHA", "CI_COMMIT_SHA", "BUILD_SOURCEVERSION", "CIRCLE_SHA1")
 
 
 class Change(Stored):
-    """One thing that differs: a cell that is in one run only, an outcome, a figure, or the verdict on a check, a cell or the run.
+    """One thing that differs: a cell that is in one run only, an outcome, a figure, or the verdict
+    on a check, a cell or the run.
 
-    `name` is the figure or check as tolerances name it; `before` and `after` are None where there is nothing.
+    `name` is the figure or check as tolerances name it; `before` and `after` are None where there
+    is nothing.
     """
 
     scene: str = ""
@@ -54,10 +58,17 @@ class Change(Stored):
 
 
 def changes(before: Run, after: Run) -> list[Change]:
-    """All that differs, verdicts first, then figures, the one that moved most first. Raises `InputError` for runs of two suites."""
+    """All that differs, verdicts first, then figures, the one that moved most first. Raises
+    `InputError` for runs of two suites."""
     if before.suite != after.suite:
-        raise InputError(f"the runs are of two suites, {printable(before.suite)} and {printable(after.suite)}")
-    found = [Change(what="verdict", before=before.words, after=after.words)] if before.words != after.words else []
+        raise InputError(
+            f"the runs are of two suites, {printable(before.suite)} and {printable(after.suite)}"
+        )
+    found = (
+        [Change(what="verdict", before=before.words, after=after.words)]
+        if before.words != after.words
+        else []
+    )
     old, new = ({(cell.scene, cell.model): cell for cell in run.cells} for run in (before, after))
     for place in dict.fromkeys((*old, *new)):
         if place in old and place in new:
@@ -86,7 +97,12 @@ def _of_cell(old: Cell, new: Cell) -> Iterator[Change]:
             yield Change(**place, what="verdict", name=name, before=was, after=now)
     figures = [{_key(figure): figure for figure in cell.figures} for cell in (old, new)]
     for name, one, other in _pairs(*figures):
-        if one and other and not (one.of_a_fall or other.of_a_fall) and _moved(one.measure, one.value, other.value):
+        if (
+            one
+            and other
+            and not (one.of_a_fall or other.of_a_fall)
+            and _moved(one.measure, one.value, other.value)
+        ):
             yield Change(**place, what="figure", name=name, before=one.value, after=other.value)
 
 
@@ -109,7 +125,8 @@ def _moved(name: str, was: float | None, now: float | None) -> bool:
 
 
 class Moment(Stored):
-    """One run in a history: when, of which commit and version, its verdict, and every judged figure by "scene, model: check"."""
+    """One run in a history: when, of which commit and version, its verdict, and every judged figure
+    by "scene, model: check"."""
 
     created: str
     commit: str = ""
@@ -131,24 +148,40 @@ def moment_of(run: Run, folder: Path) -> Moment:
         suite=run.suite,
         verdict=run.words,
         wall_seconds=run.wall_seconds,
-        figures={name: None if check.figure.of_a_fall else check.figure.value for name, check in names},
+        figures={
+            name: None if check.figure.of_a_fall else check.figure.value for name, check in names
+        },
         not_passed=tuple(name for name, check in names if check.weighs != "pass"),
     )
 
 
 def commit_of(folder: Path) -> str:
-    """The commit that is checked out, with "-dirty" where files have changed since; "" outside of a repository."""
+    """The commit that is checked out, with "-dirty" where files have changed since; "" outside of a
+    repository."""
     git = shutil.which("git")
     if git:
-        words = [git, "-C", str(folder), "describe", "--always", "--dirty", "--abbrev=12", "--exclude", "*"]
-        found = subprocess.run(words, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
+        words = [
+            git,
+            "-C",
+            str(folder),
+            "describe",
+            "--always",
+            "--dirty",
+            "--abbrev=12",
+            "--exclude",
+            "*",
+        ]
+        found = subprocess.run(
+            words, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL
+        )
         if found.returncode == 0:
             return printable(found.stdout.strip())
     return printable(next((os.environ[name][:12] for name in COMMITS if os.environ.get(name)), ""))
 
 
 def remember(path: Path, moment: Moment) -> list[Moment]:
-    """Append a line to the history; returns all its moments of the same suite, the oldest first. Raises `InputError`."""
+    """Append a line to the history; returns all its moments of the same suite, the oldest first.
+    Raises `InputError`."""
     known = read_history(path) if path.exists() else []
     try:
         with path.open("a", encoding="utf-8") as stream:
@@ -167,7 +200,9 @@ def read_history(path: Path) -> list[Moment]:
         try:
             found.append(Moment.model_validate(json.loads(line)))
         except ValidationError as error:
-            raise InputError(f"{printable(path)}, line {n}: not a run of a history: {from_validation(error)}") from None
+            raise InputError(
+                f"{printable(path)}, line {n}: not a run of a history: {from_validation(error)}"
+            ) from None
         except (ValueError, RecursionError):
             raise InputError(f"{printable(path)}, line {n}: not a run of a history") from None
     return found
@@ -181,7 +216,8 @@ class Trend(Stored):
 
     @property
     def spread(self) -> float:
-        """Largest less smallest value, relative to the largest size; 0 where fewer than two are known."""
+        """Largest less smallest value, relative to the largest size; 0 where fewer than two are
+        known."""
         known = [value for value in self.values if value is not None]
         most = max(map(abs, known), default=0.0)
         return (max(known) - min(known)) / most if most > 0.0 else 0.0
@@ -198,5 +234,8 @@ class Trend(Stored):
 def trends(moments: Sequence[Moment]) -> list[Trend]:
     """Every figure of the last run over all runs, the one that varied most first."""
     last = moments[-1].figures if moments else {}
-    found = [Trend(name=name, values=tuple(moment.figures.get(name) for moment in moments)) for name in last]
+    found = [
+        Trend(name=name, values=tuple(moment.figures.get(name) for moment in moments))
+        for name in last
+    ]
     return sorted(found, key=lambda trend: -trend.spread)

@@ -1,4 +1,5 @@
-"""How sure a cell's figures are: its difference from each reference against u_num, u_input and u_D (ASME V&V 20)."""
+"""How sure a cell's figures are: its difference from each reference against u_num, u_input and u_D
+(ASME V&V 20)."""
 
 from __future__ import annotations
 
@@ -22,11 +23,16 @@ QUANTITIES = {"theta_rms": "alpha", "peak_rotation": "alpha", "last_slip": "m"}
 
 def key_of(uncertainty: bool) -> dict[str, str]:
     """What a cell's key also depends on if its numerical uncertainty is asked for."""
-    return {"uncertainty": provenance.code_digest("rockcheck.validation.uncertainty.numerical")} if uncertainty else {}
+    return (
+        {"uncertainty": provenance.code_digest("rockcheck.validation.uncertainty.numerical")}
+        if uncertainty
+        else {}
+    )
 
 
 def numerical_of(record: Mapping[str, Any]) -> Numerical | None:
-    """The numerical uncertainty that a worker has found, None where it was not asked for or not to be had."""
+    """The numerical uncertainty that a worker has found, None where it was not asked for or not to
+    be had."""
     found = record.get("numerical")
     return None if found is None else Numerical(**found)
 
@@ -35,7 +41,11 @@ def inputs_of(store: Store, given: UncertainScene) -> Inputs:
     """What the spread of a scene's inputs makes of its figures; kept in the store."""
     spreads = {name: spread.model_dump() for name, spread in given.spreads.items()}
     code = provenance.code_digest("rockcheck.validation.uncertainty.population")
-    key = provenance.cell_key(given.scene, "ebm-unilateral", {"spreads": spreads, "correlation": given.correlation.tolist(), "code": code})
+    key = provenance.cell_key(
+        given.scene,
+        "ebm-unilateral",
+        {"spreads": spreads, "correlation": given.correlation.tolist(), "code": code},
+    )
     name = name_of(given.scene.name, "inputs", key)
     with suppress(TypeError, ValueError):  # a kept result may lack the fields that it should have
         return Inputs(**(store.get_record(COMPARISONS, name) or {}))
@@ -52,9 +62,11 @@ def explanations(
     own: Mapping[str, Any],
     inputs: Inputs | None,
 ) -> Iterator[Explanation]:
-    """The verdict on each quantity against each reference, by name: its own figures and its record (`records`).
+    """The verdict on each quantity against each reference, by name: its own figures and its record
+    (`records`).
 
-    `own` is the candidate's record. There is no verdict for a model whose numerical error is unknown, nor for a block that falls.
+    `own` is the candidate's record. There is no verdict for a model whose numerical error is
+    unknown, nor for a block that falls.
     """
     numerical = numerical_of(own)
     if numerical is None:
@@ -69,7 +81,9 @@ def explanations(
             if error is None:
                 continue
             u_num, reason = _both(name, numerical, other)
-            u_data = math.hypot(*(_u_data(scene, record, name) for record in (own, records[against])))
+            u_data = math.hypot(
+                *(_u_data(scene, record, name) for record in (own, records[against]))
+            )
             u_input = (inputs.u_input(name) or 0.0) if inputs else 0.0
             yield explain(name, unit, error, u_num, u_input, u_data, reason=reason, against=against)
 
@@ -80,17 +94,24 @@ def _falls(record: Mapping[str, Any]) -> str:
     return outcome if outcome.startswith("overturned") else ""
 
 
-def _other_outcome(against: str, mine: Numerical, other: Numerical | None, inputs: Inputs | None) -> Explanation:
-    """What two different outcomes say: the peaks and slips of a block that falls have nothing to be compared with."""
+def _other_outcome(
+    against: str, mine: Numerical, other: Numerical | None, inputs: Inputs | None
+) -> Explanation:
+    """What two different outcomes say: the peaks and slips of a block that falls have nothing to be
+    compared with."""
     reasons = [reason for found in (mine, other) if found for reason in found.reasons]
     if reasons:
         return explain("outcome", "", None, None, reason="; ".join(reasons), against=against)
     both_occur = inputs is not None and 0.0 < inputs.overturns.value < 1.0  # among the draws
     verdict = INPUTS if both_occur else "not explained: model form or set-up, another outcome"
-    return Explanation(quantity="outcome", unit="", against=against, error=1.0, u_num=0.0, verdict=verdict)
+    return Explanation(
+        quantity="outcome", unit="", against=against, error=1.0, u_num=0.0, verdict=verdict
+    )
 
 
-def _error(name: str, figures: Iterable[Figure], yardstick: Iterable[Figure], against: str) -> float | None:
+def _error(
+    name: str, figures: Iterable[Figure], yardstick: Iterable[Figure], against: str
+) -> float | None:
     if name == "theta_rms":
         return _value(figures, name, against)
     mine, theirs = _value(figures, name, ""), _value(yardstick, name, "")
@@ -98,7 +119,10 @@ def _error(name: str, figures: Iterable[Figure], yardstick: Iterable[Figure], ag
 
 
 def _value(figures: Iterable[Figure], name: str, against: str) -> float | None:
-    return next((f.value for f in figures if f.measure == name and f.against == against and not f.window), None)
+    return next(
+        (f.value for f in figures if f.measure == name and f.against == against and not f.window),
+        None,
+    )
 
 
 def _both(name: str, mine: Numerical, other: Numerical | None) -> tuple[float | None, str]:

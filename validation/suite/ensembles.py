@@ -1,4 +1,5 @@
-"""Ensembles: rocking is chaotic, so single histories are not predictable, but distributions are (Bachmann et al. 2018).
+"""Ensembles: rocking is chaotic, so single histories are not predictable, but distributions are
+(Bachmann et al. 2018).
 
 An ensemble is one table of a suite, drawn the same for every model:
 
@@ -12,9 +13,10 @@ An ensemble is one table of a suite, drawn the same for every model:
     pulse = { period = {...}, amplitude = {...} }      # a Ricker pulse of random phase, m/s^2 and s
     noise = { amplitude = {...}, frequency = 2.5, damping = 0.6, strong = 8.0 }
 
-A pulse of phase phi is cos(phi) times the symmetric Ricker pulse plus sin(phi) times the antisymmetric one. Noise is white
-noise through the Kanai-Tajimi filter, of power spectrum (1 + 4 z^2 r^2)/((1 - r^2)^2 + 4 z^2 r^2), r = f/`frequency`, z =
-`damping`, times a half-sine envelope of `strong` seconds; `amplitude` is its peak acceleration, m/s^2.
+A pulse of phase phi is cos(phi) times the symmetric Ricker pulse plus sin(phi) times the
+antisymmetric one. Noise is white noise through the Kanai-Tajimi filter, of power spectrum (1 + 4
+z^2 r^2)/((1 - r^2)^2 + 4 z^2 r^2), r = f/`frequency`, z = `damping`, times a half-sine envelope of
+`strong` seconds; `amplitude` is its peak acceleration, m/s^2.
 """
 
 from __future__ import annotations
@@ -33,7 +35,8 @@ RECORD_STEP = 0.002
 
 
 class Distribution(Frozen):
-    """`uniform` between two values, or `lognormal` with a median and the standard deviation of the logarithm."""
+    """`uniform` between two values, or `lognormal` with a median and the standard deviation of the
+    logarithm."""
 
     uniform: tuple[Finite, Finite] | None = None
     lognormal: tuple[Positive, NonNegative] | None = None
@@ -60,11 +63,20 @@ class Pulse(Frozen):
 
     def draw(self, chance: np.random.Generator) -> Record:
         """One pulse, sampled."""
-        phase, period, amplitude = chance.uniform(0.0, 2.0 * math.pi), self.period.draw(chance), self.amplitude.draw(chance)
+        phase, period, amplitude = (
+            chance.uniform(0.0, 2.0 * math.pi),
+            self.period.draw(chance),
+            self.amplitude.draw(chance),
+        )
         t = np.arange(0.0, 4.0 * period, RECORD_STEP)
-        parts = (Ricker(amplitude=1.0, period=period, symmetric=symmetric).acceleration(t) for symmetric in (True, False))
+        parts = (
+            Ricker(amplitude=1.0, period=period, symmetric=symmetric).acceleration(t)
+            for symmetric in (True, False)
+        )
         even, odd = parts
-        return Record.from_samples(amplitude * (math.cos(phase) * even + math.sin(phase) * odd), RECORD_STEP)
+        return Record.from_samples(
+            amplitude * (math.cos(phase) * even + math.sin(phase) * odd), RECORD_STEP
+        )
 
 
 class Noise(Frozen):
@@ -80,7 +92,9 @@ class Noise(Frozen):
         amplitude = self.amplitude.draw(chance)
         count = math.ceil(self.strong / RECORD_STEP)
         ratio = np.fft.rfftfreq(count, RECORD_STEP) / self.frequency
-        power = (1.0 + 4.0 * self.damping**2 * ratio**2) / ((1.0 - ratio**2) ** 2 + 4.0 * self.damping**2 * ratio**2)
+        power = (1.0 + 4.0 * self.damping**2 * ratio**2) / (
+            (1.0 - ratio**2) ** 2 + 4.0 * self.damping**2 * ratio**2
+        )
         shaped = np.fft.irfft(np.fft.rfft(chance.standard_normal(count)) * np.sqrt(power), count)
         shaped *= np.sin(np.pi * np.arange(count) / count)
         return Record.from_samples(amplitude * shaped / np.max(np.abs(shaped)), RECORD_STEP)
@@ -115,7 +129,12 @@ class Ensemble(Frozen):
         if motion is not None:
             change["excitation"] = motion.draw(chance)
         if self.friction is not None:
-            change["floor"] = base.floor.model_copy(update={"friction": self.friction.draw(chance), "static_friction": None})
+            change["floor"] = base.floor.model_copy(
+                update={"friction": self.friction.draw(chance), "static_friction": None}
+            )
         if self.gap is not None:
-            change["walls"] = tuple(Wall(side=w.side, gap=self.gap.draw(chance), restitution=w.restitution) for w in base.walls)
+            change["walls"] = tuple(
+                Wall(side=w.side, gap=self.gap.draw(chance), restitution=w.restitution)
+                for w in base.walls
+            )
         return base.replace(**change)

@@ -1,11 +1,13 @@
-"""What the suites have found about each model: bias and scatter of its figures, and the domain that the scenes cover.
+"""What the suites have found about each model: bias and scatter of its figures, and the domain that
+the scenes cover.
 
-Bias and scatter as in the FDS validation guide (McGrattan and Toman 2011). With M a model's figure and E the reference's,
+Bias and scatter as in the FDS validation guide (McGrattan and Toman 2011). With M a model's figure
+and E the reference's,
 
     sigma = standard deviation of ln(M/E),      delta = exp(mean of ln(M/E) + sigma^2 / 2).
 
-The reference's own numerical error is far below sigma and left out. A new prediction M is then expected at M/delta, with a relative
-standard deviation sigma: `History.expected`.
+The reference's own numerical error is far below sigma and left out. A new prediction M is then
+expected at M/delta, with a relative standard deviation sigma: `History.expected`.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ FEWEST = 5
 
 
 def pairs_of(runs: Iterable[Run]) -> dict[tuple[str, str], list[tuple[float, float]]]:
-    """(reference's, model's) figures of all cells by (model, quantity), where both are finite and large enough for a ratio.
+    """(reference's, model's) figures of all cells by (model, quantity), where both are finite and
+    large enough for a ratio.
 
     Blocks that fall have no peak: they are left out, as are cells of the reference itself.
     """
@@ -36,14 +39,20 @@ def pairs_of(runs: Iterable[Run]) -> dict[tuple[str, str], list[tuple[float, flo
         references = {cell.scene: cell for cell in run.cells if cell.model == run.reference}
         for cell in run.cells:
             yardstick = references.get(cell.scene)
-            if yardstick is None or yardstick is cell or "failed" in (cell.status, yardstick.status):
+            if (
+                yardstick is None
+                or yardstick is cell
+                or "failed" in (cell.status, yardstick.status)
+            ):
                 continue
             if cell.outcome.startswith("overturned") or yardstick.outcome.startswith("overturned"):
                 continue
             for name, least in QUANTITIES.items():
                 values = [_value(one.figures, name) for one in (yardstick, cell)]
                 if all(value is not None and value > least for value in values):
-                    found.setdefault((cell.model, name), []).append((values[0] or 0.0, values[1] or 0.0))
+                    found.setdefault((cell.model, name), []).append(
+                        (values[0] or 0.0, values[1] or 0.0)
+                    )
         for model, name, one_pair in _ensemble_pairs(run):
             found.setdefault((model, name), []).append(one_pair)
     return found
@@ -64,11 +73,14 @@ def _ensemble_pairs(run: Run) -> Iterator[tuple[str, str, tuple[float, float]]]:
 
 
 def _value(figures: Sequence[Any], name: str) -> float | None:
-    return next((f.value for f in figures if f.measure == name and not f.against and not f.window), None)
+    return next(
+        (f.value for f in figures if f.measure == name and not f.against and not f.window), None
+    )
 
 
 def experience_of(runs: Sequence[Run]) -> Experience:
-    """Bias and scatter a model and figure, and the domain of the scenes, over some runs of suites."""
+    """Bias and scatter a model and figure, and the domain of the scenes, over some runs of
+    suites."""
     trust: dict[str, dict[str, Trust]] = {}
     for (model, name), found in sorted(pairs_of(runs).items()):
         if len(found) < FEWEST:
@@ -76,7 +88,9 @@ def experience_of(runs: Sequence[Run]) -> Experience:
         bias, scatter = bias_and_scatter(found)
         trust.setdefault(model, {})[name] = Trust(bias=bias, scatter=scatter, count=len(found))
     scenes = [run.load_scene(name) for run in runs for name in run.scenes]
-    return Experience(suites=tuple(run.suite for run in runs), trust=trust, domain=domain_of(scenes))
+    return Experience(
+        suites=tuple(run.suite for run in runs), trust=trust, domain=domain_of(scenes)
+    )
 
 
 def bias_and_scatter(pairs: Sequence[tuple[float, float]]) -> tuple[float, float]:

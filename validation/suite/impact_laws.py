@@ -1,4 +1,5 @@
-"""The law of impacts in a suite: where a scene's motion depends on it, and figures held against the reference under any law."""
+"""The law of impacts in a suite: where a scene's motion depends on it, and figures held against the
+reference under any law."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ from rockcheck.validation.execute.models import build, is_own
 from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
 from rockcheck.validation.suite.suites import ModelVariant
 
-#: What is judged by the nearest law. Histories are judged up to the horizon, which ends where the laws part.
+#: What is judged by the nearest law. Histories are judged up to the horizon, which ends where the
+#: laws part.
 BY_ANY = ("outcome_agrees", "peak_ratio")
 
 
@@ -26,7 +28,11 @@ def landing_of(store: Store, scene: Scene) -> Landing | None:
     if not may_fly(scene):
         return None
     code = provenance.code_digest("rockcheck.validation.discrepancy.impact_laws")
-    name = name_of(scene.name, "impact-laws", provenance.cell_key(scene, "ebm-unilateral", {"of": "impact laws", "code": code}))
+    name = name_of(
+        scene.name,
+        "impact-laws",
+        provenance.cell_key(scene, "ebm-unilateral", {"of": "impact laws", "code": code}),
+    )
     found = store.get_record(COMPARISONS, name)
     try:
         if found is not None:
@@ -37,12 +43,15 @@ def landing_of(store: Store, scene: Scene) -> Landing | None:
         landing = parting_landing(scene)
     except (InputError, ModelFailure):  # it is not a scene for that model
         landing = None
-    store.put_record(COMPARISONS, name, {"landing": None if landing is None else landing.model_dump(mode="json")})
+    store.put_record(
+        COMPARISONS, name, {"landing": None if landing is None else landing.model_dump(mode="json")}
+    )
     return landing
 
 
 def under_other_laws(scene: Scene, variant: ModelVariant) -> dict[str, History]:
-    """What a reference does under the other laws, by law; those under which it fails, or has no law to choose, are left out."""
+    """What a reference does under the other laws, by law; those under which it fails, or has no law
+    to choose, are left out."""
     model = None if is_own(variant.family_name) else build(variant.family_name, variant.settings)
     found: dict[str, History] = {}
     if isinstance(model, EventBasedModel):
@@ -60,10 +69,11 @@ def by_any(
     until: float | None,
     measures: Iterable[str],
 ) -> tuple[tuple[Figure, ...], dict[str, tuple[str, bool]]]:
-    """The figures of a comparison, those of BY_ANY against the nearest of its reference and the `references` under other laws.
+    """The figures of a comparison, those of BY_ANY against the nearest of its reference and the
+    `references` under other laws.
 
-    A figure says so if its nearest law is another one. The second value says, by measure, what could not be compared under that
-    law, and whether the reason is that one block fell.
+    A figure says so if its nearest law is another one. The second value says, by measure, what
+    could not be compared under that law, and whether the reason is that one block fell.
     """
     figures = {figure.measure: figure for figure in found.figures}
     gaps: dict[str, tuple[str, bool]] = {}
@@ -74,7 +84,9 @@ def by_any(
             own = figures.get(rival.measure)
             if own is not None and _away(rival) < _away(own):
                 note = f'{rival.note}; impacts = "{law}"' if rival.note else f'impacts = "{law}"'
-                figures[rival.measure] = rival.model_copy(update={"against": own.against, "window": own.window, "note": note})
+                figures[rival.measure] = rival.model_copy(
+                    update={"against": own.against, "window": own.window, "note": note}
+                )
                 gaps[rival.measure] = other.gap, other.fall
     return tuple(figures.values()), gaps
 

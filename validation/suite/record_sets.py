@@ -1,4 +1,5 @@
-"""Scenes under sets of recorded motions: a suite's tables `[[records]]`, and what `rockcheck validate SCENE` plays.
+"""Scenes under sets of recorded motions: a suite's tables `[[records]]`, and what `rockcheck
+validate SCENE` plays.
 
     [[records]]
     files = ["records/RSN1_H*.AT2", "station.V2"]    # files, folders, patterns, beside the suite
@@ -6,8 +7,9 @@
     vertical = true                                  # optional: with the vertical component, of the same file or of one named alike
     scenes = ["shelf"]                               # optional: the scenes that are meant; without it all
 
-Each horizontal component takes the place of the scene's own excitation. The scene lasts as long as its record, and at least as
-long as it says itself; its own vertical motion stays, unless `vertical` puts another in its place.
+Each horizontal component takes the place of the scene's own excitation. The scene lasts as long as
+its record, and at least as long as it says itself; its own vertical motion stays, unless `vertical`
+puts another in its place.
 """
 
 from __future__ import annotations
@@ -33,9 +35,11 @@ _Path = Annotated[str, StringConstraints(min_length=1, max_length=4096)]
 
 
 class RecordSet(Reading):
-    """A table `[[records]]`: files, the factor of their accelerations, the scenes that they shake, and the options of a reader.
+    """A table `[[records]]`: files, the factor of their accelerations, the scenes that they shake,
+    and the options of a reader.
 
-    With `vertical` the base also moves up and down, as the same file says, or one of the set that is named alike.
+    With `vertical` the base also moves up and down, as the same file says, or one of the set that
+    is named alike.
     """
 
     files: Annotated[tuple[_Path, ...], Field(min_length=1)]
@@ -52,9 +56,11 @@ class RecordSet(Reading):
 def under_records(
     scenes: Mapping[str, UncertainScene], sets: Sequence[RecordSet], folder: Path
 ) -> tuple[dict[str, UncertainScene], list[str]]:
-    """The scenes, those that a set names once for each of its motions; and the vertical components that are left out.
+    """The scenes, those that a set names once for each of its motions; and the vertical components
+    that are left out.
 
-    A scene is then named `<scene>, <record>`. Raises `InputError` for files that cannot be read, and scenes that there are not.
+    A scene is then named `<scene>, <record>`. Raises `InputError` for files that cannot be read,
+    and scenes that there are not.
     """
     found: dict[str, UncertainScene] = {}
     left_out: list[str] = []
@@ -70,24 +76,38 @@ def under_records(
         chosen = given.scenes or tuple(scenes)
         shaken.update(chosen)
         for name in chosen:
-            for label, (motion, recording) in zip(_labels([motion for motion, _ in motions]), motions, strict=True):
+            for label, (motion, recording) in zip(
+                _labels([motion for motion, _ in motions]), motions, strict=True
+            ):
                 one = _shaken(scenes[name], label, (recording, upward.get(motion)), given.scale)
                 if one.scene.name in found:
-                    raise InputError(f"scene {one.scene.name!r} is named twice: two records have one name", "records.files")
+                    raise InputError(
+                        f"scene {one.scene.name!r} is named twice: two records have one name",
+                        "records.files",
+                    )
                 found[one.scene.name] = one
     return {name: one for name, one in scenes.items() if name not in shaken} | found, left_out
 
 
-def _shaken(base: UncertainScene, label: str, motion: tuple[Recording, Recording | None], scale: float) -> UncertainScene:
-    """A scene under one motion, horizontal and perhaps vertical; what is not known of the excitation that it replaces goes with that."""
+def _shaken(
+    base: UncertainScene, label: str, motion: tuple[Recording, Recording | None], scale: float
+) -> UncertainScene:
+    """A scene under one motion, horizontal and perhaps vertical; what is not known of the
+    excitation that it replaces goes with that."""
     scene = base.scene
     horizontal, vertical = motion
     change: dict[str, Any] = {"excitation": _record(horizontal, label, scale)}
     if vertical is not None:
         change["vertical"] = _record(vertical, f"{label}, vertical", scale)
     if base.spreads and not base.independent:
-        raise InputError("correlated numbers cannot be given together with [[records]]", "correlation")
-    spreads = {place: spread for place, spread in base.spreads.items() if place.partition(".")[0] not in change}
+        raise InputError(
+            "correlated numbers cannot be given together with [[records]]", "correlation"
+        )
+    spreads = {
+        place: spread
+        for place, spread in base.spreads.items()
+        if place.partition(".")[0] not in change
+    }
     name = f"{scene.name[: _LONGEST - len(label) - 2]}, {label}"
     duration = max(scene.duration, change["excitation"].quiet_after)
     return uncertain_scene(scene.replace(name=name, duration=duration, **change), spreads, {})
@@ -99,9 +119,13 @@ def _record(motion: Recording, label: str, scale: float) -> Record:
 
 
 def _labels(names: Sequence[str]) -> list[str]:
-    """Names of records as names of scenes may have them: without their endings, where these do not tell two apart."""
+    """Names of records as names of scenes may have them: without their endings, where these do not
+    tell two apart."""
     short = [re.sub(r"\.[A-Za-z0-9]{1,5}(?= |$)", "", name, count=1) for name in names]
-    return [_allowed(one if short.count(one) == 1 else name) for one, name in zip(short, names, strict=True)]
+    return [
+        _allowed(one if short.count(one) == 1 else name)
+        for one, name in zip(short, names, strict=True)
+    ]
 
 
 def _allowed(name: str) -> str:

@@ -1,4 +1,5 @@
-"""A finished run as data: what `rockcheck validate` writes to `run.json` and what reports, CI and `rockcheck accept` read.
+"""A finished run as data: what `rockcheck validate` writes to `run.json` and what reports, CI and
+`rockcheck accept` read.
 
 A run's folder holds
 
@@ -37,26 +38,28 @@ FAULT = 70
 #: Verdict on one check: as expected; nearer to what is perfect; a ratio to nothing; inside the
 #: limit, but outside the drift band; outside the limit or not to be judged. See `tolerances`.
 CheckVerdict = Literal["pass", "better", "not defined", "changed", "fail"]
-#: Verdict on a cell or a run: the worst of its checks, "incomplete" where a model is not installed, or "error" where one failed.
+#: Verdict on a cell or a run: the worst of its checks, "incomplete" where a model is not installed,
+#: or "error" where one failed.
 Verdict = Literal["pass", "incomplete", "changed", "fail", "error"]
 #: What fails beside what is out of a limit: nothing; what changed and a model that is not
 #: installed; "both": what got better, too.
 Strict = bool | Literal["both"]
 SEVERITY: tuple[Verdict, ...] = ("pass", "incomplete", "changed", "fail", "error")
-#: "numerical": two solutions of the same equations. "model form": the reference forbids free flight, the candidate does not.
-#: "measured": one of the two was measured. "exact": against a closed form. "absolute": a figure of the cell itself against
-#: its expected value.
+#: "numerical": two solutions of the same equations. "model form": the reference forbids free
+#: flight, the candidate does not. "measured": one of the two was measured. "exact": against a
+#: closed form. "absolute": a figure of the cell itself against its expected value.
 Kind = Literal["numerical", "model form", "measured", "exact", "absolute"]
 
 
 class Check(Stored):
     """A figure with the tolerance that it was held against.
 
-    The figure's distance from `ideal` (0 for differences, 1 for ratios, `expected` for absolute figures) may be at most
-    `limit`; a value further than `drift` from `expected` is "better" or "changed". `limit` is None
-    where no tolerance is written down, which never passes. `reason` says why a check is no plain
-    pass, one line; `gap` what part of the window could not be compared. A value below `floor` means
-    nothing; `beside` is the reference's figure, where that says which value is better.
+    The figure's distance from `ideal` (0 for differences, 1 for ratios, `expected` for absolute
+    figures) may be at most `limit`; a value further than `drift` from `expected` is "better" or
+    "changed". `limit` is None where no tolerance is written down, which never passes. `reason` says
+    why a check is no plain pass, one line; `gap` what part of the window could not be compared. A
+    value below `floor` means nothing; `beside` is the reference's figure, where that says which
+    value is better.
     """
 
     figure: Figure
@@ -85,11 +88,16 @@ class Check(Stored):
     @property
     def words(self) -> str:
         """The verdict for people: a figure that waits for its tolerance has not failed."""
-        return "no tolerance yet" if self.limit is None and not self.gap and self.figure.value is not None else self.verdict
+        return (
+            "no tolerance yet"
+            if self.limit is None and not self.gap and self.figure.value is not None
+            else self.verdict
+        )
 
 
 class CostRecord(Stored):
-    """What the cell's run took: `scenes.Cost`, and all of the worker's wall time (set-up, simulation, writing)."""
+    """What the cell's run took: `scenes.Cost`, and all of the worker's wall time (set-up,
+    simulation, writing)."""
 
     wall_seconds: float = 0.0
     cpu_seconds: float = 0.0
@@ -106,15 +114,16 @@ class CostRecord(Stored):
 class Cell(Stored):
     """One scene played by one model.
 
-    `status` "failed" means no history (`reason` says why: a model's failure, a crash, a hang, memory), "absent" that the model
-    is not installed (`reason` says what to install). `history` is the
-    path of its CSV relative to the run's folder. `read_back` is true where nothing that the cell depends on had changed.
-    `figures` are all measures, judged or not; `checks` those with a tolerance or in need of one. `numerical` is the run's
-    numerical uncertainty, where the suite asks for it, and `explanations` what it says of the differences.
-    `impact_law` is the law of impacts that the history followed at the scene's first landing where laws part, which nothing judges.
-    `overturned_at` is the time (s) at which the block lay, None for one that stays.
-    `traceback` is the path of a file beside them: of an exception that no model may raise, which is `unexpected` where the
-    model is one of rockcheck's own.
+    `status` "failed" means no history (`reason` says why: a model's failure, a crash, a hang,
+    memory), "absent" that the model is not installed (`reason` says what to install). `history` is
+    the path of its CSV relative to the run's folder. `read_back` is true where nothing that the
+    cell depends on had changed. `figures` are all measures, judged or not; `checks` those with a
+    tolerance or in need of one. `numerical` is the run's numerical uncertainty, where the suite
+    asks for it, and `explanations` what it says of the differences. `impact_law` is the law of
+    impacts that the history followed at the scene's first landing where laws part, which nothing
+    judges. `overturned_at` is the time (s) at which the block lay, None for one that stays.
+    `traceback` is the path of a file beside them: of an exception that no model may raise, which is
+    `unexpected` where the model is one of rockcheck's own.
     """
 
     scene: str
@@ -140,40 +149,56 @@ class Cell(Stored):
     @field_validator("history")
     @classmethod
     def _inside(cls, history: str | None) -> str | None:
-        if history is not None and (PurePath(history).is_absolute() or ".." in PurePath(history).parts or not history.isprintable()):
-            raise InputError(f"{printable(history)} is not allowed: it must be a path within the run's folder")
+        if history is not None and (
+            PurePath(history).is_absolute()
+            or ".." in PurePath(history).parts
+            or not history.isprintable()
+        ):
+            raise InputError(
+                f"{printable(history)} is not allowed: it must be a path within the run's folder"
+            )
         return history
 
     @property
     def fate(self) -> str:
         """The outcome in words, with the time of overturning: "overturned left at 3.21 s"."""
-        return self.outcome if self.overturned_at is None else f"{self.outcome} at {self.overturned_at:.3g} s"
+        return (
+            self.outcome
+            if self.overturned_at is None
+            else f"{self.outcome} at {self.overturned_at:.3g} s"
+        )
 
     @property
     def converged(self) -> bool | None:
-        """Whether the run's numerical error is known; None where it was not asked for or the model has no step."""
+        """Whether the run's numerical error is known; None where it was not asked for or the model
+        has no step."""
         return None if self.numerical is None else self.numerical.converged
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of the cell's checks; "error" if the model failed, "incomplete" if it is not installed."""
+        """The worst of the cell's checks; "error" if the model failed, "incomplete" if it is not
+        installed."""
         if self.status != "done":
             return "error" if self.status == "failed" else "incomplete"
         return worst(check.weighs for check in self.checks)
 
     @property
     def words(self) -> str:
-        """The verdict for people; "no tolerance yet" where nothing else keeps the cell from passing."""
-        waits = self.status == "done" and any(check.words == "no tolerance yet" for check in self.checks)
+        """The verdict for people; "no tolerance yet" where nothing else keeps the cell from
+        passing."""
+        waits = self.status == "done" and any(
+            check.words == "no tolerance yet" for check in self.checks
+        )
         failed = any(check.words == "fail" for check in self.checks)
         return "no tolerance yet" if waits and not failed else self.verdict
 
 
 class EnsembleRecord(Stored):
-    """What each model made of an ensemble: by model, peak |theta| in alpha and outcome of each scene (None and why it failed).
+    """What each model made of an ensemble: by model, peak |theta| in alpha and outcome of each
+    scene (None and why it failed).
 
-    The statistics are in the figures of the ensemble's cells, whose `scene` is the ensemble's name. `definition` is the table
-    that the scenes are drawn from.
+    The statistics are in the figures of the ensemble's cells, whose `scene` is the ensemble's name.
+    `definition` is the table that the scenes are drawn from.
     """
 
     name: str
@@ -186,10 +211,11 @@ class EnsembleRecord(Stored):
 class Run(Stored):
     """All of one run of a suite.
 
-    `scenes` holds each scene's `model_dump(mode="json")` by name, in the suite's order, `models` the models' names in
-    order; a cell's `scene` may also be one of `ensembles`. `reference` is the model that judges numerical differences,
-    `model_form` the one whose missing physics is shown beside it. `faults` are checks that belong to no cell of the run (a
-    tolerance whose cell is missing).
+    `scenes` holds each scene's `model_dump(mode="json")` by name, in the suite's order, `models`
+    the models' names in order; a cell's `scene` may also be one of `ensembles`. `reference` is the
+    model that judges numerical differences, `model_form` the one whose missing physics is shown
+    beside it. `faults` are checks that belong to no cell of the run (a tolerance whose cell is
+    missing).
     """
 
     format: int = FORMAT
@@ -218,14 +244,16 @@ class Run(Stored):
 
     @property
     def verdict(self) -> Verdict:
-        """The worst cell's verdict. At least "fail" where there are faults, or where checks were asked for and none was made."""
+        """The worst cell's verdict. At least "fail" where there are faults, or where checks were
+        asked for and none was made."""
         found = worst([cell.verdict for cell in self.cells] + (["fail"] if self.faults else []))
         judged = any(check.verdict != "not defined" for _, check in self.checks())
         return found if judged or not self.judged else worst([found, "fail"])
 
     @property
     def words(self) -> str:
-        """The verdict for people; "no tolerance yet" where nothing else keeps the run from passing, "not judged" where nothing was."""
+        """The verdict for people; "no tolerance yet" where nothing else keeps the run from passing,
+        "not judged" where nothing was."""
         if not self.judged and self.verdict == "pass":
             return "not judged"
         found = {cell.words for cell in self.cells}
@@ -240,7 +268,11 @@ class Run(Stored):
         if self.verdict == "error":
             return 3
         incomplete = bool(self.strict) and any(cell.status == "absent" for cell in self.cells)
-        return int(incomplete or self.verdict == "fail" or any(check.fails(self.strict) for _, check in self.checks()))
+        return int(
+            incomplete
+            or self.verdict == "fail"
+            or any(check.fails(self.strict) for _, check in self.checks())
+        )
 
     @property
     def up_to_date(self) -> int:
@@ -249,7 +281,9 @@ class Run(Stored):
 
     def cell(self, scene: str, model: str) -> Cell | None:
         """The cell of that scene and model, or None."""
-        return next((cell for cell in self.cells if (cell.scene, cell.model) == (scene, model)), None)
+        return next(
+            (cell for cell in self.cells if (cell.scene, cell.model) == (scene, model)), None
+        )
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -257,7 +291,8 @@ class Run(Stored):
         return tuple(self.by_scene())
 
     def by_scene(self) -> dict[str, dict[str, Cell]]:
-        """All cells by scene or ensemble, and by model, in order: for whoever goes through all of them."""
+        """All cells by scene or ensemble, and by model, in order: for whoever goes through all of
+        them."""
         found: dict[str, dict[str, Cell]] = {}
         for cell in self.cells:
             found.setdefault(cell.scene, {})[cell.model] = cell
@@ -270,7 +305,9 @@ class Run(Stored):
     @property
     def without_tolerance(self) -> int:
         """How many figures are asked for but have no tolerance yet, which none of them passes."""
-        return sum(check.limit is None and check.verdict != "not defined" for _, check in self.checks())
+        return sum(
+            check.limit is None and check.verdict != "not defined" for _, check in self.checks()
+        )
 
     def checks(self) -> Iterator[tuple[Cell, Check]]:
         """All checks with their cells."""
@@ -283,19 +320,27 @@ class Run(Stored):
         return Scene(**self.scenes[name])
 
     def save(self, folder: Path) -> Path:
-        """Write `run.json` and its schema into `folder` (made if need be), each whole or not at all; returns run.json's path."""
-        write_whole(made(folder) / SCHEMA_FILE, json.dumps(schema(), indent=1, sort_keys=True) + "\n")
+        """Write `run.json` and its schema into `folder` (made if need be), each whole or not at
+        all; returns run.json's path."""
+        write_whole(
+            made(folder) / SCHEMA_FILE, json.dumps(schema(), indent=1, sort_keys=True) + "\n"
+        )
         return write_whole(folder / RUN_FILE, _by_line(json.loads(self.model_dump_json())))
 
     @classmethod
     def load(cls, folder: str | Path) -> Run:
-        """The run in `folder`; raises `InputError` where there is none or it was written by another format."""
+        """The run in `folder`; raises `InputError` where there is none or it was written by another
+        format."""
         path = Path(folder) / RUN_FILE
         if not path.exists():
             raise InputError(f"{printable(path)}: no finished run here")
         data = read_json(within(path.parent, RUN_FILE))
         if isinstance(data, dict) and data.get("format") != FORMAT:
-            found = f"format {printable(data['format'])}; this version reads {FORMAT}" if "format" in data else "not the run of a suite"
+            found = (
+                f"format {printable(data['format'])}; this version reads {FORMAT}"
+                if "format" in data
+                else "not the run of a suite"
+            )
             raise InputError(f"{printable(path)}: {found}")
         try:
             run = cls.model_validate(data)
@@ -303,7 +348,10 @@ class Run(Stored):
             raise InputError(f"{printable(path)}: {from_validation(error)}") from None
         for key, names, allowed in run._named():
             if unknown := sorted(set(names) - set(allowed)):
-                raise InputError(f"{printable(path)}: {key}: {printable(unknown[0])!r} is not in the run{suggestion(unknown[0], allowed)}")
+                raise InputError(
+                    f"{printable(path)}: {key}: {printable(unknown[0])!r} is not in the"
+                    f" run{suggestion(unknown[0], allowed)}"
+                )
         return run
 
     def _named(self) -> Iterator[tuple[str, Iterable[str], Collection[str]]]:
@@ -320,11 +368,16 @@ def worst(verdicts: Iterator[Any] | list[Any]) -> Verdict:
 
 
 def _by_line(data: Mapping[str, Any]) -> str:
-    """JSON with a line for each value, and for each of those in a list or an object: two thirds of what indented JSON takes."""
+    """JSON with a line for each value, and for each of those in a list or an object: two thirds of
+    what indented JSON takes."""
     fields = []
     for name, value in data.items():
         if value and isinstance(value, dict):
-            text = "{\n" + ",\n".join(f"{json.dumps(key)}: {_compact(part)}" for key, part in value.items()) + "\n}"
+            text = (
+                "{\n"
+                + ",\n".join(f"{json.dumps(key)}: {_compact(part)}" for key, part in value.items())
+                + "\n}"
+            )
         elif value and isinstance(value, list):
             text = "[\n" + ",\n".join(map(_compact, value)) + "\n]"
         else:

@@ -1,4 +1,5 @@
-"""Runs a suite: plays the cells that are not up to date, compares, judges, and returns the `Run`."""
+"""Runs a suite: plays the cells that are not up to date, compares, judges, and returns the
+`Run`."""
 
 from __future__ import annotations
 
@@ -54,6 +55,7 @@ class PlannedCell(Task):
 
     scene: Scene = field(compare=False)
     variant: ModelVariant = field(compare=False)
+    model: str
     key: str
     uncertainty: bool = field(default=False, compare=False)
 
@@ -86,6 +88,7 @@ class PlannedBatch(Task):
     base: Scene = field(compare=False)
     variant: ModelVariant = field(compare=False)
     numbers: range = field(compare=False)
+    model: str
     key: str
 
     @property
@@ -120,7 +123,8 @@ def _model(variant: ModelVariant) -> dict[str, Any]:
 
 
 Planned = PlannedCell | PlannedBatch
-#: What a cell is compared with, None for its own figures; and the measures that are asked for over a window, or on request.
+#: What a cell is compared with, None for its own figures; and the measures that are asked for over
+#: a window, or on request.
 Asked = tuple[PlannedCell | None, list[Windowed]]
 
 
@@ -136,7 +140,8 @@ class CellRecord(Stored):
 
 
 class BatchRecord(Stored):
-    """What is kept of a batch: peak |theta| in alpha and outcome of each scene, None and the reason where the model failed."""
+    """What is kept of a batch: peak |theta| in alpha and outcome of each scene, None and the reason
+    where the model failed."""
 
     peaks: tuple[float | None, ...]
     outcomes: tuple[str, ...]
@@ -148,10 +153,11 @@ FigureRow = tuple[str, str, float | None, str, float | None, str]
 
 
 class ComparisonRecord(Stored):
-    """The figures of a comparison; by window, what could not be compared, and whether because one block fell.
+    """The figures of a comparison; by window, what could not be compared, and whether because one
+    block fell.
 
-    What could not be compared is given by measure and window where a measure has its own. `impact_law` and `overturned_at` are those of
-    a cell's own figures.
+    What could not be compared is given by measure and window where a measure has its own.
+    `impact_law` and `overturned_at` are those of a cell's own figures.
     """
 
     figures: tuple[FigureRow, ...]
@@ -185,7 +191,8 @@ class ComparisonRecord(Stored):
 
 
 class CellComparisons(Stored):
-    """What is kept of a cell's comparisons: by the name of the reference, and by OWN_FIGURES its own figures."""
+    """What is kept of a cell's comparisons: by the name of the reference, and by OWN_FIGURES its
+    own figures."""
 
     of: dict[str, ComparisonRecord]
 
@@ -202,8 +209,8 @@ def run_suite(
 ) -> Run:
     """Play, compare and judge every cell of a suite; see `validation.study.run`.
 
-    A cell that fails is a failed cell of the run, never an exception. Raises `InputError` where `folder` cannot be used, and
-    `KeyboardInterrupt` once what was played is kept.
+    A cell that fails is a failed cell of the run, never an exception. Raises `InputError` where
+    `folder` cannot be used, and `KeyboardInterrupt` once what was played is kept.
     """
     study = SuiteStudy(suite, folder)
     found = run(study, folder, jobs=jobs, force=force, scheduler=scheduler, on_progress=on_progress)
@@ -215,7 +222,8 @@ def run_suite(
 
 
 class SuiteStudy(Study):
-    """A suite: tasks are its cells and its ensembles' batches. Results are kept and read back in `folder`."""
+    """A suite: tasks are its cells and its ensembles' batches. Results are kept and read back in
+    `folder`."""
 
     name = "suite"
     kinds = (HISTORIES, COMPARISONS)
@@ -225,18 +233,24 @@ class SuiteStudy(Study):
         try:
             self.store = Store(folder)
         except OSError as error:
-            raise InputError(f"{folder}: cannot be used as the output folder: {error.strerror}") from None
+            raise InputError(
+                f"{folder}: cannot be used as the output folder: {error.strerror}"
+            ) from None
         limits = [suite.suite_of(name).limits for name in (*suite.scenes, *suite.ensembles)]
         self.memory_mb = max((limit.memory_mb for limit in limits), default=None)
         self.cells = [self._planned(scene, variant) for scene, variant in suite.cells()]
-        self.batches = [batch for found in suite.ensemble_cells() for batch in self._batches(*found)]
+        self.batches = [
+            batch for found in suite.ensemble_cells() for batch in self._batches(*found)
+        ]
         self.read_back: set[Planned] = set()
         self.records: dict[Planned, dict[str, Any]] = {}
         self.failures: dict[Planned, str] = {}
         self.traces: set[Planned] = set()
         self.compared: dict[PlannedCell, Cell] = {}
         self.by_place = {(cell.place, cell.variant.label): cell for cell in self.cells}
-        self.by_scene = {scene: list(of) for scene, of in groupby(self.cells, key=lambda cell: cell.place)}
+        self.by_scene = {
+            scene: list(of) for scene, of in groupby(self.cells, key=lambda cell: cell.place)
+        }
         self.items: list[Planned] = [*self.cells, *self.batches]
         for item in self.items:
             if missing := not_installed(item.variant.family_name):
@@ -245,23 +259,47 @@ class SuiteStudy(Study):
     def _planned(self, scene: Scene, variant: ModelVariant) -> PlannedCell:
         own = self.suite.suite_of(scene.name)
         keyed = replace(variant, settings={**variant.settings, **key_of(own.uncertainty)})
-        return PlannedCell(scene, variant, _key(scene, keyed), own.uncertainty, **self._how(scene.name, variant))
+        return PlannedCell(
+            scene,
+            variant,
+            variant.label,
+            _key(scene, keyed),
+            own.uncertainty,
+            **self._how(scene.name, variant),
+        )
 
     def _how(self, place: str, variant: ModelVariant) -> dict[str, Any]:
         kind = family(variant.family_name)
-        return {"seconds": self.suite.suite_of(place).limits.seconds, "compiles": kind.module if kind.compiled else ""}
+        return {
+            "seconds": self.suite.suite_of(place).limits.seconds,
+            "compiles": kind.module if kind.compiled else "",
+        }
 
-    def _batches(self, ensemble: Ensemble, base: Scene, variant: ModelVariant) -> Iterator[PlannedBatch]:
-        """An ensemble in batches. A batch's key covers how its scenes are drawn, so it can be looked up without drawing them."""
+    def _batches(
+        self, ensemble: Ensemble, base: Scene, variant: ModelVariant
+    ) -> Iterator[PlannedBatch]:
+        """An ensemble in batches. A batch's key covers how its scenes are drawn, so it can be
+        looked up without drawing them."""
         drawing = {
             "ensemble": ensemble.model_dump(mode="json", exclude={"count", "batch", "description"}),
             "code": provenance.code_digest("rockcheck.validation.suite.ensembles"),
         }
         for start in range(0, ensemble.count, ensemble.batch):
             numbers = range(start, min(start + ensemble.batch, ensemble.count))
-            settings = {**variant.settings, "drawn": {**drawing, "numbers": [numbers.start, numbers.stop]}}
+            settings = {
+                **variant.settings,
+                "drawn": {**drawing, "numbers": [numbers.start, numbers.stop]},
+            }
             key = _key(base, replace(variant, settings=settings))
-            yield PlannedBatch(ensemble, base, variant, numbers, key, **self._how(ensemble.name, variant))
+            yield PlannedBatch(
+                ensemble,
+                base,
+                variant,
+                numbers,
+                variant.label,
+                key,
+                **self._how(ensemble.name, variant),
+            )
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Planned]:
         """All cells and batches of models that are installed."""
@@ -280,7 +318,9 @@ class SuiteStudy(Study):
         """A cell's record where its history is whole, a batch's."""
         cell = isinstance(task, PlannedCell)
         found = self.store.get(task.name) if cell else self.store.get_record(COMPARISONS, task.name)
-        with suppress(ValueError):  # what is kept is not trusted to have the fields that it must have
+        with suppress(
+            ValueError
+        ):  # what is kept is not trusted to have the fields that it must have
             if found is not None and (CellRecord if cell else BatchRecord).model_validate(found):
                 self.read_back.add(task)
                 self.records[task] = found
@@ -288,7 +328,8 @@ class SuiteStudy(Study):
         return None
 
     def keep(self, store: Store, task: Any, record: workers.Played) -> None:
-        """Keep a history or a batch, and compare its scene where that is the last of it: while others play."""
+        """Keep a history or a batch, and compare its scene where that is the last of it: while
+        others play."""
         self.records[task] = record.record
         if record.traceback:  # some scenes of a batch: not to be read back
             self.traces.add(task)
@@ -322,10 +363,20 @@ class SuiteStudy(Study):
         cells = [self.compared[planned] for planned in self.cells]
         beside = {name: list(of) for name, of in groupby(cells, key=lambda cell: cell.scene)}
         cells = [_judged_beside(suite, cell, beside[cell.scene]) for cell in cells]
-        cells = [_explained(suite, cell, beside[cell.scene], self.by_place, self.records, inputs.get(cell.scene)) for cell in cells]
-        ensembles, ensemble_cells = _ensembles(suite, self.batches, self.records, self.failures, self.read_back)
+        cells = [
+            _explained(
+                suite, cell, beside[cell.scene], self.by_place, self.records, inputs.get(cell.scene)
+            )
+            for cell in cells
+        ]
+        ensembles, ensemble_cells = _ensembles(
+            suite, self.batches, self.records, self.failures, self.read_back
+        )
         faults = {(task.place, task.variant.label): _fault(task) for task in self.traces}
-        cells = [cell.model_copy(update=faults.get((cell.scene, cell.model), {})) for cell in (*cells, *ensemble_cells)]
+        cells = [
+            cell.model_copy(update=faults.get((cell.scene, cell.model), {}))
+            for cell in (*cells, *ensemble_cells)
+        ]
         finished = Run(
             suite=suite.name,
             description=suite.description,
@@ -339,32 +390,56 @@ class SuiteStudy(Study):
             inputs=inputs,
             printed=tuple(name for name in suite.scenes if suite.suite_of(name).print_figures),
             faults=_without_cell(suite, {(cell.scene, cell.model) for cell in cells}),
-            measures=tuple(MeasureRecord(name=m.name, label=m.label, unit=m.unit, formula=m.formula) for m in MEASURES.values()),
+            measures=tuple(
+                MeasureRecord(name=m.name, label=m.label, unit=m.unit, formula=m.formula)
+                for m in MEASURES.values()
+            ),
             versions=provenance.versions(),
             hardware=provenance.hardware(),
             judged=suite.judged,
             tolerances_file=str(suite.tolerances_path),
         )
-        return Finding(self.name, suite.name, finished.words, data={"run": finished}, exit_code=finished.exit_code)
+        return Finding(
+            self.name,
+            suite.name,
+            finished.words,
+            data={"run": finished},
+            exit_code=finished.exit_code,
+        )
 
     def _cell(self, planned: PlannedCell) -> Cell:
-        return _cell(self.suite, planned, self.by_place, self.records, self.failures, self.store, planned in self.read_back)
+        return _cell(
+            self.suite,
+            planned,
+            self.by_place,
+            self.records,
+            self.failures,
+            self.store,
+            planned in self.read_back,
+        )
 
 
 def in_order(items: Sequence[Planned]) -> list[Planned]:
     """The order in which cells begin.
 
-    One of each package that compiles goes first, since the others of it wait for that one; then what is not compiled, which takes
-    longest; the quick rest fills the processes up to the end.
+    One of each package that compiles goes first, since the others of it wait for that one; then
+    what is not compiled, which takes longest; the quick rest fills the processes up to the end.
     """
     first = {item.compiles: n for n, item in reversed(list(enumerate(items)))}
-    turn = [1 if not item.compiles else 0 if first[item.compiles] == n else 2 for n, item in enumerate(items)]
+    turn = [
+        1 if not item.compiles else 0 if first[item.compiles] == n else 2
+        for n, item in enumerate(items)
+    ]
     return [items[n] for n in sorted(range(len(items)), key=turn.__getitem__)]
 
 
 def _fault(item: Any) -> dict[str, Any]:
-    """What a cell says of an exception that no model may raise. In a user's own model it is that model's fault, not rockcheck's."""
-    return {"traceback": f"{FAULTS}/{item.name}.txt", "unexpected": not is_own(item.variant.family_name)}
+    """What a cell says of an exception that no model may raise. In a user's own model it is that
+    model's fault, not rockcheck's."""
+    return {
+        "traceback": f"{FAULTS}/{item.name}.txt",
+        "unexpected": not is_own(item.variant.family_name),
+    }
 
 
 def _key(scene: Scene, variant: ModelVariant) -> str:
@@ -382,22 +457,39 @@ def _ensembles(
     ensembles: list[EnsembleRecord] = []
     cells: list[Cell] = []
     for ensemble, of_ensemble in groupby(batches, key=lambda batch: batch.ensemble):
-        by_model = {label: list(found) for label, found in groupby(of_ensemble, key=lambda batch: batch.variant.label)}
+        by_model = {
+            label: list(found)
+            for label, found in groupby(of_ensemble, key=lambda batch: batch.variant.label)
+        }
         samples: dict[str, Sample] = {}
         for label, parts in by_model.items():
-            got = [records.get(b) or {"peaks": [None] * len(b.numbers), "outcomes": [failures[b]] * len(b.numbers)} for b in parts]
-            peaks = [math.nan if peak is None else peak for record in got for peak in record["peaks"]]
-            samples[label] = Sample(np.array(peaks), tuple(outcome for record in got for outcome in record["outcomes"]))
+            got = [
+                records.get(b)
+                or {"peaks": [None] * len(b.numbers), "outcomes": [failures[b]] * len(b.numbers)}
+                for b in parts
+            ]
+            peaks = [
+                math.nan if peak is None else peak for record in got for peak in record["peaks"]
+            ]
+            samples[label] = Sample(
+                np.array(peaks), tuple(outcome for record in got for outcome in record["outcomes"])
+            )
         ensembles.append(
             EnsembleRecord(
                 name=ensemble.name,
                 description=ensemble.description,
                 definition=ensemble.model_dump(mode="json", exclude_none=True),
-                peaks={label: tuple(peak if math.isfinite(peak) else None for peak in sample.peaks) for label, sample in samples.items()},
+                peaks={
+                    label: tuple(peak if math.isfinite(peak) else None for peak in sample.peaks)
+                    for label, sample in samples.items()
+                },
                 outcomes={label: tuple(sample.outcomes) for label, sample in samples.items()},
             )
         )
-        cells += [_ensemble_cell(suite, ensemble, by_model[label], samples, records, read_back) for label in samples]
+        cells += [
+            _ensemble_cell(suite, ensemble, by_model[label], samples, records, read_back)
+            for label in samples
+        ]
     return ensembles, cells
 
 
@@ -418,31 +510,54 @@ def _ensemble_cell(
         "key": provenance.digest("".join(batch.key for batch in batches)),
         "settings": dict(variant.settings),
         "read_back": all(batch in read_back for batch in batches),
-        "cost": CostRecord(**{key: sum(cost[key] for cost in costs) for key in (costs[0] if costs else ())}),
+        "cost": CostRecord(
+            **{key: sum(cost[key] for cost in costs) for key in (costs[0] if costs else ())}
+        ),
     }
     if missing := not_installed(variant.family_name):
         return Cell(**about, status="absent", reason=missing)
     if own.failures:
-        reason = next(outcome for peak, outcome in zip(own.peaks, own.outcomes, strict=True) if not math.isfinite(peak))
-        return Cell(**about, status="failed", reason=f"{own.failures} of {len(own.peaks)} scenes failed; the first: {reason}")
+        reason = next(
+            outcome
+            for peak, outcome in zip(own.peaks, own.outcomes, strict=True)
+            if not math.isfinite(peak)
+        )
+        return Cell(
+            **about,
+            status="failed",
+            reason=f"{own.failures} of {len(own.peaks)} scenes failed; the first: {reason}",
+        )
     required = origin.required(ensemble.name, variant.label)
     figures = [
         evaluate(measure, Samples(samples[name], own), "alpha", against=name)
-        for name in dict.fromkeys([origin.reference, origin.model_form, *(place.against for place in required)])
+        for name in dict.fromkeys(
+            [origin.reference, origin.model_form, *(place.against for place in required)]
+        )
         if name in samples and name != variant.label
         for measure in STATISTICS.values()
     ]
     checks = [
-        judge(_figure(figures, place), origin.tolerances.get(place), kind=kind, measure=place.what.definition)
+        judge(
+            _figure(figures, place),
+            origin.tolerances.get(place),
+            kind=kind,
+            measure=place.what.definition,
+        )
         for place, kind in required.items()
     ]
     outcome = f"{int(np.sum(own.fallen))} of {len(own.peaks)} overturned"
-    return Cell(**about, status="done", outcome=outcome, figures=tuple(figures), checks=tuple(checks))
+    return Cell(
+        **about, status="done", outcome=outcome, figures=tuple(figures), checks=tuple(checks)
+    )
 
 
 def _without_cell(suite: Suite, cells: Container[tuple[str, str]]) -> tuple[str, ...]:
     """Tolerances that nothing in the suite can meet."""
-    return tuple(f"tolerance [{place}] has no cell in the suite" for place in suite.tolerances if (place.scene, place.model) not in cells)
+    return tuple(
+        f"tolerance [{place}] has no cell in the suite"
+        for place in suite.tolerances
+        if (place.scene, place.model) not in cells
+    )
 
 
 def _cell(
@@ -456,7 +571,12 @@ def _cell(
 ) -> Cell:
     """The finished cell: its figures, compared with each reference, and the verdicts on them."""
     scene, label = planned.scene, planned.variant.label
-    about: dict[str, Any] = {"scene": scene.name, "model": label, "key": planned.key, "read_back": read_back}
+    about: dict[str, Any] = {
+        "scene": scene.name,
+        "model": label,
+        "key": planned.key,
+        "read_back": read_back,
+    }
     if planned in failures:
         about["status"] = "absent" if not_installed(planned.variant.family_name) else "failed"
         return Cell(**about, reason=failures[planned], settings=dict(planned.variant.settings))
@@ -464,10 +584,18 @@ def _cell(
     required = suite.required(scene.name, label)
     own = suite.suite_of(scene.name)
     asked: dict[str, Asked] = {}
-    for name in dict.fromkeys([OWN_FIGURES, own.reference, own.model_form, *(place.against for place in required)]):
+    for name in dict.fromkeys(
+        [OWN_FIGURES, own.reference, own.model_form, *(place.against for place in required)]
+    ):
         reference = None if name == OWN_FIGURES else planned_cells.get((scene.name, name))
-        if name == OWN_FIGURES or (reference is not None and reference is not planned and reference in records):
-            extra = sorted(p.what for p in required if p.against == name and (p.what.window or p.what.definition.on_request))
+        if name == OWN_FIGURES or (
+            reference is not None and reference is not planned and reference in records
+        ):
+            extra = sorted(
+                p.what
+                for p in required
+                if p.against == name and (p.what.window or p.what.definition.on_request)
+            )
             asked[name] = reference, extra
     found = _compared(store, scene, planned, asked)
     numerical = numerical_of(record)
@@ -483,7 +611,11 @@ def _cell(
             gap += "; `offset` of the measured model shifts its times, a window such as theta_rms@8s ends sooner"
         measure = place.what.definition
         floor = floor_of(measure, scene, numerical)
-        checks.append(judge(figure, own.tolerances.get(place), kind=kind, measure=measure, gap=gap, floor=floor))
+        checks.append(
+            judge(
+                figure, own.tolerances.get(place), kind=kind, measure=measure, gap=gap, floor=floor
+            )
+        )
     return Cell(
         **about,
         status="done",
@@ -503,21 +635,32 @@ def _cell(
 def _judged_beside(suite: Suite, cell: Cell, cells: Sequence[Cell]) -> Cell:
     """The cell with its own figures judged beside the reference's, where one is not as expected.
 
-    Both must solve the same equations. A figure of the reference that is itself not as expected is no yardstick.
+    Both must solve the same equations. A figure of the reference that is itself not as expected is
+    no yardstick.
     """
     own = suite.suite_of(cell.scene)
-    moved = next((check for check in cell.checks if check.kind == "absolute" and check.weighs != "pass"), None)
-    reference = next((other for other in cells if other.model == own.reference and other is not cell), None)
+    moved = next(
+        (check for check in cell.checks if check.kind == "absolute" and check.weighs != "pass"),
+        None,
+    )
+    reference = next(
+        (other for other in cells if other.model == own.reference and other is not cell), None
+    )
     if moved is None or reference is None:
         return cell
-    if own.kind(Place(cell.scene, cell.model, own.reference, Windowed(moved.figure.measure))) != "numerical":
+    if (
+        own.kind(Place(cell.scene, cell.model, own.reference, Windowed(moved.figure.measure)))
+        != "numerical"
+    ):
         return cell
     known = {(f.measure, f.window): f.value for f in reference.figures if not f.against}
     for check in reference.checks:
         if check.verdict != "pass" and not check.figure.against:
             known.pop((check.figure.measure, check.figure.window), None)
     checks = (
-        judged_beside(check, known.get((check.figure.measure, check.figure.window))) if check.kind == "absolute" else check
+        judged_beside(check, known.get((check.figure.measure, check.figure.window)))
+        if check.kind == "absolute"
+        else check
         for check in cell.checks
     )
     return cell.model_copy(update={"checks": tuple(checks)})
@@ -531,15 +674,17 @@ def _explained(
     records: Mapping[Planned, Mapping[str, Any]],
     inputs: Inputs | None,
 ) -> Cell:
-    """The cell with the verdicts on its differences from the references among `cells`, of its scene, that finished; unchanged where
-    nothing is known."""
+    """The cell with the verdicts on its differences from the references among `cells`, of its
+    scene, that finished; unchanged where nothing is known."""
     own = suite.suite_of(cell.scene)
     if cell.numerical is None:
         return cell
     others = {
         other.model: other
         for other in cells
-        if other.model in (own.reference, own.model_form) and other.model != cell.model and other.status == "done"
+        if other.model in (own.reference, own.model_form)
+        and other.model != cell.model
+        and other.status == "done"
     }
     found = explanations(
         own.scenes[cell.scene],
@@ -553,20 +698,32 @@ def _explained(
 
 
 def _figure(figures: Sequence[Figure], place: Place) -> Figure:
-    """The figure that a check is about; one without value where it is missing, so that the check cannot pass."""
+    """The figure that a check is about; one without value where it is missing, so that the check
+    cannot pass."""
     against = "" if place.against == OWN_FIGURES else place.against
     for figure in figures:
-        if (figure.measure, figure.against, figure.window) == (place.what.measure, against, place.what.window):
+        if (figure.measure, figure.against, figure.window) == (
+            place.what.measure,
+            against,
+            place.what.window,
+        ):
             return figure
     measure = place.what.definition
     reason = f"{place.against} failed in this scene" if against else "not computed"
     return Figure(
-        measure=measure.name, label=measure.label, unit=measure.unit, value=None, against=against, window=place.what.window, note=reason
+        measure=measure.name,
+        label=measure.label,
+        unit=measure.unit,
+        value=None,
+        against=against,
+        window=place.what.window,
+        note=reason,
     )
 
 
 def _horizon(store: Store, scene: Scene) -> float:
-    """The time up to which histories of this scene can be compared point by point (`ebm.horizon`), s; kept in the store."""
+    """The time up to which histories of this scene can be compared point by point (`ebm.horizon`),
+    s; kept in the store."""
     key = provenance.cell_key(scene, "ebm-unilateral", {"of": "horizon"})
     name = name_of(scene.name, HORIZON, key)
     found = store.get_record(COMPARISONS, name)
@@ -578,33 +735,58 @@ def _horizon(store: Store, scene: Scene) -> float:
     return float(found["horizon"])
 
 
-def _compared(store: Store, scene: Scene, planned: PlannedCell, asked: Mapping[str, Asked]) -> dict[str, ComparisonRecord]:
-    """The comparisons that are asked of a cell, by name of the reference, and by OWN_FIGURES its own figures; kept in the store.
+def _compared(
+    store: Store, scene: Scene, planned: PlannedCell, asked: Mapping[str, Asked]
+) -> dict[str, ComparisonRecord]:
+    """The comparisons that are asked of a cell, by name of the reference, and by OWN_FIGURES its
+    own figures; kept in the store.
 
     Each has all figures over the whole time, and those asked for over a window.
     """
-    horizon = _horizon(store, scene) if any(what.window == HORIZON for _, extra in asked.values() for what in extra) else None
+    horizon = (
+        _horizon(store, scene)
+        if any(what.window == HORIZON for _, extra in asked.values() for what in extra)
+        else None
+    )
     code = provenance.code_digest("rockcheck.validation.suite.impact_laws")  # with `compare`
-    against = [[name, reference.key if reference else "", list(map(str, extra))] for name, (reference, extra) in asked.items()]
-    name = name_of(scene.name, planned.variant.label, provenance.digest(json.dumps([planned.key, against, horizon, code])))
+    against = [
+        [name, reference.key if reference else "", list(map(str, extra))]
+        for name, (reference, extra) in asked.items()
+    ]
+    name = name_of(
+        scene.name,
+        planned.variant.label,
+        provenance.digest(json.dumps([planned.key, against, horizon, code])),
+    )
     with suppress(ValueError):  # what is kept is not trusted to have the fields that it must have
         kept = CellComparisons.model_validate(store.get_record(COMPARISONS, name))
         if kept.of.keys() == asked.keys():
             return {one: kept.of[one] for one in asked}
-    found = {one: _compute(store, scene, planned, reference, extra, horizon) for one, (reference, extra) in asked.items()}
+    found = {
+        one: _compute(store, scene, planned, reference, extra, horizon)
+        for one, (reference, extra) in asked.items()
+    }
     store.put_record(COMPARISONS, name, CellComparisons(of=found).model_dump(mode="json"))
     return found
 
 
 def _compute(
-    store: Store, scene: Scene, planned: PlannedCell, reference: PlannedCell | None, windowed: Sequence[Windowed], horizon: float | None
+    store: Store,
+    scene: Scene,
+    planned: PlannedCell,
+    reference: PlannedCell | None,
+    windowed: Sequence[Windowed],
+    horizon: float | None,
 ) -> ComparisonRecord:
-    """The figures of the cell itself where `reference` is None, with the law of impacts that it followed."""
+    """The figures of the cell itself where `reference` is None, with the law of impacts that it
+    followed."""
     candidate = store.load(planned.name)
     yardstick = store.load(reference.name) if reference else None
     figures: list[Figure] = []
     gaps: dict[str, tuple[str, bool]] = {}
-    by_window: dict[str, list[str]] = {"": [m.name for m in (DIFFERENCES if reference else FIGURES).values() if not m.on_request]}
+    by_window: dict[str, list[str]] = {
+        "": [m.name for m in (DIFFERENCES if reference else FIGURES).values() if not m.on_request]
+    }
     for what in windowed:
         by_window.setdefault(what.window, []).append(what.measure)
     landing = landing_of(store, scene)
@@ -620,7 +802,9 @@ def _compute(
             if landing and (until is None or until > landing.t):
                 found, own = by_any(discrepancy, others, candidate, scene, until, measures)
                 gaps |= {str(Windowed(measure, window)): gap for measure, gap in own.items()}
-        figures += [figure.model_copy(update={"window": window}) for figure in found] if window else found
+        figures += (
+            [figure.model_copy(update={"window": window}) for figure in found] if window else found
+        )
     law = landing.followed_by(candidate, scene) if landing and yardstick is None else None
     return ComparisonRecord(
         figures=tuple((f.measure, f.unit, f.value, f.window, f.until, f.note) for f in figures),

@@ -1,4 +1,5 @@
-"""Suites: which scenes, which models with which settings, and which figures must be within tolerance.
+"""Suites: which scenes, which models with which settings, and which figures must be within
+tolerance.
 
 A suite is a TOML file that a user can write:
 
@@ -32,10 +33,11 @@ A suite is a TOML file that a user can write:
         [{ name = "weak", excitation = { kind = "ricker", amplitude = 4.0, period = 1.5 } }],
     ]
 
-Scenes under recorded motions are `[[records]]` tables (validation.suite.record_sets).
-Ensembles are `[[ensemble]]` tables (validation.suite.ensembles), judged by what `require.ensemble` names. Scenes can also be written
-out as `[[scene]]` tables. Tolerances (validation.suite.tolerances) are a table `[tolerances]` in the file or a file
-`<suite>.tolerances.toml` beside it. `include = ["smoke", "walls"]` joins other suites instead.
+Scenes under recorded motions are `[[records]]` tables (validation.suite.record_sets). Ensembles are
+`[[ensemble]]` tables (validation.suite.ensembles), judged by what `require.ensemble` names. Scenes
+can also be written out as `[[scene]]` tables. Tolerances (validation.suite.tolerances) are a table
+`[tolerances]` in the file or a file `<suite>.tolerances.toml` beside it. `include = ["smoke",
+"walls"]` joins other suites instead.
 """
 
 from __future__ import annotations
@@ -53,7 +55,13 @@ from pydantic import Field
 from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.base import Frozen, Positive
 from rockcheck.scenes.errors import printable, unknown_name
-from rockcheck.scenes.files import load_uncertain_scene, named_scenes, read_toml, scene_from, uncertain_scene_from
+from rockcheck.scenes.files import (
+    load_uncertain_scene,
+    named_scenes,
+    read_toml,
+    scene_from,
+    uncertain_scene_from,
+)
 from rockcheck.scenes.trust.inputs import UncertainScene, uncertain_scene
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS
@@ -61,7 +69,14 @@ from rockcheck.validation.execute.models import Family, build, check_allowed, fa
 from rockcheck.validation.suite.ensembles import Ensemble
 from rockcheck.validation.suite.record_sets import RecordSet, under_records
 from rockcheck.validation.suite.results import Kind
-from rockcheck.validation.suite.tolerances import HORIZON, OWN_FIGURES, Place, Tolerances, Windowed, parse_tolerances
+from rockcheck.validation.suite.tolerances import (
+    HORIZON,
+    OWN_FIGURES,
+    Place,
+    Tolerances,
+    Windowed,
+    parse_tolerances,
+)
 
 #: The fair reference for engines, and the model that forbids flight.
 REFERENCE, PAPER_MODEL = "ebm-unilateral", "ebm"
@@ -80,8 +95,9 @@ class Limits(Frozen):
 class Require(Frozen):
     """Measures ("name" or "name@window") that must have a tolerance in every scene.
 
-    `difference`: of every other model against the reference; `model_form`: against the suite's `model_form`; `figures`: of
-    every cell itself; `ensemble`: of every other model against the reference, in the suite's ensembles.
+    `difference`: of every other model against the reference; `model_form`: against the suite's
+    `model_form`; `figures`: of every cell itself; `ensemble`: of every other model against the
+    reference, in the suite's ensembles.
     """
 
     difference: tuple[str, ...] = ()
@@ -91,7 +107,8 @@ class Require(Frozen):
 
 
 class Grid(Frozen):
-    """Scenes by combination: one alternative of each axis merged into `scene`, their names joined to the scene's."""
+    """Scenes by combination: one alternative of each axis merged into `scene`, their names joined
+    to the scene's."""
 
     scene: dict[str, Any] = Field(default_factory=dict)
     axes: Annotated[tuple[tuple[dict[str, Any], ...], ...], Field(min_length=1)]
@@ -147,13 +164,15 @@ class Suite:
     require: Require
     limits: Limits
     tolerances: Tolerances = field(repr=False)
-    #: Where `rockcheck accept` writes: the tolerance file, or the suite file where it holds a table `[tolerances]`.
+    #: Where `rockcheck accept` writes: the tolerance file, or the suite file where it holds a table
+    #: `[tolerances]`.
     tolerances_path: Path = Path()
     #: Ensembles with the scene that each is drawn from.
     ensembles: Mapping[str, tuple[Ensemble, Scene]] = field(default_factory=dict)
     #: The suites that this one joins.
     included: tuple[Suite, ...] = ()
-    #: Whether the numerical error of each cell is asked for (three coarser runs a cell), and scenes with uncertain numbers, by name.
+    #: Whether the numerical error of each cell is asked for (three coarser runs a cell), and scenes
+    #: with uncertain numbers, by name.
     uncertainty: bool = False
     uncertain: Mapping[str, UncertainScene] = field(default_factory=dict)
     #: Vertical components of its records, which are not played, and whether anything is judged.
@@ -172,7 +191,10 @@ class Suite:
 
     def suite_of(self, scene: str) -> Suite:
         """The suite that a scene or an ensemble comes from: this one, or the included one."""
-        return next((suite for suite in self.included if scene in suite.scenes or scene in suite.ensembles), self)
+        return next(
+            (suite for suite in self.included if scene in suite.scenes or scene in suite.ensembles),
+            self,
+        )
 
     def cells(self) -> Iterator[tuple[Scene, ModelVariant]]:
         """All cells, scene by scene."""
@@ -194,7 +216,11 @@ class Suite:
             raise unknown_name("scene of the suite", scene, self.scenes)
         if model not in own.models:
             raise unknown_name("model of the suite", model, own.models)
-        tolerances = {place: line for place, line in own.tolerances.items() if (place.scene, place.model) == (scene, model)}
+        tolerances = {
+            place: line
+            for place, line in own.tolerances.items()
+            if (place.scene, place.model) == (scene, model)
+        }
         needed = {model, own.reference, own.model_form, *(place.against for place in tolerances)}
         return replace(
             own,
@@ -205,25 +231,39 @@ class Suite:
         )
 
     def required(self, scene: str, model: str) -> dict[Place, Kind]:
-        """What must be judged in a cell, and as what: what the suite requires and whatever has a tolerance."""
+        """What must be judged in a cell, and as what: what the suite requires and whatever has a
+        tolerance."""
         own = self.suite_of(scene)
         require = own.require
         if scene in own.ensembles:
             require = Require(difference=require.ensemble)
-        places = [Place(scene, model, OWN_FIGURES, Windowed.parse(text)) for text in require.figures]
-        for against, texts in ((own.reference, require.difference), (own.model_form, require.model_form)):
+        places = [
+            Place(scene, model, OWN_FIGURES, Windowed.parse(text)) for text in require.figures
+        ]
+        for against, texts in (
+            (own.reference, require.difference),
+            (own.model_form, require.model_form),
+        ):
             if against and model not in (own.reference, against):
                 places += [Place(scene, model, against, Windowed.parse(text)) for text in texts]
         places += own._judged.get((scene, model), [])
         return {place: own.kind(place) for place in places}
 
     def kind(self, place: Place) -> Kind:
-        """What a check means: with a wall (or a bounce), a model that cannot fly differs in form from one that can."""
+        """What a check means: with a wall (or a bounce), a model that cannot fly differs in form
+        from one that can."""
         if place.against == OWN_FIGURES:
             return "exact" if place.what.definition.exact else "absolute"
-        if "measured" in (self.models[place.model].family_name, self.models[place.against].family_name):
+        if "measured" in (
+            self.models[place.model].family_name,
+            self.models[place.against].family_name,
+        ):
             return "measured"
-        scene = self.ensembles[place.scene][1] if place.scene in self.ensembles else self.scenes[place.scene]
+        scene = (
+            self.ensembles[place.scene][1]
+            if place.scene in self.ensembles
+            else self.scenes[place.scene]
+        )
         may_hop = bool(scene.walls) or scene.floor.restitution > 0.0 or scene.initial_height > 0.0
         differ = self.models[place.model].family.flies != self.models[place.against].family.flies
         return "model form" if may_hop and differ else "numerical"
@@ -242,32 +282,46 @@ def describe_suite(path: Path) -> str:
 def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
     """A suite from a TOML file, or by the name of one that comes with the package.
 
-    Nothing is run or imported that the file names: a model "module:Class" must be in `allow_code`, and is imported only by the
-    processes that play it. Raises `InputError` naming the file, the key, the value and what is allowed.
+    Nothing is run or imported that the file names: a model "module:Class" must be in `allow_code`,
+    and is imported only by the processes that play it. Raises `InputError` naming the file, the
+    key, the value and what is allowed.
     """
     known = named_suites()
     shipped = str(source) in known
     path = known[str(source)] if shipped else Path(source)
     if path.suffix.lower() != ".toml":
-        raise InputError(f"{unknown_name('suite', str(source), known)}; or the path of a .toml file")
+        raise InputError(
+            f"{unknown_name('suite', str(source), known)}; or the path of a .toml file"
+        )
     tables = read_toml(path)
     if "block" in tables:
         names = f"scenes = [{printable(path.name)!r}], and tables [models.NAME]"
-        raise InputError(f"{printable(path)}: is a scene, not a suite; `rockcheck validate` plays a scene, and a suite is a file with {names}")
+        raise InputError(
+            f"{printable(path)}: is a scene, not a suite; `rockcheck validate` plays a scene, and"
+            f" a suite is a file with {names}"
+        )
     try:
         return _suite(SuiteFile(**tables), path, shipped, allow_code)
     except InputError as error:
         text = str(error)
-        raise InputError(text if text.startswith(printable(path.parent)) else f"{printable(path)}: {text}") from None
+        raise InputError(
+            text if text.startswith(printable(path.parent)) else f"{printable(path)}: {text}"
+        ) from None
 
 
 def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[str]) -> Suite:
     if given.include:
         return _joined(given, path, allow_code)
-    models = {label: _variant(label, settings, path.parent, allow_code) for label, settings in given.models.items()}
+    models = {
+        label: _variant(label, settings, path.parent, allow_code)
+        for label, settings in given.models.items()
+    }
     uncertain, left_out = under_records(_scenes(given, path.parent), given.records, path.parent)
     scenes = {name: found.scene for name, found in uncertain.items()}
-    ensembles = {e.name: (e, scene_from(e.scene, folder=path.parent, default_name=e.name)) for e in given.ensemble}
+    ensembles = {
+        e.name: (e, scene_from(e.scene, folder=path.parent, default_name=e.name))
+        for e in given.ensemble
+    }
     _check_names(given, models, scenes, ensembles)
     tolerances_path, tables = _tolerance_tables(given, path, shipped)
     return Suite(
@@ -297,10 +351,11 @@ def scene_suite(
     records: Sequence[RecordSet] = (),
     allow_code: Container[str] = (),
 ) -> Suite:
-    """One scene (a name or a .toml file) by some models, each with its settings, perhaps under records: nothing is judged.
+    """One scene (a name or a .toml file) by some models, each with its settings, perhaps under
+    records: nothing is judged.
 
-    Differences are from `ebm-unilateral`, or the first model where that is not among them. Models of one's own are looked for in
-    the working folder. Raises `InputError` as `load_suite`.
+    Differences are from `ebm-unilateral`, or the first model where that is not among them. Models
+    of one's own are looked for in the working folder. Raises `InputError` as `load_suite`.
     """
     known = named_scenes()
     path = Path(f"{source}.toml" if source in known else source)
@@ -317,23 +372,34 @@ def scene_suite(
     )
     suite = _suite(given, path, source in known, allow_code)
     here = (str(Path.cwd()),)
-    variants = {name: replace(one, search_path=here) if one.search_path else one for name, one in suite.models.items()}
+    variants = {
+        name: replace(one, search_path=here) if one.search_path else one
+        for name, one in suite.models.items()
+    }
     return replace(suite, models=variants, judged=False)
 
 
 def is_scene(source: str) -> bool:
-    """Whether that is the name or the file of a scene, where a suite could be meant. Raises `InputError` for a file that is no TOML."""
+    """Whether that is the name or the file of a scene, where a suite could be meant. Raises
+    `InputError` for a file that is no TOML."""
     if source in named_suites():
         return False
     path = Path(source)
-    return source in named_scenes() or (path.suffix.lower() == ".toml" and "block" in read_toml(path))
+    return source in named_scenes() or (
+        path.suffix.lower() == ".toml" and "block" in read_toml(path)
+    )
 
 
-def _check_names(given: SuiteFile, models: Container[str], scenes: Collection[str], ensembles: Collection[str]) -> None:
+def _check_names(
+    given: SuiteFile, models: Container[str], scenes: Collection[str], ensembles: Collection[str]
+) -> None:
     """Raises `InputError` where something is missing, named twice, or not known."""
     for key, label in (("reference", given.reference), ("model_form", given.model_form)):
         if label and label not in models:
-            raise InputError(f"{label!r} is not among the suite's models: {', '.join(given.models) or 'none'}", key)
+            raise InputError(
+                f"{label!r} is not among the suite's models: {', '.join(given.models) or 'none'}",
+                key,
+            )
     if not given.models:
         raise InputError("no model; at least the reference is needed", "models")
     if not scenes and not ensembles:
@@ -346,26 +412,41 @@ def _check_names(given: SuiteFile, models: Container[str], scenes: Collection[st
             _required(key, text)
 
 
-def _tolerances(path: Path, tables: Mapping[str, Any], scenes: Iterable[str], models: Mapping[str, ModelVariant]) -> Tolerances:
+def _tolerances(
+    path: Path, tables: Mapping[str, Any], scenes: Iterable[str], models: Mapping[str, ModelVariant]
+) -> Tolerances:
     try:
         tolerances = parse_tolerances(tables, _played(scenes, models))
         for place in tolerances:
             if place.against not in (OWN_FIGURES, *models):
-                raise unknown_name(f"reference of [{place.scene}.{place.model}]", place.against, [OWN_FIGURES, *models])
+                raise unknown_name(
+                    f"reference of [{place.scene}.{place.model}]",
+                    place.against,
+                    [OWN_FIGURES, *models],
+                )
     except InputError as error:
         raise InputError(f"{printable(path)}: {error}") from None
     return tolerances
 
 
 def _played(scenes: Iterable[str], models: Mapping[str, ModelVariant]) -> Iterator[tuple[str, str]]:
-    """Names of scenes and models that make a cell: all, but a measured history belongs to the scenes that it names."""
+    """Names of scenes and models that make a cell: all, but a measured history belongs to the
+    scenes that it names."""
     for scene in scenes:
-        yield from ((scene, label) for label, model in models.items() if scene in model.settings.get("files", {scene: ""}))
+        yield from (
+            (scene, label)
+            for label, model in models.items()
+            if scene in model.settings.get("files", {scene: ""})
+        )
 
 
 def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
-    """Several suites as one; their scenes must have different names, their references must agree."""
-    included = [load_suite(name if name in named_suites() else path.parent / name, allow_code=allow_code) for name in given.include]
+    """Several suites as one; their scenes must have different names, their references must
+    agree."""
+    included = [
+        load_suite(name if name in named_suites() else path.parent / name, allow_code=allow_code)
+        for name in given.include
+    ]
     scenes: dict[str, Scene] = {}
     ensembles: dict[str, tuple[Ensemble, Scene]] = {}
     models: dict[str, ModelVariant] = {}
@@ -373,7 +454,9 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
         for name in {*suite.scenes, *suite.ensembles} & {*scenes, *ensembles}:
             raise InputError(f"scene {name!r} is in two of the suites", "include")
         if suite.reference != included[0].reference:
-            raise InputError(f"{suite.name} and {included[0].name} have different references", "include")
+            raise InputError(
+                f"{suite.name} and {included[0].name} have different references", "include"
+            )
         scenes |= suite.scenes
         ensembles |= suite.ensembles
         models |= suite.models
@@ -396,12 +479,16 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
     )
 
 
-def _variant(label: str, settings: Mapping[str, Any], folder: Path, allow_code: Container[str]) -> ModelVariant:
+def _variant(
+    label: str, settings: Mapping[str, Any], folder: Path, allow_code: Container[str]
+) -> ModelVariant:
     settings = dict(settings)
     name = str(settings.pop("model", label))
     if name == "measured" and isinstance(settings.get("files"), dict):
         settings["files"] = {
-            scene: [str(folder / str(one)) for one in files] if isinstance(files, list) else str(folder / str(files))
+            scene: [str(folder / str(one)) for one in files]
+            if isinstance(files, list)
+            else str(folder / str(files))
             for scene, files in settings["files"].items()
         }
     if is_own(name):
@@ -417,9 +504,21 @@ def _variant(label: str, settings: Mapping[str, Any], folder: Path, allow_code: 
 def _scenes(given: SuiteFile, folder: Path) -> dict[str, UncertainScene]:
     found: dict[str, UncertainScene] = {}
     for scene in itertools.chain(
-        (load_uncertain_scene(name if name in named_scenes() or Path(name).suffix != ".toml" else folder / name) for name in given.scenes),
-        (uncertain_scene_from(table, folder=folder, default_name=f"scene {n}") for n, table in enumerate(given.scene, 1)),
-        (uncertain_scene(scene, {}, {}) for grid in given.grid for scene in _combined(grid, folder)),
+        (
+            load_uncertain_scene(
+                name if name in named_scenes() or Path(name).suffix != ".toml" else folder / name
+            )
+            for name in given.scenes
+        ),
+        (
+            uncertain_scene_from(table, folder=folder, default_name=f"scene {n}")
+            for n, table in enumerate(given.scene, 1)
+        ),
+        (
+            uncertain_scene(scene, {}, {})
+            for grid in given.grid
+            for scene in _combined(grid, folder)
+        ),
     ):
         name = scene.scene.name
         if name in found:
@@ -436,16 +535,23 @@ def _combined(grid: Grid, folder: Path) -> Iterator[Scene]:
             if not isinstance(alternative.get("name"), str):
                 raise InputError("each alternative needs a name", "grid.axes")
             names.append(alternative["name"])
-            table = _merged(table, {key: value for key, value in alternative.items() if key != "name"})
-        yield scene_from({**table, "name": "-".join(map(str, names))}, folder=folder, default_name="scene")
+            table = _merged(
+                table, {key: value for key, value in alternative.items() if key != "name"}
+            )
+        yield scene_from(
+            {**table, "name": "-".join(map(str, names))}, folder=folder, default_name="scene"
+        )
 
 
 def _merged(base: Any, change: Any) -> Any:
-    """`change` over `base`: tables key by key, lists of tables one by one, anything else replaced."""
+    """`change` over `base`: tables key by key, lists of tables one by one, anything else
+    replaced."""
     if isinstance(base, dict) and isinstance(change, dict):
         return {**base, **{key: _merged(base.get(key), value) for key, value in change.items()}}
     if isinstance(base, list) and isinstance(change, list):
-        return [_merged(a, b) if b is not None else a for a, b in itertools.zip_longest(base, change)]
+        return [
+            _merged(a, b) if b is not None else a for a, b in itertools.zip_longest(base, change)
+        ]
     return change
 
 
@@ -455,8 +561,14 @@ def _required(key: str, text: str) -> None:
         raise unknown_name(f"measure of require.{key}", text, book)
 
 
-def _tolerance_tables(given: SuiteFile, path: Path, shipped: bool) -> tuple[Path, Mapping[str, Any]]:
+def _tolerance_tables(
+    given: SuiteFile, path: Path, shipped: bool
+) -> tuple[Path, Mapping[str, Any]]:
     if given.tolerances is not None:
         return path, given.tolerances
-    beside = DATA / "tolerances" / path.name if shipped else path.with_name(f"{path.stem}.tolerances.toml")
+    beside = (
+        DATA / "tolerances" / path.name
+        if shipped
+        else path.with_name(f"{path.stem}.tolerances.toml")
+    )
     return beside, read_toml(beside) if beside.exists() else {}

@@ -16,13 +16,21 @@ from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, apart
 
 #: The most scenes that tables and pages show one by one.
 MOST_SHOWN = 200
-COLOURS = {"pass": "green", "incomplete": "yellow", "changed": "yellow", "fail": "red", "error": "red"}
+COLOURS = {
+    "pass": "green",
+    "incomplete": "yellow",
+    "changed": "yellow",
+    "fail": "red",
+    "error": "red",
+}
 
 
 def shown(run: Run, most: int = MOST_SHOWN) -> tuple[str, ...]:
-    """The scenes and ensembles that are shown one by one, in the suite's order: all, of a large run the worst `most`.
+    """The scenes and ensembles that are shown one by one, in the suite's order: all, of a large run
+    the worst `most`.
 
-    The worst are those with the worst verdict, and of these the nearest to a limit. Ensembles are always shown.
+    The worst are those with the worst verdict, and of these the nearest to a limit. Ensembles are
+    always shown.
     """
     cells = run.by_scene()
     if len(cells) <= most:
@@ -46,7 +54,8 @@ def not_shown(run: Run) -> Iterator[str]:
 
 
 def verdict_table(run: Run) -> Table:
-    """A row a cell, within 80 columns: the check that is nearest to its limit, how much of that it uses, and the verdict.
+    """A row a cell, within 80 columns: the check that is nearest to its limit, how much of that it
+    uses, and the verdict.
 
     Of a large run, the scenes that are `shown`.
     """
@@ -64,16 +73,27 @@ def verdict_table(run: Run) -> Table:
         near = nearest(cell)
         judged = windowed(near) if near else "as it must be" if cell.checks else "nothing judged"
         words = judged if cell.status == "done" else cell.reason or "failed"
-        verdict = Text("-") if cell.status == "done" and not cell.checks else Text(cell.words, COLOURS[cell.verdict])
+        verdict = (
+            Text("-")
+            if cell.status == "done" and not cell.checks
+            else Text(cell.words, COLOURS[cell.verdict])
+        )
         if cell.converged is False:
             verdict.append(", not converged", "yellow")
-        table.add_row("" if cell.scene == before else cell.scene, cell.model, Text(words), percent(near) if near else "", verdict)
+        table.add_row(
+            "" if cell.scene == before else cell.scene,
+            cell.model,
+            Text(words),
+            percent(near) if near else "",
+            verdict,
+        )
         before = cell.scene
     return table
 
 
 def outcome_tables(run: Run) -> Iterator[tuple[str, Table]]:
-    """Each scene with a row a model, within 80 columns: what becomes of the block, its peak rotation, and how far from the reference."""
+    """Each scene with a row a model, within 80 columns: what becomes of the block, its peak
+    rotation, and how far from the reference."""
     for scene, cells in run.by_scene().items():
         table = Table(box=None, pad_edge=False, expand=False)
         for name, width in (("", 0), ("model", 16), ("outcome", 26)):
@@ -82,9 +102,14 @@ def outcome_tables(run: Run) -> Iterator[tuple[str, Table]]:
             table.add_column(name, justify="right", no_wrap=True, min_width=8)
         for cell in cells.values():
             words = cell.fate if cell.status == "done" else cell.reason or "failed"
-            colour = "red" if cell.status == "failed" else "yellow" if cell.status == "absent" else ""
+            colour = (
+                "red" if cell.status == "failed" else "yellow" if cell.status == "absent" else ""
+            )
             row = outcome_row(cell, run.reference)
-            peak, apart = ("" if row[name] is None else f"{row[name]:.3g}" for name in ("peak_rotation_alpha", "apart_alpha"))
+            peak, apart = (
+                "" if row[name] is None else f"{row[name]:.3g}"
+                for name in ("peak_rotation_alpha", "apart_alpha")
+            )
             apart = "ref." if cell.model == run.reference else apart
             took = f"{cell.cost.wall_seconds:.1f} s" if cell.status == "done" else ""
             table.add_row("", cell.model, Text(words, colour), peak, apart, took)
@@ -108,7 +133,8 @@ def outcome_row(cell: Cell, reference: str) -> dict[str, Any]:
 
 
 def summary(run: Run) -> dict[str, Any]:
-    """The verdicts in a few plain values: of the run, of each cell, and why anything is not a pass."""
+    """The verdicts in a few plain values: of the run, of each cell, and why anything is not a
+    pass."""
     return {
         "suite": run.suite,
         "verdict": run.verdict,
@@ -124,7 +150,9 @@ def summary(run: Run) -> dict[str, Any]:
                 "verdict": cell.verdict if cell.checks or cell.status != "done" else None,
                 "converged": cell.converged,
                 "impact_law": cell.impact_law.law if cell.impact_law else None,
-                "explanations": [f"{e.quantity} against {e.against}: {e.verdict}" for e in cell.explanations],
+                "explanations": [
+                    f"{e.quantity} against {e.against}: {e.verdict}" for e in cell.explanations
+                ],
             }
             for cell in run.cells
         ],
@@ -141,20 +169,31 @@ def verdict_lines(run: Run) -> Iterator[str]:
     for cell in run.cells:
         if cell.status != "absent":
             yield from cell_lines(cell)
-    if run.judged and not any(cell.status != "done" or any(c.verdict != "not defined" for c in cell.checks) for cell in run.cells):
+    if run.judged and not any(
+        cell.status != "done" or any(c.verdict != "not defined" for c in cell.checks)
+        for cell in run.cells
+    ):
         yield "nothing was judged: no measure that is defined here is required or has a tolerance"
 
 
 def improvements(run: Run) -> Iterator[str]:
     """The figures that are better than was expected, a line each."""
-    yield from (f"{place(cell)}: {title(check)}: {check.reason}" for cell, check in run.checks() if check.verdict == "better")
+    yield from (
+        f"{place(cell)}: {title(check)}: {check.reason}"
+        for cell, check in run.checks()
+        if check.verdict == "better"
+    )
 
 
 def cell_lines(cell: Cell, strict: Strict = True) -> Iterator[str]:
     """Why a cell is not a pass for a run that is so strict, a line each."""
     if cell.status != "done":
         yield f"{place(cell)}: {cell.reason}"
-    yield from (f"{place(cell)}: {title(check)}: {check.reason}" for check in cell.checks if check.fails(strict))
+    yield from (
+        f"{place(cell)}: {title(check)}: {check.reason}"
+        for check in cell.checks
+        if check.fails(strict)
+    )
 
 
 def place(cell: Cell) -> str:
@@ -174,7 +213,8 @@ def windowed(check: Check) -> str:
 
 
 def used(check: Check) -> float:
-    """Share of its limit that a check uses up, 0 to 1 within it; infinite where it cannot be judged.
+    """Share of its limit that a check uses up, 0 to 1 within it; infinite where it cannot be
+    judged.
 
     0 where nothing is asked, and where the limit lies around a value that is no longer wanted.
     """
@@ -202,8 +242,13 @@ def percent(check: Check) -> str:
 
 
 def nearest(cell: Cell) -> Check | None:
-    """The check that failed, else the one nearest to its limit. A yes-or-no measure, or a limit of 0, is never near its limit."""
-    return max((check for check in cell.checks if check.verdict == "fail" or graded(check)), key=used, default=None)
+    """The check that failed, else the one nearest to its limit. A yes-or-no measure, or a limit of
+    0, is never near its limit."""
+    return max(
+        (check for check in cell.checks if check.verdict == "fail" or graded(check)),
+        key=used,
+        default=None,
+    )
 
 
 def asks(check: Check) -> bool:
@@ -222,7 +267,13 @@ def share(check: Check) -> str:
     figure = check.figure
     if asks(check):
         return f"{windowed(check)} {value_words(figure.value, yes_no=True)}"
-    value = "-" if figure.value is None else f"off {abs(figure.value - check.ideal):.1e}" if check.ideal else f"{figure.value:.2e}"
+    value = (
+        "-"
+        if figure.value is None
+        else f"off {abs(figure.value - check.ideal):.1e}"
+        if check.ideal
+        else f"{figure.value:.2e}"
+    )
     limit = "none" if check.limit is None else f"{check.limit:.2g}"
     return f"{windowed(check)} {value} / {limit}"
 
@@ -230,17 +281,31 @@ def share(check: Check) -> str:
 def checks_csv(run: Run) -> str:
     """All checks, a row each."""
     tolerance = ("expected", "limit", "drift", "verdict", "reason", "why")
-    rows = ((*_row(cell, check.figure), check.kind, *(getattr(check, name) for name in tolerance)) for cell, check in run.checks())
+    rows = (
+        (*_row(cell, check.figure), check.kind, *(getattr(check, name) for name in tolerance))
+        for cell, check in run.checks()
+    )
     return table_text((*ROW, "kind", *tolerance), rows)
 
 
 def figures_csv(run: Run) -> str:
     """All figures, judged or not, a row each."""
-    return table_text((*ROW, "note"), ((*_row(cell, figure), figure.note) for cell in run.cells for figure in cell.figures))
+    return table_text(
+        (*ROW, "note"),
+        ((*_row(cell, figure), figure.note) for cell in run.cells for figure in cell.figures),
+    )
 
 
 ROW = ("scene", "model", "against", "measure", "window", "value", "unit")
 
 
 def _row(cell: Cell, figure: Figure) -> tuple[object, ...]:
-    return cell.scene, cell.model, figure.against, figure.measure, figure.window, figure.value, figure.unit
+    return (
+        cell.scene,
+        cell.model,
+        figure.against,
+        figure.measure,
+        figure.window,
+        figure.value,
+        figure.unit,
+    )

@@ -1,21 +1,22 @@
-"""Tolerances: what each figure was expected to be, how far it may go, and the verdict on what it is.
+"""Tolerances: what each figure was expected to be, how far it may go, and the verdict on what it
+is.
 
 A tolerance file is TOML; a table a scene, model and reference, a line a measure:
 
     [fig5a.mujoco.ebm-unilateral]
     "theta_rms@8s" = { expected = 2.3e-4, limit = 2e-3, drift = 1e-4, why = "first-order step error, prototype 2e-4" }
 
-The third name is the reference model, or "figures" for a figure of the cell itself, its distance from a closed form among
-them. The first may be "*", every scene that the model plays: such a line holds where a scene has none of its own, and gives
-what a scene's own line leaves out:
+The third name is the reference model, or "figures" for a figure of the cell itself, its distance
+from a closed form among them. The first may be "*", every scene that the model plays: such a line
+holds where a scene has none of its own, and gives what a scene's own line leaves out:
 
     ["*".mujoco.ebm-unilateral]
     outcome_agrees = { expected = 1.0, limit = 0.0, drift = 0.0, why = "the same outcome" }
     "theta_rms@8s" = { why = "first-order step error" }
 
-`@` bounds the window: seconds, or `@horizon`. `limit` bounds the distance from the perfect value (from `expected`
-for figures of the cell itself; for "at least" measures the value itself). All in the measure's
-unit.
+`@` bounds the window: seconds, or `@horizon`. `limit` bounds the distance from the perfect value
+(from `expected` for figures of the cell itself; for "at least" measures the value itself). All in
+the measure's unit.
 
 What a figure is judged by depends on its measure's role:
 
@@ -28,8 +29,8 @@ What a figure is judged by depends on its measure's role:
 A figure has moved by what it and `expected` differ beyond their floor (`floor_of`), so two values
 below it are the same: nothing. The limit of an error holds as it is written. What moved is
 *better*, else *changed*; better passes, a quantity or count beyond its limit too. A quantity has a
-better only where the reference solves the same equations and is itself as expected (`runner`).
-A ratio to nothing is *not defined*.
+better only where the reference solves the same equations and is itself as expected (`runner`). A
+ratio to nothing is *not defined*.
 """
 
 from __future__ import annotations
@@ -69,12 +70,15 @@ class Windowed:
 
     @classmethod
     def parse(cls, text: str) -> Windowed:
-        """Read "measure@window"; raises `InputError` for an unknown measure or a window that is none."""
+        """Read "measure@window"; raises `InputError` for an unknown measure or a window that is
+        none."""
         name, at, window = text.partition("@")
         if name not in MEASURES:
             raise unknown_name("measure", name, MEASURES)
         if at and window != HORIZON and not re.fullmatch(r"\d+(\.\d+)?s", window):
-            raise InputError(f"window {printable(window)!r} of {name}: give seconds such as 8s, or {HORIZON}")
+            raise InputError(
+                f"window {printable(window)!r} of {name}: give seconds such as 8s, or {HORIZON}"
+            )
         return cls(name, window)
 
     @property
@@ -102,7 +106,8 @@ class Tolerance(Frozen):
 
 @dataclass(frozen=True, order=True)
 class Place:
-    """Where a tolerance belongs: scene, model, what it is held against, and the windowed measure."""
+    """Where a tolerance belongs: scene, model, what it is held against, and the windowed
+    measure."""
 
     scene: str
     model: str
@@ -117,8 +122,11 @@ Tolerances = dict[Place, Tolerance]
 _Path = tuple[str, ...]
 
 
-def parse_tolerances(tables: Mapping[str, Any], cells: Iterable[tuple[str, str]] = ()) -> Tolerances:
-    """The tolerances in the tables of a file; a line for every scene becomes one for each of `cells` (scene, model).
+def parse_tolerances(
+    tables: Mapping[str, Any], cells: Iterable[tuple[str, str]] = ()
+) -> Tolerances:
+    """The tolerances in the tables of a file; a line for every scene becomes one for each of
+    `cells` (scene, model).
 
     Raises `InputError` naming the place of whatever is not usable.
     """
@@ -132,7 +140,9 @@ def parse_tolerances(tables: Mapping[str, Any], cells: Iterable[tuple[str, str]]
             tolerance = Tolerance(**line)
             measure = place.what.definition
             if (measure.name in FIGURES) != (against == OWN_FIGURES):
-                raise InputError(f"figures of a cell itself, and only they, stand under {OWN_FIGURES!r}")
+                raise InputError(
+                    f"figures of a cell itself, and only they, stand under {OWN_FIGURES!r}"
+                )
             if measure.ideal is None and measure.sense == "at most" and tolerance.expected is None:
                 raise InputError("is missing", "expected")
         except InputError as error:
@@ -141,24 +151,38 @@ def parse_tolerances(tables: Mapping[str, Any], cells: Iterable[tuple[str, str]]
     return found
 
 
-def _spread(lines: Mapping[_Path, Any], cells: Iterable[tuple[str, str]]) -> Iterator[tuple[_Path, Any]]:
-    """The lines with those for every scene at each of the model's cells, below what the scene itself says."""
+def _spread(
+    lines: Mapping[_Path, Any], cells: Iterable[tuple[str, str]]
+) -> Iterator[tuple[_Path, Any]]:
+    """The lines with those for every scene at each of the model's cells, below what the scene
+    itself says."""
     played = list(cells)
     common = {path: line for path, line in lines.items() if path[0] == EVERY}
     for path, line in lines.items():
         below = common.get((EVERY, *path[1:]))
         if path[0] != EVERY:
-            yield path, {**below, **line} if isinstance(below, Mapping) and isinstance(line, Mapping) else line
+            yield (
+                path,
+                {**below, **line}
+                if isinstance(below, Mapping) and isinstance(line, Mapping)
+                else line,
+            )
     for (_, *rest), line in common.items():
         scenes = [scene for scene, model in played if model == rest[0]]
         completes = any(path[0] != EVERY and path[1:] == tuple(rest) for path in lines)
         if completes and isinstance(line, Mapping) and "limit" not in line:
             continue
         # Where no cell is run it stays as it is, and is reported as a tolerance without a cell.
-        yield from (((scene, *rest), line) for scene in scenes or [EVERY] if (scene, *rest) not in lines or scene == EVERY)
+        yield from (
+            ((scene, *rest), line)
+            for scene in scenes or [EVERY]
+            if (scene, *rest) not in lines or scene == EVERY
+        )
 
 
-def _lines(tables: Mapping[str, Any], depth: int, above: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+def _lines(
+    tables: Mapping[str, Any], depth: int, above: tuple[str, ...] = ()
+) -> Iterator[tuple[tuple[str, ...], Any]]:
     for name, inner in tables.items():
         path = (*above, str(name))
         if len(path) == depth:
@@ -177,7 +201,11 @@ def floor_of(measure: Measure, scene: Scene, numerical: Numerical | None) -> flo
     """
     if not measure.resolution:
         return 0.0
-    known = [numerical.u_num(name) for name in (measure.name, STANDS_FOR.get(measure.unit, ""))] if numerical else []
+    known = (
+        [numerical.u_num(name) for name in (measure.name, STANDS_FOR.get(measure.unit, ""))]
+        if numerical
+        else []
+    )
     p, step = scene.frequency_parameter, scene.output_step
     rows = between_rows(measure.unit, p, scene.gravity, step) if measure.role == "quantity" else 0.0
     return max(measure.resolution, rows, next((u for u in known if u is not None), 0.0))
@@ -209,7 +237,9 @@ def judge(
     elif gap or tolerance is None:
         reason = gap or "no tolerance yet"
     else:
-        verdict, reason = _verdict(figure, value, tolerance, measure, least, _perfect(measure, kind, beside))
+        verdict, reason = _verdict(
+            figure, value, tolerance, measure, least, _perfect(measure, kind, beside)
+        )
     return Check(
         figure=figure,
         kind=kind,
@@ -232,18 +262,37 @@ def judged_beside(check: Check, beside: float | None) -> Check:
         return check
     line = Tolerance(limit=check.limit, expected=check.expected, drift=check.drift, why=check.why)
     measure = MEASURES[check.figure.measure]
-    return judge(check.figure, line, kind=check.kind, measure=measure, gap=check.gap, floor=check.floor, beside=beside)
+    return judge(
+        check.figure,
+        line,
+        kind=check.kind,
+        measure=measure,
+        gap=check.gap,
+        floor=check.floor,
+        beside=beside,
+    )
 
 
 def _perfect(measure: Measure, kind: Kind, beside: float | None) -> float | None:
     """The value that a better one is nearer to; None for another model form, no yardstick."""
     if kind == "model form":
         return None
-    return math.inf if measure.sense == "at least" else measure.ideal if measure.role == "error" else beside
+    return (
+        math.inf
+        if measure.sense == "at least"
+        else measure.ideal
+        if measure.role == "error"
+        else beside
+    )
 
 
 def _verdict(
-    figure: Figure, value: float, line: Tolerance, measure: Measure, floor: float, perfect: float | None
+    figure: Figure,
+    value: float,
+    line: Tolerance,
+    measure: Measure,
+    floor: float,
+    perfect: float | None,
 ) -> tuple[CheckVerdict, str]:
     """The table at the top of this module; and why the figure is no plain pass."""
     expected, drift = line.expected, math.inf if line.drift is None else line.drift
@@ -254,12 +303,19 @@ def _verdict(
     if expected is None or not (outside or moved > drift):
         return "pass", ""
     if _nearer(value, expected, perfect) > (line.drift or 0.0):
-        return "better", f"{value:.6g} was {expected:.6g}" + (f", nearer to {perfect:.6g}" if perfect and perfect < math.inf else "")
-    return ("fail", outside) if outside else ("changed", f"{value:.6g} was {expected:.6g} (drift allowed {drift:.2g})")
+        return "better", f"{value:.6g} was {expected:.6g}" + (
+            f", nearer to {perfect:.6g}" if perfect and perfect < math.inf else ""
+        )
+    return (
+        ("fail", outside)
+        if outside
+        else ("changed", f"{value:.6g} was {expected:.6g} (drift allowed {drift:.2g})")
+    )
 
 
 def _nearer(value: float, expected: float, perfect: float | None) -> float:
-    """By how much a value is nearer to a perfect one than the expected is; 0 where there is none."""
+    """By how much a value is nearer to a perfect one than the expected is; 0 where there is
+    none."""
     if perfect is None or math.isinf(perfect):
         return 0.0 if perfect is None else value - expected
     return abs(expected - perfect) - abs(value - perfect)

@@ -25,10 +25,12 @@ MARKS = {"pass": "✅", "incomplete": "⚪", "changed": "🟡", "fail": "❌", "
 
 
 def junit(run: Run) -> str:
-    """JUnit XML: a test suite a scene, a test case a check and one for each cell's run, which is an error where it failed.
+    """JUnit XML: a test suite a scene, a test case a check and one for each cell's run, which is an
+    error where it failed.
 
-    A figure that changed within its limit, and a model that is not installed, are failures only in a
-    strict run, one that is better in a run that is strict both ways. What is not defined is skipped.
+    A figure that changed within its limit, and a model that is not installed, are failures only in
+    a strict run, one that is better in a run that is strict both ways. What is not defined is
+    skipped.
     """
     document = JUnitXml(f"rockcheck {run.suite}")
     for scene, cells in run.by_scene().items():
@@ -51,10 +53,18 @@ def _cases(cell: Cell, strict: Strict) -> Iterator[TestCase]:
     ran.time = cell.cost.worker_seconds
     yield ran
     if cell.numerical is not None:
-        yield _case(place, "converged", None if cell.numerical.converged else Skipped("; ".join(cell.numerical.reasons)))
+        yield _case(
+            place,
+            "converged",
+            None if cell.numerical.converged else Skipped("; ".join(cell.numerical.reasons)),
+        )
     for check in cell.checks:
         failure = Failure(check.reason, check.verdict) if check.fails(strict) else None
-        yield _case(place, title(check), Skipped(check.reason) if check.verdict == "not defined" else failure)
+        yield _case(
+            place,
+            title(check),
+            Skipped(check.reason) if check.verdict == "not defined" else failure,
+        )
 
 
 def _case(place: str, name: str, result: Failure | Error | Skipped | None) -> TestCase:
@@ -65,33 +75,63 @@ def _case(place: str, name: str, result: Failure | Error | Skipped | None) -> Te
 
 
 def markdown(run: Run) -> str:
-    """A summary for a job's page: the verdict, what is not a pass and why, and a table of scenes by models."""
+    """A summary for a job's page: the verdict, what is not a pass and why, and a table of scenes by
+    models."""
     lines = [
         f"## {MARKS[run.verdict]} rockcheck {_plain(run.suite)}: {run.words}",
         "",
-        f"{len(run.cells)} simulations, {run.up_to_date} up to date, {sum(1 for _ in run.checks())} checks, {run.wall_seconds:.1f} s.",
+        f"{len(run.cells)} simulations, {run.up_to_date} up to date,"
+        f" {sum(1 for _ in run.checks())} checks, {run.wall_seconds:.1f} s.",
         "",
     ]
-    for heading, found in (("", list(verdict_lines(run))), ("Better than expected:", list(improvements(run)))):
-        more = [f"- and {len(found) - MOST_SHOWN} more, in junit.xml"] if len(found) > MOST_SHOWN else []
+    for heading, found in (
+        ("", list(verdict_lines(run))),
+        ("Better than expected:", list(improvements(run))),
+    ):
+        more = (
+            [f"- and {len(found) - MOST_SHOWN} more, in junit.xml"]
+            if len(found) > MOST_SHOWN
+            else []
+        )
         lines += [heading, ""] if heading and found else []
         lines += [*(f"- {_plain(one)}" for one in found[:MOST_SHOWN]), *more, ""] if found else []
     cells, places = run.by_scene(), shown(run)
-    rows = ((_plain(scene), *(_entry(cells[scene].get(model), run.judged) for model in run.models)) for scene in places)
+    rows = (
+        (_plain(scene), *(_entry(cells[scene].get(model), run.judged) for model in run.models))
+        for scene in places
+    )
     table = markdown_table(("scene", *map(_plain, run.models)), rows)
-    rest = [line for one in not_shown(run) for line in ("", one)]  # a line right below would be a row of the table
+    rest = [
+        line for one in not_shown(run) for line in ("", one)
+    ]  # a line right below would be a row of the table
     return "\n".join([*lines, table, *rest, *_laws(run, places)]) + "\n"
 
 
 def _laws(run: Run, places: Container[str]) -> Iterator[str]:
-    """Which law of impacts each model followed, where these scenes have a landing that tells; it is no verdict."""
-    told = {cell.scene: cell.impact_law.t for cell in run.cells if cell.impact_law and cell.scene in places}
+    """Which law of impacts each model followed, where these scenes have a landing that tells; it is
+    no verdict."""
+    told = {
+        cell.scene: cell.impact_law.t
+        for cell in run.cells
+        if cell.impact_law and cell.scene in places
+    }
     if not told:
         return
-    models = [model for model in run.models if any(cell.model == model and cell.impact_law for cell in run.cells)]
-    yield from ("", "The law of impacts followed at the first landing at which laws part (not judged):", "")
+    models = [
+        model
+        for model in run.models
+        if any(cell.model == model and cell.impact_law for cell in run.cells)
+    ]
+    yield from (
+        "",
+        "The law of impacts followed at the first landing at which laws part (not judged):",
+        "",
+    )
     found = {(cell.scene, cell.model): cell.impact_law.law for cell in run.cells if cell.impact_law}
-    rows = ((_plain(scene), f"{t:.3f} s", *(found.get((scene, model), "") for model in models)) for scene, t in told.items())
+    rows = (
+        (_plain(scene), f"{t:.3f} s", *(found.get((scene, model), "") for model in models))
+        for scene, t in told.items()
+    )
     yield markdown_table(("scene", "landing", *map(_plain, models)), rows)
 
 
@@ -105,10 +145,18 @@ def _entry(cell: Cell | None, judged: bool) -> str:
 
 
 def _worst(checks: tuple[Check, ...]) -> str:
-    against_others = [check for check in checks if check.figure.against and check.kind == "numerical"]
+    against_others = [
+        check for check in checks if check.figure.against and check.kind == "numerical"
+    ]
     return share(max(against_others, key=used)) if against_others else ""
 
 
 def _plain(text: str) -> str:
-    """Text that somebody else may have chosen, as Markdown that shows it and does nothing: no tag, link, picture or new line."""
-    return re.sub(r"([\\`*\[\]!#~])", r"\\\1", printable(text, 1000)).replace("&", "&amp;").replace("<", "&lt;").replace("://", ":&#47;/")
+    """Text that somebody else may have chosen, as Markdown that shows it and does nothing: no tag,
+    link, picture or new line."""
+    return (
+        re.sub(r"([\\`*\[\]!#~])", r"\\\1", printable(text, 1000))
+        .replace("&", "&amp;")
+        .replace("<", "&lt;")
+        .replace("://", ":&#47;/")
+    )

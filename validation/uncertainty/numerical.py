@@ -41,7 +41,8 @@ FACTORS = (1.0, 2.0, 3.0, 4.0)
 SAFETY, POOR_SAFETY = 1.25, 3.0
 #: From this order on the histories converge.
 LEAST_ORDER = 0.5
-#: Farther apart (rotations in alpha, slips in alpha R, times in 1/p) histories are not of one motion.
+#: Farther apart (rotations in alpha, slips in alpha R, times in 1/p) histories are not of one
+#: motion.
 LARGE = 0.1
 
 Verdict = Literal["converged", "not converged"]
@@ -103,7 +104,9 @@ class Numerical(Stored):
 
     def u_num(self, name: str) -> float | None:
         """The uncertainty of a quantity; None where it is not converged or not known."""
-        return next((q.u_num for q in self.quantities if q.name == name and q.verdict == "converged"), None)
+        return next(
+            (q.u_num for q in self.quantities if q.name == name and q.verdict == "converged"), None
+        )
 
     def reason(self, name: str) -> str:
         """Why a quantity is not converged; of one that the runs do not have, why nothing is."""
@@ -115,8 +118,11 @@ class Numerical(Stored):
         return tuple(dict.fromkeys(q.reason for q in self.quantities if q.verdict != "converged"))
 
 
-def numerical_uncertainty(model: object, scene: Scene, history: History | None = None) -> Numerical | None:
-    """u_num of a model's run of a scene; None for a model that has neither a step nor a tolerance to change.
+def numerical_uncertainty(
+    model: object, scene: Scene, history: History | None = None
+) -> Numerical | None:
+    """u_num of a model's run of a scene; None for a model that has neither a step nor a tolerance
+    to change.
 
     `history` is the run at the model's own step, played here where it is not given. Three coarser
     runs (together 13/12 of its cost), or one of an event-based model at a hundredth of its
@@ -128,7 +134,10 @@ def numerical_uncertainty(model: object, scene: Scene, history: History | None =
         return Numerical(method="steps h, 2h, 3h and 4h", quantities=_from_steps(scene, runs))
     if isinstance(model, EventBased):
         given = history or model.simulate(scene)
-        return Numerical(method="a hundredth of the tolerance", quantities=_from_tolerance(scene, given, model.finer().simulate(scene)))
+        return Numerical(
+            method="a hundredth of the tolerance",
+            quantities=_from_tolerance(scene, given, model.finer().simulate(scene)),
+        )
     return None
 
 
@@ -207,7 +216,8 @@ def _outcome(history: History, reason: str = "") -> Quantity:
 
 
 def _between_rows(history: History) -> float:
-    """How far the largest |theta| may lie above that of the rows, rad: by the parabola through the highest three."""
+    """How far the largest |theta| may lie above that of the rows, rad: by the parabola through the
+    highest three."""
     theta = np.abs(history.channels["theta"])
     top = int(np.argmax(theta))
     if not 0 < top < len(theta) - 1:
@@ -216,7 +226,8 @@ def _between_rows(history: History) -> float:
 
 
 def _from_tolerance(scene: Scene, given: History, finer: History) -> tuple[Quantity, ...]:
-    """The change, times the factor of safety: the finer run errs, too, by a few hundredths of it."""
+    """The change, times the factor of safety: the finer run errs, too, by a few hundredths of
+    it."""
     if _side(given) != _side(finer):
         return (_outcome(given, "the outcome changes with the tolerance"),)
     rms = _changes(scene, given, finer)["theta_rms"]
@@ -228,7 +239,8 @@ def _from_tolerance(scene: Scene, given: History, finer: History) -> tuple[Quant
 
 
 def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float]]:
-    """Name, unit and value of the scalar figures: peak rotation and last slip, or the time of the fall."""
+    """Name, unit and value of the scalar figures: peak rotation and last slip, or the time of the
+    fall."""
     if _side(history):
         return [("end_time", "s", float(history.channels["t"][-1]))]
     found = [("peak_rotation", "alpha", history.peak_rotation / scene.block.alpha)]
@@ -239,9 +251,17 @@ def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float]]:
 
 def _units(scene: Scene) -> dict[str, float]:
     """What a quantity is small against, by its unit."""
-    return {"alpha": 1.0, "m": scene.block.alpha * scene.block.radius, "s": 1.0 / scene.frequency_parameter}
+    return {
+        "alpha": 1.0,
+        "m": scene.block.alpha * scene.block.radius,
+        "s": 1.0 / scene.frequency_parameter,
+    }
 
 
 def _side(history: History) -> str:
     """The side it overturns to, empty where it stands."""
-    return history.outcome.removeprefix("overturned ") if history.outcome.startswith("overturned") else ""
+    return (
+        history.outcome.removeprefix("overturned ")
+        if history.outcome.startswith("overturned")
+        else ""
+    )

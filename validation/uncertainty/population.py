@@ -373,12 +373,14 @@ def sensitivities(
         found = sobol_indices(**how, rng=np.random.default_rng(seed))
     except TypeError:  # scipy before 1.15 calls it random_state
         found = sobol_indices(**how, random_state=np.random.default_rng(seed))
-    first, total = found.first_order[0].tolist(), found.total_order[0].tolist()
+    first, total = found.first_order[0], found.total_order[0]
+    if not np.any(total):
+        return ()
     rows = [
-        Sensitivity(name=name, first=a, total=b)
+        Sensitivity(name=name, first=float(a), total=float(b))
         for name, a, b in zip(given.names, first, total, strict=True)
     ]
-    return tuple(sorted(rows, key=lambda row: -row.total)) if any(total) else ()
+    return tuple(sorted(rows, key=lambda row: -row.total))
 
 
 def _ends(values: Floats | list[float]) -> tuple[float, float]:

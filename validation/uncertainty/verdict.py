@@ -9,7 +9,8 @@
 | E > u_val | not explained: model form or set-up, at least E - u_val |
 | u_num is not known | could not be judged: not converged |
 
-It stands beside the verdict of a tolerance and never replaces it. All uncertainties are expanded (95 %).
+It stands beside the verdict of a tolerance and never replaces it. All uncertainties are expanded
+(95 %).
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ NOT_CONVERGED = "not converged"
 class Explanation(Stored):
     """The difference of one quantity from the reference's, its uncertainties, and what they say.
 
-    `error` is |S - D| (for theta_rms the RMS difference itself); a `u_num` of None means that the run is not converged.
+    `error` is |S - D| (for theta_rms the RMS difference itself); a `u_num` of None means that the
+    run is not converged.
     """
 
     quantity: str
@@ -62,7 +64,8 @@ def explain(
     reason: str = "",
     against: str = "",
 ) -> Explanation:
-    """The verdict on a difference; `u_num` holds both runs' numerical uncertainties, `reason` why it is None, `against` the reference."""
+    """The verdict on a difference; `u_num` holds both runs' numerical uncertainties, `reason` why
+    it is None, `against` the reference."""
     verdict = _verdict(unit, error, u_num, u_input, u_data)
     return Explanation(
         quantity=quantity,
@@ -77,7 +80,9 @@ def explain(
     )
 
 
-def _verdict(unit: str, error: float | None, u_num: float | None, u_input: float, u_data: float) -> str:
+def _verdict(
+    unit: str, error: float | None, u_num: float | None, u_input: float, u_data: float
+) -> str:
     if u_num is None or error is None:
         return NOT_CONVERGED
     if error <= u_num:

@@ -1,17 +1,21 @@
-"""Impacts where the floor can only push: Newton's restitution with Coulomb friction at every contact that is touched.
+"""Impacts where the floor can only push: Newton's restitution with Coulomb friction at every
+contact that is touched.
 
-In the pivot's frame (see ebm.core.motion), natural units. Six contacts: the pivot F and the other bottom corner E on the floor, the
-top and bottom corner on the tip wall, the bottom and top corner on the far wall; E and the second corner of a wall touch
-only at theta = 0.
+In the pivot's frame (see ebm.core.motion), natural units. Six contacts: the pivot F and the other
+bottom corner E on the floor, the top and bottom corner on the tip wall, the bottom and top corner
+on the far wall; E and the second corner of a wall touch only at theta = 0.
 
-Contacts that touch at one instant strike in *stages*, until none approaches. A law of impacts says which contacts take part in a
-stage, the set A. In it the impulses p_j and the velocities u_j across the contacts obey
+Contacts that touch at one instant strike in *stages*, until none approaches. A law of impacts says
+which contacts take part in a stage, the set A. In it the impulses p_j and the velocities u_j across
+the contacts obey
 
     0 <= p_j  complementary to  u_j+ - e_j max(-u_j-, 0) >= 0,    |T| <= mu sum P on the floor.
 
-- "moreau": whatever touches takes part; at an elastic wall (e = 1), where nothing rests, only the corners that approach. The first of
+- "moreau": whatever touches takes part; at an elastic wall (e = 1), where nothing rests, only the
+  corners that approach. The first of
   these is the branch "closed", the second "open", whatever e.
-- "floor-first": one contact after another, in the order of neighbouring trajectories: first the floor, then each wall corner when
+- "floor-first": one contact after another, in the order of neighbouring trajectories: first the
+  floor, then each wall corner when
   it would arrive had the wall stood a little farther off.
 - "leading-first", "trailing-first": as "moreau", but of two bottom corners that approach the floor
   together only one takes part, that on the side to which the block slides or the other one. On a
@@ -49,24 +53,29 @@ _TANGENT = 6
 _NONE, _STICK, _PLUS, _MINUS = range(4)
 # Every set of at most three contacts: their number, the contacts, and these as bits.
 _CHOSEN = [some for n in range(4) for some in itertools.combinations(range(CONTACTS), n)]
-_SETS = np.array([[len(some), *some, *[0] * (3 - len(some)), sum(1 << j for j in some)] for some in _CHOSEN])
+_SETS = np.array(
+    [[len(some), *some, *[0] * (3 - len(some)), sum(1 << j for j in some)] for some in _CHOSEN]
+)
 # By the contacts that take part, as bits: the sets of no others, by their numbers, and then -1.
 _WITHIN = np.full((1 << CONTACTS, len(_SETS) + 1), -1, dtype=np.int8)
 for _bits in range(1 << CONTACTS):
     _inside = np.flatnonzero(_SETS[:, 4] & ~_bits == 0)
     _WITHIN[_bits, : len(_inside)] = _inside
 _ON_FLOOR = 1 << F | 1 << E
-# Rounding of a velocity, of the velocities at play; rows of contacts that are nearer to parallel than this give no solution.
+# Rounding of a velocity, of the velocities at play; rows of contacts that are nearer to parallel
+# than this give no solution.
 _ROUNDING, _PARALLEL = NOISE[POSITION], CLOSED
 _MOST_STAGES = 40
-#: What came of an impact: all stages obey the law; a stage only violates it by least; or the stages do not end.
+#: What came of an impact: all stages obey the law; a stage only violates it by least; or the stages
+#: do not end.
 ENDLESS, FITS, LEAST_WRONG = range(3)
 _HALVINGS = 45
 
 
 @inner_kernel
 def contact_rows(b, sense, phi, rows):
-    """Writes rows (xi, y, phi) of the six normal contacts and, last, of the floor's tangent, for a block that tips by phi to `sense`."""
+    """Writes rows (xi, y, phi) of the six normal contacts and, last, of the floor's tangent, for a
+    block that tips by phi to `sense`."""
     pivot, other = side_of(b, sense), side_of(b, -sense)
     s, c = pivot.radius * math.sin(pivot.alpha - phi), pivot.radius * math.cos(pivot.alpha - phi)
     rows[:] = 0.0
@@ -92,7 +101,8 @@ def _mass_dot(spin, row, column):
 
 @inner_kernel
 def kinetic_energy(spin, v):
-    """Kinetic energy of velocities (xi, y, phi), per unit mass; `spin` is one over the moment of inertia."""
+    """Kinetic energy of velocities (xi, y, phi), per unit mass; `spin` is one over the moment of
+    inertia."""
     return 0.5 * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] / spin)
 
 
@@ -103,9 +113,11 @@ def _size(v):
 
 @inner_kernel
 def solve(system, n):
-    """Solves the n x n system whose right-hand side is column n, in place, by elimination; False where it is singular.
+    """Solves the n x n system whose right-hand side is column n, in place, by elimination; False
+    where it is singular.
 
-    The residual is rounding even where the solution is ill-conditioned, which an inverse does not give.
+    The residual is rounding even where the solution is ill-conditioned, which an inverse does not
+    give.
     """
     for k in range(n):
         best = k
@@ -129,7 +141,8 @@ def solve(system, n):
 
 @inner_kernel
 def _fits(number, friction, slippery):
-    """Whether a set is to be tried with this friction: at most three unknowns, friction where the floor is in it."""
+    """Whether a set is to be tried with this friction: at most three unknowns, friction where the
+    floor is in it."""
     on_floor = _SETS[number, 4] & _ON_FLOOR != 0
     if friction == _STICK:
         return on_floor and _SETS[number, 0] <= 2
@@ -138,13 +151,15 @@ def _fits(number, friction, slippery):
 
 @inner_kernel
 def _push(rows, index, kappa, k):
-    """What a contact's impulse does to velocity k, times the mass: its row, and of a slipping floor's the friction."""
+    """What a contact's impulse does to velocity k, times the mass: its row, and of a slipping
+    floor's the friction."""
     return rows[index, k] - (kappa * rows[_TANGENT, k] if index <= E else 0.0)
 
 
 @inner_kernel
 def _try_set(rows, spin, number, friction, target, mu_k, v, system, trial, lam):
-    """The impulses of the contacts in the set, and the velocities after them; False where there are none."""
+    """The impulses of the contacts in the set, and the velocities after them; False where there are
+    none."""
     count = _SETS[number, 0]
     n = count + (1 if friction == _STICK else 0)
     kappa = mu_k if friction == _PLUS else (-mu_k if friction == _MINUS else 0.0)
@@ -155,7 +170,9 @@ def _try_set(rows, spin, number, friction, target, mu_k, v, system, trial, lam):
             system[i, n] -= rows[row, k] * v[k]
         for j in range(n):
             column = _SETS[number, 1 + j] if j < count else _TANGENT
-            system[i, j] = rows[row, 0] * _push(rows, column, kappa, 0) + rows[row, 1] * _push(rows, column, kappa, 1)
+            system[i, j] = rows[row, 0] * _push(rows, column, kappa, 0) + rows[row, 1] * _push(
+                rows, column, kappa, 1
+            )
             system[i, j] += spin * rows[row, 2] * _push(rows, column, kappa, 2)
     if not solve(system, n):
         return False
@@ -171,7 +188,8 @@ def _try_set(rows, spin, number, friction, target, mu_k, v, system, trial, lam):
 
 @inner_kernel
 def _violation(rows, number, friction, taking, target, mu_s, trial, lam):
-    """By how much a solution violates the law: a pull, a contact that still closes, friction beyond its cone or in the wrong sense."""
+    """By how much a solution violates the law: a pull, a contact that still closes, friction beyond
+    its cone or in the wrong sense."""
     count = _SETS[number, 0]
     worst = 0.0
     floor_normal = 0.0
@@ -192,10 +210,12 @@ def _violation(rows, number, friction, taking, target, mu_s, trial, lam):
 
 @called_kernel
 def _strike(rows, spin, taking, target, mu_s, mu_k, v, after, impulse, system):
-    """One stage over the contacts in `taking`: writes the velocities after it and the impulses; False where only the least wrong fits.
+    """One stage over the contacts in `taking`: writes the velocities after it and the impulses;
+    False where only the least wrong fits.
 
-    Every set of contacts is tried with every friction. Of those that obey the law the one that leaves the least energy is taken; where
-    none does, but for rounding or for friction that jams (Painleve), the one that contradicts it least.
+    Every set of contacts is tried with every friction. Of those that obey the law the one that
+    leaves the least energy is taken; where none does, but for rounding or for friction that jams
+    (Painleve), the one that contradicts it least.
     """
     least, lowest = np.inf, np.inf
     lam, trial = system[3], system[4]
@@ -207,13 +227,17 @@ def _strike(rows, spin, taking, target, mu_s, mu_k, v, after, impulse, system):
         if number < 0:
             break
         for friction in range(4):
-            if not _fits(number, friction, mu_s == 0.0) or not _try_set(rows, spin, number, friction, target, mu_k, v, system, trial, lam):
+            if not _fits(number, friction, mu_s == 0.0) or not _try_set(
+                rows, spin, number, friction, target, mu_k, v, system, trial, lam
+            ):
                 continue
             scale = _size(v) + _size(trial) + _size(lam)
             wrong = _violation(rows, number, friction, taking, target, mu_s, trial, lam)
             wrong = 0.0 if wrong <= _ROUNDING * scale else wrong
             energy = kinetic_energy(spin, trial)
-            if not wrong < least and not (wrong == least and energy < lowest - _ROUNDING * scale * scale):
+            if not wrong < least and not (
+                wrong == least and energy < lowest - _ROUNDING * scale * scale
+            ):
                 continue
             least, lowest = wrong, energy
             impulse[:] = 0.0
@@ -231,12 +255,15 @@ def _moreau(law, touching, approach, restitution, rounding, taking):
     """Whatever touches takes part; at an elastic wall only the corners that approach."""
     for j in range(CONTACTS):
         rests = law != OPEN_BRANCH and (law == CLOSED_BRANCH or restitution[j] < 1.0)
-        taking[j] = 1.0 if touching[j] != 0.0 and (j <= E or approach[j] < -rounding or rests) else 0.0
+        taking[j] = (
+            1.0 if touching[j] != 0.0 and (j <= E or approach[j] < -rounding or rests) else 0.0
+        )
 
 
 @inner_kernel
 def _one_corner(law, approach, slip, taking):
-    """Of two bottom corners that approach the floor only the one that the law puts first takes part.
+    """Of two bottom corners that approach the floor only the one that the law puts first takes
+    part.
 
     F stands on the side of negative slip. Without slip neither leads, and both take part.
     """
@@ -248,9 +275,11 @@ def _one_corner(law, approach, slip, taking):
 
 @inner_kernel
 def _floor_first(touching, approach, stage, rounding, ahead, taking):
-    """The contacts that are struck next, in the order of a neighbouring trajectory, and those that rest meanwhile.
+    """The contacts that are struck next, in the order of a neighbouring trajectory, and those that
+    rest meanwhile.
 
-    `ahead` keeps how far each contact is from its next impact there: where the floor is struck first, a wall is one unit away.
+    `ahead` keeps how far each contact is from its next impact there: where the floor is struck
+    first, a wall is one unit away.
     """
     floor = approach[F] < -rounding or approach[E] < -rounding
     if stage == 0:
@@ -272,14 +301,18 @@ def _floor_first(touching, approach, stage, rounding, ahead, taking):
 
 @called_kernel
 def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, tally, work):
-    """All stages at one instant; v (xi, y, phi rates) becomes the velocities after them. Returns FITS, LEAST_WRONG or ENDLESS.
+    """All stages at one instant; v (xi, y, phi rates) becomes the velocities after them. Returns
+    FITS, LEAST_WRONG or ENDLESS.
 
-    The block tips by phi to `sense`. `touching[6]` says which gaps are closed (not 0), `resting` is the approach speed below which a
-    contact closes for good. `work` is scratch, such as that of the root search: `WORK` rows.
-    `impulse[2]` gathers the normal impulses of floor and walls; `tally[0]` counts stages that added energy and `tally[1]` keeps the
-    largest relative gain.
+    The block tips by phi to `sense`. `touching[6]` says which gaps are closed (not 0), `resting` is
+    the approach speed below which a contact closes for good. `work` is scratch, such as that of the
+    root search: `WORK` rows. `impulse[2]` gathers the normal impulses of floor and walls;
+    `tally[0]` counts stages that added energy and `tally[1]` keeps the largest relative gain.
     """
-    rows, system = work[:7], work[7:12]  # the impulses and velocities of a trial stand below the system
+    rows, system = (
+        work[:7],
+        work[7:12],
+    )  # the impulses and velocities of a trial stand below the system
     restitution, target, part, approach, ahead, after, taking, full = (
         work[12], work[13], work[14], work[15], work[16], work[17], work[18], work[19]
     )  # fmt: skip
@@ -289,12 +322,16 @@ def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, t
     rounding = _ROUNDING * _size(v)
     found = FITS
     for stage in range(_MOST_STAGES):
-        plastic = 2 * stage >= _MOST_STAGES  # impacts that alternate between floor and wall without end become plastic
+        plastic = (
+            2 * stage >= _MOST_STAGES
+        )  # impacts that alternate between floor and wall without end become plastic
         closes = False
         for j in range(CONTACTS):
             approach[j] = _dot(rows[j], v) if touching[j] != 0.0 else 0.0
             closes = closes or approach[j] < -rounding
-            restitution[j] = 0.0 if plastic else (b.e_floor if j <= E else (e_tip if j <= TIP_BOTTOM else e_far))
+            restitution[j] = (
+                0.0 if plastic else (b.e_floor if j <= E else (e_tip if j <= TIP_BOTTOM else e_far))
+            )
         if not closes:
             _close(rows, b.spin, touching, resting, v, system)
             return found
@@ -305,7 +342,11 @@ def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, t
             _moreau(law, touching, approach, restitution, rounding, taking)
             _one_corner(law, approach, _dot(rows[_TANGENT], v), taking)
         for j in range(CONTACTS):
-            target[j] = -restitution[j] * approach[j] if taking[j] != 0.0 and approach[j] < -resting else 0.0
+            target[j] = (
+                -restitution[j] * approach[j]
+                if taking[j] != 0.0 and approach[j] < -resting
+                else 0.0
+            )
         before = kinetic_energy(b.spin, v)
         if not _strike(rows, b.spin, taking, target, b.mu_s, b.mu_k, v, after, part, system):
             found = LEAST_WRONG
@@ -321,7 +362,8 @@ def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, t
         for k in range(3):
             v[k] = after[k]
     if touching[TIP_TOP] != 0.0 and touching[FAR_BOTTOM] != 0.0:
-        # Its diagonal just fits between two walls, with a lever so short that no impulse can be solved for: it jams.
+        # Its diagonal just fits between two walls, with a lever so short that no impulse can be
+        # solved for: it jams.
         v[0] = v[2] = 0.0
     return ENDLESS
 
@@ -345,7 +387,8 @@ def _strike_without_gain(b, rows, taking, target, v, after, part, system, before
 
 @called_kernel
 def _close(rows, spin, touching, resting, v, system):
-    """Contacts that part more slowly than `resting` are closed: the velocity is projected onto them, mass-orthogonally."""
+    """Contacts that part more slowly than `resting` are closed: the velocity is projected onto
+    them, mass-orthogonally."""
     members, count = system[3], 0
     for j in range(CONTACTS):
         if touching[j] != 0.0 and count < 3 and abs(_dot(rows[j], v)) < resting:

@@ -1,10 +1,13 @@
-"""The paper's impact laws, for the pivot that never leaves the floor: floor impact and the wall impact cascade of Fig. 3.
+"""The paper's impact laws, for the pivot that never leaves the floor: floor impact and the wall
+impact cascade of Fig. 3.
 
-Natural units (lengths in R, accelerations in g, unit mass), base frame. S is the pivot (+1 lower left), Sw the wall (+1
-left), w the angular velocity, xdot the horizontal velocity of the mass's centre, v the pivot's slip velocity, s and c the horizontal
-and vertical distance of the mass's centre from the pivot, c' its vertical one from the corner on the wall: sin(alpha - |theta|),
-cos(alpha - |theta|) and cos(alpha + |theta|) of a homogeneous block. k = 1/(I + R^2) is 3/4 then, `spin` = 1/I is 3.
-Index 1 is before the impact, 2 after it; P and Q are the impulses of the floor on the pivot.
+Natural units (lengths in R, accelerations in g, unit mass), base frame. S is the pivot (+1 lower
+left), Sw the wall (+1 left), w the angular velocity, xdot the horizontal velocity of the mass's
+centre, v the pivot's slip velocity, s and c the horizontal and vertical distance of the mass's
+centre from the pivot, c' its vertical one from the corner on the wall: sin(alpha - |theta|),
+cos(alpha - |theta|) and cos(alpha + |theta|) of a homogeneous block. k = 1/(I + R^2) is 3/4 then,
+`spin` = 1/I is 3. Index 1 is before the impact, 2 after it; P and Q are the impulses of the floor
+on the pivot.
 """
 
 from __future__ import annotations
@@ -23,9 +26,11 @@ A_STICK, B_STICK, C_STICK, D_SLIP, E_SLIP, NO_BRANCH = range(6)
 
 @inner_kernel
 def floor_stick(s1, s2, c, k2, S2, w1, v1):
-    """Floor impact on the other corner, which sticks (e_g = 0): w2, P, Q; s1, s2, k2 of the old and the new pivot.
+    """Floor impact on the other corner, which sticks (e_g = 0): w2, P, Q; s1, s2, k2 of the old and
+    the new pivot.
 
-    The angular momentum about the new pivot stays what it is: with v1 = 0, w2/w1 = 1 - k2 s2 (s1 + s2), Housner's ratio 1 - 1.5 s^2.
+    The angular momentum about the new pivot stays what it is: with v1 = 0, w2/w1 = 1 - k2 s2 (s1 +
+    s2), Housner's ratio 1 - 1.5 s^2.
     """
     w2 = (1.0 - k2 * (s1 + s2) * s2) * w1 - k2 * c * v1
     return w2, S2 * (s2 * (w1 + w2) + (s1 - s2) * w1), c * (w1 - w2) - v1
@@ -33,7 +38,8 @@ def floor_stick(s1, s2, c, k2, S2, w1, v1):
 
 @inner_kernel
 def floor_slip(s1, s2, c, spin, S2, d, mu_k, w1, v1):
-    """Floor impact on the other corner, which slips toward d (e_g = 0): w2, v2, P; s1, s2 of the old and the new pivot."""
+    """Floor impact on the other corner, which slips toward d (e_g = 0): w2, v2, P; s1, s2 of the
+    old and the new pivot."""
     old, new = s1 * s2 + mu_k * d * S2 * s1 * c, s2 * s2 + mu_k * d * S2 * s2 * c
     w2 = w1 * (1.0 - spin * old) / (1.0 + spin * new)
     p = (s1 + s2) * abs(w1) / (1.0 + spin * new)
@@ -42,10 +48,11 @@ def floor_slip(s1, s2, c, spin, S2, d, mu_k, w1, v1):
 
 @inner_kernel
 def floor_impact(b, S1, w1, v1, mu_s, mu_k):
-    """Floor impact as theta passes zero, from pivot S1 of the block b (a `Setting`) to -S1: form (STICK, SLIP, FLAT_END), w2, v2, P.
+    """Floor impact as theta passes zero, from pivot S1 of the block b (a `Setting`) to -S1: form
+    (STICK, SLIP, FLAT_END), w2, v2, P.
 
-    Sticks if it can, else slips against the friction; where neither lets the block turn on it stays flat (squat blocks, much
-    friction), and v2 is then the velocity with which it slides.
+    Sticks if it can, else slips against the friction; where neither lets the block turn on it stays
+    flat (squat blocks, much friction), and v2 is then the velocity with which it slides.
     """
     S2 = -S1
     s1, s2, c, k2 = side_of(b, S1).arm, side_of(b, S2).arm, b.height, side_of(b, S2).share
@@ -62,11 +69,17 @@ def floor_impact(b, S1, w1, v1, mu_s, mu_k):
         if S2 * w2 >= 0.0 and d * v2 >= -rounding:
             return SLIP, w2, v2, p
     if turns and mu_s > mu_k and S2 * stuck[0] >= 0.0:
-        # Static friction above kinetic leaves a gap in which neither form is consistent: sticking is the nearer one.
+        # Static friction above kinetic leaves a gap in which neither form is consistent: sticking
+        # is the nearer one.
         return STICK, stuck[0], 0.0, stuck[1]
     p = s1 * abs(w1)
     xdot = v1 - c * w1
-    return FLAT_END, 0.0, (0.0 if abs(xdot) <= mu_s * p else xdot - math.copysign(mu_k * p, xdot)), p
+    return (
+        FLAT_END,
+        0.0,
+        (0.0 if abs(xdot) <= mu_s * p else xdot - math.copysign(mu_k * p, xdot)),
+        p,
+    )
 
 
 @inner_kernel
@@ -80,9 +93,12 @@ def wall_stick(S, Sw, s, c, C, spin, w1, xdot1, e):
 
 @inner_kernel
 def wall_slip(S, s, c, C, spin, w1, xdot1, e, mu_k, Sr, sy):
-    """(30): the corner rebounds with e, the pivot slips toward Sr under a P of sign sy: w2, xdot2, P, Q."""
+    """(30): the corner rebounds with e, the pivot slips toward Sr under a P of sign sy: w2, xdot2,
+    P, Q."""
     k = S * s + (c + C) * mu_k * Sr * sy
-    w2 = (w1 / spin + k * S * s * w1 - e * C * C * w1 + (1.0 + e) * C * xdot1) / (1.0 / spin + k * S * s + C * C)
+    w2 = (w1 / spin + k * S * s * w1 - e * C * C * w1 + (1.0 + e) * C * xdot1) / (
+        1.0 / spin + k * S * s + C * C
+    )
     p = S * s * (w2 - w1)
     return w2, C * w2 - e * (xdot1 - C * w1), p, -mu_k * Sr * sy * p
 
@@ -95,9 +111,11 @@ def _stops(branch, S, Sw, s, w1, xdot1):
 
 @inner_kernel
 def wall_impact(S, Sw, s, c, c_prime, share, spin, w1, xdot1, e, mu_s, mu_k, no_slip):
-    """A corner strikes the wall, case I (top, S = Sw) or II (bottom): branch, w2, xdot2, N, P, v2, after the cascade of Fig. 3.
+    """A corner strikes the wall, case I (top, S = Sw) or II (bottom): branch, w2, xdot2, N, P, v2,
+    after the cascade of Fig. 3.
 
-    `share` is the pivot's k, N >= 0 is the wall's impulse. (31) is the identity map while the pivot is on the floor, so it does not appear.
+    `share` is the pivot's k, N >= 0 is the wall's impulse. (31) is the identity map while the pivot
+    is on the floor, so it does not appear.
     """
     C = S * Sw * c_prime
     rounding = NOISE[POSITION] * (abs(w1) + abs(xdot1))
@@ -106,7 +124,9 @@ def wall_impact(S, Sw, s, c, c_prime, share, spin, w1, xdot1, e, mu_s, mu_k, no_
         n = Sw * (xdot2 - xdot1 - q)
         if n >= 0.0:  # (21)
             return A_STICK, w2, xdot2, n, p, 0.0
-        w2 = share * (w1 / spin - c * xdot1 + S * s * (S * s * w1))  # (27): no impulse from the wall
+        w2 = share * (
+            w1 / spin - c * xdot1 + S * s * (S * s * w1)
+        )  # (27): no impulse from the wall
         xdot2 = -c * w2
         if Sw * (xdot2 - C * w2) >= 0.0:  # (22)
             return B_STICK, w2, xdot2, 0.0, S * s * (w2 - w1), 0.0
@@ -121,7 +141,9 @@ def wall_impact(S, Sw, s, c, c_prime, share, spin, w1, xdot1, e, mu_s, mu_k, no_
             if n >= 0.0:
                 return D_SLIP, w2, xdot2, n, p, v2
             k = -mu_k * Sr * sy
-            if abs(k * S * s - C) <= CLOSED:  # friction and wall have one lever: no speed meets both
+            if (
+                abs(k * S * s - C) <= CLOSED
+            ):  # friction and wall have one lever: no speed meets both
                 return _stops(NO_BRANCH, S, Sw, s, w1, xdot1)
             w2 = (k * S * s * w1 - xdot1) / (k * S * s - C)  # (32)
             xdot2 = C * w2

@@ -1,7 +1,9 @@
-"""What an impact does to a block: the floor impact, a wall impact, or all contacts that touch at one instant.
+"""What an impact does to a block: the floor impact, a wall impact, or all contacts that touch at
+one instant.
 
-The bilateral pivot follows the paper's laws (`impacts`), one impact at a time. With the unilateral one every contact that touches
-takes part (`contact_impacts`). Either way slow rebounds end by the Zeno rule (ebm.core.settle). Natural units.
+The bilateral pivot follows the paper's laws (`impacts`), one impact at a time. With the unilateral
+one every contact that touches takes part (`contact_impacts`). Either way slow rebounds end by the
+Zeno rule (ebm.core.settle). Natural units.
 """
 
 from __future__ import annotations
@@ -38,7 +40,25 @@ from rockcheck.ebm.core.laws.contact_impacts import (
     contact_impact,
 )
 from rockcheck.ebm.core.modes import tips_first
-from rockcheck.ebm.core.motion import FAMILY, FAR, FLAT, FLOOR, HEIGHT, OFF, PULL, STICK, THETA, TILT, TIP, VX, VY, S, W, X, side_of
+from rockcheck.ebm.core.motion import (
+    FAMILY,
+    FAR,
+    FLAT,
+    FLOOR,
+    HEIGHT,
+    OFF,
+    PULL,
+    STICK,
+    THETA,
+    TILT,
+    TIP,
+    VX,
+    VY,
+    S,
+    W,
+    X,
+    side_of,
+)
 from rockcheck.ebm.core.rules import (
     ENDLESS_STAGES,
     FLAT_LANDING,
@@ -65,10 +85,18 @@ def rocks(m, sense):
 
 @inner_kernel
 def strike(b, m, z, which, gh, t, resting, impulse, gains, rules, work):
-    """Resolves the impact at the closing of gap `which`: what it was, and whether m is already the mode that follows. `work` is scratch."""
+    """Resolves the impact at the closing of gap `which`: what it was, and whether m is already the
+    mode that follows. `work` is scratch."""
     touch(b, m, z, which)
-    # Near phi = 0 the far gap goes with phi^2, so that its root says phi to the square root of rounding only.
-    if which == G_FAR_GAP and m[FAMILY] == TILT and z[THETA] * z[THETA] < CLOSED and m[S] * z[W] < 0.0 and closed_floor(b, z):
+    # Near phi = 0 the far gap goes with phi^2, so that its root says phi to the square root of
+    # rounding only.
+    if (
+        which == G_FAR_GAP
+        and m[FAMILY] == TILT
+        and z[THETA] * z[THETA] < CLOSED
+        and m[S] * z[W] < 0.0
+        and closed_floor(b, z)
+    ):
         rules[LANDS_ALONG] += 1
         which = G_PHI
     if which == G_PHI:
@@ -91,10 +119,12 @@ def strike(b, m, z, which, gh, t, resting, impulse, gains, rules, work):
 
 @inner_kernel
 def touch(b, m, z, which):
-    """Puts the block onto the contact whose gap has just closed: the series knows the gap to the tolerance only.
+    """Puts the block onto the contact whose gap has just closed: the series knows the gap to the
+    tolerance only.
 
-    A standing pivot keeps its place if the rotation can take up the correction. Otherwise the pivot would creep, impact by impact.
-    It stands after it, too: else it would approach the floor, or leave it, by as much as the correction.
+    A standing pivot keeps its place if the rotation can take up the correction. Otherwise the pivot
+    would creep, impact by impact. It stands after it, too: else it would approach the floor, or
+    leave it, by as much as the correction.
     """
     phi = abs(z[THETA])
     if which == G_LANDING:
@@ -103,10 +133,15 @@ def touch(b, m, z, which):
     elif which == G_TIP_GAP and m[FAMILY] == TILT and m[FLOOR] == STICK:
         sign, side = float(m[S]), side_of(b, m[S])
         pivot = sign * z[X] - side.radius * math.sin(side.alpha - phi)
-        arms = side.radius * math.cos(side.alpha - phi) + side.top_radius * math.cos(side.top_alpha + phi)
+        arms = side.radius * math.cos(side.alpha - phi) + side.top_radius * math.cos(
+            side.top_alpha + phi
+        )
         turned = phi + wall_gap(b, z, m[S]) / arms
         if turned > 0.0:
-            s, c = side.radius * math.sin(side.alpha - turned), side.radius * math.cos(side.alpha - turned)
+            s, c = (
+                side.radius * math.sin(side.alpha - turned),
+                side.radius * math.cos(side.alpha - turned),
+            )
             z[X], z[HEIGHT], z[THETA] = sign * (pivot + s), c, sign * turned
             z[VX], z[VY] = -c * z[W], s * sign * z[W]
         else:  # past upright it would stand on its other corner, without an impact
@@ -118,7 +153,8 @@ def touch(b, m, z, which):
 
 @inner_kernel
 def _settle_flat(b, z, resting, rules):
-    """An upright block with a spin below the settling speed lies flat. Along a wall such a spin is a slip, too, and is dropped with it."""
+    """An upright block with a spin below the settling speed lies flat. Along a wall such a spin is
+    a slip, too, and is dropped with it."""
     rules[SETTLES] += 1
     v = slip_velocity(b, z)
     z[VX] = v if abs(v) > max(resting, 4.0 * SETTLE) else 0.0
@@ -129,7 +165,8 @@ def _settle_flat(b, z, resting, rules):
 
 @inner_kernel
 def _floor_impact(b, m, z, resting, impulse, rules):
-    """Bilateral pivot: the block lands at theta = 0. Returns whether it is already known to rock on in m."""
+    """Bilateral pivot: the block lands at theta = 0. Returns whether it is already known to rock on
+    in m."""
     w1, v1 = z[W], slip_velocity(b, z)
     S1, c = m[S], b.height
     s1, s2 = side_of(b, S1).arm, side_of(b, -S1).arm
@@ -138,7 +175,8 @@ def _floor_impact(b, m, z, resting, impulse, rules):
         stop(z)
         return False
     if wall_gap(b, z, -S1) < CLOSED:
-        # Flush with the wall toward which it would rock: the closed branch of "moreau" (the paper is silent).
+        # Flush with the wall toward which it would rock: the closed branch of "moreau" (the paper
+        # is silent).
         rules[FLUSH_LANDING] += 1
         e = b.e_right if S1 > 0 else b.e_left
         impulse[0] = (1.0 + e) * s1 * abs(w1)
@@ -146,7 +184,9 @@ def _floor_impact(b, m, z, resting, impulse, rules):
         z[VX] = (-e * v1 if S1 * v1 > 0.0 else v1) - c * z[W]
         z[VY] = S1 * s1 * z[W]
         return False
-    form, w2, v2, p = impacts.floor_impact(b, S1, w1, v1, b.mu_s if not b.no_slip else np.inf, b.mu_k)
+    form, w2, v2, p = impacts.floor_impact(
+        b, S1, w1, v1, b.mu_s if not b.no_slip else np.inf, b.mu_k
+    )
     impulse[0] = p
     z[W], z[VX], z[VY] = w2, v2 - c * w2, -S1 * s2 * w2
     if form == impacts.STICK and abs(w2) > SETTLE:
@@ -157,8 +197,11 @@ def _floor_impact(b, m, z, resting, impulse, rules):
 
 @inner_kernel
 def _wall_impact(b, m, z, tip, resting, impulse, gains, rules):
-    """Bilateral pivot: a corner (case I, II) or the side (case III) strikes a wall. Returns whether m is already right."""
-    if between_walls(b, z) or m[TIP] != 0 or m[FAR] != 0:  # wedged: between both walls at once nothing rebounds
+    """Bilateral pivot: a corner (case I, II) or the side (case III) strikes a wall. Returns whether
+    m is already right."""
+    if (
+        between_walls(b, z) or m[TIP] != 0 or m[FAR] != 0
+    ):  # wedged: between both walls at once nothing rebounds
         rules[WEDGED] += 1
         impulse[1] = abs(z[VX])
         stop(z)
@@ -174,14 +217,21 @@ def _wall_impact(b, m, z, tip, resting, impulse, gains, rules):
 
 @inner_kernel
 def _corner_impact(b, m, z, sw, e, resting, impulse, gains):
-    """The paper's cascade for the corner at the tip wall (sw = 1) or the far wall (-1), in the pivot's frame."""
+    """The paper's cascade for the corner at the tip wall (sw = 1) or the far wall (-1), in the
+    pivot's frame."""
     phi, sign = abs(z[THETA]), float(m[S])
     side, other = side_of(b, m[S]), side_of(b, -m[S])
     s, c = side.radius * math.sin(side.alpha - phi), side.radius * math.cos(side.alpha - phi)
-    cp = side.top_radius * math.cos(side.top_alpha + phi) if sw > 0.0 else other.radius * math.cos(other.alpha + phi)
+    cp = (
+        side.top_radius * math.cos(side.top_alpha + phi)
+        if sw > 0.0
+        else other.radius * math.cos(other.alpha + phi)
+    )
     w1, xdot1 = sign * z[W], sign * z[VX]
     before = xdot1 * xdot1 + (s * w1) ** 2 + w1 * w1 / b.spin
-    branch, w2, xdot2, n, p, v2 = impacts.wall_impact(1.0, sw, s, c, cp, side.share, b.spin, w1, xdot1, e, b.mu_s, b.mu_k, b.no_slip)
+    branch, w2, xdot2, n, p, v2 = impacts.wall_impact(
+        1.0, sw, s, c, cp, side.share, b.spin, w1, xdot1, e, b.mu_s, b.mu_k, b.no_slip
+    )
     impulse[0], impulse[1] = abs(p), n
     count_gain(before, xdot2 * xdot2 + (s * w2) ** 2 + w2 * w2 / b.spin, gains)
     C = sw * cp
@@ -192,7 +242,9 @@ def _corner_impact(b, m, z, sw, e, resting, impulse, gains):
     if abs(xdot2 + c * w2) < SLOW:
         xdot2 = -c * w2
     z[W], z[VX], z[VY] = sign * w2, sign * xdot2, s * w2
-    flush = phi == 0.0 and stays and -resting < sw * xdot2 + c * w2 < 0.0  # its side: the other corner follows
+    flush = (
+        phi == 0.0 and stays and -resting < sw * xdot2 + c * w2 < 0.0
+    )  # its side: the other corner follows
     if (b.no_slip and stays) or flush:
         stop(z)
     if not stays and v2 == 0.0:
@@ -203,7 +255,8 @@ def _corner_impact(b, m, z, sw, e, resting, impulse, gains):
 
 @inner_kernel
 def count_gain(before, after, gains):
-    """Counts an impact that added energy; `gains` keeps their number and the largest relative gain."""
+    """Counts an impact that added energy; `gains` keeps their number and the largest relative
+    gain."""
     if after > before * (1.0 + 10.0 * NOISE[POSITION]):
         gains[0] += 1.0
         gains[1] = max(gains[1], after / before - 1.0)
@@ -211,7 +264,8 @@ def count_gain(before, after, gains):
 
 @inner_kernel
 def _strike_by(law, b, m, z, gh, t, resting, impulse, gains, rules, work):
-    """Resolves all contacts. Where there is no law for them the code for it is not even compiled: numba looks at arguments only."""
+    """Resolves all contacts. Where there is no law for them the code for it is not even compiled:
+    numba looks at arguments only."""
     if law is not None:
         _strike_all(b, m, z, gh, t, resting, impulse, gains, rules, work)
 
@@ -222,10 +276,18 @@ def _strike_all(b, m, z, gh, t, resting, impulse, gains, rules, work):
     sign = float(tips_first(b, z, gh, t) if m[FAMILY] == FLAT else m[S])
     phi = abs(z[THETA])
     flat = z[THETA] == 0.0
-    floor, tip, far = abs(floor_gap(b, z)) < CLOSED, abs(wall_gap(b, z, sign)) < CLOSED, abs(wall_gap(b, z, -sign)) < CLOSED
+    floor, tip, far = (
+        abs(floor_gap(b, z)) < CLOSED,
+        abs(wall_gap(b, z, sign)) < CLOSED,
+        abs(wall_gap(b, z, -sign)) < CLOSED,
+    )
     touching, v = work[WORK], work[WORK + 1]
     touching[F], touching[TIP_TOP], touching[FAR_BOTTOM] = floor, tip, far
-    touching[E], touching[TIP_BOTTOM], touching[FAR_TOP] = flat and floor, flat and tip, flat and far
+    touching[E], touching[TIP_BOTTOM], touching[FAR_TOP] = (
+        flat and floor,
+        flat and tip,
+        flat and far,
+    )
     v[0], v[1], v[2] = sign * z[VX], z[VY], sign * z[W]
     slower = v[1] + max(side_of(b, -sign).arm * v[2], -side_of(b, sign).arm * v[2])
     rules[FLAT_LANDING] += flat and floor and slower < -SLOW

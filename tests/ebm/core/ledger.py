@@ -15,14 +15,21 @@ from rockcheck.ebm.core import rules
 FOLDER = Path(rockcheck.ebm.__file__).parent
 #: What counts as a small number, and the zeros: where they are defined, and of what.
 SMALL = 2e-3
-ZEROS = {"position": ("core/contacts.py", "CLOSED"), "velocity": ("core/contacts.py", "SLOW"), "time": ("core/series.py", "INSTANT")}
+ZEROS = {
+    "position": ("core/contacts.py", "CLOSED"),
+    "velocity": ("core/contacts.py", "SLOW"),
+    "time": ("core/series.py", "INSTANT"),
+}
 #: Statements and expressions at which a path divides, as ruff's C901 counts them.
 _BRANCHES = (ast.If, ast.For, ast.While, ast.ExceptHandler, ast.comprehension, ast.match_case)
 
 
 def sources() -> dict[str, ast.Module]:
     """The modules of the package, parsed, by path in it."""
-    return {path.relative_to(FOLDER).as_posix(): ast.parse(path.read_text(encoding="utf-8")) for path in sorted(FOLDER.rglob("*.py"))}
+    return {
+        path.relative_to(FOLDER).as_posix(): ast.parse(path.read_text(encoding="utf-8"))
+        for path in sorted(FOLDER.rglob("*.py"))
+    }
 
 
 def small_numbers() -> list[tuple[str, int, float]]:
@@ -31,7 +38,9 @@ def small_numbers() -> list[tuple[str, int, float]]:
         (name, node.lineno, node.value)
         for name, tree in sources().items()
         for node in ast.walk(tree)
-        if isinstance(node, ast.Constant) and isinstance(node.value, float) and 0.0 < abs(node.value) < SMALL
+        if isinstance(node, ast.Constant)
+        and isinstance(node.value, float)
+        and 0.0 < abs(node.value) < SMALL
     ]
 
 
@@ -41,20 +50,39 @@ def homes(rule: str) -> set[str]:
     for name, tree in sources().items():
         for node in ast.walk(tree):
             if isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Subscript):
-                found |= {name for part in ast.walk(node.target.slice) if isinstance(part, ast.Name) and part.id == rule}
+                found |= {
+                    name
+                    for part in ast.walk(node.target.slice)
+                    if isinstance(part, ast.Name) and part.id == rule
+                }
     return found
 
 
 def names_of_rules() -> dict[str, str]:
     """The constants of ebm.core.rules and the names that they stand for."""
-    constants = {key: value for key, value in vars(rules).items() if key.isupper() and isinstance(value, int) and key != "RULES"}
-    return {key: rules.NAMES[value] for key, value in sorted(constants.items(), key=lambda item: item[1])}
+    constants = {
+        key: value
+        for key, value in vars(rules).items()
+        if key.isupper() and isinstance(value, int) and key != "RULES"
+    }
+    return {
+        key: rules.NAMES[value]
+        for key, value in sorted(constants.items(), key=lambda item: item[1])
+    }
 
 
 def complexities() -> list[tuple[int, str]]:
     """Cyclomatic complexity of every function, the largest first."""
-    functions = [(name, node) for name, tree in sources().items() for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
-    sizes = ((1 + sum(isinstance(part, _BRANCHES) for part in ast.walk(node)), f"{name} {node.name}") for name, node in functions)
+    functions = [
+        (name, node)
+        for name, tree in sources().items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef)
+    ]
+    sizes = (
+        (1 + sum(isinstance(part, _BRANCHES) for part in ast.walk(node)), f"{name} {node.name}")
+        for name, node in functions
+    )
     return sorted(sizes, reverse=True)
 
 
@@ -67,7 +95,9 @@ def lines() -> Iterator[str]:
     names = names_of_rules()
     yield f"modelling choices: {len(names)}"
     yield from (f"  {name} ({', '.join(sorted(homes(key)))})" for key, name in names.items())
-    yield "most complex functions: " + ", ".join(f"{where} {size}" for size, where in complexities()[:3])
+    yield "most complex functions: " + ", ".join(
+        f"{where} {size}" for size, where in complexities()[:3]
+    )
 
 
 if __name__ == "__main__":

@@ -1,6 +1,8 @@
-"""The parts of the event core by themselves: roots and signs of polynomials, guards, and the mode that follows.
+"""The parts of the event core by themselves: roots and signs of polynomials, guards, and the mode
+that follows.
 
-`Core` is all that these tests know of how the core is called: a core of another shape is met there, and nowhere else.
+`Core` is all that these tests know of how the core is called: a core of another shape is met there,
+and nowhere else.
 """
 
 from __future__ import annotations
@@ -51,7 +53,9 @@ class Core:
     """The core as these tests call it. Natural units: R, g, sqrt(R/g)."""
 
     @staticmethod
-    def first_root(coefficients, h: float, noise: float = series.NOISE[series.POSITION]) -> float | None:
+    def first_root(
+        coefficients, h: float, noise: float = series.NOISE[series.POSITION]
+    ) -> float | None:
         """First time in [0, h] at which the polynomial (constant first) turns negative."""
         row, stack = _row(coefficients), np.zeros((48, series.WIDTH))
         found = series.first_root(row, 0, len(coefficients) - 1, h, h, noise, series.AHEAD, stack)
@@ -64,35 +68,72 @@ class Core:
 
     def __init__(self, scene: Scene, pivot: str, friction: str = "coulomb") -> None:
         assert scene.gravity == scene.block.radius == 1.0
-        self.setting = natural.setting_of(scene, unilateral=pivot == "unilateral", no_slip=friction == "no-slip", energy_cap=False)
+        self.setting = natural.setting_of(
+            scene, unilateral=pivot == "unilateral", no_slip=friction == "no-slip", energy_cap=False
+        )
         self.grounds = natural.grounds_of(scene)
         self.work = motion.workspace()[0]
 
     def select(self, state) -> Mode | None:
         """The mode in which the state (x, y, theta and their rates) goes on."""
-        m, tried, memory = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.zeros(modes.MODES, dtype=bool), np.zeros(modes.MEMORY)
+        m, tried, memory = (
+            np.zeros(motion.MODE_SIZE, dtype=np.int64),
+            np.zeros(modes.MODES, dtype=bool),
+            np.zeros(modes.MEMORY),
+        )
         modes.forget(tried, memory, 0.0)
         chosen = np.zeros(rules.RULES, dtype=np.int64)
-        if not modes.select(self.setting, np.array(state), *self.grounds, 0.0, m, tried, memory, chosen, self.work):
+        if not modes.select(
+            self.setting, np.array(state), *self.grounds, 0.0, m, tried, memory, chosen, self.work
+        ):
             return None
         if chosen[rules.LEAST_CONTRADICTION]:
             return None
         floor = {motion.OFF: "off", motion.STICK: "stick", motion.SLIPPING: "slip"}[m[motion.FLOOR]]
         at = (bool(m[motion.TIP]), bool(m[motion.FAR]))
-        return Mode(m[motion.FAMILY] == motion.TILT, int(m[motion.S]), floor, int(m[motion.SLIP]), int(m[motion.PULL]), *at)
+        return Mode(
+            m[motion.FAMILY] == motion.TILT,
+            int(m[motion.S]),
+            floor,
+            int(m[motion.SLIP]),
+            int(m[motion.PULL]),
+            *at,
+        )
 
     def guards(self, mode: Mode, state) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-        """Guards of a tilted mode as polynomials of time, and the motion (phi, xi, y) that they follow."""
+        """Guards of a tilted mode as polynomials of time, and the motion (phi, xi, y) that they
+        follow."""
         m = np.zeros(motion.MODE_SIZE, dtype=np.int64)
-        m[motion.FAMILY], m[motion.S], m[motion.SLIP], m[motion.PULL] = motion.TILT, mode.side, mode.slip, mode.pull
-        m[motion.FLOOR] = {"off": motion.OFF, "stick": motion.STICK, "slip": motion.SLIPPING}[mode.floor]
+        m[motion.FAMILY], m[motion.S], m[motion.SLIP], m[motion.PULL] = (
+            motion.TILT,
+            mode.side,
+            mode.slip,
+            mode.pull,
+        )
+        m[motion.FLOOR] = {"off": motion.OFF, "stick": motion.STICK, "slip": motion.SLIPPING}[
+            mode.floor
+        ]
         m[motion.TIP], m[motion.FAR] = mode.tip, mode.far
         z = np.array(state)
-        order = motion.tilt_series(self.setting, m, z, *self.grounds, 0.0, ORDER, 0.0, 0.0, self.work)
+        order = motion.tilt_series(
+            self.setting, m, z, *self.grounds, 0.0, ORDER, 0.0, 0.0, self.work
+        )
         pivot = mode.side * z[0] - self.work[motion.SIN, 0]
-        names = {"far gap": guards.G_FAR_GAP, "tip gap": guards.G_TIP_GAP, "landing": guards.G_LANDING}
-        names |= {"push": guards.G_PUSH, "tip push": guards.G_TIP_PUSH, "far push": guards.G_FAR_PUSH}
-        names |= {"cone +": guards.G_CONE_PLUS, "cone -": guards.G_CONE_MINUS, "slip": guards.G_SLIP}
+        names = {
+            "far gap": guards.G_FAR_GAP,
+            "tip gap": guards.G_TIP_GAP,
+            "landing": guards.G_LANDING,
+        }
+        names |= {
+            "push": guards.G_PUSH,
+            "tip push": guards.G_TIP_PUSH,
+            "far push": guards.G_FAR_PUSH,
+        }
+        names |= {
+            "cone +": guards.G_CONE_PLUS,
+            "cone -": guards.G_CONE_MINUS,
+            "slip": guards.G_SLIP,
+        }
         names |= {"topple": guards.G_TOPPLE, "phi": guards.G_PHI}
         guards.fill_guards(self.setting, m, pivot, self.work)
         found = {}
@@ -104,7 +145,10 @@ class Core:
         rows = {"phi": self.work[motion.PHI, : order + 1].copy()}
         xi = self.work[motion.SIN if rock else motion.XI, : order + 1].copy()
         xi[0] += pivot if rock else 0.0
-        return found, rows | {"xi": xi, "y": self.work[motion.COS if rock else motion.Y, : order + 1].copy()}
+        return found, rows | {
+            "xi": xi,
+            "y": self.work[motion.COS if rock else motion.Y, : order + 1].copy(),
+        }
 
 
 def _row(coefficients) -> np.ndarray:
@@ -141,7 +185,11 @@ def test_first_root_of_random_polynomials(noise):
         c[0] = abs(c[0]) + 0.01
         roots = np.roots(c[::-1])
         near = roots[np.abs(roots.imag) < 1e-4 * h]
-        if np.any(np.abs(near.imag) > 0.0) or np.any(np.abs(near.real - h) < 1e-6 * h) or np.any(np.diff(np.sort(near.real)) < 1e-4 * h):
+        if (
+            np.any(np.abs(near.imag) > 0.0)
+            or np.any(np.abs(near.real - h) < 1e-6 * h)
+            or np.any(np.diff(np.sort(near.real)) < 1e-4 * h)
+        ):
             continue  # about to touch, or two roots in one place: whether they are roots is a matter of rounding
         expected = min((r for r in near.real if 0.0 < r < h), default=None)
         found = Core.first_root(c, h, noise)
@@ -169,7 +217,8 @@ def test_first_root_among_many():
 
 
 def test_signs_of_all_short_patterns():
-    """`leading` is the sign of the first coefficient that is not zero: all patterns of -1, 0, 1 up to degree 5."""
+    """`leading` is the sign of the first coefficient that is not zero: all patterns of -1, 0, 1 up
+    to degree 5."""
     for pattern in itertools.product((-1.0, 0.0, 1.0), repeat=6):
         first = next((c for c in pattern if c), 0.0)
         for size in (1.0, 1e-3, 40.0):
@@ -179,7 +228,8 @@ def test_signs_of_all_short_patterns():
 
 
 def test_a_zero_at_the_start_is_divided_out():
-    """tau^k q(tau) with q(0) > 0: the event that was just met is not met again, and the next one is found."""
+    """tau^k q(tau) with q(0) > 0: the event that was just met is not met again, and the next one is
+    found."""
     rng = np.random.default_rng(43)
     for k in (1, 2, 3):
         for _ in range(100):
@@ -205,7 +255,8 @@ def test_a_guard_that_begins_as_noise_ends_its_mode_where_it_is_more_than_noise(
 
 
 def test_a_force_may_change_faster_than_what_it_moves():
-    """Its step is the one at which its own last two terms are below the tolerance; a position's is shorter, for those of its rate to be."""
+    """Its step is the one at which its own last two terms are below the tolerance; a position's is
+    shorter, for those of its rate to be."""
     terms = _row([1.0, 1e3, 1e6, 1e9])
     assert series.force_step(terms, 0, 3, 1e-9, 1.0) == pytest.approx(math.sqrt(1e-15))
     assert series.force_step(terms, 0, 3, 1e-9, 1e-8) == 1e-8
@@ -215,7 +266,8 @@ def test_a_force_may_change_faster_than_what_it_moves():
 
 @pytest.mark.parametrize("order", [12, 13, 14, 15])
 def test_a_force_of_which_only_every_fourth_power_is_there_has_a_step(order):
-    """Friction that winds up under a constant acceleration: tanh(tau^2) has a radius of sqrt(pi/2), and no step may come near it."""
+    """Friction that winds up under a constant acceleration: tanh(tau^2) has a radius of sqrt(pi/2),
+    and no step may come near it."""
     terms = np.zeros(order + 1)
     powers = [1.0, -1.0 / 3.0, 2.0 / 15.0, -17.0 / 315.0]
     terms[2::4] = powers[: len(terms[2::4])]
@@ -227,13 +279,23 @@ def test_a_force_of_which_only_every_fourth_power_is_there_has_a_step(order):
 def test_a_search_for_a_root_ends_where_the_series_is_not_finite(rate):
     """Its halvings would not: no bound holds for what is not a number."""
     with np.errstate(invalid="ignore"):
-        root = series.first_root(_row([1.0, rate, np.inf, 0.0]), 0, 3, 1.0, 1.0, 1e-13, series.AHEAD, np.zeros((48, series.WIDTH)))
+        root = series.first_root(
+            _row([1.0, rate, np.inf, 0.0]),
+            0,
+            3,
+            1.0,
+            1.0,
+            1e-13,
+            series.AHEAD,
+            np.zeros((48, series.WIDTH)),
+        )
     assert math.isnan(root)
 
 
 @pytest.mark.parametrize("place", [0.3, 0.5, 0.7310585])
 def test_touching_is_no_root_and_dipping_is_one(place):
-    """A double root lifted by 1e-12 is none; lowered by as much it is one, to the square root of that. A triple one crosses."""
+    """A double root lifted by 1e-12 is none; lowered by as much it is one, to the square root of
+    that. A triple one crosses."""
     touch = np.array([place * place, -2.0 * place, 1.0])
     lift = np.array([1e-12, 0.0, 0.0])
     assert Core.first_root(touch + lift, 1.0) is None
@@ -246,7 +308,8 @@ def test_touching_is_no_root_and_dipping_is_one(place):
 
 @pytest.mark.parametrize("dip", [0.0, 1e-16, 1e-10, 4e-10, 1e-9, 1e-6])
 def test_a_force_that_only_touches_zero_ends_no_mode(dip):
-    """A step ends where the force is positive again if it falls by less than noise, else in an event, as where it begins below."""
+    """A step ends where the force is positive again if it falls by less than noise, else in an
+    event, as where it begins below."""
     place, a = 0.1, motion.workspace()[0]
     for which in range(guards.GUARDS):
         guards.drop(a, which)
@@ -260,7 +323,9 @@ def test_a_force_that_only_touches_zero_ends_no_mode(dip):
     if dip > series.NOISE[series.FORCE]:
         assert (tau, which) == (pytest.approx(place - math.sqrt(dip), abs=1e-12), guards.G_PUSH)
     else:
-        assert (tau, which) == (pytest.approx(place + math.sqrt(dip), abs=3e-9), -1) or (dip == 0.0 and (tau, which) == (1.0, -1))
+        assert (tau, which) == (pytest.approx(place + math.sqrt(dip), abs=3e-9), -1) or (
+            dip == 0.0 and (tau, which) == (1.0, -1)
+        )
         a[motion.P, 0] += tau * (a[motion.P, 1] + tau)  # the series about tau
         a[motion.P, 1] += 2.0 * tau
         assert guards.first_event(2, 0.5, 1.0, a, np.zeros((48, series.WIDTH))) == (0.5, -1)
@@ -284,7 +349,8 @@ def test_noise_is_no_sign(noise):
 
 @pytest.mark.parametrize("noise", NOISES)
 def test_what_is_noise_at_first_may_grow(noise):
-    """In a long step a guard that starts as noise and falls is met where it has become more than noise."""
+    """In a long step a guard that starts as noise and falls is met where it has become more than
+    noise."""
     c = [0.0, 0.0, 0.0, 0.0, -noise]  # -noise tau^4
     assert Core.leading(c, noise) == 0
     assert Core.first_root(c, 0.9, noise) is None
@@ -292,11 +358,14 @@ def test_what_is_noise_at_first_may_grow(noise):
     assert found is not None
     assert 0.9 < found < 1.2
     # Met where it has fallen by the noise: noise tau^4 / 16 is that at tau = 2.
-    assert Core.first_root([0.0, 0.0, 0.0, 0.0, -noise / 16.0], 10.0, noise) == pytest.approx(2.0, rel=1e-9)
+    assert Core.first_root([0.0, 0.0, 0.0, 0.0, -noise / 16.0], 10.0, noise) == pytest.approx(
+        2.0, rel=1e-9
+    )
 
 
 def test_terms_beyond_the_third_drown_no_earlier_one():
-    """Where friction nearly jams the pivot they grow without bound: the noise that they bring is not that of a slope."""
+    """Where friction nearly jams the pivot they grow without bound: the noise that they bring is
+    not that of a slope."""
     assert Core.leading([0.0, -1e-7, 0.0, 1e12]) == -1
     assert Core.leading([0.0, -1e-7, 1e12]) == 1, "the third one does"
 
@@ -306,7 +375,8 @@ def test_terms_beyond_the_third_drown_no_earlier_one():
 
 @dataclasses.dataclass(frozen=True)
 class Situation:
-    """A block (R = 1, g = 1) under constant accelerations of its base, with walls that it may touch, in a state."""
+    """A block (R = 1, g = 1) under constant accelerations of its base, with walls that it may
+    touch, in a state."""
 
     alpha: float
     mu_s: float
@@ -319,13 +389,24 @@ class Situation:
     @property
     def scene(self) -> Scene:
         block = Block(half_width=math.sin(self.alpha), half_height=math.cos(self.alpha))
-        block = Block(half_width=block.half_width / block.radius, half_height=block.half_height / block.radius)
+        block = Block(
+            half_width=block.half_width / block.radius, half_height=block.half_height / block.radius
+        )
         if block.radius != 1.0:  # of the last bit
             block = block.model_copy(update={"half_height": math.sqrt(1.0 - block.half_width**2)})
-        horizontal, vertical = (Record.from_samples([a, a, a], time_step=1.0) for a in (self.u, self.g - 1.0))
+        horizontal, vertical = (
+            Record.from_samples([a, a, a], time_step=1.0) for a in (self.u, self.g - 1.0)
+        )
         floor = Floor(friction=self.mu_k, static_friction=self.mu_s)
         return Scene(
-            name="part", block=block, floor=floor, walls=self.walls, excitation=horizontal, vertical=vertical, duration=1.0, gravity=1.0
+            name="part",
+            block=block,
+            floor=floor,
+            walls=self.walls,
+            excitation=horizontal,
+            vertical=vertical,
+            duration=1.0,
+            gravity=1.0,
         )
 
 
@@ -334,7 +415,8 @@ def upright(u: float, g: float, alpha: float, mu_s: float, mu_k: float) -> Situa
 
 
 def shentons(mu_s: float, mu_k: float, slope: float, a: float) -> str:
-    """Shenton (1996): the mode into which a block at rest goes under a base acceleration a over gravity."""
+    """Shenton (1996): the mode into which a block at rest goes under a base acceleration a over
+    gravity."""
     if a <= min(slope, mu_s):
         return "rest"
     if mu_s < slope:
@@ -347,11 +429,17 @@ def shentons(mu_s: float, mu_k: float, slope: float, a: float) -> str:
 @pytest.mark.parametrize("pivot", PIVOTS)
 @pytest.mark.parametrize("friction", ["equal", "static above kinetic"])
 def test_selection_at_rest_is_shentons_map(friction, pivot):
-    """Under a vertical motion too, which only makes gravity another one; to the side that the inertia force points to."""
+    """Under a vertical motion too, which only makes gravity another one; to the side that the
+    inertia force points to."""
     rng = np.random.default_rng(44)
     seen = set()
     for _ in range(600):
-        mu_s, alpha, a, g = rng.uniform(0.0, 1.33), rng.uniform(0.02, 1.2), 10.0 ** rng.uniform(-1.5, 0.5), rng.uniform(0.3, 2.5)
+        mu_s, alpha, a, g = (
+            rng.uniform(0.0, 1.33),
+            rng.uniform(0.02, 1.2),
+            10.0 ** rng.uniform(-1.5, 0.5),
+            rng.uniform(0.3, 2.5),
+        )
         mu_k = mu_s if friction == "equal" else mu_s * rng.uniform(0.3, 1.0)
         side = int(rng.choice([-1, 1]))
         at = upright(side * a * g, g, alpha, mu_s, mu_k)
@@ -362,7 +450,9 @@ def test_selection_at_rest_is_shentons_map(friction, pivot):
         if mode.tilted:
             assert mode.side == side
         if mode.floor == "slip":
-            assert mode.slip * (mode.side if mode.tilted else 1) == -side  # it stays behind the base
+            assert (
+                mode.slip * (mode.side if mode.tilted else 1) == -side
+            )  # it stays behind the base
         seen.add(expected)
     assert seen == {"rest", "slide", "rock", "slide-rock"}
 
@@ -378,7 +468,8 @@ def test_no_slip_block_only_rests_or_rocks(pivot):
 
 
 class Found(NamedTuple):
-    """What a candidate mode asks for, by Newton and Euler: accelerations of xi, y, phi and the contact forces."""
+    """What a candidate mode asks for, by Newton and Euler: accelerations of xi, y, phi and the
+    contact forces."""
 
     acceleration: np.ndarray
     normal: float
@@ -388,7 +479,8 @@ class Found(NamedTuple):
 
 
 def answer(at: Situation, mode: Mode) -> Found:
-    """Solves the equations of motion of a tilted block with the contacts of a mode, in its pivot's frame."""
+    """Solves the equations of motion of a tilted block with the contacts of a mode, in its pivot's
+    frame."""
     phi, w = mode.side * at.state[2], mode.side * at.state[5]
     rows, bias = contacts(at.alpha, phi, w)
     unknowns = 7  # three accelerations; P, Q, N, M
@@ -409,14 +501,21 @@ def answer(at: Situation, mode: Mode) -> Found:
 
 
 def contacts(alpha: float, phi: float, w: float) -> tuple[np.ndarray, np.ndarray]:
-    """Of floor (normal, tangent), tip wall and far wall: the gap's derivative by (xi, y, phi), and what the rates alone give it."""
-    s, c, sp, cp = math.sin(alpha - phi), math.cos(alpha - phi), math.sin(alpha + phi), math.cos(alpha + phi)
+    """Of floor (normal, tangent), tip wall and far wall: the gap's derivative by (xi, y, phi), and
+    what the rates alone give it."""
+    s, c, sp, cp = (
+        math.sin(alpha - phi),
+        math.cos(alpha - phi),
+        math.sin(alpha + phi),
+        math.cos(alpha + phi),
+    )
     rows = np.array([[0.0, 1.0, -s], [1.0, 0.0, c], [1.0, 0.0, -cp], [-1.0, 0.0, -cp]])
     return rows, np.array([c, s, sp, sp]) * w * w
 
 
 def margin(at: Situation, mode: Mode, touched: tuple[bool, bool], pivot: str) -> float:
-    """By how much a mode is consistent (positive) or not (negative): the least of all that must not be negative."""
+    """By how much a mode is consistent (positive) or not (negative): the least of all that must not
+    be negative."""
     try:
         found = answer(at, mode)
     except np.linalg.LinAlgError:
@@ -461,10 +560,16 @@ def candidates(side: int, touched: tuple[bool, bool], pivot: str) -> list[Mode]:
 
 
 def random_tilt(rng: np.random.Generator, touch: str) -> tuple[Situation, int, tuple[bool, bool]]:
-    """A block tilted at random on the floor, perhaps with a corner on a wall, at rest or moving as its contacts allow."""
+    """A block tilted at random on the floor, perhaps with a corner on a wall, at rest or moving as
+    its contacts allow."""
     alpha = rng.uniform(0.05, 0.7)
     phi, side = alpha * rng.uniform(0.05, 0.9), int(rng.choice([-1, 1]))
-    s, c, sp, cp = math.sin(alpha - phi), math.cos(alpha - phi), math.sin(alpha + phi), math.cos(alpha + phi)
+    s, c, sp, cp = (
+        math.sin(alpha - phi),
+        math.cos(alpha - phi),
+        math.sin(alpha + phi),
+        math.cos(alpha + phi),
+    )
     mu_k = rng.uniform(0.0, 1.2)
     mu_s = min(mu_k * float(rng.choice([1.0, rng.uniform(1.0, 1.4)])), 1.33)
     w, v, xi = 0.0, 0.0, rng.uniform(-0.02, 0.02)
@@ -486,7 +591,9 @@ def random_tilt(rng: np.random.Generator, touch: str) -> tuple[Situation, int, t
     # 0.3 g to 2 g, seldom a floor that falls away
     g = rng.uniform(0.3, 2.0) if rng.random() < 0.9 else rng.uniform(-1.0, -0.2)
     at = Situation(alpha, mu_s, mu_k, rng.normal(0.0, 0.7), g, state, walls)
-    if rng.random() < 0.4 and (touch == "none" or w == 0.0):  # at the limit of slip, where a pivot may stand or go on slipping
+    if rng.random() < 0.4 and (
+        touch == "none" or w == 0.0
+    ):  # at the limit of slip, where a pivot may stand or go on slipping
         at = dataclasses.replace(at, state=standing(at))
         stuck = answer(at, Mode(True, side, "stick", 0, 1, touch == "tip", touch == "far"))
         mu_k = min(abs(stuck.friction / stuck.normal) * rng.uniform(0.75, 1.15), 1.2)
@@ -497,16 +604,20 @@ def random_tilt(rng: np.random.Generator, touch: str) -> tuple[Situation, int, t
 @pytest.mark.parametrize("pivot", PIVOTS)
 @pytest.mark.parametrize("touch", ["none", "tip", "far"])
 def test_selection_of_a_tilted_block(touch, pivot):
-    """Rock, slide-rock, lean, ladder, flight: what is selected is consistent by Newton, Euler and Coulomb; nothing that goes before is.
+    """Rock, slide-rock, lean, ladder, flight: what is selected is consistent by Newton, Euler and
+    Coulomb; nothing that goes before is.
 
-    More contacts go before fewer, sticking before slipping. Where no candidate is consistent, none is invented.
+    More contacts go before fewer, sticking before slipping. Where no candidate is consistent, none
+    is invented.
     """
     rng = np.random.default_rng(46)
     seen: set[tuple[str, bool, bool]] = set()
     judged = choices = 0
     for _ in range(250):
         at, side, touched = random_tilt(rng, touch)
-        margins = {mode: margin(at, mode, touched, pivot) for mode in candidates(side, touched, pivot)}
+        margins = {
+            mode: margin(at, mode, touched, pivot) for mode in candidates(side, touched, pivot)
+        }
         if min(abs(one) for one in margins.values()) < 1e-6:
             continue  # a tie but for rounding
         mode = Core(at.scene, pivot).select(at.state)
@@ -521,10 +632,16 @@ def test_selection_of_a_tilted_block(touch, pivot):
         seen.add((mode.floor, mode.tip, mode.far))
         assert mode.contacts == max(one.contacts for one in fitting), (at, mode, fitting)
         alike = [one for one in fitting if (one.tip, one.far) == (mode.tip, mode.far)]
-        assert mode.floor == "stick" or all(one.floor != "stick" for one in alike), (at, mode, fitting)
+        assert mode.floor == "stick" or all(one.floor != "stick" for one in alike), (
+            at,
+            mode,
+            fitting,
+        )
         choices += len({one.floor for one in alike}) > 1
     assert judged > 200
-    assert choices > 2  # static friction above kinetic lets both a standing and a slipping pivot be consistent
+    assert (
+        choices > 2
+    )  # static friction above kinetic lets both a standing and a slipping pivot be consistent
     expected = {("stick", False, False), ("slip", False, False)}
     if touch != "none":
         expected |= {("stick", *touched), ("slip", *touched)}  # lean, ladder
@@ -536,7 +653,8 @@ def test_selection_of_a_tilted_block(touch, pivot):
 @pytest.mark.parametrize("pivot", PIVOTS)
 @pytest.mark.parametrize("touch", ["none", "tip", "far"])
 def test_guards_are_what_their_names_say(touch, pivot):
-    """Forces by Newton and Euler, friction cones, and gaps from the corners' places now and along the motion."""
+    """Forces by Newton and Euler, friction cones, and gaps from the corners' places now and along
+    the motion."""
     rng = np.random.default_rng(47)
     seen: set[str] = set()
     for _ in range(40):
@@ -549,12 +667,19 @@ def test_guards_are_what_their_names_say(touch, pivot):
             if mode.floor == "stick":  # rock: as if it stood
                 at = Situation(at.alpha, at.mu_s, at.mu_k, at.u, at.g, standing(at), at.walls)
             found = answer(at, mode)
-            size = 1.0 + max(abs(one) for one in (found.normal, found.friction, found.tip, found.far))
+            size = 1.0 + max(
+                abs(one) for one in (found.normal, found.friction, found.tip, found.far)
+            )
             guards, moves = Core(at.scene, pivot).guards(mode, at.state)
             seen |= guards.keys()
-            expected = {"push": mode.pull * found.normal, "tip push": found.tip, "far push": found.far}
+            expected = {
+                "push": mode.pull * found.normal,
+                "tip push": found.tip,
+                "far push": found.far,
+            }
             expected |= {
-                f"cone {sign}": at.mu_s * mode.pull * found.normal - push for sign, push in (("+", found.friction), ("-", -found.friction))
+                f"cone {sign}": at.mu_s * mode.pull * found.normal - push
+                for sign, push in (("+", found.friction), ("-", -found.friction))
             }
             for name, force in expected.items():
                 if name in guards:
@@ -565,7 +690,9 @@ def test_guards_are_what_their_names_say(touch, pivot):
                 if name in guards:
                     assert value(guards[name], tau) == pytest.approx(gap, abs=1e-12), (name, mode)
             if "landing" in guards:
-                assert value(guards["landing"], tau) == pytest.approx(y - math.cos(at.alpha - phi), abs=1e-12)
+                assert value(guards["landing"], tau) == pytest.approx(
+                    y - math.cos(at.alpha - phi), abs=1e-12
+                )
             if "slip" in guards and touch == "none":
                 rate = np.polynomial.polynomial.polyder(moves["xi"])
                 turn = value(np.polynomial.polynomial.polyder(moves["phi"]), tau)
@@ -583,31 +710,52 @@ def standing(at: Situation) -> tuple[float, ...]:
     """The state with the slip of its pivot taken away."""
     x, y, theta, _, _, w = at.state
     side = math.copysign(1.0, theta)
-    return x, y, theta, -math.cos(at.alpha - abs(theta)) * w, side * math.sin(at.alpha - abs(theta)) * w, w
+    return (
+        x,
+        y,
+        theta,
+        -math.cos(at.alpha - abs(theta)) * w,
+        side * math.sin(at.alpha - abs(theta)) * w,
+        w,
+    )
 
 
 def gaps(at: Situation, side: int, phi: float, xi: float) -> dict[str, float]:
-    """Clear distance of the tip wall and the far wall from the nearest of the block's four corners, which are turned one by one."""
+    """Clear distance of the tip wall and the far wall from the nearest of the block's four corners,
+    which are turned one by one."""
     turned = np.array([[math.cos(phi), -math.sin(phi)], [math.sin(phi), math.cos(phi)]])
-    corners = turned @ np.array([[sx * math.sin(at.alpha), sy * math.cos(at.alpha)] for sx in (1, -1) for sy in (1, -1)]).T
+    corners = (
+        turned
+        @ np.array(
+            [[sx * math.sin(at.alpha), sy * math.cos(at.alpha)] for sx in (1, -1) for sy in (1, -1)]
+        ).T
+    )
     places = {1: -(at_wall(at, side) or math.inf), -1: at_wall(at, -side) or math.inf}
-    return {"tip gap": float(np.min(xi + corners[0])) - places[1], "far gap": places[-1] - float(np.max(xi + corners[0]))}
+    return {
+        "tip gap": float(np.min(xi + corners[0])) - places[1],
+        "far gap": places[-1] - float(np.max(xi + corners[0])),
+    }
 
 
 def at_wall(at: Situation, side: int) -> float | None:
     """Distance of the wall on a side (+1 left) from the middle, or None."""
-    return next((math.sin(at.alpha) + w.gap for w in at.walls if (w.side == "left") == (side > 0)), None)
+    return next(
+        (math.sin(at.alpha) + w.gap for w in at.walls if (w.side == "left") == (side > 0)), None
+    )
 
 
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_selection_of_a_flat_block_at_a_wall(pivot, side):
-    """Without friction: pressed on the wall it rests, pressed hard it tips over its other corner, pulled away it slides."""
+    """Without friction: pressed on the wall it rests, pressed hard it tips over its other corner,
+    pulled away it slides."""
     alpha = 0.4
     walls = (Wall(side="left" if side > 0 else "right", gap=0.0),)
     modes = {}
     for name, u in {"pressed": 0.1, "away": -0.1}.items():
-        at = Situation(alpha, 0.0, 0.0, side * u, 1.0, (0.0, math.cos(alpha), 0.0, 0.0, 0.0, 0.0), walls)
+        at = Situation(
+            alpha, 0.0, 0.0, side * u, 1.0, (0.0, math.cos(alpha), 0.0, 0.0, 0.0, 0.0), walls
+        )
         modes[name] = Core(at.scene, pivot).select(at.state)
     assert modes["pressed"].name == "rest"
     assert (modes["pressed"].tip, modes["pressed"].far) == (side > 0, side < 0)
@@ -615,9 +763,14 @@ def test_selection_of_a_flat_block_at_a_wall(pivot, side):
     assert (modes["away"].slip, modes["away"].tip, modes["away"].far) == (side, False, False)
 
 
-@pytest.mark.parametrize("mode", [("stick", 0, 1), ("slip", 1, 1), ("slip", -1, 1), ("slip", 1, -1), ("off", 0, 1)], ids=str)
+@pytest.mark.parametrize(
+    "mode",
+    [("stick", 0, 1), ("slip", 1, 1), ("slip", -1, 1), ("slip", 1, -1), ("off", 0, 1)],
+    ids=str,
+)
 def test_series_obey_newton_and_euler_in_every_term(mode):
-    """Rock, slide-rock and flight: forces and motion, contacts and Coulomb's law hold as polynomials of time, not only at the start."""
+    """Rock, slide-rock and flight: forces and motion, contacts and Coulomb's law hold as
+    polynomials of time, not only at the start."""
     floor, slip, pull = mode
     block, phi, w, v = Block(half_width=0.6, half_height=0.8), 0.2, -0.3, 0.4 * slip
     core = Core(
@@ -633,8 +786,13 @@ def test_series_obey_newton_and_euler_in_every_term(mode):
         "unilateral",
     )
     s, c = math.sin(block.alpha - phi), math.cos(block.alpha - phi)
-    core.guards(Mode(True, 1, floor, slip, pull, tip=False, far=False), (0.0, c, phi, v - c * w, s * w, w))
-    rows = {name: core.work[getattr(motion, name), : ORDER + 1] for name in ("PHI", "OMEGA", "SIN", "COS", "XI", "Y", "P", "Q", "U", "G")}
+    core.guards(
+        Mode(True, 1, floor, slip, pull, tip=False, far=False), (0.0, c, phi, v - c * w, s * w, w)
+    )
+    rows = {
+        name: core.work[getattr(motion, name), : ORDER + 1]
+        for name in ("PHI", "OMEGA", "SIN", "COS", "XI", "Y", "P", "Q", "U", "G")
+    }
     known = ORDER - 1  # accelerations have two terms fewer
 
     def product(one, other):
@@ -645,7 +803,9 @@ def test_series_obey_newton_and_euler_in_every_term(mode):
 
     np.testing.assert_allclose(rate("SIN")[:known], -product("OMEGA", "COS"), atol=1e-14)
     np.testing.assert_allclose(rate("COS")[:known], product("OMEGA", "SIN"), atol=1e-14)
-    np.testing.assert_allclose(rate("PHI", 2), 3.0 * (product("COS", "Q") - product("SIN", "P")), atol=1e-13)
+    np.testing.assert_allclose(
+        rate("PHI", 2), 3.0 * (product("COS", "Q") - product("SIN", "P")), atol=1e-13
+    )
     xi, y = (rate("SIN", 2), rate("COS", 2)) if floor == "stick" else (rate("XI", 2), rate("Y", 2))
     np.testing.assert_allclose(xi, rows["Q"][:known] - rows["U"][:known], atol=1e-13)
     np.testing.assert_allclose(y, rows["P"][:known] - rows["G"][:known], atol=1e-13)
@@ -661,16 +821,28 @@ def test_flight_of_a_block_whose_floor_falls_away():
     mode = Core(at.scene, "unilateral").select(at.state)
     assert (mode.name, mode.tilted) == ("flight", False)
     held = Core(at.scene, "bilateral").select(at.state)
-    assert (held.name, held.tilted) == ("rest", False)  # nothing tells left from right: it hangs on both corners
-    pushed = {u: Situation(alpha, 0.5, 0.5, u, -0.2, (0.0, math.cos(alpha), 0.0, 0.0, 0.0, 0.0)) for u in (1e-6, -1e-6)}
+    assert (held.name, held.tilted) == (
+        "rest",
+        False,
+    )  # nothing tells left from right: it hangs on both corners
+    pushed = {
+        u: Situation(alpha, 0.5, 0.5, u, -0.2, (0.0, math.cos(alpha), 0.0, 0.0, 0.0, 0.0))
+        for u in (1e-6, -1e-6)
+    }
     hangs = {u: Core(one.scene, "bilateral").select(one.state) for u, one in pushed.items()}
-    assert {u: (mode.tilted, mode.side) for u, mode in hangs.items()} == {1e-6: (True, 1), -1e-6: (True, -1)}
-    slides = {v: Core(at.scene, "bilateral").select((*at.state[:3], v, 0.0, 0.0)) for v in (0.1, -0.1)}
+    assert {u: (mode.tilted, mode.side) for u, mode in hangs.items()} == {
+        1e-6: (True, 1),
+        -1e-6: (True, -1),
+    }
+    slides = {
+        v: Core(at.scene, "bilateral").select((*at.state[:3], v, 0.0, 0.0)) for v in (0.1, -0.1)
+    }
     assert {v: mode.side for v, mode in slides.items()} == {0.1: -1, -0.1: 1}
 
 
 def test_a_block_that_hangs_flat_is_counted_once():
-    """The choice that nothing tells left from right is in the tally of a run that made it; a wall that holds the block tells."""
+    """The choice that nothing tells left from right is in the tally of a run that made it; a wall
+    that holds the block tells."""
     alpha = 0.3
     at = Situation(alpha, 0.5, 0.5, 0.0, -0.2, (0.0, math.cos(alpha), 0.0, 0.0, 0.0, 0.0))
     history = EventBasedModel().simulate(at.scene.replace(duration=0.02, output_step=0.01))
@@ -685,7 +857,8 @@ def test_a_block_that_hangs_flat_is_counted_once():
 
 
 def test_what_was_tried_at_an_instant():
-    """A new instant knows of nothing and has no slack; a mode that a force ended may go on there, once; one that a gap ended may not."""
+    """A new instant knows of nothing and has no slack; a mode that a force ended may go on there,
+    once; one that a gap ended may not."""
     m, memory = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.full(modes.MEMORY, 7.0)
     m[motion.FAMILY], m[motion.S] = motion.TILT, 1
     tried = np.ones(modes.MODES, dtype=bool)
@@ -696,7 +869,11 @@ def test_what_was_tried_at_an_instant():
     assert memory[modes.SLACK] == 1.0, "the least slack is one noise"
     modes.slacken(memory)
     assert memory[modes.SLACK] == 2.0
-    for kind, began, may in ((series.FORCE, 2.0, True), (series.FORCE, 3.0, False), (series.POSITION, 2.0, False)):
+    for kind, began, may in (
+        (series.FORCE, 2.0, True),
+        (series.FORCE, 3.0, False),
+        (series.POSITION, 2.0, False),
+    ):
         modes.forget(tried, memory, 3.0)
         memory[modes.BEGAN] = began
         modes.leave(m, tried, memory, 3.0, kind)
@@ -707,7 +884,8 @@ def test_what_was_tried_at_an_instant():
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_a_spin_of_rounding_is_taken_from_a_block_that_leans_on_a_wall(side):
-    """One wall is enough; the same block a little away from it keeps its spin, which is then a motion."""
+    """One wall is enough; the same block a little away from it keeps its spin, which is then a
+    motion."""
     alpha, phi, gap = 0.3, 0.1, 0.2
     sign = 1.0 if side == "left" else -1.0
     walls = [Wall(side=side, gap=gap, restitution=0.0)]
@@ -717,7 +895,11 @@ def test_a_spin_of_rounding_is_taken_from_a_block_that_leans_on_a_wall(side):
     touches = math.sin(alpha + phi) - math.sin(alpha) - gap  # where the top corner meets the wall
     for away, spin in ((0.0, 0.0), (0.05, 0.1 * contacts_of_the_core.SLOW)):
         z = np.zeros(6)
-        z[motion.X], z[motion.HEIGHT], z[motion.THETA] = sign * (touches + away), math.cos(alpha - phi), sign * phi
+        z[motion.X], z[motion.HEIGHT], z[motion.THETA] = (
+            sign * (touches + away),
+            math.cos(alpha - phi),
+            sign * phi,
+        )
         z[motion.W] = 0.1 * contacts_of_the_core.SLOW
         modes._clean(setting, z, True)
         assert z[motion.W] == spin
@@ -725,11 +907,21 @@ def test_a_spin_of_rounding_is_taken_from_a_block_that_leans_on_a_wall(side):
 
 def test_a_block_that_lies_down_along_a_wall_meets_it_while_it_turns_over():
     """However slowly it turns; one that turns back, or has some way to go, does not."""
-    m, z, count = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.zeros(6), np.zeros(rules.RULES, dtype=np.int64)
+    m, z, count = (
+        np.zeros(motion.MODE_SIZE, dtype=np.int64),
+        np.zeros(6),
+        np.zeros(rules.RULES, dtype=np.int64),
+    )
     m[motion.FAMILY], m[motion.FLOOR] = motion.TILT, motion.STICK
     for sign in (1, -1):
         m[motion.S] = sign
-        for left, spin, lies in ((1e-6, 0.5, True), (1e-6, 1e-3, True), (1e-6, 0.0, False), (1e-6, -0.5, False), (1e-3, 0.5, False)):
+        for left, spin, lies in (
+            (1e-6, 0.5, True),
+            (1e-6, 1e-3, True),
+            (1e-6, 0.0, False),
+            (1e-6, -0.5, False),
+            (1e-3, 0.5, False),
+        ):
             z[motion.THETA], z[motion.W] = sign * (0.5 * math.pi - left), sign * spin
             before = count[rules.LANDS_ALONG]
             assert march._lies_along_wall(m, z, guards.G_TIP_GAP, count) == lies
@@ -738,19 +930,34 @@ def test_a_block_that_lies_down_along_a_wall_meets_it_while_it_turns_over():
 
 
 def test_a_mode_that_must_go_on_has_twice_the_slack_each_time():
-    """Where all modes were tried at an instant the one that fits goes on, counted each time, with a slack of 1, 2, 4 noises."""
+    """Where all modes were tried at an instant the one that fits goes on, counted each time, with a
+    slack of 1, 2, 4 noises."""
     core = Core(upright(0.1, 1.0, 0.3, 0.5, 0.5).scene, "unilateral")
-    z, chosen = np.array(upright(0.1, 1.0, 0.3, 0.5, 0.5).state), np.zeros(rules.RULES, dtype=np.int64)
-    m, tried, memory = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.ones(modes.MODES, dtype=bool), np.zeros(modes.MEMORY)
+    z, chosen = (
+        np.array(upright(0.1, 1.0, 0.3, 0.5, 0.5).state),
+        np.zeros(rules.RULES, dtype=np.int64),
+    )
+    m, tried, memory = (
+        np.zeros(motion.MODE_SIZE, dtype=np.int64),
+        np.ones(modes.MODES, dtype=bool),
+        np.zeros(modes.MEMORY),
+    )
     memory[modes.SLACK] = memory[modes.LEAST_SLACK] = 1.0
     for count, slack in enumerate((1.0, 2.0, 4.0), 1):
-        assert modes.select(core.setting, z, *core.grounds, 0.0, m, tried, memory, chosen, core.work)
+        assert modes.select(
+            core.setting, z, *core.grounds, 0.0, m, tried, memory, chosen, core.work
+        )
         assert (m[motion.FAMILY], m[motion.FLOOR]) == (motion.FLAT, motion.STICK)
-        assert (memory[modes.SLACK], chosen[rules.MODE_AGAIN], chosen.sum()) == (slack, count, count)
+        assert (memory[modes.SLACK], chosen[rules.MODE_AGAIN], chosen.sum()) == (
+            slack,
+            count,
+            count,
+        )
 
 
 def test_the_model_starts_as_the_selection_says():
-    """The adapter looks at the core that the model runs: the same mode in the first row of a history."""
+    """The adapter looks at the core that the model runs: the same mode in the first row of a
+    history."""
     rng = np.random.default_rng(48)
     for _ in range(20):
         a, mu, alpha = 10.0 ** rng.uniform(-1.0, 0.3), rng.uniform(0.05, 1.2), rng.uniform(0.1, 0.8)
@@ -765,9 +972,17 @@ def test_uplift_is_found_to_rounding_in_few_evaluations(monkeypatch):
     real = ground.acceleration
     monkeypatch.setattr(ground, "acceleration", lambda g, t: asked.append(t) or real(g, t))
     count = 0
-    for amplitude, period, symmetric in itertools.product(np.linspace(2.6, 30.0, 12), (0.3, 1.1, 4.0), (False, True)):
+    for amplitude, period, symmetric in itertools.product(
+        np.linspace(2.6, 30.0, 12), (0.3, 1.1, 4.0), (False, True)
+    ):
         pulse = Ricker(amplitude=amplitude, period=period, symmetric=symmetric)
-        scene = Scene(name="pulse", block=PAPER_BLOCK, floor=Floor(friction=1.0), excitation=pulse, duration=5.0)
+        scene = Scene(
+            name="pulse",
+            block=PAPER_BLOCK,
+            floor=Floor(friction=1.0),
+            excitation=pulse,
+            duration=5.0,
+        )
         base, _ = natural.grounds_of(scene)
         t = ground.next_exceedance(base, 0.0, -limit, limit, 0.0, 0.0)
         assert abs(real(base, t)) >= limit * (1.0 - 1e-15)
@@ -791,7 +1006,8 @@ def test_what_stays_below_a_level_is_below_it(seed):
 
 @pytest.mark.parametrize("degree", [2, 3, 6])
 def test_the_bound_of_what_stays_below_is_as_it_says(degree):
-    """Of t - t^degree, whose curvature is largest at the end: d^2/8 of it above the largest of five values, and no more."""
+    """Of t - t^degree, whose curvature is largest at the end: d^2/8 of it above the largest of five
+    values, and no more."""
     a, _ = motion.workspace()
     a[0, 1], a[0, degree] = 1.0, -1.0
     highest = max(series.value(a, 0, degree, t) for t in (0.0, 0.25, 0.5, 0.75, 1.0))

@@ -1,4 +1,5 @@
-"""What the impact laws decide: the branches of the wall cascade, the energy cap, and when a block lies still."""
+"""What the impact laws decide: the branches of the wall cascade, the energy cap, and when a block
+lies still."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ from rockcheck.scenes.scene import PAPER_BLOCK
 
 
 def random_strikes(count: int, parting: bool):
-    """alpha, phi, case, w1, xdot1, e, mu, no_slip: a corner that comes to the wall, or leaves it already."""
+    """alpha, phi, case, w1, xdot1, e, mu, no_slip: a corner that comes to the wall, or leaves it
+    already."""
     rng = np.random.default_rng(20)
     for _ in range(count):
         alpha, sw = rng.uniform(0.05, 1.0), float(rng.choice([-1, 1]))
@@ -26,24 +28,37 @@ def random_strikes(count: int, parting: bool):
         w1, xdot1 = rng.normal(0.0, 1.0, 2) * 10.0 ** rng.uniform(-1.0, 1.0, 2)
         if (sw * (xdot1 - C * w1) >= 0.0) != parting:
             w1, xdot1 = -w1, -xdot1
-        yield alpha, phi, sw, w1, xdot1, float(rng.choice([0.0, 1.0, rng.uniform()])), rng.uniform(0.0, 1.3), bool(rng.integers(0, 2))
+        yield (
+            alpha,
+            phi,
+            sw,
+            w1,
+            xdot1,
+            float(rng.choice([0.0, 1.0, rng.uniform()])),
+            rng.uniform(0.0, 1.3),
+            bool(rng.integers(0, 2)),
+        )
 
 
 @pytest.mark.parametrize("parting", [False, True], ids=["the corner comes", "the corner leaves"])
 def test_each_branch_of_the_wall_cascade(parting):
-    """Every branch of Fig. 3 is taken for the reason that it stands for, and gives what its equations say.
+    """Every branch of Fig. 3 is taken for the reason that it stands for, and gives what its
+    equations say.
 
-    A corner that comes leads to A, B and D only: the impulse of the wall grows with the speed at which the corner is thrown back.
-    The others are reached where it leaves already.
+    A corner that comes leads to A, B and D only: the impulse of the wall grows with the speed at
+    which the corner is thrown back. The others are reached where it leaves already.
     """
     seen: Counter[int] = Counter()
     for alpha, phi, sw, w1, xdot1, e, mu, no_slip in random_strikes(4000, parting):
         s, c, cp = math.sin(alpha - phi), math.cos(alpha - phi), math.cos(alpha + phi)
         C = sw * cp
-        branch, w2, xdot2, n, p, v2 = impacts.wall_impact(1.0, sw, s, c, cp, 0.75, 3.0, w1, xdot1, e, mu, mu, no_slip)
+        branch, w2, xdot2, n, p, v2 = impacts.wall_impact(
+            1.0, sw, s, c, cp, 0.75, 3.0, w1, xdot1, e, mu, mu, no_slip
+        )
         seen[branch] += 1
         assert n >= 0.0
-        # (27): without an impulse of the wall, the pivot held: angular momentum about it stays what it is.
+        # (27): without an impulse of the wall, the pivot held: angular momentum about it stays what
+        # it is.
         alone = 0.75 * (w1 / 3.0 - c * xdot1 + s * s * w1)
         leaves = sw * (-c * alone - C * alone)
         if branch == impacts.A_STICK:
@@ -70,11 +85,24 @@ def test_each_branch_of_the_wall_cascade(parting):
         if branch == impacts.E_SLIP:
             assert n == 0.0
             assert xdot2 == pytest.approx(C * w2, abs=1e-10)  # (32): the corner stays on the wall
-            # The friction is that of the slip which (30) would have, were it not for its pull of the wall.
-            slips = ((sr, sy, impacts.wall_slip(1.0, s, c, C, 3.0, w1, xdot1, e, mu, sr, sy)) for sr in (1, -1) for sy in (1, -1))
-            sense = next(sr * sy for sr, sy, (w, x, push, _) in slips if push * sy >= -1e-12 and (x + c * w) * sr >= -1e-12)
+            # The friction is that of the slip which (30) would have, were it not for its pull of
+            # the wall.
+            slips = (
+                (sr, sy, impacts.wall_slip(1.0, s, c, C, 3.0, w1, xdot1, e, mu, sr, sy))
+                for sr in (1, -1)
+                for sy in (1, -1)
+            )
+            sense = next(
+                sr * sy
+                for sr, sy, (w, x, push, _) in slips
+                if push * sy >= -1e-12 and (x + c * w) * sr >= -1e-12
+            )
             assert q == pytest.approx(-mu * sense * p, abs=1e-10)
-    least = {impacts.A_STICK: 20, impacts.B_STICK: 20, impacts.E_SLIP if parting else impacts.D_SLIP: 500}
+    least = {
+        impacts.A_STICK: 20,
+        impacts.B_STICK: 20,
+        impacts.E_SLIP if parting else impacts.D_SLIP: 500,
+    }
     least |= {impacts.C_STICK: 10} if parting else {}
     assert seen.keys() == least.keys()
     assert all(seen[branch] > count for branch, count in least.items()), seen
@@ -99,20 +127,41 @@ def rows_of(setting, sense: float, phi: float) -> np.ndarray:
     return rows
 
 
-def landing(alpha: float, phi: float, mu: float, e: float, v, cap: bool) -> tuple[np.ndarray, float]:
-    """Velocities after a tilted block lands on its corner with restitution e, and the largest relative gain of energy."""
+def landing(
+    alpha: float, phi: float, mu: float, e: float, v, cap: bool
+) -> tuple[np.ndarray, float]:
+    """Velocities after a tilted block lands on its corner with restitution e, and the largest
+    relative gain of energy."""
     touching = np.zeros(ci.CONTACTS, dtype=bool)
     touching[ci.F] = True
     after, impulse, tally = np.array(v), np.zeros(2), np.zeros(2)
-    assert ci.contact_impact(setting_of(alpha, mu, e, cap), 1.0, phi, touching, 0.0, 0.0, 1e-9, after, impulse, tally, work())
+    assert ci.contact_impact(
+        setting_of(alpha, mu, e, cap),
+        1.0,
+        phi,
+        touching,
+        0.0,
+        0.0,
+        1e-9,
+        after,
+        impulse,
+        tally,
+        work(),
+    )
     return after, float(tally[1])
 
 
 def test_an_impact_reads_no_scratch_that_it_has_not_written():
-    """Whatever the root search has left there: also impacts whose approach is hardly more than rounding."""
+    """Whatever the root search has left there: also impacts whose approach is hardly more than
+    rounding."""
     rng = np.random.default_rng(24)
     for _ in range(300):
-        alpha, mu, e, resting = rng.uniform(0.1, 1.2), rng.uniform(0.05, 1.2), rng.uniform(0.0, 1.0), 1e-9
+        alpha, mu, e, resting = (
+            rng.uniform(0.1, 1.2),
+            rng.uniform(0.05, 1.2),
+            rng.uniform(0.0, 1.0),
+            1e-9,
+        )
         phi = float(rng.choice([0.0, 1e-8, 0.1 * alpha]))
         can = range(ci.CONTACTS) if phi == 0.0 else (ci.F, ci.TIP_TOP, ci.FAR_BOTTOM)
         touching = np.isin(np.arange(ci.CONTACTS), can) & (rng.integers(0, 2, ci.CONTACTS) == 1)
@@ -121,13 +170,26 @@ def test_an_impact_reads_no_scratch_that_it_has_not_written():
         found = []
         for scratch in (0.0, np.nan, 1e9):
             after, impulse, tally = v.copy(), np.zeros(2), np.zeros(2)
-            end = ci.contact_impact(setting, 1.0, phi, touching, e, e, resting, after, impulse, tally, np.full((ci.WORK, 6), scratch))
+            end = ci.contact_impact(
+                setting,
+                1.0,
+                phi,
+                touching,
+                e,
+                e,
+                resting,
+                after,
+                impulse,
+                tally,
+                np.full((ci.WORK, 6), scratch),
+            )
             found.append((end, *after, *impulse, *tally))
         assert found[0] == found[1] == found[2]
 
 
 def test_the_floor_takes_friction_within_its_cone():
-    """A corner that lands and slips is held by mu times what holds it up, against the slip; one that sticks by no more than that."""
+    """A corner that lands and slips is held by mu times what holds it up, against the slip; one
+    that sticks by no more than that."""
     rng = np.random.default_rng(22)
     sticks = slips = 0
     for _ in range(500):
@@ -149,7 +211,8 @@ def test_the_floor_takes_friction_within_its_cone():
 
 
 def test_the_energy_cap_takes_the_largest_restitution_that_adds_none():
-    """Where Newton's restitution adds no energy the cap changes nothing; where it does, a little more restitution would add some."""
+    """Where Newton's restitution adds no energy the cap changes nothing; where it does, a little
+    more restitution would add some."""
     rng = np.random.default_rng(21)
     capped = untouched = 0
     for _ in range(3000):
@@ -169,7 +232,9 @@ def test_the_energy_cap_takes_the_largest_restitution_that_adds_none():
         assert none <= 1e-12
         used = -(row @ held) / (row @ v)
         assert 0.0 < used < e
-        np.testing.assert_allclose(landing(alpha, phi, mu, used, v, cap=False)[0], held, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(
+            landing(alpha, phi, mu, used, v, cap=False)[0], held, rtol=0.0, atol=1e-12
+        )
         assert landing(alpha, phi, mu, used * (1.0 + 1e-9), v, cap=False)[1] > 0.0
     assert capped > 10
     assert untouched > 1000
@@ -180,30 +245,60 @@ def test_the_energy_cap_leaves_an_elastic_impact_as_it_is():
     touching = np.array([True, True, True, True, False, False])
     rng = np.random.default_rng(23)
     for _ in range(200):
-        alpha, mu, v = rng.uniform(0.1, 1.2), rng.uniform(0.0, 1.2), np.array([-rng.uniform(0.01, 100.0), 0.0, 0.0])
+        alpha, mu, v = (
+            rng.uniform(0.1, 1.2),
+            rng.uniform(0.0, 1.2),
+            np.array([-rng.uniform(0.01, 100.0), 0.0, 0.0]),
+        )
         plain, held = v.copy(), v.copy()
         for after, cap in ((plain, False), (held, True)):
             assert ci.contact_impact(
-                setting_of(alpha, mu, 0.9, cap), 1.0, 0.0, touching, 1.0, 0.0, 1e-9, after, np.zeros(2), np.zeros(2), work()
+                setting_of(alpha, mu, 0.9, cap),
+                1.0,
+                0.0,
+                touching,
+                1.0,
+                0.0,
+                1e-9,
+                after,
+                np.zeros(2),
+                np.zeros(2),
+                work(),
             )
         np.testing.assert_array_equal(held, plain)
         assert plain == pytest.approx(-v, rel=1e-12)
 
 
-@pytest.mark.parametrize("wall", [(ci.TIP_TOP, ci.TIP_BOTTOM), (ci.FAR_BOTTOM, ci.FAR_TOP)], ids=["tip", "far"])
+@pytest.mark.parametrize(
+    "wall", [(ci.TIP_TOP, ci.TIP_BOTTOM), (ci.FAR_BOTTOM, ci.FAR_TOP)], ids=["tip", "far"]
+)
 def test_floor_first_is_a_trajectory_beside_a_wall_that_stands_farther_off(wall):
-    """A block that lands flush, without friction: its corners strike one by one, each as it arrives where the wall is a unit away."""
+    """A block that lands flush, without friction: its corners strike one by one, each as it arrives
+    where the wall is a unit away."""
     rng = np.random.default_rng(23)
     both = 0
     for _ in range(400):
         alpha, floor_e, wall_e = rng.uniform(0.1, 1.2), rng.uniform(0.3, 0.9), rng.uniform(0.3, 0.9)
         block = Block(half_width=math.sin(alpha), half_height=math.cos(alpha))
-        scene = Scene(name="flush", block=block, floor=Floor(friction=0.0, restitution=floor_e), duration=1.0)
-        setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False, impacts="floor-first")
+        scene = Scene(
+            name="flush", block=block, floor=Floor(friction=0.0, restitution=floor_e), duration=1.0
+        )
+        setting = natural.setting_of(
+            scene, unilateral=True, no_slip=False, energy_cap=False, impacts="floor-first"
+        )
         rows, v, mass = rows_of(setting, 1, 0.0), rng.normal(0.0, 0.5, 3), np.array([1.0, 1.0, 3.0])
         v[0] = math.copysign(v[0], -rows[wall[0], 0])  # toward the wall
-        away, struck, after = dict.fromkeys((ci.F, ci.E), 0.0) | dict.fromkeys(wall, 1.0), [], v.copy()
-        if not min(rows[ci.F] @ v, rows[ci.E] @ v) < -1e-3 < 1e-3 < max(rows[ci.F] @ v, rows[ci.E] @ v):
+        away, struck, after = (
+            dict.fromkeys((ci.F, ci.E), 0.0) | dict.fromkeys(wall, 1.0),
+            [],
+            v.copy(),
+        )
+        if (
+            not min(rows[ci.F] @ v, rows[ci.E] @ v)
+            < -1e-3
+            < 1e-3
+            < max(rows[ci.F] @ v, rows[ci.E] @ v)
+        ):
             continue  # one corner lands
         while True:
             rates = {j: float(rows[j] @ after) for j in away}
@@ -213,12 +308,34 @@ def test_floor_first_is_a_trajectory_beside_a_wall_that_stands_farther_off(wall)
             first = min(coming, key=coming.__getitem__)
             away = {j: gap + rates[j] * coming[first] for j, gap in away.items()} | {first: 0.0}
             restitution = floor_e if first in (ci.F, ci.E) else wall_e
-            after = after - (1.0 + restitution) * rates[first] / (rows[first] @ (mass * rows[first])) * mass * rows[first]
+            after = (
+                after
+                - (1.0 + restitution)
+                * rates[first]
+                / (rows[first] @ (mass * rows[first]))
+                * mass
+                * rows[first]
+            )
             struck.append(first)
         touching = np.isin(np.arange(ci.CONTACTS), (ci.F, ci.E, *wall))
         found = v.copy()
         if len(struck) < 20:  # of more stages the rest are plastic
-            assert ci.contact_impact(setting, 1, 0.0, touching, wall_e, wall_e, 1e-9, found, np.zeros(2), np.zeros(2), work()) == ci.FITS
+            assert (
+                ci.contact_impact(
+                    setting,
+                    1,
+                    0.0,
+                    touching,
+                    wall_e,
+                    wall_e,
+                    1e-9,
+                    found,
+                    np.zeros(2),
+                    np.zeros(2),
+                    work(),
+                )
+                == ci.FITS
+            )
             np.testing.assert_allclose(found, after, rtol=0.0, atol=1e-9)
             both += set(wall) <= set(struck)
     assert both > 30
@@ -226,14 +343,26 @@ def test_floor_first_is_a_trajectory_beside_a_wall_that_stands_farther_off(wall)
 
 @pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
 def test_a_block_rocks_on_until_its_rate_is_a_ten_millionth(pivot):
-    """Housner's impacts follow each other down to a rate of 1e-6 sqrt(g/R) at least; with the paper's pivot all to 5e-8."""
+    """Housner's impacts follow each other down to a rate of 1e-6 sqrt(g/R) at least; with the
+    paper's pivot all to 5e-8."""
     alpha = PAPER_BLOCK.alpha
     tilt, ratio = 0.3 * alpha, 1.0 - 1.5 * math.sin(alpha) ** 2
-    scene = Scene(name="still", block=PAPER_BLOCK, floor=Floor(friction=0.8), initial_rotation=tilt, duration=12.0, output_step=0.1)
+    scene = Scene(
+        name="still",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=0.8),
+        initial_rotation=tilt,
+        duration=12.0,
+        output_step=0.1,
+    )
     history = EventBasedModel(pivot=pivot).simulate(scene)
     assert history.outcome == "at rest"
     speed = math.sqrt(scene.gravity * PAPER_BLOCK.radius)
-    rates = [event.impulse / speed / (math.sin(alpha) * (1.0 + ratio)) for event in history.event_list if event.kind == "floor impact"]
+    rates = [
+        event.impulse / speed / (math.sin(alpha) * (1.0 + ratio))
+        for event in history.event_list
+        if event.kind == "floor impact"
+    ]
     first = math.sqrt(1.5 * (math.cos(alpha - tilt) - math.cos(alpha)))
     np.testing.assert_allclose(rates[:100], first * ratio ** np.arange(100), rtol=1e-6)
     assert rates[-1] < 1e-6
@@ -243,7 +372,8 @@ def test_a_block_rocks_on_until_its_rate_is_a_ten_millionth(pivot):
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_block_is_put_onto_the_contact_that_closes(side):
-    """The gap is zero to rounding, whichever it was and whatever the pivot does; what need not give way keeps its place."""
+    """The gap is zero to rounding, whichever it was and whatever the pivot does; what need not give
+    way keeps its place."""
     alpha, gap, off = 0.4, 0.05, 1e-7
     walls = (Wall(side="left", gap=gap), Wall(side="right", gap=2.0 * gap))
     block = Block(half_width=math.sin(alpha), half_height=math.cos(alpha))
@@ -265,10 +395,15 @@ def test_a_block_is_put_onto_the_contact_that_closes(side):
             m, before = np.zeros(motion.MODE_SIZE, dtype=np.int64), z.copy()
             m[motion.FAMILY], m[motion.S], m[motion.FLOOR] = family, tip, floor
             strike.touch(b, m, z, which)
-            assert (contacts.wall_gap(b, z, wall) if wall else contacts.floor_gap(b, z)) == pytest.approx(0.0, abs=1e-13)
+            assert (
+                contacts.wall_gap(b, z, wall) if wall else contacts.floor_gap(b, z)
+            ) == pytest.approx(0.0, abs=1e-13)
             assert np.max(np.abs(z - before)) == pytest.approx(off, rel=1.0)
             if wall and tilt and floor == motion.STICK:
-                pivots = [one[motion.X] - side * math.sin(alpha - abs(one[motion.THETA])) for one in (before, z)]
+                pivots = [
+                    one[motion.X] - side * math.sin(alpha - abs(one[motion.THETA]))
+                    for one in (before, z)
+                ]
                 assert pivots[1] == pytest.approx(pivots[0], abs=1e-15)
                 assert contacts.floor_gap(b, z) == 0.0
             else:
@@ -278,42 +413,61 @@ def test_a_block_is_put_onto_the_contact_that_closes(side):
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_flush_landing_rebounds_as_the_wall_does_that_it_meets(side):
-    """The paper's pivot, closed branch: a block that tipped to one side lands against the other one's wall, with that one's restitution."""
-    walls = (Wall(side="left", gap=0.0, restitution=0.3), Wall(side="right", gap=0.0, restitution=0.7))
+    """The paper's pivot, closed branch: a block that tipped to one side lands against the other
+    one's wall, with that one's restitution."""
+    walls = (
+        Wall(side="left", gap=0.0, restitution=0.3),
+        Wall(side="right", gap=0.0, restitution=0.7),
+    )
     block = Block(half_width=math.sin(0.4), half_height=math.cos(0.4))
     scene = Scene(name="flush", block=block, floor=Floor(friction=0.5), walls=walls, duration=1.0)
     b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
     e, w = (0.7 if side > 0 else 0.3), -0.2 * side
-    m, impulse, counts = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.zeros(2), np.zeros(rules.RULES, dtype=np.int64)
+    m, impulse, counts = (
+        np.zeros(motion.MODE_SIZE, dtype=np.int64),
+        np.zeros(2),
+        np.zeros(rules.RULES, dtype=np.int64),
+    )
     m[motion.FAMILY], m[motion.S], m[motion.FLOOR] = motion.TILT, side, motion.STICK
     z = np.array([0.0, math.cos(0.4), 0.0, -math.cos(0.4) * w, 0.0, w])
     assert not strike._floor_impact(b, m, z, 1e-9, impulse, counts)
     assert z[motion.W] == pytest.approx(-e * w, abs=1e-15)
-    assert (z[motion.VX], z[motion.VY]) == pytest.approx((math.cos(0.4) * e * w, -side * math.sin(0.4) * e * w), abs=1e-15)
+    assert (z[motion.VX], z[motion.VY]) == pytest.approx(
+        (math.cos(0.4) * e * w, -side * math.sin(0.4) * e * w), abs=1e-15
+    )
     assert impulse.tolist() == [pytest.approx((1.0 + e) * math.sin(0.4) * abs(w)), 0.0]
     assert (counts[rules.FLUSH_LANDING], counts.sum()) == (1, 1)
 
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_corner_rebounds_as_the_wall_does_that_it_strikes(side):
-    """The paper's pivot, held: a block that tips to one side meets that wall, and its corner leaves with that one's restitution."""
-    walls = (Wall(side="left", gap=0.5, restitution=0.3), Wall(side="right", gap=0.5, restitution=0.7))
+    """The paper's pivot, held: a block that tips to one side meets that wall, and its corner leaves
+    with that one's restitution."""
+    walls = (
+        Wall(side="left", gap=0.5, restitution=0.3),
+        Wall(side="right", gap=0.5, restitution=0.7),
+    )
     block = Block(half_width=math.sin(0.4), half_height=math.cos(0.4))
     scene = Scene(name="corner", block=block, floor=Floor(friction=0.5), walls=walls, duration=1.0)
     b = natural.setting_of(scene, unilateral=False, no_slip=True, energy_cap=False)
     m, counts = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.zeros(rules.RULES, dtype=np.int64)
     m[motion.FAMILY], m[motion.S], m[motion.FLOOR] = motion.TILT, side, motion.STICK
     w = 0.3 * side
-    z = np.array([0.0, math.cos(0.25), 0.15 * side, -math.cos(0.25) * w, math.sin(0.25) * abs(w), w])
+    z = np.array(
+        [0.0, math.cos(0.25), 0.15 * side, -math.cos(0.25) * w, math.sin(0.25) * abs(w), w]
+    )
     assert strike._wall_impact(b, m, z, True, 1e-9, np.zeros(2), np.zeros(2), counts)
     e = 0.3 if side > 0 else 0.7
     assert z[motion.W] == pytest.approx(-e * w, abs=1e-15)
     assert z[motion.VX] == pytest.approx(math.cos(0.25) * e * w, abs=1e-15)
 
 
-@pytest.mark.parametrize(("slip", "kept"), [(0.1, True), (-3e-7, True), (1e-7, False), (-1e-7, False)])
+@pytest.mark.parametrize(
+    ("slip", "kept"), [(0.1, True), (-3e-7, True), (1e-7, False), (-1e-7, False)]
+)
 def test_a_block_that_lands_with_less_spin_than_counts_slides_on(slip, kept):
-    """Its spin, and a bounce and a slip below the settling speed, are gone; a slip above it, and a faster bounce, are not."""
+    """Its spin, and a bounce and a slip below the settling speed, are gone; a slip above it, and a
+    faster bounce, are not."""
     block = Block(half_width=math.sin(0.4), half_height=math.cos(0.4))
     scene = Scene(name="lands", block=block, floor=Floor(friction=0.5), duration=1.0)
     b = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
@@ -335,7 +489,8 @@ def no_impacts() -> np.ndarray:
 
 
 def test_the_settling_speed_rises_as_impacts_accumulate():
-    """Tenfold with every hundred impacts up to 2.5e-3, without a bound after five hundred times as many; back after a quiet 0.025."""
+    """Tenfold with every hundred impacts up to 2.5e-3, without a bound after five hundred times as
+    many; back after a quiet 0.025."""
     counts, rattle, t = np.zeros(rules.RULES, dtype=np.int64), no_impacts(), 0.0
     speeds = []
     for _ in range(50_100):
@@ -343,7 +498,9 @@ def test_the_settling_speed_rises_as_impacts_accumulate():
         speeds.append(settle.settling_speed(rattle, t, counts))
     rises = [k + 1 for k in range(1, len(speeds)) if speeds[k] != speeds[k - 1]]
     assert rises == [100, 200, 300, 400, 500, 50_000]
-    np.testing.assert_allclose([speeds[0], *(speeds[k - 1] for k in rises)], [5e-8, 5e-7, 5e-6, 5e-5, 5e-4, 2.5e-3, np.inf])
+    np.testing.assert_allclose(
+        [speeds[0], *(speeds[k - 1] for k in rises)], [5e-8, 5e-7, 5e-6, 5e-5, 5e-4, 2.5e-3, np.inf]
+    )
     assert counts[rules.RATTLES] == 501
     assert settle.settling_speed(rattle, t + 0.024, counts) == np.inf
     assert settle.settling_speed(rattle, t + 0.024 + 0.026, counts) == 5e-8

@@ -1,4 +1,5 @@
-"""Lanes: the compiled code does what the plain functions say, to the bit; polynomials in two halves."""
+"""Lanes: the compiled code does what the plain functions say, to the bit; polynomials in two
+halves."""
 
 from __future__ import annotations
 
@@ -13,11 +14,30 @@ from hypothesis import strategies as st
 
 from rockcheck.ebm import natural
 from rockcheck.ebm.core import lanes, motion, series
-from rockcheck.ebm.core.lanes import LANES, above, falls, first, load, powers, put, ramp, shifted, store, total, upto, zeros
+from rockcheck.ebm.core.lanes import (
+    LANES,
+    above,
+    falls,
+    first,
+    load,
+    powers,
+    put,
+    ramp,
+    shifted,
+    store,
+    total,
+    upto,
+    zeros,
+)
 from rockcheck.scenes import Floor, Ricker, Scene
 from rockcheck.scenes.scene import PAPER_BLOCK
 
-NUMBERS = np.array([[1.5, -2.25, 0.0, -0.0, 3e300, -1e-310, 0.1, 7.0], [0.3, np.nan, -np.inf, np.inf, -1e-3, 2.0, -5.0, 1e10]])
+NUMBERS = np.array(
+    [
+        [1.5, -2.25, 0.0, -0.0, 3e300, -1e-310, 0.1, 7.0],
+        [0.3, np.nan, -np.inf, np.inf, -1e-3, 2.0, -5.0, 1e10],
+    ]
+)
 
 
 def arithmetic(a, place, number):
@@ -46,7 +66,9 @@ def whole(a, place, number):
 
 
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
-@pytest.mark.parametrize("function", [arithmetic, made, places, whole], ids=lambda function: function.__name__)
+@pytest.mark.parametrize(
+    "function", [arithmetic, made, places, whole], ids=lambda function: function.__name__
+)
 def test_compiled_lanes_are_the_plain_ones(function):
     compiled = numba.njit(error_model="numpy")(function)
     for place in (-9, -1, 0, 3, LANES - 1, LANES, 2**40):
@@ -63,7 +85,8 @@ def test_compiled_lanes_are_the_plain_ones(function):
 
 
 def test_a_series_fills_two_registers():
-    """The rates of a guard are read one coefficient further, and so are the terms behind a zero: all that stands within the row."""
+    """The rates of a guard are read one coefficient further, and so are the terms behind a zero:
+    all that stands within the row."""
     assert series.ORDER + 1 == 2 * lanes.LANES
     assert 2 * series.ORDER < series.WIDTH
 
@@ -114,7 +137,8 @@ def test_the_least_change_of_what_is_no_number():
 @pytest.mark.parametrize("vertical", [False, True])
 @pytest.mark.parametrize("slip", [0, 1, -1])
 def test_what_is_written_out_is_the_general_solution(slip, vertical):
-    """All terms of ROCK and SLIDE-ROCK, whose sums are made eight at a time, against the series of any set of contacts."""
+    """All terms of ROCK and SLIDE-ROCK, whose sums are made eight at a time, against the series of
+    any set of contacts."""
     rng = np.random.default_rng(5)
     shaken = Ricker(amplitude=3.0, period=1.1) if vertical else None
     scene = Scene(
@@ -130,22 +154,38 @@ def test_what_is_written_out_is_the_general_solution(slip, vertical):
     m = np.zeros(motion.MODE_SIZE, dtype=np.int64)
     m[motion.FAMILY], m[motion.PULL], m[motion.SLIP] = motion.TILT, 1, slip
     m[motion.FLOOR] = motion.SLIPPING if slip else motion.STICK
-    rows = [motion.PHI, motion.OMEGA, motion.SIN, motion.COS, motion.P, motion.Q] + [motion.XI, motion.Y] * (slip != 0)
+    rows = [motion.PHI, motion.OMEGA, motion.SIN, motion.COS, motion.P, motion.Q] + [
+        motion.XI,
+        motion.Y,
+    ] * (slip != 0)
     for _ in range(20):
         m[motion.S] = rng.choice([-1, 1])
         theta, w = m[motion.S] * rng.uniform(0.0, 1.2) * b.left.alpha, rng.uniform(-0.5, 0.5)
         lean = b.left.alpha - abs(theta)
         s, c = math.sin(lean), math.cos(lean)
-        z = np.array([m[motion.S] * s, c, theta, m[motion.S] * (rng.uniform(-1.0, 1.0) if slip else 0.0) - c * w, m[motion.S] * s * w, w])
+        z = np.array(
+            [
+                m[motion.S] * s,
+                c,
+                theta,
+                m[motion.S] * (rng.uniform(-1.0, 1.0) if slip else 0.0) - c * w,
+                m[motion.S] * s * w,
+                w,
+            ]
+        )
         t = rng.uniform(0.5, 2.5)
         order = motion.tilt_series(b, m, z, *grounds, t, series.ORDER, 0.0, 1.0, a)
         assert order == series.ORDER
         a[motion.OMEGA, order] = 0.0  # ROCK has one more
         found = a[rows, : order + 1].copy()
-        a[motion.XI, :2], a[motion.Y, :2] = [m[motion.S] * z[motion.X], m[motion.S] * z[motion.VX]], [z[motion.HEIGHT], z[motion.VY]]
+        a[motion.XI, :2], a[motion.Y, :2] = (
+            [m[motion.S] * z[motion.X], m[motion.S] * z[motion.VX]],
+            [z[motion.HEIGHT], z[motion.VY]],
+        )
         motion._contact_series(b, motion.side_of(b, m[motion.S]), m, order, 0.0, 1.0, a)
         wanted = a[rows, : order + 1]
-        # Rounding of an early term spreads over all that follow: it is relative to the largest one so far.
+        # Rounding of an early term spreads over all that follow: it is relative to the largest one
+        # so far.
         size = np.maximum.accumulate(np.abs(wanted).max(axis=0))
         assert np.all(np.abs(found - wanted) <= 2e-13 * size)
         assert np.abs(wanted).max() < 1e6

@@ -1,4 +1,5 @@
-"""The event core stays small: few numbers, one zero of a kind, few modelling choices with a home and a paragraph each; short functions."""
+"""The event core stays small: few numbers, one zero of a kind, few modelling choices with a home
+and a paragraph each; short functions."""
 
 from __future__ import annotations
 
@@ -34,7 +35,9 @@ def test_modelling_choices_are_few():
 @pytest.mark.parametrize("rule", ledger.names_of_rules())
 def test_a_modelling_choice_is_counted_and_explained(rule):
     assert len(ledger.homes(rule)) in (1, 2, 3)
-    assert rules.NAMES[getattr(rules, rule)] in (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
+    assert rules.NAMES[getattr(rules, rule)] in (ROOT / "docs" / "limits.md").read_text(
+        encoding="utf-8"
+    )
 
 
 def test_functions_are_short_of_branches():

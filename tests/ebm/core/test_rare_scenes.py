@@ -1,4 +1,5 @@
-"""Scenes, by name, in which a model once found no mode or no impact to go on with: they run, and their contacts hold."""
+"""Scenes, by name, in which a model once found no mode or no impact to go on with: they run, and
+their contacts hold."""
 
 from __future__ import annotations
 
@@ -9,7 +10,18 @@ import pytest
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.batch import pack, run_batch
-from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from rockcheck.scenes import (
+    Block,
+    Floor,
+    InputError,
+    Record,
+    Rest,
+    Ricker,
+    Scene,
+    Sine,
+    Wall,
+    kinematics,
+)
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 SQUARE = Block(half_width=7.069, half_height=7.069)
@@ -20,7 +32,14 @@ def both(left: float, right: float, e: float) -> tuple[Wall, Wall]:
 
 
 def scene_of(block: Block, friction: float, duration: float, **more: object) -> Scene:
-    return Scene(name="rare", block=block, floor=Floor(friction=friction), duration=duration, output_step=duration / 200.0, **more)
+    return Scene(
+        name="rare",
+        block=block,
+        floor=Floor(friction=friction),
+        duration=duration,
+        output_step=duration / 200.0,
+        **more,
+    )
 
 
 SCENES = {
@@ -32,22 +51,35 @@ SCENES = {
         walls=[Wall(side="left", gap=0.003)],
         excitation=Ricker(amplitude=27.828295819935693, period=1.030200737875156),
     ),
-    "no room between walls": scene_of(SQUARE, 0.3, 1.0, walls=both(0.0, 0.0, 0.9), initial_velocity=1.33),
+    "no room between walls": scene_of(
+        SQUARE, 0.3, 1.0, walls=both(0.0, 0.0, 0.9), initial_velocity=1.33
+    ),
     "no room, elastic walls": scene_of(
-        PAPER_BLOCK, 0.3, 1.0, walls=both(0.0, 0.0, 1.0), initial_velocity=-0.5, initial_angular_velocity=0.2
+        PAPER_BLOCK,
+        0.3,
+        1.0,
+        walls=both(0.0, 0.0, 1.0),
+        initial_velocity=-0.5,
+        initial_angular_velocity=0.2,
     ),
     "wedged": scene_of(
         Block(half_width=0.2767571700542464, half_height=1.842522521858856),
         1.0755489589847906,
         0.0423,
         walls=[Wall(side="left", gap=0.0), Wall(side="right", gap=4.4275213258795984e-05)],
-        excitation=Record.from_samples([17.01251771455549, 3.1933179172065307, 0.0], 0.02356894360863881),
+        excitation=Record.from_samples(
+            [17.01251771455549, 3.1933179172065307, 0.0], 0.02356894360863881
+        ),
         initial_angular_velocity=0.49573088587126474,
         initial_velocity=1.072157064841811,
         gravity=10.0,
     ),
     "no friction, shaken both ways": scene_of(
-        PAPER_BLOCK, 0.0, 6.0, excitation=Ricker(amplitude=8.0, period=0.9), vertical=Ricker(amplitude=-6.0, period=0.6)
+        PAPER_BLOCK,
+        0.0,
+        6.0,
+        excitation=Ricker(amplitude=8.0, period=0.9),
+        vertical=Ricker(amplitude=-6.0, period=0.6),
     ),
     "no friction, a wall that is touched": scene_of(
         PAPER_BLOCK,
@@ -62,7 +94,11 @@ SCENES = {
         Block(half_width=0.5, half_height=0.5), 0.6, 4.0, initial_rotation=0.5, excitation=Rest()
     ),
     "weight that turns around": scene_of(
-        PAPER_BLOCK, 0.5, 3.0, excitation=Ricker(amplitude=3.0, period=1.0), vertical=Sine(amplitude=14.0, period=1.1, cycles=2)
+        PAPER_BLOCK,
+        0.5,
+        3.0,
+        excitation=Ricker(amplitude=3.0, period=1.0),
+        vertical=Sine(amplitude=14.0, period=1.1, cycles=2),
     ),
     "spikes from below": scene_of(
         Block(half_width=0.088, half_height=0.996),
@@ -74,15 +110,24 @@ SCENES = {
 
 
 @pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("settings", [{}, {"tolerance": 1e-8}, {"pivot": "unilateral"}, {"friction": "bouc-wen"}], ids=str)
+@pytest.mark.parametrize(
+    "settings",
+    [{}, {"tolerance": 1e-8}, {"pivot": "unilateral"}, {"friction": "bouc-wen"}],
+    ids=str,
+)
 def test_it_runs(name, settings):
     scene = SCENES[name]
     history = EventBasedModel(**settings).simulate(scene)
     motion, length = history.channels, scene.block.radius
     assert all(np.all(np.isfinite(motion[channel])) for channel in ("x", "y", "theta"))
-    assert np.min(kinematics.pivot_height(scene.block, motion["y"], motion["theta"])) > -1e-9 * length
+    assert (
+        np.min(kinematics.pivot_height(scene.block, motion["y"], motion["theta"])) > -1e-9 * length
+    )
     for wall in scene.walls:
-        assert np.min(kinematics.wall_gap(scene, wall.side, motion["x"], motion["theta"])) > -1e-9 * length
+        assert (
+            np.min(kinematics.wall_gap(scene, wall.side, motion["x"], motion["theta"]))
+            > -1e-9 * length
+        )
 
 
 @pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
@@ -94,7 +139,8 @@ def test_without_room_nothing_moves(name, pivot):
 
 
 def test_a_landing_at_the_slip_limit_takes_its_energy():
-    """Housner's ratio for 45 degrees is 1/4: the tilt falls with each landing, and the block comes to rest."""
+    """Housner's ratio for 45 degrees is 1/4: the tilt falls with each landing, and the block comes
+    to rest."""
     history = EventBasedModel().simulate(SCENES["square block that lands at its slip limit"])
     assert history.outcome == "at rest"
     assert len(history.event_list) < 60
@@ -102,7 +148,9 @@ def test_a_landing_at_the_slip_limit_takes_its_energy():
 
 def test_a_pivot_that_cannot_slip_has_no_slip_velocity():
     with pytest.raises(InputError, match="initial_velocity"):
-        EventBasedModel(friction="no-slip").simulate(scene_of(PAPER_BLOCK, 0.3, 1.0, initial_velocity=0.1))
+        EventBasedModel(friction="no-slip").simulate(
+            scene_of(PAPER_BLOCK, 0.3, 1.0, initial_velocity=0.1)
+        )
 
 
 def test_a_vertical_record_of_zeros_is_none():
@@ -114,9 +162,12 @@ def test_a_vertical_record_of_zeros_is_none():
     np.testing.assert_array_equal(other.channels["theta"], one.channels["theta"])
 
 
-@pytest.mark.parametrize("settings", [{}, {"pivot": "unilateral"}, {"friction": "no-slip"}], ids=str)
+@pytest.mark.parametrize(
+    "settings", [{}, {"pivot": "unilateral"}, {"friction": "no-slip"}], ids=str
+)
 def test_random_pulses_between_walls(settings):
-    """A thousand pulses between walls that are touched or nearly so: every one is played to its end."""
+    """A thousand pulses between walls that are touched or nearly so: every one is played to its
+    end."""
     random = np.random.default_rng(7)
     model = EventBasedModel(tolerance=1e-8, **settings)
     gaps = (0.0, 0.003, 0.053)
@@ -125,19 +176,30 @@ def test_random_pulses_between_walls(settings):
             PAPER_BLOCK,
             float(random.choice([0.0, 0.1, 0.3, 1.2])),
             6.0,
-            walls=both(float(random.choice(gaps)), float(random.choice(gaps)), float(random.choice([0.0, 0.5, 1.0]))),
-            excitation=Ricker(amplitude=float(random.uniform(-30.0, 30.0)), period=float(random.uniform(0.4, 4.0))),
+            walls=both(
+                float(random.choice(gaps)),
+                float(random.choice(gaps)),
+                float(random.choice([0.0, 0.5, 1.0])),
+            ),
+            excitation=Ricker(
+                amplitude=float(random.uniform(-30.0, 30.0)), period=float(random.uniform(0.4, 4.0))
+            ),
         )
         for _ in range(1000)
     ]
     assert not run_batch(pack(scenes, model), model, until_decided=False, strict=False).failed.any()
 
 
-@pytest.mark.parametrize(("amplitude", "period", "friction"), [(6.0, 1.0, 0.3), (-9.0, 0.7, 1.0), (5.0, 1.5, 0.6)])
+@pytest.mark.parametrize(
+    ("amplitude", "period", "friction"), [(6.0, 1.0, 0.3), (-9.0, 0.7, 1.0), (5.0, 1.5, 0.6)]
+)
 def test_a_decided_run_has_the_peak_of_the_whole_run(amplitude, period, friction):
-    """Deciding early, when what is left of the pulse cannot lift the block above its peak, changes no peak."""
+    """Deciding early, when what is left of the pulse cannot lift the block above its peak, changes
+    no peak."""
     model = EventBasedModel(tolerance=1e-11)
-    scene = scene_of(PAPER_BLOCK, friction, 15.0, excitation=Ricker(amplitude=amplitude, period=period))
+    scene = scene_of(
+        PAPER_BLOCK, friction, 15.0, excitation=Ricker(amplitude=amplitude, period=period)
+    )
     packed = pack([scene], model)
     early, whole = run_batch(packed, model), run_batch(packed, model, until_decided=False)
     assert early.series[0] < whole.series[0]
@@ -154,15 +216,28 @@ def test_impulse_ahead_is_the_integral(symmetric):
     ground = ground_of(Ricker(amplitude=5.0, period=1.3, symmetric=symmetric), 9.81, 0.4)
     for share in (1.3, 1.6, 2.2):
         t = ground.centre + share / math.sqrt(ground.rate)
-        there, _ = quad(lambda s: abs(acceleration(ground, s)), t, ground.quiet, epsabs=1e-15, epsrel=1e-12)
+        there, _ = quad(
+            lambda s: abs(acceleration(ground, s)), t, ground.quiet, epsabs=1e-15, epsrel=1e-12
+        )
         assert impulse_ahead(ground, t) == pytest.approx(there, rel=1e-9)
     assert impulse_ahead(ground, ground.centre) == math.inf
 
 
 def test_inner_kernels_return_no_arrays(monkeypatch):
-    """They are compiled without reference counts, so that an array that they returned would be freed too early."""
+    """They are compiled without reference counts, so that an array that they returned would be
+    freed too early."""
     from rockcheck.ebm import natural
-    from rockcheck.ebm.core import contacts, decide, ground, guards, march, modes, motion, series, settle
+    from rockcheck.ebm.core import (
+        contacts,
+        decide,
+        ground,
+        guards,
+        march,
+        modes,
+        motion,
+        series,
+        settle,
+    )
     from rockcheck.ebm.core.lanes import LANES
     from rockcheck.ebm.core.laws import contact_impacts, impacts, strike
 
@@ -173,7 +248,9 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
             found = function(*arguments)
             parts = found if isinstance(found, tuple) else (found,)
             # Lanes are an array in the interpreter only.
-            assert not any(isinstance(part, np.ndarray) and part.shape != (LANES,) for part in parts), function.__name__
+            assert not any(
+                isinstance(part, np.ndarray) and part.shape != (LANES,) for part in parts
+            ), function.__name__
             seen.add(function.__name__)
             return found
 
@@ -181,28 +258,63 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
 
     # The event loop in the interpreter, with every function of it that is no kernel under watch.
     run, scratch, scene = march.run.py_func, motion.workspace(), SCENES["wedged"]
-    for module in (contact_impacts, contacts, decide, ground, guards, impacts, march, modes, motion, series, settle, strike):
+    for module in (
+        contact_impacts,
+        contacts,
+        decide,
+        ground,
+        guards,
+        impacts,
+        march,
+        modes,
+        motion,
+        series,
+        settle,
+        strike,
+    ):
         for name, function in list(vars(module).items()):
             if not hasattr(function, "py_func"):
                 continue
             counts_references = function.targetoptions["_nrt"]
-            monkeypatch.setattr(module, name, function.py_func if counts_references else watched(function.py_func))
+            monkeypatch.setattr(
+                module, name, function.py_func if counts_references else watched(function.py_func)
+            )
     setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
     control = march.Control(1e-8, 200, 200, False, 1.0)
     nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
     with np.errstate(all="ignore"):
-        run(setting, *natural.grounds_of(scene), natural.state_of(scene), 3.0, control, *nothing, *scratch)
+        run(
+            setting,
+            *natural.grounds_of(scene),
+            natural.state_of(scene),
+            3.0,
+            control,
+            *nothing,
+            *scratch,
+        )
     assert len(seen) > 30
 
 
-@pytest.mark.parametrize("settings", [{}, {"pivot": "unilateral"}, {"friction": "no-slip"}], ids=str)
+@pytest.mark.parametrize(
+    "settings", [{}, {"pivot": "unilateral"}, {"friction": "no-slip"}], ids=str
+)
 def test_a_block_that_falls_away_from_its_wall_is_decided_on_the_way(settings):
-    """On a base at rest, as soon as it is steeper than friction: whatever it does then turns it farther."""
+    """On a base at rest, as soon as it is steeper than friction: whatever it does then turns it
+    farther."""
     model = EventBasedModel(**settings)
-    scene = scene_of(PAPER_BLOCK, 0.3, 10.0, walls=[Wall(side="left", gap=0.003)], initial_rotation=-1.05 * PAPER_BLOCK.alpha)
+    scene = scene_of(
+        PAPER_BLOCK,
+        0.3,
+        10.0,
+        walls=[Wall(side="left", gap=0.003)],
+        initial_rotation=-1.05 * PAPER_BLOCK.alpha,
+    )
     whole = model.simulate(scene)
     assert whole.outcome == "overturned right"
     decided = run_batch(pack([scene], model), model)
     assert decided.side[0] == 1
     assert decided.peak[0] == pytest.approx(0.5 * math.pi)
-    assert decided.t_end[0] * math.sqrt(PAPER_BLOCK.radius / scene.gravity) < whole.event_list[-1].t - 0.1
+    assert (
+        decided.t_end[0] * math.sqrt(PAPER_BLOCK.radius / scene.gravity)
+        < whole.event_list[-1].t - 0.1
+    )

@@ -30,7 +30,8 @@ class Deadly(Stress):
 
 
 class Stubborn(Stress):
-    """Every scene fails. As they shrink, run 13 kills its process, run 4 takes its time, run 3 never ends once it has no walls."""
+    """Every scene fails. As they shrink, run 13 kills its process, run 4 takes its time, run 3
+    never ends once it has no walls."""
 
     @staticmethod
     def play(task: Any) -> Any:
@@ -38,7 +39,9 @@ class Stubborn(Stress):
             failures = [Broken("ebm", "mirror", 1, number, 1.0) for number in FAILING]
             return RunTotals(model=task.model, counts=Counter(runs=task.count), failures=failures)
 
-        def check(self: EventBased, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
+        def check(
+            self: EventBased, scene: Scene, seed: int, number: int, only: str = ""
+        ) -> CheckedRun:
             if number == 13:
                 os._exit(9)
             if number == 4:

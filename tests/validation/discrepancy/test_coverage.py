@@ -14,7 +14,8 @@ BIAS, SCATTER, AGREE = 0.05, 0.2, 0.9
 
 
 def made(chance) -> Samples:
-    """Peaks whose ratios are lognormal, and outcomes of which nine in ten agree; who falls has no ratio."""
+    """Peaks whose ratios are lognormal, and outcomes of which nine in ten agree; who falls has no
+    ratio."""
     peaks = chance.uniform(0.2, 0.8, SCENES)
     outcomes = np.where(chance.random(SCENES) < 0.3, "overturned left", "at rest")
     other = np.where(outcomes == "at rest", "overturned left", "at rest")
@@ -23,7 +24,10 @@ def made(chance) -> Samples:
     return Samples(Sample(peaks, list(outcomes)), Sample(peaks * ratios, list(theirs)))
 
 
-@pytest.mark.parametrize(("name", "truth"), [("peak_bias", BIAS), ("peak_scatter", SCATTER), ("overturning_accuracy", AGREE)])
+@pytest.mark.parametrize(
+    ("name", "truth"),
+    [("peak_bias", BIAS), ("peak_scatter", SCATTER), ("overturning_accuracy", AGREE)],
+)
 def test_the_interval_in_the_remark_covers(name, truth):
     chance, inside = np.random.default_rng(11), 0
     for _ in range(TIMES):

@@ -14,11 +14,18 @@ from rockcheck.validation.discrepancy.impact_laws import law_followed, parting_l
 
 
 def flush_landing(restitution: float, side: str = "left") -> Scene:
-    """A block that stands against a wall and is tilted away from it: its first landing is on floor and wall at once."""
+    """A block that stands against a wall and is tilted away from it: its first landing is on floor
+    and wall at once."""
     tilt = 0.3 * PAPER_BLOCK.alpha * (-1.0 if side == "left" else 1.0)
     wall = Wall(side=side, gap=0.0, restitution=restitution)
     return Scene(
-        name="flush", block=PAPER_BLOCK, floor=Floor(friction=0.5), walls=[wall], initial_rotation=tilt, duration=1.0, output_step=0.002
+        name="flush",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=0.5),
+        walls=[wall],
+        initial_rotation=tilt,
+        duration=1.0,
+        output_step=0.002,
     )
 
 
@@ -34,7 +41,9 @@ def test_a_branch_is_known_again(law: str, restitution: float, side: str) -> Non
 
 
 @pytest.mark.parametrize(("restitution", "branch"), [(0.5, "closed"), (1.0, "open")])
-def test_the_default_law_is_closed_below_one_and_open_at_one(restitution: float, branch: str) -> None:
+def test_the_default_law_is_closed_below_one_and_open_at_one(
+    restitution: float, branch: str
+) -> None:
     scene = flush_landing(restitution)
     found = law_followed(scene, EventBasedModel(pivot="unilateral").simulate(scene))
     assert found is not None
@@ -90,11 +99,14 @@ ALL_AT_ONCE = Scene(
 
 @pytest.mark.parametrize("closed", [stepping.CLOSED, 1.4 * stepping.CLOSED, 4.0 * stepping.CLOSED])
 @pytest.mark.parametrize("engine", ["Dart", "MuJoCo", "PyBullet", "Pymunk"])
-@pytest.mark.parametrize("scene", [PIVOT_IS_LIFTED, SLIDES, ALL_AT_ONCE], ids=lambda scene: scene.name)
+@pytest.mark.parametrize(
+    "scene", [PIVOT_IS_LIFTED, SLIDES, ALL_AT_ONCE], ids=lambda scene: scene.name
+)
 def test_corners_that_land_at_one_instant_share_the_impact(
     scene: Scene, engine: str, closed: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """So with steps that end at events all engines follow the closed branch, however near a corner must be to touch."""
+    """So with steps that end at events all engines follow the closed branch, however near a corner
+    must be to touch."""
     model = getattr(engines, engine)
     if not model.installed():
         pytest.skip(f"{engine} is not installed")
@@ -143,10 +155,15 @@ def flat_landing(**change: object) -> Scene:
 
 @pytest.mark.parametrize(("tilt", "law"), [(1e-9, "leading-first"), (-1e-9, "trailing-first")])
 @pytest.mark.parametrize("speed", [-1.0, 1.0])
-def test_a_tilt_that_is_next_to_nothing_says_which_corner_is_first(tilt: float, law: str, speed: float) -> None:
-    """Tilted to the side to which it slides a block lands on its leading corner; the laws are the limits of such landings."""
+def test_a_tilt_that_is_next_to_nothing_says_which_corner_is_first(
+    tilt: float, law: str, speed: float
+) -> None:
+    """Tilted to the side to which it slides a block lands on its leading corner; the laws are the
+    limits of such landings."""
     scene = flat_landing(initial_velocity=speed)
-    tilted = EventBasedModel(pivot="unilateral").simulate(scene.replace(initial_rotation=-speed * tilt))
+    tilted = EventBasedModel(pivot="unilateral").simulate(
+        scene.replace(initial_rotation=-speed * tilt)
+    )
     found = law_followed(scene, tilted)
     assert found is not None
     assert law in found.law.split(" or ")
@@ -167,7 +184,8 @@ def test_a_flat_landing_is_told_from_one_without_slip_and_one_that_tips() -> Non
 
 
 def test_a_block_that_a_wall_has_struck_lands_flat() -> None:
-    """The continuous model tells that this landing has several answers: it follows another one as its springs grow stiffer."""
+    """The continuous model tells that this landing has several answers: it follows another one as
+    its springs grow stiffer."""
     scene = Scene(
         name="struck",
         block=Block(half_width=0.6257529044558684, half_height=1.450050869104316),
@@ -179,7 +197,10 @@ def test_a_block_that_a_wall_has_struck_lands_flat() -> None:
     landing = parting_landing(scene)
     assert landing is not None
     assert landing.t == pytest.approx(1.8439, abs=scene.output_step)
-    soft, stiff = (landing.followed_by(ContinuousModel(penetration=depth).simulate(scene), scene) for depth in (1e-8, 1e-10))
+    soft, stiff = (
+        landing.followed_by(ContinuousModel(penetration=depth).simulate(scene), scene)
+        for depth in (1e-8, 1e-10)
+    )
     assert soft is not None
     assert stiff is not None
     assert soft.law == "moreau or leading-first"

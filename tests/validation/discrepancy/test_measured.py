@@ -41,14 +41,30 @@ last_x = { expected = 0.0, limit = 0.0, drift = 0.0, why = "it stands" }
 
 def write(path: Path, head: str, *columns: object) -> Path:
     path.write_text(
-        head + "\n" + "\n".join(",".join(map(repr, map(float, row))) for row in zip(*columns, strict=True)) + "\n", encoding="utf-8"
+        head
+        + "\n"
+        + "\n".join(",".join(map(repr, map(float, row))) for row in zip(*columns, strict=True))
+        + "\n",
+        encoding="utf-8",
     )
     return path
 
 
 def test_units_of_columns(tmp_path):
     t = np.arange(5.0)
-    history = read_measured(write(tmp_path / "a.csv", "time_ms, theta_deg, x_mm, slip_rate_cm_s, y, strain", t, t, t, t, t, t), offset=0.25)
+    history = read_measured(
+        write(
+            tmp_path / "a.csv",
+            "time_ms, theta_deg, x_mm, slip_rate_cm_s, y, strain",
+            t,
+            t,
+            t,
+            t,
+            t,
+            t,
+        ),
+        offset=0.25,
+    )
     np.testing.assert_allclose(history.channels["t"], 1e-3 * t + 0.25)
     np.testing.assert_allclose(history.channels["theta"], np.deg2rad(t))
     np.testing.assert_allclose(history.channels["x"], 1e-3 * t)
@@ -73,7 +89,9 @@ def test_faults_are_named(tmp_path, head, fault):
     with pytest.raises(InputError, match="cannot be read"):
         read_measured(tmp_path / "gone.csv")
     with pytest.raises(InputError, match="is not finite"):
-        read_measured(write(tmp_path / "a.csv", "t_s,theta_deg", np.arange(3.0), [0.0, np.nan, 0.0]))
+        read_measured(
+            write(tmp_path / "a.csv", "t_s,theta_deg", np.arange(3.0), [0.0, np.nan, 0.0])
+        )
 
 
 def test_a_measured_history_is_judged_like_a_model(tmp_path, capsys):
@@ -84,7 +102,12 @@ def test_a_measured_history_is_judged_like_a_model(tmp_path, capsys):
 
     truth = EventBasedModel().simulate(scene)
     rows = truth.channels["t"] <= 1.6
-    write(tmp_path / "table.csv", "time_s,theta_deg", truth.channels["t"][rows] + 0.4, np.rad2deg(truth.channels["theta"][rows]))
+    write(
+        tmp_path / "table.csv",
+        "time_s,theta_deg",
+        truth.channels["t"][rows] + 0.4,
+        np.rad2deg(truth.channels["theta"][rows]),
+    )
     run = run_suite(load_suite(path), tmp_path / "out", jobs=1)
     cell = run.cell("tilt", "table")
     assert run.cell("other", "table") is None
@@ -92,12 +115,28 @@ def test_a_measured_history_is_judged_like_a_model(tmp_path, capsys):
         ("1.5s", "measured", "pass"),
         ("", "measured", "fail"),
     ]
-    words = "`offset` of the measured model shifts its times, a window such as theta_rms@8s ends sooner"
+    words = (
+        "`offset` of the measured model shifts its times, a window such as theta_rms@8s ends sooner"
+    )
     assert cell.checks[1].reason == f"table ends at 1.6 s, before 2 s; {words}"
     write(tmp_path / "table.csv", "time_s,theta_deg", [0.3, 0.9], [0.0, 0.0])
-    assert run_suite(load_suite(path), tmp_path / "out", jobs=1).cell("tilt", "table").read_back is False
+    assert (
+        run_suite(load_suite(path), tmp_path / "out", jobs=1).cell("tilt", "table").read_back
+        is False
+    )
     truth.save(tmp_path / "truth.csv")
-    assert main(["compare", str(tmp_path / "truth.csv"), str(tmp_path / "table.csv"), "--offset", "-0.4"]) == 0
+    assert (
+        main(
+            [
+                "compare",
+                str(tmp_path / "truth.csv"),
+                str(tmp_path / "table.csv"),
+                "--offset",
+                "-0.4",
+            ]
+        )
+        == 0
+    )
     assert "measured against ebm, 0 to 0.5 s" in capsys.readouterr().out
 
 

@@ -32,7 +32,10 @@ def test_a_history_agrees_with_itself(made):
 
 
 def test_rms_and_peak_of_an_offset(made):
-    found = compare(made(WAVE, T), made(WAVE + 0.02, T, x=np.full(len(T), 0.003), slip_rate=0.1 * np.sin(2 * np.pi * T)))
+    found = compare(
+        made(WAVE, T),
+        made(WAVE + 0.02, T, x=np.full(len(T), 0.003), slip_rate=0.1 * np.sin(2 * np.pi * T)),
+    )
     assert found["theta_rms"] == pytest.approx(0.02, rel=1e-9)
     assert found["theta_peak"] == pytest.approx(0.02, rel=1e-9)
     assert found["x_rms"] == pytest.approx(0.003, rel=1e-9)
@@ -60,14 +63,19 @@ def test_energy_is_kinetic_plus_potential(made):
 def test_grids_may_differ_and_until_cuts(made):
     coarse_time = np.linspace(0.0, 10.0, 1501)
     drifting = np.where(coarse_time > 5.0, 0.1 * (coarse_time - 5.0), 0.0)
-    found = compare(made(WAVE, T), made(0.3 * np.sin(2 * np.pi * coarse_time) + drifting, coarse_time), until=5.0)
+    found = compare(
+        made(WAVE, T),
+        made(0.3 * np.sin(2 * np.pi * coarse_time) + drifting, coarse_time),
+        until=5.0,
+    )
     assert found["theta_peak"] < 1e-4
     assert found.end == 5.0
     assert found.figures[0].window == "5s"
 
 
 def test_the_window_is_the_common_time_and_holds_its_own_ends(made):
-    """From the later start to the earlier end, or to `until`; rows, and events, just at an end are inside."""
+    """From the later start to the earlier end, or to `until`; rows, and events, just at an end are
+    inside."""
     t = np.arange(11.0)
     late, early = made(np.zeros(9), t[2:]), made(np.zeros(9), t[:-2])
     for pair in ((early, late), (late, early)):
@@ -93,8 +101,13 @@ def test_hausdorff_counts_a_late_jump_as_lateness(made):
 
 def test_hausdorff_scales_time_by_the_scene_s_own_gravity(made):
     late = made(np.where(T < 5.01, 0.0, 1.0), T)
-    moon = Scene(name="moon", block=PAPER_BLOCK, floor=Floor(friction=0.5), duration=10.0, gravity=1.62)
-    on_earth, on_the_moon = (compare(made(np.where(T < 5.0, 0.0, 1.0), T), late, scene=scene)["theta_hausdorff"] for scene in (None, moon))
+    moon = Scene(
+        name="moon", block=PAPER_BLOCK, floor=Floor(friction=0.5), duration=10.0, gravity=1.62
+    )
+    on_earth, on_the_moon = (
+        compare(made(np.where(T < 5.0, 0.0, 1.0), T), late, scene=scene)["theta_hausdorff"]
+        for scene in (None, moon)
+    )
     assert on_the_moon / on_earth == pytest.approx(math.sqrt(1.62 / 9.81), rel=0.02)
 
 
@@ -102,14 +115,27 @@ def test_hausdorff_scales_time_by_the_scene_s_own_gravity(made):
 def test_nan_is_never_a_number(made, column):
     values = WAVE.copy()
     values[-1] = math.nan
-    broken = made(values if column == "theta" else WAVE, T, **({} if column == "theta" else {column: values}))
-    touched = {"theta": "theta_rms", "x": "x_rms", "slip_rate": "slip_rate_rms", "y_dot": "energy_rms"}[column]
+    broken = made(
+        values if column == "theta" else WAVE, T, **({} if column == "theta" else {column: values})
+    )
+    touched = {
+        "theta": "theta_rms",
+        "x": "x_rms",
+        "slip_rate": "slip_rate_rms",
+        "y_dot": "energy_rms",
+    }[column]
     for pair in ((made(WAVE, T), broken), (broken, made(WAVE, T))):
         found = compare(*pair)
         assert math.isnan(found[touched])
         assert math.isnan(found[touched.replace("rms", "peak")])
         if column == "theta":
-            for name in ("theta_hausdorff", "peak_ratio", "sprague_geers_m", "sprague_geers_p", "sprague_geers_c"):
+            for name in (
+                "theta_hausdorff",
+                "peak_ratio",
+                "sprague_geers_m",
+                "sprague_geers_p",
+                "sprague_geers_c",
+            ):
                 assert math.isnan(found[name]), name
 
 
@@ -137,7 +163,15 @@ def test_what_was_not_compared_is_a_gap(made):
 
 
 def test_both_fell_the_same_way_is_whole(made):
-    fallen = [made(WAVE[:n], T[:n], outcome="overturned left", events=[Event(t=T[n], kind="overturned left")]) for n in (2000, 2004)]
+    fallen = [
+        made(
+            WAVE[:n],
+            T[:n],
+            outcome="overturned left",
+            events=[Event(t=T[n], kind="overturned left")],
+        )
+        for n in (2000, 2004)
+    ]
     found = compare(*fallen)
     assert found.gap == ""
     assert found["overturning_time"] == pytest.approx(0.01)
@@ -148,8 +182,12 @@ def test_both_fell_the_same_way_is_whole(made):
 
 
 def test_events_agree_until_the_first_without_counterpart(made):
-    reference = made(WAVE, T, model="r", events=[impact(1.0), impact(2.0), impact(3.0), impact(4.0, 0.001)])
-    candidate = made(WAVE, T, model="c", events=[impact(1.004), impact(2.0), impact(3.1), impact(5.0, 0.001)])
+    reference = made(
+        WAVE, T, model="r", events=[impact(1.0), impact(2.0), impact(3.0), impact(4.0, 0.001)]
+    )
+    candidate = made(
+        WAVE, T, model="c", events=[impact(1.004), impact(2.0), impact(3.1), impact(5.0, 0.001)]
+    )
     found = compare(reference, candidate)
     assert found["events_agree_until"] == 3.0
     assert found.figure("events_agree_until").note == "floor impact only in r"
@@ -158,7 +196,9 @@ def test_events_agree_until_the_first_without_counterpart(made):
 
 
 def test_matching_takes_the_nearest_and_each_once():
-    matched = match_impacts([impact(1.0), impact(1.012)], [impact(1.011), impact(1.03, kind="wall impact")])
+    matched = match_impacts(
+        [impact(1.0), impact(1.012)], [impact(1.011), impact(1.03, kind="wall impact")]
+    )
     assert [(a.t, b.t) for a, b in matched.pairs] == [(1.012, 1.011)]
     assert [e.t for e in matched.only_reference] == [1.0]
     assert [e.kind for e in matched.only_candidate] == ["wall impact"]
@@ -166,7 +206,12 @@ def test_matching_takes_the_nearest_and_each_once():
 
 def test_figures_of_one_history(made):
     theta = 0.5 * np.sin(np.pi * T)
-    history = made(theta, T, x=np.linspace(0, 0.1, len(T)), events=[impact(1.0), impact(2.0, 0.001), impact(3.0)])
+    history = made(
+        theta,
+        T,
+        x=np.linspace(0, 0.1, len(T)),
+        events=[impact(1.0), impact(2.0, 0.001), impact(3.0)],
+    )
     values = {figure.measure: figure.value for figure in describe(history)}
     assert set(values) == {name for name, measure in FIGURES.items() if not measure.on_request}
     assert values["peak_rotation"] == pytest.approx(0.5, rel=1e-6)
@@ -176,11 +221,15 @@ def test_figures_of_one_history(made):
     hop = made(theta, T, y=history.channels["y"] + 0.004)
     assert {f.measure: f.value for f in describe(hop)}["highest_hop"] == pytest.approx(0.004)
     sunk = made(theta, T, y=history.channels["y"] - 0.002)
-    assert {f.measure: f.value for f in describe(sunk)}["deepest_penetration"] == pytest.approx(0.002)
+    assert {f.measure: f.value for f in describe(sunk)}["deepest_penetration"] == pytest.approx(
+        0.002
+    )
 
 
 def test_a_measured_history_may_lack_columns(made):
-    bare = dataclasses.replace(made(WAVE, T), channels={"t": T, "theta": made(WAVE, T).channels["theta"]}, half_width=None)
+    bare = dataclasses.replace(
+        made(WAVE, T), channels={"t": T, "theta": made(WAVE, T).channels["theta"]}, half_width=None
+    )
     found = compare(made(WAVE, T), bare)
     assert found["theta_rms"] == 0.0
     assert math.isnan(found["x_rms"])
@@ -205,10 +254,15 @@ def test_nothing_in_common_is_bad_input(made):
 
 @pytest.mark.parametrize("late", [False, True], ids=["ends early", "starts late"])
 def test_what_is_less_than_a_step_and_a_half_short_is_whole(made, late):
-    """Of histories of eleven rows a second apart: 1.4 s are rounding of their grids, 1.6 s are not."""
+    """Of histories of eleven rows a second apart: 1.4 s are rounding of their grids, 1.6 s are
+    not."""
     t = np.arange(11.0)
     for missing, whole in ((1.4, True), (1.6, False)):
-        other = np.concatenate([[missing], t[2:]]) if late else np.concatenate([t[:-2], [10.0 - missing]])
+        other = (
+            np.concatenate([[missing], t[2:]])
+            if late
+            else np.concatenate([t[:-2], [10.0 - missing]])
+        )
         other = np.linspace(other[0], other[-1], 11)
         assert (compare(made(np.zeros(11), t), made(np.zeros(11), other)).gap == "") is whole
 
@@ -223,7 +277,10 @@ def test_every_measure_says_what_it_is():
 def test_iso_18571_rates_on_one_bounded_grid(made):
     few, wave = T[::40], WAVE[::40]
     reference = made(wave, few)
-    same, worse = (compare(reference, made(c * wave, few), measures=["iso_18571"])["iso_18571"] for c in (1.0, 0.7))
+    same, worse = (
+        compare(reference, made(c * wave, few), measures=["iso_18571"])["iso_18571"]
+        for c in (1.0, 0.7)
+    )
     assert same == pytest.approx(1.0)
     assert 0.3 < worse < 0.9
     flat = compare(reference, made(0.0 * wave, few), measures=["iso_18571"]).figure("iso_18571")

@@ -1,4 +1,5 @@
-"""How sure a figure is: u_num on problems with a known answer, draws of inputs, repeats, verdicts."""
+"""How sure a figure is: u_num on problems with a known answer, draws of inputs, repeats,
+verdicts."""
 
 from __future__ import annotations
 
@@ -10,7 +11,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rockcheck import Block, ContinuousModel, EventBasedModel, Floor, InputError, MuJoCo, Ricker, Scene, Wall
+from rockcheck import (
+    Block,
+    ContinuousModel,
+    EventBasedModel,
+    Floor,
+    InputError,
+    MuJoCo,
+    Ricker,
+    Scene,
+    Wall,
+)
 from rockcheck.commands.cli import main
 from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.scenes.files import load_scene, load_uncertain_scene
@@ -69,7 +80,8 @@ period = { value = 1.2, sd = 0.1 }
 
 @dataclass(frozen=True)
 class Made:
-    """A model whose rotation is sin t times a factor that depends on its step: exactly 1 for a step of zero."""
+    """A model whose rotation is sin t times a factor that depends on its step: exactly 1 for a step
+    of zero."""
 
     factor: object
     step: float = 1e-3
@@ -224,7 +236,8 @@ def test_the_time_of_a_fall_is_that_of_its_changes_and_of_a_row(late, u_num):
 
 
 def test_a_slip_pinned_at_the_gap_is_not_taken_for_sure():
-    """At h, 2h and 4h the slip ends at the wall's gap, 0.03993 m; at a sixteenth of the step it ends at 0.0323 m."""
+    """At h, 2h and 4h the slip ends at the wall's gap, 0.03993 m; at a sixteenth of the step it
+    ends at 0.0323 m."""
     scene = Scene(
         name="slip-pinned-at-the-gap",
         block=Block(half_width=0.5241724288392692, half_height=1.6786164824612813),
@@ -235,7 +248,10 @@ def test_a_slip_pinned_at_the_gap_is_not_taken_for_sure():
     )
     found = numerical_uncertainty(MuJoCo(time_step=4e-4), scene)
     truth = MuJoCo(time_step=2.5e-5).simulate(scene)
-    sought = {"last_slip": truth.channels["slip"][-1], "peak_rotation": truth.peak_rotation / scene.block.alpha}
+    sought = {
+        "last_slip": truth.channels["slip"][-1],
+        "peak_rotation": truth.peak_rotation / scene.block.alpha,
+    }
     for name, value in sought.items():
         (quantity,) = (q for q in found.quantities if q.name == name)
         assert quantity.u_num is None or abs(quantity.value - value) <= quantity.u_num < 0.1
@@ -252,7 +268,9 @@ def test_an_outcome_that_changes_with_the_step_is_not_converged():
     found = numerical_uncertainty(Made(lambda h: 1.0, falls=lambda h: h > 3.5e-3), BOOKCASE)
     assert not found.converged
     assert all(q.verdict == "not converged" and q.u_num is None for q in found.quantities)
-    assert found.reasons == ("the outcome changes with the step: stands, stands, stands, left at h, 2h, 3h, 4h",)
+    assert found.reasons == (
+        "the outcome changes with the step: stands, stands, stands, left at h, 2h, 3h, 4h",
+    )
 
 
 def test_a_model_without_a_step_is_not_judged():
@@ -260,7 +278,8 @@ def test_a_model_without_a_step_is_not_judged():
 
 
 def test_the_interval_covers_as_often_as_it_says():
-    """Errors a h + b h^1.5 + c h^2 with random signs, and powers with noise: at least 95 % of the intervals hold the truth."""
+    """Errors a h + b h^1.5 + c h^2 with random signs, and powers with noise: at least 95 % of the
+    intervals hold the truth."""
     chance = np.random.default_rng(5)
     inside = told = 0
     for k in range(400):
@@ -281,9 +300,14 @@ def test_the_interval_covers_as_often_as_it_says():
 
 
 def test_event_based_and_continuous_models_are_within_their_own_error():
-    scene = BOOKCASE.replace(excitation=Ricker(amplitude=3.0, period=1.0), floor=Floor(friction=0.6), duration=4.0)
+    scene = BOOKCASE.replace(
+        excitation=Ricker(amplitude=3.0, period=1.0), floor=Floor(friction=0.6), duration=4.0
+    )
     truth = EventBasedModel(pivot="unilateral", tolerance=1e-13).simulate(scene)
-    for model in (EventBasedModel(pivot="unilateral", tolerance=1e-6), ContinuousModel(penetration=1e-7)):
+    for model in (
+        EventBasedModel(pivot="unilateral", tolerance=1e-6),
+        ContinuousModel(penetration=1e-7),
+    ):
         found, history = numerical_uncertainty(model, scene), model.simulate(scene)
         assert found.converged
         error = abs(history.peak_rotation - truth.peak_rotation) / BOOKCASE.block.alpha
@@ -312,7 +336,10 @@ def test_a_scene_file_says_what_is_not_known(uncertain):
 
 
 def test_correlated_numbers(uncertain):
-    uncertain.write_text(UNCERTAIN + '[correlation]\n"floor.friction, excitation.amplitude" = 0.8\n', encoding="utf-8")
+    uncertain.write_text(
+        UNCERTAIN + '[correlation]\n"floor.friction, excitation.amplitude" = 0.8\n',
+        encoding="utf-8",
+    )
     values = load_uncertain_scene(uncertain).values(np.random.default_rng(1).random((20000, 3)))
     assert np.corrcoef(values.T)[0, 2] == pytest.approx(0.8, abs=0.02)
 
@@ -321,13 +348,29 @@ def test_correlated_numbers(uncertain):
     ("old", "new", "said"),
     [
         ("sd = 0.05", "sd = -0.05", "floor.friction.sd: -0.05 is not allowed"),
-        ("value = 0.5, sd", "valu = 0.5, sd", "floor.friction.valu: unknown key; did you mean 'value'?"),
+        (
+            "value = 0.5, sd",
+            "valu = 0.5, sd",
+            "floor.friction.valu: unknown key; did you mean 'value'?",
+        ),
         ("value = 0.5, sd", "sd", "floor.friction.value: is missing beside sd"),
-        ("low = 0.05, high", "low = 0.07, high", "walls.left.gap.high: 0.06 is not allowed: must be more than low, 0.07"),
+        (
+            "low = 0.05, high",
+            "low = 0.07, high",
+            "walls.left.gap.high: 0.06 is not allowed: must be more than low, 0.07",
+        ),
         ('"lognormal"', '"gamma"', "excitation.amplitude.distribution"),
         ("value = 6.0", "value = -6.0", "a lognormal number is positive"),
-        ("period = 1.0", 'period = 1.0\n[correlation]\n"floor.frction, walls.left.gap" = 0.1', "did you mean 'floor.friction'?"),
-        ("period = 1.0", 'period = 1.0\n[correlation]\n"floor.friction, walls.left.gap" = 1.5', "give a number between -1 and 1"),
+        (
+            "period = 1.0",
+            'period = 1.0\n[correlation]\n"floor.frction, walls.left.gap" = 0.1',
+            "did you mean 'floor.friction'?",
+        ),
+        (
+            "period = 1.0",
+            'period = 1.0\n[correlation]\n"floor.friction, walls.left.gap" = 1.5',
+            "give a number between -1 and 1",
+        ),
     ],
 )
 def test_faults_of_the_file_are_one_line(uncertain, old, new, said):
@@ -341,7 +384,9 @@ def test_faults_of_the_file_are_one_line(uncertain, old, new, said):
 @pytest.mark.long
 def test_draws_agree_with_many_more_draws(uncertain):
     given = load_uncertain_scene(uncertain)
-    few, many = (propagate(given, samples=n, seed=seed, indices=False) for n, seed in ((256, 1), (2048, 7)))
+    few, many = (
+        propagate(given, samples=n, seed=seed, indices=False) for n, seed in ((256, 1), (2048, 7))
+    )
     (a, b), (c, d) = ((f.low, f.high) for f in (few.inputs.figures[0], many.inputs.figures[0]))
     assert abs(a - c) < 0.05
     assert abs(b - d) < 0.05
@@ -366,15 +411,24 @@ def test_sobol_indices_of_a_free_slide(tmp_path):
 
 @pytest.mark.slow
 def test_sobol_indices_agree_with_brute_force(tmp_path):
-    """The bookcase with five uncertain numbers: 100,000 draws, means within bins and numbers drawn again one at a time."""
-    path, model, draws, again = tmp_path / "bookcase.toml", EventBasedModel(pivot="unilateral", tolerance=1e-8), 100_000, 20_000
+    """The bookcase with five uncertain numbers: 100,000 draws, means within bins and numbers drawn
+    again one at a time."""
+    path, model, draws, again = (
+        tmp_path / "bookcase.toml",
+        EventBasedModel(pivot="unilateral", tolerance=1e-8),
+        100_000,
+        20_000,
+    )
     path.write_text(FIVE, encoding="utf-8")
     given = load_uncertain_scene(path)
     chance = np.random.default_rng(5)
 
     def peaks(points):
         scenes = [given.at(row) for row in given.values(points)]
-        return np.minimum(run_batch(pack(scenes, model), model, until_decided=False).peak / BOOKCASE.block.alpha, 1.0)
+        return np.minimum(
+            run_batch(pack(scenes, model), model, until_decided=False).peak / BOOKCASE.block.alpha,
+            1.0,
+        )
 
     points = chance.random((draws, len(given.names)))
     found = peaks(points)
@@ -382,7 +436,9 @@ def test_sobol_indices_agree_with_brute_force(tmp_path):
     assert set(indices) == set(given.names)
     for k, name in enumerate(given.names):
         inside = [found[(points[:, k] * 50).astype(int) == n] for n in range(50)]
-        first = np.var([np.mean(one) for one in inside]) - np.mean([np.var(one, ddof=1) / len(one) for one in inside])
+        first = np.var([np.mean(one) for one in inside]) - np.mean(
+            [np.var(one, ddof=1) / len(one) for one in inside]
+        )
         other = points[:again].copy()
         other[:, k] = chance.random(again)
         total = 0.5 * np.mean((found[:again] - peaks(other)) ** 2)
@@ -391,7 +447,8 @@ def test_sobol_indices_agree_with_brute_force(tmp_path):
 
 
 def test_the_interval_of_the_share_that_falls_covers(uncertain):
-    """Of few draws it holds what many say, and so does the interval of the draws' own peaks, as often as they should."""
+    """Of few draws it holds what many say, and so does the interval of the draws' own peaks, as
+    often as they should."""
     given = load_uncertain_scene(uncertain)
     many = propagate(given, samples=8192, seed=99, indices=False)
     (peak, *_), share = many.inputs.figures, many.inputs.overturns.value
@@ -401,7 +458,9 @@ def test_the_interval_of_the_share_that_falls_covers(uncertain):
         falls += few.inputs.overturns.low <= share <= few.inputs.overturns.high
         peaks.append(np.mean((peak.low <= few.peaks) & (few.peaks <= peak.high)))
     assert falls / 60 >= 0.9
-    assert many.inputs.figures[0].high == 1.0  # some fall, and count as 1: then only the lower end leaves draws out
+    assert (
+        many.inputs.figures[0].high == 1.0
+    )  # some fall, and count as 1: then only the lower end leaves draws out
     assert np.mean(peaks) == pytest.approx(0.975, abs=0.01)
 
 
@@ -411,7 +470,9 @@ def test_the_interval_of_the_share_that_falls_covers(uncertain):
 def swing(scale=1.0, delay=0.0):
     t = np.linspace(0.0, 4.0, 401)
     state = np.zeros((401, 6))
-    state[:, 2] = 0.1 * scale * np.exp(-4.0 * (t - 1.2 - delay) ** 2) * np.cos(3.0 * (t - 1.2 - delay))
+    state[:, 2] = (
+        0.1 * scale * np.exp(-4.0 * (t - 1.2 - delay) ** 2) * np.cos(3.0 * (t - 1.2 - delay))
+    )
     return observe(BOOKCASE.replace(duration=4.0, output_step=0.01), "measured", state)
 
 
@@ -467,7 +528,12 @@ def test_what_a_difference_says_where_nothing_is_known_of_inputs_and_tests():
     found = verdict.explain("theta_rms", "alpha", 0.1, 0.04)
     assert (found.u_input, found.u_data, found.u_val) == (0.0, 0.0, 0.04)
     assert found.verdict == "not explained: model form or set-up, at least 0.06 alpha"
-    assert verdict.Explanation(quantity="theta_rms", unit="alpha", error=0.1, u_num=0.04, verdict="").u_val == 0.04
+    assert (
+        verdict.Explanation(
+            quantity="theta_rms", unit="alpha", error=0.1, u_num=0.04, verdict=""
+        ).u_val
+        == 0.04
+    )
 
 
 def test_bias_and_scatter_are_recovered_and_cover():
@@ -486,7 +552,9 @@ def test_bias_and_scatter_are_recovered_and_cover():
 def test_the_domain_names_the_axis_that_leaves_it():
     inside = {axis: Range(low=min(v), high=max(v)) for axis, v in axes_of(BOOKCASE).items()}
     assert outside(BOOKCASE, inside) == []
-    assert outside(BOOKCASE.replace(floor=Floor(friction=0.9)), inside) == ["friction is 0.9; the suites cover 0.3 to 0.3"]
+    assert outside(BOOKCASE.replace(floor=Floor(friction=0.9)), inside) == [
+        "friction is 0.9; the suites cover 0.3 to 0.3"
+    ]
     assert Experience(domain=inside).domain["alpha"].low == BOOKCASE.block.alpha
 
 
@@ -499,7 +567,22 @@ def test_the_command_says_converged_and_not(uncertain, capsys, tmp_path):
     assert found["converged"] is True
     assert {"name", "value", "u_num", "order", "verdict"} <= found["quantities"][0].keys()
     assert found["inputs"]["samples"] == 16
-    assert main(["uncertainty", str(uncertain), "--model", "mujoco", "--set", "time_step=4e-3", "--samples", "2", "--json"]) == 1
+    assert (
+        main(
+            [
+                "uncertainty",
+                str(uncertain),
+                "--model",
+                "mujoco",
+                "--set",
+                "time_step=4e-3",
+                "--samples",
+                "2",
+                "--json",
+            ]
+        )
+        == 1
+    )
     found = json.loads(capsys.readouterr().out)
     assert found["converged"] is False
     assert any(q["reason"] for q in found["quantities"])
@@ -541,13 +624,22 @@ def test_a_suite_explains_its_differences(uncertain, tmp_path):
 
 
 def test_two_outcomes_are_explained_by_inputs_that_decide_them():
-    converged = Numerical(method="", quantities=(Quantity(name="outcome", unit="", value="", verdict="converged"),))
+    converged = Numerical(
+        method="", quantities=(Quantity(name="outcome", unit="", value="", verdict="converged"),)
+    )
     records = {"ebm": {"outcome": "overturned left", "numerical": converged.model_dump()}}
     own = {"outcome": "at rest", "numerical": converged.model_dump()}
     (found,) = explanations(BOOKCASE, (), {"ebm": ()}, records, own, None)
     assert found.verdict.startswith("not explained")
     shares = Interval(name="overturns", unit="1", value=0.3, low=0.2, high=0.4)
-    inputs = Inputs(samples=64, model="ebm-unilateral", names=("floor.friction",), figures=(), overturns=shares, sensitivities=())
+    inputs = Inputs(
+        samples=64,
+        model="ebm-unilateral",
+        names=("floor.friction",),
+        figures=(),
+        overturns=shares,
+        sensitivities=(),
+    )
     (found,) = explanations(BOOKCASE, (), {"ebm": ()}, records, own, inputs)
     assert found.verdict == verdict.INPUTS
 

@@ -1,4 +1,5 @@
-"""Models that go wrong in every way that a worker must survive, and one that is exact. Copied beside a test's suite."""
+"""Models that go wrong in every way that a worker must survive, and one that is exact. Copied
+beside a test's suite."""
 
 from __future__ import annotations
 
@@ -57,7 +58,8 @@ class Hang(Frozen):
 
 
 class Hog(Frozen):
-    """Asks for 100 MB after 100 MB, at most 8 GB. It writes to none of it: a first write takes a loaded machine seconds."""
+    """Asks for 100 MB after 100 MB, at most 8 GB. It writes to none of it: a first write takes a
+    loaded machine seconds."""
 
     def simulate(self, scene: Scene) -> History:
         taken = [np.zeros(100 * 2**17) for _ in range(80)]
@@ -79,4 +81,10 @@ class Falls(Frozen):
         state = np.zeros((len(t), 6))
         state[:, 1] = scene.block.half_height
         state[:, 2] = np.minimum(t, 2.0)
-        return observe(scene, "falls", state, events=(Event(t=np.pi / 2, kind="overturned left"),), notes=("made to fall",))
+        return observe(
+            scene,
+            "falls",
+            state,
+            events=(Event(t=np.pi / 2, kind="overturned left"),),
+            notes=("made to fall",),
+        )

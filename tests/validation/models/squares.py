@@ -42,7 +42,11 @@ class Squares(Study):
         self.first = [Square(value, str(log), **how) for value in values]
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Square]:
-        larger = [one.value for one in done.values() if isinstance(one, Squared) and 100.0 < one.value < 1e6]
+        larger = [
+            one.value
+            for one in done.values()
+            if isinstance(one, Squared) and 100.0 < one.value < 1e6
+        ]
         return [*self.first, *(Square(value, self.first[0].log) for value in larger)]
 
     @staticmethod
@@ -62,4 +66,6 @@ class Squares(Study):
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         rows = [[task.value, one.value] for task, one in done.items() if isinstance(one, Squared)]
         table = Table("squares", [Column("value"), Column("square", unit="m")], rows)
-        return Finding(self.name, "Squares", f"{len(rows)} squares", [table], data={"count": len(rows)})
+        return Finding(
+            self.name, "Squares", f"{len(rows)} squares", [table], data={"count": len(rows)}
+        )

@@ -1,4 +1,5 @@
-"""Populations: what is scaled and played, what is said of a block that overturns, curves and fits."""
+"""Populations: what is scaled and played, what is said of a block that overturns, curves and
+fits."""
 
 from __future__ import annotations
 
@@ -44,7 +45,9 @@ SCENE = Scene(
     duration=20.0,
 )
 LEVELS = np.linspace(0.2, 1.2, 6)
-TOML = "duration = 20.0\nblock = { half_width = 0.3, half_height = 1.0 }\nfloor = { friction = 0.4 }\n"
+TOML = (
+    "duration = 20.0\nblock = { half_width = 0.3, half_height = 1.0 }\nfloor = { friction = 0.4 }\n"
+)
 
 
 def motion(gain: float, rate: float = 3.0) -> Recording:
@@ -64,7 +67,8 @@ def played(study):
 
 @pytest.fixture(scope="module")
 def lines():
-    """An analysis of the motions: peaks (motion, direction, intensity; infinite where it fell), and the finding."""
+    """An analysis of the motions: peaks (motion, direction, intensity; infinite where it fell), and
+    the finding."""
     done, found = played(ida(SCENE, MOTIONS, LEVELS))
     return np.array([runs.peaks for runs in done.values()]).reshape(3, 2, len(LEVELS)), found
 
@@ -97,7 +101,9 @@ def test_a_run_is_the_record_at_that_intensity(lines):
                 own = math.inf if fell else history.peak_rotation / SCENE.block.alpha
                 assert peak == pytest.approx(own, abs=2e-4)
                 shown = math.nan if fell else peak
-                assert next(rows) == pytest.approx([name, sign, level, shown, int(fell)], nan_ok=True)
+                assert next(rows) == pytest.approx(
+                    [name, sign, level, shown, int(fell)], nan_ok=True
+                )
     assert 0 < np.sum(np.isinf(peaks)) < peaks.size
 
 
@@ -123,7 +129,9 @@ def test_a_capacity_is_exceeded_not_met(lines):
     assert shares[-6:] == np.mean(peaks > 1.0, axis=(0, 1)).tolist()
     limit = float(np.max(peaks[np.isfinite(peaks)]))
     _, again = played(ida(SCENE, MOTIONS, LEVELS, capacities=[limit]))
-    assert [row[2] for row in again.table("fragility").rows] == np.mean(peaks > limit, axis=(0, 1)).tolist()
+    assert [row[2] for row in again.table("fragility").rows] == np.mean(
+        peaks > limit, axis=(0, 1)
+    ).tolist()
 
 
 @pytest.mark.parametrize("measure", [*MEASURES, "sa:0.5"])
@@ -168,7 +176,10 @@ def test_another_model_plays_until_the_outcome_is_certain():
             return fair.simulate(scene)
 
     record = Record.from_samples(motion(2.5).samples, 0.02)
-    scenes = [SCENE.replace(walls=(), excitation=record.scaled(f), duration=0.1) for f in (0.1, 2.0, -2.0, 4.0)]
+    scenes = [
+        SCENE.replace(walls=(), excitation=record.scaled(f), duration=0.1)
+        for f in (0.1, 2.0, -2.0, 4.0)
+    ]
     slow, fast = play(scenes, Slow()), play(scenes, fair)
     assert slow.side[:3] == fast.side[:3] == (0, fast.side[1], -fast.side[1])
     assert fast.side[1] != 0
@@ -197,8 +208,12 @@ def test_both_cases_and_directions_are_played():
     scene = SCENE.replace(excitation=Ricker(amplitude=1.0, period=1.0))
     study = fragility(scene, (), np.linspace(1.0, 6.0, 4), (1.0, 3.0), model="ebm-unilateral")
     done, found = played(study)
-    assert [batch.of[0] for batch in done] == ["with the wall"] * PULSES + ["without a wall"] * PULSES
-    sides = np.array([runs.side for batch, runs in done.items() if not batch.scene.walls]).reshape(PULSES, 2, 4)
+    assert [batch.of[0] for batch in done] == ["with the wall"] * PULSES + [
+        "without a wall"
+    ] * PULSES
+    sides = np.array([runs.side for batch, runs in done.items() if not batch.scene.walls]).reshape(
+        PULSES, 2, 4
+    )
     assert set(np.unique(sides)) == {-1, 0, 1}
     np.testing.assert_array_equal(sides[:, 0], -sides[:, 1])
     shares = [row[2] for row in found.table("fragility").rows]
@@ -209,7 +224,9 @@ def test_both_cases_and_directions_are_played():
 def test_records_are_scaled_to_the_intensity():
     """Two records that differ only in their size: both directions of each overturn together."""
     scene = SCENE.replace(walls=())
-    study = fragility(scene, [("a", motion(1.0)), ("b", motion(4.0))], np.linspace(0.5, 12.0, 8), (1.0, 2.0))
+    study = fragility(
+        scene, [("a", motion(1.0)), ("b", motion(4.0))], np.linspace(0.5, 12.0, 8), (1.0, 2.0)
+    )
     done, found = played(study)
     one, other = done.values()
     assert one.side == other.side
@@ -220,7 +237,8 @@ def test_records_are_scaled_to_the_intensity():
 
 
 def test_the_intensity_in_g_is_that_of_the_pivot_that_lifts_first():
-    """Of a block whose mass lies to the right and low: its right corner, nearer to the mass's centre."""
+    """Of a block whose mass lies to the right and low: its right corner, nearer to the mass's
+    centre."""
     block = Block(half_width=0.3, half_height=1.0, centre_of_mass=(0.1, -0.2))
     scene = load_scene("loaded").replace(block=block)
     study = fragility(scene, (), LEVELS, (1.0, 2.0))
@@ -242,7 +260,9 @@ def test_a_set_that_is_none_is_refused():
 def test_the_lognormal_curve_is_found_again():
     intensities, motions = np.linspace(0.5, 8.0, 60), 10**7
     counts = np.round(motions * norm.cdf(np.log(intensities / 2.5) / 0.4)).astype(np.int64)
-    assert fit_lognormal(intensities, counts, np.full(60, motions)) == pytest.approx((2.5, 0.4), rel=1e-3)
+    assert fit_lognormal(intensities, counts, np.full(60, motions)) == pytest.approx(
+        (2.5, 0.4), rel=1e-3
+    )
     for none in (np.zeros(60, dtype=np.int64), np.full(60, 10)):
         assert np.isnan(fit_lognormal(intensities, none, np.full(60, 10))).all()
 
@@ -257,7 +277,8 @@ def test_a_curve_is_found_where_few_overturn():
 
 
 def test_a_fitted_median_lies_inside_its_interval():
-    """The interval is that of the sets of motions that could have been drawn; without a fit there is none."""
+    """The interval is that of the sets of motions that could have been drawn; without a fit there
+    is none."""
     hit = np.array([[[True] * 6] * 2, [[False] * 3 + [True] * 3] * 2, [[False] * 5 + [True]] * 2])
     never = np.zeros_like(hit)
     curve = curve_of("made", hit, never, LEVELS, 200)
@@ -276,13 +297,17 @@ def test_the_band_holds_the_binomial_spread():
     hit[:50, :, 1] = hit[:, :, 2] = True  # directions alike: no more is known than from 100 runs
     none, half, _ = curve_of("made", hit, np.zeros_like(hit), np.array([1.0, 2.0, 3.0])).points
     assert half[1:4] == pytest.approx([0.5, 0.5 - 1.96 * 0.05, 0.5 + 1.96 * 0.05], abs=0.015)
-    assert none[1:4] == pytest.approx([0.0, 0.0, 3.8415 / 103.8415], rel=1e-4)  # Wilson's z^2/(n + z^2)
+    assert none[1:4] == pytest.approx(
+        [0.0, 0.0, 3.8415 / 103.8415], rel=1e-4
+    )  # Wilson's z^2/(n + z^2)
 
 
 def test_the_band_covers_as_often_as_it_says():
-    """Motions with capacities of their own and directions that scatter about them; shares between 2 and 98 %.
+    """Motions with capacities of their own and directions that scatter about them; shares between 2
+    and 98 %.
 
-    Counts are whole numbers: nearer to 0 and 1 Wilson's interval may hold only 83 % (Brown, Cai and DasGupta 2001).
+    Counts are whole numbers: nearer to 0 and 1 Wilson's interval may hold only 83 % (Brown, Cai and
+    DasGupta 2001).
     """
     chance, intensities, median, dispersion = (
         np.random.default_rng(3),
@@ -314,12 +339,16 @@ def test_a_curve_never_counts_a_failed_run_as_safe():
     curve = curve_of("made", hit, failed, intensities)
     assert [point[1] for point in plain.points] == [0.0, 0.5, 1.0]
     assert [point[1] for point in curve.points] == [0.0, 1.0, 1.0]
-    assert curve.points[1][2:4] == pytest.approx([2 / (2 + 3.8415), 1.0], rel=1e-4)  # of both motions
+    assert curve.points[1][2:4] == pytest.approx(
+        [2 / (2 + 3.8415), 1.0], rel=1e-4
+    )  # of both motions
     assert curve.undecided == 5
     assert curve.median < plain.median
     failed[:, :, 1] = True
     nowhere = curve_of("made", hit, failed, intensities)
-    assert [point[1] for point in nowhere.points] == pytest.approx([0.0, math.nan, 1.0], nan_ok=True)
+    assert [point[1] for point in nowhere.points] == pytest.approx(
+        [0.0, math.nan, 1.0], nan_ok=True
+    )
     assert nowhere.median > 0.0
     failed[:] = True
     assert math.isnan(curve_of("made", hit, failed, intensities).median)

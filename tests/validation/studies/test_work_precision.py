@@ -1,4 +1,5 @@
-"""The benchmark: orders of convergence and error levels of every model at two settings (never times), and its arithmetic."""
+"""The benchmark: orders of convergence and error levels of every model at two settings (never
+times), and its arithmetic."""
 
 import math
 from pathlib import Path
@@ -11,7 +12,13 @@ from rockcheck.reports.style import power_of_ten
 from rockcheck.validation.execute.models import not_installed
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.studies.work_precision import runs, savings
-from rockcheck.validation.studies.work_precision.ebm import CASES, LEVEL, at_level, batch_size, batch_times
+from rockcheck.validation.studies.work_precision.ebm import (
+    CASES,
+    LEVEL,
+    at_level,
+    batch_size,
+    batch_times,
+)
 from rockcheck.validation.studies.work_precision.runs import (
     LINES,
     BenchmarkRun,
@@ -46,7 +53,9 @@ def measure(family: str, member: int, line: str, value: float) -> BenchmarkRun:
     return play(Play(family, member, line, value, 1))
 
 
-def order_and_errors(family: str, line: str, coarse: float, fine: float) -> tuple[float, float, float]:
+def order_and_errors(
+    family: str, line: str, coarse: float, fine: float
+) -> tuple[float, float, float]:
     """Order between two settings and the median errors at them, alpha, of three members."""
     found = points_of([measure(family, k, line, value) for k in SOME for value in (coarse, fine)])
     first, second = (point.rms for point in found)
@@ -73,7 +82,9 @@ def order_and_errors(family: str, line: str, coarse: float, fine: float) -> tupl
         ("wall 53 mm e 0.5", "pybullet", 1e-2, 1e-4, 0.7, 2e-3),
     ],
 )
-def test_every_model_converges_to_its_limit(family: str, line: str, coarse: float, fine: float, order: float, level: float) -> None:
+def test_every_model_converges_to_its_limit(
+    family: str, line: str, coarse: float, fine: float, order: float, level: float
+) -> None:
     found, _, error = order_and_errors(family, line, coarse, fine)
     assert found > order
     assert error < level
@@ -97,7 +108,8 @@ def test_mujocos_default_contact_does_not_converge_beside_a_wall() -> None:
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_members_stay_up_and_end_at_their_horizon(family: str) -> None:
-    """A member that fell would be compared over its fall only; without wall the two limits are one model."""
+    """A member that fell would be compared over its fall only; without wall the two limits are one
+    model."""
     for k in range(MEMBERS):
         ready = prepared(family, k)
         assert 1.5 < ready.horizon <= 8.0
@@ -112,7 +124,12 @@ def point(value: float, rms: float, cpu: float) -> Point:
 
 
 def test_the_order_is_the_slope_between_rounding_and_nonsense() -> None:
-    line = [point(1e-1, 0.9, 1.0), point(1e-2, 3e-2, 1.0), point(1e-3, 3e-4, 1.0), point(1e-4, 1e-14, 1.0)]
+    line = [
+        point(1e-1, 0.9, 1.0),
+        point(1e-2, 3e-2, 1.0),
+        point(1e-3, 3e-4, 1.0),
+        point(1e-4, 1e-14, 1.0),
+    ]
     assert order_of(line) == pytest.approx(2.0)
     assert math.isnan(order_of(line[:2]))
 
@@ -132,14 +149,33 @@ def test_the_error_of_adaptive_steps_is_told_at_the_cost_of_fixed_ones() -> None
     assert math.isnan(error_at(line, 17.0))
     some = [sample(k, 5e-3) for k in range(10)]
     for value, rms, cpu in ((2e-3, 1e-3, 0.15), (1e-3, 1e-5, 0.6)):
-        some += [BenchmarkRun("pulse a", k, "mujoco adaptive", value, 3.0, rms=rms * (1 + k % 3), cpu=cpu) for k in range(3)]
-    everything = {row.line: row for row in runs.pooled(some) if row.kind == "all" and row.value == 1e-3}
+        some += [
+            BenchmarkRun(
+                "pulse a", k, "mujoco adaptive", value, 3.0, rms=rms * (1 + k % 3), cpu=cpu
+            )
+            for k in range(3)
+        ]
+    everything = {
+        row.line: row for row in runs.pooled(some) if row.kind == "all" and row.value == 1e-3
+    }
     assert everything["mujoco"].at_the_cost == pytest.approx(2e-4)
     assert everything["mujoco adaptive"].rms_worst == pytest.approx(3e-5)
 
 
 def sample(member: int, rms: float, **change: object) -> BenchmarkRun:
-    return BenchmarkRun("free", member, "mujoco", 1e-3, 3.0, rms=rms, cpu=0.3, wall=0.6, set_up=0.1, steps=3000, **change)  # type: ignore[arg-type]
+    return BenchmarkRun(
+        "free",
+        member,
+        "mujoco",
+        1e-3,
+        3.0,
+        rms=rms,
+        cpu=0.3,
+        wall=0.6,
+        set_up=0.1,
+        steps=3000,
+        **change,
+    )  # type: ignore[arg-type]
 
 
 def test_failed_runs_count_as_infinitely_wrong() -> None:
@@ -158,17 +194,25 @@ def test_quantiles_are_those_of_the_sample() -> None:
 def test_every_member_meets_every_setting_once_and_only_the_finest_steps_are_not_timed() -> None:
     tasks = [task for task in WorkPrecision("models").tasks({}) if isinstance(task, Play)]
     lines = [line for line in LINES.values() if not not_installed(line.model)]
-    assert len(set(tasks)) == len(tasks) == MEMBERS * len(FAMILIES) * sum(len(line.values) for line in lines)
+    assert (
+        len(set(tasks))
+        == len(tasks)
+        == MEMBERS * len(FAMILIES) * sum(len(line.values) for line in lines)
+    )
     for task in tasks:
         fine = LINES[task.line].knob == "time_step" and task.value < 1e-4
         assert (task.where == "worker") is fine
 
 
-def test_who_has_no_restitution_plays_the_scenes_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_has_no_restitution_plays_the_scenes_without_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     module = "rockcheck.validation.studies.work_precision.study.not_installed"
     monkeypatch.setattr(module, lambda model: "")
     tasks = [task for task in WorkPrecision("convergence").tasks({}) if isinstance(task, Play)]
-    played = {line: {task.family for task in tasks if task.line == line} for line in ("drake", "mujoco")}
+    played = {
+        line: {task.family for task in tasks if task.line == line} for line in ("drake", "mujoco")
+    }
     assert played["drake"] == {name for name in WALLS if not name.endswith("e 0.5")}
     assert played["mujoco"] == set(WALLS)
     assert len(WALLS) == len(PULSES) * len(GAPS) * len(RESTITUTIONS) == 18
@@ -184,7 +228,9 @@ def test_every_pulse_hits_the_wall_and_leaves_the_unilateral_block_standing(name
 
 @pytest.mark.parametrize("scene", TWO_WALLS)
 @pytest.mark.parametrize("model", [line.label for line in LINES.values() if line.converge])
-def test_errors_fall_against_the_unilateral_model_and_stall_against_the_papers(model: str, scene: str) -> None:
+def test_errors_fall_against_the_unilateral_model_and_stall_against_the_papers(
+    model: str, scene: str
+) -> None:
     if not_installed(model) or (model == "drake" and scene.endswith("e 0.5")):
         return
     coarse, fine = (measure(scene, 0, model, value) for value in LINES[model].converge[:2])
@@ -201,14 +247,17 @@ def made(*errors: float, model: str = "mujoco", scene: str = TWO_WALLS[0]) -> li
     """Runs with these errors against the unilateral model, steps falling tenfold from 1e-3."""
     steps = [10.0 ** -(3 + n) for n in range(len(errors))]
     return [
-        BenchmarkRun(scene, 0, model, step, 5.0, rms=error, against_ebm=0.1, step=step) for step, error in zip(steps, errors, strict=True)
+        BenchmarkRun(scene, 0, model, step, 5.0, rms=error, against_ebm=0.1, step=step)
+        for step, error in zip(steps, errors, strict=True)
     ]
 
 
 def test_levels_and_orders_of_known_errors() -> None:
     found = [*made(1e-2, 1e-3, 1e-4), *made(4e-2, 4e-4, 4e-6, scene=TWO_WALLS[1])]
     levels = [level for level in levels_of(found) if level.reference == "ebm-unilateral"]
-    orders = {(order.reference, order.scene): order.order for order in orders_of(found, levels_of(found))}
+    orders = {
+        (order.reference, order.scene): order.order for order in orders_of(found, levels_of(found))
+    }
     assert [level.median for level in levels] == pytest.approx([2.5e-2, 7e-4, 5.2e-5])
     assert [level.within for level in levels] == [0, 2, 2]
     assert orders["ebm-unilateral", TWO_WALLS[0]] == pytest.approx(1.0)
@@ -226,7 +275,8 @@ def test_what_does_not_converge_is_named_not_dropped() -> None:
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_batches_are_as_good_as_their_tolerance(case: object) -> None:
-    """Errors fall with the tolerance, outcomes agree, none fails, and the cheapest good tolerance is found."""
+    """Errors fall with the tolerance, outcomes agree, none fails, and the cheapest good tolerance
+    is found."""
     name: str = case.name  # type: ignore[attr-defined]
     rows = batch_times(name, 6)
     by_tolerance = {row.tolerance: row for row in rows}
@@ -242,15 +292,30 @@ def test_batches_are_as_good_as_their_tolerance(case: object) -> None:
 
 def test_the_finding_holds_every_table(tmp_path: Path) -> None:
     settings = (("ebm", 1e-4), ("ebm", 1e-8), ("cm", 1e-5), ("cm", 1e-6), ("mujoco", 1e-2))
-    tasks = [Play(family, k, *one, 1) for family in ("free", "wall 53 mm e 0") for k in SOME for one in settings]
+    tasks = [
+        Play(family, k, *one, 1)
+        for family in ("free", "wall 53 mm e 0")
+        for k in SOME
+        for one in settings
+    ]
     tasks += [Play(scene, 0, "cm", value, 1) for scene in TWO_WALLS for value in (1e-6, 1e-8)]
     done: dict[object, object] = {task: Measured(run=play(task)) for task in tasks}
     done[Play("free", 0, "pybullet", 1e-2)] = Failure("it blew up <fast>")
     done[Measure("batch", "friction")] = Measured(times=tuple(batch_times("friction", 6)))
     done[Measure("size", "3", 20)] = Measured(size=batch_size(20, 3))
-    done[Measure("saving", "made")] = Measured(saved=(savings.Saving("cm", "wall", "ms", 2.0, 1.0),))
+    done[Measure("saving", "made")] = Measured(
+        saved=(savings.Saving("cm", "wall", "ms", 2.0, 1.0),)
+    )
     found = WorkPrecision().gather(done)
-    for name in ("runs", "work-precision", "orders-and-ratios", "levels", "batch-times", "batch-sizes", "savings"):
+    for name in (
+        "runs",
+        "work-precision",
+        "orders-and-ratios",
+        "levels",
+        "batch-times",
+        "batch-sizes",
+        "savings",
+    ):
         assert found.table(name).rows, name
     assert found.table("batch-sizes").records()[0]["runs"] == 20
     lost = [row for row in found.table("runs").records() if row["line"] == "pybullet"]
@@ -261,7 +326,13 @@ def test_the_finding_holds_every_table(tmp_path: Path) -> None:
 
 
 def test_axis_labels() -> None:
-    assert [power_of_ten(10.0**k) for k in (-12, -1, 0, 3, 4)] == ["10⁻¹²", "0.1", "1", "1000", "10⁴"]
+    assert [power_of_ten(10.0**k) for k in (-12, -1, 0, 3, 4)] == [
+        "10⁻¹²",
+        "0.1",
+        "1",
+        "1000",
+        "10⁴",
+    ]
 
 
 def test_an_unknown_part_is_refused_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
@@ -271,7 +342,8 @@ def test_an_unknown_part_is_refused_in_one_line(capsys: pytest.CaptureFixture[st
 
 @pytest.mark.slow
 def test_nothing_that_is_skipped_changes_the_motion() -> None:
-    """Every saving but those that a scene may need (a sliding pivot's cone, a strong pulse's slip)."""
+    """Every saving but those that a scene may need (a sliding pivot's cone, a strong pulse's
+    slip)."""
     found = [one for name, kind in savings.KINDS.items() if name != "batches" for one in kind()]
     needed = {"cone correction", "friction limit"}
     for saving in found:

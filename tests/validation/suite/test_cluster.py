@@ -1,4 +1,5 @@
-"""The same cells on a Dask cluster of two local workers: the same run, and failures that stay in their cells."""
+"""The same cells on a Dask cluster of two local workers: the same run, and failures that stay in
+their cells."""
 
 from __future__ import annotations
 
@@ -12,9 +13,13 @@ from rockcheck.scenes import InputError
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 
-OWN = [f"faulty:{name}" for name in ("Still", "Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")]
+OWN = [
+    f"faulty:{name}" for name in ("Still", "Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")
+]
 
-MODELS = "\n".join(f'[models.{name}]\nmodel = "faulty:{name}"' for name in ("Segfault", "Hang", "Hog", "Fails"))
+MODELS = "\n".join(
+    f'[models.{name}]\nmodel = "faulty:{name}"' for name in ("Segfault", "Hang", "Hog", "Fails")
+)
 
 
 @pytest.mark.long

@@ -1,4 +1,5 @@
-"""Ensembles: drawing is repeatable, statistics are right on samples that are known, and a run holds them against tolerances."""
+"""Ensembles: drawing is repeatable, statistics are right on samples that are known, and a run holds
+them against tolerances."""
 
 from __future__ import annotations
 
@@ -17,7 +18,9 @@ from rockcheck.validation.suite.ensembles import Distribution
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 
-OWN = [f"faulty:{name}" for name in ("Still", "Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")]
+OWN = [
+    f"faulty:{name}" for name in ("Still", "Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")
+]
 
 SUITE = """
 reference = "still"
@@ -75,11 +78,17 @@ def test_scenes_are_drawn_alike_whatever_the_count(suite_file):
 def test_noise_has_the_spectrum_that_it_states(suite_file):
     ensemble, _ = load_suite(suite_file, allow_code=OWN).ensembles["crowd"]
     noise = ensemble.noise.model_copy(update={"strong": 40.0})
-    power = sum(np.abs(np.fft.rfft(noise.draw(np.random.default_rng(n)).samples)) ** 2 for n in range(40))
+    power = sum(
+        np.abs(np.fft.rfft(noise.draw(np.random.default_rng(n)).samples)) ** 2 for n in range(40)
+    )
     frequency = np.fft.rfftfreq(20000, 0.002)
-    band = [float(np.mean(power[(frequency > f - 0.3) & (frequency < f + 0.3)])) for f in (2.5, 10.0)]
+    band = [
+        float(np.mean(power[(frequency > f - 0.3) & (frequency < f + 0.3)])) for f in (2.5, 10.0)
+    ]
     ratio = (10.0 / 2.5) ** 2
-    stated = ((1 + 4 * 0.36 * ratio) / ((1 - ratio) ** 2 + 4 * 0.36 * ratio)) / ((1 + 4 * 0.36) / (4 * 0.36))
+    stated = ((1 + 4 * 0.36 * ratio) / ((1 - ratio) ** 2 + 4 * 0.36 * ratio)) / (
+        (1 + 4 * 0.36) / (4 * 0.36)
+    )
     assert band[1] / band[0] == pytest.approx(stated, rel=0.25)
 
 
@@ -108,9 +117,15 @@ def test_statistics_of_known_samples():
         Sample(np.ones(4), ("overturned left", "at rest", "moving", "overturned right")),
         Sample(np.ones(4), ("overturned left", "overturned left", "moving", "moving")),
     )
-    assert [STATISTICS[f"overturning_{name}"].evaluate(falls)[0] for name in ("accuracy", "precision", "recall")] == [0.5, 0.5, 0.5]
+    assert [
+        STATISTICS[f"overturning_{name}"].evaluate(falls)[0]
+        for name in ("accuracy", "precision", "recall")
+    ] == [0.5, 0.5, 0.5]
     assert STATISTICS["ks_distance"].evaluate(falls)[0] == 0.0
-    lost = Samples(falls.reference, Sample(np.array([1.0, math.nan, 1.0, 1.0]), ("moving", "failed", "moving", "moving")))
+    lost = Samples(
+        falls.reference,
+        Sample(np.array([1.0, math.nan, 1.0, 1.0]), ("moving", "failed", "moving", "moving")),
+    )
     assert math.isnan(STATISTICS["ks_distance"].evaluate(lost)[0])
 
 
@@ -143,7 +158,9 @@ def test_accept_writes_what_an_ensemble_is_judged_by(suite_file, tmp_path):
     assert [check.verdict for check in again.cell("crowd", "near").checks] == ["pass", "pass"]
 
 
-@pytest.mark.parametrize("given", [{}, {"uniform": (0.0, 1.0), "lognormal": (1.0, 1.0)}, {"lognormal": (-1.0, 1.0)}])
+@pytest.mark.parametrize(
+    "given", [{}, {"uniform": (0.0, 1.0), "lognormal": (1.0, 1.0)}, {"lognormal": (-1.0, 1.0)}]
+)
 def test_a_distribution_is_one_thing(given):
     with pytest.raises(InputError):
         Distribution(**given)

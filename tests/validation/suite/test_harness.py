@@ -1,4 +1,5 @@
-"""The harness as a whole, on copies of the project: faults put in on purpose, and runs that are killed. Minutes, not seconds."""
+"""The harness as a whole, on copies of the project: faults put in on purpose, and runs that are
+killed. Minutes, not seconds."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ PACKAGES = ("scenes", "ebm", "cm", "engines", "validation", "reports")
 
 
 class Copy:
-    """A copy of the project as it is installed, in which files can be changed and put back, compiled code and times kept."""
+    """A copy of the project as it is installed, in which files can be changed and put back,
+    compiled code and times kept."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -33,7 +35,13 @@ class Copy:
         environment = {**os.environ, "PYTHONPATH": str(self.folder), "PYTHONDONTWRITEBYTECODE": "1"}
         command = [sys.executable, "-m", "rockcheck", *words, "--no-report"]
         return subprocess.Popen(
-            command, cwd=self.folder, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True
+            command,
+            cwd=self.folder,
+            env=environment,
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
         )
 
     def run(self, *words: str) -> tuple[int, str]:
@@ -62,12 +70,24 @@ def project(tmp_path_factory):
     return copy
 
 
-#: What is done wrong, in which file, by replacing what (a regular expression) with what, and how many of the 25 cells cannot
-#: depend on that file. Compiled code last: it takes a minute.
+#: What is done wrong, in which file, by replacing what (a regular expression) with what, and how
+#: many of the 25 cells cannot depend on that file. Compiled code last: it takes a minute.
 FAULTS = [
     ("gravity 9.8", "scenes/scene.py", r"gravity: Positive = 9\.81", "gravity: Positive = 9.8", 0),
-    ("the record's last sample dropped", "scenes/excitations.py", r"found\.samples\.tolist\(\)", "found.samples[:-1].tolist()", 0),
-    ("output shifted by one sample", "scenes/observation.py", r"name: state\[:, column\] for", "name: np.roll(state[:, column], 1) for", 0),
+    (
+        "the record's last sample dropped",
+        "scenes/excitations.py",
+        r"found\.samples\.tolist\(\)",
+        "found.samples[:-1].tolist()",
+        0,
+    ),
+    (
+        "output shifted by one sample",
+        "scenes/observation.py",
+        r"name: state\[:, column\] for",
+        "name: np.roll(state[:, column], 1) for",
+        0,
+    ),
     (
         "NaN at the end",
         "scenes/observation.py",
@@ -75,7 +95,13 @@ FAULTS = [
         "    rows = max(rows, 1)\n    state[rows - 1] = np.nan\n",
         0,
     ),
-    ("wall 1 mm off", "engines/contacts.py", r"distance=b \+ wall\.gap", "distance=b + wall.gap + 0.001 / 1.605", 15),
+    (
+        "wall 1 mm off",
+        "engines/contacts.py",
+        r"distance=b \+ wall\.gap",
+        "distance=b + wall.gap + 0.001 / 1.605",
+        15,
+    ),
     ("e ignored", "engines/contacts.py", r"restitution=wall\.restitution", "restitution=0.0", 15),
     (
         "a swapped left and right",
@@ -84,9 +110,21 @@ FAULTS = [
         'inward = 1.0 if wall.side == "right"',
         15,
     ),
-    ("dt off by 1e-3", "engines/adaptive.py", r"\(vx, vy, w\), dt,", "(vx, vy, w), 1.001 * dt,", 15),
+    (
+        "dt off by 1e-3",
+        "engines/adaptive.py",
+        r"\(vx, vy, w\), dt,",
+        "(vx, vy, w), 1.001 * dt,",
+        15,
+    ),
     ("a lost impact", "engines/events.py", r"in _rises\(flags\):", "in _rises(flags)[1:]:", 15),
-    ("friction 5 % low", "ebm/natural.py", r"mu_k=scene\.floor\.friction", "mu_k=0.95 * scene.floor.friction", 15),
+    (
+        "friction 5 % low",
+        "ebm/natural.py",
+        r"mu_k=scene\.floor\.friction",
+        "mu_k=0.95 * scene.floor.friction",
+        15,
+    ),
     (
         "Housner's ratio off by 1 %",
         "ebm/core/laws/impacts.py",
@@ -94,12 +132,20 @@ FAULTS = [
         "w2 = 1.01 * (1.0 - k2",
         15,
     ),
-    ("a sign in (3)", "ebm/core/motion.py", r"share \* r \* \(push - weight\)", "share * r * (push + weight)", 15),
+    (
+        "a sign in (3)",
+        "ebm/core/motion.py",
+        r"share \* r \* \(push - weight\)",
+        "share * r * (push + weight)",
+        15,
+    ),
 ]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("fault", "file", "old", "new", "untouched"), FAULTS, ids=[fault[0] for fault in FAULTS])
+@pytest.mark.parametrize(
+    ("fault", "file", "old", "new", "untouched"), FAULTS, ids=[fault[0] for fault in FAULTS]
+)
 def test_a_deliberate_fault_fails_the_smoke_suite(project, fault, file, old, new, untouched):
     with project.changed(file, old, new):
         code, out = project.run("validate", "smoke", "--strict")
@@ -111,7 +157,13 @@ def test_a_deliberate_fault_fails_the_smoke_suite(project, fault, file, old, new
 CHANGES = [
     ("an engine's module", "engines/pybullet_engine.py", r"\Z", "\nUNUSED = 1\n", 20),
     ("a remark", "engines/pybullet_engine.py", r"\Z", "\n# unused\n", 25),
-    ("an engine's setting", "validation/data/suites/smoke.toml", r"(\[models\.mujoco\]\n)", r"\g<1>largest_step = 4.9e-4\n", 20),
+    (
+        "an engine's setting",
+        "validation/data/suites/smoke.toml",
+        r"(\[models\.mujoco\]\n)",
+        r"\g<1>largest_step = 4.9e-4\n",
+        20,
+    ),
     ("the continuous model's", "cm/contact.py", r"\Z", "\nUNUSED = 1\n", 20),
     ("a measure", "validation/discrepancy/measures.py", r"\Z", "\nUNUSED = 1\n", 25),
     ("a page", "reports/site.py", r"\Z", "\nUNUSED = 1\n", 25),
@@ -125,7 +177,11 @@ def test_what_is_to_be_changed_is_there(file: str, old: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("file", "old", "new", "untouched"), [change[1:] for change in CHANGES], ids=[change[0] for change in CHANGES])
+@pytest.mark.parametrize(
+    ("file", "old", "new", "untouched"),
+    [change[1:] for change in CHANGES],
+    ids=[change[0] for change in CHANGES],
+)
 def test_exactly_what_depends_on_a_change_runs_again(project, file, old, new, untouched):
     project.run("validate", "smoke")
     assert "25 of 25 simulations were up to date" in project.run("validate", "smoke")[1]
@@ -171,7 +227,12 @@ def _alive(group: int) -> list[str]:
     """Processes of a process group, after half a minute's grace."""
     listed: list[str] = []
     for _ in range(60):
-        done = subprocess.run(["ps", "-o", "pid=,args=", "--sort=pid", "-g", str(group)], capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            ["ps", "-o", "pid=,args=", "--sort=pid", "-g", str(group)],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         listed = [line for line in done.stdout.splitlines() if "<defunct>" not in line]
         if not listed:
             break

@@ -1,4 +1,5 @@
-"""The law of impacts in a suite: named where a landing tells, never judged; outcomes and peaks by the nearest law."""
+"""The law of impacts in a suite: named where a landing tells, never judged; outcomes and peaks by
+the nearest law."""
 
 from __future__ import annotations
 
@@ -18,8 +19,8 @@ from rockcheck.validation.suite.suites import ModelVariant, load_suite
 from rockcheck.validation.suite.tables import summary
 from rockcheck.validation.suite.verdicts import markdown
 
-# Under "moreau" the first block stays and under "floor-first" it falls; the second stands beside no wall
-# that bounces; the last one lands flat, and overturns where its trailing corner is first.
+# Under "moreau" the first block stays and under "floor-first" it falls; the second stands beside no
+# wall that bounces; the last one lands flat, and overturns where its trailing corner is first.
 SUITE = """
 reference = "ebm-unilateral"
 [models.ebm-unilateral]
@@ -69,11 +70,24 @@ peak_ratio = { expected = 1.0, limit = 1e-6, drift = 1e-6, why = "the nearer of 
 @pytest.fixture(scope="module")
 def suite_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The suite, with a pulse that is a node of the paper's Fig. 6 of which the law decides."""
-    block = Scene(name="a", **{"block": {"half_width": 0.397, "half_height": 1.555}, "floor": {"friction": 0.3}, "duration": 1.0})
+    block = Scene(
+        name="a",
+        **{
+            "block": {"half_width": 0.397, "half_height": 1.555},
+            "floor": {"friction": 0.3},
+            "duration": 1.0,
+        },
+    )
     ratio = np.linspace(0.5, 8.0, 100)[73]
-    period, amplitude = 2.0 * np.pi / (ratio * block.frequency_parameter), 6.0 * 9.81 * 0.397 / 1.555
+    period, amplitude = (
+        2.0 * np.pi / (ratio * block.frequency_parameter),
+        6.0 * 9.81 * 0.397 / 1.555,
+    )
     path = tmp_path_factory.mktemp("suite") / "laws.toml"
-    path.write_text(SUITE.replace("AMPLITUDE", repr(float(amplitude))).replace("PERIOD", repr(float(period))), encoding="utf-8")
+    path.write_text(
+        SUITE.replace("AMPLITUDE", repr(float(amplitude))).replace("PERIOD", repr(float(period))),
+        encoding="utf-8",
+    )
     return path
 
 
@@ -101,7 +115,8 @@ def test_the_law_that_each_model_followed_is_in_its_cell(run: Run) -> None:
 
 
 def test_outcomes_and_peaks_are_judged_by_the_nearest_law(run: Run) -> None:
-    """The two laws end differently, and yet both are right; the histories are held against each other only up to where they part."""
+    """The two laws end differently, and yet both are right; the histories are held against each
+    other only up to where they part."""
     cell = cell_of(run, "of the law", "floor-first")
     assert cell_of(run, "of the law", "ebm-unilateral").outcome != cell.outcome
     assert {str(check.figure.measure): check.verdict for check in cell.checks} == dict.fromkeys(
@@ -112,22 +127,33 @@ def test_outcomes_and_peaks_are_judged_by_the_nearest_law(run: Run) -> None:
     assert notes["peak_ratio"] == 'impacts = "floor-first"'
     assert "impacts = " not in notes["theta_rms"]
     assert cell.impact_law is not None
-    horizon = next(check.figure.until for check in cell.checks if check.figure.measure == "theta_rms")
+    horizon = next(
+        check.figure.until for check in cell.checks if check.figure.measure == "theta_rms"
+    )
     assert horizon is not None
     assert abs(horizon - cell.impact_law.t) < 0.05
 
 
 def test_a_block_that_lands_flat_is_judged_by_the_nearest_law(run: Run) -> None:
-    """The third variant overturns, the reference does not: both are right, and the table says which law each followed."""
+    """The third variant overturns, the reference does not: both are right, and the table says which
+    law each followed."""
     cell = cell_of(run, "flat", "trailing-first")
     assert cell.outcome == "overturned left"
     assert cell_of(run, "flat", "ebm-unilateral").outcome == "moving"
     assert {check.figure.measure: check.verdict for check in cell.checks} == dict.fromkeys(
         ("outcome_agrees", "peak_ratio", "theta_rms"), "pass"
     )
-    assert all(check.figure.note.endswith('impacts = "trailing-first"') for check in cell.checks if check.figure.until is None)
-    horizon = next(check.figure.until for check in cell.checks if check.figure.measure == "theta_rms")
-    laws = {model: law.law for model in run.models if (law := cell_of(run, "flat", model).impact_law)}
+    assert all(
+        check.figure.note.endswith('impacts = "trailing-first"')
+        for check in cell.checks
+        if check.figure.until is None
+    )
+    horizon = next(
+        check.figure.until for check in cell.checks if check.figure.measure == "theta_rms"
+    )
+    laws = {
+        model: law.law for model in run.models if (law := cell_of(run, "flat", model).impact_law)
+    }
     assert laws["trailing-first"] == "trailing-first"
     assert laws["ebm-unilateral"] == laws["mujoco"] == "moreau or leading-first"
     assert cell.impact_law is not None
@@ -149,19 +175,28 @@ def test_the_summary_names_the_laws_and_nothing_depends_on_them(run: Run, tmp_pa
     assert laws["of the law", "mujoco"] == "closed"
     assert laws["plastic", "mujoco"] is None
     run.save(tmp_path)
-    assert cell_of(Run.load(tmp_path), "of the law", "mujoco").impact_law == cell_of(run, "of the law", "mujoco").impact_law
-    silent = run.model_copy(update={"cells": tuple(cell.model_copy(update={"impact_law": None}) for cell in run.cells)})
+    assert (
+        cell_of(Run.load(tmp_path), "of the law", "mujoco").impact_law
+        == cell_of(run, "of the law", "mujoco").impact_law
+    )
+    silent = run.model_copy(
+        update={"cells": tuple(cell.model_copy(update={"impact_law": None}) for cell in run.cells)}
+    )
     assert "not judged" not in markdown(silent)
     assert silent.verdict == run.verdict
 
 
-def test_a_landing_is_kept_and_what_was_kept_is_not_trusted(suite_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_landing_is_kept_and_what_was_kept_is_not_trusted(
+    suite_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     scene, store = load_suite(suite_file).scenes["of the law"], Store(tmp_path)
     first = landing_of(store, scene)
     assert first is not None
     (kept,) = (tmp_path / COMPARISONS).iterdir()
     with monkeypatch.context() as patched:
-        patched.setattr("rockcheck.validation.suite.impact_laws.parting_landing", lambda scene: None)
+        patched.setattr(
+            "rockcheck.validation.suite.impact_laws.parting_landing", lambda scene: None
+        )
         assert landing_of(store, scene) == first
     store.put_record(COMPARISONS, kept.stem, {"landing": {"t": 1.0}})
     assert landing_of(store, scene) == first
@@ -182,11 +217,20 @@ def test_only_a_reference_with_a_law_to_choose_has_another(suite_file: Path) -> 
 
 def test_the_reference_itself_counts_where_it_is_nearer(suite_file: Path) -> None:
     scene = load_suite(suite_file).scenes["of the law"]
-    one, other = (EventBasedModel(pivot="unilateral", impacts=law).simulate(scene) for law in ("moreau", "floor-first"))
+    one, other = (
+        EventBasedModel(pivot="unilateral", impacts=law).simulate(scene)
+        for law in ("moreau", "floor-first")
+    )
     others = {"floor-first": other}
-    figures, gaps = by_any(compare(one, one, scene=scene), others, one, scene, None, ["outcome_agrees", "peak_ratio"])
+    figures, gaps = by_any(
+        compare(one, one, scene=scene), others, one, scene, None, ["outcome_agrees", "peak_ratio"]
+    )
     assert gaps == {}
-    assert {figure.measure: figure.value for figure in figures if figure.measure in ("outcome_agrees", "peak_ratio")} == {
+    assert {
+        figure.measure: figure.value
+        for figure in figures
+        if figure.measure in ("outcome_agrees", "peak_ratio")
+    } == {
         "outcome_agrees": 1.0,
         "peak_ratio": 1.0,
     }

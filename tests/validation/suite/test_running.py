@@ -1,4 +1,5 @@
-"""Suites end to end: cells in workers that crash, hang and eat memory; results kept and read back."""
+"""Suites end to end: cells in workers that crash, hang and eat memory; results kept and read
+back."""
 
 from __future__ import annotations
 
@@ -25,7 +26,9 @@ from rockcheck.validation.suite.suites import load_suite
 from rockcheck.validation.suite.tables import verdict_lines
 from rockcheck.validation.suite.verdicts import junit
 
-OWN = [f"faulty:{name}" for name in ("Still", "Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")]
+OWN = [
+    f"faulty:{name}" for name in ("Still", "Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")
+]
 
 SUITE = """
 reference = "still"
@@ -47,11 +50,15 @@ floor = {{ friction = 0.5 }}
 FINE = '[tolerances.short.{model}.still]\ntheta_rms = {{ expected = 0.0, limit = 1e-9, drift = 0.0, why = "the same" }}\n'
 
 
-def write_suite(folder: Path, models: dict[str, str], tolerances: str = "", seconds: float = 60.0) -> Path:
+def write_suite(
+    folder: Path, models: dict[str, str], tolerances: str = "", seconds: float = 60.0
+) -> Path:
     shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", folder / "faulty.py")
     tables = "\n".join(f"[models.{label}]\n{lines}" for label, lines in models.items())
     path = folder / "mine.toml"
-    path.write_text(SUITE.format(models=tables, tolerances=tolerances, seconds=seconds), encoding="utf-8")
+    path.write_text(
+        SUITE.format(models=tables, tolerances=tolerances, seconds=seconds), encoding="utf-8"
+    )
     return path
 
 
@@ -67,7 +74,8 @@ def run(tmp_path, monkeypatch):
 
 
 def test_figures_are_the_same_from_memory_and_from_files(tmp_path):
-    """A history is compared as its worker gave it; read back from its files, where the comparisons are lost, it gives the same."""
+    """A history is compared as its worker gave it; read back from its files, where the comparisons
+    are lost, it gives the same."""
     folder = tmp_path / "out"
     first = run_suite(load_suite("smoke"), folder, jobs=2)
     shutil.rmtree(folder / "comparisons")
@@ -78,8 +86,16 @@ def test_figures_are_the_same_from_memory_and_from_files(tmp_path):
 
 @pytest.mark.long
 def test_every_kind_of_failure_fails_its_cell_alone(tmp_path, run):
-    faults = {name: f'model = "faulty:{name}"' for name in ("Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")}
-    path = write_suite(tmp_path, {**faults, "again": 'model = "faulty:Still"'}, FINE.format(model="again"), seconds=15.0)
+    faults = {
+        name: f'model = "faulty:{name}"'
+        for name in ("Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")
+    }
+    path = write_suite(
+        tmp_path,
+        {**faults, "again": 'model = "faulty:Still"'},
+        FINE.format(model="again"),
+        seconds=15.0,
+    )
     done = run(path, jobs=2)
     reasons = {cell.model: cell.reason for cell in done.cells}
     assert reasons["Segfault"] == "crashed: SIGSEGV"
@@ -95,14 +111,26 @@ def test_every_kind_of_failure_fails_its_cell_alone(tmp_path, run):
 
 @pytest.mark.parametrize("strict", [False, True])
 def test_a_model_that_is_not_installed_is_named(tmp_path, run, monkeypatch, strict):
-    """Its cells are not played, all others are; the run is incomplete, which `--strict` does not accept."""
-    monkeypatch.setattr("rockcheck.validation.suite.runner.not_installed", lambda name: "not installed: so" * (name == "pybullet"))
-    path = write_suite(tmp_path, {"a": 'model = "faulty:Still"', "pybullet": "time_step = 1e-3"}, FINE.format(model="a"))
+    """Its cells are not played, all others are; the run is incomplete, which `--strict` does not
+    accept."""
+    monkeypatch.setattr(
+        "rockcheck.validation.suite.runner.not_installed",
+        lambda name: "not installed: so" * (name == "pybullet"),
+    )
+    path = write_suite(
+        tmp_path,
+        {"a": 'model = "faulty:Still"', "pybullet": "time_step = 1e-3"},
+        FINE.format(model="a"),
+    )
     path.write_text(path.read_text() + FINE.format(model="pybullet"))
     done = run(path, strict=strict)
     assert done.cell("short", "a").verdict == "pass"
     absent = done.cell("short", "pybullet")
-    assert (absent.status, absent.verdict, absent.reason) == ("absent", "incomplete", "not installed: so")
+    assert (absent.status, absent.verdict, absent.reason) == (
+        "absent",
+        "incomplete",
+        "not installed: so",
+    )
     assert done.verdict == "incomplete"
     assert done.exit_code == int(strict)
     assert list(verdict_lines(done)) == ["pybullet: not installed: so"]
@@ -111,7 +139,11 @@ def test_a_model_that_is_not_installed_is_named(tmp_path, run, monkeypatch, stri
 
 
 def test_only_what_changed_runs_again(tmp_path, run):
-    path = write_suite(tmp_path, {"a": 'model = "faulty:Still"', "b": 'model = "faulty:Still"\noffset = 1e-12'}, FINE.format(model="a"))
+    path = write_suite(
+        tmp_path,
+        {"a": 'model = "faulty:Still"', "b": 'model = "faulty:Still"\noffset = 1e-12'},
+        FINE.format(model="a"),
+    )
     assert run(path).up_to_date == 0
     again = run(path)
     assert again.up_to_date == 3
@@ -120,7 +152,10 @@ def test_only_what_changed_runs_again(tmp_path, run):
     assert [cell.model for cell in changed.cells if not cell.read_back] == ["b"]
     assert run(path, force=True).up_to_date == 0
     code = tmp_path / "faulty.py"
-    code.write_text(code.read_text().replace('"""A block that stands', '"""A block that stays') + "\n# a remark\n")
+    code.write_text(
+        code.read_text().replace('"""A block that stands', '"""A block that stays')
+        + "\n# a remark\n"
+    )
     assert _reread(run, path).up_to_date == 3, "documentation is not code"
     code.write_text(code.read_text().replace("= self.offset", "= 1.0 * self.offset"))
     assert _reread(run, path).up_to_date == 0
@@ -139,10 +174,16 @@ def _reread(run, path):
 def test_a_damaged_result_is_not_read(tmp_path, run, suffix, damage):
     path = write_suite(tmp_path, {})
     run(path)
-    (target,) = (file for file in (tmp_path / "out" / "histories").iterdir() if file.name.partition(".")[2] == suffix[1:])
+    (target,) = (
+        file
+        for file in (tmp_path / "out" / "histories").iterdir()
+        if file.name.partition(".")[2] == suffix[1:]
+    )
     content = target.read_bytes()
     shown = _lines(content)
-    target.unlink() if damage == "gone" else target.write_bytes(content[: len(content) // 2] if damage == "cut short" else b"")
+    target.unlink() if damage == "gone" else target.write_bytes(
+        content[: len(content) // 2] if damage == "cut short" else b""
+    )
     assert run(path).up_to_date == 0
     assert _lines(target.read_bytes())[1:] == shown[1:]
     assert run(path).up_to_date == 1
@@ -183,13 +224,19 @@ def test_models_of_different_form_may_fall_apart_where_that_is_accepted(tmp_path
     path.write_text(FORM, encoding="utf-8")
     done = run(path)
     assert [cell.outcome for cell in done.cells] == ["at rest", "overturned right"]
-    assert [(check.kind, check.verdict) for _, check in done.checks()] == [("model form", "pass")] * 2
+    assert [(check.kind, check.verdict) for _, check in done.checks()] == [
+        ("model form", "pass")
+    ] * 2
     shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", tmp_path / "faulty.py")
     falling = re.sub(r"walls = .*", "initial_rotation = -0.3", FORM)
-    path.write_text(falling.replace("[models.ebm]", '[models.ebm]\nmodel = "faulty:Still"'), encoding="utf-8")
+    path.write_text(
+        falling.replace("[models.ebm]", '[models.ebm]\nmodel = "faulty:Still"'), encoding="utf-8"
+    )
     done = run(path)
     assert [cell.outcome for cell in done.cells] == ["overturned right", "at rest"]
-    assert [(check.kind, check.verdict) for _, check in done.checks()] == [("numerical", "fail")] * 2
+    assert [(check.kind, check.verdict) for _, check in done.checks()] == [
+        ("numerical", "fail")
+    ] * 2
 
 
 def test_missing_tolerance_missing_cell_and_nothing_judged_do_not_pass(tmp_path, run):
@@ -240,8 +287,14 @@ sys.exit(1)
 def test_only_calls_that_compile_wait_for_each_other(tmp_path):
     """The second call can end only while the third one runs, which begins as the first one ends."""
     there = str(tmp_path / "there")
-    plain = [[sys.executable, "-c", WAITS, there], [sys.executable, "-c", "import pathlib, sys; pathlib.Path(sys.argv[1]).touch()", there]]
-    calls = [Call(math.sqrt, (4.0,), compiles="a package"), *(Call(subprocess.run, (command,)) for command in plain)]
+    plain = [
+        [sys.executable, "-c", WAITS, there],
+        [sys.executable, "-c", "import pathlib, sys; pathlib.Path(sys.argv[1]).touch()", there],
+    ]
+    calls = [
+        Call(math.sqrt, (4.0,), compiles="a package"),
+        *(Call(subprocess.run, (command,)) for command in plain),
+    ]
     with Pool(2) as pool:
         found = [ended.result for ended in pool.run(deque(calls))]
     assert [one.returncode for one in found if one != 2.0] == [0, 0]

@@ -18,7 +18,9 @@ def suite(tmp_path, text):
 
 
 def test_scenes_by_name_by_table_and_by_file(tmp_path):
-    (tmp_path / "own.toml").write_text(SHELF.replace("[[scene]]\n", "").replace("shelf", "own"), encoding="utf-8")
+    (tmp_path / "own.toml").write_text(
+        SHELF.replace("[[scene]]\n", "").replace("shelf", "own"), encoding="utf-8"
+    )
     found = suite(tmp_path, 'scenes = ["fig4a", "own.toml"]\n' + MODELS + SHELF)
     assert list(found.scenes) == ["fig4a", "own", "shelf"]
     assert found.scenes["shelf"].block.half_width == 0.1
@@ -46,14 +48,28 @@ walls = [{ restitution = 0.5 }]
 """
     )
     found = suite(tmp_path, text)
-    assert list(found.scenes) == [f"w-{side}-{rest}" for side in ("left", "right") for rest in ("3mm", "53mm", "mu09")]
+    assert list(found.scenes) == [
+        f"w-{side}-{rest}" for side in ("left", "right") for rest in ("3mm", "53mm", "mu09")
+    ]
     scene = found.scenes["w-right-mu09"]
-    assert (scene.walls[0].side, scene.walls[0].gap, scene.walls[0].restitution, scene.floor.friction) == ("right", 0.1, 0.5, 0.9)
+    assert (
+        scene.walls[0].side,
+        scene.walls[0].gap,
+        scene.walls[0].restitution,
+        scene.floor.friction,
+    ) == ("right", 0.1, 0.5, 0.9)
 
 
 def test_variants_of_a_model_have_labels_of_their_own(tmp_path):
-    found = suite(tmp_path, SHELF.replace("[[scene]]", MODELS + '[models.coarse]\nmodel = "mujoco"\ntime_step = 1e-3\n[[scene]]'))
-    assert [(scene.name, variant.label, variant.family_name) for scene, variant in found.cells()] == [
+    found = suite(
+        tmp_path,
+        SHELF.replace(
+            "[[scene]]", MODELS + '[models.coarse]\nmodel = "mujoco"\ntime_step = 1e-3\n[[scene]]'
+        ),
+    )
+    assert [
+        (scene.name, variant.label, variant.family_name) for scene, variant in found.cells()
+    ] == [
         ("shelf", "ebm", "ebm"),
         ("shelf", "coarse", "mujoco"),
     ]
@@ -71,11 +87,17 @@ def test_variants_of_a_model_have_labels_of_their_own(tmp_path):
         (MODELS + "tollerance = 1e-9\n" + SHELF, "ebm.tollerance: unknown key"),
         (MODELS + 'pivot = "unilateral"\n' + SHELF, "ebm.pivot: is fixed by the name"),
         (MODELS + "[models.mujcoo]\n" + SHELF, "did you mean 'mujoco'"),
-        (MODELS + '[models.own]\nmodel = "nowhere:Model"\n' + SHELF, "models.own: 'nowhere:Model' is code of your own; it runs only if"),
+        (
+            MODELS + '[models.own]\nmodel = "nowhere:Model"\n' + SHELF,
+            "models.own: 'nowhere:Model' is code of your own; it runs only if",
+        ),
         (MODELS + "[require]\ndifference = ['theta_rsm']\n" + SHELF, "did you mean 'theta_rms'"),
         (MODELS + "[require]\ndifference = ['peak_rotation']\n" + SHELF, "require.difference"),
         (MODELS + SHELF.replace("0.1", "-0.1"), "block.half_width: -0.1 is not allowed"),
-        (MODELS + SHELF + "[tolerances.shelf.ebm.nobody]\ntheta_rms = { limit = 1.0 }\n", "unknown reference"),
+        (
+            MODELS + SHELF + "[tolerances.shelf.ebm.nobody]\ntheta_rms = { limit = 1.0 }\n",
+            "unknown reference",
+        ),
         ("reference = [\n", "not valid TOML"),
         ('include = ["paper", "paper"]\n', "is in two of the suites"),
         ("unknown = 1\n" + MODELS, "unknown: unknown key"),

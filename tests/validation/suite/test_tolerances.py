@@ -59,11 +59,24 @@ def test_no_tolerance_and_a_gap_fail():
 
 def test_ratios_are_held_against_one_and_figures_against_what_was_expected():
     band = Tolerance(expected=1.0, limit=0.1, drift=0.05)
-    assert [verdict(v, band, "peak_ratio") for v in (1.0, 0.94, 0.89, 1.11)] == ["pass", "changed", "fail", "fail"]
+    assert [verdict(v, band, "peak_ratio") for v in (1.0, 0.94, 0.89, 1.11)] == [
+        "pass",
+        "changed",
+        "fail",
+        "fail",
+    ]
     own = Tolerance(expected=0.33, limit=0.01, drift=0.001)
-    assert [verdict(v, own, "peak_rotation") for v in (0.33, 0.335, 0.345)] == ["pass", "changed", "fail"]
+    assert [verdict(v, own, "peak_rotation") for v in (0.33, 0.335, 0.345)] == [
+        "pass",
+        "changed",
+        "fail",
+    ]
     until = Tolerance(limit=8.0)
-    assert [verdict(v, until, "events_agree_until") for v in (8.0, 12.0, 7.9)] == ["pass", "pass", "fail"]
+    assert [verdict(v, until, "events_agree_until") for v in (8.0, 12.0, 7.9)] == [
+        "pass",
+        "pass",
+        "fail",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -89,15 +102,21 @@ def test_faults_in_a_file_are_named(text, fault):
 
 def made_run(*checks):
     cell = Cell(scene="s", model="m", status="done", checks=checks)
-    return Run(suite="mine", created="", reference="r", scenes={"s": {}}, models=("r", "m"), cells=(cell,))
+    return Run(
+        suite="mine", created="", reference="r", scenes={"s": {}}, models=("r", "m"), cells=(cell,)
+    )
 
 
 def check(value, line=LINE, measure="theta_rms"):
-    return judge(figure(value, measure, against="r"), line, kind="numerical", measure=DIFFERENCES[measure])
+    return judge(
+        figure(value, measure, against="r"), line, kind="numerical", measure=DIFFERENCES[measure]
+    )
 
 
 def accepted(path: Path, run: Run, reason: str | None = None):
-    suite = SimpleNamespace(included=(), path=Path("mine.toml"), tolerances_path=path, scenes={"s": None})
+    suite = SimpleNamespace(
+        included=(), path=Path("mine.toml"), tolerances_path=path, scenes={"s": None}
+    )
     return accept(suite, run, reason)
 
 
@@ -123,10 +142,18 @@ def test_accept_moves_the_expected_figure_only_with_a_reason_and_keeps_the_limit
     assert tolerance_file.read_text() == FILE
     changes, refused = accepted(tolerance_file, made_run(check(1.5e-3)), "another step")
     assert refused == []
-    assert changes == ["[s.m.r] theta_rms: moved: expected 0.001, limit 0.002, drift 0.0001 -> expected 0.0015, limit 0.002, drift 0.0001"]
+    assert changes == [
+        "[s.m.r] theta_rms: moved: expected 0.001, limit 0.002, drift 0.0001 -> expected 0.0015,"
+        " limit 0.002, drift 0.0001"
+    ]
     text = tolerance_file.read_text()
     assert text.startswith("# by hand\n\n[s.m.r]\n# the main one\n")
-    assert tomllib.loads(text)["s"]["m"]["r"]["theta_rms"] == {"expected": 0.0015, "limit": 0.002, "drift": 0.0001, "why": "another step"}
+    assert tomllib.loads(text)["s"]["m"]["r"]["theta_rms"] == {
+        "expected": 0.0015,
+        "limit": 0.002,
+        "drift": 0.0001,
+        "why": "another step",
+    }
 
 
 def test_accept_loosens_only_with_a_reason(tolerance_file):
@@ -138,14 +165,27 @@ def test_accept_loosens_only_with_a_reason(tolerance_file):
     changes, refused = accepted(tolerance_file, run, "coarser step since 1.2")
     assert refused == []
     line = tomllib.loads(tolerance_file.read_text())["s"]["m"]["r"]["theta_rms"]
-    assert line == {"expected": 0.005, "limit": 0.01, "drift": 0.0001, "why": "coarser step since 1.2"}
+    assert line == {
+        "expected": 0.005,
+        "limit": 0.01,
+        "drift": 0.0001,
+        "why": "coarser step since 1.2",
+    }
 
 
 def test_accept_refuses_what_is_not_a_figure(tolerance_file):
     changes, refused = accepted(tolerance_file, made_run(check(math.nan)), "because")
     assert (changes, len(refused)) == ([], 1)
-    gap = judge(figure(1e-3, against="r"), LINE, kind="numerical", measure=DIFFERENCES["theta_rms"], gap="m ends at 3 s")
-    assert accepted(tolerance_file, made_run(gap), "because")[1] == ["[s.m.r] theta_rms: m ends at 3 s"]
+    gap = judge(
+        figure(1e-3, against="r"),
+        LINE,
+        kind="numerical",
+        measure=DIFFERENCES["theta_rms"],
+        gap="m ends at 3 s",
+    )
+    assert accepted(tolerance_file, made_run(gap), "because")[1] == [
+        "[s.m.r] theta_rms: m ends at 3 s"
+    ]
     assert tolerance_file.read_text() == FILE
 
 
@@ -158,7 +198,12 @@ def test_accept_writes_a_line_that_was_missing(tmp_path):
         "peak_ratio": (0.99, 0.02),
     }
     for place, line in lines.items():
-        assert judge(figure(line.expected), line, kind="numerical", measure=place.what.definition).verdict == "pass"
+        assert (
+            judge(
+                figure(line.expected), line, kind="numerical", measure=place.what.definition
+            ).verdict
+            == "pass"
+        )
 
 
 def test_a_new_line_holds_what_it_was_made_from(tmp_path):
@@ -166,7 +211,10 @@ def test_a_new_line_holds_what_it_was_made_from(tmp_path):
         path = tmp_path / f"{number}.toml"
         accepted(path, made_run(check(value, None)))
         ((place, line),) = parse_tolerances(tomllib.loads(path.read_text())).items()
-        assert judge(figure(value), line, kind="numerical", measure=place.what.definition).verdict == "pass"
+        assert (
+            judge(figure(value), line, kind="numerical", measure=place.what.definition).verdict
+            == "pass"
+        )
 
 
 def test_shipped_suites_load_and_their_tolerances_have_cells():
@@ -195,15 +243,23 @@ outcome_agrees = { expected = 0.0, limit = 1.0, drift = 0.0, why = "one falls" }
 
 
 def test_a_line_for_every_scene():
-    lines = parse_tolerances(tomllib.loads(EVERYWHERE), [("a", "m"), ("b", "m"), ("c", "m"), ("a", "r")])
-    assert {(place.scene, str(place.what)): (line.limit, line.why) for place, line in lines.items()} == {
+    lines = parse_tolerances(
+        tomllib.loads(EVERYWHERE), [("a", "m"), ("b", "m"), ("c", "m"), ("a", "r")]
+    )
+    assert {
+        (place.scene, str(place.what)): (line.limit, line.why) for place, line in lines.items()
+    } == {
         ("a", "theta_rms"): (0.002, "the step"),
         ("b", "theta_rms"): (0.004, "another"),
         ("a", "outcome_agrees"): (0.0, "the same"),
         ("b", "outcome_agrees"): (1.0, "one falls"),
         ("c", "outcome_agrees"): (0.0, "the same"),
     }
-    assert {place.scene for place in parse_tolerances(tomllib.loads(EVERYWHERE))} == {"*", "a", "b"}, "without a cell it is told as a fault"
+    assert {place.scene for place in parse_tolerances(tomllib.loads(EVERYWHERE))} == {
+        "*",
+        "a",
+        "b",
+    }, "without a cell it is told as a fault"
     with pytest.raises(InputError, match="theta_rms: limit: is missing"):
         parse_tolerances({"*": {"m": {"r": {"theta_rms": {"why": "of what?"}}}}}, [("a", "m")])
 
@@ -216,12 +272,21 @@ def test_accept_writes_a_scene_s_own_line_beside_one_for_every_scene(tmp_path):
         for place, line in parse_tolerances(tomllib.loads(path.read_text()), [("s", "m")]).items()
         if place.scene == "s"
     }
-    same = made_run(check(1.0e-3, lines["theta_rms"]), check(1.0, lines["outcome_agrees"], "outcome_agrees"))
+    same = made_run(
+        check(1.0e-3, lines["theta_rms"]), check(1.0, lines["outcome_agrees"], "outcome_agrees")
+    )
     assert accepted(path, same) == ([], [])
-    changes, refused = accepted(path, made_run(check(0.0, lines["outcome_agrees"], "outcome_agrees")), "one falls now")
+    changes, refused = accepted(
+        path, made_run(check(0.0, lines["outcome_agrees"], "outcome_agrees")), "one falls now"
+    )
     assert (len(changes), refused) == (1, [])
     written = tomllib.loads(path.read_text())
-    assert written["s"]["m"]["r"]["outcome_agrees"] == {"expected": 0.0, "limit": 1.0, "drift": 0.0, "why": "one falls now"}
+    assert written["s"]["m"]["r"]["outcome_agrees"] == {
+        "expected": 0.0,
+        "limit": 1.0,
+        "drift": 0.0,
+        "why": "one falls now",
+    }
     assert written["*"] == tomllib.loads(EVERYWHERE)["*"]
 
 

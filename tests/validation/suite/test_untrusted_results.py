@@ -1,4 +1,5 @@
-"""What is read back is not trusted: a result that was damaged, edited or exchanged is found, and played or compared again."""
+"""What is read back is not trusted: a result that was damaged, edited or exchanged is found, and
+played or compared again."""
 
 from __future__ import annotations
 
@@ -60,7 +61,9 @@ def run(tmp_path, monkeypatch) -> Callable[[], Run]:
 
 
 def records(folder: Path) -> list[Path]:
-    return sorted(path for kind in (HISTORIES, COMPARISONS) for path in (folder / "out" / kind).glob("*.json"))
+    return sorted(
+        path for kind in (HISTORIES, COMPARISONS) for path in (folder / "out" / kind).glob("*.json")
+    )
 
 
 def plain(run: Run) -> list[Any]:
@@ -79,18 +82,26 @@ def edited(path: Path, change: Callable[[Any], Any]) -> None:
 
 
 DAMAGE: dict[str, Callable[[Path], Any]] = {
-    "a figure edited": lambda path: edited(path, lambda value: 0.5 * value + 7.0 if isinstance(value, float) else value),
-    "an outcome edited": lambda path: edited(path, lambda value: "overturned left" if value == "at rest" else value),
+    "a figure edited": lambda path: edited(
+        path, lambda value: 0.5 * value + 7.0 if isinstance(value, float) else value
+    ),
+    "an outcome edited": lambda path: edited(
+        path, lambda value: "overturned left" if value == "at rest" else value
+    ),
     "no content": lambda path: path.write_text("{}"),
     "a list": lambda path: path.write_text("[]"),
     "a number": lambda path: path.write_text("7"),
     "null": lambda path: path.write_text("null"),
     "empty": lambda path: path.write_text(""),
     "cut short": lambda path: path.write_text(path.read_text()[:-40]),
-    "no hash": lambda path: path.write_text(json.dumps({"content": json.loads(path.read_text())["content"]})),
+    "no hash": lambda path: path.write_text(
+        json.dumps({"content": json.loads(path.read_text())["content"]})
+    ),
     "not text": lambda path: path.write_bytes(b"\xff\xfe\x00"),
     "deep": lambda path: path.write_text("[" * 100_000),
-    "another shape, well hashed": lambda path: path.write_text(_sealed(path.stem, {"figures": 7, "peaks": [1], "outcome": 3})),
+    "another shape, well hashed": lambda path: path.write_text(
+        _sealed(path.stem, {"figures": 7, "peaks": [1], "outcome": 3})
+    ),
     "empty, well hashed": lambda path: path.write_text(_sealed(path.stem, {})),
 }
 
@@ -137,16 +148,27 @@ EVIL = "a|b](http://x.y/?z)<img src=x onerror=alert(1)>`c`![p](http://x.y/p.png)
 
 
 def test_names_in_the_summary_and_in_junit_are_text(tmp_path):
-    """A model, scene, suite or reason may be called anything: no tag, link, picture, line or control character comes of it."""
+    """A model, scene, suite or reason may be called anything: no tag, link, picture, line or
+    control character comes of it."""
     cell = Cell(scene=EVIL, model=EVIL, status="failed", reason=EVIL)
-    made = Run(suite=EVIL, created="2026", reference="x", scenes={}, models=(EVIL,), cells=(cell,), faults=(EVIL,))
+    made = Run(
+        suite=EVIL,
+        created="2026",
+        reference="x",
+        scenes={},
+        models=(EVIL,),
+        cells=(cell,),
+        faults=(EVIL,),
+    )
     text = markdown(made)
     assert text.replace("\n", "").isprintable()
     assert len([line for line in text.splitlines() if line.startswith("#")]) == 1
     assert "<" not in text
     assert "://" not in text
     for mark in ("](", "![", "`"):
-        assert mark not in text.replace("\\[", "").replace("\\]", "").replace("\\`", "").replace("\\!", ""), mark
+        assert mark not in text.replace("\\[", "").replace("\\]", "").replace("\\`", "").replace(
+            "\\!", ""
+        ), mark
     rows = [line for line in text.splitlines() if line.startswith("|")]
     assert len(rows) == 3
     assert {line.replace("\\|", "").count("|") for line in rows} == {3}

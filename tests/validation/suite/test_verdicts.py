@@ -1,4 +1,5 @@
-"""What CI reads: totals and failures of the JUnit file, limits that hold to the last digit, statistics against their definitions."""
+"""What CI reads: totals and failures of the JUnit file, limits that hold to the last digit,
+statistics against their definitions."""
 
 from __future__ import annotations
 
@@ -30,16 +31,30 @@ def check(value: float | None, measure: str = "theta_rms", line: Tolerance = LIN
 def run_of(*cells: Cell, **more: object) -> Run:
     scenes = {cell.scene: {} for cell in cells}
     return Run(
-        suite="mine", created="", reference="r", scenes=scenes, models=("r", *dict.fromkeys(c.model for c in cells)), cells=cells, **more
+        suite="mine",
+        created="",
+        reference="r",
+        scenes=scenes,
+        models=("r", *dict.fromkeys(c.model for c in cells)),
+        cells=cells,
+        **more,
     )
 
 
 def cell(scene: str, model: str, *checks: Check, reason: str = "") -> Cell:
-    return Cell(scene=scene, model=model, status="failed" if reason else "done", reason=reason, checks=checks)
+    return Cell(
+        scene=scene,
+        model=model,
+        status="failed" if reason else "done",
+        reason=reason,
+        checks=checks,
+    )
 
 
 MIXED = (
-    cell("a", "m", check(0.25), check(0.4, "theta_peak"), check(0.75, "x_rms")),  # passes, has changed, fails
+    cell(
+        "a", "m", check(0.25), check(0.4, "theta_peak"), check(0.75, "x_rms")
+    ),  # passes, has changed, fails
     cell("a", "n", reason="more than 10 events"),
     cell("b", "m", check(0.4), check(0.9, "theta_peak")),
 )
@@ -51,8 +66,11 @@ def totals(element: ET.Element) -> dict[str, int]:
 
 @pytest.mark.parametrize(("strict", "failures"), [(False, [1, 1, 1]), (True, [2, 2, 1])])
 def test_totals_and_failures_of_the_junit_file(strict, failures):
-    """A test case a run and a check; what has changed is red in a strict run only; totals of a suite and of all are the sums."""
-    root = ET.fromstring(junit(run_of(*MIXED, strict=strict, faults=("s.m.r: theta_rms: no such cell",))))
+    """A test case a run and a check; what has changed is red in a strict run only; totals of a
+    suite and of all are the sums."""
+    root = ET.fromstring(
+        junit(run_of(*MIXED, strict=strict, faults=("s.m.r: theta_rms: no such cell",)))
+    )
     suites = {suite.get("name"): suite for suite in root.iter("testsuite")}
     assert {name: totals(suite) for name, suite in suites.items()} == {
         "a": {"tests": 5, "failures": failures[0], "errors": 1},
@@ -60,7 +78,11 @@ def test_totals_and_failures_of_the_junit_file(strict, failures):
         "tolerances": {"tests": 1, "failures": failures[2], "errors": 0},
     }
     assert totals(root) == {"tests": 9, "failures": sum(failures), "errors": 1}
-    red = {(case.get("classname"), case.get("name").partition(" ")[0]) for case in root.iter("testcase") if len(case)}
+    red = {
+        (case.get("classname"), case.get("name").partition(" ")[0])
+        for case in root.iter("testcase")
+        if len(case)
+    }
     expected = {("a.m", "x_rms"), ("a.n", "runs"), ("b.m", "theta_peak")} | (
         {("a.m", "theta_peak"), ("b.m", "theta_rms")} if strict else set()
     )
@@ -75,16 +97,27 @@ def test_a_run_without_a_fault_is_green():
 
 
 def test_a_cell_that_has_not_converged_is_skipped_with_its_reason():
-    """A case of its own, beside the run's: green where the run has converged, none where nothing was asked for."""
+    """A case of its own, beside the run's: green where the run has converged, none where nothing
+    was asked for."""
 
     def found(*quantities: Quantity) -> Cell:
         numerical = Numerical(method="steps h, 2h, 3h and 4h", quantities=quantities)
         return cell("a", "m", check(0.25)).model_copy(update={"numerical": numerical})
 
     sure = Quantity(name="theta_peak", unit="alpha", value=0.5, verdict="converged")
-    unsure = Quantity(name="outcome", unit="", value="right", verdict="not converged", reason="the outcome changes: right, right, stands")
+    unsure = Quantity(
+        name="outcome",
+        unit="",
+        value="right",
+        verdict="not converged",
+        reason="the outcome changes: right, right, stands",
+    )
     cases = {}
-    for name, one in {"asked": found(sure), "unsure": found(sure, unsure), "unasked": cell("a", "m", check(0.25))}.items():
+    for name, one in {
+        "asked": found(sure),
+        "unsure": found(sure, unsure),
+        "unasked": cell("a", "m", check(0.25)),
+    }.items():
         root = ET.fromstring(junit(run_of(one)))
         cases[name] = [case for case in root.iter("testcase") if case.get("name") == "converged"]
         assert totals(root) == {"tests": 2 + len(cases[name]), "failures": 0, "errors": 0}
@@ -95,22 +128,43 @@ def test_a_cell_that_has_not_converged_is_skipped_with_its_reason():
 
 
 def test_the_table_of_laws_has_the_models_that_met_a_landing():
-    """One row a scene with such a landing, one column a model that followed a law in any scene; others have none."""
+    """One row a scene with such a landing, one column a model that followed a law in any scene;
+    others have none."""
 
     def followed(scene: str, model: str, law: str) -> Cell:
-        return cell(scene, model).model_copy(update={"impact_law": LawFollowed(t=1.25, law=law, errors={}, spread=0.1)})
+        return cell(scene, model).model_copy(
+            update={"impact_law": LawFollowed(t=1.25, law=law, errors={}, spread=0.1)}
+        )
 
-    cells = (followed("a", "m", "closed"), cell("a", "n"), cell("a", "o"), followed("b", "n", "open"), cell("b", "m"), cell("c", "m"))
+    cells = (
+        followed("a", "m", "closed"),
+        cell("a", "n"),
+        cell("a", "o"),
+        followed("b", "n", "open"),
+        cell("b", "m"),
+        cell("c", "m"),
+    )
     table = markdown(run_of(*cells)).split("(not judged):")[1].strip().splitlines()
     rows = [[entry.strip() for entry in line.strip("|").split("|")] for line in table]
-    assert [rows[0], *rows[2:]] == [["scene", "landing", "m", "n"], ["a", "1.250 s", "closed", ""], ["b", "1.250 s", "", "open"]]
+    assert [rows[0], *rows[2:]] == [
+        ["scene", "landing", "m", "n"],
+        ["a", "1.250 s", "closed", ""],
+        ["b", "1.250 s", "", "open"],
+    ]
 
 
 def test_the_summary_of_a_run_that_nothing_judges_tells_the_outcomes():
     """And of a cell without a history that it failed, not an outcome."""
     fell = cell("a", "m").model_copy(update={"outcome": "overturned left", "overturned_at": 3.21})
-    row = markdown(run_of(fell, cell("a", "n", reason="more than 10 events"), judged=False)).splitlines()[-1]
-    assert [entry.strip() for entry in row.strip("|").split("|")] == ["a", "", "overturned left at 3.21 s", MARKS["error"]]
+    row = markdown(
+        run_of(fell, cell("a", "n", reason="more than 10 events"), judged=False)
+    ).splitlines()[-1]
+    assert [entry.strip() for entry in row.strip("|").split("|")] == [
+        "a",
+        "",
+        "overturned left at 3.21 s",
+        MARKS["error"],
+    ]
 
 
 def test_the_summary_names_what_is_not_a_pass():
@@ -118,7 +172,9 @@ def test_the_summary_names_what_is_not_a_pass():
     assert "## 💥 rockcheck mine: error" in text
     assert "3 simulations, 0 up to date, 5 checks" in text
     assert "theta_peak against r: 0.9 is more than 0.5" in text
-    assert [line for line in text.splitlines() if line.startswith("| a |")] == ["| a |  | ❌ x_rms 7.50e-01 / 0.5 | 💥 |"]
+    assert [line for line in text.splitlines() if line.startswith("| a |")] == [
+        "| a |  | ❌ x_rms 7.50e-01 / 0.5 | 💥 |"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -134,16 +190,25 @@ def test_the_summary_names_what_is_not_a_pass():
     ],
 )
 def test_limit_and_drift_themselves_are_inside(value, expected):
-    """Numbers that a computer holds exactly: a figure just at its drift passes, one just at its limit does not fail."""
+    """Numbers that a computer holds exactly: a figure just at its drift passes, one just at its
+    limit does not fail."""
     assert check(value).verdict == expected
 
 
 def test_a_large_run_shows_its_worst_scenes_in_the_suites_order():
-    """The one that is out of tolerance, the nearest to their limits, and all ensembles; JUnit has every scene."""
+    """The one that is out of tolerance, the nearest to their limits, and all ensembles; JUnit has
+    every scene."""
     near = [cell(f"near {n}", "m", check(0.4)) for n in range(MOST_SHOWN - 1)]
     far = [cell(f"far {n}", "m", check(0.25)) for n in range(30)]
     drawn = EnsembleRecord(name="drawn", definition={}, peaks={}, outcomes={})
-    run = run_of(*far[:10], cell("drawn", "m", check(0.1)), *near, *far[10:], cell("out", "m", check(0.75)), ensembles=(drawn,))
+    run = run_of(
+        *far[:10],
+        cell("drawn", "m", check(0.1)),
+        *near,
+        *far[10:],
+        cell("out", "m", check(0.75)),
+        ensembles=(drawn,),
+    )
     assert shown(run) == ("drawn", *(one.scene for one in near), "out")
     assert verdict_table(run).row_count == MOST_SHOWN + 1
     text = markdown(run)
@@ -161,10 +226,15 @@ def test_the_summary_of_a_run_that_is_wrong_everywhere_has_an_end():
 
 
 def test_what_waits_for_its_tolerance_has_not_failed():
-    """Nor has what no tolerance is written for: unless nothing was computed, part of the window is missing, or something else failed."""
+    """Nor has what no tolerance is written for: unless nothing was computed, part of the window is
+    missing, or something else failed."""
     waits = check(0.25).model_copy(update={"limit": None, "verdict": "fail"})
     gone = waits.model_copy(update={"figure": waits.figure.model_copy(update={"value": None})})
-    assert [one.words for one in (waits, waits.model_copy(update={"gap": "ends early"}), gone)] == ["no tolerance yet", "fail", "fail"]
+    assert [one.words for one in (waits, waits.model_copy(update={"gap": "ends early"}), gone)] == [
+        "no tolerance yet",
+        "fail",
+        "fail",
+    ]
     for cells, faults, expected in (
         ((cell("a", "m", waits),), (), "no tolerance yet"),
         ((cell("a", "m", waits),), ("a tolerance without its cell",), "fail"),
@@ -175,7 +245,8 @@ def test_what_waits_for_its_tolerance_has_not_failed():
 
 
 def test_the_worst_cell_is_the_verdict_of_the_run_and_has_its_exit_code():
-    """A model that is not installed, a figure that has changed, a tolerance without its cell, nothing to judge by, a fault inside."""
+    """A model that is not installed, a figure that has changed, a tolerance without its cell,
+    nothing to judge by, a fault inside."""
     absent = Cell(scene="a", model="n", status="absent", reason="needs it")
     passes, changed, failed = (cell("a", "m", check(value)) for value in (0.25, 0.4, 0.75))
     strange = Cell(scene="a", model="o", status="failed", reason="a fault", unexpected=True)
@@ -194,7 +265,9 @@ def test_the_worst_cell_is_the_verdict_of_the_run_and_has_its_exit_code():
         assert [run.verdict for run in runs] == [verdict, verdict]
         assert [run.exit_code for run in runs] == [code, strict]
     assert run_of(cell("a", "m"), judged=False).words == "not judged"
-    assert not any(value for name, value in CostRecord().model_dump().items() if name != "rules"), "what was not counted is nothing"
+    assert not any(value for name, value in CostRecord().model_dump().items() if name != "rules"), (
+        "what was not counted is nothing"
+    )
 
 
 def test_a_figure_that_is_missing_is_not_the_worst_of_those_that_are_there():
@@ -203,17 +276,28 @@ def test_a_figure_that_is_missing_is_not_the_worst_of_those_that_are_there():
 
 
 def test_the_table_shows_what_two_solutions_of_the_same_equations_differ_by():
-    """Neither what another model form differs by, nor a figure that is held against no other model."""
+    """Neither what another model form differs by, nor a figure that is held against no other
+    model."""
     figure = Figure(measure="theta_rms", label="theta_rms", unit="alpha", value=0.9, against="r")
     form = judge(figure, LINE, kind="model form", measure=DIFFERENCES["theta_rms"])
-    alone = judge(figure.model_copy(update={"measure": "x_rms", "against": ""}), LINE, kind="numerical", measure=DIFFERENCES["x_rms"])
-    text = markdown(run_of(cell("a", "m", check(0.26, "theta_peak"), form, alone), cell("a", "n", form, alone)))
+    alone = judge(
+        figure.model_copy(update={"measure": "x_rms", "against": ""}),
+        LINE,
+        kind="numerical",
+        measure=DIFFERENCES["x_rms"],
+    )
+    text = markdown(
+        run_of(cell("a", "m", check(0.26, "theta_peak"), form, alone), cell("a", "n", form, alone))
+    )
     assert "| a |  | ❌ theta_peak 2.60e-01 / 0.5 | ❌ |" in text
 
 
 def test_a_line_for_every_scene_is_completed_by_the_same_line_only():
     """Another measure's line leaves it as it is: without a limit."""
-    tables = {"*": {"m": {"r": {"theta_rms": {"why": "a test"}}}}, "a": {"m": {"r": {"x_rms": {"expected": 0.1, "limit": 1.0}}}}}
+    tables = {
+        "*": {"m": {"r": {"theta_rms": {"why": "a test"}}}},
+        "a": {"m": {"r": {"x_rms": {"expected": 0.1, "limit": 1.0}}}},
+    }
     with pytest.raises(InputError, match="theta_rms: limit: is missing"):
         parse_tolerances(tables, [("a", "m")])
 
@@ -226,15 +310,27 @@ def test_a_limit_of_zero_asks_for_the_figure_itself():
 
 def test_the_reason_gives_the_remark_where_the_figure_itself_is_asked_for():
     """Which outcomes they were; of a figure with a limit the distance says enough."""
-    figure = Figure(measure="outcome_agrees", label="outcome", unit="1", value=0.0, against="r", note="at rest, not overturned left")
+    figure = Figure(
+        measure="outcome_agrees",
+        label="outcome",
+        unit="1",
+        value=0.0,
+        against="r",
+        note="at rest, not overturned left",
+    )
     exact = Tolerance(expected=1.0, limit=0.0, drift=0.0, why="the same outcome")
     wide = Tolerance(expected=1.0, limit=0.5, drift=0.0, why="half of it")
-    told, untold = (judge(figure, line, kind="numerical", measure=DIFFERENCES["outcome_agrees"]).reason for line in (exact, wide))
+    told, untold = (
+        judge(figure, line, kind="numerical", measure=DIFFERENCES["outcome_agrees"]).reason
+        for line in (exact, wide)
+    )
     assert told == "0, not 1 (at rest, not overturned left)"
     assert untold == "0 is more than 0.5 from 1"
 
 
-def samples(reference: list[float], candidate: list[float], fallen: tuple[int, ...] = ()) -> Samples:
+def samples(
+    reference: list[float], candidate: list[float], fallen: tuple[int, ...] = ()
+) -> Samples:
     """Peaks of both; in the scenes `fallen` the candidate falls."""
     safe = ("at rest",) * len(reference)
     ends = tuple("overturned left" if n in fallen else "at rest" for n in range(len(candidate)))
@@ -242,14 +338,18 @@ def samples(reference: list[float], candidate: list[float], fallen: tuple[int, .
 
 
 def test_the_fallen_are_beyond_all_others():
-    """Two of four rock less than any of the reference and two fall: the distributions part by a half; as peaks of 0 by the whole."""
-    value, remark = STATISTICS["ks_distance"].evaluate(samples([0.1, 0.2, 0.3, 0.4], [0.05, 0.06, 0.1, 0.2], fallen=(2, 3)))
+    """Two of four rock less than any of the reference and two fall: the distributions part by a
+    half; as peaks of 0 by the whole."""
+    value, remark = STATISTICS["ks_distance"].evaluate(
+        samples([0.1, 0.2, 0.3, 0.4], [0.05, 0.06, 0.1, 0.2], fallen=(2, 3))
+    )
     assert value == pytest.approx(0.5)
     assert remark.startswith("p = ")
 
 
 def test_bias_and_scatter_by_student_and_chi_squared():
-    """Four ratios: mean and its interval as scipy's t-test has it; the scatter is that of a sample, not of a population."""
+    """Four ratios: mean and its interval as scipy's t-test has it; the scatter is that of a sample,
+    not of a population."""
     reference, candidate = [0.1, 0.2, 0.3, 0.4], [0.11, 0.19, 0.36, 0.41]
     ratios = np.log(np.array(candidate) / reference)
     bias, remark = STATISTICS["peak_bias"].evaluate(samples(reference, candidate))
@@ -259,11 +359,14 @@ def test_bias_and_scatter_by_student_and_chi_squared():
     scatter, remark = STATISTICS["peak_scatter"].evaluate(samples(reference, candidate))
     assert scatter == pytest.approx(np.sqrt(np.sum((ratios - bias) ** 2) / 3.0))
     # chi-squared with 3 degrees of freedom has its 2.5 % and 97.5 % points at 0.2158 and 9.3484
-    assert remark == f"[{scatter * np.sqrt(3.0 / 9.3484):.2g}, {scatter * np.sqrt(3.0 / 0.2158):.2g}]"
+    assert (
+        remark == f"[{scatter * np.sqrt(3.0 / 9.3484):.2g}, {scatter * np.sqrt(3.0 / 0.2158):.2g}]"
+    )
 
 
 def test_only_scenes_in_which_both_rock_have_a_ratio():
-    """A peak of a thousandth and less, and a fall, have none; with fewer than two there is no bias and no scatter."""
+    """A peak of a thousandth and less, and a fall, have none; with fewer than two there is no bias
+    and no scatter."""
     both = samples([0.1, 0.2, 1e-3, 0.4, 0.3], [0.2, 0.4, 0.4, 1e-3, 0.6], fallen=(4,))
     assert both.log_ratios() == pytest.approx(np.log([2.0, 2.0]))
     for name in ("peak_bias", "peak_scatter"):
@@ -274,12 +377,22 @@ def test_only_scenes_in_which_both_rock_have_a_ratio():
 
 def test_shares_have_wilsons_interval():
     """Three of four: Wilson (1927) by his formula; where none falls, precision and recall are 1."""
-    value, remark = STATISTICS["overturning_accuracy"].evaluate(samples([0.1] * 4, [0.1] * 4, fallen=(0,)))
+    value, remark = STATISTICS["overturning_accuracy"].evaluate(
+        samples([0.1] * 4, [0.1] * 4, fallen=(0,))
+    )
     z, p, n = 1.959963984540054, 0.75, 4
-    middle, half = (p + z * z / (2 * n)) / (1 + z * z / n), z / (1 + z * z / n) * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    middle, half = (
+        (p + z * z / (2 * n)) / (1 + z * z / n),
+        z / (1 + z * z / n) * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n)),
+    )
     assert (value, remark) == (0.75, f"[{middle - half:.3f}, {middle + half:.3f}], 3 of 4")
-    assert STATISTICS["overturning_recall"].evaluate(samples([0.1] * 4, [0.1] * 4, fallen=(0,))) == (1.0, "none fall")
-    assert STATISTICS["overturning_precision"].evaluate(samples([0.1] * 4, [0.1] * 4, fallen=(0,)))[0] == 0.0
+    assert STATISTICS["overturning_recall"].evaluate(
+        samples([0.1] * 4, [0.1] * 4, fallen=(0,))
+    ) == (1.0, "none fall")
+    assert (
+        STATISTICS["overturning_precision"].evaluate(samples([0.1] * 4, [0.1] * 4, fallen=(0,)))[0]
+        == 0.0
+    )
 
 
 def test_a_failed_scene_is_counted():
@@ -288,6 +401,9 @@ def test_a_failed_scene_is_counted():
 
 
 def test_what_a_statistic_tells_apart():
-    """One of a thousand scenes is a thousandth of a share; areas and logarithms are told to a ten-thousandth."""
+    """One of a thousand scenes is a thousandth of a share; areas and logarithms are told to a
+    ten-thousandth."""
     shares = {"ks_distance", "overturning_accuracy", "overturning_precision", "overturning_recall"}
-    assert {name: one.resolution for name, one in STATISTICS.items()} == {name: 1e-3 if name in shares else 1e-4 for name in STATISTICS}
+    assert {name: one.resolution for name, one in STATISTICS.items()} == {
+        name: 1e-3 if name in shares else 1e-4 for name in STATISTICS
+    }

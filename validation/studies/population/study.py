@@ -169,7 +169,8 @@ class Population(Study):
         return Finding(
             self.name,
             self.title,
-            f"{len(self.motions)} motions in both directions, {len(self.levels)} intensities. Median"
+            f"{len(self.motions)} motions in both directions, {len(self.levels)} intensities."
+            " Median"
             f" {self.across.label}: {', '.join(medians).rstrip() or 'no curve fits'}.",
             [*blocks, Table("motions", columns, rows, "Motions", on="page", folded=True)],
             {"model": self.model, **self.data},
@@ -320,7 +321,8 @@ def measure_of(word: str) -> Measure:
 def _recorded(
     motions: Motions, scene: Scene, of: Callable[[Recording, Scene], float]
 ) -> list[tuple[str, Record, float]]:
-    """Records with their own intensities. Raises `InputError` for too few, or one without motion."""
+    """Records with their own intensities. Raises `InputError` for too few, or one without
+    motion."""
     if len(motions) < FEWEST:
         raise InputError(f"{len(motions)} is too few: give at least {FEWEST} records", "records")
     found = [

@@ -1,6 +1,8 @@
-"""What must hold of every history, whatever the scene. Each invariant gives a figure, which must stay below its bound.
+"""What must hold of every history, whatever the scene. Each invariant gives a figure, which must
+stay below its bound.
 
-Figures are in natural units (lengths in R, accelerations in g, times in sqrt(R/g)), energies relative to what was at play.
+Figures are in natural units (lengths in R, accelerations in g, times in sqrt(R/g)), energies
+relative to what was at play.
 """
 
 from __future__ import annotations
@@ -15,8 +17,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import History, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, kinematics
-from rockcheck.validation.studies.stress.mechanics import BOOLE, GROUP, arms, integrals, tilted_forces
+from rockcheck.scenes import (
+    History,
+    InputError,
+    ModelFailure,
+    Record,
+    Rest,
+    Ricker,
+    Scene,
+    Sine,
+    kinematics,
+)
+from rockcheck.validation.studies.stress.mechanics import (
+    BOOLE,
+    GROUP,
+    arms,
+    integrals,
+    tilted_forces,
+)
 
 Floats = NDArray[np.float64]
 
@@ -33,33 +51,68 @@ class Invariant:
 INVARIANTS = {
     one.name: one
     for one in (
-        Invariant("ends", "the run ends within its caps, in a mode of motion (1: it does not)", 0.0),
+        Invariant(
+            "ends", "the run ends within its caps, in a mode of motion (1: it does not)", 0.0
+        ),
         Invariant("finite", "values that are not finite", 0.0),
-        Invariant("outcome", "rows, last event and outcome contradict each other (1: they do)", 0.0),
+        Invariant(
+            "outcome", "rows, last event and outcome contradict each other (1: they do)", 0.0
+        ),
         Invariant("penetration", "depth of a corner in floor or wall, R", 1e-9),
-        Invariant("floor", "height of the pivot over the floor in modes that have it there, R", 1e-9),
+        Invariant(
+            "floor", "height of the pivot over the floor in modes that have it there, R", 1e-9
+        ),
         Invariant("stick", "slip rate of a pivot that stands, sqrt(g R)", 1e-9),
-        Invariant("coulomb", "friction beyond the cone of a pivot that stands, of the acceleration at play", 1e-7),
-        Invariant("push", "tension in a contact that can only push, of the acceleration at play", 1e-7),
-        Invariant("energy", "energy less the work of base and friction, between events, of the energy at play", 1e-9),
-        Invariant("impacts", "relative energy that an impact without restitution, or with the energy cap, adds", 0.0),
+        Invariant(
+            "coulomb",
+            "friction beyond the cone of a pivot that stands, of the acceleration at play",
+            1e-7,
+        ),
+        Invariant(
+            "push", "tension in a contact that can only push, of the acceleration at play", 1e-7
+        ),
+        Invariant(
+            "energy",
+            "energy less the work of base and friction, between events, of the energy at play",
+            1e-9,
+        ),
+        Invariant(
+            "impacts",
+            "relative energy that an impact without restitution, or with the energy cap, adds",
+            0.0,
+        ),
         Invariant("mirror", "bits that differ in the mirror image", 0.0),
-        Invariant("similarity", "rotation of the scene at another scale, within the horizon, rad", 1e-6),
+        Invariant(
+            "similarity", "rotation of the scene at another scale, within the horizon, rad", 1e-6
+        ),
         Invariant("tolerance", "rotation at tolerance/100, within the horizon, rad", 1e-6),
         # of models that approximate contact
-        Invariant("depth", "penetration over twice the way that a step, or the contact's spring, takes at this motion", 1.0),
-        Invariant("source", "energy beyond that of the start and the work of the base, of all work done", 0.05),
+        Invariant(
+            "depth",
+            "penetration over twice the way that a step, or the contact's spring, takes at this"
+            " motion",
+            1.0,
+        ),
+        Invariant(
+            "source",
+            "energy beyond that of the start and the work of the base, of all work done",
+            0.05,
+        ),
     )
 }
-#: The horizon of predictability of a run is the first of three times: a relative disturbance of the scene's data by DISTURBANCE turns
-#: the block by SEEN rad (half the bound of the invariants that end there); answers at tolerances finer than EXACT, a hundred times
-#: apart, differ by a tenth of SEEN; friction near Painleve's limit lets a difference of EXACT grow to SEEN (`_amplified`).
+#: The horizon of predictability of a run is the first of three times: a relative disturbance of the
+#: scene's data by DISTURBANCE turns the block by SEEN rad (half the bound of the invariants that
+#: end there); answers at tolerances finer than EXACT, a hundred times apart, differ by a tenth of
+#: SEEN; friction near Painleve's limit lets a difference of EXACT grow to SEEN (`_amplified`).
 DISTURBANCE, SEEN, DISTURBED, EXACT = 1e-7, 5e-7, 6, 1e-10
-#: Rows of an audited history: this fraction of the shortest time in the scene, and at most this many.
+#: Rows of an audited history: this fraction of the shortest time in the scene, and at most this
+#: many.
 FINE, MOST_ROWS = 64, 4000
-#: Thresholds of a closed contact and of slip; no condition is checked within this time of an event or a jump.
+#: Thresholds of a closed contact and of slip; no condition is checked within this time of an event
+#: or a jump.
 CLOSED, SLIPS, NEAR = 1e-8, 1e-9, 1e-9
-#: An integral is used where rules of order 6 and 10 agree to this, relatively: the error of order 10 is then far smaller.
+#: An integral is used where rules of order 6 and 10 agree to this, relatively: the error of order
+#: 10 is then far smaller.
 RESOLVED = 1e-10
 #: Kinds of motion by the contacts they have.
 ON_FLOOR = ("rest", "slide", "rock", "slide-rock", "lean", "ladder")
@@ -72,13 +125,15 @@ SWAPPED = {"overturned left": "overturned right", "overturned right": "overturne
 
 @dataclass(frozen=True, kw_only=True)
 class CheckedRun:
-    """What was found of one run: the figure of each invariant that was looked at, and how it failed to end."""
+    """What was found of one run: the figure of each invariant that was looked at, and how it failed
+    to end."""
 
     figures: dict[str, float]
     failure: str = ""
     outcome: str = ""
     events: int = 0
-    #: Impacts that added energy where the impact law is known to do so (see `rules`), and the most that one added.
+    #: Impacts that added energy where the impact law is known to do so (see `rules`), and the most
+    #: that one added.
     gains: int = 0
     largest_gain: float = 0.0
     #: How often each modelling choice was made.
@@ -94,8 +149,11 @@ class CheckedRun:
         return [name for name, value in self.figures.items() if not value <= INVARIANTS[name].bound]
 
 
-def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: bool = False, only: str = "") -> CheckedRun:
-    """Plays a scene and checks every invariant, or only one. With `audit` also those that ask for many rows: energy."""
+def check_run(
+    model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: bool = False, only: str = ""
+) -> CheckedRun:
+    """Plays a scene and checks every invariant, or only one. With `audit` also those that ask for
+    many rows: energy."""
     played = audited(scene) if audit else scene
     figures: dict[str, float] = {}
     try:
@@ -124,7 +182,9 @@ def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: boo
     if only in ("", "tolerance"):
         figures["tolerance"] = horizon.apart(history, played, finer(model))
     return CheckedRun(
-        figures=figures if not only else {name: figure for name, figure in figures.items() if name == only},
+        figures=figures
+        if not only
+        else {name: figure for name, figure in figures.items() if name == only},
         outcome=history.outcome,
         events=len(history.event_list),
         gains=gains,
@@ -139,8 +199,8 @@ def check_run(model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: boo
 def _energy(model: EventBasedModel, scene: Scene) -> float | None:
     """The energy's error, or None where it cannot be judged.
 
-    If it is too large, or cannot be judged, it is computed again from rows four times as dense. That removes an error of the integral,
-    but not one of the motion.
+    If it is too large, or cannot be judged, it is computed again from rows four times as dense.
+    That removes an error of the integral, but not one of the motion.
     """
     error = energy_error(model, scene, model.simulate(scene))
     if error is None or error > INVARIANTS["energy"].bound:
@@ -156,7 +216,8 @@ def finer(model: EventBasedModel, times: float = 100.0) -> EventBasedModel:
 
 
 def audited(scene: Scene) -> Scene:
-    """The scene with rows so dense that integrals over them are exact to 1e-10, and no longer than can be afforded."""
+    """The scene with rows so dense that integrals over them are exact to 1e-10, and no longer than
+    can be afforded."""
     unit = math.sqrt(scene.block.radius / scene.gravity)
     step = 0.03 * unit
     for excitation in (scene.excitation, scene.vertical):
@@ -164,7 +225,9 @@ def audited(scene: Scene) -> Scene:
             step = min(step, excitation.period / FINE)
     for excitation in (scene.excitation, scene.vertical):
         if isinstance(excitation, Record):
-            step = excitation.time_step / (GROUP * max(1, math.ceil(excitation.time_step / (GROUP * step))))
+            step = excitation.time_step / (
+                GROUP * max(1, math.ceil(excitation.time_step / (GROUP * step)))
+            )
             break
     return scene.replace(output_step=step, duration=min(scene.duration, MOST_ROWS * step))
 
@@ -174,7 +237,13 @@ def _bounces(scene: Scene) -> bool:
 
 
 def _not_finite(history: History) -> float:
-    return float(sum(np.sum(~np.isfinite(column)) for column in history.channels.values() if column.dtype.kind == "f"))
+    return float(
+        sum(
+            np.sum(~np.isfinite(column))
+            for column in history.channels.values()
+            if column.dtype.kind == "f"
+        )
+    )
 
 
 def _contradicts(scene: Scene, history: History) -> bool:
@@ -182,11 +251,17 @@ def _contradicts(scene: Scene, history: History) -> bool:
     falls = [event for event in history.event_list if event.kind.startswith("overturned")]
     rows, theta = len(history.channels["t"]), history.channels["theta"]
     times = [event.t for event in history.event_list]
-    if any(b < a for a, b in itertools.pairwise(times)) or (times and times[-1] > scene.duration * (1.0 + 1e-12)):
+    if any(b < a for a, b in itertools.pairwise(times)) or (
+        times and times[-1] > scene.duration * (1.0 + 1e-12)
+    ):
         return True
     if history.outcome.startswith("overturned"):
-        return [event.kind for event in falls] != [history.outcome] or history.event_list[-1] is not falls[0]
-    return bool(falls) or rows != len(scene.output_times) or bool(np.any(np.abs(theta) >= math.pi / 2))
+        return [event.kind for event in falls] != [history.outcome] or history.event_list[
+            -1
+        ] is not falls[0]
+    return (
+        bool(falls) or rows != len(scene.output_times) or bool(np.any(np.abs(theta) >= math.pi / 2))
+    )
 
 
 def conditions(model: EventBasedModel, scene: Scene, history: History) -> dict[str, float]:
@@ -202,7 +277,11 @@ def conditions(model: EventBasedModel, scene: Scene, history: History) -> dict[s
     depth = [float(np.max(-height)), *(float(np.max(-gap - rounding)) for gap in gaps.values())]
     on_floor, stands = np.isin(mode, ON_FLOOR), np.isin(mode, STANDS)
     speed = np.abs(channels["slip_rate"]) * unit / radius
-    scale = 1.0 + 1e-6 * np.abs(channels["x_dot"]) * unit / radius + np.abs(channels["theta_dot"]) * unit
+    scale = (
+        1.0
+        + 1e-6 * np.abs(channels["x_dot"]) * unit / radius
+        + np.abs(channels["theta_dot"]) * unit
+    )
     found = {
         "penetration": max(0.0, *depth),
         "floor": float(np.max(np.abs(height[on_floor]), initial=0.0)),
@@ -217,7 +296,10 @@ def conditions(model: EventBasedModel, scene: Scene, history: History) -> dict[s
 
 def _gaps(scene: Scene, x: Floats, theta: Floats) -> dict[str, Floats]:
     """Clear distance to each wall, R."""
-    return {wall.side: kinematics.wall_gap(scene, wall.side, x, theta) / scene.block.radius for wall in scene.walls}
+    return {
+        wall.side: kinematics.wall_gap(scene, wall.side, x, theta) / scene.block.radius
+        for wall in scene.walls
+    }
 
 
 def _touches(gaps: dict[str, Floats], rows: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -240,7 +322,11 @@ def _clear(scene: Scene, history: History, t: Floats) -> NDArray[np.bool_]:
 
 
 def _force_conditions(
-    model: EventBasedModel, scene: Scene, history: History, gaps: dict[str, Floats], clear: NDArray[np.bool_]
+    model: EventBasedModel,
+    scene: Scene,
+    history: History,
+    gaps: dict[str, Floats],
+    clear: NDArray[np.bool_],
 ) -> tuple[float, float]:
     """Largest friction beyond the cone, and largest tension, relative to 1 + |u| + |vg| + w^2."""
     channels = history.channels
@@ -261,7 +347,9 @@ def _force_conditions(
     # A base that accelerates to the right tips the block to the left.
     tips = np.where(u > 0.0, *(pivot.arm / pivot.height for pivot in pivots))
     limit = tips if model.friction == "no-slip" else np.minimum(tips, max(mu_s, 1e-9))
-    excess = max(excess, float(np.max(((np.abs(u) - limit * np.abs(g)) / scale)[rest], initial=0.0)))
+    excess = max(
+        excess, float(np.max(((np.abs(u) - limit * np.abs(g)) / scale)[rest], initial=0.0))
+    )
     flat = clear & np.isin(mode, ("rest", "slide"))
     if unilateral:
         tension = max(tension, float(np.max((-g / scale)[flat], initial=0.0)))
@@ -269,7 +357,12 @@ def _force_conditions(
     sign = _pivots(theta)
     tip, far = np.where(sign > 0, left, right), np.where(sign > 0, right, left)
     walls = np.isin(mode, ("lean", "ladder"))
-    tilted = clear & np.isin(mode, ("rock", "slide-rock", "lean", "ladder")) & (theta != 0.0) & ~(walls & (tip == far))
+    tilted = (
+        clear
+        & np.isin(mode, ("rock", "slide-rock", "lean", "ladder"))
+        & (theta != 0.0)
+        & ~(walls & (tip == far))
+    )
     slides = np.isin(mode, ("slide-rock", "ladder"))
     tilted &= ~(slides & (np.abs(slip) < SLIPS))
     if not tilted.any():
@@ -278,26 +371,41 @@ def _force_conditions(
     on = np.ones(int(tilted.sum()), dtype=bool)
     touching = on, (tip & walls)[tilted], (far & walls)[tilted]
     over, pulls = np.full(len(on), math.inf), np.full(len(on), math.inf)
-    # What happens within NEAR is one event, in the core and here: a spinning block passes through its friction cone in less time. So a
-    # condition is broken only where it is broken for that long before and after.
+    # What happens within NEAR is one event, in the core and here: a spinning block passes through
+    # its friction cone in less time. So a condition is broken only where it is broken for that long
+    # before and after.
     for moment in (0.0, -NEAR, NEAR):
         turned = np.abs(theta)[tilted] + moment * (sign * w)[tilted]
         at = arms(scene.block, sign[tilted], turned)
-        forces = tilted_forces(at, scene.floor.friction, (sign * w)[tilted], (sign * u)[tilted], g[tilted], touching, direction)
-        over = np.minimum(over, (np.abs(forces.friction) - mu_s * np.abs(forces.normal)) / scale[tilted])
+        forces = tilted_forces(
+            at,
+            scene.floor.friction,
+            (sign * w)[tilted],
+            (sign * u)[tilted],
+            g[tilted],
+            touching,
+            direction,
+        )
+        over = np.minimum(
+            over, (np.abs(forces.friction) - mu_s * np.abs(forces.normal)) / scale[tilted]
+        )
         floor = -forces.normal if unilateral else -math.inf
-        pulls = np.minimum(pulls, np.maximum(np.maximum(-forces.tip, -forces.far), floor) / scale[tilted])
+        pulls = np.minimum(
+            pulls, np.maximum(np.maximum(-forces.tip, -forces.far), floor) / scale[tilted]
+        )
     if model.friction != "no-slip":
         excess = max(excess, float(np.max(over[direction == 0], initial=0.0)))
     return excess, max(tension, float(np.max(pulls, initial=0.0)))
 
 
 def energy_error(model: EventBasedModel, scene: Scene, history: History) -> float | None:
-    """Largest change of energy, over eight rows without event or kink, that the work of base and friction does not account for.
+    """Largest change of energy, over eight rows without event or kink, that the work of base and
+    friction does not account for.
 
-    Relative to the energy and the work at play in the run, at least g R. Where friction is not known (Bouc-Wen): what
-    energy gains beyond the work of the base and what the friction spring can hold. None where no eight rows can be judged: the
-    history has fewer, events or kinks lie in all of them, or the work is not resolved in any.
+    Relative to the energy and the work at play in the run, at least g R. Where friction is not
+    known (Bouc-Wen): what energy gains beyond the work of the base and what the friction spring can
+    hold. None where no eight rows can be judged: the history has fewer, events or kinks lie in all
+    of them, or the work is not resolved in any.
     """
     channels, radius, gravity = history.channels, scene.block.radius, scene.gravity
     if len(channels["t"]) <= GROUP:
@@ -323,8 +431,12 @@ def energy_error(model: EventBasedModel, scene: Scene, history: History) -> floa
     size = 1.0 + np.maximum(energy[GROUP::GROUP][: len(work)], moved)
     off = (change - work) / size
     doubt = np.where(whole, np.abs(work - rough) / size, 0.0)
-    # Checked in the groups before and after, too: the difference of the two rules says nothing where it changes its sign.
-    whole &= np.maximum(doubt, np.maximum(np.append(doubt[1:], 0.0), np.append(0.0, doubt[:-1]))) < RESOLVED
+    # Checked in the groups before and after, too: the difference of the two rules says nothing
+    # where it changes its sign.
+    whole &= (
+        np.maximum(doubt, np.maximum(np.append(doubt[1:], 0.0), np.append(0.0, doubt[:-1])))
+        < RESOLVED
+    )
     if model.friction == "bouc-wen":
         rise = np.abs(np.diff(up)) / speed / step  # per row; with gravity it is the floor's force
         force = 2.0 + np.max(np.abs(vg)) + rise[: len(work) * GROUP].reshape(-1, GROUP).max(axis=1)
@@ -335,7 +447,8 @@ def energy_error(model: EventBasedModel, scene: Scene, history: History) -> floa
 
 
 def _pivots(theta: Floats) -> Floats:
-    """The sign of theta in each row; of the next row where it is zero, as a block that is about to tilt has its pivot already."""
+    """The sign of theta in each row; of the next row where it is zero, as a block that is about to
+    tilt has its pivot already."""
     sign = np.sign(theta)
     standing = np.flatnonzero(sign[:-1] == 0.0)
     sign[standing] = sign[standing + 1]
@@ -355,12 +468,18 @@ def _friction_power(scene: Scene, history: History, u: Floats, g: Floats) -> Flo
     if tilted.any():
         sign = _pivots(theta)
         gaps = {
-            wall.side: kinematics.wall_gap(scene, wall.side, channels["x"], theta) / scene.block.radius < CLOSED for wall in scene.walls
+            wall.side: kinematics.wall_gap(scene, wall.side, channels["x"], theta)
+            / scene.block.radius
+            < CLOSED
+            for wall in scene.walls
         }
         nowhere = np.zeros(len(theta), dtype=bool)
         left, right = gaps.get("left", nowhere), gaps.get("right", nowhere)
         ladder = mode == "ladder"
-        tip, far = np.where(sign > 0, left, right) & ladder, np.where(sign > 0, right, left) & ladder
+        tip, far = (
+            np.where(sign > 0, left, right) & ladder,
+            np.where(sign > 0, right, left) & ladder,
+        )
         forces = tilted_forces(
             arms(scene.block, sign[tilted], np.abs(theta)[tilted]),
             mu,
@@ -375,7 +494,8 @@ def _friction_power(scene: Scene, history: History, u: Floats, g: Floats) -> Flo
 
 
 def _whole_groups(scene: Scene, history: History) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which groups of eight steps have neither event nor kink inside, and in which the mode of motion is the same in all rows."""
+    """Which groups of eight steps have neither event nor kink inside, and in which the mode of
+    motion is the same in all rows."""
     t, mode = history.channels["t"], history.channels["mode"]
     groups = (len(t) - 1) // GROUP
     edges = t[: groups * GROUP + 1 : GROUP]
@@ -390,8 +510,13 @@ def _whole_groups(scene: Scene, history: History) -> tuple[NDArray[np.bool_], ND
     whole = np.searchsorted(places, edges[:-1] + near) == np.searchsorted(places, edges[1:] - near)
     # An event at an edge itself: the row there is from before or after it.
     events = np.sort(np.array([event.t for event in history.event_list] + [math.inf]))
-    whole &= np.searchsorted(events, edges[:-1] - 1e3 * near) == np.searchsorted(events, edges[1:] + 1e3 * near)
-    for excitation in (scene.excitation, scene.vertical):  # the base acceleration jumps where a record ends
+    whole &= np.searchsorted(events, edges[:-1] - 1e3 * near) == np.searchsorted(
+        events, edges[1:] + 1e3 * near
+    )
+    for excitation in (
+        scene.excitation,
+        scene.vertical,
+    ):  # the base acceleration jumps where a record ends
         if isinstance(excitation, Record):
             end = excitation.quiet_after
             whole &= ~((edges[:-1] - 1e3 * near <= end) & (end <= edges[1:] + 1e3 * near))
@@ -400,21 +525,28 @@ def _whole_groups(scene: Scene, history: History) -> tuple[NDArray[np.bool_], ND
 
 
 def _mirror(model: EventBasedModel, scene: Scene, history: History) -> float:
-    """How many values differ from those of the mirror image, to the bit; infinitely many where it is longer."""
+    """How many values differ from those of the mirror image, to the bit; infinitely many where it
+    is longer."""
     try:
         image = model.simulate(scene.mirrored())
     except ModelFailure:
         return math.inf
-    if len(image.channels["t"]) != len(history.channels["t"]) or len(image.event_list) != len(history.event_list):
+    if len(image.channels["t"]) != len(history.channels["t"]) or len(image.event_list) != len(
+        history.event_list
+    ):
         return math.inf
     differ = sum(int(np.sum(history.channels[name] != image.channels[name])) for name in EVEN)
     differ += sum(int(np.sum(history.channels[name] != -image.channels[name])) for name in ODD)
-    differ += sum(replace(a, kind=SWAPPED.get(a.kind, a.kind)) != b for a, b in zip(history.event_list, image.event_list, strict=True))
+    differ += sum(
+        replace(a, kind=SWAPPED.get(a.kind, a.kind)) != b
+        for a, b in zip(history.event_list, image.event_list, strict=True)
+    )
     return float(differ + (image.outcome != SWAPPED.get(history.outcome, history.outcome)))
 
 
 def similar(scene: Scene, seed: int) -> Scene:
-    """The scene at another scale: lengths times k, times sqrt(k), accelerations the same; k is random in 0.01 to 100."""
+    """The scene at another scale: lengths times k, times sqrt(k), accelerations the same; k is
+    random in 0.01 to 100."""
     k = float(np.exp(np.random.default_rng([seed, 1]).uniform(math.log(1e-2), math.log(1e2))))
     root = math.sqrt(k)
 
@@ -432,7 +564,8 @@ def similar(scene: Scene, seed: int) -> Scene:
 
 
 class _Horizon:
-    """Compares histories of a scene up to the time at which a small disturbance of its data shows; that time is computed only if needed."""
+    """Compares histories of a scene up to the time at which a small disturbance of its data shows;
+    that time is computed only if needed."""
 
     def __init__(self, model: EventBasedModel, scene: Scene, seed: int) -> None:
         self.model, self.scene, self.seed = model, scene, seed
@@ -440,7 +573,8 @@ class _Horizon:
         self.found, self.failure = 0, ""
 
     def apart(self, history: History, scene: Scene, model: EventBasedModel | None = None) -> float:
-        """Largest |difference of theta| in rad within the horizon; infinite where the other run fails within it."""
+        """Largest |difference of theta| in rad within the horizon; infinite where the other run
+        fails within it."""
         played = model or self.model
         if played.friction == "bouc-wen" and scene.block.radius != self.scene.block.radius:
             size = played.yield_displacement * scene.block.radius / self.scene.block.radius
@@ -451,17 +585,25 @@ class _Horizon:
             self.failure = f"{self.failure}; {error}".strip("; ")
             return math.inf
         rows, difference = _differences(history, other)
-        if rows == len(history.channels["t"]) == len(other.channels["t"]) and not np.any(difference > SEEN):
+        if rows == len(history.channels["t"]) == len(other.channels["t"]) and not np.any(
+            difference > SEEN
+        ):
             return float(np.max(difference, initial=0.0))
         return float(np.max(difference[: self.row(history)], initial=0.0))
 
     def row(self, history: History) -> int:
-        """The first row in which the scene and a disturbed one, or two finer tolerances, part (see `SEEN`)."""
+        """The first row in which the scene and a disturbed one, or two finer tolerances, part (see
+        `SEEN`)."""
         if self._row is None:
             self.found = 1
             self._row = len(history.channels["t"])
-            exact = self.model.model_copy(update={"tolerance": EXACT})  # the horizon belongs to the scene, however coarse the model is
-            for by in (10.0, 100.0):  # rounding is a disturbance, too: finer tolerances must agree on the answer
+            exact = self.model.model_copy(
+                update={"tolerance": EXACT}
+            )  # the horizon belongs to the scene, however coarse the model is
+            for by in (
+                10.0,
+                100.0,
+            ):  # rounding is a disturbance, too: finer tolerances must agree on the answer
                 with suppress(ModelFailure):
                     a, b = (finer(exact, times).simulate(self.scene) for times in (by, 100.0 * by))
                     self._row = min(self._row, _agree(a, b, 0.1 * SEEN))
@@ -477,11 +619,13 @@ class _Horizon:
 
 
 def _amplified(scene: Scene, history: History) -> Floats:
-    """The logarithm, by each row, of how much sliding friction has amplified a small difference of the rotation rate.
+    """The logarithm, by each row, of how much sliding friction has amplified a small difference of
+    the rotation rate.
 
-    With P = N/D a slipping pivot has theta'' = -(s + k c)/I N/D, in which N falls with w^2: near Painleve's limit, where D is small,
-    a difference of w grows or decays faster than all else. A disturbance of the scene's data may have decayed before, and then does not
-    show this growth; a rounding error of the moment grows all the same. So the sum starts anew wherever it is negative.
+    With P = N/D a slipping pivot has theta'' = -(s + k c)/I N/D, in which N falls with w^2: near
+    Painleve's limit, where D is small, a difference of w grows or decays faster than all else. A
+    disturbance of the scene's data may have decayed before, and then does not show this growth; a
+    rounding error of the moment grows all the same. So the sum starts anew wherever it is negative.
     """
     channels, step = history.channels, 1e-4
     unit = math.sqrt(scene.block.radius / scene.gravity)
@@ -497,13 +641,23 @@ def _amplified(scene: Scene, history: History) -> Floats:
         direction = np.sign(sign * slip).astype(np.int8)[slides]
         turns = []
         for change in (step, -step):
-            forces = tilted_forces(at, scene.floor.friction, (sign * w)[slides] + change, u, g, (on, off, off), direction)
+            forces = tilted_forces(
+                at,
+                scene.floor.friction,
+                (sign * w)[slides] + change,
+                u,
+                g,
+                (on, off, off),
+                direction,
+            )
             turns.append(at.spin * (at.pivot[1] * forces.friction - at.pivot[0] * forces.normal))
         rate[slides] = (turns[0] - turns[1]) / (2.0 * step)
     grown = np.zeros(len(theta))
     for k in range(1, len(theta)):
         time = (channels["t"][k] - channels["t"][k - 1]) / unit
-        grown[k] = max(0.0, grown[k - 1] + 0.5 * (rate[k - 1] + rate[k]) * time) if slides[k] else 0.0
+        grown[k] = (
+            max(0.0, grown[k - 1] + 0.5 * (rate[k - 1] + rate[k]) * time) if slides[k] else 0.0
+        )
     return grown
 
 
@@ -520,11 +674,14 @@ def _agree(a: History, b: History, seen: float) -> int:
 
 
 def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
-    """The scene with all its data changed by up to a relative `DISTURBANCE`, in random directions."""
+    """The scene with all its data changed by up to a relative `DISTURBANCE`, in random
+    directions."""
     r = np.random.default_rng([seed, 2])
 
     def by(value: float) -> float:
-        return value * (1.0 + DISTURBANCE * float(r.choice([-1.0, 1.0])) * float(r.uniform(0.5, 1.0)))
+        return value * (
+            1.0 + DISTURBANCE * float(r.choice([-1.0, 1.0])) * float(r.uniform(0.5, 1.0))
+        )
 
     def stronger(excitation: Rest | Ricker | Sine | Record) -> Rest | Ricker | Sine | Record:
         return excitation if excitation.kind == "rest" else excitation.scaled(by(1.0))
@@ -541,14 +698,24 @@ def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
                     centre_of_mass=block.centre_of_mass and tuple(map(by, block.offset)),
                     moment_of_inertia=block.moment_of_inertia and by(block.moment_of_inertia),
                 ),
-                "floor": floor.replace(friction=kinetic, static_friction=static, restitution=bounce),
-                "walls": tuple(wall.replace(gap=by(wall.gap), restitution=min(by(wall.restitution), 1.0)) for wall in scene.walls),
+                "floor": floor.replace(
+                    friction=kinetic, static_friction=static, restitution=bounce
+                ),
+                "walls": tuple(
+                    wall.replace(gap=by(wall.gap), restitution=min(by(wall.restitution), 1.0))
+                    for wall in scene.walls
+                ),
                 "excitation": stronger(scene.excitation),
                 "vertical": stronger(scene.vertical),
             }
-            change |= {name: by(getattr(scene, name)) for name in ("initial_angular_velocity", "initial_velocity", "initial_height")}
+            change |= {
+                name: by(getattr(scene, name))
+                for name in ("initial_angular_velocity", "initial_velocity", "initial_height")
+            }
             tilt = by(scene.initial_rotation)
             try:
                 yield scene.replace(**change, initial_rotation=tilt)
             except InputError:  # it would start inside a wall
-                yield scene.replace(**change, initial_rotation=scene.initial_rotation * (1.0 - DISTURBANCE))
+                yield scene.replace(
+                    **change, initial_rotation=scene.initial_rotation * (1.0 - DISTURBANCE)
+                )

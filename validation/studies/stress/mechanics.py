@@ -1,12 +1,14 @@
-"""Newton-Euler for a block with given contacts, solved by other means than in `ebm`: its histories are checked against it.
+"""Newton-Euler for a block with given contacts, solved by other means than in `ebm`: its histories
+are checked against it.
 
-Natural units: lengths in R, accelerations in g, unit mass; xi and y are those of the mass's centre. As
-in `ebm.core.motion`, a tilted block is seen in the frame of its pivot, which is then the lower-left
-corner: with S = sign theta and phi = |theta|, that corner is s to the left of the mass's centre and c
-below it (`Arms`). The top corner is s' to the left and c' above, the lifted bottom corner s' to the right
-and c' below. Four contact forces can act: P and Q of the floor on the pivot, N of the wall that the top
-corner touches, M of the wall that the lifted bottom corner touches. The gap of each contact, its row
-J (xi, y, phi) and the part of its acceleration that the velocities alone give:
+Natural units: lengths in R, accelerations in g, unit mass; xi and y are those of the mass's centre.
+As in `ebm.core.motion`, a tilted block is seen in the frame of its pivot, which is then the
+lower-left corner: with S = sign theta and phi = |theta|, that corner is s to the left of the mass's
+centre and c below it (`Arms`). The top corner is s' to the left and c' above, the lifted bottom
+corner s' to the right and c' below. Four contact forces can act: P and Q of the floor on the pivot,
+N of the wall that the top corner touches, M of the wall that the lifted bottom corner touches. The
+gap of each contact, its row J (xi, y, phi) and the part of its acceleration that the velocities
+alone give:
 
     P  y - c             (0, 1, -s)      c w^2
     Q  xi - s            (1, 0, c)       s w^2
@@ -29,7 +31,8 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Forces:
-    """Contact forces per unit mass in units of g, one value a row; zero where there is no contact."""
+    """Contact forces per unit mass in units of g, one value a row; zero where there is no
+    contact."""
 
     normal: Floats
     friction: Floats
@@ -63,18 +66,33 @@ def arms(block: Block, sign: Floats, phi: Floats) -> Arms:
 
 
 def tilted_forces(
-    at: Arms, mu: float, w: Floats, u: Floats, g: Floats, touching: tuple[Mask, Mask, Mask], slip: NDArray[np.int8]
+    at: Arms,
+    mu: float,
+    w: Floats,
+    u: Floats,
+    g: Floats,
+    touching: tuple[Mask, Mask, Mask],
+    slip: NDArray[np.int8],
 ) -> Forces:
     """Forces of a tilted block.
 
-    `w`: rate of rotation; `u`, `g`: base acceleration and gravity felt, all in the pivot's frame. `touching`: pivot on the
-    floor, top corner on its wall, bottom corner on its wall. `slip`: direction in which the pivot slips, 0 where it sticks. A slipping
-    pivot has Q = -mu d |P|: where P would pull, the sign of its friction turns with it. Near Painleve's limit both signs of P can
+    `w`: rate of rotation; `u`, `g`: base acceleration and gravity felt, all in the pivot's frame.
+    `touching`: pivot on the floor, top corner on its wall, bottom corner on its wall. `slip`:
+    direction in which the pivot slips, 0 where it sticks. A slipping pivot has Q = -mu d |P|: where
+    P would pull, the sign of its friction turns with it. Near Painleve's limit both signs of P can
     solve this; it is then the pull that is returned where only with it the walls push.
     """
     (s, c), (tip_s, tip_c), (far_s, far_c) = at.pivot, at.tip, at.far
     zero, one = np.zeros_like(w), np.ones_like(w)
-    rows = np.stack([_triple(zero, one, -s), _triple(one, zero, c), _triple(one, zero, -tip_c), _triple(-one, zero, -far_c)], axis=1)
+    rows = np.stack(
+        [
+            _triple(zero, one, -s),
+            _triple(one, zero, c),
+            _triple(one, zero, -tip_c),
+            _triple(-one, zero, -far_c),
+        ],
+        axis=1,
+    )
     bias = np.stack([c, s, tip_s, far_s], axis=1) * (w * w)[:, None]
     floor, tip, far = touching
     closed = np.stack([floor, floor & (slip == 0), tip, far], axis=1)
@@ -93,13 +111,16 @@ def tilted_forces(
         matrix[asked, 1, 0] *= -1.0
         other = forces.copy()
         other[asked] = _solved(matrix[asked], right[asked])
-        pulls = asked & ((forces[:, 0] < 0.0) | ((other[:, 0] < 0.0) & (other[:, 2:].min(axis=1) >= 0.0)))
+        pulls = asked & (
+            (forces[:, 0] < 0.0) | ((other[:, 0] < 0.0) & (other[:, 2:].min(axis=1) >= 0.0))
+        )
         forces[pulls] = other[pulls]
     return Forces(*forces.T)
 
 
 def _solved(matrix: Floats, right: Floats) -> Floats:
-    """Solves one system for each row. Where contacts are parallel to rounding (a corner just off its wall), takes the least forces."""
+    """Solves one system for each row. Where contacts are parallel to rounding (a corner just off
+    its wall), takes the least forces."""
     try:
         return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
     except np.linalg.LinAlgError:
@@ -111,14 +132,20 @@ def _triple(x: Floats, y: Floats, turn: Floats) -> Floats:
 
 
 #: Weights of the closed Newton-Cotes rule with nine nodes, which is exact up to degree 9.
-NEWTON_COTES = np.array([989.0, 5888.0, -928.0, 10496.0, -4540.0, 10496.0, -928.0, 5888.0, 989.0]) * 4.0 / 14175.0
+NEWTON_COTES = (
+    np.array([989.0, 5888.0, -928.0, 10496.0, -4540.0, 10496.0, -928.0, 5888.0, 989.0])
+    * 4.0
+    / 14175.0
+)
 GROUP = len(NEWTON_COTES) - 1
-#: The same interval by Boole's rule twice, exact up to degree 5. The difference of the two rules estimates the error.
+#: The same interval by Boole's rule twice, exact up to degree 5. The difference of the two rules
+#: estimates the error.
 BOOLE = np.array([7.0, 32.0, 12.0, 32.0, 14.0, 32.0, 12.0, 32.0, 7.0]) * 2.0 / 45.0
 
 
 def integrals(step: float, values: Floats, rule: Floats = NEWTON_COTES) -> Floats:
-    """Integrals of `values`, given at multiples of `step`, over each group of eight steps; what is over is left out."""
+    """Integrals of `values`, given at multiples of `step`, over each group of eight steps; what is
+    over is left out."""
     groups = (len(values) - 1) // GROUP
     nodes = values[np.arange(groups)[:, None] * GROUP + np.arange(GROUP + 1)]
     return np.asarray(step * (nodes @ rule))

@@ -1,4 +1,5 @@
-"""The models that are stressed: the settings and scenes of each, and the invariants that it must keep."""
+"""The models that are stressed: the settings and scenes of each, and the invariants that it must
+keep."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ from rockcheck.validation.studies.stress.invariants import CheckedRun, check_run
 
 Floats = NDArray[np.float64]
 
-#: Caps of an event-based run: the Zeno rule ends what bounces without end after some 1e5 impacts, of up to 18 steps with Bouc-Wen.
+#: Caps of an event-based run: the Zeno rule ends what bounces without end after some 1e5 impacts,
+#: of up to 18 steps with Bouc-Wen.
 MOST_STEPS, MOST_EVENTS = 2_000_000, 400_000
 #: One in so many runs is audited: sampled so finely that its energy can be integrated.
 AUDIT = 10
@@ -29,7 +31,8 @@ AUDIT = 10
 
 @dataclass(frozen=True)
 class Player(ABC):
-    """A model under stress: its label, the kind of scenes that it can play, how many in a whole run, and in a quick one."""
+    """A model under stress: its label, the kind of scenes that it can play, how many in a whole
+    run, and in a quick one."""
 
     label: str
     kind: Kind
@@ -69,7 +72,8 @@ class EventBased(Player):
         return (exact_scene if self.exact else random_scene)(seed, number, self.kind)
 
     def model(self, scene: Scene, number: int) -> EventBasedModel:
-        """The model as it plays this scene: every other unilateral run has the energy cap, Bouc-Wen yields within R/1000."""
+        """The model as it plays this scene: every other unilateral run has the energy cap, Bouc-Wen
+        yields within R/1000."""
         return EventBasedModel(
             pivot="unilateral" if self.kind == "unilateral" else "bilateral",
             friction=self.friction,
@@ -88,7 +92,11 @@ class EventBased(Player):
     def command(self, scene: Scene, number: int) -> str:
         """The options of `rockcheck simulate` with which this run can be made again."""
         name = {"unilateral": "ebm-unilateral", "bouc-wen": "ebm-bouc-wen"}.get(self.kind, "ebm")
-        options = [f"--model {name}" if self.friction != "no-slip" else "--model ebm:EventBasedModel --set friction=no-slip"]
+        options = [
+            f"--model {name}"
+            if self.friction != "no-slip"
+            else "--model ebm:EventBasedModel --set friction=no-slip"
+        ]
         if self.impacts != "moreau":
             options.append(f"--set impacts={self.impacts}")
         if self.kind == "unilateral" and number % 2 == 1:
@@ -100,9 +108,11 @@ class EventBased(Player):
 
 @dataclass(frozen=True)
 class Approximate(Player):
-    """The continuous model or an engine: it may sink no deeper than it states, and gain energy from the base only.
+    """The continuous model or an engine: it may sink no deeper than it states, and gain energy from
+    the base only.
 
-    Lengths and times of its settings are in R and sqrt(R/g), so that they mean the same for every block; runs last at most `longest`.
+    Lengths and times of its settings are in R and sqrt(R/g), so that they mean the same for every
+    block; runs last at most `longest`.
     """
 
     family: str = ""
@@ -110,27 +120,46 @@ class Approximate(Player):
     step: float = 2e-3
 
     def scene(self, seed: int, number: int) -> Scene:
-        """The scene of that number, no longer than affordable, with a row a step: between them the base may do any work."""
+        """The scene of that number, no longer than affordable, with a row a step: between them the
+        base may do any work."""
         scene = random_scene(seed, number, self.kind)
         unit = math.sqrt(scene.block.radius / scene.gravity)
-        return scene.replace(duration=min(scene.duration, self.longest * unit), output_step=self.step * unit)
+        return scene.replace(
+            duration=min(scene.duration, self.longest * unit), output_step=self.step * unit
+        )
 
     def settings(self, scene: Scene) -> dict[str, float]:
         """What the model is built with for this scene."""
         unit = math.sqrt(scene.block.radius / scene.gravity)
-        return {"penetration": DEPTH * scene.block.radius} if self.family == "cm" else {"time_step": self.step * unit}
+        return (
+            {"penetration": DEPTH * scene.block.radius}
+            if self.family == "cm"
+            else {"time_step": self.step * unit}
+        )
 
     def command(self, scene: Scene, number: int) -> str:
         """The options of `rockcheck simulate` with which this run can be made again."""
-        return " ".join([f"--model {self.family}", *(f"--set {key}={value!r}" for key, value in self.settings(scene).items())])
+        return " ".join(
+            [
+                f"--model {self.family}",
+                *(f"--set {key}={value!r}" for key, value in self.settings(scene).items()),
+            ]
+        )
 
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
-        """Checks the run's end, finite numbers, depth and energy. If an engine breaks one of the last two, says what half the step does."""
+        """Checks the run's end, finite numbers, depth and energy. If an engine breaks one of the
+        last two, says what half the step does."""
         played = self._check(scene)
         broken = [name for name in played.broken if name in ("depth", "source")]
         if broken and self.family != "cm":
-            finer = replace(self, step=0.5 * self.step)._check(scene.replace(output_step=0.5 * scene.output_step))
-            words = [f"{name} {played.figures[name]:.2g}, with half the step {finer.figures.get(name, math.nan):.2g}" for name in broken]
+            finer = replace(self, step=0.5 * self.step)._check(
+                scene.replace(output_step=0.5 * scene.output_step)
+            )
+            words = [
+                f"{name} {played.figures[name]:.2g}, with half the step"
+                f" {finer.figures.get(name, math.nan):.2g}"
+                for name in broken
+            ]
             played = replace(played, failure="; ".join(words))
         return played
 
@@ -139,19 +168,34 @@ class Approximate(Player):
             history = build(self.family, self.settings(scene)).simulate(scene)
         except (ModelFailure, InputError) as error:
             return CheckedRun(figures={"ends": 1.0}, failure=str(error))
-        bad = sum(float(np.sum(~np.isfinite(column))) for column in history.channels.values() if column.dtype.kind == "f")
+        bad = sum(
+            float(np.sum(~np.isfinite(column)))
+            for column in history.channels.values()
+            if column.dtype.kind == "f"
+        )
         figures = {"ends": 0.0, "finite": bad}
         if not bad:
-            figures |= {"depth": self.depth(scene, history), "source": energy_without_source(scene, history)}
+            figures |= {
+                "depth": self.depth(scene, history),
+                "source": energy_without_source(scene, history),
+            }
         return CheckedRun(figures=figures, outcome=history.outcome, events=len(history.event_list))
 
     def depth(self, scene: Scene, history: History) -> float:
-        """Deepest penetration over what the model states: for an engine the way of a step, for the CM that of a spring."""
+        """Deepest penetration over what the model states: for an engine the way of a step, for the
+        CM that of a spring."""
         channels, radius = history.channels, scene.block.radius
         unit = math.sqrt(radius / scene.gravity)
         speed = sum(np.max(np.abs(channels[name])) for name in ("x_dot", "y_dot")) * unit / radius
         speed += float(np.max(np.abs(channels["theta_dot"]))) * unit
-        level = 1.0 + sum(np.max(np.abs(e.acceleration(channels["t"]))) for e in (scene.excitation, scene.vertical)) / scene.gravity
+        level = (
+            1.0
+            + sum(
+                np.max(np.abs(e.acceleration(channels["t"])))
+                for e in (scene.excitation, scene.vertical)
+            )
+            / scene.gravity
+        )
         level += float(np.max(np.abs(channels["theta_dot"]))) ** 2 * unit**2
         if self.family == "cm":
             stated = speed * math.sqrt(DEPTH) + level * DEPTH
@@ -164,16 +208,21 @@ def deepest(scene: Scene, history: History) -> float:
     """How deep a corner is in floor or wall at most, R."""
     channels = history.channels
     gaps = [kinematics.pivot_height(scene.block, channels["y"], channels["theta"])]
-    gaps += [kinematics.wall_gap(scene, wall.side, channels["x"], channels["theta"]) for wall in scene.walls]
+    gaps += [
+        kinematics.wall_gap(scene, wall.side, channels["x"], channels["theta"])
+        for wall in scene.walls
+    ]
     return max(float(np.max(-gap)) for gap in gaps) / scene.block.radius
 
 
 def energy_without_source(scene: Scene, history: History) -> float:
-    """Largest energy above the start's and the work of the base up to then, relative to all work done, at least g R.
+    """Largest energy above the start's and the work of the base up to then, relative to all work
+    done, at least g R.
 
-    The base works on the block, which feels its acceleration as a force, by that impulse times the mean of the velocities before
-    and after. It is exact however the acceleration changes between two rows (a record can be finer than they are) where the
-    block stands, and where nothing but the base changes its velocity.
+    The base works on the block, which feels its acceleration as a force, by that impulse times the
+    mean of the velocities before and after. It is exact however the acceleration changes between
+    two rows (a record can be finer than they are) where the block stands, and where nothing but the
+    base changes its velocity.
     """
     channels, block, gravity = history.channels, scene.block, scene.gravity
     motion = [channels[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")]
@@ -185,11 +234,14 @@ def energy_without_source(scene: Scene, history: History) -> float:
         part = 0.5 * (velocity[1:] + velocity[:-1]) * impulse
         work[1:] += np.cumsum(part)
         moved[1:] += np.cumsum(np.abs(part))
-    return float(np.max((energy - energy[0] - work) / (gravity * block.radius + np.abs(energy[0]) + moved)))
+    return float(
+        np.max((energy - energy[0] - work) / (gravity * block.radius + np.abs(energy[0]) + moved))
+    )
 
 
 def _base_velocity(excitation: Excitation, t: Floats) -> Floats:
-    """Integral of the base acceleration from the first of the times `t` on; exact for a record, which is linear between samples."""
+    """Integral of the base acceleration from the first of the times `t` on; exact for a record,
+    which is linear between samples."""
     times = t
     if isinstance(excitation, Record):
         kinks = excitation.time_step * np.arange(len(excitation.unscaled))
@@ -206,18 +258,98 @@ PLAYERS: dict[str, Player] = {
     player.label: player
     for player in (
         EventBased("ebm", "bilateral", 100_000, 1000, "the paper's pivot, Coulomb friction"),
-        EventBased("ebm no-slip", "no-slip", 100_000, 500, "the paper's pivot, which never slips", "no-slip"),
-        EventBased("ebm-unilateral", "unilateral", 100_000, 1000, "a floor that can only push; every other run with the energy cap"),
-        EventBased("ebm-bouc-wen", "bouc-wen", 100_000, 300, "regularised friction, which yields within R/1000", "bouc-wen"),
-        EventBased("ebm-unilateral floor-first", "unilateral", 20_000, 200, "one contact after another", impacts="floor-first"),
-        EventBased("ebm-unilateral leading-first", "unilateral", 20_000, 100, "lands flat on one corner", impacts="leading-first"),
-        EventBased("ebm-unilateral trailing-first", "unilateral", 20_000, 100, "on the other one", impacts="trailing-first"),
-        EventBased("ebm exact", "bilateral", 20_000, 200, "scenes at which rounding decides", exact=True),
-        EventBased("ebm no-slip exact", "no-slip", 20_000, 200, "scenes at which rounding decides", "no-slip", exact=True),
-        EventBased("ebm-unilateral exact", "unilateral", 20_000, 200, "scenes at which rounding decides", exact=True),
-        EventBased("ebm-bouc-wen exact", "bouc-wen", 5000, 50, "scenes at which rounding decides", "bouc-wen", exact=True),
+        EventBased(
+            "ebm no-slip",
+            "no-slip",
+            100_000,
+            500,
+            "the paper's pivot, which never slips",
+            "no-slip",
+        ),
+        EventBased(
+            "ebm-unilateral",
+            "unilateral",
+            100_000,
+            1000,
+            "a floor that can only push; every other run with the energy cap",
+        ),
+        EventBased(
+            "ebm-bouc-wen",
+            "bouc-wen",
+            100_000,
+            300,
+            "regularised friction, which yields within R/1000",
+            "bouc-wen",
+        ),
+        EventBased(
+            "ebm-unilateral floor-first",
+            "unilateral",
+            20_000,
+            200,
+            "one contact after another",
+            impacts="floor-first",
+        ),
+        EventBased(
+            "ebm-unilateral leading-first",
+            "unilateral",
+            20_000,
+            100,
+            "lands flat on one corner",
+            impacts="leading-first",
+        ),
+        EventBased(
+            "ebm-unilateral trailing-first",
+            "unilateral",
+            20_000,
+            100,
+            "on the other one",
+            impacts="trailing-first",
+        ),
+        EventBased(
+            "ebm exact", "bilateral", 20_000, 200, "scenes at which rounding decides", exact=True
+        ),
+        EventBased(
+            "ebm no-slip exact",
+            "no-slip",
+            20_000,
+            200,
+            "scenes at which rounding decides",
+            "no-slip",
+            exact=True,
+        ),
+        EventBased(
+            "ebm-unilateral exact",
+            "unilateral",
+            20_000,
+            200,
+            "scenes at which rounding decides",
+            exact=True,
+        ),
+        EventBased(
+            "ebm-bouc-wen exact",
+            "bouc-wen",
+            5000,
+            50,
+            "scenes at which rounding decides",
+            "bouc-wen",
+            exact=True,
+        ),
         Approximate("cm", "unilateral", 2000, 40, "continuous model, standing 1e-8 R deep", "cm"),
-        Approximate("mujoco", "unilateral", 2000, 40, "MuJoCo, best settings, steps of 0.002 sqrt(R/g)", "mujoco"),
-        Approximate("pybullet", "unilateral", 2000, 40, "PyBullet, best settings, steps of 0.002 sqrt(R/g)", "pybullet"),
+        Approximate(
+            "mujoco",
+            "unilateral",
+            2000,
+            40,
+            "MuJoCo, best settings, steps of 0.002 sqrt(R/g)",
+            "mujoco",
+        ),
+        Approximate(
+            "pybullet",
+            "unilateral",
+            2000,
+            40,
+            "PyBullet, best settings, steps of 0.002 sqrt(R/g)",
+            "pybullet",
+        ),
     )
 }

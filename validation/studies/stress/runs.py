@@ -1,4 +1,5 @@
-"""Runs of one model under stress: chunks of them, what they showed, and smaller scenes of those that failed."""
+"""Runs of one model under stress: chunks of them, what they showed, and smaller scenes of those
+that failed."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ from rockcheck.validation.studies.stress.players import PLAYERS
 from rockcheck.validation.studies.stress.shrinking import MOST_TRIALS, scene_text, shrink
 from rockcheck.validation.study import Task
 
-#: Time (s) that a run may take on average, event-based or not: so many times what it takes; and a task in addition.
+#: Time (s) that a run may take on average, event-based or not: so many times what it takes; and a
+#: task in addition.
 A_RUN, AN_APPROXIMATE_RUN, AMPLE = 0.2, 2.0, 50.0
 PATIENCE = 20.0
 #: Failures of a model and an invariant that are written as scenes.
@@ -69,8 +71,8 @@ class RunTotals:
     outcomes: Counter[str] = field(default_factory=Counter)
     #: How often each modelling choice of the model was made, by its name.
     rules: Counter[str] = field(default_factory=Counter)
-    #: "runs", "events", runs in which an impact added energy, as its law is known to do ("gaining"),
-    #: and whose comparison ended at the horizon of predictability ("horizons").
+    #: "runs", "events", runs in which an impact added energy, as its law is known to do
+    #: ("gaining"), and whose comparison ended at the horizon of predictability ("horizons").
     counts: Counter[str] = field(default_factory=Counter)
     #: The most energy that an impact added, of what was there.
     largest_gain: float = 0.0
@@ -190,7 +192,8 @@ class Shrinking(Task):
 
 
 def chunk(model: str, seed: int, first: int, count: int) -> Chunk:
-    """These runs as a task; what it may take is far more than it does, and little enough for a hang to be found soon."""
+    """These runs as a task; what it may take is far more than it does, and little enough for a hang
+    to be found soon."""
     a_run = A_RUN if PLAYERS[model].event_based else AN_APPROXIMATE_RUN
     return Chunk(
         model,

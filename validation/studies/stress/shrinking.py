@@ -1,4 +1,5 @@
-"""The smallest scene that still shows a failure: fields are dropped or rounded as long as it stays."""
+"""The smallest scene that still shows a failure: fields are dropped or rounded as long as it
+stays."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ def shrink(
     trials: int = MOST_TRIALS,
     seconds: float = math.inf,
 ) -> tuple[Scene, bool]:
-    """A scene that `shows` the failure as `scene` does, and from which no single simplification can be taken without losing it.
+    """A scene that `shows` the failure as `scene` does, and from which no single simplification can
+    be taken without losing it.
 
     Ends after so many `trials` or `seconds` with what it has then; the second value is then false.
     """
@@ -45,7 +47,9 @@ def simplifications(scene: Scene) -> Iterator[Scene]:
     """Valid scenes that are simpler in one respect, the greatest simplification first."""
     for change in _changes(scene):
         try:
-            simpler = scene.replace(**{key: _changed(getattr(scene, key), value) for key, value in change.items()})
+            simpler = scene.replace(
+                **{key: _changed(getattr(scene, key), value) for key, value in change.items()}
+            )
         except InputError:
             continue
         if simpler != scene:
@@ -57,7 +61,8 @@ def _changed(part: Any, change: Any) -> Any:
 
 
 def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
-    """New values of the scene's fields; a dictionary has new values of fields of that part of it."""
+    """New values of the scene's fields; a dictionary has new values of fields of that part of
+    it."""
     yield from _without(scene)
     yield from _plainer_contacts(scene)
     unit = math.sqrt(scene.block.radius / scene.gravity)
@@ -84,7 +89,12 @@ def _without(scene: Scene) -> Iterator[dict[str, Any]]:
             yield {key: Rest()}
     for n in range(len(scene.walls)):
         yield {"walls": scene.walls[:n] + scene.walls[n + 1 :]}
-    for key in ("initial_height", "initial_velocity", "initial_angular_velocity", "initial_rotation"):
+    for key in (
+        "initial_height",
+        "initial_velocity",
+        "initial_angular_velocity",
+        "initial_rotation",
+    ):
         if getattr(scene, key) != 0.0:
             yield {key: 0.0}
     x, z = scene.block.offset
@@ -118,7 +128,14 @@ def _shorter(samples: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
 def _rounded(scene: Scene) -> Iterator[dict[str, Any]]:
     """One number with fewer digits."""
     for digits in (1, 2, 4, 8):
-        for key in ("duration", "gravity", "initial_rotation", "initial_angular_velocity", "initial_velocity", "initial_height"):
+        for key in (
+            "duration",
+            "gravity",
+            "initial_rotation",
+            "initial_angular_velocity",
+            "initial_velocity",
+            "initial_height",
+        ):
             if (key, getattr(scene, key)) != ("gravity", 9.81):
                 yield {key: _digits(getattr(scene, key), digits)}
         for key in ("block", "floor", "excitation", "vertical"):
@@ -139,7 +156,8 @@ def _digits(value: float, digits: int) -> float:
 
 
 def scene_text(scene: Scene, remarks: str) -> str:
-    """A scene file that `load_scene` reads back to the bit (samples stand in the file itself), with remarks on top."""
+    """A scene file that `load_scene` reads back to the bit (samples stand in the file itself), with
+    remarks on top."""
     tables: dict[str, Any] = scene.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
     for key in ("excitation", "vertical"):
         if key in tables:
@@ -147,4 +165,6 @@ def scene_text(scene: Scene, remarks: str) -> str:
     tables.pop("name", None)  # the file's own
     plain = {key: value for key, value in tables.items() if not isinstance(value, dict | list)}
     lines = "".join(f"# {line}\n" for line in remarks.splitlines())
-    return lines + tomlkit.dumps(plain | {key: value for key, value in tables.items() if key not in plain})
+    return lines + tomlkit.dumps(
+        plain | {key: value for key, value in tables.items() if key not in plain}
+    )

@@ -1,4 +1,5 @@
-"""Where engines and the continuous model break: the largest stable step, and what a block does that should stand still.
+"""Where engines and the continuous model break: the largest stable step, and what a block does that
+should stand still.
 
 Lengths are in R, times in sqrt(R/g): the same step is asked of a domino and of a tower.
 """
@@ -12,7 +13,19 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from rockcheck.scenes import (
+    Block,
+    Floor,
+    InputError,
+    ModelFailure,
+    Record,
+    Rest,
+    Ricker,
+    Scene,
+    Sine,
+    Wall,
+    kinematics,
+)
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import build, not_installed
@@ -20,7 +33,8 @@ from rockcheck.validation.studies.stress.players import deepest, energy_without_
 from rockcheck.validation.study import Task
 
 SLOPE = math.tan(0.25)
-#: Values along each axis; all else is the paper's block beside a wall: R in m, friction, restitution of the wall, a_p/(g tan alpha).
+#: Values along each axis; all else is the paper's block beside a wall: R in m, friction,
+#: restitution of the wall, a_p/(g tan alpha).
 AXES: dict[str, tuple[float, ...]] = {
     "size": (1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1000.0),
     "friction": (0.0, 0.1, 0.3, 0.6, 0.9, 1.2),
@@ -34,13 +48,15 @@ AXIS_WORDS: dict[str, str] = {
     "restitution": "restitution of the wall",
     "shaking": "peak acceleration, g tan α",
 }
-#: Steps that are tried, sqrt(R/g), coarse to fine, and what a stable run keeps to: depth in R, energy without source.
+#: Steps that are tried, sqrt(R/g), coarse to fine, and what a stable run keeps to: depth in R,
+#: energy without source.
 STEPS = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4)
 DEEPEST, MOST_ENERGY = 0.02, 0.1
-#: Adaptive steps are as fine as they need to be: what is tried is how large they may grow, from here on.
+#: Adaptive steps are as fine as they need to be: what is tried is how large they may grow, from
+#: here on.
 ADAPTIVE_FINEST = 3e-3
-#: Stand-still runs: a block left alone, one that is pushed or shaken (or left alone, where a step takes a millisecond), and in a quick
-#: run, s; and the step (s).
+#: Stand-still runs: a block left alone, one that is pushed or shaken (or left alone, where a step
+#: takes a millisecond), and in a quick run, s; and the step (s).
 HOUR, PUSHED, QUICK_REST, REST_STEP = 3600.0, 300.0, 10.0, 5e-3
 QUICK_STEPS, QUICK_VALUES = STEPS[1:-1:2], 2
 #: What a place may take, s: far more than it needs.
@@ -49,7 +65,8 @@ MOST_SECONDS = 600.0
 
 @dataclass(frozen=True)
 class ModelSetup:
-    """A model with settings as they come ("default") or at their best; `knob` is what the step is called there.
+    """A model with settings as they come ("default") or at their best; `knob` is what the step is
+    called there.
 
     A block is left `alone` for so long, s. `finest` is the finest step that is tried, sqrt(R/g).
     """
@@ -67,16 +84,41 @@ SETUPS = {
     for line in (
         ModelSetup("mujoco default", "mujoco", (("settings", "default"),)),
         ModelSetup("mujoco", "mujoco", ()),
-        ModelSetup("mujoco adaptive", "mujoco", (("time_step", "adaptive"),), "largest_step", finest=ADAPTIVE_FINEST),
+        ModelSetup(
+            "mujoco adaptive",
+            "mujoco",
+            (("time_step", "adaptive"),),
+            "largest_step",
+            finest=ADAPTIVE_FINEST,
+        ),
         ModelSetup("pybullet default", "pybullet", (("settings", "default"),)),
         ModelSetup("pybullet", "pybullet", ()),
-        ModelSetup("pybullet adaptive", "pybullet", (("time_step", "adaptive"),), "largest_step", finest=ADAPTIVE_FINEST),
+        ModelSetup(
+            "pybullet adaptive",
+            "pybullet",
+            (("time_step", "adaptive"),),
+            "largest_step",
+            finest=ADAPTIVE_FINEST,
+        ),
         ModelSetup("pymunk default", "pymunk", (("settings", "default"),)),
         ModelSetup("pymunk", "pymunk", ()),
-        ModelSetup("pymunk adaptive", "pymunk", (("time_step", "adaptive"),), "largest_step", finest=ADAPTIVE_FINEST),
+        ModelSetup(
+            "pymunk adaptive",
+            "pymunk",
+            (("time_step", "adaptive"),),
+            "largest_step",
+            finest=ADAPTIVE_FINEST,
+        ),
         ModelSetup("dart default", "dart", (("settings", "default"),)),
         ModelSetup("dart", "dart", ()),
-        ModelSetup("dart adaptive", "dart", (("time_step", "adaptive"),), "largest_step", PUSHED, ADAPTIVE_FINEST),
+        ModelSetup(
+            "dart adaptive",
+            "dart",
+            (("time_step", "adaptive"),),
+            "largest_step",
+            PUSHED,
+            ADAPTIVE_FINEST,
+        ),
         ModelSetup("drake default", "drake", (("settings", "default"),)),
         ModelSetup("drake", "drake", ()),
         ModelSetup("cm paper", "cm", (("damping_rule", "paper"),)),
@@ -87,7 +129,8 @@ SETUPS = {
 
 @dataclass(frozen=True)
 class Stable:
-    """The largest step (sqrt(R/g)) from which on a model is stable, 0 where none was; and what the next coarser one does."""
+    """The largest step (sqrt(R/g)) from which on a model is stable, 0 where none was; and what the
+    next coarser one does."""
 
     line: str
     axis: str
@@ -98,7 +141,8 @@ class Stable:
 
 @dataclass(frozen=True)
 class Still:
-    """What a block does that should stand still: the largest of each, R, alpha or sqrt(g R); `fault` where the run did not end."""
+    """What a block does that should stand still: the largest of each, R, alpha or sqrt(g R);
+    `fault` where the run did not end."""
 
     line: str
     case: str
@@ -125,27 +169,39 @@ def scene_at(axis: str, value: float) -> Scene:
 
 
 def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
-    """How a run of that step (sqrt(R/g)) breaks: "blows up", "sinks", "gains energy"; empty where it does not."""
+    """How a run of that step (sqrt(R/g)) breaks: "blows up", "sinks", "gains energy"; empty where
+    it does not."""
     unit, radius = math.sqrt(scene.block.radius / scene.gravity), scene.block.radius
-    scene = scene.replace(output_step=max(scene.output_step, step * unit))  # the CM ends a step at each row
+    scene = scene.replace(
+        output_step=max(scene.output_step, step * unit)
+    )  # the CM ends a step at each row
     # The CM's contact is as stiff as the block's size asks for.
     stiff = {"penetration": 1e-7 * radius} if line.family == "cm" else {}
     try:
-        history = build(line.family, dict(line.settings) | {line.knob: step * unit} | stiff).simulate(scene)
+        history = build(
+            line.family, dict(line.settings) | {line.knob: step * unit} | stiff
+        ).simulate(scene)
     except ModelFailure as error:
         return "sinks" if "through the floor" in str(error) else "blows up"
     except InputError as error:
         return printable(error, 60)
     channels = history.channels
-    if not all(np.all(np.isfinite(column)) for column in channels.values() if column.dtype.kind == "f"):
+    if not all(
+        np.all(np.isfinite(column)) for column in channels.values() if column.dtype.kind == "f"
+    ):
         return "blows up"
     # The distance of one step is no fault.
-    if deepest(scene, history) > DEEPEST + 2.0 * step * float(np.max(np.hypot(channels["x_dot"], channels["y_dot"]))) * unit / radius:
+    if (
+        deepest(scene, history)
+        > DEEPEST
+        + 2.0 * step * float(np.max(np.hypot(channels["x_dot"], channels["y_dot"]))) * unit / radius
+    ):
         return "sinks"
     return "gains energy" if energy_without_source(scene, history) > MOST_ENERGY else ""
 
 
-#: Push or shaking (at 1 Hz) under which a block should still stand, as a share of what would move it.
+#: Push or shaking (at 1 Hz) under which a block should still stand, as a share of what would move
+#: it.
 CASES = {"left alone": 0.0, "pushed": 0.5, "shaken": 0.8}
 
 
@@ -161,7 +217,12 @@ def stand_still(label: str, case: str, duration: float, step: float = REST_STEP)
         else Rest()
     )
     scene = Scene(
-        name=case, block=block, floor=Floor(friction=mu), excitation=excitation, duration=duration, output_step=max(step, duration / 4000)
+        name=case,
+        block=block,
+        floor=Floor(friction=mu),
+        excitation=excitation,
+        duration=duration,
+        output_step=max(step, duration / 4000),
     )
     line = SETUPS[label]
     settings = dict(line.settings)
@@ -175,7 +236,9 @@ def stand_still(label: str, case: str, duration: float, step: float = REST_STEP)
     late = channels["t"] > 0.5 * channels["t"][-1]
     height = kinematics.pivot_height(block, channels["y"], channels["theta"])
     lifted = height + 2.0 * block.half_width * np.abs(np.sin(channels["theta"]))
-    speed = np.sqrt(channels["x_dot"] ** 2 + channels["y_dot"] ** 2 + (radius * channels["theta_dot"]) ** 2)
+    speed = np.sqrt(
+        channels["x_dot"] ** 2 + channels["y_dot"] ** 2 + (radius * channels["theta_dot"]) ** 2
+    )
     return Still(
         label,
         case,
@@ -186,7 +249,9 @@ def stand_still(label: str, case: str, duration: float, step: float = REST_STEP)
             "sinking": max(0.0, float(np.max(-height))) / radius,
             "rotation": float(np.max(np.abs(channels["theta"]))) / block.alpha,
             "uplift": max(0.0, float(np.max(lifted))) / radius,
-            "jitter": float(np.sqrt(np.mean(speed[late] ** 2))) / math.sqrt(9.81 * radius) if late.any() else math.nan,
+            "jitter": float(np.sqrt(np.mean(speed[late] ** 2))) / math.sqrt(9.81 * radius)
+            if late.any()
+            else math.nan,
         },
         "" if not history.outcome.startswith("overturned") else history.outcome,
     )
@@ -194,7 +259,8 @@ def stand_still(label: str, case: str, duration: float, step: float = REST_STEP)
 
 @dataclass(frozen=True)
 class Place(Task):
-    """A place of a map: a model with settings at a value of an axis, or a block that should stand so long (s)."""
+    """A place of a map: a model with settings at a value of an axis, or a block that should stand
+    so long (s)."""
 
     line: str
     at: str
@@ -206,7 +272,9 @@ class Place(Task):
         if self.at in CASES:
             return stand_still(self.line, self.at, self.value)
         setup, scene, best, fault = SETUPS[self.line], scene_at(self.at, self.value), 0.0, ""
-        for step in sorted(one for one in (QUICK_STEPS if self.quick else STEPS) if one >= setup.finest):
+        for step in sorted(
+            one for one in (QUICK_STEPS if self.quick else STEPS) if one >= setup.finest
+        ):
             if fault := fault_of(setup, scene, step):
                 break
             best = step
@@ -214,12 +282,24 @@ class Place(Task):
 
 
 def places(quick: bool = False) -> list[Place]:
-    """The maps of all `SETUPS` that are installed, the longest tasks first; `quick` has fewer values, steps and seconds."""
+    """The maps of all `SETUPS` that are installed, the longest tasks first; `quick` has fewer
+    values, steps and seconds."""
     lines = [label for label, setup in SETUPS.items() if not not_installed(setup.family)]
     how: dict[str, Any] = {"seconds": MOST_SECONDS, "expected": 0.5 if quick else 4.0}
     still = [
-        Place(line, case, QUICK_REST if quick else PUSHED if CASES[case] else SETUPS[line].alone, **how)
+        Place(
+            line,
+            case,
+            QUICK_REST if quick else PUSHED if CASES[case] else SETUPS[line].alone,
+            **how,
+        )
         for case, line in itertools.product(CASES, lines)
     ]
-    values = [(axis, one) for axis, some in AXES.items() for one in (some[:: max(1, len(some) // QUICK_VALUES)] if quick else some)]
-    return still + [Place(line, axis, value, quick, **how) for axis, value in values for line in lines]
+    values = [
+        (axis, one)
+        for axis, some in AXES.items()
+        for one in (some[:: max(1, len(some) // QUICK_VALUES)] if quick else some)
+    ]
+    return still + [
+        Place(line, axis, value, quick, **how) for axis, value in values for line in lines
+    ]

@@ -107,11 +107,12 @@ class Stress(Study):
         return Finding(
             self.name,
             "Stress: random scenes against what must always hold",
-            f"seed {self.seed}: {runs:,} runs, {said if broken else 'no failure of an event-based model'}",
+            f"seed {self.seed}: {runs:,} runs,"
+            f" {said if broken else 'no failure of an event-based model'}",
             [
+                *(_runs(totals) if totals else ()),
                 *(_maps(stable) if stable else ()),
                 *([_stood(still)] if still else ()),
-                *(_runs(totals) if totals else ()),
             ],
             data={
                 "seed": self.seed,
@@ -244,15 +245,15 @@ def _worst(name: str, totals: Sequence[RunTotals]) -> list[Any]:
     ]
 
 
-def _maps(found: Sequence[Stable]) -> Iterator[Block]:
+def _maps(found: Sequence[Stable]) -> list[Block]:
     lines = list(dict.fromkeys(one.line for one in found))
-    panels = []
+    panels, tables = [], []
     for axis, words in AXIS_WORDS.items():
         of = {(one.line, one.value): one for one in found if one.axis == axis}
         values = list(dict.fromkeys(value for _, value in of))
         rows = [[of.get((line, value)) for value in values] for line in lines]
         panels.append([words, values, [[one and one.step for one in row] for row in rows]])
-        yield Table(
+        table = Table(
             f"steps-{axis}",
             [text("line", "model"), *(text(f"{value:g}") for value in values)],
             [
@@ -262,7 +263,8 @@ def _maps(found: Sequence[Stable]) -> Iterator[Block]:
             f"Largest stable step, √(R/g), by {words}",
             folded=True,
         )
-    yield Plot(
+        tables.append(table)
+    plot = Plot(
         "stable-steps",
         "Where engines and the continuous model break: largest stable step, √(R/g)",
         "stable-steps",
@@ -273,7 +275,7 @@ def _maps(found: Sequence[Stable]) -> Iterator[Block]:
         " the distance of a step, and the energy gained without a source is below a tenth of all"
         " work. “none”: not even the finest step is stable (3e-4, with adaptive steps 3e-3).",
     )
-    yield table_of("stable-steps", Stable, found)
+    return [plot, *tables, table_of("stable-steps", Stable, found)]
 
 
 def _stood(found: Sequence[Still]) -> Table:
@@ -282,10 +284,10 @@ def _stood(found: Sequence[Still]) -> Table:
         [
             text("case", "block"),
             text("line", "model"),
-            Column("simulated", unit="s"),
-            Column("step", unit="s", digits=2),
+            Column("simulated", "for", "s", digits=4),
+            Column("step", unit="s", digits=2, brief=False),
             *(Column(name, unit=unit, digits=1) for name, unit in MOVES.items()),
-            text("fault", " "),
+            text("fault", " ", brief=False),
         ],
         [
             [one.case, one.line, one.simulated, one.step, *map(one.moves.get, MOVES), one.fault]

@@ -135,10 +135,14 @@ KINDS = {
 }
 #: What is not measured, and why.
 LEFT_OUT = (
-    "default settings at a step of 3e-5 s: at 1e-4 s they have stopped converging, or converge as at larger steps",
-    "PyBullet's other solvers and MuJoCo's RK4 and pyramidal cone: no better limit, or none, at more cost",
-    "pymunk and DART at 3e-5 s and Drake below 1e-3 s: a simulated second of Drake at 1e-4 s takes it more than a second",
-    "native batches of an engine (mujoco.rollout): they cannot end a step at an event; their cost is in the table of savings",
+    "default settings at a step of 3e-5 s: at 1e-4 s they have stopped converging, or converge as"
+    " at larger steps",
+    "PyBullet's other solvers and MuJoCo's RK4 and pyramidal cone: no better limit, or none, at"
+    " more cost",
+    "pymunk and DART at 3e-5 s and Drake below 1e-3 s: a simulated second of Drake at 1e-4 s takes"
+    " it more than a second",
+    "native batches of an engine (mujoco.rollout): they cannot end a step at an event; their cost"
+    " is in the table of savings",
     "measured histories: they have no cost",
 )
 

@@ -25,8 +25,10 @@ FAR = Wall(side="left", gap=100.0)
 ROUNDS = 5
 #: Not in the table, and why.
 NOT_MEASURED = (
-    "rendering in MuJoCo: it needs a display or a GPU; no model here ever makes a renderer, nor PyBullet's window",
-    "out-of-plane motion in PyBullet: it is always three-dimensional; a huge inertia about the other axes keeps the block in its plane",
+    "rendering in MuJoCo: it needs a display or a GPU; no model here ever makes a renderer, nor"
+    " PyBullet's window",
+    "out-of-plane motion in PyBullet: it is always three-dimensional; a huge inertia about the"
+    " other axes keeps the block in its plane",
 )
 
 

@@ -206,7 +206,8 @@ def _answer(
     ):
         first = standings[0]
         said.append(
-            f"The cheapest engine at an error of {LEVEL:g} alpha is {first.line}: {1e3 * first.cost:.2g} ms of CPU a simulated second."
+            f"The cheapest engine at an error of {LEVEL:g} alpha is {first.line}:"
+            f" {1e3 * first.cost:.2g} ms of CPU a simulated second."
         )
     best = [row for case in ebm.CASES if (row := ebm.at_level(times, case.name))]
     if best:
@@ -217,7 +218,8 @@ def _answer(
         finest = {level.model: level for level in levels if level.reference == REFERENCES[0]}
         errors = ", ".join(f"{model} {level.median:.1e}" for model, level in finest.items())
         said.append(
-            f"Beside a wall, median errors against {REFERENCES[0]} at the finest setting, alpha: {errors}."
+            f"Beside a wall, median errors against {REFERENCES[0]} at the finest setting, alpha:"
+            f" {errors}."
         )
     return " ".join(said) or "Nothing was measured."
 
@@ -242,7 +244,8 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
                 for one in standings
             ],
             "League of engines",
-            "Free rocking and pulses. Error: RMS of theta. Cost: CPU a simulated second. Empty: not reached.",
+            "Free rocking and pulses. Error: RMS of theta. Cost: CPU a simulated second. Empty:"
+            " not reached.",
         )
     for title, starts in SHEETS.items():
         shown = [family for family in families if family.startswith(starts)]
