@@ -77,7 +77,7 @@ def lines(plot: Plot) -> Figure:
         figure = Figure(
             figsize=(PAGE, (3.4 if rows == 1 else 2.1 * rows) + 0.4), layout="constrained"
         )
-        grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        grid = figure.subplots(rows, columns, sharex=True, sharey=plot.shared, squeeze=False)
         handles: dict[str, Any] = {}
         per = plot.data["per_unit"] if plot.data else 1.0
         for ax, panel in zip(grid.flat, plot.panels, strict=False):

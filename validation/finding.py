@@ -130,6 +130,7 @@ class Panel:
 class Plot:
     """A figure. `kind` "lines" draws `panels`; any other is drawn from `data` by its drawer in
     `rockcheck.reports.drawers`. A `live` one of one panel is read under the pointer on the page.
+    Panels have common scales where they are `shared`.
     `data` of "lines" gives their x axis in another unit, too: `per_unit`, `other_unit`,
     `other_label`.
     """
@@ -143,6 +144,7 @@ class Plot:
     note: str = ""
     live: bool = False
     data: Any = None
+    shared: bool = True
     on: Literal["all", "page"] = "page"
     folded: bool = False
     block: ClassVar[str] = "plot"

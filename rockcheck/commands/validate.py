@@ -34,7 +34,7 @@ from rockcheck.scenes.errors import printable
 from rockcheck.scenes.recordings import Reading
 from rockcheck.scenes.recordings.sets import record_path
 from rockcheck.validation.execute.models import FAMILIES, family, is_own, not_installed
-from rockcheck.validation.suite.changes import Moment, moment_of, remember, trends
+from rockcheck.validation.suite.changes import Moment, moment_of, remember, trend_of, trends
 from rockcheck.validation.suite.record_sets import RecordSet
 from rockcheck.validation.suite.results import Run, Strict
 from rockcheck.validation.suite.runner import run_suite
@@ -173,11 +173,10 @@ def run(
     if history is not None:
         tell_trend(moments, history)
     if history is not None and report:
-        from rockcheck.reports.studies.trend import write_trend
+        from rockcheck.reports.document import publish as written
 
-        console().print(
-            f"trend: {write_trend(moments, usable_folder(folder, TREND))}", soft_wrap=True
-        )
+        trend = written(trend_of(moments), usable_folder(folder, TREND))
+        console().print(f"trend: {trend}", soft_wrap=True)
     page = published(folder, jobs) if report else kept
     console().print(f"report: {page}", soft_wrap=True)
     answer(summary(finished) | {"report": page})

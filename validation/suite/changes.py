@@ -22,6 +22,17 @@ from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import from_validation, printable
 from rockcheck.scenes.reading import read_text
 from rockcheck.validation.discrepancy.figures import Figure, Stored
+from rockcheck.validation.finding import (
+    Axis,
+    Block,
+    Column,
+    Finding,
+    Panel,
+    Plot,
+    Series,
+    Table,
+    text,
+)
 from rockcheck.validation.suite.results import Cell, Run
 from rockcheck.validation.suite.tables import title
 from rockcheck.validation.suite.tolerances import MEASURES
@@ -239,3 +250,40 @@ def trends(moments: Sequence[Moment]) -> list[Trend]:
         for name in last
     ]
     return sorted(found, key=lambda trend: -trend.spread)
+
+
+#: So many figures are drawn, those that varied most; the table has all that varied.
+DRAWN = 12
+
+
+def trend_of(moments: Sequence[Moment]) -> Finding:
+    """The figures of a suite over its runs: those that varied, drawn and in a table; the runs."""
+    found, last = [trend for trend in trends(moments) if trend.spread > 0.0], moments[-1]
+    numbers = list(range(1, len(moments) + 1))
+    panels = []
+    for one in found[:DRAWN]:
+        bad = [
+            n for n, moment in zip(numbers, moments, strict=True) if one.name in moment.not_passed
+        ]
+        marked = Series("not passed", bad, [one.values[n - 1] for n in bad], style="points")
+        panels.append(
+            Panel(one.name.replace(": ", "\n", 1), [Series("", numbers, one.values), marked])
+        )
+    rows = []
+    for one in found:
+        known = [value for value in one.values if value is not None]
+        rows.append([one.name, one.values[0], min(known), max(known), *one.values[-2:]])
+    columns = [Column(name) for name in ("first", "least", "most", "before", "now")]
+    made = [
+        [one.created, one.commit, one.rockcheck, one.verdict, len(one.not_passed)]
+        for one in reversed(moments)
+    ]
+    about = [*map(text, ("made", "commit", "rockcheck", "verdict")), Column("not_passed")]
+    blocks: list[Block] = [
+        *([Plot("trend", panels=panels, x=Axis("run"), shared=False)] if panels else []),
+        Table("figures", [text("figure"), *columns], rows, "What varied"),
+        Table("runs", about, made, "Runs"),
+    ]
+    same = len(last.figures) - len(found)
+    answer = f"{len(found)} figures varied, {same} stayed the same. The last run: {last.verdict}."
+    return Finding("trend", f"{last.suite} over {len(moments)} runs", answer, blocks)

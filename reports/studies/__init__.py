@@ -1,1 +1,0 @@
-"""Pages and figures of the studies: benchmark, convergence, spectra."""
