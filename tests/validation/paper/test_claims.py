@@ -174,10 +174,8 @@ def test_a_shape_is_not_an_area():
             one.outcomes[:] = one.outcomes[::-1].copy()
     claim = judged(spectra_made)["restitution gives the shape"]
     assert claim.verdict == "does not hold"
-    assert (
-        claim.rows[0].value
-        == "the safe region differs at up to 100.0 % of the nodes between gaps, at up to 0.0 % between e"
-    )
+    value = claim.rows[0].value
+    assert "at up to 100.0 % of the nodes between gaps, at up to 0.0 % between e" in value
 
 
 def test_exceptions_are_named_and_found():
