@@ -8,6 +8,7 @@ import typer
 
 from rockcheck.commands import answer, console, model_names, progress, scene_names, setting_of
 from rockcheck.scenes.files import load_uncertain_scene
+from rockcheck.validation.discrepancy.impact_laws import parting_landing
 from rockcheck.validation.execute.models import FAMILIES, build
 from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
 from rockcheck.validation.uncertainty.population import SAMPLES, propagate
@@ -56,7 +57,9 @@ def run(
         numerical = numerical_uncertainty(player, given.scene)
         tell(1, 2, "draws")
         inputs = propagate(given, samples=samples).inputs if given.spreads else None
-    found = finding_of(given.scene.name, model, numerical, inputs)
+        landing = parting_landing(given.scene)
+    parts = None if landing is None else landing.t
+    found = finding_of(given.scene.name, model, numerical, inputs, parts)
     show(found, console())
     answer(found.data)
     raise typer.Exit(found.exit_code)

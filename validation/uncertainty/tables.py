@@ -8,11 +8,19 @@ from rockcheck.validation.uncertainty.population import Inputs
 
 
 def finding_of(
-    scene: str, model: str, numerical: Numerical | None, inputs: Inputs | None
+    scene: str,
+    model: str,
+    numerical: Numerical | None,
+    inputs: Inputs | None,
+    parts: float | None = None,
 ) -> Finding:
     """The numerical uncertainty of each figure, and what the spread of the inputs makes of it; its
-    data are what `--json` says."""
-    converged = numerical is not None and numerical.converged
+    data are what `--json` says.
+
+    `parts` is the time (s) from which the motion depends on the law of impacts: from there on no
+    step makes a figure sure.
+    """
+    converged = numerical is not None and numerical.converged and parts is None
     said = "a model without step or tolerance; its numerical error is not known"
     quantities, blocks = [], list[Block]()
     if numerical is not None:
@@ -26,6 +34,9 @@ def finding_of(
         columns += [text("unit"), text("verdict")]
         rows = [[one[column.name] for column in columns] for one in quantities]
         blocks += [Table("quantities", columns, rows), Text(items=numerical.reasons)]
+    if parts is not None:
+        law = f"from {parts:.3g} s on the motion depends on the law of impacts (docs, limits)"
+        blocks.append(Text(law, verdict="changed"))
     if inputs is not None:
         about = f"{inputs.samples} draws of {', '.join(inputs.names)}, played by {inputs.model}"
         shares = [[s.name, max(s.first, 0.0), max(s.total, 0.0)] for s in inputs.sensitivities]
@@ -64,6 +75,7 @@ def finding_of(
             "scene": scene,
             "model": model,
             "converged": converged,
+            "depends_on_law_from_s": parts,
             "method": numerical.method if numerical else "",
             "quantities": quantities,
             "inputs": inputs.model_dump() if inputs else None,

@@ -653,3 +653,12 @@ def test_a_peak_between_two_rows_is_allowed_for():
         theta = np.cos(step * (np.arange(-20, 21) - shift))
         missed = 1.0 - np.max(theta)
         assert missed <= _between_rows(SimpleNamespace(channels={"theta": theta})) < 1.3e-3
+
+
+def test_a_motion_that_depends_on_the_law_of_impacts_is_not_sure(capsys):
+    """It lands flat while it slides: no step tells which corner is first."""
+    scene = Path(__file__).parents[2] / "data" / "modelling_choices" / "flat-landing.toml"
+    assert main(["uncertainty", str(scene), "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert not found["converged"]
+    assert 0.0 < found["depends_on_law_from_s"] < 3.0
