@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from rockcheck.scenes.writing import markdown_table
 from rockcheck.validation.paper.panels import paper_panels
@@ -26,22 +24,18 @@ COLUMNS = {
 }
 
 
-def claims_found(folder: Path) -> list[Mapping[str, Any]]:
-    """The rows of the table of claims; what is played is kept in `folder`."""
-    return run(Spectra(paper_panels()), folder).table("claims").records()
-
-
-def table(claims: list[Mapping[str, Any]]) -> str:
-    """A row a sentence."""
-    return markdown_table(list(COLUMNS.values()), [[row[key] for key in COLUMNS] for row in claims])
+def made(folder: Path) -> str:
+    """The table, a row a sentence; what is played is kept in `folder`."""
+    rows = run(Spectra(paper_panels()), folder).table("claims").records()
+    return markdown_table(list(COLUMNS.values()), [[row[key] for key in COLUMNS] for row in rows])
 
 
 def main() -> None:
     """Write it into the page."""
     text = PAGE.read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory() as folder:
-        made = table(claims_found(Path(folder)))
-    PAGE.write_text(PLACE.sub(lambda _: made, text), encoding="utf-8")
+        table = made(Path(folder))
+    PAGE.write_text(PLACE.sub(lambda _: table, text), encoding="utf-8")
 
 
 if __name__ == "__main__":

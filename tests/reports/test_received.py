@@ -15,7 +15,6 @@ from rockcheck.commands.publish import LOCK, keep
 from rockcheck.reports import write_site
 from rockcheck.scenes import InputError
 from rockcheck.validation.execute.store import HISTORIES, Store
-from rockcheck.validation.spectra.study import read_index
 from rockcheck.validation.suite.results import RUN_FILE, Run
 
 POSIX = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with a name are POSIX")
@@ -196,31 +195,3 @@ def test_text_that_turns_around_reaches_no_page(received: Path, sign: str) -> No
             assert sign not in text, path
             assert f"\\u{code}" not in text, path
     assert "gnp?.exe" in (received / "index.html").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize(
-    ("key", "name"), [("name", "../../a"), ("model", "/tmp/a"), ("model", "a\\b"), ("model", "ebm")]
-)
-def test_a_list_of_spectra_names_no_file_elsewhere(tmp_path: Path, key: str, name: str) -> None:
-    """Names of figures and tables are made of it."""
-    record = {
-        "name": "a",
-        "title": "",
-        "figure": None,
-        "scene": {},
-        "model": "ebm",
-        "settings": {},
-        "refined": False,
-        "evaluations": 0,
-    }
-    record |= {
-        "frequency_ratios": [],
-        "amplitude_ratios": [],
-        "undecided": 0,
-        "safe": 0.0,
-        "left": 0.0,
-        "right": 0.0,
-        key: name,
-    }
-    (tmp_path / "spectra.json").write_text(json.dumps({"spectra": [record]}))
-    assert len(read_index(tmp_path).spectra) == (name == "ebm")

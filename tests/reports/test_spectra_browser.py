@@ -78,11 +78,14 @@ def test_the_panels_stand_as_in_the_paper_and_are_painted(page: playwright.Page)
     ]
     assert page.locator(".key.outcomes span").all_inner_texts() == outcomes
     colours = """([panel, nodes]) => {
-        const c = document.querySelectorAll('.panel canvas')[panel], w = c.clientWidth - 48, h = c.clientHeight - 30, r = devicePixelRatio;
+        const c = document.querySelectorAll('.panel canvas')[panel], r = devicePixelRatio;
+        const w = c.clientWidth - 48, h = c.clientHeight - 30;
         const all = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
         return nodes.map(([i, j]) => {
-            const [x, y] = [42 + (j + .5) / 20 * w, 4 + h - (i + .5) / 20 * h].map(pixels => Math.round(r * pixels));
-            return '#' + [0, 1, 2].map(k => all[4 * (y * c.width + x) + k].toString(16).padStart(2, '0')).join('');
+            const place = [42 + (j + .5) / 20 * w, 4 + h - (i + .5) / 20 * h];
+            const [x, y] = place.map(pixels => Math.round(r * pixels));
+            const hex = k => all[4 * (y * c.width + x) + k].toString(16).padStart(2, '0');
+            return '#' + [0, 1, 2].map(hex).join('');
         });
     }"""
     free = page.evaluate(colours, [0, [[3, 9], [9, 9], [0, 0]]])

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE
-from rockcheck.scenes import Scene
 from rockcheck.validation.paper.panels import AMPLITUDES, FIGURES, GAPS, RESTITUTIONS
 
 Mask = NDArray[np.bool_]
@@ -36,8 +35,13 @@ SAID = ("{} wall", "μ {:g}", "{:g} mm", "e {:g}")
 SMALL = 0.01
 #: Where the paper's example of overturning with one impact lies, omega_p/p.
 ONE_IMPACT = (2.0, 3.0)
-#: The amplitudes that are scanned, beyond the spectra's own range, and at which omega_p/p.
+#: The amplitudes that are scanned, beyond the spectra's own range, and at which omega_p/p; and of
+#: which spectra: gap and e, None without a wall.
 SCANNED, SCANNED_AT = np.arange(AMPLITUDES[0], 20.005, 0.01), 6.0
+SCANNED_WALLS: dict[str, tuple[float, float] | None] = {
+    "figure-8-unobstructed": None,
+    **{f"figure-8-gap-103-e-{e:g}": (GAPS[-1], e) for e in RESTITUTIONS},
+}
 
 
 @dataclass(frozen=True)
@@ -317,17 +321,6 @@ def _lowest(paper: Paper, mu: float, outcomes: NDArray[np.int8]) -> Row:
         f"clockwise at {np.sum(clockwise[:count])} of {count} frequencies, up to ω_p/p of {end:.1f}"
     )
     return Row(f"μ {mu:g}, the lowest overturning", value, bool(lead[count - 1] > 0))
-
-
-def wall_of(scene: Scene) -> tuple[float, float] | None:
-    """Gap and restitution of the wall, None without one."""
-    return (scene.walls[0].gap, scene.walls[0].restitution) if scene.walls else None
-
-
-def is_scanned(scene: Scene) -> bool:
-    """Whether it is one of the scenes whose lowest overturning amplitude is looked for."""
-    wall = (scene.walls[0].side, scene.walls[0].gap) if scene.walls else None
-    return scene.floor.friction == AXES["friction"][0] and wall in (None, ("right", GAPS[-1]))
 
 
 def near_one_impact(spectrum: Spectrum) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -157,13 +157,11 @@ class Spectra(Study):
         request = self.request
         how = request.model, request.settings
         least, one_impact = {}, {}
-        for scene in (one.scene for one in spectra if measures.is_scanned(one.scene)):
-            scan = measures.SCANNED, np.full(len(measures.SCANNED), measures.SCANNED_AT)
+        scan = measures.SCANNED, np.full(len(measures.SCANNED), measures.SCANNED_AT)
+        for scene in (one.scene for one in spectra if one.scene.name in measures.SCANNED_WALLS):
             if (outcomes := book.outcomes(scene, *scan, *how)) is not None:
-                falls = outcomes[0] != SAFE
-                least[measures.wall_of(scene)] = (
-                    float(measures.SCANNED[np.argmax(falls)]) if falls.any() else np.inf
-                )
+                fallen = measures.SCANNED[outcomes[0] != SAFE]
+                least[measures.SCANNED_WALLS[scene.name]] = float(fallen.min(initial=np.inf))
         for one in (one for one in spectra if not one.scene.walls):
             i, j = measures.near_one_impact(one)
             tasks = tiles.nodes_of(
@@ -180,15 +178,12 @@ class Spectra(Study):
         rows = []
         for panel, one in spectra.items():
             law = one.depends_on_law
-            stem = self._stem(panel)
-            row: list[Any] = [panel.name, panel.title, panel.figure]
-            row += [
-                one.safe_area,
-                *(float(np.mean(one.outcomes == side)) for side in (LEFT, RIGHT)),
-            ]
+            row: list[Any] = [panel.name, panel.title, panel.figure, one.safe_area]
+            row += [float(np.mean(one.outcomes == side)) for side in (LEFT, RIGHT)]
             row += [len(one.undecided), *([None if law is None else len(law)] if laws else [])]
-            files = [Mark(kind.upper(), link=f"{stem}.{kind}") for kind in ("csv", "npz")]
-            rows.append([*row, one.evaluations, *files])
+            files = {kind: f"{self._stem(panel)}.{kind}" for kind in ("csv", "npz")}
+            row += [one.evaluations, *(Mark(k.upper(), link=link) for k, link in files.items())]
+            rows.append(row)
         columns = [text("spectrum"), text("title", brief=False), Column("figure", brief=False)]
         columns += [
             Column(name, kind="percent", digits=4, help=words)
@@ -210,13 +205,10 @@ class Spectra(Study):
             mine = {p: one for p, one in found.spectra.items() if p.figure == number}
             panels = [self._panel(panel, one, found) for panel, one in mine.items()]
             first = next(iter(mine))
-            name = self._stem(first)
-            if number is not None:
-                name = name.replace(first.name, f"figure-{number}")
-            title = title_of(number) if number else first.title
+            name = f"figure-{number}" if number else first.name
             yield Plot(
-                name,
-                title + by,
+                self._stem(first).replace(first.name, name),
+                (title_of(number) if number else first.title) + by,
                 kind="spectra",
                 live=True,
                 note=f"{request.size} x {request.size} nodes, {request.model}"
