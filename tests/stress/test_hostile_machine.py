@@ -226,7 +226,7 @@ def test_worker_lost_or_hanging(tmp_path, deadly):
         failure["number"]: failure["words"] for failure in found.table("failures").records()
     }
     assert failures == {3: "the process ended with code 9", 13: "did not end within 4 s"}
-    assert all("not shrunk" in text for text in found.scenes.values())
+    assert all("not shrunk" in text for text in found.files.values())
 
 
 def test_shrinking_that_hangs(tmp_path, deadly):
@@ -247,7 +247,9 @@ def test_shrinking_that_hangs(tmp_path, deadly):
     assert small[5].duration < 0.1 * before[5].duration
     assert small[13].excitation == before[13].excitation
     remarks = {
-        number: found.scenes[f"ebm-mirror-1-{number}.toml"].partition("rockcheck simulate")[0]
+        number: found.files[f"failures/ebm-mirror-1-{number}.toml"].partition("rockcheck simulate")[
+            0
+        ]
         for number in deadly.FAILING
     }
     assert {number for number, said in remarks.items() if "not the smallest" in said} == {3, 4}
@@ -268,8 +270,8 @@ def test_shrinking_interrupted(tmp_path, monkeypatch):
     found = run(study.Stress("runs", models=("ebm",), runs=30), tmp_path, jobs=0)
     assert not found.complete
     assert len(found.table("failures").rows) == 30
-    assert len(found.scenes) == runs.MOST_FILES
-    assert all("not shrunk" in text for text in found.scenes.values())
+    assert len(found.files) == runs.MOST_FILES
+    assert all("not shrunk" in text for text in found.files.values())
 
 
 linux = pytest.mark.skipif(

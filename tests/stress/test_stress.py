@@ -173,7 +173,7 @@ def test_failures_of_the_program_and_of_engines():
         other: RunTotals(model="cm", failures=failures, counts=Counter(runs=30))
     }
     done = {task: one for task, one in done.items() if one.model == task.model}
-    assert (study.gather(done).exit_code, len(study.gather(done).scenes)) == (0, MOST_FILES)
+    assert (study.gather(done).exit_code, len(study.gather(done).files)) == (0, MOST_FILES)
     done[lost] = Failure("it hangs")
     found = study.gather(done)
     assert found.exit_code == 1
