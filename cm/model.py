@@ -46,18 +46,20 @@ class ContinuousModel(Frozen):
     model), not to the paper's, whose pivot the floor may pull.
 
     penetration
-        The one target that ties the two numerical knobs, in m: how deep the block sinks when it stands on one corner.
-        The contacts' stiffness per unit mass is k/m = g/penetration. The error falls with the penetration itself without
-        walls, with its root where a wall has restitution (the duration of the contact).
+        The one target that ties the two numerical knobs, in m: how deep the block sinks when it
+        stands on one corner. The contacts' stiffness per unit mass is k/m = g/penetration. The
+        error falls with the penetration itself without walls, with its root where a wall has
+        restitution (the duration of the contact).
     stiffness
         k/m in 1/s^2, in place of that.
     time_step
-        Longest step in s; None means 3/sqrt(k/m), from which on shorter ones change nothing (El Centro, k/m = 9.81e8: 1.4e-6 of
-        alpha from the rigid motion after 12 s; 6.5e-6 at 10, 1.4e-4 at 30 times 1/sqrt(k/m)). Impacts have shorter steps of
-        their own, whatever it is.
+        Longest step in s; None means 3/sqrt(k/m), from which on shorter ones change nothing (El
+        Centro, k/m = 9.81e8: 1.4e-6 of alpha from the rigid motion after 12 s; 6.5e-6 at 10, 1.4e-4
+        at 30 times 1/sqrt(k/m)). Impacts have shorter steps of their own, whatever it is.
     damping_rule
-        "calibrated": a contact that closes is given the damping with which a clamped contact of its effective mass has the
-        scene's restitution (`contact.damping_ratio`, `contact.effective_mass`). "paper": (33) with the whole mass, constant.
+        "calibrated": a contact that closes is given the damping with which a clamped contact of its
+        effective mass has the scene's restitution (`contact.damping_ratio`,
+        `contact.effective_mass`). "paper": (33) with the whole mass, constant.
 
     What the calibration leaves out: slip that stops or turns within an impact (then friction, not
     the spring, decides; up to 0.08 of restitution on floors with restitution), another corner that
@@ -138,9 +140,20 @@ class ContinuousModel(Frozen):
 
         def advance(row: int, rows: int) -> tuple[int, int, int, int, int, float]:
             return kernels.advance(
-                parameters, row, scene.output_step, surfaces, horizontal, horizontal_rate, vertical, vertical_rate,
-                state, memory, friction, output[row : row + rows], events,
-            )  # fmt: skip
+                parameters,
+                row,
+                scene.output_step,
+                surfaces,
+                horizontal,
+                horizontal_rate,
+                vertical,
+                vertical_rate,
+                state,
+                memory,
+                friction,
+                output[row : row + rows],
+                events,
+            )
 
         advance(1, 0)  # compiles, or reads the compiled loop from its cache
         ready, ready_cpu = time.perf_counter(), time.process_time()

@@ -77,7 +77,8 @@ class EventBasedModel(Frozen):
             self._check_bouc_wen(scene)
         if self.friction == "no-slip" and scene.initial_velocity != 0.0:
             raise InputError(
-                f'{scene.initial_velocity:g} is not allowed with friction="no-slip": it never slips',
+                f'{scene.initial_velocity:g} is not allowed with friction="no-slip":'
+                " it never slips",
                 "initial_velocity",
             )
         if self.pivot == "bilateral":

@@ -57,7 +57,10 @@ class MuJoCo(Engine):
         friction, damping = parameters["friction"], parameters["restitution"] / step
         impedance = " ".join(map(repr, IMPEDANCE))
         solref = f"{-PUSHED_OUT / step**2!r} {-damping!r}"
-        settings = f'<option cone="elliptic"/><default><geom solref="{solref}" solimp="{impedance}"/></default>'
+        settings = (
+            '<option cone="elliptic"/>'
+            f'<default><geom solref="{solref}" solimp="{impedance}"/></default>'
+        )
         return _MuJoCoWorld(_stock_model(scene, friction, settings))
 
     def tuned(self, step: float) -> dict[str, float]:
@@ -232,7 +235,8 @@ def _planar_body(scene: Scene, geoms: str, raised: float = 0.0) -> str:
     inertia = scene.block.gyration_squared
     return f"""
 <body pos="0 0 {raised!r}">
-  <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/><joint type="hinge" axis="0 -1 0"/>
+  <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>\
+<joint type="hinge" axis="0 -1 0"/>
   <inertial pos="0 0 0" mass="1" diaginertia="{inertia!r} {inertia!r} {inertia!r}"/>
   {geoms}
 </body>"""
@@ -253,7 +257,10 @@ def _plane(name: str, scene: Scene, inset: float, attributes: str) -> str:
     wall = next(wall for wall in scene.walls if wall.side == name)
     inward = 1.0 if name == "left" else -1.0
     place = -inward * (scene.block.half_width + wall.gap + inset)
-    return f'<geom name="{name}" type="plane" size="0 0 1" pos="{place!r} 0 0" zaxis="{inward!r} 0 0" {attributes}/>'
+    return (
+        f'<geom name="{name}" type="plane" size="0 0 1" pos="{place!r} 0 0"'
+        f' zaxis="{inward!r} 0 0" {attributes}/>'
+    )
 
 
 def _point_contact_model(scene: Scene) -> str:
@@ -281,14 +288,16 @@ def _point_contact_model(scene: Scene) -> str:
     if mu > 0.0:
         kinds["floor"] = f'condim="3" friction="{mu!r} {mu!r} 0 0 0"'
     pairs = "".join(
-        f'<pair geom1="{contact.surface}" geom2="{corners[contact.corner]}" solimp="{impedance}" {kinds[contact.surface]}/>'
+        f'<pair geom1="{contact.surface}" geom2="{corners[contact.corner]}"'
+        f' solimp="{impedance}" {kinds[contact.surface]}/>'
         for contact in contacts
     )
     # Without warm start Newton's method needs fewer iterations, and it does not get stuck on the
     # edge of a stiff cone. The 50 iterations of a line search that MuJoCo allows are too few there:
     # Newton's method would stop short of its solution.
     settings = f"""
-<option integrator="Euler" cone="elliptic" impratio="1" jacobian="dense" solver="Newton" iterations="100" tolerance="1e-15"
+<option integrator="Euler" cone="elliptic" impratio="1" jacobian="dense" solver="Newton" \
+iterations="100" tolerance="1e-15"
   ls_tolerance="1e-6" ls_iterations="200"><flag island="disable" warmstart="disable"/></option>
 <contact>{pairs}</contact>"""
     return _model(planes + _planar_body(scene, spheres, CORNER_RADIUS), settings)

@@ -13,7 +13,9 @@ from rockcheck.engines.world import State, World
 from rockcheck.scenes import Scene
 
 FloatArray = NDArray[np.float64]
-SLAB = 10.0  # half the thickness of floor and walls: Chipmunk's normals are exact where shapes do not cross each other's middle
+# half the thickness of floor and walls: Chipmunk's normals are exact where shapes do not cross each
+# other's middle
+SLAB = 10.0
 REACH = 1000.0  # half their extent
 KEPT = 0.5  # share of a penetration that is left after a second
 ITERATIONS = 200

@@ -24,7 +24,9 @@ Base = tuple[Floats, float, float]
 
 # Lengths in units of the block's radius R, times in units of 1/p.
 CLOSED = 5e-9  # a corner nearer than this touches
-DRIFT = 3e-6  # of the longest step: a corner that rests may leave its surface by so much in one, and touches from there if it is more
+# of the longest step: a corner that rests may leave its surface by so much in one, and touches from
+# there if it is more
+DRIFT = 3e-6
 EMBEDDED = 5e-10  # how deep the engine sees a corner that touches
 PROBE_STEP = 6e-5  # the longest step where the acceleration is not known, that is, after an event
 # an impact takes one: its time is wrong by so much, its place by what the block moves in it
@@ -33,7 +35,9 @@ LONG_APPROACH = 6e-4  # from farther away the prediction of an event is only tru
 RESTING = (
     0.001  # of g times the longest step: slower approaches and departures are not told from rest
 )
-TOGETHER = 20.0  # of corners that strike at one moment, one may be so many times as fast as another: the slenderness of a slender block
+# of corners that strike at one moment, one may be so many times as fast as another: the slenderness
+# of a slender block
+TOGETHER = 20.0
 SETTLING_GAP = 2e-6
 # A corner that leaves and is back within twice this share of a step is taken to stay: of the
 # longest step, after an event of a probe.
@@ -291,9 +295,18 @@ def plan(
 
 @kernel
 def step(
-    run: March, corners: Floats, starts: Floats, across: Base, up: Base, limits: Limits, end: float,
-    kicked_x: float, kicked_y: float, kicked_w: float, row: Floats,
-) -> int:  # fmt: skip
+    run: March,
+    corners: Floats,
+    starts: Floats,
+    across: Base,
+    up: Base,
+    limits: Limits,
+    end: float,
+    kicked_x: float,
+    kicked_y: float,
+    kicked_w: float,
+    row: Floats,
+) -> int:
     """Ends the step with the velocity that the engine gave, writes its `row`, and plans the next
     one; LOST where it has blown up."""
     z, dt = run.state, run.asked[DT]

@@ -334,7 +334,10 @@ def _cloud(ax: Axes, samples: Samples, color: str) -> None:
     ax.set_ylim(LEAST * 0.8, fallen * 1.5)
     close = samples.log_ratios()
     if len(close) > 1:
-        words = f"ln ratio {np.mean(close):+.2g} ± {np.std(close, ddof=1):.2g}\n{len(close)} above {SMALLEST_PEAK:g}"
+        words = (
+            f"ln ratio {np.mean(close):+.2g} ± {np.std(close, ddof=1):.2g}\n"
+            f"{len(close)} above {SMALLEST_PEAK:g}"
+        )
         ax.text(
             0.97,
             0.03,

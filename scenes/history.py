@@ -188,13 +188,14 @@ class History(Shown):
 
         | ending | what is written |
         |---|---|
-        | .csv | the table, with outcome, model, block and settings in the first row of its last column; `<stem>.events.csv` beside it |
+        | .csv | the table, the rest in the first row of its last column; and `<stem>.events.csv` |
         | .csv.gz | the same two files compressed; `pandas.read_csv` opens them as they are |
-        | .json | {"outcome", "model", "settings", ..., "channels": {name: [...]}, "events": {column: [...]}} |
+        | .json | {"outcome", "model", ..., "channels": {name: [...]}, "events": {column: [...]}} |
         | .mat | the same as a MATLAB file: structures `about`, `channels` and `events` |
-        | .parquet | the table, the rest in the frame's `attrs`; `<stem>.events.parquet` beside it; needs the package pyarrow |
+        | .parquet | the table, the rest in the frame's `attrs`; `<stem>.events.parquet` beside it |
 
-        All is written whole, or nothing is touched. `load` reads the CSV, compressed or not. Raises
+        The rest is outcome, model, block and settings. Parquet needs the package pyarrow. All is
+        written whole, or nothing is touched. `load` reads the CSV, compressed or not. Raises
         `InputError` for another ending, and `OSError` that names the file which cannot be written.
         """
         path = Path(path)

@@ -130,7 +130,10 @@ EQUIVALENT = {
         "validation/uncertainty/numerical.py",
         "(1.0, 2.0, ",
         "1.0  ->  100.0",
-    ): "the finest run is the one at the model's own step: only the factors of the coarser ones are used",
+    ): (
+        "the finest run is the one at the model's own step: only the factors of the coarser ones"
+        " are used"
+    ),
     (
         "validation/uncertainty/numerical.py",
         "largest <= ROUNDING",
@@ -170,7 +173,10 @@ EQUIVALENT = {
         "ebm/core/laws/impacts.py",
         "-1.0 if q > 0.0",
         "-1.0  ->  1.0",
-    ): "at most one of the two slips is consistent up to friction 4/3, so that it does not matter which is tried first",
+    ): (
+        "at most one of the two slips is consistent up to friction 4/3, so that it does not matter"
+        " which is tried first"
+    ),
     (
         "ebm/core/laws/contact_impacts.py",
         "_MOST_STAGES = 40",
@@ -228,9 +234,19 @@ EQUIVALENT = {
 #: Names of numbers that are 1 or -1.
 SIGNS = {"S", "S1", "S2", "Sw", "Sr", "sy", "d", "sense", "side", "sign"}
 SWAPS: dict[type, type] = {
-    ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
-    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.And: ast.Or, ast.Or: ast.And,
-}  # fmt: skip
+    ast.Lt: ast.LtE,
+    ast.LtE: ast.Lt,
+    ast.Gt: ast.GtE,
+    ast.GtE: ast.Gt,
+    ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq,
+    ast.Add: ast.Sub,
+    ast.Sub: ast.Add,
+    ast.Mult: ast.Div,
+    ast.Div: ast.Mult,
+    ast.And: ast.Or,
+    ast.Or: ast.And,
+}
 
 
 def changed(node: ast.AST) -> Iterator[ast.AST]:

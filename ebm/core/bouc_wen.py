@@ -160,7 +160,8 @@ def friction_series(b, m, z, zeta, yielded, yield_displacement, gh, gv, t, order
     tip or far wall, else 0, C = Sw c', J = I + C^2, f = u - Sw s' w^2, g = G0 - c w^2 and k = mu_k
     z sgn P,
 
-        P = (g J - s C f) / (J + s^2 + k s (c + C)),   Q = -k P,   J theta'' = -s P + (c + C) Q - C f,
+        P = (g J - s C f) / (J + s^2 + k s (c + C)),   Q = -k P,
+        J theta'' = -s P + (c + C) Q - C f,
 
     which is (7), (8) with z for d where Sw = 0, and LADDER with z for d otherwise. Flat: P = G0,
     x'' = Q - u.
@@ -547,9 +548,9 @@ def locate(b, m, order, h, slack, a, stack):
     """The first event of the step, as with Coulomb's friction; one more is that z comes to the sign
     of V, from where the pivot loads."""
     fill_guards(b, m, 0.0, a)
-    if (
-        m[FAMILY] == TILT
-    ):  # the friction of a wedged block, which does not slip, is what z makes it: it has no cone to leave
+    # The friction of a wedged block, which does not slip, is what z makes it: it has no cone to
+    # leave.
+    if m[FAMILY] == TILT:
         drop(a, G_CONE_PLUS)
         drop(a, G_CONE_MINUS)
     tau, which = first_event(order, h, slack, a, stack)

@@ -281,7 +281,9 @@ def _possible(b, m, z, v, floor, walls):
             return False
         v = z[VX]
     elif m[FLOOR] == STICK and mine == 2 and z[THETA] * z[THETA] < CLOSED:
-        return False  # near phi = 0 the far gap goes with phi^2: it lands along that wall, and does not lean on it
+        # Near phi = 0 the far gap goes with phi^2: it lands along that wall, and does not lean on
+        # it.
+        return False
     else:
         v = m[S] * (v if mine == 0 else z[W])  # along a wall the pivot slips as the block turns
     return m[FLOOR] == OFF or (v == 0.0 if m[FLOOR] == STICK else m[SLIP] * v >= 0.0)
@@ -342,7 +344,9 @@ def select(b, z, gh, gv, t, m, tried, memory, rules, a):
             walls = (near if _CANDIDATES[number, 1] > 0 else away) if tilts else upright_walls
             touched = walls if tilts or first > 0 else walls >> 1 | (walls & 1) << 1
             if _CANDIDATES[number, 5] & ~touched or (tilts and favoured == 0):
-                continue  # it does not lean on a wall that it does not touch; where nothing tells left from right it does not tilt
+                # It does not lean on a wall that it does not touch; where nothing tells left from
+                # right it does not tilt.
+                continue
             _write(number, first, m)
             if tried[code_of(m)] != again or not _possible(b, m, z, v, floor, walls):
                 continue

@@ -15,8 +15,8 @@ homogeneous block 1 and its slenderness, whichever the corner), the contacts are
 
     pivot on the floor, normal     gap  y - c                 force P along (0, 1, -s)
     pivot on the floor, tangent    slip xi - s                force Q along (1, 0, c)
-    tip wall: top corner           gap  xi + delta_a - s'     force N_a along (1, 0, -c')     (case I)
-    far wall: lifted bottom corner gap  delta_b - xi - s'     force N_b along (-1, 0, -c')    (case II)
+    tip wall: top corner           gap  xi + delta_a - s'     force N_a along (1, 0, -c')  (case I)
+    far wall: lifted bottom corner gap  delta_b - xi - s'     force N_b along (-1, 0, -c') (case II)
 
 where a triple gives the force on xi, y and the moment about the centroid (relative to unit force),
 and also the row of the constraint. A slipping pivot adds Q = -mu_k d |P|. Newton-Euler with these

@@ -43,7 +43,10 @@ def html_table(caption: str, rows: Iterable[Sequence[object]], head: Sequence[ob
     column, row_name = 'th scope="col"', 'th scope="row"'
     lines = [line(head, column, column)] if head else []
     lines += [line(row, "td" if head else row_name, "td") for row in rows]
-    return f'<table><caption style="text-align: left"><b>{escape(inert(caption))}</b></caption>{"".join(lines)}</table>'
+    return (
+        f'<table><caption style="text-align: left"><b>{escape(inert(caption))}</b></caption>'
+        f"{''.join(lines)}</table>"
+    )
 
 
 def excitation_words(excitation: Rest | Ricker | Sine | Record) -> str:
@@ -52,9 +55,15 @@ def excitation_words(excitation: Rest | Ricker | Sine | Record) -> str:
         return f"{excitation.source} × {number(excitation.scale)}, peak {number(excitation.peak)} g"
     if isinstance(excitation, Ricker):
         shape = "symmetric" if excitation.symmetric else "antisymmetric"
-        return f"{shape} Ricker pulse, {number(excitation.amplitude)} m/s², period {number(excitation.period)} s"
+        return (
+            f"{shape} Ricker pulse, {number(excitation.amplitude)} m/s²,"
+            f" period {number(excitation.period)} s"
+        )
     if isinstance(excitation, Sine):
-        return f"sine, {number(excitation.amplitude)} m/s², period {number(excitation.period)} s, {excitation.cycles} cycles"
+        return (
+            f"sine, {number(excitation.amplitude)} m/s²,"
+            f" period {number(excitation.period)} s, {excitation.cycles} cycles"
+        )
     return "at rest"
 
 
@@ -98,7 +107,10 @@ def mass_facts(block: Block) -> list[tuple[str, str]]:
     if block.homogeneous:
         return []
     (x, z), left, right = block.offset, block.pivot("left"), block.pivot("right")
-    place = f"{number(abs(x))} m {'right' if x >= 0.0 else 'left'} of the box's, {number(abs(z))} m {'above' if z >= 0.0 else 'below'} it"
+    place = (
+        f"{number(abs(x))} m {'right' if x >= 0.0 else 'left'} of the box's,"
+        f" {number(abs(z))} m {'above' if z >= 0.0 else 'below'} it"
+    )
     gyration = f"radius of gyration {number(math.sqrt(block.gyration_squared))} m"
     return [
         ("mass's centre", f"{place}; {gyration}"),

@@ -92,7 +92,8 @@ def run(
         list[str] | None,
         typer.Option(
             "--records",
-            help="Of a scene: files, folders or patterns, each played in place of its excitation; repeatable.",
+            help="Of a scene: files, folders or patterns, each played in place of its excitation;"
+            " repeatable.",
         ),
     ] = None,
     read: ReadOption = None,
@@ -106,7 +107,8 @@ def run(
         Strictness | None,
         typer.Option(
             "--strict",
-            help="Figures that left their drift band for the worse fail; with `--strict both` better ones, too.",
+            help="Figures that left their drift band for the worse fail; with `--strict both`"
+            " better ones, too.",
         ),
     ] = None,
     scheduler: SchedulerOption = None,

@@ -6,7 +6,7 @@
 | COSMOS V2, CSMIP V2 | `.V2` | points, format, unit, time step; one or several channels |
 | ESM (DYNA 1.2) | `.ASC` | NDATA, SAMPLING_INTERVAL_S, UNITS |
 | K-NET, KiK-net | `.NS`, `.EW1`, ... | Scale Factor, Sampling Freq(Hz), Duration Time(s) |
-| CSV | any | columns `time_s` and `acceleration_g`, `_m_s2`, `_cm_s2`, `_gal`, `_mm_s2` or `_ft_s2` |
+| CSV | any | `time_s` and `acceleration_g`, `_m_s2`, `_cm_s2`, `_gal`, `_mm_s2` or `_ft_s2` |
 | columns of text | any | whatever is not there is an option of `Reading` |
 
 A format is known by what the file holds; `.AT2` and `.csv` by the name. Every reader takes time in

@@ -21,7 +21,8 @@ _VERTICAL = re.compile(
 _KIKNET = ("3", "6")
 #: The part of a file's name that says so, with its sign before it.
 _UPWARD = re.compile(
-    r"(?:^|[-_. ])(?:up|dn|dwn|down|u-?d|vertical|vert|vrt|ver|[HBES][NLGH]Z|[VZ])(?=\d?(?:[-_. ]|$))",
+    r"(?:^|[-_. ])(?:up|dn|dwn|down|u-?d|vertical|vert|vrt|ver|[HBES][NLGH]Z|[VZ])"
+    r"(?=\d?(?:[-_. ]|$))",
     re.IGNORECASE,
 )
 

@@ -3,9 +3,9 @@
 | written | meaning |
 |---|---|
 | `{ value = 0.3, sd = 0.03 }` | normal: mean and standard deviation |
-| `{ value = 0.3, sd = 0.03, distribution = "lognormal" }` | lognormal with that mean and standard deviation: always positive |
-| `{ value = 0.3, sd = 0.03, distribution = "uniform" }` | uniform with that mean and standard deviation |
-| `{ low = 0.0, high = 0.1 }` | uniform between two bounds; `value` is the middle unless it is given |
+| `{ value = 0.3, sd = 0.03, distribution = "lognormal" }` | lognormal of that mean and sd, > 0 |
+| `{ value = 0.3, sd = 0.03, distribution = "uniform" }` | uniform of that mean and sd |
+| `{ low = 0.0, high = 0.1 }` | uniform between these; `value` is the middle unless it is given |
 
 Any number of a scene can be written so. `load_scene` takes the values; `load_uncertain_scene` also
 says what is not known. Numbers are independent unless a table `[correlation]` says otherwise:
@@ -139,7 +139,8 @@ class UncertainScene:
             )
         except InputError as error:
             raise InputError(
-                f'{error}; a sample of the scene\'s inputs: distribution = "lognormal" or bounds keep it inside'
+                f"{error}; a sample of the scene's inputs:"
+                ' distribution = "lognormal" or bounds keep it inside'
             ) from None
 
 

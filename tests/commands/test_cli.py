@@ -165,7 +165,10 @@ duration = 0.2
 block = { half_width = 0.4, half_height = 1.5 }
 floor = { friction = 0.5 }
 """
-    line = "[tolerances.short.near.still]\ntheta_peak = { expected = 0.0038, limit = %s, drift = 0.0001, why = 'a test' }\n"
+    line = (
+        "[tolerances.short.near.still]\n"
+        "theta_peak = { expected = 0.0038, limit = %s, drift = 0.0001, why = 'a test' }\n"
+    )
     expected = {"0.01": 0, "0.001": 1}
     for limit, code in expected.items():
         write("mine.toml", suite + line % limit)

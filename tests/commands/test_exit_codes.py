@@ -51,9 +51,9 @@ def test_a_fault_that_cannot_be_written_down_is_told(monkeypatch, capsys):
     monkeypatch.setattr("tempfile.mkstemp", full)
     assert main(["scenes"]) == 70
     (line,) = capsys.readouterr().err.splitlines()
-    assert (
-        line
-        == "rockcheck: a fault of rockcheck itself, RecursionError: please report it with this: too deep"
+    assert line == (
+        "rockcheck: a fault of rockcheck itself, RecursionError:"
+        " please report it with this: too deep"
     )
 
 

@@ -131,9 +131,9 @@ def test_a_scene_is_no_suite(type_):
 )
 def test_an_option_given_twice_is_refused(type_, words):
     _, err = type_(*words, code=2)
-    assert (
-        err
-        == f"rockcheck: {words[3] if words[0] == 'compare' else words[2]}: is given twice: give one value\n"
+    assert err == (
+        f"rockcheck: {words[3] if words[0] == 'compare' else words[2]}:"
+        " is given twice: give one value\n"
     )
 
 
@@ -146,9 +146,9 @@ def test_without_a_model_the_reference_plays(type_):
 
 def test_what_is_no_format_of_a_history_is_refused_before_the_run(type_):
     _, err = type_("simulate", "fig5a", "-o", "x.xlsx", code=2)
-    assert (
-        err
-        == "rockcheck: x.xlsx: a history is written as .csv, .csv.gz, .json, .mat or .parquet, not as .xlsx\n"
+    assert err == (
+        "rockcheck: x.xlsx: a history is written as .csv, .csv.gz, .json, .mat or .parquet,"
+        " not as .xlsx\n"
     )
     assert not Path("x.xlsx").exists()
 

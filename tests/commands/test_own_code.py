@@ -147,7 +147,10 @@ def test_what_is_allowed_must_be_a_model(capsys, model, said):
 
 def test_an_allowed_model_is_imported_by_a_worker_only(folder):
     """Its code is read to see whether it changed, not run, by the process of the command itself."""
-    script = "import os, sys; from rockcheck.commands.cli import main; code = main(sys.argv[1:]); print(os.getpid(), code)"
+    script = (
+        "import os, sys; from rockcheck.commands.cli import main;"
+        " code = main(sys.argv[1:]); print(os.getpid(), code)"
+    )
     (folder / "mine.toml").write_text(SUITE.replace("{model}", "spy:Told") + SCENE)
     for n, words in enumerate(
         (
@@ -249,13 +252,17 @@ sys.exit(cli.main(sys.argv[1:]))
 #: Modules that may unpickle or import by a name, and why.
 UNPICKLE = {
     "scenes/compiled.py": "the user's own private folder, owner and mode checked, each file hashed",
-    "validation/execute/remote.py": "tasks between the workers of one's own cluster and their children",
+    "validation/execute/remote.py": (
+        "tasks between the workers of one's own cluster and their children"
+    ),
 }
 IMPORT = {
     "rockcheck/__init__.py": "the public names",
     "rockcheck/commands/cli.py": "rockcheck's own commands",
     "reports/drawers.py": "rockcheck's own drawers, by the kind of a plot",
-    "validation/execute/models.py": "models by rockcheck's own names; one's own only as the command line allows, in a worker",
+    "validation/execute/models.py": (
+        "models by rockcheck's own names; one's own only as the command line allows, in a worker"
+    ),
 }
 
 

@@ -37,7 +37,10 @@ def motion(gain: float) -> np.ndarray:
 
 def at2(name: str, gain: float, component: str) -> None:
     values = " ".join(f"{a:.8e}" for a in motion(gain))
-    head = f"PEER NGA\nSomewhere, 1/1/2000, Station, {component}\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 101, DT= .02 SEC\n"
+    head = (
+        f"PEER NGA\nSomewhere, 1/1/2000, Station, {component}\n"
+        "ACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 101, DT= .02 SEC\n"
+    )
     Path(name).write_text(head + values + "\n", encoding="utf-8")
 
 
@@ -114,7 +117,11 @@ def test_the_vertical_component_of_a_file_goes_with_its_others(told, capsys):
         values = "".join(
             f"{981 * a:10.4f}" + "\n" * (n % 8 == 7) for n, a in enumerate(motion(gain))
         )
-        text += f"Corrected data\nChan  1: {name}\n  101 points of accel data equally spaced at   .020 sec, in cm/sec2. (8f10.4)\n{values}\n"
+        text += (
+            f"Corrected data\nChan  1: {name}\n"
+            "  101 points of accel data equally spaced at   .020 sec, in cm/sec2. (8f10.4)\n"
+            f"{values}\n"
+        )
     Path("two.v2").write_text(text, encoding="utf-8")
     words = ("validate", "rack.toml", "--records", "two.v2", "--read", "scale=2", *STILL)
     assert told(*words)["left_out"] == ["two.v2 Up"]

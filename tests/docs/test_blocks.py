@@ -5,8 +5,8 @@
 - bash, and indented commands: run; one that fails, fails the page. `make` targets are looked up
   instead of run.
 - an HTML comment that begins with `check`: executed after the blocks before it, and not shown to a
-  reader. It computes figures that the
-  page states: `said("within 0.008")` holds the page to its words, an assertion holds the words to what comes out.
+  reader. It computes figures that the page states: `said("within 0.008")` holds the page to its
+  words, an assertion holds the words to what comes out.
 
 Pages of studies hold commands of many minutes; these are run with `@pytest.mark.slow`, the longest
 in their `--quick` form.

@@ -613,8 +613,8 @@ def test_series_begin_with_the_closed_forms(name, side, case):
         push = a[motion.NA, 0] + a[motion.NB, 0] if mode.Sw else 0.0
         found = [x2, S * a[motion.OMEGA, 1], a[motion.P, 0], S * a[motion.Q, 0], push]
         scale = 1.0 + np.abs(expected).max()
-        if (
-            name == "lean"
-        ):  # the forces of a block that leans on its own pivot's side are as ill-conditioned as 1/(c + C)
+        # The forces of a block that leans on its own pivot's side are as ill-conditioned as
+        # 1/(c + C).
+        if name == "lean":
             scale /= c + paper.C(S, y)
         np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * scale)

@@ -296,9 +296,9 @@ def test_series_begin_with_newton_and_euler(mode, case):
             pivot.radius * math.sin(pivot.alpha - abs(theta)),
             pivot.radius * math.cos(pivot.alpha - abs(theta)),
         )
-        if (
-            mode == "ladder"
-        ):  # the corner keeps to the wall: the centre's velocity is that of the turn, and the slip's sense too
+        # The corner keeps to the wall: the centre's velocity is that of the turn, and the slip's
+        # sense too.
+        if mode == "ladder":
             dx, dz = block.offset
             top = h - dz if wall == S else -h - dz
             vx = w * (math.sin(theta) * (-wall * b - dx) + math.cos(theta) * top)

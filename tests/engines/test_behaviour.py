@@ -64,7 +64,8 @@ def test_a_run_prints_nothing():
     code = """
 from rockcheck import engines
 from rockcheck.scenes import Block, Floor, Scene
-scene = Scene(name="quiet", block=Block(half_width=0.4, half_height=1.5), floor=Floor(friction=0.3), duration=0.01)
+scene = Scene(name="quiet", block=Block(half_width=0.4, half_height=1.5), \
+floor=Floor(friction=0.3), duration=0.01)
 for engine in (getattr(engines, name) for name in engines.__all__):
     if engine.installed():
         for settings in ("best", "default"):

@@ -249,7 +249,10 @@ def test_what_is_no_scene_or_history_is_named(call, key, wanted):
 
 
 def test_importing_rockcheck_loads_nothing_heavy():
-    code = "import sys, rockcheck; print(sorted({'numpy', 'numba', 'pandas', 'pydantic', 'mujoco'} & set(sys.modules)))"
+    code = (
+        "import sys, rockcheck;"
+        " print(sorted({'numpy', 'numba', 'pandas', 'pydantic', 'mujoco'} & set(sys.modules)))"
+    )
     assert (
         subprocess.run(
             [sys.executable, "-c", code], capture_output=True, text=True, check=True
@@ -259,7 +262,10 @@ def test_importing_rockcheck_loads_nothing_heavy():
 
 
 def test_the_plugin_loads_nothing_of_rockcheck():
-    code = "import sys, rockcheck.plugin; print(sorted(m for m in sys.modules if m.startswith('rockcheck')))"
+    code = (
+        "import sys, rockcheck.plugin;"
+        " print(sorted(m for m in sys.modules if m.startswith('rockcheck')))"
+    )
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.strip()

@@ -109,7 +109,10 @@ def test_every_link_leads_to_a_file(visit: Visit) -> None:
 
 def test_the_index_is_filtered_and_sorted(visit: Visit) -> None:
     page = visit.open("index.html")
-    shown = "[...document.querySelectorAll('#matrix tbody tr:not([hidden])')].map(row => row.dataset.scene)"
+    shown = (
+        "[...document.querySelectorAll('#matrix tbody tr:not([hidden])')]"
+        ".map(row => row.dataset.scene)"
+    )
     assert page.evaluate(shown) == ["free", "beside a wall", "Free"]
     page.locator("#pick [name=order]").select_option("worst")
     assert page.evaluate(shown)[:2] == ["Free", "beside a wall"]

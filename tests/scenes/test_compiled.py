@@ -51,7 +51,8 @@ if __name__ == "__main__":
     assert doubled(np.array([1.0, 2.0])) == 6.0
     assert doubled(np.array([1.0, 2.0], dtype=np.float32)) == 6.0
     stats = getattr(doubled, "stats", None)
-    print("interpreted" if stats is None else f"{sum(stats.cache_hits.values())} read, {sum(stats.cache_misses.values())} compiled")
+    print("interpreted" if stats is None else \
+f"{sum(stats.cache_hits.values())} read, {sum(stats.cache_misses.values())} compiled")
 """
 
 
@@ -220,9 +221,9 @@ def test_a_folder_that_others_may_change_is_not_used(tmp_path, play, fault):
     else:
         folder.parent.chmod(0o777)
     said = play("0 read, 2 compiled")
-    assert (
-        said
-        == "rockcheck: no private folder for compiled code, each run compiles anew: set NUMBA_CACHE_DIR to one of your own\n"
+    assert said == (
+        "rockcheck: no private folder for compiled code, each run compiles anew:"
+        " set NUMBA_CACHE_DIR to one of your own\n"
     )
 
 
@@ -254,8 +255,14 @@ def test_without_the_compiler(play):
 
 def test_everything_can_be_imported_without_the_compiler():
     """NUMBA_DISABLE_JIT=1, as for a debugger."""
-    imports = "import rockcheck, rockcheck.ebm, rockcheck.cm, rockcheck.engines, rockcheck.ebm.core.bouc_wen"
-    play = "scene = rockcheck.load_scene('fig4a').replace(duration=0.2); print(rockcheck.EventBasedModel().simulate(scene).outcome)"
+    imports = (
+        "import rockcheck, rockcheck.ebm, rockcheck.cm, rockcheck.engines,"
+        " rockcheck.ebm.core.bouc_wen"
+    )
+    play = (
+        "scene = rockcheck.load_scene('fig4a').replace(duration=0.2);"
+        " print(rockcheck.EventBasedModel().simulate(scene).outcome)"
+    )
     command = [sys.executable, "-c", f"{imports}; {play}"]
     done = subprocess.run(
         command,

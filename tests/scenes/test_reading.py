@@ -65,7 +65,8 @@ from rockcheck.validation.discrepancy.measured import read_measured
 used = resource.getrusage(resource.RUSAGE_SELF).ru_utime
 resource.setrlimit(resource.RLIMIT_CPU, (int(used) + 10,) * 2)
 path = Path(sys.argv[1])
-for read in {".toml": [read_toml], ".csv": [read_record, History.load, read_measured]}.get(path.suffix, [read_record]):
+for read in {".toml": [read_toml], ".csv": [read_record, History.load, read_measured]}\
+.get(path.suffix, [read_record]):
     try:
         read(path)
     except InputError as error:
@@ -144,7 +145,10 @@ def test_words_are_no_numbers_and_rows_are_lines(tmp_path, text, said):
 
 def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
     """As some editors write it: scene, suite, record and history are read as without it."""
-    scene = 'duration = 1.0\nblock = { half_width = 0.3, half_height = 1.0 }\nfloor = { friction = 0.4 }\nname = "a"\n'
+    scene = (
+        "duration = 1.0\nblock = { half_width = 0.3, half_height = 1.0 }\n"
+        'floor = { friction = 0.4 }\nname = "a"\n'
+    )
     (tmp_path / "a.toml").write_text(scene, encoding="utf-8-sig")
     assert load_scene(tmp_path / "a.toml").name == "a"
     (tmp_path / "a.csv").write_text(

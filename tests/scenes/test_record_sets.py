@@ -29,7 +29,11 @@ def channels(path, **gains):
     text = ""
     for name, gain in gains.items():
         values = "".join(f"{100 * gain * a:10.4f}" for a in (0, 1, -1, 0, 0, 0, 0, 0))
-        text += f"Corrected data\nChan  1: {name}\n    8 points of accel data equally spaced at   .020 sec, in cm/sec2. (8f10.4)\n{values}\n"
+        text += (
+            f"Corrected data\nChan  1: {name}\n"
+            "    8 points of accel data equally spaced at   .020 sec, in cm/sec2. (8f10.4)\n"
+            f"{values}\n"
+        )
     path.write_text(text, encoding="utf-8")
     return path
 

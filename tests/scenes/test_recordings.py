@@ -42,7 +42,10 @@ def _fixed(values: NDArray[np.float64], across: int, form: str) -> str:
 def at2(component: str, header: str = "NPTS=  {n}, DT= {dt:.4f} SEC,") -> bytes:
     values = motion(component) / G
     head = header.format(n=len(values), dt=STEP)
-    text = f"PEER NGA STRONG MOTION DATABASE RECORD\nM\xe9xico, 9/19/1985, {component}\nACCELERATION TIME SERIES IN UNITS OF G\n{head}\n"
+    text = (
+        f"PEER NGA STRONG MOTION DATABASE RECORD\nM\xe9xico, 9/19/1985, {component}\n"
+        f"ACCELERATION TIME SERIES IN UNITS OF G\n{head}\n"
+    )
     return (text + _fixed(values, 5, "15.7E")).encode("latin-1")
 
 
@@ -64,7 +67,8 @@ def _cosmos_channel(component: str) -> str:
         + " 100 Real-header values follow on  17 lines, Format= (6F13.6)\n"
         + _fixed(np.array(reals), 6, "13.6f")
         + '   2 Comment lines follow, each starting with a "|":\n| a remark\n| accel of another\n'
-        + f"    {len(values)} acceleration pts, approx    4 secs, units=cm/sec2 (04),Format=(8F10.5)\n"
+        + f"    {len(values)} acceleration pts, approx    4 secs, units=cm/sec2 (04),"
+        "Format=(8F10.5)\n"
         + _fixed(values, 8, "10.5f")
         + f"    {len(values)} velocity pts, approx    4 secs, units=cm/sec (05),Format=(8F10.5)\n"
         + _fixed(values * 0 + 999.0, 8, "10.5f")
@@ -233,7 +237,8 @@ def test_several_components_in_one_file(write, names, tmp_path, capsys):
         np.testing.assert_allclose(one.samples, motion(component), atol=1.01e-7)
     with pytest.raises(
         InputError,
-        match=r"3 components, 1 '360 .eg', .* give one: --read component=1 \(in a scene file: component = 1\)",
+        match=r"3 components, 1 '360 .eg', .* give one:"
+        r" --read component=1 \(in a scene file: component = 1\)",
     ):
         Record.from_file(path)
     assert Record.from_file(path, component=2).peak == pytest.approx(0.27, abs=1e-7)
@@ -322,7 +327,8 @@ def test_tables(text, options, samples, step, tmp_path):
         (
             "0 1\n0.5 2\n",
             {},
-            'the unit of acceleration is not stated; give it: --read unit=g (in a scene file: unit = "g")',
+            "the unit of acceleration is not stated; give it:"
+            ' --read unit=g (in a scene file: unit = "g")',
         ),
         (
             "1\n2\n",
@@ -551,7 +557,10 @@ def run_together(
     )
     words = [format(value, form)[-width:].rjust(width) for value in values]
     lines = ["".join(words[k : k + across]) for k in range(0, count, across)]
-    head = f"PEER\nA, 1/1/2000, B, 180\nACCELERATION TIME SERIES IN UNITS OF {unit}\nNPTS= {count}, DT= .01 SEC\n"
+    head = (
+        f"PEER\nA, 1/1/2000, B, 180\nACCELERATION TIME SERIES IN UNITS OF {unit}\n"
+        f"NPTS= {count}, DT= .01 SEC\n"
+    )
     return head + "\n".join(lines) + "\n", np.array([float(word) for word in words])
 
 

@@ -11,7 +11,10 @@ import pytest
 from rockcheck.scenes import InputError, Record
 
 G = 9.80665
-NAMED = "PEER STRONG MOTION DATABASE RECORD\nSomewhere, 1/1/2000\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS=  {npts}, DT= {dt} SEC\n"
+NAMED = (
+    "PEER STRONG MOTION DATABASE RECORD\nSomewhere, 1/1/2000\n"
+    "ACCELERATION TIME SERIES IN UNITS OF G\nNPTS=  {npts}, DT= {dt} SEC\n"
+)
 PLAIN = "PEER\nSomewhere\nACCELERATION TIME HISTORY IN UNITS OF G\n {npts}  {dt}  NPTS, DT\n"
 
 
@@ -119,7 +122,10 @@ def test_genuine_peer_files(component, count, peak):
 @pytest.mark.parametrize("end", ["\n", "\r\n"], ids=["LF", "CRLF"])
 @pytest.mark.parametrize(("column", "factor"), [("acceleration_g", G), ("acceleration_m_s2", 1.0)])
 def test_csv(column, factor, end, tmp_path):
-    text = f"# a remark\nstation,time_s , {column}\nA,0.00,0.0\n\nA,0.02,1.0e-1\n# another\nA,0.04,-.2\n"
+    text = (
+        f"# a remark\nstation,time_s , {column}\n"
+        "A,0.00,0.0\n\nA,0.02,1.0e-1\n# another\nA,0.04,-.2\n"
+    )
     record = Record.from_file(written(tmp_path, text.replace("\n", end), "motion.csv"))
     np.testing.assert_allclose(record.samples, np.array([0.0, 0.1, -0.2]) * factor, rtol=1e-15)
     assert record.time_step == 0.02

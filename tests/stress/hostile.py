@@ -125,7 +125,11 @@ from rockcheck.commands.cli import main
 sys.exit(main(sys.argv[3:]))
 """
 ROCKCHECK = (sys.executable, "-m", "rockcheck")
-SPY = "from pathlib import Path\n(Path(__file__).parent / 'imported').write_text('')\nclass Told: pass\n"
+SPY = (
+    "from pathlib import Path\n"
+    "(Path(__file__).parent / 'imported').write_text('')\n"
+    "class Told: pass\n"
+)
 
 
 @dataclass(frozen=True)
@@ -161,7 +165,10 @@ def cases() -> Iterator[Case]:
                 lambda folder, t=text: (folder / "a.toml").write_text(t),
             )
     for name in CODE:
-        text = f'reference = "ebm"\nscenes = ["a.toml"]\n[models.ebm]\n[models.x]\nmodel = "{name}"\ncommand = "touch imported"\n'
+        text = (
+            'reference = "ebm"\nscenes = ["a.toml"]\n[models.ebm]\n'
+            f'[models.x]\nmodel = "{name}"\ncommand = "touch imported"\n'
+        )
         yield Case(
             f"code: {name}",
             ("validate", "s.toml"),

@@ -67,7 +67,10 @@ V2 = """Corrected accelerogram   89146-L2500-12044.02       Chan  1: 360 Deg    
  3 points of accel data equally spaced at  .005 sec, in cm/sec2. (8f10.6)
   -.000010  -.000009  -.000010
 """
-ESM = "EVENT_NAME: X\nSAMPLING_INTERVAL_S: 0.005000\nNDATA: 3\nSTREAM: HNN\nUNITS: cm/s^2\nDATA_TYPE: ACCELERATION\n0.1\n-0.2\n0.3\n"
+ESM = (
+    "EVENT_NAME: X\nSAMPLING_INTERVAL_S: 0.005000\nNDATA: 3\nSTREAM: HNN\nUNITS: cm/s^2\n"
+    "DATA_TYPE: ACCELERATION\n0.1\n-0.2\n0.3\n"
+)
 KNET = """Origin Time       2011/03/11 14:46:00
 Sampling Freq(Hz) 100Hz
 Duration Time(s)  .08
@@ -458,7 +461,8 @@ for path in sorted(Path(sys.argv[1]).iterdir()):
     began = time.monotonic()
     if path.suffix == ".toml":
         for model in ("ebm", "ebm-unilateral"):
-            assert main(["simulate", str(path), "--model", model, "-o", str(Path(sys.argv[2]) / "o.csv")]) in (0, 2, 3), path
+            assert main(["simulate", str(path), "--model", model, "-o", \
+str(Path(sys.argv[2]) / "o.csv")]) in (0, 2, 3), path
     else:
         try:
             read_record(path)

@@ -367,7 +367,6 @@ def _weak(events: Sequence[Event]) -> float:
 
 
 # --- differences
-# -------------------------------------------------------------------------------------------------------
 
 
 @difference("RMS difference of rotation", "angle")
@@ -595,7 +594,6 @@ def _unmatched(pair: Pair, matched: MatchedImpacts) -> list[tuple[History, Seque
 
 
 # --- figures of one history
-# ----------------------------------------------------------------------------------------------
 
 
 @figure("peak rotation", "angle")

@@ -3,8 +3,8 @@ they depend on changed.
 
 | folder | a result |
 |---|---|
-| `histories/` | `.csv.gz` and `.events.csv.gz` (`scenes.History.save`); `.json`, the record with their hashes, is written last |
-| `comparisons/` | `.json`: the comparisons of a cell, peaks of an ensemble's batch, a horizon of predictability |
+| `histories/` | `.csv.gz`, `.events.csv.gz` (`History.save`); last `.json`, with their hashes |
+| `comparisons/` | `.json`: a cell's comparisons, a batch's peaks, a horizon of predictability |
 | `records/` | `.json`: what a task of a study gave |
 
 A name contains the hash of everything that the content depends on. So runs that share a folder can

@@ -8,7 +8,8 @@ An ensemble is one table of a suite, drawn the same for every model:
     count = 500
     seed = 1
     scene = { duration = 10.0, block = { ... }, floor = { friction = 0.5 } }
-    friction = { uniform = [0.2, 0.8] }                # each optional: uniform, lognormal (median, sigma of the logarithm)
+    # each optional: uniform, lognormal (median, sigma of the logarithm)
+    friction = { uniform = [0.2, 0.8] }
     gap = { uniform = [0.01, 0.1] }                    # of every wall of the scene, m
     pulse = { period = {...}, amplitude = {...} }      # a Ricker pulse of random phase, m/s^2 and s
     noise = { amplitude = {...}, frequency = 2.5, damping = 0.6, strong = 8.0 }

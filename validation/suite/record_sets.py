@@ -3,9 +3,10 @@ validate SCENE` plays.
 
     [[records]]
     files = ["records/RSN1_H*.AT2", "station.V2"]    # files, folders, patterns, beside the suite
-    scale = 1.6                                      # optional; and what a file does not say, such as unit = "cm/s2"
-    vertical = true                                  # optional: with the vertical component, of the same file or of one named alike
-    scenes = ["shelf"]                               # optional: the scenes that are meant; without it all
+    # the rest is optional; so is what a file does not say, such as unit = "cm/s2"
+    scale = 1.6
+    vertical = true       # with the vertical component, of the same file or of one named alike
+    scenes = ["shelf"]    # the scenes that are meant; without it all
 
 Each horizontal component takes the place of the scene's own excitation. The scene lasts as long as
 its record, and at least as long as it says itself; its own vertical motion stays, unless `vertical`

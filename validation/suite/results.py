@@ -3,9 +3,13 @@
 
 A run's folder holds
 
-    run.json                       one `Run` (this module), a line a field, a scene or a cell; run.schema.json beside it describes it
-    histories/<scene>--<model>--<key>.csv.gz          one history a cell, `scenes.History.save` (path in `Cell.history`)
-    histories/<scene>--<model>--<key>.events.csv.gz   its events
+    run.json
+        one `Run` (this module), a line a field, a scene or a cell; run.schema.json beside it
+        describes it
+    histories/<scene>--<model>--<key>.csv.gz
+        one history a cell, `scenes.History.save` (path in `Cell.history`)
+    histories/<scene>--<model>--<key>.events.csv.gz
+        its events
 
 Nothing here knows how a cell is simulated, compared or shown.
 """

@@ -608,7 +608,10 @@ def _cell(
         text, fall = gaps.get((place.against, str(place.what)), of_window)
         gap = "" if fall and kind == "model form" else text
         if gap and kind == "measured" and not fall:
-            gap += "; `offset` of the measured model shifts its times, a window such as theta_rms@8s ends sooner"
+            gap += (
+                "; `offset` of the measured model shifts its times,"
+                " a window such as theta_rms@8s ends sooner"
+            )
         measure = place.what.definition
         floor = floor_of(measure, scene, numerical)
         checks.append(

@@ -6,30 +6,38 @@ A suite is a TOML file that a user can write:
     description = "my shelf on my record"
     reference = "ebm-unilateral"                 # judges numerical differences
     model_form = "ebm"                           # optional: shown beside it, with a band of its own
-    print_figures = true                         # each scene's figure for a paper (SVG, PNG, PDF); without it `rockcheck report` draws one
+    # each scene's figure for a paper (SVG, PNG, PDF); without it `rockcheck report` draws one
+    print_figures = true
     scenes = ["fig4a", "shelf.toml"]             # names, or scene files beside this one
 
     [models.ebm-unilateral]
     [models.ebm]
     [models.mujoco]
     time_step = 1e-4
-    [models.mujoco-coarse]                       # a second variant of a model; "my_module:MyModel" is one of your own, see --allow-code
+    # a second variant of a model; "my_module:MyModel" is one of your own, see --allow-code
+    [models.mujoco-coarse]
     model = "mujoco"
     time_step = 1e-3
-    [models.table]                               # a measured history, for the scenes that it names (validation.discrepancy.measured)
+    # a measured history, for the scenes that it names (validation.discrepancy.measured)
+    [models.table]
     model = "measured"
     files = { shelf = "run7.csv" }
     offset = -0.35                               # s, added to its times
 
-    [require]                                    # what must have a tolerance, for every scene and model
+    # what must have a tolerance, for every scene and model
+    [require]
     difference = ["theta_rms@8s", "outcome_agrees"]
     model_form = ["theta_rms@8s"]
     figures = ["peak_rotation@8s"]
 
-    [[grid]]                                     # scenes by combination: one alternative of each axis, merged into `scene`
+    # scenes by combination: one alternative of each axis, merged into `scene`
+    [[grid]]
     scene = { duration = 6.0, block = { half_width = 0.4, half_height = 1.5 } }
     axes = [
-        [{ name = "mu03", floor = { friction = 0.3 } }, { name = "mu06", floor = { friction = 0.6 } }],
+        [
+            { name = "mu03", floor = { friction = 0.3 } },
+            { name = "mu06", floor = { friction = 0.6 } },
+        ],
         [{ name = "weak", excitation = { kind = "ricker", amplitude = 4.0, period = 1.5 } }],
     ]
 

@@ -4,7 +4,7 @@ is.
 A tolerance file is TOML; a table a scene, model and reference, a line a measure:
 
     [fig5a.mujoco.ebm-unilateral]
-    "theta_rms@8s" = { expected = 2.3e-4, limit = 2e-3, drift = 1e-4, why = "first-order step error, prototype 2e-4" }
+    "theta_rms@8s" = { expected = 2.3e-4, limit = 2e-3, drift = 1e-4, why = "first-order error" }
 
 The third name is the reference model, or "figures" for a figure of the cell itself, its distance
 from a closed form among them. The first may be "*", every scene that the model plays: such a line

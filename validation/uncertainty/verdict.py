@@ -5,7 +5,7 @@
 | | says |
 |---|---|
 | E <= u_num | explained by numerical error |
-| E <= u_val | explained by what is not known about the inputs, or by the scatter of the tests, whichever is larger |
+| E <= u_val | explained by what is not known about the inputs or the tests' scatter, the larger |
 | E > u_val | not explained: model form or set-up, at least E - u_val |
 | u_num is not known | could not be judged: not converged |
 

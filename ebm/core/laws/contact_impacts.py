@@ -314,8 +314,15 @@ def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, t
         work[7:12],
     )  # the impulses and velocities of a trial stand below the system
     restitution, target, part, approach, ahead, after, taking, full = (
-        work[12], work[13], work[14], work[15], work[16], work[17], work[18], work[19]
-    )  # fmt: skip
+        work[12],
+        work[13],
+        work[14],
+        work[15],
+        work[16],
+        work[17],
+        work[18],
+        work[19],
+    )
     contact_rows(b, sense, phi, rows)
     part[:] = 0.0
     after[:] = 0.0

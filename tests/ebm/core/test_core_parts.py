@@ -190,7 +190,9 @@ def test_first_root_of_random_polynomials(noise):
             or np.any(np.abs(near.real - h) < 1e-6 * h)
             or np.any(np.diff(np.sort(near.real)) < 1e-4 * h)
         ):
-            continue  # about to touch, or two roots in one place: whether they are roots is a matter of rounding
+            # About to touch, or two roots in one place: whether they are roots is a matter of
+            # rounding.
+            continue
         expected = min((r for r in near.real if 0.0 < r < h), default=None)
         found = Core.first_root(c, h, noise)
         judged[found is None] += 1

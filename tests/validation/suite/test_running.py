@@ -47,7 +47,10 @@ block = {{ half_width = 0.4, half_height = 1.5 }}
 floor = {{ friction = 0.5 }}
 {tolerances}
 """
-FINE = '[tolerances.short.{model}.still]\ntheta_rms = {{ expected = 0.0, limit = 1e-9, drift = 0.0, why = "the same" }}\n'
+FINE = (
+    "[tolerances.short.{model}.still]\n"
+    'theta_rms = {{ expected = 0.0, limit = 1e-9, drift = 0.0, why = "the same" }}\n'
+)
 
 
 def write_suite(

@@ -8,7 +8,10 @@ from rockcheck.scenes import InputError
 from rockcheck.validation.suite.suites import load_suite
 
 MODELS = 'reference = "ebm"\n[models.ebm]\n'
-SHELF = '[[scene]]\nname = "shelf"\nduration = 1.0\nblock = { half_width = 0.1, half_height = 0.4 }\nfloor = { friction = 0.5 }\n'
+SHELF = (
+    '[[scene]]\nname = "shelf"\nduration = 1.0\n'
+    "block = { half_width = 0.1, half_height = 0.4 }\nfloor = { friction = 0.5 }\n"
+)
 
 
 def suite(tmp_path, text):
@@ -32,7 +35,8 @@ def test_a_grid_is_every_combination(tmp_path):
         + """
 [[grid]]
 axes = [
-    [{ name = "left", walls = [{ side = "left" }] }, { name = "right", walls = [{ side = "right" }] }],
+    [{ name = "left", walls = [{ side = "left" }] }, \
+{ name = "right", walls = [{ side = "right" }] }],
     [
         { name = "3mm", walls = [{ gap = 0.003 }] },
         { name = "53mm", walls = [{ gap = 0.053 }] },

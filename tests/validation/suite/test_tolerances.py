@@ -82,18 +82,18 @@ def test_ratios_are_held_against_one_and_figures_against_what_was_expected():
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ('[a.b.c]\ntheta_rsm = {limit = 1.0}', "did you mean 'theta_rms'"),
+        ("[a.b.c]\ntheta_rsm = {limit = 1.0}", "did you mean 'theta_rms'"),
         ('[a.b.c]\n"theta_rms@8" = {limit = 1.0}', "window '8'"),
-        ('[a.b.c]\ntheta_rms = {limit = nan}', "limit"),
-        ('[a.b.c]\ntheta_rms = {limit = -1.0}', "limit"),
-        ('[a.b.c]\ntheta_rms = {expected = 1.0}', "limit: is missing"),
-        ('[a.b.c]\ntheta_rms = {limit = 1.0, dirft = 1.0}', "dirft: unknown key"),
-        ('[a.b.c]\ntheta_rms = 1.0', "a table"),
-        ('[a.b.c]\npeak_rotation = {limit = 1.0, expected = 1.0}', "figures"),
-        ('[a.b.figures]\npeak_rotation = {limit = 1.0}', "expected: is missing"),
-        ('a = 1', "tables"),
+        ("[a.b.c]\ntheta_rms = {limit = nan}", "limit"),
+        ("[a.b.c]\ntheta_rms = {limit = -1.0}", "limit"),
+        ("[a.b.c]\ntheta_rms = {expected = 1.0}", "limit: is missing"),
+        ("[a.b.c]\ntheta_rms = {limit = 1.0, dirft = 1.0}", "dirft: unknown key"),
+        ("[a.b.c]\ntheta_rms = 1.0", "a table"),
+        ("[a.b.c]\npeak_rotation = {limit = 1.0, expected = 1.0}", "figures"),
+        ("[a.b.figures]\npeak_rotation = {limit = 1.0}", "expected: is missing"),
+        ("a = 1", "tables"),
     ],
-)  # fmt: skip
+)
 def test_faults_in_a_file_are_named(text, fault):
     with pytest.raises(InputError, match=fault) as caught:
         parse_tolerances(tomllib.loads(text))
@@ -120,7 +120,10 @@ def accepted(path: Path, run: Run, reason: str | None = None):
     return accept(suite, run, reason)
 
 
-FILE = '# by hand\n\n[s.m.r]\n# the main one\ntheta_rms = { expected = 0.001, limit = 0.002, drift = 0.0001, why = "a test" }\n'
+FILE = (
+    "# by hand\n\n[s.m.r]\n# the main one\n"
+    'theta_rms = { expected = 0.001, limit = 0.002, drift = 0.0001, why = "a test" }\n'
+)
 
 
 @pytest.fixture

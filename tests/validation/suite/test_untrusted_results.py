@@ -144,7 +144,10 @@ def test_a_record_under_another_name_is_none(tmp_path, run):
     assert plain(run()) == before
 
 
-EVIL = "a|b](http://x.y/?z)<img src=x onerror=alert(1)>`c`![p](http://x.y/p.png)\n# title\x00\x1b[2J&amp; https://x.y www"
+EVIL = (
+    "a|b](http://x.y/?z)<img src=x onerror=alert(1)>`c`![p](http://x.y/p.png)\n"
+    "# title\x00\x1b[2J&amp; https://x.y www"
+)
 
 
 def test_names_in_the_summary_and_in_junit_are_text(tmp_path):

@@ -76,7 +76,10 @@ def _pulses(
     name: str, frequency_ratio: float, amplitude_ratio: float, friction: float, *walls: Wall
 ) -> SceneFamily:
     beside = "".join(f", wall at {1e3 * wall.gap:g} mm, e {wall.restitution:g}" for wall in walls)
-    words = f"Ricker pulse, ω_p = {frequency_ratio:g} p, a_p = {amplitude_ratio:g} g tan α, μ {friction:g}{beside}"
+    words = (
+        f"Ricker pulse, ω_p = {frequency_ratio:g} p, a_p = {amplitude_ratio:g} g tan α,"
+        f" μ {friction:g}{beside}"
+    )
     return SceneFamily(
         name,
         words,

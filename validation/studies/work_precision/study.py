@@ -188,7 +188,8 @@ class WorkPrecision(Study):
         answer = _answer(plain, walls, [row for one in found for row in one.times])
         return Finding(
             self.name,
-            f"Benchmark{'' if self.what == 'all' else f': {self.what}'}{', quick' if self.quick else ''}",
+            f"Benchmark{'' if self.what == 'all' else f': {self.what}'}"
+            f"{', quick' if self.quick else ''}",
             answer,
             blocks,
         )
