@@ -272,7 +272,7 @@ class SuiteStudy(Study):
         kind = family(variant.family_name)
         return {
             "seconds": self.suite.suite_of(place).limits.seconds,
-            "compiles": kind.module if kind.compiled else "",
+            "compiles": variant.family_name if kind.compiled else "",
         }
 
     def _batches(

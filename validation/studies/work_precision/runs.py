@@ -470,13 +470,13 @@ def cost_at(line: Sequence[Point | Pooled], level: float = LEVEL) -> tuple[float
 
 
 def slope(points: Iterable[tuple[float, float]]) -> float:
-    """Slope of log error over log step by least squares; NaN with fewer than two finite points."""
+    """Slope of log error over log step by least squares; NaN with fewer than two usable steps."""
     usable = [
         (math.log(step), math.log(error))
         for step, error in points
         if math.isfinite(step) and 0.0 < error < math.inf
     ]
-    if len(usable) < 2:
+    if len({step for step, _ in usable}) < 2:
         return math.nan
     x, y = np.array(usable).T
     return float(np.polyfit(x, y, 1)[0])
