@@ -25,6 +25,9 @@ from rockcheck.scenes.recordings.sets import files_of, motions_of
 
 MODELS = ("ebm-unilateral", "ebm")
 MOST_LEVELS = 1000
+LEVELS, PULSE_LEVELS = "0.05:2:40", "1:12:40"
+#: Of the pulses, omega_p/p.
+FREQUENCIES = (0.5, 8.0)
 
 
 def run(
@@ -44,8 +47,13 @@ def run(
         ),
     ] = "pga",
     levels: Annotated[
-        str, typer.Option("--levels", metavar="LOW:HIGH:COUNT", help="The intensities.")
-    ] = "0.05:2:40",
+        str | None,
+        typer.Option(
+            "--levels",
+            metavar="LOW:HIGH:COUNT",
+            help=f"The intensities (default {LEVELS}; of pulses {PULSE_LEVELS}).",
+        ),
+    ] = None,
     capacity: Annotated[
         list[float] | None,
         typer.Option(
@@ -70,15 +78,27 @@ def run(
 
     Each record is scaled to every intensity and played in both directions by the event-based model:
     a curve a motion, their median and 16 to 84 % band, and fragility curves for peak rotations.
+
+    Without records: the probability that pulses of the scene's kind overturn the block, with its
+    wall and without; their intensity is peak acceleration over g tan(alpha).
     """
-    from rockcheck.validation.studies.population.study import CAPACITIES, ida
+    from rockcheck.validation.studies.population.study import CAPACITIES, fragility, ida
 
     if model not in MODELS:
         raise InputError(str(unknown_name("model", model, MODELS)), "--model")
-    values = levels_of(levels)
-    motions, left_out = motions_of(files_of(records or ()), reading_of(read))
+    what = load_scene(scene)
+    if not records:
+        values = levels_of(levels or PULSE_LEVELS)
+        studied(
+            fragility(what, [], values, FREQUENCIES, model=model),
+            out,
+            jobs=jobs,
+            scheduler=scheduler,
+        )
+    values = levels_of(levels or LEVELS)
+    motions, left_out = motions_of(files_of(records), reading_of(read))
     study = ida(
-        load_scene(scene),
+        what,
         motions,
         values,
         measure=intensity,

@@ -7,7 +7,6 @@ document.addEventListener("DOMContentLoaded", () => {
   const words = value => value === null || value === undefined ? "–" : String(Number(value.toPrecision(3))).replace("-", "−");
   const soft = () => dark() ? "#a3adb8" : "#57606a", grid = () => dark() ? "#2a3038" : "#e6e8eb";
   window.rockcheckCharts = {};
-  for (const one of document.querySelectorAll("details.print")) one.open = false;  // without scripts they are all that there is
 
   for (const chart of window.rockcheckCurves ?? []) {
     const host = document.querySelector(`[data-curves="${chart.name}"]`);

@@ -12,6 +12,8 @@
   apply();
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", apply);
   document.addEventListener("DOMContentLoaded", () => {
+    // Figures for print are all that there is without scripts.
+    for (const one of document.querySelectorAll("details.print")) one.open = false;
     const button = document.getElementById("theme");
     const word = button.querySelector("span");
     button.hidden = false;

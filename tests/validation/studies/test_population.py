@@ -360,7 +360,7 @@ def test_a_curve_never_counts_a_failed_run_as_safe():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ([], "records: 0 is too few: give at least 2 records"),
+        ([], "records: are needed: the scene's excitation is no pulse"),
         (["records/H1.csv"], "records: 1 is too few"),
         (
             ["records", "--intensity", "pgd"],
@@ -386,17 +386,8 @@ def test_slips_are_named(records, capsys, words, said):
 
 
 def test_the_command_writes_curves_tables_and_page(records, capsys, tmp_path):
-    words = [
-        "ida",
-        "rack.toml",
-        "records/H*.csv",
-        "--levels",
-        "0.2:1.2:6",
-        "--capacity",
-        "0.5",
-        "--json",
-    ]
-    assert main(words) == 0
+    words = "ida rack.toml records/H*.csv --levels 0.2:1.2:6 --capacity 0.5 --json"
+    assert main(words.split()) == 0
     answer = json.loads(capsys.readouterr().out)
     assert (answer["unit"], answer["capacities"], answer["left_out"]) == ("g", [0.5], [])
     folder = tmp_path / "rockcheck-report" / "ida"
@@ -406,3 +397,11 @@ def test_the_command_writes_curves_tables_and_page(records, capsys, tmp_path):
         "lines.svg",
         "fragility.svg",
     }
+
+
+def test_without_records_pulses_of_the_scenes_kind_tell_the_probability(records, capsys):
+    assert main(["new", "pulse.toml", "-q"]) == 0
+    assert main(["ida", "pulse.toml", "--levels", "1:6:6", "--json"]) == 0
+    fits = json.loads(capsys.readouterr().out)["tables"]["fits"]
+    assert len(fits) == 2
+    assert all(1.0 < fit["median"] < 6.0 for fit in fits)
