@@ -48,7 +48,7 @@ sys.exit(main(sys.argv[2:]))
 def one_line(stderr: str) -> str:
     # Code that is not yet compiled, and cannot be kept where no file can be large, is announced,
     # and so are long work and how far it is.
-    announced = ("rockcheck: compiling ", "rockcheck: stress: ")
+    announced = ("rockcheck: compiling ", "rockcheck: stress: ", "rockcheck: smoke")
     (line,) = (said for said in stderr.splitlines() if not said.startswith(announced))
     assert line.startswith("rockcheck: ")
     return line
