@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.ebm.horizon import START, _disturbed, predictability_horizon
+from rockcheck.ebm.horizon import START, _disturbed, may_fly, predictability_horizon
 from rockcheck.scenes import Block, Floor, InputError, Ricker, Scene, Sine, Wall, load_scene
 from rockcheck.scenes.scene import PAPER_BLOCK
 
@@ -193,3 +193,18 @@ def test_what_is_zero_at_the_start_is_disturbed_to_either_side() -> None:
         )
     held = EventBasedModel(friction="no-slip")
     assert all(one.initial_velocity == 0.0 for _, one in _disturbed(scene, held, 1e-6))
+
+
+@pytest.mark.parametrize(
+    ("change", "flies"),
+    [
+        ({}, False),
+        ({"excitation": Sine(amplitude=1.0, period=1.0, cycles=1)}, False),
+        ({"initial_height": 0.05}, True),
+        ({"vertical": Sine(amplitude=1.0, period=1.0, cycles=1)}, True),
+        ({"floor": Floor(friction=0.5, restitution=0.3)}, True),
+        ({"walls": (Wall(side="right", gap=0.01),)}, True),
+    ],
+)
+def test_only_what_may_fly_may_land_flat(change: dict[str, object], flies: bool) -> None:
+    assert may_fly(balanced(**change)) is flies

@@ -122,7 +122,7 @@ FAMILIES = {
         _record("fig5a", "μ 0.3, wall at 53 mm, e 0"),
     )
 }
-QUICK, QUICK_MEMBERS = ("free", "pulse a", "slip a", "wall 53 mm e 0"), 5
+QUICK, QUICK_MEMBERS = ("free", "pulse a", "slip a", "wall 53 mm e 0"), 2
 
 #: omega_p/p, a_p/(g tan alpha) and friction of pulses that hit a left wall at every gap, and leave
 #: the block standing.
