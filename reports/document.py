@@ -49,8 +49,11 @@ def _value(value: Any, column: Column, write: Callable[[float, int], str]) -> st
         return "yes" if value else "no"
     if column.kind == "text" or not isinstance(value, int | float):
         return str(value)
-    if column.kind == "percent":
-        return f"{100.0 * value:.{max(column.digits - 2, 0)}f} %"
+    if column.kind == "used" and not value <= 1.0:
+        return f"{_typed(value, 3)}×" if value < math.inf else "beyond"
+    if column.kind in ("percent", "used"):
+        after = max(column.digits - 2, 0) if column.kind == "percent" else 0
+        return f"{100.0 * value:.{after}f} %"
     return str(value) if isinstance(value, int) else write(value, column.digits)
 
 
@@ -66,7 +69,7 @@ def row_cells(row: Sequence[Any], columns: Sequence[Column]) -> list[dict[str, A
 
 def _for_page(cell: Any, column: Column) -> dict[str, Any]:
     mark = cell if isinstance(cell, Mark) else Mark(cell)
-    numeric = column.kind in ("number", "percent")
+    numeric = column.kind not in ("text", "model")
     return {
         "words": words(cell, column),
         "css": " ".join(filter(None, ["n" if numeric else column.kind, mark.verdict])),
@@ -74,6 +77,8 @@ def _for_page(cell: Any, column: Column) -> dict[str, Any]:
         "tip": mark.words,
         "link": mark.link,
         "model": mark.value if column.kind == "model" else "",
+        "more": mark.more,
+        "used": mark.value if column.kind == "used" and mark.value is not None else None,
     }
 
 
@@ -85,7 +90,7 @@ def show(found: Finding, screen: Console) -> None:
             if len(block.rows) > MOST_ROWS:
                 screen.print(f"and {len(block.rows) - MOST_ROWS} more rows: {block.name}.csv")
         elif isinstance(block, Text) and block.on == "all":
-            for line in (block.text, *block.items):
+            for line in (block.text, *map(": ".join, block.facts), *block.items):
                 if line:
                     screen.print(line, style=COLOURS.get(block.verdict, ""), soft_wrap=True)
     for where, reason in found.failures.items():
@@ -132,7 +137,14 @@ def block_markdown(block: Table | Plot | Text) -> str:
     title = f"## {block.title}\n\n" if block.title else ""
     if isinstance(block, Text):
         return title + "\n\n".join(
-            filter(None, [block.text, "\n".join(f"- {item}" for item in block.items)])
+            filter(
+                None,
+                [
+                    block.text,
+                    "\n".join(f"- {name}: {value}" for name, value in block.facts),
+                    "\n".join(f"- {item}" for item in block.items),
+                ],
+            )
         )
     if isinstance(block, Plot) or block.on == "file":
         return ""

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rockcheck.reports.style import LOOKS, PAGE, figure_style, log_scales
+from rockcheck.reports.style import BY_KEY, LOOKS, PAGE, figure_style, log_scales
 from rockcheck.validation.finding import Axis, Panel, Plot, Series
 
 if TYPE_CHECKING:
@@ -42,6 +42,8 @@ STYLES: dict[str, dict[str, Any]] = {
     "dots": {"linestyle": (0, (0.7, 1.7)), "linewidth": 0.8},
     "thin": {"linewidth": 0.5, "alpha": 0.6},
     "marked": {"linestyle": (0, (4, 1.5)), "marker": "*", "markersize": 5.0},
+    "step": {"drawstyle": "steps-post"},
+    "cross": {"linestyle": "none", "marker": "x", "markersize": 3.0},
 }
 
 
@@ -145,6 +147,9 @@ def _scale(ax: Axes, x: Axis, y: Axis) -> None:
             limit(*axis.limits)
     if x.log or y.log:
         log_scales(ax)
+    for ticks, put in ((x.ticks, ax.set_xticks), (y.ticks, ax.set_yticks)):
+        if ticks:
+            put(list(ticks), list(ticks.values()))
 
 
 def _draw(ax: Axes, panel: Panel, handles: dict[str, Any]) -> None:
@@ -162,6 +167,8 @@ def _draw(ax: Axes, panel: Panel, handles: dict[str, Any]) -> None:
             look = STYLES[series.style] | (
                 {"marker": LOOKS[series.look].marker}
                 if series.look in LOOKS and series.style == "line"
+                else {"linestyle": BY_KEY[series.look].line["linestyle"]}
+                if series.look in BY_KEY and series.style == "step"
                 else {}
             )
             (drawn,) = ax.plot(
@@ -177,8 +184,8 @@ def colours(panel: Panel) -> list[tuple[str, str]]:
     own: dict[str, tuple[str, str]] = {}
     found = []
     for series in panel.series:
-        if series.look in LOOKS:
-            found.append((LOOKS[series.look].light, LOOKS[series.look].dark))
+        if series.look in BY_KEY:
+            found.append((BY_KEY[series.look].light, BY_KEY[series.look].dark))
         elif series.style == "thin":
             found.append(GREY)
         else:

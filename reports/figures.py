@@ -4,14 +4,14 @@ differences below each."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rockcheck.reports.show.words import SUPERSCRIPTS
-from rockcheck.reports.style import PAGE, figure_style, looks, save
+from rockcheck.reports.show.words import SUPERSCRIPTS, number
+from rockcheck.reports.style import PAGE, Look, figure_style, looks, save
 from rockcheck.reports.view import PAPER_CHANNELS, Band, Channel, SceneView
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
 
@@ -95,29 +95,44 @@ def histories_figure(
     return figure
 
 
-def thumbnail(view: SceneView) -> Figure:
-    """Rotation of all models, small and without words."""
+def thumbnail(curves: Iterable[tuple[Any, Any, Look]], *, step: bool = False) -> Figure:
+    """Some curves (x, y, and whose) over each other, small and without words."""
     from matplotlib.figure import Figure
 
     with figure_style():
         figure = Figure(figsize=(3.4, 0.9))
         ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        for model, look in looks(view.run.models).items():
-            if model in view.values:
-                ax.plot(view.t, view.drawn[model]["theta"], color=look.light, linewidth=0.7)
-        ax.axhline(0.0, color="#bbbbbb", linewidth=0.4, zorder=0)
-        ax.margins(x=0.0, y=0.08)
+        for x, y, look in curves:
+            style = "steps-post" if step else "default"
+            ax.plot(x, y, color=look.light, linewidth=0.7, drawstyle=style)
+        if step:
+            ax.set_ylim(0.0, 1.0)
+        else:
+            ax.axhline(0.0, color="#bbbbbb", linewidth=0.4, zorder=0)
+            ax.margins(x=0.0, y=0.08)
         ax.set_axis_off()
     return figure
 
 
-def write_figures(view: SceneView, folder: Path) -> list[Path]:
-    """Write the figures of a scene into `folder`: a thumbnail, and where the run asks for them
-    those for a paper, one a reference."""
-    written = save(thumbnail(view), folder / f"{view.slug}-small", ["svg"])
+def write_figures(view: SceneView, folder: Path) -> None:
+    """Write the figures of a scene into `folder`: a thumbnail of all rotations, and where the run
+    asks for them those for a paper, one a reference."""
+    known = looks(view.run.models)
+    curves = [(view.t, view.drawn[m]["theta"], known[m]) for m in known if m in view.values]
+    save(thumbnail(curves), folder / f"{view.slug}-small", ["svg"])
     for against in view.figure_references if view.printed else ():
-        written += save(histories_figure(view, against), folder / figure_stem(view, against))
-    return written
+        save(histories_figure(view, against), folder / figure_stem(view, against))
+
+
+def summary(view: SceneView) -> str:
+    """The figure of a scene in words: each model's peak rotation, impacts and outcome."""
+    said = []
+    for model, history in view.histories.items():
+        impacts = sum(event.kind in ("floor impact", "wall impact") for event in history.event_list)
+        peak = number(history.peak_rotation / view.scene.block.alpha)
+        reached = f"peak {peak} α, " if history.overturned_at is None else ""
+        said.append(f"{model}: {reached}{impacts} impacts, {history.fate}")
+    return "; ".join(said) + "."
 
 
 def figure_stem(view: SceneView, against: str | None) -> str:

@@ -4,25 +4,18 @@ scenes."""
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING
 
-import numpy as np
-
-from rockcheck.reports.style import PAGE, figure_style, log_scales, looks, save
+from rockcheck.reports.style import looks
 from rockcheck.reports.tables import overrun
 from rockcheck.reports.view import FALL
 from rockcheck.scenes.trust.experience import Trust, known
 from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.finding import Axis, Block, Column, Panel, Plot, Series, Table
 from rockcheck.validation.suite.experience import FEWEST, bias_and_scatter, pairs_of
 from rockcheck.validation.suite.results import Cell, Check, Run
 from rockcheck.validation.suite.tolerances import MEASURES, apart
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Drawing
 
 QUANTITY = "peak_rotation"
 #: The figure of all peaks; no scene's file has such a name.
@@ -98,17 +91,6 @@ class Glance:
     apart: tuple[Row, ...]
     changed: tuple[tuple[Cell, Check], ...]
     judged: int
-
-
-@dataclass(frozen=True)
-class Accuracy:
-    """A model over all scenes: (reference's, model's) peaks (alpha), bias and scatter in this run,
-    and over all suites."""
-
-    model: str
-    pairs: Sequence[tuple[float, float]]
-    here: Trust | None
-    everywhere: Trust | None
 
 
 def matrix(run: Run) -> list[Row]:
@@ -222,95 +204,65 @@ def _side(outcome: str) -> str:
     return words[1] if words and words[0] in ("overturned", "falling") else ""
 
 
-def accuracies(run: Run) -> list[Accuracy]:
-    """Each model that has peaks to be compared with the reference's, in the run's order."""
-    pairs = {model: found for (model, name), found in pairs_of([run]).items() if name == QUANTITY}
-    everywhere = known().trust
-    return [
-        Accuracy(m, pairs[m], _trust(pairs[m]), everywhere.get(m, {}).get(QUANTITY))
-        for m in run.models
-        if m in pairs
-    ]
+def accuracy(run: Run) -> list[Block]:
+    """Peak rotation by each model against the reference's, over all scenes: a point a scene, lines
+    for the bias and two standard deviations; bias and scatter of this run and of all suites.
 
-
-def _trust(pairs: Sequence[tuple[float, float]]) -> Trust | None:
-    if len(pairs) < FEWEST:
-        return None
-    bias, scatter = bias_and_scatter(pairs)
-    return Trust(bias=bias, scatter=scatter, count=len(pairs))
-
-
-def peaks_figure(run: Run, found: Sequence[Accuracy]) -> Drawing:
-    """Peak rotation by each model against the reference's: a point a scene, a line for its bias,
-    dashed lines at two sigma."""
-    from matplotlib.figure import Figure
-
-    styles = looks(run.models)
-    columns = min(4, len(found))
-    rows = -(-len(found) // columns)
-    values = [value for one in found for pair in one.pairs for value in pair]
-    low, high = (
-        10.0 ** whole(math.log10(end))
-        for whole, end in ((math.floor, 0.8 * min(values)), (math.ceil, 1.25 * max(values)))
-    )
-    with figure_style():
-        height = 0.7 + 1.85 * rows
-        figure = Figure(figsize=(PAGE, height))
-        panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-        figure.subplots_adjust(
-            0.085, 0.42 / height, 0.98, 1.0 - 0.3 / height, wspace=0.22, hspace=0.3
-        )
-        for ax, one in zip(panels, found, strict=False):
-            _points(ax, one, styles[one.model].light, (low, high))
-            ax.set_title(styles[one.model].label)
-        for ax in panels[len(found) :]:
-            ax.set_visible(False)
-        figure.supxlabel(
-            f"peak |θ|/α by {styles[run.reference].label}", fontsize=7.5, y=0.05 / height
-        )
-        figure.supylabel("peak |θ|/α by the model", fontsize=7.5, x=0.005)
-    return figure
-
-
-def _points(ax: Axes, one: Accuracy, color: str, ends: tuple[float, float]) -> None:
-    x, y = np.array(one.pairs).T
-    line = np.array(ends)
-    ax.plot(line, line, color="#999999", linewidth=0.6, zorder=1)
-    trust = one.everywhere or one.here
-    if trust is not None:
-        ax.plot(line, trust.bias * line, color=color, linewidth=0.7, zorder=2)
-        for side in (-2.0, 2.0):
-            ax.plot(
-                line,
-                trust.bias * math.exp(side * trust.scatter) * line,
-                color=color,
-                linewidth=0.6,
-                linestyle="--",
-                zorder=2,
-            )
-    ax.plot(x, y, ".", color=color, markersize=5.0, markeredgewidth=0, alpha=0.7, zorder=3)
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    log_scales(ax, decades=4)
-    ax.set_xlim(*ends)
-    ax.set_ylim(*ends)
-
-
-def write_overview(run: Run, folder: Path, scenes: Container[str]) -> Mapping[str, object]:
-    """Writes the figure of all peaks into `folder`, where there is something to say; returns what
-    the index shows.
-
-    `scenes` are those that have a page; the others stand in no table.
+    Nothing where neither is known.
     """
-    found = accuracies(run)
-    found = found if any(one.here or one.everywhere for one in found) else []
-    if found:
-        save(peaks_figure(run, found), folder / PEAKS, ["svg"])
-    else:
-        (folder / f"{PEAKS}.svg").unlink(missing_ok=True)
-    rows = matrix(run)
-    return {
-        "matrix": [row for row in rows if row.scene in scenes],
-        "accuracies": found,
-        "glance": glance(run, rows),
+    pairs = {m: found for (m, name), found in pairs_of([run]).items() if name == QUANTITY}
+    everywhere = {m: of[QUANTITY] for m, of in known().trust.items() if QUANTITY in of}
+    here = {
+        m: Trust(bias=bias, scatter=scatter, count=len(pairs[m]))
+        for m in run.models
+        if m in pairs and len(pairs[m]) >= FEWEST
+        for bias, scatter in (bias_and_scatter(pairs[m]),)
     }
+    found = [model for model in run.models if model in pairs]
+    if not any(model in here or model in everywhere for model in found):
+        return []
+    styles = looks(run.models)
+    values = [value for model in found for pair in pairs[model] for value in pair]
+    ends = (
+        10.0 ** math.floor(math.log10(0.8 * min(values))),
+        10.0 ** math.ceil(math.log10(1.25 * max(values))),
+    )
+    panels, rows = [], []
+    for model in found:
+        x, y = zip(*pairs[model], strict=True)
+        trusts = here.get(model), everywhere.get(model)
+        trust, look = trusts[1] or trusts[0], styles[model].key
+        lines = [Series("", ends, ends, style="thin")]
+        if trust:
+            factors = [trust.bias * math.exp(sigma * trust.scatter) for sigma in (0.0, -2.0, 2.0)]
+            bias, *two = ([factor * end for end in ends] for factor in factors)
+            lines.append(Series("", ends, bias, look=look, style="smooth"))
+            lines += [Series("", ends, line, look=look, style="dots") for line in two]
+        lines.append(Series("", x, y, look=look, style="points"))
+        panels.append(Panel(styles[model].label, lines))
+        shown = [(one.bias, one.scatter) if one else (None, None) for one in trusts]
+        rows.append([model, len(x), *shown[0], *shown[1]])
+    columns = [
+        Column("model", kind="model"),
+        Column("scenes_here"),
+        *(
+            Column(f"{what}_{where}", f"{what}, {where.replace('_', ' ')}", digits=digits)
+            for where in ("here", "all_suites")
+            for what, digits in (("bias", 4), ("scatter", 2))
+        ),
+    ]
+    x_axis, y_axis = (
+        Axis(f"peak |θ|/α by {of}", log=True, limits=ends)
+        for of in (styles[run.reference].label, "the model")
+    )
+    title, note = (
+        "Predicted against reference",
+        (
+            "Peak rotation of the blocks that stand. Grey: equal. Coloured: the bias; dotted: two"
+            " standard deviations."
+        ),
+    )
+    return [
+        Plot(PEAKS, title, panels=panels, x=x_axis, y=y_axis, note=note),
+        Table("accuracy", columns, rows),
+    ]

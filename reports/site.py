@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,17 +16,20 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from rockcheck.reports import tables, words
-from rockcheck.reports.document import side_by_side
-from rockcheck.reports.ensembles import (
-    EnsembleView,
-    distributions_figure,
-    ensemble_views,
-    write_ensemble_figures,
+from rockcheck.reports.document import FIGURES, csv, row_cells, side_by_side
+from rockcheck.reports.drawers import figure_of
+from rockcheck.reports.ensembles import EnsembleView
+from rockcheck.reports.figures import (
+    figure_stem,
+    histories_figure,
+    summary,
+    thumbnail,
+    write_figures,
 )
-from rockcheck.reports.figures import figure_stem, histories_figure, write_figures
-from rockcheck.reports.overview import entry, outcome_of, write_overview
+from rockcheck.reports.overview import PEAKS, accuracy, entry, glance, matrix, outcome_of
 from rockcheck.reports.payload import script
 from rockcheck.reports.scene_file import write_scene_file
+from rockcheck.reports.show.words import scene_facts
 from rockcheck.reports.style import FORMATS, LOOKS, SPARE, looks, save
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
 from rockcheck.scenes import InputError
@@ -38,6 +40,7 @@ from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.execute.pool import Call
+from rockcheck.validation.finding import Plot
 from rockcheck.validation.suite.results import SEVERITY, Run
 from rockcheck.validation.suite.tables import shown
 
@@ -46,29 +49,10 @@ DATA = Path(str(resources.files("rockcheck.reports"))) / "data"
 PAGES = "pages"
 #: The page to open.
 INDEX = "index.html"
-#: Columns of an ensemble's table: measure and title.
-STATISTICS_SHOWN = (
-    ("overturning_accuracy", "agreement"),
-    ("overturning_precision", "precision"),
-    ("overturning_recall", "recall"),
-    ("ks_distance", "KS distance"),
-    ("peak_bias", "bias"),
-    ("peak_scatter", "scatter"),
-)
 #: What a page with figures for a paper takes to be made, in pages without. Less than FEW in all are
 #: written by the process itself: it has what draws anyway, and another process takes as long as
 #: twenty pages to have it, too.
 PRINTED, FEW = 25, 40
-#: What a verdict is called and the sign that goes with its colour.
-VERDICTS = {
-    "pass": ("within tolerance", "✓"),
-    "better": ("better", "✓"),
-    "not defined": ("not defined here", "–"),
-    "incomplete": ("not installed", "–"),
-    "changed": ("changed", "△"),
-    "fail": ("out of tolerance", "✕"),
-    "error": ("failed", "!"),
-}
 
 
 @dataclass(frozen=True)
@@ -139,7 +123,7 @@ def write_figure(folder: Path, name: str, path: Path, against: str | None = None
             raise InputError(
                 "an ensemble's figure shows differences from its reference", "--against"
             )
-        return save(distributions_figure(view), path.with_suffix(""), [kind], named=True)[0]
+        return save(figure_of(view.distributions()), path.with_suffix(""), [kind], named=True)[0]
     if against is not None and against not in view.histories:
         raise unknown_name("model with a history of this scene", against, view.histories)
     if not view.histories:
@@ -186,7 +170,7 @@ def write_site(
 def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterator[None]:
     """Write these pages, each with its stamp, and last the index, in processes of their own where
     that is quicker."""
-    work = sum(PRINTED if pages.views[name].printed else 1 for name in stamps)
+    work = sum(PRINTED if printed(pages.views[name]) else 1 for name in stamps)
     if work < FEW:
         yield from map(pages.write, stamps, stamps.values())
         pages.write_index()
@@ -212,7 +196,7 @@ class _Pages:
         chosen = {*shown(self.run), *wanted}
         found: list[View] = [
             *scene_views(self.run, folder, chosen),
-            *ensemble_views(self.run, folder, slugs),
+            *(EnsembleView(self.run, one, slugs[one.name]) for one in self.run.ensembles),
         ]
         self.views = {view.name: view for view in found}
         links = [(view.name, _address(view)) for view in found]
@@ -231,7 +215,7 @@ class _Pages:
             (self.folder / PAGES / old).unlink(missing_ok=True)
 
     def _write_scene(self, view: SceneView, stamp: str) -> None:
-        write_figures(view, made(self.folder, PAGES, "figures"))
+        write_figures(view, made(self.folder, PAGES, FIGURES))
         write_whole(made(self.folder, PAGES, "data") / f"{view.slug}.js", script(view))
         files = write_scene_file(view.scene, made(self.folder, PAGES, "scene-files"), view.slug)
         names = [one.name for one in self.views.values() if isinstance(one, SceneView)]
@@ -243,9 +227,16 @@ class _Pages:
         self._page(view, stamp, "scene.html", files=files, **beside)
 
     def _write_ensemble(self, view: EnsembleView, stamp: str) -> None:
-        write_ensemble_figures(view, made(self.folder, PAGES, "figures"))
-        write_whole(made(self.folder, PAGES, "data") / f"{view.slug}.csv", view.table())
-        self._page(view, stamp, "ensemble.html", columns=STATISTICS_SHOWN)
+        page, figures = view.page(), made(self.folder, PAGES, FIGURES)
+        known = looks(self.run.models)
+        curves = [(*view.curves[model], known[model]) for model in known if model in view.curves]
+        save(thumbnail(curves, step=True), figures / f"{view.slug}-small", ["svg"])
+        for plot in page.plots():
+            save(figure_of(plot), figures / plot.name)
+        for table in page.tables():
+            *parts, name = table.name.split("/")
+            write_whole(made(self.folder, PAGES, *parts) / f"{name}.csv", csv(table))
+        self._page(view, stamp, "finding.html", found=page)
 
     def _page(self, view: View, stamp: str, template: str, **context: Any) -> None:
         self.site.page(
@@ -254,21 +245,28 @@ class _Pages:
 
     def write_index(self) -> None:
         """The page to open, which shows when the run was."""
-        scenes = [view for view in self.views.values() if isinstance(view, SceneView)]
-        ensembles = [view for view in self.views.values() if isinstance(view, EnsembleView)]
-        worst, times = tables.worst_first(self.run), tables.run_times(self.run)
-        summaries = {
-            model: FAMILIES[model].summary for model in self.run.models if model in FAMILIES
-        }
-        told: dict[str, Any] = {
-            "scenes": scenes,
-            "ensembles": ensembles,
-            "worst": worst,
-            "times": times,
-            "summaries": summaries,
-        }
-        told |= write_overview(self.run, made(self.folder, PAGES, "figures"), self.views)
-        self.site.page(INDEX, "index.html", **told, **_common(self.run))
+        figures = made(self.folder, PAGES, FIGURES)
+        blocks = accuracy(self.run)
+        (figures / f"{PEAKS}.svg").unlink(missing_ok=True)
+        for block in blocks:
+            if isinstance(block, Plot):
+                save(figure_of(block), figures / PEAKS)
+        rows = matrix(self.run)
+        links = {name: _address(view) for name, view in self.views.items()}
+        self.site.page(
+            INDEX,
+            "index.html",
+            scenes=[view for view in self.views.values() if isinstance(view, SceneView)],
+            ensembles=[view for view in self.views.values() if isinstance(view, EnsembleView)],
+            worst=tables.worst_table(self.run, links),
+            hidden_worst=max(0, len(tables.worst_first(self.run)) - tables.WORST),
+            times=tables.times_table(self.run),
+            summaries={m: FAMILIES[m].summary for m in self.run.models if m in FAMILIES},
+            matrix=[row for row in rows if row.scene in self.views],
+            accuracy=blocks,
+            glance=glance(self.run, rows),
+            **_common(self.run),
+        )
 
     def stamp(self, view: View) -> str:
         """Hash of all that a page shows and of the code that draws it; not when the run was, nor
@@ -295,6 +293,11 @@ class _Pages:
             "drawn by": _appearance(),
         }
         return provenance.digest(json.dumps(shown, sort_keys=True))
+
+
+def printed(view: View) -> bool:
+    """Whether a view has figures for a paper: each ensemble's has, a scene's where the run asks."""
+    return isinstance(view, EnsembleView) or view.printed
 
 
 def _address(view: View) -> str:
@@ -351,7 +354,6 @@ def _common(run: Run) -> dict[str, Any]:
         "run": run,
         "looks": looks(run.models),
         "channels": CHANNELS,
-        "measures": {measure.name: measure for measure in run.measures},
     }
 
 
@@ -382,25 +384,24 @@ def _environment() -> Environment:
         words.unit,
         words.duration,
         words.moment,
-        words.ratio,
         words.window,
         words.dash_array,
         words.readable,
     ):
         environment.filters[filter.__name__] = filter
     for function in (
-        words.share,
-        words.formula,
-        words.known,
-        tables.overrun,
-        tables.measure_table,
-        tables.scene_facts,
-        tables.summary,
-        tables.events_of,
+        row_cells,
+        tables.checks_table,
+        tables.measures_table,
+        tables.runs_table,
+        tables.uncertainty_table,
+        tables.use,
+        scene_facts,
+        summary,
         figure_stem,
         entry,
         outcome_of,
     ):
         environment.globals[function.__name__] = function
-    environment.globals |= {"VERDICTS": VERDICTS, "SEVERITY": SEVERITY, "finite": math.isfinite}
+    environment.globals |= {"VERDICTS": tables.VERDICTS, "SEVERITY": SEVERITY}
     return environment

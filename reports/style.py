@@ -80,6 +80,8 @@ SPARE = (
     Look("spare-4", "", "#8a1f4b", "#e0719e", (8.0, 2.0, 2.0, 2.0)),
     Look("spare-5", "", "#4f6f1f", "#94bb57", (1.0, 2.0)),
 )
+#: All looks by their keys, as a plot's series name them.
+BY_KEY = LOOKS | {look.key: look for look in SPARE}
 
 
 def looks(models: Iterable[str]) -> dict[str, Look]:

@@ -2,22 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Mapping
 from datetime import datetime
 
 from rockcheck.reports.show.words import SUPERSCRIPTS, number
 from rockcheck.reports.style import Look
-from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord
-from rockcheck.validation.suite.results import Check
-from rockcheck.validation.suite.tables import used
-
-
-def known(value: float, digits: int = 2) -> str:
-    """`number` where there is one, else a dash."""
-    return number(value, digits) if math.isfinite(value) else "–"
-
+from rockcheck.validation.discrepancy.figures import Figure
 
 _POWER = re.compile(r"(?<![\w.])([+-]?\d+(?:\.\d+)?)e([+-]?\d+)(?![\w.]\w)")
 _MINUS = re.compile(r"(?<![\w.)\]-])-(?=\.?\d)")
@@ -64,16 +54,6 @@ def window(figure: Figure) -> str:
             f" ({number(figure.until)} s)" if figure.until is not None else ""
         )
     return f"first {number(figure.until)} s" if figure.until is not None else "whole run"
-
-
-def share(check: Check) -> float:
-    """How much of its limit a check uses, 0 to 1; 1 where it is out."""
-    return min(1.0, used(check))
-
-
-def formula(measures: Mapping[str, MeasureRecord], name: str) -> str:
-    """How a measure is defined, empty where the run does not say."""
-    return measures[name].formula if name in measures else ""
 
 
 def dash_array(look: Look) -> str:

@@ -18,7 +18,7 @@ Cell = Any
 class Mark:
     """A cell with a verdict, which colours it, and words that explain it under the pointer.
 
-    `digits` stand for those of its column.
+    `digits` stand for those of its column. `more` is a remark that the page shows below the value.
     """
 
     value: Any
@@ -26,6 +26,7 @@ class Mark:
     words: str = ""
     link: str = ""
     digits: int = 0
+    more: str = ""
 
 
 @dataclass(frozen=True)
@@ -33,14 +34,15 @@ class Column:
     """What a column means.
 
     `name` heads it in CSV and JSON, `label` and `unit` for readers. `kind` says how a value is
-    shown: "number" with so many significant `digits`, "percent" (of a share), "text", or "model"
-    (a model's name, with its colour). Files keep all digits. A terminal shows `brief` columns only.
+    shown: "number" with so many significant `digits`, "percent" (of a share), "used" (how much of a
+    limit, 1 at the limit), "text", or "model" (a model's name, with its colour). Files keep all
+    digits. A terminal shows `brief` columns only.
     """
 
     name: str
     label: str = ""
     unit: str = ""
-    kind: Literal["number", "percent", "text", "model"] = "number"
+    kind: Literal["number", "percent", "used", "text", "model"] = "number"
     digits: int = 3
     help: str = ""
     brief: bool = True
@@ -97,7 +99,8 @@ class Series:
     """One line of a panel. `low` and `high` bound a band around it; `look` names a model's colour.
 
     `style`: a line, "smooth" (without marks), points only, dots (a fit), "thin" (one of many behind
-    the others), or "level", a horizontal line at the only `y`, for reference.
+    the others), "level", a horizontal line at the only `y`, for reference, "step" (each value up to
+    the next), or "cross" (points that stand out).
     """
 
     label: str
@@ -106,16 +109,20 @@ class Series:
     low: Sequence[float | None] = ()
     high: Sequence[float | None] = ()
     look: str = ""
-    style: Literal["line", "smooth", "points", "dots", "thin", "level", "marked"] = "line"
+    style: Literal[
+        "line", "smooth", "points", "dots", "thin", "level", "marked", "step", "cross"
+    ] = "line"
 
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis: what it shows, and its scale and limits."""
+    """An axis: what it shows, its scale and limits, and its ticks with their words where they are
+    not the usual ones."""
 
     label: str
     log: bool = False
     limits: tuple[float, float] | None = None
+    ticks: Mapping[float, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -152,11 +159,12 @@ class Plot:
 
 @dataclass(frozen=True)
 class Text:
-    """A paragraph, or a list of `items`; `verdict` colours it."""
+    """A paragraph, a list of `items`, `facts` by their names; `verdict` colours it."""
 
     text: str = ""
     title: str = ""
     items: Sequence[str] = ()
+    facts: Sequence[tuple[str, str]] = ()
     verdict: Verdict = ""
     on: Literal["all", "page"] = "all"
     folded: bool = False
