@@ -92,8 +92,8 @@ def run(
     out = console()
     out.print(headline(found), style="bold")
     table = Table(box=None, pad_edge=False)
-    for name, justify in (("measure", "left"), ("value", "right"), ("unit", "left"), ("", "left")):
-        table.add_column(name, justify=justify)  # type: ignore[arg-type]
+    for name in ("measure", "value", "unit", ""):
+        table.add_column(name, justify="right" if name == "value" else "left")
     for figure in found.figures:
         yes_no = DIFFERENCES[figure.measure].yes_no
         table.add_row(
