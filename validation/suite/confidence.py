@@ -5,16 +5,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from typing import Any
 
 from rockcheck.scenes import Scene
-from rockcheck.scenes.trust.inputs import UncertainScene
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
 from rockcheck.validation.uncertainty.numerical import Numerical
-from rockcheck.validation.uncertainty.population import Inputs, propagate
+from rockcheck.validation.uncertainty.population import Inputs
 from rockcheck.validation.uncertainty.verdict import INPUTS, Explanation, explain
 
 #: Quantities that are explained, with their units.
@@ -35,23 +32,6 @@ def numerical_of(record: Mapping[str, Any]) -> Numerical | None:
     be had."""
     found = record.get("numerical")
     return None if found is None else Numerical(**found)
-
-
-def inputs_of(store: Store, given: UncertainScene) -> Inputs:
-    """What the spread of a scene's inputs makes of its figures; kept in the store."""
-    spreads = {name: spread.model_dump() for name, spread in given.spreads.items()}
-    code = provenance.code_digest("rockcheck.validation.uncertainty.population")
-    key = provenance.cell_key(
-        given.scene,
-        "ebm-unilateral",
-        {"spreads": spreads, "correlation": given.correlation.tolist(), "code": code},
-    )
-    name = name_of(given.scene.name, "inputs", key)
-    with suppress(TypeError, ValueError):  # a kept result may lack the fields that it should have
-        return Inputs(**(store.get_record(COMPARISONS, name) or {}))
-    found = propagate(given).inputs
-    store.put_record(COMPARISONS, name, found.model_dump(mode="json"))
-    return found
 
 
 def explanations(

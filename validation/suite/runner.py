@@ -3,26 +3,22 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import field_validator
 
 from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.writing import made, write_whole
-from rockcheck.validation.discrepancy.compare import compare, describe, evaluate, too_short
+from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
-from rockcheck.validation.discrepancy.impact_laws import LawFollowed
-from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.execute import provenance, workers
 from rockcheck.validation.execute.models import family, is_own, not_installed
@@ -30,13 +26,12 @@ from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store, name_of
 from rockcheck.validation.finding import Finding
 from rockcheck.validation.study import FAULTS, Study, Task, run
-from rockcheck.validation.suite.confidence import explanations, inputs_of, key_of, numerical_of
+from rockcheck.validation.suite.comparing import Asked, compared, inputs_of
+from rockcheck.validation.suite.confidence import explanations, key_of, numerical_of
 from rockcheck.validation.suite.ensembles import Ensemble
-from rockcheck.validation.suite.impact_laws import by_any, landing_of, under_other_laws
 from rockcheck.validation.suite.results import Cell, CostRecord, EnsembleRecord, Run, Strict
 from rockcheck.validation.suite.suites import ModelVariant, Suite
 from rockcheck.validation.suite.tolerances import (
-    HORIZON,
     MEASURES,
     OWN_FIGURES,
     Place,
@@ -50,82 +45,48 @@ from rockcheck.validation.uncertainty.population import Inputs
 
 
 @dataclass(frozen=True)
-class PlannedCell(Task):
-    """A cell of the suite: scene, model, and the key of all that it depends on."""
+class Planned(Task):
+    """A cell that is to be played: a scene by a model, or the scenes `numbers` of an `ensemble`,
+    which are drawn from `scene`. Its key is of all that it depends on."""
 
     scene: Scene = field(compare=False)
     variant: ModelVariant = field(compare=False)
     model: str
     key: str
     uncertainty: bool = field(default=False, compare=False)
+    ensemble: Ensemble | None = field(default=None, compare=False)
+    numbers: range = field(default=range(0), compare=False)
 
     @property
     def place(self) -> str:
-        """Name of the scene."""
-        return self.scene.name
+        """Name of the scene, or of the ensemble."""
+        return self.ensemble.name if self.ensemble else self.scene.name
 
     @property
     def name(self) -> str:
         """Name of its files."""
-        return name_of(self.place, self.variant.label, self.key)
+        part = [f"{self.numbers.start}"] if self.ensemble else []
+        return name_of(self.place, self.variant.label, *part, self.key)
 
     @property
     def label(self) -> str:
-        """Scene and model."""
-        return f"{self.place}, {self.variant.label}"
+        """Scene and model; of an ensemble the first scene, too."""
+        part = f", from {self.numbers.start}" if self.ensemble else ""
+        return f"{self.place}, {self.variant.label}{part}"
 
     @property
     def work(self) -> workers.Task | workers.BatchTask:
         """What a worker needs to know."""
-        return workers.Task(scene=self.scene, uncertainty=self.uncertainty, **_model(self.variant))
-
-
-@dataclass(frozen=True)
-class PlannedBatch(Task):
-    """Some scenes of an ensemble, for one model."""
-
-    ensemble: Ensemble = field(compare=False)
-    base: Scene = field(compare=False)
-    variant: ModelVariant = field(compare=False)
-    numbers: range = field(compare=False)
-    model: str
-    key: str
-
-    @property
-    def place(self) -> str:
-        """Name of the ensemble."""
-        return self.ensemble.name
-
-    @property
-    def name(self) -> str:
-        """Name of its file."""
-        return name_of(self.place, self.variant.label, f"{self.numbers.start}", self.key)
-
-    @property
-    def label(self) -> str:
-        """Ensemble, model and scenes."""
-        return f"{self.place}, {self.variant.label}, from {self.numbers.start}"
-
-    @property
-    def work(self) -> workers.Task | workers.BatchTask:
-        """What a worker needs to know."""
-        scenes = tuple(self.ensemble.drawn(self.base, n) for n in self.numbers)
-        return workers.BatchTask(scenes=scenes, **_model(self.variant))
-
-
-def _model(variant: ModelVariant) -> dict[str, Any]:
-    return {
-        "label": variant.label,
-        "family": variant.family_name,
-        "settings": dict(variant.settings),
-        "search_path": variant.search_path,
-    }
-
-
-Planned = PlannedCell | PlannedBatch
-#: What a cell is compared with, None for its own figures; and the measures that are asked for over
-#: a window, or on request.
-Asked = tuple[PlannedCell | None, list[Windowed]]
+        model: dict[str, Any] = {
+            "label": self.variant.label,
+            "family": self.variant.family_name,
+            "settings": dict(self.variant.settings),
+            "search_path": self.variant.search_path,
+        }
+        if self.ensemble is None:
+            return workers.Task(scene=self.scene, uncertainty=self.uncertainty, **model)
+        scenes = tuple(self.ensemble.drawn(self.scene, n) for n in self.numbers)
+        return workers.BatchTask(scenes=scenes, **model)
 
 
 class CellRecord(Stored):
@@ -146,55 +107,6 @@ class BatchRecord(Stored):
     peaks: tuple[float | None, ...]
     outcomes: tuple[str, ...]
     cost: CostRecord
-
-
-#: A figure as it is kept: measure, unit, value, window, until, note. Its label is the measure's.
-FigureRow = tuple[str, str, float | None, str, float | None, str]
-
-
-class ComparisonRecord(Stored):
-    """The figures of a comparison; by window, what could not be compared, and whether because one
-    block fell.
-
-    What could not be compared is given by measure and window where a measure has its own.
-    `impact_law` and `overturned_at` are those of a cell's own figures.
-    """
-
-    figures: tuple[FigureRow, ...]
-    gaps: dict[str, tuple[str, bool]]
-    impact_law: LawFollowed | None = None
-    overturned_at: float | None = None
-
-    @field_validator("figures")
-    @classmethod
-    def _known(cls, rows: tuple[FigureRow, ...]) -> tuple[FigureRow, ...]:
-        if unknown := {row[0] for row in rows} - MEASURES.keys():
-            raise ValueError(f"unknown measures: {', '.join(sorted(unknown))}")
-        return rows
-
-    def figures_against(self, name: str) -> list[Figure]:
-        """The figures, `name` being the reference's or OWN_FIGURES."""
-        against = "" if name == OWN_FIGURES else name
-        return [
-            Figure(
-                measure=measure,
-                label=MEASURES[measure].label,
-                unit=unit,
-                value=value,
-                against=against,
-                window=window,
-                until=until,
-                note=note,
-            )
-            for measure, unit, value, window, until, note in self.figures
-        ]
-
-
-class CellComparisons(Stored):
-    """What is kept of a cell's comparisons: by the name of the reference, and by OWN_FIGURES its
-    own figures."""
-
-    of: dict[str, ComparisonRecord]
 
 
 def run_suite(
@@ -238,7 +150,10 @@ class SuiteStudy(Study):
             ) from None
         limits = [suite.suite_of(name).limits for name in (*suite.scenes, *suite.ensembles)]
         self.memory_mb = max((limit.memory_mb for limit in limits), default=None)
-        self.cells = [self._planned(scene, variant) for scene, variant in suite.cells()]
+        self.cells = [
+            self._planned(scene, variant, key_of(suite.suite_of(scene.name).uncertainty))
+            for scene, variant in suite.cells()
+        ]
         self.batches = [
             batch for found in suite.ensemble_cells() for batch in self._batches(*found)
         ]
@@ -246,7 +161,7 @@ class SuiteStudy(Study):
         self.records: dict[Planned, dict[str, Any]] = {}
         self.failures: dict[Planned, str] = {}
         self.traces: set[Planned] = set()
-        self.compared: dict[PlannedCell, Cell] = {}
+        self.compared: dict[Planned, Cell] = {}
         self.by_place = {(cell.place, cell.variant.label): cell for cell in self.cells}
         self.by_scene = {
             scene: list(of) for scene, of in groupby(self.cells, key=lambda cell: cell.place)
@@ -256,28 +171,25 @@ class SuiteStudy(Study):
             if missing := not_installed(item.variant.family_name):
                 self.failures[item] = missing
 
-    def _planned(self, scene: Scene, variant: ModelVariant) -> PlannedCell:
-        own = self.suite.suite_of(scene.name)
-        keyed = replace(variant, settings={**variant.settings, **key_of(own.uncertainty)})
-        return PlannedCell(
+    def _planned(
+        self, scene: Scene, variant: ModelVariant, depends: Mapping[str, Any], **of: Any
+    ) -> Planned:
+        own, settings = self.suite.suite_of(scene.name), {**variant.settings, **depends}
+        if "ensemble" in of:
+            own = self.suite.suite_of(of["ensemble"].name)
+        kind = variant.family_name
+        return Planned(
             scene,
             variant,
             variant.label,
-            _key(scene, keyed),
+            provenance.cell_key(scene, kind, settings, variant.search_path),
             own.uncertainty,
-            **self._how(scene.name, variant),
+            **of,
+            seconds=own.limits.seconds,
+            compiles=kind if family(kind).compiled else "",
         )
 
-    def _how(self, place: str, variant: ModelVariant) -> dict[str, Any]:
-        kind = family(variant.family_name)
-        return {
-            "seconds": self.suite.suite_of(place).limits.seconds,
-            "compiles": variant.family_name if kind.compiled else "",
-        }
-
-    def _batches(
-        self, ensemble: Ensemble, base: Scene, variant: ModelVariant
-    ) -> Iterator[PlannedBatch]:
+    def _batches(self, ensemble: Ensemble, base: Scene, variant: ModelVariant) -> Iterator[Planned]:
         """An ensemble in batches. A batch's key covers how its scenes are drawn, so it can be
         looked up without drawing them."""
         drawing = {
@@ -286,20 +198,9 @@ class SuiteStudy(Study):
         }
         for start in range(0, ensemble.count, ensemble.batch):
             numbers = range(start, min(start + ensemble.batch, ensemble.count))
-            settings = {
-                **variant.settings,
-                "drawn": {**drawing, "numbers": [numbers.start, numbers.stop]},
-            }
-            key = _key(base, replace(variant, settings=settings))
-            yield PlannedBatch(
-                ensemble,
-                base,
-                variant,
-                numbers,
-                variant.label,
-                key,
-                **self._how(ensemble.name, variant),
-            )
+            drawn = {**drawing, "numbers": [numbers.start, numbers.stop]}
+            of = {"ensemble": ensemble, "numbers": numbers}
+            yield self._planned(base, variant, {"drawn": drawn}, **of)
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Planned]:
         """All cells and batches of models that are installed."""
@@ -316,7 +217,7 @@ class SuiteStudy(Study):
 
     def find(self, store: Store, task: Any) -> workers.Played | None:
         """A cell's record where its history is whole, a batch's."""
-        cell = isinstance(task, PlannedCell)
+        cell = task.ensemble is None
         found = self.store.get(task.name) if cell else self.store.get_record(COMPARISONS, task.name)
         with suppress(
             ValueError
@@ -334,7 +235,7 @@ class SuiteStudy(Study):
         if record.traceback:  # some scenes of a batch: not to be read back
             self.traces.add(task)
             write_whole(made(self.store.folder, FAULTS) / f"{task.name}.txt", record.traceback)
-        elif isinstance(task, PlannedCell):
+        elif task.ensemble is None:
             self.store.put(task.name, record.files, record.record, record.history)
             self._compare(task.place)
         else:
@@ -360,23 +261,21 @@ class SuiteStudy(Study):
         for scene in self.by_scene:
             self._compare(scene)
         inputs = {name: inputs_of(self.store, given) for name, given in suite.uncertain.items()}
-        cells = [self.compared[planned] for planned in self.cells]
-        beside = {name: list(of) for name, of in groupby(cells, key=lambda cell: cell.scene)}
-        cells = [_judged_beside(suite, cell, beside[cell.scene]) for cell in cells]
+        found = [self.compared[planned] for planned in self.cells]
+        beside = {name: list(of) for name, of in groupby(found, key=lambda cell: cell.scene)}
+        found = [self._judged_beside(cell, beside[cell.scene]) for cell in found]
         cells = [
-            _explained(
-                suite, cell, beside[cell.scene], self.by_place, self.records, inputs.get(cell.scene)
-            )
-            for cell in cells
+            self._explained(cell, beside[cell.scene], inputs.get(cell.scene)) for cell in found
         ]
-        ensembles, ensemble_cells = _ensembles(
-            suite, self.batches, self.records, self.failures, self.read_back
-        )
+        ensembles: list[EnsembleRecord] = []
+        for ensemble, batches in groupby(self.batches, key=lambda batch: batch.ensemble):
+            if ensemble is not None:
+                record, of_ensemble = self._ensemble(ensemble, list(batches))
+                ensembles.append(record)
+                cells += of_ensemble
         faults = {(task.place, task.variant.label): _fault(task) for task in self.traces}
-        cells = [
-            cell.model_copy(update=faults.get((cell.scene, cell.model), {}))
-            for cell in (*cells, *ensemble_cells)
-        ]
+        cells = [cell.model_copy(update=faults.get((cell.scene, cell.model), {})) for cell in cells]
+        there = {(cell.scene, cell.model) for cell in cells}
         finished = Run(
             suite=suite.name,
             description=suite.description,
@@ -389,7 +288,11 @@ class SuiteStudy(Study):
             ensembles=tuple(ensembles),
             inputs=inputs,
             printed=tuple(name for name in suite.scenes if suite.suite_of(name).print_figures),
-            faults=_without_cell(suite, {(cell.scene, cell.model) for cell in cells}),
+            faults=tuple(
+                f"tolerance [{place}] has no cell in the suite"
+                for place in suite.tolerances
+                if (place.scene, place.model) not in there
+            ),
             measures=tuple(
                 MeasureRecord(name=m.name, label=m.label, unit=m.unit, formula=m.formula)
                 for m in MEASURES.values()
@@ -407,15 +310,216 @@ class SuiteStudy(Study):
             exit_code=finished.exit_code,
         )
 
-    def _cell(self, planned: PlannedCell) -> Cell:
-        return _cell(
-            self.suite,
-            planned,
-            self.by_place,
-            self.records,
-            self.failures,
-            self.store,
-            planned in self.read_back,
+    def _cell(self, planned: Planned) -> Cell:
+        """The finished cell: its figures, compared with each reference, and their verdicts."""
+        scene, label, suite = planned.scene, planned.variant.label, self.suite
+        about: dict[str, Any] = {
+            "scene": scene.name,
+            "model": label,
+            "key": planned.key,
+            "read_back": planned in self.read_back,
+        }
+        if planned in self.failures:
+            about["status"] = "absent" if not_installed(planned.variant.family_name) else "failed"
+            return Cell(
+                **about, reason=self.failures[planned], settings=dict(planned.variant.settings)
+            )
+        record = self.records[planned]
+        required = suite.required(scene.name, label)
+        own = suite.suite_of(scene.name)
+        asked: dict[str, Asked] = {}
+        for name in dict.fromkeys(
+            [OWN_FIGURES, own.reference, own.model_form, *(place.against for place in required)]
+        ):
+            reference = None if name == OWN_FIGURES else self.by_place.get((scene.name, name))
+            if name == OWN_FIGURES or (
+                reference is not None and reference is not planned and reference in self.records
+            ):
+                extra = sorted(
+                    p.what
+                    for p in required
+                    if p.against == name and (p.what.window or p.what.definition.on_request)
+                )
+                asked[name] = reference, extra
+        found = compared(self.store, scene, planned, asked)
+        numerical = numerical_of(record)
+        figures = [figure for name, one in found.items() for figure in one.figures_against(name)]
+        gaps = {
+            (name, window): gap for name, one in found.items() for window, gap in one.gaps.items()
+        }
+        checks = []
+        for place, kind in required.items() if suite.judged else ():
+            figure = _figure(figures, place)
+            of_window = gaps.get((place.against, place.what.window), ("", False))
+            text, fall = gaps.get((place.against, str(place.what)), of_window)
+            gap = "" if fall and kind == "model form" else text
+            if gap and kind == "measured" and not fall:
+                gap += (
+                    "; `offset` of the measured model shifts its times,"
+                    " a window such as theta_rms@8s ends sooner"
+                )
+            measure = place.what.definition
+            floor = floor_of(measure, scene, numerical)
+            checks.append(
+                judge(
+                    figure,
+                    own.tolerances.get(place),
+                    kind=kind,
+                    measure=measure,
+                    gap=gap,
+                    floor=floor,
+                )
+            )
+        return Cell(
+            **about,
+            status="done",
+            settings=record["settings"],
+            history=f"{HISTORIES}/{planned.name}{TABLE}",
+            outcome=record["outcome"],
+            overturned_at=found[OWN_FIGURES].overturned_at,
+            notes=tuple(record["notes"]),
+            cost=CostRecord(**record["cost"]),
+            figures=tuple(figures),
+            checks=tuple(checks),
+            numerical=numerical,
+            impact_law=found[OWN_FIGURES].impact_law,
+        )
+
+    def _judged_beside(self, cell: Cell, cells: Sequence[Cell]) -> Cell:
+        """The cell with its own figures judged beside the reference's, where one is not as
+        expected.
+
+        Both must solve the same equations. A figure of the reference that is itself not as expected
+        is no yardstick.
+        """
+        own = self.suite.suite_of(cell.scene)
+        moved = next(
+            (check for check in cell.checks if check.kind == "absolute" and check.weighs != "pass"),
+            None,
+        )
+        reference = next(
+            (other for other in cells if other.model == own.reference and other is not cell), None
+        )
+        if moved is None or reference is None:
+            return cell
+        if (
+            own.kind(Place(cell.scene, cell.model, own.reference, Windowed(moved.figure.measure)))
+            != "numerical"
+        ):
+            return cell
+        known = {(f.measure, f.window): f.value for f in reference.figures if not f.against}
+        for check in reference.checks:
+            if check.verdict != "pass" and not check.figure.against:
+                known.pop((check.figure.measure, check.figure.window), None)
+        checks = (
+            judged_beside(check, known.get((check.figure.measure, check.figure.window)))
+            if check.kind == "absolute"
+            else check
+            for check in cell.checks
+        )
+        return cell.model_copy(update={"checks": tuple(checks)})
+
+    def _explained(self, cell: Cell, cells: Sequence[Cell], inputs: Inputs | None) -> Cell:
+        """The cell with the verdicts on its differences from the references among `cells`, of its
+        scene, that finished; unchanged where nothing is known."""
+        own = self.suite.suite_of(cell.scene)
+        if cell.numerical is None:
+            return cell
+        others = {
+            other.model: other.figures
+            for other in cells
+            if other.model in {own.reference, own.model_form} - {cell.model}
+            and other.status == "done"
+        }
+        record = {name: self.records[self.by_place[cell.scene, name]] for name in others}
+        mine = self.records[self.by_place[cell.scene, cell.model]]
+        scene = own.scenes[cell.scene]
+        found = explanations(scene, cell.figures, others, record, mine, inputs)
+        return cell.model_copy(update={"explanations": tuple(found)})
+
+    def _ensemble(
+        self, ensemble: Ensemble, batches: Sequence[Planned]
+    ) -> tuple[EnsembleRecord, list[Cell]]:
+        """An ensemble with all peaks and outcomes, and a cell for each model."""
+        by_model = {
+            label: list(found)
+            for label, found in groupby(batches, key=lambda batch: batch.variant.label)
+        }
+        samples: dict[str, Sample] = {}
+        for label, parts in by_model.items():
+            got = [
+                self.records.get(b)
+                or {
+                    "peaks": [None] * len(b.numbers),
+                    "outcomes": [self.failures[b]] * len(b.numbers),
+                }
+                for b in parts
+            ]
+            peaks = [
+                math.nan if peak is None else peak for record in got for peak in record["peaks"]
+            ]
+            outcomes = tuple(outcome for record in got for outcome in record["outcomes"])
+            samples[label] = Sample(np.array(peaks), outcomes)
+        record = EnsembleRecord(
+            name=ensemble.name,
+            description=ensemble.description,
+            definition=ensemble.model_dump(mode="json", exclude_none=True),
+            peaks={
+                label: tuple(peak if math.isfinite(peak) else None for peak in sample.peaks)
+                for label, sample in samples.items()
+            },
+            outcomes={label: tuple(sample.outcomes) for label, sample in samples.items()},
+        )
+        return record, [self._ensemble_cell(parts, samples) for parts in by_model.values()]
+
+    def _ensemble_cell(self, batches: Sequence[Planned], samples: Mapping[str, Sample]) -> Cell:
+        variant, place = batches[0].variant, batches[0].place
+        own, origin = samples[variant.label], self.suite.suite_of(place)
+        costs = [self.records[batch]["cost"] for batch in batches if batch in self.records]
+        about: dict[str, Any] = {
+            "scene": place,
+            "model": variant.label,
+            "key": provenance.digest("".join(batch.key for batch in batches)),
+            "settings": dict(variant.settings),
+            "read_back": all(batch in self.read_back for batch in batches),
+            "cost": CostRecord(
+                **{key: sum(cost[key] for cost in costs) for key in (costs[0] if costs else ())}
+            ),
+        }
+        if missing := not_installed(variant.family_name):
+            return Cell(**about, status="absent", reason=missing)
+        if own.failures:
+            reason = next(
+                outcome
+                for peak, outcome in zip(own.peaks, own.outcomes, strict=True)
+                if not math.isfinite(peak)
+            )
+            return Cell(
+                **about,
+                status="failed",
+                reason=f"{own.failures} of {len(own.peaks)} scenes failed; the first: {reason}",
+            )
+        required = origin.required(place, variant.label)
+        figures = [
+            evaluate(measure, Samples(samples[name], own), "alpha", against=name)
+            for name in dict.fromkeys(
+                [origin.reference, origin.model_form, *(place.against for place in required)]
+            )
+            if name in samples and name != variant.label
+            for measure in STATISTICS.values()
+        ]
+        checks = [
+            judge(
+                _figure(figures, place),
+                origin.tolerances.get(place),
+                kind=kind,
+                measure=place.what.definition,
+            )
+            for place, kind in required.items()
+        ]
+        outcome = f"{int(np.sum(own.fallen))} of {len(own.peaks)} overturned"
+        return Cell(
+            **about, status="done", outcome=outcome, figures=tuple(figures), checks=tuple(checks)
         )
 
 
@@ -442,264 +546,6 @@ def _fault(item: Any) -> dict[str, Any]:
     }
 
 
-def _key(scene: Scene, variant: ModelVariant) -> str:
-    return provenance.cell_key(scene, variant.family_name, variant.settings, variant.search_path)
-
-
-def _ensembles(
-    suite: Suite,
-    batches: Sequence[PlannedBatch],
-    records: Mapping[Planned, Mapping[str, Any]],
-    failures: Mapping[Planned, str],
-    read_back: Container[Planned],
-) -> tuple[list[EnsembleRecord], list[Cell]]:
-    """The ensembles with all peaks and outcomes, and a cell for each of them and each model."""
-    ensembles: list[EnsembleRecord] = []
-    cells: list[Cell] = []
-    for ensemble, of_ensemble in groupby(batches, key=lambda batch: batch.ensemble):
-        by_model = {
-            label: list(found)
-            for label, found in groupby(of_ensemble, key=lambda batch: batch.variant.label)
-        }
-        samples: dict[str, Sample] = {}
-        for label, parts in by_model.items():
-            got = [
-                records.get(b)
-                or {"peaks": [None] * len(b.numbers), "outcomes": [failures[b]] * len(b.numbers)}
-                for b in parts
-            ]
-            peaks = [
-                math.nan if peak is None else peak for record in got for peak in record["peaks"]
-            ]
-            samples[label] = Sample(
-                np.array(peaks), tuple(outcome for record in got for outcome in record["outcomes"])
-            )
-        ensembles.append(
-            EnsembleRecord(
-                name=ensemble.name,
-                description=ensemble.description,
-                definition=ensemble.model_dump(mode="json", exclude_none=True),
-                peaks={
-                    label: tuple(peak if math.isfinite(peak) else None for peak in sample.peaks)
-                    for label, sample in samples.items()
-                },
-                outcomes={label: tuple(sample.outcomes) for label, sample in samples.items()},
-            )
-        )
-        cells += [
-            _ensemble_cell(suite, ensemble, by_model[label], samples, records, read_back)
-            for label in samples
-        ]
-    return ensembles, cells
-
-
-def _ensemble_cell(
-    suite: Suite,
-    ensemble: Ensemble,
-    batches: Sequence[PlannedBatch],
-    samples: Mapping[str, Sample],
-    records: Mapping[Planned, Mapping[str, Any]],
-    read_back: Container[Planned],
-) -> Cell:
-    variant = batches[0].variant
-    own, origin = samples[variant.label], suite.suite_of(ensemble.name)
-    costs = [records[batch]["cost"] for batch in batches if batch in records]
-    about: dict[str, Any] = {
-        "scene": ensemble.name,
-        "model": variant.label,
-        "key": provenance.digest("".join(batch.key for batch in batches)),
-        "settings": dict(variant.settings),
-        "read_back": all(batch in read_back for batch in batches),
-        "cost": CostRecord(
-            **{key: sum(cost[key] for cost in costs) for key in (costs[0] if costs else ())}
-        ),
-    }
-    if missing := not_installed(variant.family_name):
-        return Cell(**about, status="absent", reason=missing)
-    if own.failures:
-        reason = next(
-            outcome
-            for peak, outcome in zip(own.peaks, own.outcomes, strict=True)
-            if not math.isfinite(peak)
-        )
-        return Cell(
-            **about,
-            status="failed",
-            reason=f"{own.failures} of {len(own.peaks)} scenes failed; the first: {reason}",
-        )
-    required = origin.required(ensemble.name, variant.label)
-    figures = [
-        evaluate(measure, Samples(samples[name], own), "alpha", against=name)
-        for name in dict.fromkeys(
-            [origin.reference, origin.model_form, *(place.against for place in required)]
-        )
-        if name in samples and name != variant.label
-        for measure in STATISTICS.values()
-    ]
-    checks = [
-        judge(
-            _figure(figures, place),
-            origin.tolerances.get(place),
-            kind=kind,
-            measure=place.what.definition,
-        )
-        for place, kind in required.items()
-    ]
-    outcome = f"{int(np.sum(own.fallen))} of {len(own.peaks)} overturned"
-    return Cell(
-        **about, status="done", outcome=outcome, figures=tuple(figures), checks=tuple(checks)
-    )
-
-
-def _without_cell(suite: Suite, cells: Container[tuple[str, str]]) -> tuple[str, ...]:
-    """Tolerances that nothing in the suite can meet."""
-    return tuple(
-        f"tolerance [{place}] has no cell in the suite"
-        for place in suite.tolerances
-        if (place.scene, place.model) not in cells
-    )
-
-
-def _cell(
-    suite: Suite,
-    planned: PlannedCell,
-    planned_cells: Mapping[tuple[str, str], PlannedCell],
-    records: Mapping[Planned, Mapping[str, Any]],
-    failures: Mapping[Planned, str],
-    store: Store,
-    read_back: bool,
-) -> Cell:
-    """The finished cell: its figures, compared with each reference, and the verdicts on them."""
-    scene, label = planned.scene, planned.variant.label
-    about: dict[str, Any] = {
-        "scene": scene.name,
-        "model": label,
-        "key": planned.key,
-        "read_back": read_back,
-    }
-    if planned in failures:
-        about["status"] = "absent" if not_installed(planned.variant.family_name) else "failed"
-        return Cell(**about, reason=failures[planned], settings=dict(planned.variant.settings))
-    record = records[planned]
-    required = suite.required(scene.name, label)
-    own = suite.suite_of(scene.name)
-    asked: dict[str, Asked] = {}
-    for name in dict.fromkeys(
-        [OWN_FIGURES, own.reference, own.model_form, *(place.against for place in required)]
-    ):
-        reference = None if name == OWN_FIGURES else planned_cells.get((scene.name, name))
-        if name == OWN_FIGURES or (
-            reference is not None and reference is not planned and reference in records
-        ):
-            extra = sorted(
-                p.what
-                for p in required
-                if p.against == name and (p.what.window or p.what.definition.on_request)
-            )
-            asked[name] = reference, extra
-    found = _compared(store, scene, planned, asked)
-    numerical = numerical_of(record)
-    figures = [figure for name, one in found.items() for figure in one.figures_against(name)]
-    gaps = {(name, window): gap for name, one in found.items() for window, gap in one.gaps.items()}
-    checks = []
-    for place, kind in required.items() if suite.judged else ():
-        figure = _figure(figures, place)
-        of_window = gaps.get((place.against, place.what.window), ("", False))
-        text, fall = gaps.get((place.against, str(place.what)), of_window)
-        gap = "" if fall and kind == "model form" else text
-        if gap and kind == "measured" and not fall:
-            gap += (
-                "; `offset` of the measured model shifts its times,"
-                " a window such as theta_rms@8s ends sooner"
-            )
-        measure = place.what.definition
-        floor = floor_of(measure, scene, numerical)
-        checks.append(
-            judge(
-                figure, own.tolerances.get(place), kind=kind, measure=measure, gap=gap, floor=floor
-            )
-        )
-    return Cell(
-        **about,
-        status="done",
-        settings=record["settings"],
-        history=f"{HISTORIES}/{planned.name}{TABLE}",
-        outcome=record["outcome"],
-        overturned_at=found[OWN_FIGURES].overturned_at,
-        notes=tuple(record["notes"]),
-        cost=CostRecord(**record["cost"]),
-        figures=tuple(figures),
-        checks=tuple(checks),
-        numerical=numerical,
-        impact_law=found[OWN_FIGURES].impact_law,
-    )
-
-
-def _judged_beside(suite: Suite, cell: Cell, cells: Sequence[Cell]) -> Cell:
-    """The cell with its own figures judged beside the reference's, where one is not as expected.
-
-    Both must solve the same equations. A figure of the reference that is itself not as expected is
-    no yardstick.
-    """
-    own = suite.suite_of(cell.scene)
-    moved = next(
-        (check for check in cell.checks if check.kind == "absolute" and check.weighs != "pass"),
-        None,
-    )
-    reference = next(
-        (other for other in cells if other.model == own.reference and other is not cell), None
-    )
-    if moved is None or reference is None:
-        return cell
-    if (
-        own.kind(Place(cell.scene, cell.model, own.reference, Windowed(moved.figure.measure)))
-        != "numerical"
-    ):
-        return cell
-    known = {(f.measure, f.window): f.value for f in reference.figures if not f.against}
-    for check in reference.checks:
-        if check.verdict != "pass" and not check.figure.against:
-            known.pop((check.figure.measure, check.figure.window), None)
-    checks = (
-        judged_beside(check, known.get((check.figure.measure, check.figure.window)))
-        if check.kind == "absolute"
-        else check
-        for check in cell.checks
-    )
-    return cell.model_copy(update={"checks": tuple(checks)})
-
-
-def _explained(
-    suite: Suite,
-    cell: Cell,
-    cells: Sequence[Cell],
-    planned: Mapping[tuple[str, str], PlannedCell],
-    records: Mapping[Planned, Mapping[str, Any]],
-    inputs: Inputs | None,
-) -> Cell:
-    """The cell with the verdicts on its differences from the references among `cells`, of its
-    scene, that finished; unchanged where nothing is known."""
-    own = suite.suite_of(cell.scene)
-    if cell.numerical is None:
-        return cell
-    others = {
-        other.model: other
-        for other in cells
-        if other.model in (own.reference, own.model_form)
-        and other.model != cell.model
-        and other.status == "done"
-    }
-    found = explanations(
-        own.scenes[cell.scene],
-        cell.figures,
-        {name: other.figures for name, other in others.items()},
-        {name: records[planned[cell.scene, name]] for name in others},
-        records[planned[cell.scene, cell.model]],
-        inputs,
-    )
-    return cell.model_copy(update={"explanations": tuple(found)})
-
-
 def _figure(figures: Sequence[Figure], place: Place) -> Figure:
     """The figure that a check is about; one without value where it is missing, so that the check
     cannot pass."""
@@ -721,97 +567,4 @@ def _figure(figures: Sequence[Figure], place: Place) -> Figure:
         against=against,
         window=place.what.window,
         note=reason,
-    )
-
-
-def _horizon(store: Store, scene: Scene) -> float:
-    """The time up to which histories of this scene can be compared point by point (`ebm.horizon`),
-    s; kept in the store."""
-    key = provenance.cell_key(scene, "ebm-unilateral", {"of": "horizon"})
-    name = name_of(scene.name, HORIZON, key)
-    found = store.get_record(COMPARISONS, name)
-    if found is None or not isinstance(found.get("horizon"), float | int):
-        from rockcheck.ebm.horizon import predictability_horizon
-
-        found = {"horizon": predictability_horizon(scene)}
-        store.put_record(COMPARISONS, name, found)
-    return float(found["horizon"])
-
-
-def _compared(
-    store: Store, scene: Scene, planned: PlannedCell, asked: Mapping[str, Asked]
-) -> dict[str, ComparisonRecord]:
-    """The comparisons that are asked of a cell, by name of the reference, and by OWN_FIGURES its
-    own figures; kept in the store.
-
-    Each has all figures over the whole time, and those asked for over a window.
-    """
-    horizon = (
-        _horizon(store, scene)
-        if any(what.window == HORIZON for _, extra in asked.values() for what in extra)
-        else None
-    )
-    code = provenance.code_digest("rockcheck.validation.suite.impact_laws")  # with `compare`
-    against = [
-        [name, reference.key if reference else "", list(map(str, extra))]
-        for name, (reference, extra) in asked.items()
-    ]
-    name = name_of(
-        scene.name,
-        planned.variant.label,
-        provenance.digest(json.dumps([planned.key, against, horizon, code])),
-    )
-    with suppress(ValueError):  # what is kept is not trusted to have the fields that it must have
-        kept = CellComparisons.model_validate(store.get_record(COMPARISONS, name))
-        if kept.of.keys() == asked.keys():
-            return {one: kept.of[one] for one in asked}
-    found = {
-        one: _compute(store, scene, planned, reference, extra, horizon)
-        for one, (reference, extra) in asked.items()
-    }
-    store.put_record(COMPARISONS, name, CellComparisons(of=found).model_dump(mode="json"))
-    return found
-
-
-def _compute(
-    store: Store,
-    scene: Scene,
-    planned: PlannedCell,
-    reference: PlannedCell | None,
-    windowed: Sequence[Windowed],
-    horizon: float | None,
-) -> ComparisonRecord:
-    """The figures of the cell itself where `reference` is None, with the law of impacts that it
-    followed."""
-    candidate = store.load(planned.name)
-    yardstick = store.load(reference.name) if reference else None
-    figures: list[Figure] = []
-    gaps: dict[str, tuple[str, bool]] = {}
-    by_window: dict[str, list[str]] = {
-        "": [m.name for m in (DIFFERENCES if reference else FIGURES).values() if not m.on_request]
-    }
-    for what in windowed:
-        by_window.setdefault(what.window, []).append(what.measure)
-    landing = landing_of(store, scene)
-    others = under_other_laws(scene, reference.variant) if landing and reference else {}
-    for window, measures in by_window.items():
-        until = horizon if window == HORIZON else float(window[:-1]) if window else None
-        if yardstick is None:
-            found = describe(candidate, until=until, scene=scene, measures=measures)
-            gaps[window] = too_short(candidate, until), False
-        else:
-            discrepancy = compare(yardstick, candidate, until=until, scene=scene, measures=measures)
-            found, gaps[window] = discrepancy.figures, (discrepancy.gap, discrepancy.fall)
-            if landing and (until is None or until > landing.t):
-                found, own = by_any(discrepancy, others, candidate, scene, until, measures)
-                gaps |= {str(Windowed(measure, window)): gap for measure, gap in own.items()}
-        figures += (
-            [figure.model_copy(update={"window": window}) for figure in found] if window else found
-        )
-    law = landing.followed_by(candidate, scene) if landing and yardstick is None else None
-    return ComparisonRecord(
-        figures=tuple((f.measure, f.unit, f.value, f.window, f.until, f.note) for f in figures),
-        gaps=gaps,
-        impact_law=law,
-        overturned_at=None if yardstick else candidate.overturned_at,
     )

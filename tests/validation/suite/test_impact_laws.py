@@ -12,7 +12,7 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Scene
 from rockcheck.validation.discrepancy.compare import compare
 from rockcheck.validation.execute.store import COMPARISONS, Store
-from rockcheck.validation.suite.impact_laws import by_any, landing_of, under_other_laws
+from rockcheck.validation.suite.comparing import by_any, landing_of, under_other_laws
 from rockcheck.validation.suite.results import Cell, Run
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import ModelVariant, load_suite
@@ -194,9 +194,7 @@ def test_a_landing_is_kept_and_what_was_kept_is_not_trusted(
     assert first is not None
     (kept,) = (tmp_path / COMPARISONS).iterdir()
     with monkeypatch.context() as patched:
-        patched.setattr(
-            "rockcheck.validation.suite.impact_laws.parting_landing", lambda scene: None
-        )
+        patched.setattr("rockcheck.validation.suite.comparing.parting_landing", lambda scene: None)
         assert landing_of(store, scene) == first
     store.put_record(COMPARISONS, kept.stem, {"landing": {"t": 1.0}})
     assert landing_of(store, scene) == first

@@ -1,0 +1,253 @@
+"""The figures of a suite's cells against their references, under any law of impacts, and what else
+is worked out once and kept: the horizon, the landing at which laws part, what a spread of inputs
+makes of figures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from pydantic import TypeAdapter, field_validator
+
+from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.horizon import may_fly, other_laws, predictability_horizon
+from rockcheck.scenes import History, InputError, ModelFailure, Scene
+from rockcheck.scenes.trust.inputs import UncertainScene
+from rockcheck.validation.discrepancy.compare import Discrepancy, compare, describe, too_short
+from rockcheck.validation.discrepancy.figures import Figure, Stored
+from rockcheck.validation.discrepancy.impact_laws import Landing, LawFollowed, parting_landing
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
+from rockcheck.validation.execute import provenance
+from rockcheck.validation.execute.models import build, is_own
+from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
+from rockcheck.validation.suite.suites import ModelVariant
+from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Windowed
+from rockcheck.validation.uncertainty.population import Inputs, propagate
+
+if TYPE_CHECKING:
+    from rockcheck.validation.suite.runner import Planned
+
+#: What is judged by the nearest law. Histories are judged up to the horizon, which ends where the
+#: laws part.
+BY_ANY = ("outcome_agrees", "peak_ratio")
+#: What a cell is compared with, None for its own figures; and the measures that are asked for over
+#: a window, or on request.
+Asked = tuple["Planned | None", list[Windowed]]
+#: A figure as it is kept: measure, unit, value, window, until, note. Its label is the measure's.
+FigureRow = tuple[str, str, float | None, str, float | None, str]
+
+
+class ComparisonRecord(Stored):
+    """The figures of a comparison; by window, what could not be compared, and whether because one
+    block fell.
+
+    What could not be compared is given by measure and window where a measure has its own.
+    `impact_law` and `overturned_at` are those of a cell's own figures.
+    """
+
+    figures: tuple[FigureRow, ...]
+    gaps: dict[str, tuple[str, bool]]
+    impact_law: LawFollowed | None = None
+    overturned_at: float | None = None
+
+    @field_validator("figures")
+    @classmethod
+    def _known(cls, rows: tuple[FigureRow, ...]) -> tuple[FigureRow, ...]:
+        if unknown := {row[0] for row in rows} - MEASURES.keys():
+            raise ValueError(f"unknown measures: {', '.join(sorted(unknown))}")
+        return rows
+
+    def figures_against(self, name: str) -> list[Figure]:
+        """The figures, `name` being the reference's or OWN_FIGURES."""
+        against = "" if name == OWN_FIGURES else name
+        return [
+            Figure(
+                measure=measure,
+                label=MEASURES[measure].label,
+                unit=unit,
+                value=value,
+                against=against,
+                window=window,
+                until=until,
+                note=note,
+            )
+            for measure, unit, value, window, until, note in self.figures
+        ]
+
+
+def kept(store: Store, name: str, kind: Any, compute: Callable[[], Any]) -> Any:
+    """What the store has under that name, a value of the type `kind`; computed and kept where there
+    is none that has the fields it must have."""
+    adapter = TypeAdapter(kind)
+    with suppress(KeyError, TypeError, ValueError):
+        return adapter.validate_python((store.get_record(COMPARISONS, name) or {})["kept"])
+    found = compute()
+    store.put_record(COMPARISONS, name, {"kept": adapter.dump_python(found, mode="json")})
+    return found
+
+
+def _of_scene(scene: Scene, what: str, module: str, **more: Any) -> str:
+    """The name of what is kept of a scene, which depends on the code of a module."""
+    depends = {"of": what, "code": provenance.code_digest(f"rockcheck.{module}"), **more}
+    return name_of(scene.name, what, provenance.cell_key(scene, "ebm-unilateral", depends))
+
+
+def inputs_of(store: Store, given: UncertainScene) -> Inputs:
+    """What the spread of a scene's inputs makes of its figures; kept in the store."""
+    spreads = {name: spread.model_dump() for name, spread in given.spreads.items()}
+    more = {"spreads": spreads, "correlation": given.correlation.tolist()}
+    name = _of_scene(given.scene, "inputs", "validation.uncertainty.population", **more)
+    found: Inputs = kept(store, name, Inputs, lambda: propagate(given).inputs)
+    return found
+
+
+def landing_of(store: Store, scene: Scene) -> Landing | None:
+    """The first landing of a scene at which the laws part, None without one; kept in the store."""
+
+    def landing() -> Landing | None:
+        try:
+            return parting_landing(scene)
+        except (InputError, ModelFailure):  # it is not a scene for that model
+            return None
+
+    if not may_fly(scene):
+        return None
+    name = _of_scene(scene, "impact-laws", "validation.discrepancy.impact_laws")
+    found: Landing | None = kept(store, name, Landing | None, landing)
+    return found
+
+
+def horizon_of(store: Store, scene: Scene) -> float:
+    """The time up to which histories of this scene can be compared point by point (`ebm.horizon`),
+    s; kept in the store."""
+    name = _of_scene(scene, HORIZON, "ebm.horizon")
+    return float(kept(store, name, float, lambda: predictability_horizon(scene)))
+
+
+def under_other_laws(scene: Scene, variant: ModelVariant) -> dict[str, History]:
+    """What a reference does under the other laws, by law; those under which it fails, or has no law
+    to choose, are left out."""
+    model = None if is_own(variant.family_name) else build(variant.family_name, variant.settings)
+    found: dict[str, History] = {}
+    if isinstance(model, EventBasedModel):
+        for law in other_laws(model, walls=bool(scene.walls), flat=True):
+            with suppress(ModelFailure):
+                found[law] = model.model_copy(update={"impacts": law}).simulate(scene)
+    return found
+
+
+def by_any(
+    found: Discrepancy,
+    references: Mapping[str, History],
+    candidate: History,
+    scene: Scene,
+    until: float | None,
+    measures: Iterable[str],
+) -> tuple[tuple[Figure, ...], dict[str, tuple[str, bool]]]:
+    """The figures of a comparison, those of BY_ANY against the nearest of its reference and the
+    `references` under other laws.
+
+    A figure says so if its nearest law is another one. The second value says, by measure, what
+    could not be compared under that law, and whether the reason is that one block fell.
+    """
+    figures = {figure.measure: figure for figure in found.figures}
+    gaps: dict[str, tuple[str, bool]] = {}
+    wanted = [measure for measure in measures if measure in BY_ANY]
+    for law, reference in references.items():
+        other = compare(reference, candidate, until=until, scene=scene, measures=wanted)
+        for rival in other.figures:
+            own = figures.get(rival.measure)
+            if own is not None and _away(rival) < _away(own):
+                note = f'{rival.note}; impacts = "{law}"' if rival.note else f'impacts = "{law}"'
+                figures[rival.measure] = rival.model_copy(
+                    update={"against": own.against, "window": own.window, "note": note}
+                )
+                gaps[rival.measure] = other.gap, other.fall
+    return tuple(figures.values()), gaps
+
+
+def _away(figure: Figure) -> float:
+    """How far a figure is from its ideal; infinity where it has no value."""
+    ideal = DIFFERENCES[figure.measure].ideal
+    return float("inf") if figure.value is None or ideal is None else abs(figure.value - ideal)
+
+
+def compared(
+    store: Store, scene: Scene, planned: Planned, asked: Mapping[str, Asked]
+) -> dict[str, ComparisonRecord]:
+    """The comparisons that are asked of a cell, by name of the reference, and by OWN_FIGURES its
+    own figures; kept in the store.
+
+    Each has all figures over the whole time, and those asked for over a window.
+    """
+    horizon = (
+        horizon_of(store, scene)
+        if any(what.window == HORIZON for _, extra in asked.values() for what in extra)
+        else None
+    )
+    code = provenance.code_digest(__name__)  # with `compare`
+    against = [
+        [name, reference.key if reference else "", list(map(str, extra))]
+        for name, (reference, extra) in asked.items()
+    ]
+    name = name_of(
+        scene.name,
+        planned.variant.label,
+        provenance.digest(json.dumps([planned.key, against, horizon, code])),
+    )
+    found: dict[str, ComparisonRecord] = kept(
+        store,
+        name,
+        dict[str, ComparisonRecord],
+        lambda: {
+            one: _compute(store, scene, planned, reference, extra, horizon)
+            for one, (reference, extra) in asked.items()
+        },
+    )
+    return found
+
+
+def _compute(
+    store: Store,
+    scene: Scene,
+    planned: Planned,
+    reference: Planned | None,
+    windowed: Sequence[Windowed],
+    horizon: float | None,
+) -> ComparisonRecord:
+    """The figures of the cell itself where `reference` is None, with the law of impacts that it
+    followed."""
+    candidate = store.load(planned.name)
+    yardstick = store.load(reference.name) if reference else None
+    figures: list[Figure] = []
+    gaps: dict[str, tuple[str, bool]] = {}
+    by_window: dict[str, list[str]] = {
+        "": [m.name for m in (DIFFERENCES if reference else FIGURES).values() if not m.on_request]
+    }
+    for what in windowed:
+        by_window.setdefault(what.window, []).append(what.measure)
+    landing = landing_of(store, scene)
+    others = under_other_laws(scene, reference.variant) if landing and reference else {}
+    for window, measures in by_window.items():
+        until = horizon if window == HORIZON else float(window[:-1]) if window else None
+        if yardstick is None:
+            found = describe(candidate, until=until, scene=scene, measures=measures)
+            gaps[window] = too_short(candidate, until), False
+        else:
+            discrepancy = compare(yardstick, candidate, until=until, scene=scene, measures=measures)
+            found, gaps[window] = discrepancy.figures, (discrepancy.gap, discrepancy.fall)
+            if landing and (until is None or until > landing.t):
+                found, own = by_any(discrepancy, others, candidate, scene, until, measures)
+                gaps |= {str(Windowed(measure, window)): gap for measure, gap in own.items()}
+        figures += (
+            [figure.model_copy(update={"window": window}) for figure in found] if window else found
+        )
+    law = landing.followed_by(candidate, scene) if landing and yardstick is None else None
+    return ComparisonRecord(
+        figures=tuple((f.measure, f.unit, f.value, f.window, f.until, f.note) for f in figures),
+        gaps=gaps,
+        impact_law=law,
+        overturned_at=None if yardstick else candidate.overturned_at,
+    )
