@@ -15,7 +15,7 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from rockcheck.reports import tables, words
+from rockcheck.reports import tables
 from rockcheck.reports.document import FIGURES, csv, row_cells, side_by_side
 from rockcheck.reports.drawers import figure_of
 from rockcheck.reports.ensembles import EnsembleView
@@ -27,8 +27,8 @@ from rockcheck.reports.figures import (
     write_figures,
 )
 from rockcheck.reports.overview import PEAKS, accuracy, entry, glance, matrix, outcome_of
-from rockcheck.reports.payload import script
-from rockcheck.reports.scene_file import write_scene_file
+from rockcheck.reports.scene_data import script, write_scene_file
+from rockcheck.reports.show import words
 from rockcheck.reports.show.words import scene_facts
 from rockcheck.reports.style import FORMATS, LOOKS, SPARE, looks, save
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of

@@ -8,10 +8,9 @@ from pathlib import Path
 from statistics import geometric_mean
 from typing import Any
 
-from rockcheck.reports.show.words import number
+from rockcheck.reports.show.words import duration, number, ratio, unit, window
 from rockcheck.reports.style import looks
 from rockcheck.reports.view import SceneView
-from rockcheck.reports.words import duration, ratio, unit, window
 from rockcheck.scenes.history import events_path
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.finding import Column, Mark, Table, text

@@ -47,7 +47,7 @@ TARGETS = {
         "tests/validation/suite/test_verdicts.py",
         "tests/validation/suite/test_tolerances.py",
     ],
-    "validation/suite/verdicts.py": [
+    "validation/suite/tables.py": [
         "tests/validation/suite/test_verdicts.py",
         "tests/validation/suite/test_impact_laws.py",
         "tests/commands/test_cli.py",

@@ -112,7 +112,7 @@ def run(
 
 
 def _export(folder: Path) -> None:
-    from rockcheck.reports.scene_file import write_scene_file
+    from rockcheck.reports.scene_data import write_scene_file
     from rockcheck.validation.studies.conformance.phenomena import SCENES
     from rockcheck.validation.studies.conformance.study import ABOUT
 

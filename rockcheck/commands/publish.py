@@ -17,8 +17,7 @@ from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.writing import no_link, write_whole
 from rockcheck.validation.suite.results import Run
-from rockcheck.validation.suite.tables import checks_csv, figures_csv
-from rockcheck.validation.suite.verdicts import junit, markdown
+from rockcheck.validation.suite.tables import checks_csv, figures_csv, junit, markdown
 
 LOCK, HOLDER = ".lock", ".lock.holder"
 #: How long a run waits for another one that writes the same folder: before it says so, and in all,
@@ -82,14 +81,13 @@ def publish(
     Unless `afresh`, only those that would show something else than they do. `jobs` processes draw,
     by default one a core. Scenes that are `wanted` have a page in a large run, too.
     """
-    from rockcheck import reports
+    from rockcheck.reports.site import write_site
 
     with _turn(folder):
-        written = reports.write_site(
+        return write_site(
             folder,
             jobs=jobs or os.cpu_count() or 1,
             afresh=afresh,
             wanted=wanted,
             on_progress=on_progress,
         )
-        return Path(written)

@@ -329,7 +329,7 @@ def finished(tmp_path: Path) -> Run:
 @pytest.fixture(scope="session")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a finished run and its pages."""
-    from rockcheck.reports import write_site
+    from rockcheck.reports.site import write_site
 
     folder = tmp_path_factory.mktemp("site")
     make_run(folder)

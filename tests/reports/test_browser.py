@@ -14,7 +14,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright import sync_api as playwright
 
-from rockcheck.reports import write_site
+from rockcheck.reports.site import write_site
 from rockcheck.scenes import History
 from rockcheck.validation.suite.results import Run
 

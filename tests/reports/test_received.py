@@ -12,7 +12,7 @@ import pytest
 
 from rockcheck.commands.cli import main
 from rockcheck.commands.publish import LOCK, keep
-from rockcheck.reports import write_site
+from rockcheck.reports.site import write_site
 from rockcheck.scenes import InputError
 from rockcheck.validation.execute.store import HISTORIES, Store
 from rockcheck.validation.suite.results import RUN_FILE, Run

@@ -17,17 +17,15 @@ import numpy as np
 import pytest
 
 from rockcheck.commands.cli import main
-from rockcheck.reports import write_site
 from rockcheck.reports.ensembles import EnsembleView
 from rockcheck.reports.figures import histories_figure
 from rockcheck.reports.overview import PEAKS, accuracy, entry, glance, matrix
-from rockcheck.reports.payload import packed, packed_lines
-from rockcheck.reports.scene_file import write_scene_file
-from rockcheck.reports.site import PAGES
+from rockcheck.reports.scene_data import packed, packed_lines, write_scene_file
+from rockcheck.reports.show.words import number, ratio, readable
+from rockcheck.reports.site import PAGES, write_site
 from rockcheck.reports.style import LOOKS, SPARE, looks, save
 from rockcheck.reports.tables import overrun, times_table, worst_first
 from rockcheck.reports.view import FALL, scene_views, slugs_of
-from rockcheck.reports.words import number, ratio, readable
 from rockcheck.scenes import (
     Block,
     Floor,

@@ -33,7 +33,7 @@ from rockcheck.validation.suite.confidence import explanations
 from rockcheck.validation.suite.experience import bias_and_scatter
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
-from rockcheck.validation.suite.verdicts import junit, markdown
+from rockcheck.validation.suite.tables import junit, markdown
 from rockcheck.validation.uncertainty import verdict
 from rockcheck.validation.uncertainty.numerical import Numerical, Quantity, numerical_uncertainty
 from rockcheck.validation.uncertainty.population import Inputs, Interval, propagate, sensitivities

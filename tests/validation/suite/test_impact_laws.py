@@ -16,8 +16,7 @@ from rockcheck.validation.suite.comparing import by_any, landing_of, under_other
 from rockcheck.validation.suite.results import Cell, Run
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import ModelVariant, load_suite
-from rockcheck.validation.suite.tables import summary
-from rockcheck.validation.suite.verdicts import markdown
+from rockcheck.validation.suite.tables import markdown, summary
 
 # Under "moreau" the first block stays and under "floor-first" it falls; the second stands beside no
 # wall that bounces; the last one lands flat, and overturns where its trailing corner is first.

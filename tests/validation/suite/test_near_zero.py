@@ -16,9 +16,8 @@ from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.suite.acceptance import accept
 from rockcheck.validation.suite.changes import Trend
 from rockcheck.validation.suite.results import Cell, Check, Run
-from rockcheck.validation.suite.tables import improvements, verdict_lines
+from rockcheck.validation.suite.tables import improvements, junit, verdict_lines
 from rockcheck.validation.suite.tolerances import MEASURES, Tolerance, floor_of, judge
-from rockcheck.validation.suite.verdicts import junit
 from rockcheck.validation.uncertainty.numerical import Numerical, Quantity
 
 SCENE = Scene(

@@ -23,8 +23,7 @@ from rockcheck.validation.study import Task
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.runner import in_order, run_suite
 from rockcheck.validation.suite.suites import load_suite
-from rockcheck.validation.suite.tables import verdict_lines
-from rockcheck.validation.suite.verdicts import junit
+from rockcheck.validation.suite.tables import junit, verdict_lines
 
 OWN = [
     f"faulty:{name}" for name in ("Still", "Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")

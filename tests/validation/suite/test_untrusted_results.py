@@ -18,7 +18,7 @@ from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, Store, _s
 from rockcheck.validation.suite.results import Cell, Run
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
-from rockcheck.validation.suite.verdicts import junit, markdown
+from rockcheck.validation.suite.tables import junit, markdown
 
 SUITE = """
 reference = "still"

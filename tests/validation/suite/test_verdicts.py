@@ -15,9 +15,15 @@ from rockcheck.validation.discrepancy.impact_laws import LawFollowed
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.suite.results import Cell, Check, CostRecord, EnsembleRecord, Run
-from rockcheck.validation.suite.tables import MOST_SHOWN, shown, verdict_table
+from rockcheck.validation.suite.tables import (
+    MARKS,
+    MOST_SHOWN,
+    junit,
+    markdown,
+    shown,
+    verdict_table,
+)
 from rockcheck.validation.suite.tolerances import Tolerance, judge, parse_tolerances
-from rockcheck.validation.suite.verdicts import MARKS, junit, markdown
 from rockcheck.validation.uncertainty.numerical import Numerical, Quantity
 
 LINE = Tolerance(expected=0.25, limit=0.5, drift=0.125, why="a test")

@@ -1,7 +1,8 @@
-"""The data of a scene's page, as a script file: a page opened from the file system cannot fetch
-data.
+"""A scene's page as data: what it draws, as a script file, since a page opened from the file system
+cannot fetch data; and the scene as the files it could have come from, to be played again.
 
-Values are float32 (rounded to 6e-8 of their size), a line of `rows` values for the ground, each
+Values of the script are float32 (rounded to 6e-8 of their size), a line of `rows` values for the
+ground, each
 channel and each running figure. All lines of a page are packed together, and each place holds its
 line's number: what models agree on is kept once, nearly.
 """
@@ -10,17 +11,22 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 import zlib
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomlkit
 from numpy.typing import ArrayLike
 
 from rockcheck.reports.figures import fineness
 from rockcheck.reports.style import looks
 from rockcheck.reports.view import CHANNELS, SceneView
-from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
+from rockcheck.scenes import Scene
+from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS, Record
+from rockcheck.scenes.writing import write_whole
 
 
 def packed(values: ArrayLike) -> str:
@@ -118,3 +124,45 @@ def _spells(view: SceneView, model: str) -> list[list[Any]]:
     mode = np.asarray(channels["mode"]).astype(str)
     starts = np.flatnonzero(np.r_[True, mode[1:] != mode[:-1]])
     return [[float(f"{channels['t'][k]:.4f}"), str(mode[k])] for k in starts]
+
+
+def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
+    """Write the scene as `<slug>.toml` with its records as CSV beside it; returns file names and
+    texts, the TOML first.
+
+    `load_scene` reads the file back to a scene that moves in the same way.
+    """
+    document, records = scene_tables(scene, slug)
+    files = {f"{slug}.toml": tomlkit.dumps(document)}
+    for name, record in records.items():
+        rows = [f"{record.time_step * n:.12g},{value!r}" for n, value in enumerate(record.unscaled)]
+        files[name] = (
+            "\n".join(
+                [f"# {re.sub(r'[^ -~]', '?', record.source)}", "time_s,acceleration_m_s2", *rows]
+            )
+            + "\n"
+        )
+    for name, text in files.items():
+        write_whole(folder / name, text)
+    return {name: text for name, text in files.items() if name.endswith(".toml")} | dict.fromkeys(
+        records, ""
+    )
+
+
+def scene_tables(scene: Scene, slug: str) -> tuple[dict[str, Any], dict[str, Record]]:
+    """A scene as the tables of a scene file, what is at its default left out, and its records by
+    file name."""
+    records: dict[str, Record] = {}
+    tables: dict[str, Any] = scene.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
+    for key in ("excitation", "vertical"):
+        excitation = getattr(scene, key)
+        if key not in tables:
+            continue
+        table = {"kind": excitation.kind} | tables[key]
+        if isinstance(excitation, Record):
+            name = f"{slug}-{key}.csv"
+            records[name] = excitation
+            table = {"kind": "record", "file": name, "scale": excitation.scale}
+        tables[key] = table
+    plain = {key: value for key, value in tables.items() if not isinstance(value, dict | list)}
+    return plain | {key: value for key, value in tables.items() if key not in plain}, records
