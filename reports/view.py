@@ -128,11 +128,6 @@ class SceneView:
         return self.run.of_scene(self.name)
 
     @property
-    def explained(self) -> tuple[Cell, ...]:
-        """The cells whose differences from a reference are held against their uncertainty."""
-        return tuple(cell for cell in self.cells if cell.explanations)
-
-    @property
     def inputs(self) -> Inputs | None:
         """What the spread of the scene's inputs makes of its figures."""
         return self.run.inputs.get(self.name)

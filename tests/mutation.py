@@ -53,7 +53,7 @@ TARGETS = {
         "tests/commands/test_cli.py",
     ],
     "validation/discrepancy/statistics.py": [
-        "tests/validation/suite/test_verdicts.py",
+        "tests/validation/suite/test_statistics.py",
         "tests/validation/suite/test_ensembles.py",
     ],
     "validation/discrepancy/compare.py": [

@@ -42,7 +42,6 @@ from rockcheck.validation.suite.suites import Suite, is_scene, load_suite, scene
 from rockcheck.validation.suite.tables import (
     improvements,
     not_shown,
-    outcome_row,
     outcome_tables,
     summary,
     verdict_lines,
@@ -137,51 +136,55 @@ def run(
     Exit 0: within tolerance. 1: out of tolerance. 2: bad input. 3: a model failed. 70: a fault of
     rockcheck itself.
     """
-    if what is not None and is_scene(what):
+    scene = what if what is not None and is_scene(what) else None
+    if scene is None:
+        for name, given in (
+            ("--models", models != ALL),
+            ("--set", settings),
+            ("--records", records),
+            ("--read", read),
+        ):
+            if given:
+                raise InputError("is for a scene: a suite says which models play what", name)
+        folder = usable_folder(out)
+        suite = load_suite(what or "paper", allow_code=allow_code or ())
+        tell_left_out(suite.left_out)
+    else:
         if strict:
             raise InputError(
-                f"{printable(what)} is a scene, and nothing of it is judged: give a suite",
+                f"{printable(scene)} is a scene, and nothing of it is judged: give a suite",
                 "--strict",
             )
         sets = _record_sets(records or (), read or ())
-        suite = scene_suite(
-            what, chosen_models(models, settings or ()), records=sets, allow_code=allow_code or ()
-        )
+        chosen = chosen_models(models, settings or ())
+        suite = scene_suite(scene, chosen, records=sets, allow_code=allow_code or ())
         folder = usable_folder(out)
         if models == ALL:
             tell_missing()
-        play_scene(suite, folder, jobs=jobs, force=force, scheduler=scheduler, report=report)
-    for name, given in (
-        ("--models", models != ALL),
-        ("--set", settings),
-        ("--records", records),
-        ("--read", read),
-    ):
-        if given:
-            raise InputError("is for a scene: a suite says which models play what", name)
-    folder = usable_folder(out)
+        _overwrites_no_verdict(folder)
+        tell_left_out(
+            suite.left_out,
+            "--read vertical=true plays such a component together with the horizontal ones",
+        )
     how: Strict = "both" if strict == "both" else strict is not None
-    loaded = load_suite(what or "paper", allow_code=allow_code or ())
-    tell_left_out(loaded.left_out)
-    finished = play(loaded, folder, jobs, force, how, scheduler)
-    kept = keep(finished, folder)
+    finished = play(suite, folder, jobs, force, how, scheduler)
+    page = keep(finished, folder)
     show(finished, console())
     tell_faults(finished, folder)
-    moments = (
-        []
-        if history is None
-        else remember(history, moment_of(finished, Path(finished.tolerances_file).parent))
-    )
-    if history is not None:
+    if history is not None and suite.judged:
+        moments = remember(history, moment_of(finished, Path(finished.tolerances_file).parent))
         tell_trend(moments, history)
-    if history is not None and report:
-        from rockcheck.reports.document import publish as written
+        if report:
+            from rockcheck.reports.document import publish as written
 
-        trend = written(trend_of(moments), usable_folder(folder, TREND))
-        console().print(f"trend: {trend}", soft_wrap=True)
-    page = published(folder, jobs) if report else kept
+            trend = written(trend_of(moments), usable_folder(folder, TREND))
+            console().print(f"trend: {trend}", soft_wrap=True)
+    if report:
+        with progress("pages") as on_progress:
+            page = publish(folder, jobs=jobs, on_progress=on_progress)
     console().print(f"report: {page}", soft_wrap=True)
-    answer(summary(finished) | {"report": page})
+    more = {} if suite.judged else {"left_out": suite.left_out}
+    answer(summary(finished) | more | {"report": page})
     raise typer.Exit(finished.exit_code)
 
 
@@ -227,20 +230,9 @@ def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, d
     return found
 
 
-def play_scene(
-    suite: Suite,
-    folder: Path,
-    *,
-    jobs: int | None,
-    force: bool,
-    scheduler: str | None,
-    report: bool,
-) -> None:
-    """Play a suite that judges nothing; a table, the report, and exit 3 where a model failed.
-
-    Raises `InputError` where `folder` holds a judged run, whose pages and tables this one would
-    overwrite.
-    """
+def _overwrites_no_verdict(folder: Path) -> None:
+    """Raises `InputError` where `folder` holds a judged run, whose pages and tables one that judges
+    nothing would overwrite."""
     before = None
     with suppress(InputError):  # no run there, or none that can be read
         before = Run.load(folder)
@@ -250,39 +242,6 @@ def play_scene(
             " folder",
             "--out",
         )
-    finished = play(suite, folder, jobs, force, False, scheduler)
-    kept = keep(finished, folder)
-    screen = console()
-    tell_left_out(
-        suite.left_out,
-        "--read vertical=true plays such a component together with the horizontal ones",
-    )
-    for name, table in outcome_tables(finished):
-        screen.print(name, style="bold", soft_wrap=True)
-        screen.print(table)
-    screen.print(
-        "peak: largest rotation; apart: RMS difference from the reference, to the horizon of"
-        " predictability; in alpha",
-        soft_wrap=True,
-    )
-    for line in verdict_lines(finished):
-        screen.print(line, style="red" if finished.exit_code else "yellow", soft_wrap=True)
-    tell_faults(finished, folder)
-    page = published(folder, jobs) if report else kept
-    screen.print(f"report: {page}", soft_wrap=True)
-    answer(
-        {
-            "suite": finished.suite,
-            "judged": False,
-            "reference": finished.reference,
-            "exit_code": finished.exit_code,
-            "cells": [outcome_row(cell, finished.reference) for cell in finished.cells],
-            "left_out": suite.left_out,
-            "reasons": list(verdict_lines(finished)),
-            "report": page,
-        }
-    )
-    raise typer.Exit(finished.exit_code)
 
 
 def play(
@@ -304,13 +263,6 @@ def play(
             scheduler=scheduler,
             on_progress=on_progress,
         )
-
-
-def published(folder: Path, jobs: int | None) -> Path:
-    """The pages of the run that was kept in `folder`, with a progress bar; returns the page to
-    open."""
-    with progress("pages") as on_progress:
-        return publish(folder, jobs=jobs, on_progress=on_progress)
 
 
 def tell_faults(finished: Run, folder: Path) -> None:
@@ -343,12 +295,26 @@ def tell_trend(moments: Sequence[Moment], path: Path) -> None:
 
 
 def show(finished: Run, out: Console) -> None:
-    """The verdicts: a table, the reasons of what is not a pass, and a last line."""
+    """The verdicts, or the outcomes where nothing is judged: a table, the reasons of what is not a
+    pass, and a last line."""
+    bad = "red" if finished.exit_code else "yellow"
+    if not finished.judged:
+        for name, table in outcome_tables(finished):
+            out.print(name, style="bold", soft_wrap=True)
+            out.print(table)
+        out.print(
+            "peak: largest rotation; apart: RMS difference from the reference, to the horizon of"
+            " predictability; in alpha",
+            soft_wrap=True,
+        )
+        for line in verdict_lines(finished):
+            out.print(line, style=bad, soft_wrap=True)
+        return
     out.print(verdict_table(finished))
     for line in not_shown(finished):
         out.print(line)
     for line in verdict_lines(finished):
-        out.print(line, style="red" if finished.exit_code else "yellow")
+        out.print(line, style=bad)
     better = list(improvements(finished))
     if better:
         out.print("better than expected; `rockcheck accept` makes today's the expected ones:")

@@ -266,9 +266,8 @@ def test_print_shows_the_figures_and_no_controls(visit: Visit) -> None:
     page.emulate_media(media="print")
     assert not page.locator("#explore").is_visible()
     playwright.expect(page.locator("#paper")).to_have_attribute("open", "")
-    page.locator(
-        "#paper figcaption"
-    ).first.scroll_into_view_if_needed()  # an image is loaded when it comes near
+    # An image is loaded when it comes near.
+    page.locator("#paper figcaption").first.scroll_into_view_if_needed()
     playwright.expect(page.locator(".paper img").first).to_be_visible()
 
 

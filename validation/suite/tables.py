@@ -137,12 +137,18 @@ def outcome_row(cell: Cell, reference: str) -> dict[str, Any]:
 
 
 def summary(run: Run) -> dict[str, Any]:
-    """The verdicts in a few plain values: of the run, of each cell, and why anything is not a
-    pass."""
-    return {
+    """The verdicts in a few plain values: of the run, of each cell, and why anything is not a pass;
+    where nothing is judged, what became of each cell."""
+    common = {
         "suite": run.suite,
-        "verdict": run.verdict,
         "exit_code": run.exit_code,
+        "reasons": list(verdict_lines(run)),
+    }
+    if not run.judged:
+        cells = [outcome_row(cell, run.reference) for cell in run.cells]
+        return common | {"judged": False, "reference": run.reference, "cells": cells}
+    return common | {
+        "verdict": run.verdict,
         "wall_seconds": run.wall_seconds,
         "cells": [
             {
@@ -160,7 +166,6 @@ def summary(run: Run) -> dict[str, Any]:
             }
             for cell in run.cells
         ],
-        "reasons": list(verdict_lines(run)),
         "better": list(improvements(run)),
     }
 

@@ -195,7 +195,7 @@ def test_a_landing_is_kept_and_what_was_kept_is_not_trusted(
     with monkeypatch.context() as patched:
         patched.setattr("rockcheck.validation.suite.comparing.parting_landing", lambda scene: None)
         assert landing_of(store, scene) == first
-    store.put_record(COMPARISONS, kept.stem, {"landing": {"t": 1.0}})
+    store.put_record(COMPARISONS, kept.stem, {"kept": {"t": 1.0}})
     assert landing_of(store, scene) == first
 
 

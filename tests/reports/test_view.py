@@ -1,0 +1,389 @@
+"""What is shown of a scene: its data, its figures, and what is read off them."""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+import re
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rockcheck.reports.ensembles import EnsembleView
+from rockcheck.reports.figures import histories_figure
+from rockcheck.reports.overview import accuracy, entry, glance
+from rockcheck.reports.scene_data import packed, packed_lines, write_scene_file
+from rockcheck.reports.show.words import number, ratio, readable
+from rockcheck.reports.site import PAGES, write_site
+from rockcheck.reports.style import LOOKS, SPARE, looks, save
+from rockcheck.reports.tables import overrun, times_table
+from rockcheck.reports.view import FALL, scene_views, slugs_of
+from rockcheck.scenes import (
+    Block,
+    Floor,
+    InputError,
+    Record,
+    Scene,
+    Sine,
+    Wall,
+    load_scene,
+)
+from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
+from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, Pair
+from rockcheck.validation.execute.models import FAMILIES
+from rockcheck.validation.suite.results import Cell, Check, Run
+
+
+def payload_of(site: Path, slug: str) -> tuple[dict, np.ndarray]:
+    """The data of a page, and its lines of values."""
+    text = (site / PAGES / "data" / f"{slug}.js").read_text(encoding="utf-8")
+    data = json.loads(text.removeprefix("window.rockcheck = ").rstrip(";\n"))
+    return data, lines_of(data["lines"], data["rows"])
+
+
+def lines_of(text: str, rows: int) -> np.ndarray:
+    """Unpacks as a page does."""
+    places = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8).reshape(4, -1)
+    return np.ascontiguousarray(places.T).view("<f4").reshape(-1, rows)
+
+
+def test_a_figure_that_is_as_it_was_accepted_has_not_changed_though_its_limit_is_tighter(
+    finished: Run,
+) -> None:
+    def tighter(check: Check) -> Check:
+        return check.model_copy(
+            update={
+                "expected": check.figure.value,
+                "limit": 1e-12,
+                "drift": 1e-6,
+                "verdict": "fail",
+            }
+        )
+
+    cells = tuple(
+        cell.model_copy(update={"checks": tuple(map(tighter, cell.checks))})
+        for cell in finished.cells
+    )
+    found = glance(finished.model_copy(update={"cells": cells}))
+    assert found.judged > 0
+    assert found.changed == ()
+
+
+def test_a_run_that_ends_during_a_fall_says_so(finished: Run) -> None:
+    """Two models fall to one side, one of them after the scene's end: the outcome does not depend
+    on the model."""
+
+    def ending(cell: Cell, last: float) -> Cell:
+        figure = Figure(measure="last_rotation", label="last rotation", unit="alpha", value=last)
+        return cell.model_copy(
+            update={"outcome": "moving", "overturned_at": None, "figures": (*cell.figures, figure)}
+        )
+
+    for last, outcome, apart in (
+        (5.8, "falling left", False),
+        (-5.8, "falling right", True),
+        (0.4, "moving", True),
+    ):
+        cells = tuple(
+            ending(cell, last) if (cell.scene, cell.model) == ("Free", "ebm") else cell
+            for cell in finished.cells
+        )
+        found = entry(finished.model_copy(update={"cells": cells}), "Free", "ebm")
+        assert found is not None
+        assert (found.outcome, found.apart) == (outcome, apart)
+
+
+def test_data_are_the_histories(site: Path) -> None:
+    run = Run.load(site)
+    view = next(view for view in scene_views(run, site) if view.name == "beside a wall")
+    data, lines = payload_of(site, view.slug)
+    assert data["rows"] == len(view.t)
+    assert lines[data["ground"]] == pytest.approx(view.ground / GRAVITY_OF_RECORDS, rel=1e-7)
+    for model in data["models"]:
+        history = view.histories[model["name"]]
+        theta = lines[model["values"]["theta"]]
+        assert theta == pytest.approx(history.channels["theta"] / view.scene.block.alpha, rel=1e-7)
+        assert [event[1] for event in model["events"]] == [
+            event.kind for event in history.event_list
+        ]
+    assert data["horizon"] == 10.0
+    assert {
+        (band["model"], band["limit"], band["until"])
+        for band in data["bands"]
+        if band["against"] == "ebm"
+    } == {(model, 2e-3, 8.0) for model in run.models if model != "ebm"}
+
+
+def test_a_history_that_ends_early_is_padded(site: Path) -> None:
+    data, lines = payload_of(site, "Free-2")
+    theta = lines[data["models"][0]["values"]["theta"]]
+    assert len(theta) == data["rows"]
+    assert np.isnan(theta[-1])
+    assert not np.isnan(theta[0])
+
+
+def test_a_large_run_shows_every_nth_row(run_folder: Path) -> None:
+    run = Run.load(run_folder)
+    [coarse, *_] = scene_views(run, run_folder, most_values=60_000)
+    [fine, *_] = scene_views(run, run_folder)
+    assert (fine.stride, coarse.stride) == (1, 5)
+    assert coarse.values["cm"]["theta"] == pytest.approx(fine.values["cm"]["theta"][::5], abs=0.0)
+
+
+def test_the_running_rms_ends_at_the_measure(run_folder: Path) -> None:
+    view = next(
+        view
+        for view in scene_views(Run.load(run_folder), run_folder)
+        if view.name == "beside a wall"
+    )
+    bands = [band for band in view.bands("ebm-unilateral") if band.model == "mujoco"]
+    assert [(band.kind, band.until) for band in bands] == [("rms", 8.0)]
+    running, t = view.running_rms(bands[0]), view.t[view.t <= 8.0 + 1e-9]
+    apart = view.differences("theta", "ebm-unilateral")["mujoco"][: len(t)]
+    pair = Pair(view.histories["ebm-unilateral"], view.histories["mujoco"], view.scene, until=8.0)
+    assert running[-1] == pytest.approx(DIFFERENCES["theta_rms"].evaluate(pair), rel=1e-12)
+    assert running[400] == pytest.approx(
+        np.sqrt(np.trapezoid(apart[:401] ** 2, t[:401]) / t[400]), rel=1e-12
+    )
+
+
+def test_a_fall_is_drawn_up_to_one_and_a_half_alpha(run_folder: Path) -> None:
+    view = next(
+        view for view in scene_views(Run.load(run_folder), run_folder) if view.name == "Free"
+    )
+    whole, drawn = view.values["ebm"]["theta"], view.drawn["ebm"]["theta"]
+    row = int(np.flatnonzero(np.abs(whole) > FALL)[0])
+    assert view.falls["ebm"] == view.t[row]
+    assert np.nanmax(np.abs(drawn)) == whole[row] == pytest.approx(FALL, abs=0.02)
+    assert np.isnan(drawn[row + 1 :]).all()
+    assert np.nanmax(np.abs(whole)) > 2.0
+    theta = histories_figure(view).axes[1]
+    assert max(abs(end) for end in theta.get_ylim()) < 1.7
+    assert [line.get_marker() for line in theta.get_lines()].count("x") == len(view.falls) == 2
+
+
+def test_plots_open_where_something_happens(
+    tmp_path: Path, run_of: Callable[[Path, float], Run]
+) -> None:
+    run = run_of(tmp_path, 60.0)
+    view = next(view for view in scene_views(run, tmp_path) if view.name == "free")
+    start, end = view.active
+    assert start == 0.0
+    assert 25.0 < end < 35.0  # the motion decays as exp(-0.15 t), to a hundredth after 31 s
+    short = next(
+        view for view in scene_views(run_of(tmp_path, 12.0), tmp_path) if view.name == "free"
+    )
+    assert short.active == (0.0, 12.0)
+
+
+def test_the_hop_is_the_trusted_model_s(site: Path) -> None:
+    run = Run.load(site)
+    views = {view.name: view for view in scene_views(run, site)}
+    hop = views["beside a wall"].hop
+    assert hop is not None
+    assert (hop.height, hop.model) == (0.004, "ebm-unilateral")
+    text = re.sub(r"\s+", " ", (site / PAGES / "beside-a-wall.html").read_text(encoding="utf-8"))
+    assert "here 4 mm high" in text
+
+
+def test_numbers_in_sentences_do_not_break() -> None:
+    said = readable("-1.2e-3 is more than 1e+05; x-2 of run-7 on 2026-01-02 (-0.5)")
+    assert said == "−1.2·10⁻³ is more than 1·10⁵; x-2 of run-7 on 2026-01-02 (−0.5)"
+
+
+def test_missing_and_foreign_histories_are_told(tmp_path: Path, run_folder: Path) -> None:
+    run = Run.load(run_folder)
+    [one, two, *rest] = run.cells
+    cells = (
+        one.model_copy(update={"history": "histories/gone.csv"}),
+        two.model_copy(update={"history": "../../etc/passwd"}),
+        *rest,
+    )
+    [view, *_] = scene_views(run.model_copy(update={"cells": cells}), run_folder)
+    assert "gone.csv: cannot be read" in view.missing[one.model]
+    assert "outside the run's folder" in view.missing[two.model]
+    assert one.model not in view.histories
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        Scene(
+            name="pulse",
+            block=Block(half_width=0.4, half_height=1.5),
+            floor=Floor(friction=0.3),
+            excitation=Sine(amplitude=2.0, period=1.0),
+            walls=(Wall(side="left", gap=0.1, restitution=0.5), Wall(side="right", gap=0.2)),
+            duration=3.0,
+            initial_rotation=0.01,
+        ),
+        Scene(
+            name="records",
+            block=Block(half_width=0.4, half_height=1.5, mass=12.0),
+            floor=Floor(friction=0.3, static_friction=0.4),
+            excitation=Record.from_samples([0.0, 1.0 / 3.0, -2e-7], 0.02, scale=1.5),
+            vertical=Record.from_samples([0.1, 0.2], 0.005),
+            duration=3.0,
+            gravity=9.8,
+            description='quotes " and \\ and <tags>',
+        ),
+    ],
+)
+def test_scene_file_plays_the_same_scene(tmp_path: Path, scene: Scene) -> None:
+    files = write_scene_file(scene, tmp_path, "again")
+    again = load_scene(tmp_path / next(iter(files)))
+    t = np.linspace(0.0, 3.0, 1000)
+    for which in ("excitation", "vertical"):
+        assert np.array_equal(
+            getattr(again, which).acceleration(t), getattr(scene, which).acceleration(t)
+        )
+    hidden = {"excitation", "vertical"}
+    assert again.model_dump(exclude=hidden) == scene.model_dump(exclude=hidden)
+
+
+def test_slugs_differ_whatever_the_file_system() -> None:
+    slugs = slugs_of(["a b", "a,b", "A b", "a-b-2", "..", "x/../y"])
+    assert len({slug.lower() for slug in slugs.values()}) == 6
+    assert all(
+        re.fullmatch(r"[A-Za-z0-9._-]+", slug) and slug not in (".", "..")
+        for slug in slugs.values()
+    )
+
+
+def test_figures_are_reproducible_and_undated(tmp_path: Path, run_folder: Path) -> None:
+    [view, *_] = scene_views(Run.load(run_folder), run_folder)
+    written = [save(histories_figure(view), tmp_path / name / "figure") for name in ("one", "two")]
+    for first, second in zip(*written, strict=True):
+        assert first.read_bytes() == second.read_bytes(), first.suffix
+    assert {path.suffix for path in written[0]} == {".svg", ".png", ".pdf"}
+    assert b"<dc:date>" not in written[0][0].read_bytes()
+
+
+def test_differences_are_candidate_minus_reference(run_folder: Path) -> None:
+    view = next(
+        view
+        for view in scene_views(Run.load(run_folder), run_folder)
+        if view.name == "beside a wall"
+    )
+    difference = view.differences("theta", "ebm-unilateral")["pybullet"]
+    expected = (
+        view.histories["pybullet"].channels["theta"]
+        - view.histories["ebm-unilateral"].channels["theta"]
+    )
+    assert difference == pytest.approx(expected / view.scene.block.alpha, abs=1e-12)
+    assert view.figure_references == ("ebm-unilateral", "ebm")
+
+
+def test_run_times_are_ratios_to_the_reference(run_folder: Path) -> None:
+    times = {row[0]: row[1] for row in times_table(Run.load(run_folder)).rows}
+    assert times["ebm-unilateral"] == pytest.approx(1.0)
+    # 0.01 s (1 + 10 delay): 1.005 and 1.01 of the reference in the two scenes that the model played
+    assert times["cm"] == pytest.approx((1.005 * 1.01) ** 0.5)
+
+
+def test_how_much_of_its_limit_a_check_uses() -> None:
+    def check(value: float | None, **more: object) -> Check:
+        figure = Figure(measure="m", label="m", unit="1", value=value)
+        return Check(
+            figure=figure,
+            kind="numerical",
+            **{"verdict": "fail", "ideal": 0.0, "limit": 2.0, **more},
+        )
+
+    assert overrun(check(5.0)) == 2.5
+    assert overrun(check(5.0, ideal=4.0)) == 0.5
+    assert overrun(check(8.0, ideal=None, limit=12.0)) == 1.5
+    assert overrun(check(None)) == float("inf")
+    assert overrun(check(1.0, limit=None)) == float("inf")
+
+
+def contrast(first: str, second: str) -> float:
+    """Contrast ratio of two colours (WCAG 2.2, relative luminance)."""
+
+    def luminance(colour: str) -> float:
+        channels = (int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
+        red, green, blue = (
+            c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels
+        )
+        return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+    dark, bright = sorted((luminance(first), luminance(second)))
+    return (bright + 0.05) / (dark + 0.05)
+
+
+def test_models_can_be_seen_and_told_apart() -> None:
+    shown = [*LOOKS.values(), *SPARE]
+    assert min(contrast(look.light, "#ffffff") for look in shown) >= 3.0
+    assert min(contrast(look.dark, "#14171b") for look in shown) >= 3.0
+    assert len({look.light for look in shown}) == len(shown)
+    many = looks(["ebm", "a", "cm", "b", "mujoco-coarse"])
+    assert many["ebm"] is LOOKS["ebm"]
+    assert [many[name].key for name in ("a", "b", "mujoco-coarse")] == [
+        "spare-1",
+        "spare-2",
+        "spare-3",
+    ]
+
+
+def test_numbers_for_people() -> None:
+    assert [number(v) for v in (None, 0.0, -0.5, 1.23456e-7, 5300.0)] == [
+        "–",
+        "0",
+        "−0.5",
+        "1.23·10⁻⁷",
+        "5.3·10³",
+    ]
+    assert [ratio(v) for v in (None, 1.0, 0.054, 5876.0)] == ["–", "1×", "0.054×", "5\u202f876×"]
+    assert base64.b64decode(packed([1.0])) == b"\x00\x00\x80\x3f"
+
+
+def test_lines_of_values_are_packed_and_unpacked() -> None:
+    lines = [[1.0, -2.5, 3e-9], [math.nan, 0.0, 1e30], [2.0, 3.0, math.nan]]
+    assert (
+        zlib.decompress(base64.b64decode(packed_lines([[1.0, 1.0]])))
+        == b"\x00\x00\x00\x00\x80\x80\x3f\x3f"
+    )
+    assert lines_of(packed_lines([*lines[:2], lines[2][:2]]), 3) == pytest.approx(
+        np.array(lines, dtype="<f4"), abs=0.0, nan_ok=True
+    )
+
+
+def test_the_drawn_distribution_is_that_of_the_peaks(site: Path) -> None:
+    run = Run.load(site)
+    view = EnsembleView(run, run.ensembles[0], "crowd")
+    above, below = view.distributions().panels
+    curve = next(one for one in above.series if one.label == "CM")
+    sample = view.samples["cm"]
+    for peak, share in zip(curve.x, curve.y, strict=True):
+        assert share == pytest.approx(np.mean((sample.peaks <= peak) & ~sample.fallen), abs=1e-12)
+    distance = {f.measure: f.value for f in run.cell("crowd", "cm").figures}["ks_distance"]
+    assert np.max(np.abs(below.series[0].y)) == pytest.approx(distance, abs=1e-12)
+
+
+def test_index_shows_peaks_against_the_reference_s(site: Path) -> None:
+    run = Run.load(site)
+    (table,) = (block for block in accuracy(run) if block.block == "table")
+    (crowd,) = (row for row in table.records() if row["model"] == "cm")
+    assert crowd["scenes_here"] > 30
+    assert crowd["scatter_here"] == pytest.approx(0.14, abs=0.02)  # 0.2 sin k
+    assert f"{crowd['bias_here']:.4g}" in (site / "index.html").read_text(encoding="utf-8")
+    assert (site / PAGES / "figures" / "overview-peaks.svg").stat().st_size > 1000
+
+
+def test_a_folder_without_run_is_bad_input(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no finished run here"):
+        write_site(tmp_path)
+
+
+def test_index_says_what_the_models_are(site: Path) -> None:
+    index = re.sub(r"\s+", " ", (site / "index.html").read_text(encoding="utf-8"))
+    assert f"{FAMILIES['ebm-unilateral'].summary}. <strong>The reference</strong>" in index
+    assert (
+        f"{FAMILIES['ebm'].summary}. What separates it from the reference is <strong>model"
+        " form</strong>" in index
+    )
