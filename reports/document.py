@@ -26,8 +26,6 @@ SIGNS = {"pass": "✓", "changed": "△", "incomplete": "–", "fail": "✕", "e
 FIGURES = "figures"
 #: The folder of the scenes that show a failure.
 FAILING = "failures"
-#: Rows of a table that a terminal shows.
-MOST_ROWS = 40
 COLOURS = {"fail": "red", "error": "red", "changed": "yellow", "incomplete": "yellow"}
 
 
@@ -87,8 +85,8 @@ def show(found: Finding, screen: Console) -> None:
     for block in found.blocks:
         if isinstance(block, Table) and block.on == "all":
             screen.print(_grid(block))
-            if len(block.rows) > MOST_ROWS:
-                screen.print(f"and {len(block.rows) - MOST_ROWS} more rows: {block.name}.csv")
+            if len(block.rows) > block.most:
+                screen.print(f"and {len(block.rows) - block.most} more rows: {block.name}.csv")
         elif isinstance(block, Text) and block.on == "all":
             for line in (block.text, *map(": ".join, block.facts), *block.items):
                 if line:
@@ -106,7 +104,7 @@ def _grid(table: Table) -> Grid:
         if column.brief:
             left = column.kind in ("text", "model")
             grid.add_column(column.head, justify="left" if left else "right", overflow="fold")
-    for row in table.rows[:MOST_ROWS]:
+    for row in table.rows[: table.most]:
         cells = zip(row, table.columns, strict=True)
         grid.add_row(*(words(cell, column, _typed) for cell, column in cells if column.brief))
     return grid

@@ -64,7 +64,8 @@ class Table:
     """Rows of cells in the order of the columns; None and NaN are empty cells.
 
     `on` says where it is shown besides its CSV: everywhere, on the page and in Markdown only, or in
-    files only. `folded` tables are closed on the page until a reader opens them.
+    files only. `folded` tables are closed on the page until a reader opens them. A terminal shows
+    the first `most` rows.
     """
 
     name: str
@@ -74,6 +75,7 @@ class Table:
     note: str = ""
     on: Literal["all", "page", "file"] = "all"
     folded: bool = False
+    most: int = 40
     block: ClassVar[str] = "table"
 
     def records(self) -> list[dict[str, Any]]:

@@ -23,7 +23,7 @@ from rockcheck.validation.discrepancy.compare import Discrepancy, compare
 from rockcheck.validation.discrepancy.figures import value_words
 from rockcheck.validation.discrepancy.measured import read_measured, shifted, time_shift
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
-from rockcheck.validation.suite.changes import Change, changes, judged_otherwise
+from rockcheck.validation.suite.changes import difference
 from rockcheck.validation.suite.results import Run
 
 #: So many figures that moved are listed without --all.
@@ -82,8 +82,7 @@ def run(
         if study.wrote(reference):
             told(study.changes(reference, candidate))
     if reference.is_dir() or candidate.is_dir():
-        two_runs(reference, candidate, everything=everything)
-        return
+        told(difference(Run.load(reference), Run.load(candidate), None if everything else SHOWN))
     check_picture(plot)
     what = load_scene(scene) if scene else None
     given, other = read_measured(reference), read_measured(candidate, offset=offset)
@@ -144,69 +143,3 @@ def headline(found: Discrepancy) -> str:
     rms = found.figure("theta_rms")
     apart = "" if rms.value is None else f"; rotations {rms.value:.3g} {rms.unit} apart (RMS)"
     return f"{fate}{apart}"
-
-
-def two_runs(before: Path, after: Path, *, everything: bool) -> None:
-    """What changed between two finished runs of a suite; exit 1 where a verdict or a cell
-    changed."""
-    old, new = Run.load(before), Run.load(after)
-    found = changes(old, new)
-    versions = {
-        name: (old.versions.get(name), new.versions.get(name))
-        for name in sorted({*old.versions, *new.versions})
-    }
-    versions = {name: pair for name, pair in versions.items() if pair[0] != pair[1]}
-    screen = console()
-    counts = {
-        what: sum(change.what == what for change in found)
-        for what in ("verdict", "cell", "outcome", "figure")
-    }
-    words = ", ".join(
-        f"{count} {what}{'s' if count > 1 else ''}" for what, count in counts.items() if count
-    )
-    screen.print(
-        f"{old.suite}: {f'{words} changed' if words else 'nothing changed'}",
-        style="bold",
-        soft_wrap=True,
-    )
-    for name, (was, now) in versions.items():
-        screen.print(f"{name} {was or 'absent'} -> {now or 'absent'}")
-    shown = (
-        found
-        if everything
-        else [change for change in found if change.what != "figure"] + _figures(found)[:SHOWN]
-    )
-    if shown:
-        screen.print(_table(shown))
-    if len(found) > len(shown):
-        screen.print(f"and {len(found) - len(shown)} more figures: --all")
-    code = int(judged_otherwise(found))
-    answer(
-        {
-            "suite": old.suite,
-            "verdict": [old.words, new.words],
-            "exit_code": code,
-            "versions": versions,
-            "changes": [change.model_dump() for change in found],
-        }
-    )
-    raise typer.Exit(code)
-
-
-def _figures(found: list[Change]) -> list[Change]:
-    return [change for change in found if change.what == "figure"]
-
-
-def _table(found: list[Change]) -> Table:
-    table = Table(box=None, pad_edge=False)
-    for name in ("scene", "model", "what", "before", "after"):
-        table.add_column(name, overflow="fold")
-    for change in found:
-        values = (
-            f"{value:.6g}" if isinstance(value, float) else value or "-"
-            for value in (change.before, change.after)
-        )
-        table.add_row(
-            change.scene or "the run", change.model, f"{change.what} {change.name}".strip(), *values
-        )
-    return table

@@ -12,6 +12,7 @@ import os
 import re
 import shutil
 import subprocess
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -31,6 +32,7 @@ from rockcheck.validation.finding import (
     Plot,
     Series,
     Table,
+    Text,
     text,
 )
 from rockcheck.validation.suite.results import Cell, Run
@@ -91,9 +93,45 @@ def changes(before: Run, after: Run) -> list[Change]:
     return sorted(found, key=lambda change: (order.index(change.what), -change.size))
 
 
-def judged_otherwise(found: Sequence[Change]) -> bool:
-    """Whether a verdict changed, or a cell is in one of the runs only."""
-    return any(change.what in ("verdict", "cell") for change in found)
+def difference(before: Run, after: Run, most: int | None = None) -> Finding:
+    """What changed between two finished runs of a suite, with at most so many of the figures that
+    moved in its table; exit 1 where a verdict changed or a cell is in one of them only. Raises
+    `InputError` for runs of two suites."""
+    found = changes(before, after)
+    counts = Counter(change.what for change in found)
+    words = ", ".join(f"{n} {what}{'s' if n > 1 else ''}" for what, n in counts.items())
+    versions = {
+        name: (before.versions.get(name), after.versions.get(name))
+        for name in sorted({*before.versions, *after.versions})
+        if before.versions.get(name) != after.versions.get(name)
+    }
+    told = [
+        f"{name} {was or 'absent'} -> {now or 'absent'}" for name, (was, now) in versions.items()
+    ]
+    left = max(0, counts["figure"] - most) if most is not None else 0
+    if left:
+        told.append(f"{left} more figures moved: --all")
+    rows = [
+        [one.scene or "the run", one.model, f"{one.what} {one.name}".strip(), one.before, one.after]
+        for one in found[: len(found) - left]
+    ]
+    values = (Column(name, digits=6) for name in ("before", "after"))
+    table = Table(
+        "changed", [*map(text, ("scene", "model", "what")), *values], rows, most=len(rows)
+    )
+    return Finding(
+        "changes",
+        f"{after.suite}, before and after",
+        f"{after.suite}: {f'{words} changed' if words else 'nothing changed'}",
+        [*([table] if rows else []), Text(items=told)],
+        data={
+            "suite": after.suite,
+            "verdict": [before.words, after.words],
+            "versions": versions,
+            "changes": [change.model_dump() for change in found],
+        },
+        exit_code=int(bool(counts["verdict"] or counts["cell"])),
+    )
 
 
 def _of_cell(old: Cell, new: Cell) -> Iterator[Change]:
