@@ -44,11 +44,15 @@ coverage: $(VENV)/.ready ## branch coverage by folder, and the lines that no tes
 mutation: $(VENV)/.ready ## small faults planted in a sample of places: which ones no test notices
 	$(BIN)/python tests/mutation.py
 
-lint: $(VENV)/.ready ## linter, formatter's check, type checker
+# What people read is spelt and worded: .ci/proselint.json says which rules bite.
+PROSE := README.md CONTRIBUTING.md CHANGELOG.md SECURITY.md $(wildcard docs/*.md)
+lint: $(VENV)/.ready ## linter, formatter's check, type checker, spelling and wording
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
+	$(BIN)/codespell $(PROSE) rockcheck docs/site_tools
+	$(BIN)/proselint check --config .ci/proselint.json $(PROSE)
 
 format: $(VENV)/.ready
 	$(BIN)/ruff check --fix .

@@ -10,11 +10,11 @@ import tempfile
 import threading
 import time
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar
 
 import typer
 from rich.console import Console
@@ -28,7 +28,7 @@ from rich.progress import (
 )
 
 from rockcheck.scenes import History, InputError, named_scenes
-from rockcheck.scenes.errors import inert, printable
+from rockcheck.scenes.errors import inert, printable, unknown_name
 from rockcheck.scenes.progress import OnProgress, announcing
 from rockcheck.scenes.recordings.sets import Odd
 from rockcheck.scenes.writing import json_text, made
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from rockcheck.validation.study import Study
 
 OUT = Path("rockcheck-report")
+Choice = TypeVar("Choice", bound=str)
 
 
 def out_option(page: str = "index.html") -> Any:
@@ -279,6 +280,16 @@ def told(found: Finding, folder: Path | None = None, *, report: bool = True) -> 
     if not found.complete and not found.exit_code:
         raise KeyboardInterrupt
     raise typer.Exit(found.exit_code)
+
+
+def one_of(kind: str, given: str, choices: Iterable[Choice]) -> Choice:
+    """The choice that was `given`; raises `InputError` naming its `kind` and suggesting the
+    nearest."""
+    known = tuple(choices)
+    for choice in known:
+        if choice == given:
+            return choice
+    raise unknown_name(kind, given, known)
 
 
 def setting_of(text: str, option: str = "--set") -> tuple[str, Any]:

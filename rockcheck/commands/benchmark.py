@@ -6,8 +6,7 @@ from typing import Annotated, get_args
 
 import typer
 
-from rockcheck.commands import OUT, JobsOption, OutOption, studied, tell_missing
-from rockcheck.scenes.errors import unknown_name
+from rockcheck.commands import OUT, JobsOption, OutOption, one_of, studied, tell_missing
 
 WhatArgument = Annotated[
     str,
@@ -33,7 +32,6 @@ def run(
     """
     from rockcheck.validation.studies.work_precision.study import What, WorkPrecision
 
-    if what not in get_args(What):
-        raise unknown_name("benchmark", what, get_args(What))
+    part: What = one_of("benchmark", what, get_args(What))
     tell_missing()
-    studied(WorkPrecision(what, quick), out, jobs=jobs, minutes=minutes)  # type: ignore[arg-type]
+    studied(WorkPrecision(part, quick), out, jobs=jobs, minutes=minutes)

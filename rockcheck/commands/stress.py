@@ -6,8 +6,16 @@ from typing import Annotated, get_args
 
 import typer
 
-from rockcheck.commands import OUT, JobsOption, OutOption, SchedulerOption, studied, tell_missing
-from rockcheck.scenes.errors import NotInstalled, unknown_name
+from rockcheck.commands import (
+    OUT,
+    JobsOption,
+    OutOption,
+    SchedulerOption,
+    one_of,
+    studied,
+    tell_missing,
+)
+from rockcheck.scenes.errors import NotInstalled
 
 WhatArgument = Annotated[
     str,
@@ -52,13 +60,10 @@ def run(
     from rockcheck.validation.studies.stress.players import PLAYERS
     from rockcheck.validation.studies.stress.study import Stress, What
 
-    if what not in get_args(What):
-        raise unknown_name("stress", what, get_args(What))
+    part: What = one_of("stress", what, get_args(What))
     for name in model or ():
-        if name not in PLAYERS:
-            raise unknown_name("model", name, PLAYERS)
-        if missing := not_installed(name.split()[0]):
+        if missing := not_installed(one_of("model", name, PLAYERS).split()[0]):
             raise NotInstalled(missing, name)
     tell_missing()
-    study = Stress(what, seed, quick, runs, tuple(model or ()))  # type: ignore[arg-type]
+    study = Stress(part, seed, quick, runs, tuple(model or ()))
     studied(study, out, jobs=jobs, scheduler=scheduler)
