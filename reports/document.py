@@ -4,9 +4,9 @@ description."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,9 @@ from rich.table import Table as Grid
 
 from rockcheck.reports.drawers import figure_of, live_data, scripts_of
 from rockcheck.reports.show.words import number
-from rockcheck.reports.style import FORMATS, LOOKS, keep_drawn, looks
+from rockcheck.reports.style import FORMATS, LOOKS, looks, save, stamp_of, undrawn
 from rockcheck.scenes.writing import json_text, made, markdown_table, table_text, write_whole
+from rockcheck.validation.execute.pool import Call, Pool, cores
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Text, plain
 
 #: The sign of a verdict, beside its colour.
@@ -143,6 +144,33 @@ def block_markdown(block: Table | Plot | Text) -> str:
     return title + markdown_table([column.head for column in block.columns], rows) + note
 
 
+def _undrawn(plots: Sequence[Plot], folder: Path, formats: Sequence[str]) -> Iterator[Call]:
+    """What draws each plot that `folder` does not have as it is."""
+    for plot in plots:
+        stamp, stem = stamp_of(json_text(asdict(plot))), folder / plot.name
+        if missing := undrawn(stem, stamp, formats):
+            yield Call(_draw, (plot, stem, missing, stamp))
+
+
+def _draw(plot: Plot, stem: Path, formats: Sequence[str], stamp: str) -> None:
+    save(figure_of(plot), stem, formats, stamp=stamp)
+
+
+def side_by_side(calls: Iterable[Call], jobs: int | None = None, least: int = 4) -> Iterator[None]:
+    """Do these calls, in `jobs` processes (default: one a core) if they are at least so many: a
+    process takes a second to have what draws."""
+    waiting = deque(calls)
+    jobs = min(jobs or cores(), len(waiting))
+    if jobs < 2 or len(waiting) < least:
+        yield from (call.function(*call.arguments) for call in waiting)
+        return
+    with Pool(jobs) as pool:
+        for ended in pool.run(waiting):
+            if ended.error is not None:
+                raise ended.error
+            yield
+
+
 def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -> Path:
     """Write `run.json`, a CSV a table, `summary.md`, the figures, the scenes of failures and
     `index.html`; returns the page."""
@@ -157,8 +185,7 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
         write_whole(made(folder, *parts) / last, content)
     plots = list(found.plots())
     figures = made(folder, FIGURES)
-    for plot in plots:
-        keep_drawn(figures / plot.name, json_text(asdict(plot)), partial(figure_of, plot), formats)
+    list(side_by_side(_undrawn(plots, figures, formats)))
     above = (("Report", "../index.html"),) if (folder.parent / "index.html").exists() else ()
     site = Site(folder, f"rockcheck: {found.title}", above)
     site.assets()

@@ -7,7 +7,6 @@ import hashlib
 import json
 import math
 import re
-from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -18,6 +17,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from rockcheck.reports import tables, words
+from rockcheck.reports.document import side_by_side
 from rockcheck.reports.ensembles import (
     EnsembleView,
     distributions_figure,
@@ -37,7 +37,7 @@ from rockcheck.scenes.reading import MOST_BYTES, head_of
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import FAMILIES
-from rockcheck.validation.execute.pool import Call, Pool
+from rockcheck.validation.execute.pool import Call
 from rockcheck.validation.suite.results import SEVERITY, Run
 from rockcheck.validation.suite.tables import shown
 
@@ -187,20 +187,14 @@ def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterato
     """Write these pages, each with its stamp, and last the index, in processes of their own where
     that is quicker."""
     work = sum(PRINTED if pages.views[name].printed else 1 for name in stamps)
-    if min(jobs, len(stamps)) < 2 or work < FEW:
+    if work < FEW:
         yield from map(pages.write, stamps, stamps.values())
         pages.write_index()
         yield
         return
-    calls = [
-        Call(_write_page, (pages.folder, pages.wanted, name, stamp))
-        for name, stamp in stamps.items()
-    ]
-    with Pool(min(jobs, len(stamps))) as pool:
-        for ended in pool.run(deque([*calls, Call(_write_index, (pages.folder, pages.wanted))])):
-            if ended.error is not None:
-                raise ended.error
-            yield
+    of = pages.folder, pages.wanted
+    calls = [Call(_write_page, (*of, name, stamp)) for name, stamp in stamps.items()]
+    yield from side_by_side([*calls, Call(_write_index, of)], min(jobs, len(stamps)), least=2)
 
 
 class _Pages:

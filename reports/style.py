@@ -11,7 +11,7 @@ import hashlib
 import io
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
@@ -185,28 +185,19 @@ def save(
             content = io.BytesIO()
             figure.savefig(content, format=kind, metadata=undated[kind])
             written.append(write_whole(path, content.getvalue(), named=named))
+            figure.set_layout_engine("none")  # the other formats are laid out alike
     return written
 
 
-def keep_drawn(
-    stem: Path, shown: object, draw: Callable[[], Figure], formats: Sequence[str] = ("svg",)
-) -> None:
-    """`<stem>.svg` and the other `formats`, drawn only where there is none yet that shows the same.
-
-    `shown` is all that the figure shows, as JSON. The code that draws counts, too. A file of
-    another format is removed if it would show something else.
-    """
-    stamp, paths = (
-        stamp_of(shown),
-        {kind: stem.with_name(f"{stem.name}.{kind}") for kind in FORMATS},
-    )
-    current = stamp_in(paths["svg"]) == stamp
-    missing = [kind for kind in formats if not (current and paths[kind].is_file())]
-    if not current:
-        for path in paths.values():
-            path.unlink(missing_ok=True)
-    if missing:
-        save(draw(), stem, missing, stamp=stamp)
+def undrawn(stem: Path, stamp: str, formats: Sequence[str]) -> list[str]:
+    """The `formats` in which there is no `<stem>` yet that shows what `stamp` says; a file of any
+    format is removed where it shows something else."""
+    paths = {kind: stem.with_name(f"{stem.name}.{kind}") for kind in FORMATS}
+    if stamp_in(paths["svg"]) == stamp:
+        return [kind for kind in formats if not paths[kind].is_file()]
+    for path in paths.values():
+        path.unlink(missing_ok=True)
+    return list(formats)
 
 
 def stamp_of(shown: object) -> str:

@@ -21,9 +21,8 @@ from rockcheck.commands import (
 from rockcheck.scenes import load_scene
 from rockcheck.validation.discrepancy.compare import Discrepancy, compare
 from rockcheck.validation.discrepancy.figures import value_words
-from rockcheck.validation.discrepancy.measured import read_measured
+from rockcheck.validation.discrepancy.measured import read_measured, shifted, time_shift
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
-from rockcheck.validation.discrepancy.repeats import shifted, time_shift
 from rockcheck.validation.suite.changes import Change, changes, judged_otherwise
 from rockcheck.validation.suite.results import Run
 
@@ -93,8 +92,8 @@ def run(
     out = console()
     out.print(headline(found), style="bold")
     table = Table(box=None, pad_edge=False)
-    for name, justify in (("measure", "left"), ("value", "right"), ("unit", "left"), ("", "left")):
-        table.add_column(name, justify=justify)  # type: ignore[arg-type]
+    for name in ("measure", "value", "unit", ""):
+        table.add_column(name, justify="right" if name == "value" else "left")
     for figure in found.figures:
         yes_no = DIFFERENCES[figure.measure].yes_no
         table.add_row(

@@ -1,0 +1,282 @@
+"""What hand methods say of a block: closed forms, and estimates that engineers use.
+
+They stand beside a simulation and do not judge it: a criterion says whether the block uplifts,
+slides or overturns, perhaps how far it moves, from a few figures of the base motion. How often that
+agrees with the simulation is what `rockcheck assess` shows.
+
+Symbols: g gravity, b and h the block's half width and height, R the distance of the pivot from the
+mass's centre, alpha its slenderness angle, p the frequency parameter, mu_s and mu the static and
+kinetic friction. SI units, frequencies in Hz.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rockcheck.scenes import Record, Scene
+from rockcheck.scenes.block import Block
+from rockcheck.scenes.excitations import Excitation
+from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
+
+#: Samples in one period of a pulse.
+_PER_PERIOD = 400
+#: Frequencies (Hz) at which the sliding estimate looks for its capacity, ends and count.
+_SLOWEST, _FASTEST, _COUNT = 0.05, 33.0, 49
+#: Angles, in parts of the last one, at which the rocking estimate compares capacity and demand.
+_ANGLES = 40
+#: Damping of the spectrum that the sliding estimate uses.
+_SLIDING_DAMPING = 0.10
+
+
+def uplift_acceleration(block: Block, gravity: float) -> float:
+    """Base acceleration (m/s^2) above which a block at rest uplifts: g tan(alpha); statics."""
+    return gravity * block.slope
+
+
+def slip_acceleration(mu_s: float, gravity: float) -> float:
+    """Base acceleration (m/s^2) above which a block at rest slides: mu_s g; Coulomb."""
+    return mu_s * gravity
+
+
+def overturning_velocity(block: Block, gravity: float) -> float:
+    """Step of the base's velocity (m/s) that just overturns a block that does not slip.
+
+    sqrt(8 g R (1 - cos alpha)/3)/cos alpha of a homogeneous block: the energy after the step
+    equals that of the balance point (Housner 1963).
+    """
+    pivot = block.weaker_pivot
+    energy = 2.0 * gravity * pivot.radius * (1.0 - math.cos(pivot.alpha))
+    return math.sqrt(energy / pivot.share) / math.cos(pivot.alpha)
+
+
+def newmark_slip(velocity: float, acceleration: float, resistance: float) -> float:
+    """Slip (m) of a sliding block under a rectangular pulse of the base.
+
+    V^2/(2 N) (1 - N/A) for a pulse of `acceleration` A that reaches `velocity` V, against
+    `resistance` N = mu g; 0 where A <= N (Newmark 1965).
+    """
+    if acceleration <= resistance:
+        return 0.0
+    if resistance <= 0.0:
+        return math.inf
+    return velocity**2 / (2.0 * resistance) * (1.0 - resistance / acceleration)
+
+
+def rectangular_pulse_ratio(length: float, frequency_parameter: float) -> float:
+    """Acceleration over g tan(alpha) above which a rectangular pulse of `length` (s) overturns a
+    slender block: 1/(1 - exp(-p t)) (Housner 1963)."""
+    return 1.0 / -math.expm1(-frequency_parameter * length)
+
+
+def overturns_without_impact(times: ArrayLike, ratios: ArrayLike) -> bool:
+    """Whether a motion of the base overturns a slender block before its first impact.
+
+    `ratios` are a/(g alpha) at `times` in 1/p. From the uplift s0 on, where the ratio first
+    exceeds 1: the integral of f(s) exp(-(s - s0)) reaches 1 (linearised equation of motion).
+    """
+    s, f = np.asarray(times, dtype=float), np.asarray(ratios, dtype=float)
+    above = np.flatnonzero(f > 1.0)
+    if not above.size:
+        return False
+    first = int(above[0])
+    if first:  # where the line between two samples reaches 1
+        part = (1.0 - f[first - 1]) / (f[first] - f[first - 1])
+        start = s[first - 1] + part * (s[first] - s[first - 1])
+        s, f = np.concatenate([[start], s[first:]]), np.concatenate([[1.0], f[first:]])
+    return bool(np.trapezoid(f * np.exp(s[0] - s), s) >= 1.0)
+
+
+@dataclass(frozen=True)
+class Base:
+    """A base motion as hand methods see it."""
+
+    motion: Recording
+    #: Largest vertical acceleration, m/s^2.
+    vertical: float = 0.0
+
+    @cached_property
+    def acceleration(self) -> float:
+        """A, largest horizontal acceleration, m/s^2."""
+        return intensity.peak_acceleration(self.motion) * GRAVITY_OF_RECORDS
+
+    @cached_property
+    def velocity(self) -> float:
+        """V, largest horizontal velocity, m/s."""
+        return intensity.peak_velocity(self.motion)
+
+    def spectral(self, frequency: float, damping: float) -> float:
+        """Pseudo-spectral acceleration (m/s^2) at a frequency."""
+        return (
+            intensity.spectral_acceleration(self.motion, 1.0 / frequency, damping)
+            * GRAVITY_OF_RECORDS
+        )
+
+
+def base_of(scene: Scene) -> Base:
+    """The base motion of a scene."""
+    upward = sampled(scene.vertical, scene.duration).samples
+    return Base(sampled(scene.excitation, scene.duration), float(np.max(np.abs(upward))))
+
+
+def sampled(motion: Excitation, duration: float) -> Recording:
+    """An excitation as a recording; pulses at `_PER_PERIOD` samples a period."""
+    if isinstance(motion, Record):
+        samples, step = motion.samples, motion.time_step
+    elif motion.kind == "rest":
+        samples, step = np.zeros(2), duration
+    else:
+        step = motion.period / _PER_PERIOD
+        samples = motion.acceleration(np.arange(0.0, motion.quiet_after + step, step))
+    return Recording(samples=samples, time_step=step, unit="m/s2", form=motion.kind)
+
+
+def reserve_sliding(scene: Scene, base: Base) -> float:
+    """Slip (m) by the reserve-energy estimate of sliding, after ASCE 43-05, Appendix A.
+
+    c_s = 2 mu_e g with mu_e = mu (1 - 0.4 A_v/g). At f_es, the lowest frequency at which the 10 %
+    damped spectrum reaches c_s, the slip is c_s/(2 pi f_es)^2; 0 where it never does. The last
+    expression was derived, not read: check it against your copy.
+    """
+    gravity = scene.gravity
+    capacity = 2.0 * scene.floor.friction * (gravity - 0.4 * base.vertical)
+    if capacity <= 0.0:
+        return math.inf
+    frequencies = np.geomspace(_SLOWEST, _FASTEST, _COUNT)
+    before = 0.0, 0.0
+    for frequency in frequencies.tolist():
+        demand = base.spectral(frequency, _SLIDING_DAMPING)
+        if demand >= capacity:
+            found = _crossing(before, (frequency, demand), capacity)
+            return capacity / (2.0 * math.pi * found) ** 2
+        before = frequency, demand
+    return 0.0
+
+
+def _crossing(low: tuple[float, float], high: tuple[float, float], value: float) -> float:
+    """Where a straight line in frequency reaches the value."""
+    (f, a), (g, b) = low, high
+    return g if f == 0.0 else f + (g - f) * (value - a) / (b - a)
+
+
+def reserve_rocking(scene: Scene, base: Base) -> float:
+    """Peak rotation (rad) by the reserve-energy estimate of rocking, in the manner of ASCE 43-05,
+    Appendix A; infinite where it says that the block overturns.
+
+    With a = b/h, per angle th: capacity 2 g (cos th + a sin th - 1)/th, inertia C_I = 4/3 (1 +
+    a^2), frequency f = sqrt(2 g (cos th + a sin th - 1)/(C_I th^2 h))/(2 pi). Damping from
+    Housner's restitution C_R = 1 - 2 a^2/C_I: gamma = -2 ln C_R, gamma/sqrt(4 pi^2 + gamma^2). The
+    smallest th up to alpha whose capacity reaches the spectrum's demand. All of it was derived, the
+    standard's text unread: check it against your copy.
+    """
+    pivot, gravity = scene.block.weaker_pivot, scene.gravity
+    a, height = pivot.arm / pivot.height, pivot.height
+    inertia = 4.0 / 3.0 * (1.0 + a * a)
+    gamma = -2.0 * math.log(1.0 - 2.0 * a * a / inertia)
+    damping = gamma / math.hypot(2.0 * math.pi, gamma)
+    angles: NDArray[np.float64] = pivot.alpha * np.arange(1, _ANGLES + 1) / _ANGLES
+    for angle in angles.tolist():
+        # cos th - 1 without cancellation
+        work = a * math.sin(angle) - 2.0 * math.sin(0.5 * angle) ** 2
+        frequency = math.sqrt(2.0 * gravity * work / (inertia * height)) / (2.0 * math.pi * angle)
+        if 2.0 * gravity * work / angle >= base.spectral(frequency, damping):
+            return float(angle)
+    return math.inf
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """A hand method.
+
+    `event` is what it foretells: the block "uplifts", "slides" or "overturns". `says` gives that,
+    and the motion that it estimates (None: none): m of a method that foretells sliding, alpha
+    of others.
+    """
+
+    name: str
+    event: str
+    source: str
+    holds: str
+    says: Callable[[Scene, Base], tuple[bool, float | None]]
+    derived: bool = False
+
+
+def _sliding(estimate: Callable[[Scene, Base], float]) -> Callable[..., tuple[bool, float | None]]:
+    def says(scene: Scene, base: Base) -> tuple[bool, float | None]:
+        slip = estimate(scene, base)
+        return slip > 0.0, slip
+
+    return says
+
+
+def _rocking(scene: Scene, base: Base) -> tuple[bool, float | None]:
+    if base.acceleration <= uplift_acceleration(scene.block, scene.gravity):
+        return False, 0.0
+    angle = reserve_rocking(scene, base)
+    return math.isinf(angle), angle / scene.block.alpha
+
+
+CRITERIA = (
+    Criterion(
+        "uplift, a > g tan α",
+        "uplifts",
+        "statics",
+        "exact for a block at rest that does not slide first, without vertical motion",
+        lambda scene, base: (
+            base.acceleration > uplift_acceleration(scene.block, scene.gravity),
+            None,
+        ),
+    ),
+    Criterion(
+        "sliding, a > μ_s g",
+        "slides",
+        "Coulomb",
+        "exact for a block at rest that does not uplift first, without vertical motion",
+        lambda scene, base: (
+            base.acceleration > slip_acceleration(scene.floor.mu_s, scene.gravity),
+            None,
+        ),
+    ),
+    Criterion(
+        "velocity step, V ≥ √(8 g R (1 - cos α)/3)/cos α",
+        "overturns",
+        "Housner 1963",
+        "exact for a step of velocity; necessary for a pulse",
+        lambda scene, base: (
+            base.velocity >= overturning_velocity(scene.block, scene.gravity),
+            None,
+        ),
+    ),
+    Criterion(
+        "sliding block, V²/(2N) (1 - N/A)",
+        "slides",
+        "Newmark 1965",
+        "exact for one rectangular pulse; A and V are the record's peaks",
+        _sliding(
+            lambda scene, base: newmark_slip(
+                base.velocity, base.acceleration, scene.floor.friction * scene.gravity
+            )
+        ),
+    ),
+    Criterion(
+        "reserve energy, sliding",
+        "slides",
+        "after ASCE 43-05, App. A; check against your copy",
+        "an estimate; the block slides and does not rock",
+        _sliding(reserve_sliding),
+        derived=True,
+    ),
+    Criterion(
+        "reserve energy, rocking",
+        "overturns",
+        "in the manner of ASCE 43-05, App. A; check against your copy",
+        "an estimate; the block rocks, does not slide, meets no wall",
+        _rocking,
+        derived=True,
+    ),
+)
