@@ -328,7 +328,11 @@ def test_an_undecided_node_is_neither_safe_nor_overturned():
 
 def test_the_documentation_tells_the_findings_of_the_kept_spectra():
     kept = json.loads((ROOT / "docs" / "runs" / "spectrum.json").read_text(encoding="utf-8"))
-    (table,) = (block for block in kept["blocks"] if block.get("name") == "findings")
+    (table,) = (
+        block
+        for block in kept["blocks"]
+        if (block["block"], block.get("name")) == ("table", "findings")
+    )
     assert table["rows"] == [
         [one.about["sentence"], f"{one.shown.case} (Fig. {one.shown.figure})", one.words]
         for one in findings_of(Paper(kept_spectra()))
