@@ -120,7 +120,7 @@ def not_installed(name: str) -> str:
     if family(name).module != ENGINES:
         return ""
     engine = _class_of(name)
-    return "" if engine.installed() else f"not installed: pip install {engine.package}"
+    return "" if engine.installed() else str(engine.hint())
 
 
 def is_own(name: str) -> bool:
