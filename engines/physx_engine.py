@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from typing import Any, ClassVar, Literal
 
 from rockcheck.engines.contacts import Surface, corners_of, surfaces_of
@@ -31,8 +32,9 @@ class _PhysXWorld(World):
     inset, out_of_plane = 0.0, 1.0
 
     def __init__(self, scene: Scene) -> None:
-        import sapien
-        from sapien import physx
+        with warnings.catch_warnings(action="ignore"):  # nothing is rendered
+            import sapien
+            from sapien import physx
 
         self.sapien: Any = sapien
         self.physx: Any = physx

@@ -90,6 +90,19 @@ FAMILIES: dict[str, Family] = {
     ),
     "dart": Family(ENGINES, "Dart", "the physics engine DART", {}, ("dartpy", *STEPPED)),
     "drake": Family(ENGINES, "Drake", "the physics engine Drake", {}, ("drake", "numpy")),
+    "box2d": Family(
+        ENGINES,
+        "Box2D",
+        "the physics engine Box2D 3 (in two dimensions, single precision)",
+        {},
+        ("pyb2d3", "numpy"),
+    ),
+    "physx": Family(
+        ENGINES, "PhysX", "the physics engine PhysX 5 (single precision)", {}, ("sapien", "numpy")
+    ),
+    "jolt": Family(
+        ENGINES, "Jolt", "the physics engine Jolt (single precision)", {}, ("culverin", "numpy")
+    ),
     "measured": Family(
         "rockcheck.validation.discrepancy.measured",
         "Measured",
