@@ -4,6 +4,7 @@ that comes out."""
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Callable, Mapping
 from contextlib import closing
@@ -54,6 +55,9 @@ class Engine(Frozen):
     worlds: ClassVar[Worlds]
     #: Digits of its states: "double" or "single" precision.
     precision: ClassVar[Literal["double", "single"]] = "double"
+    #: The first and the last Python that the package has wheels for; None where it keeps up.
+    first_python: ClassVar[tuple[int, int]] = (3, 11)
+    last_python: ClassVar[tuple[int, int] | None] = None
     #: Why its steps cannot vary; "" where they can.
     fixed_because: ClassVar[str] = ""
     #: The settings in which contacts have Newton's coefficient of restitution.
@@ -109,9 +113,19 @@ class Engine(Frozen):
         return not cls.module or find_spec(cls.module) is not None
 
     @classmethod
+    def has_wheel(cls) -> bool:
+        """Whether its package is published in a form that this Python can install as it is."""
+        here = sys.version_info[:2]
+        return cls.first_python <= here <= (cls.last_python or here)
+
+    @classmethod
     def hint(cls) -> str:
         """What to do where it is not installed."""
-        return f"not installed: pip install {cls.package or cls.module}"
+        package = cls.package or cls.module
+        if cls.has_wheel():
+            return f"not installed: pip install {package}"
+        this = ".".join(map(str, sys.version_info[:2]))
+        return f"no wheel for Python {this}: pip install {package} compiles it"
 
     def coarser(self, factor: float) -> Self:
         """The same engine with all steps `factor` times as long; of adaptive ones those at the
@@ -167,7 +181,7 @@ class Engine(Frozen):
         is missing, `ModelFailure` if the motion blows up or its events do not end.
         """
         if not self.installed():
-            raise NotInstalled(f"the engine {self.name} is {self.hint()}", self.name)
+            raise NotInstalled(f"the engine {self.name}: {self.hint()}", self.name)
         check_kind(scene, Scene, "load_scene", "scene")
         steps = self.steps
         if scene.duration / steps.largest > MOST_STEPS:

@@ -89,6 +89,7 @@ class Jolt(Engine):
 
     name: ClassVar[str] = "jolt"
     module: ClassVar[str] = "culverin"
+    first_python: ClassVar[tuple[int, int]] = (3, 12)
     precision: ClassVar[Literal["double", "single"]] = "single"
     fixed_because: ClassVar[str] = "Jolt's velocities are in single precision"
     worlds: ClassVar[Worlds] = (_RigidJoltWorld, _JoltWorld)

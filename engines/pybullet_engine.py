@@ -201,4 +201,5 @@ class PyBullet(Engine):
 
     name: ClassVar[str] = "pybullet"
     module: ClassVar[str] = "pybullet"
+    last_python: ClassVar[tuple[int, int] | None] = (3, 11)
     worlds: ClassVar[Worlds] = (_RigidPyBulletWorld, _PyBulletWorld)

@@ -136,6 +136,11 @@ def not_installed(name: str) -> str:
     return "" if engine.installed() else str(engine.hint())
 
 
+def has_wheel(name: str) -> bool:
+    """Whether that model can be had on this Python without a compiler."""
+    return family(name).module != ENGINES or bool(_class_of(name).has_wheel())
+
+
 def is_own(name: str) -> bool:
     """Whether that is a model of the user's own: code that may lie beside the suite or in the
     working directory."""
