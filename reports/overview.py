@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from rockcheck.reports.style import looks
 from rockcheck.reports.tables import overrun
 from rockcheck.reports.view import FALL
-from rockcheck.scenes.trust.experience import Trust, known
+from rockcheck.scenes.experience import Trust, known
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.finding import Axis, Block, Column, Panel, Plot, Series, Table
 from rockcheck.validation.suite.experience import FEWEST, bias_and_scatter, pairs_of

@@ -14,7 +14,7 @@ from pydantic import TypeAdapter, field_validator
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.horizon import may_fly, other_laws, predictability_horizon
 from rockcheck.scenes import History, InputError, ModelFailure, Scene
-from rockcheck.scenes.trust.inputs import UncertainScene
+from rockcheck.scenes.files import UncertainScene
 from rockcheck.validation.discrepancy.compare import Discrepancy, compare, describe, too_short
 from rockcheck.validation.discrepancy.figures import Figure, Stored
 from rockcheck.validation.discrepancy.impact_laws import Landing, LawFollowed, parting_landing

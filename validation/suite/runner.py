@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.execute import provenance, workers
-from rockcheck.validation.execute.models import family, is_own, not_installed
+from rockcheck.validation.execute.models import family, has_wheel, is_own, not_installed
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store, name_of
 from rockcheck.validation.finding import Finding
@@ -320,7 +320,8 @@ class SuiteStudy(Study):
             "read_back": planned in self.read_back,
         }
         if planned in self.failures:
-            about["status"] = "absent" if not_installed(planned.variant.family_name) else "failed"
+            missing = not_installed(planned.variant.family_name)
+            about["status"] = _absence(planned.variant) if missing else "failed"
             return Cell(
                 **about, reason=self.failures[planned], settings=dict(planned.variant.settings)
             )
@@ -487,7 +488,7 @@ class SuiteStudy(Study):
             ),
         }
         if missing := not_installed(variant.family_name):
-            return Cell(**about, status="absent", reason=missing)
+            return Cell(**about, status=_absence(variant), reason=missing)
         if own.failures:
             reason = next(
                 outcome
@@ -544,6 +545,11 @@ def _fault(item: Any) -> dict[str, Any]:
         "traceback": f"{FAULTS}/{item.name}.txt",
         "unexpected": not is_own(item.variant.family_name),
     }
+
+
+def _absence(variant: ModelVariant) -> Literal["absent", "unavailable"]:
+    """What a cell's status is where its model's engine is not installed."""
+    return "absent" if has_wheel(variant.family_name) else "unavailable"
 
 
 def _figure(figures: Sequence[Figure], place: Place) -> Figure:
