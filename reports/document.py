@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table as Grid
 
 from rockcheck.reports.drawers import figure_of, live_data, scripts_of
+from rockcheck.reports.pages import Site
 from rockcheck.reports.show.words import number
 from rockcheck.reports.style import FORMATS, LOOKS, looks, save, stamp_of, undrawn
 from rockcheck.scenes.writing import json_text, made, markdown_table, table_text, write_whole
@@ -184,8 +185,6 @@ def side_by_side(calls: Iterable[Call], jobs: int | None = None, least: int = 4)
 def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -> Path:
     """Write `run.json`, a CSV a table, `summary.md`, the figures, the scenes of failures and
     `index.html`; returns the page."""
-    from rockcheck.reports.site import Site
-
     write_whole(folder / "run.json", json_text(found.as_dict()) + "\n")
     tables = {f"{table.name}.csv": csv(table) for table in found.tables()}
     for old in (folder / FAILING).glob("*.toml"):

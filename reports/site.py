@@ -7,13 +7,9 @@ import hashlib
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
-
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from rockcheck.reports import tables
 from rockcheck.reports.document import FIGURES, csv, row_cells, side_by_side
@@ -27,13 +23,13 @@ from rockcheck.reports.figures import (
     write_figures,
 )
 from rockcheck.reports.overview import PEAKS, accuracy, entry, glance, matrix, outcome_of
+from rockcheck.reports.pages import DATA, PAGES, Site
 from rockcheck.reports.scene_data import script, write_scene_file
-from rockcheck.reports.show import words
 from rockcheck.reports.show.words import scene_facts
-from rockcheck.reports.style import FORMATS, LOOKS, SPARE, looks, save
+from rockcheck.reports.style import FORMATS, looks, save
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
 from rockcheck.scenes import InputError
-from rockcheck.scenes.errors import inert, printable, unknown_name
+from rockcheck.scenes.errors import printable, unknown_name
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.reading import MOST_BYTES, head_of
 from rockcheck.scenes.writing import made, write_whole
@@ -44,46 +40,12 @@ from rockcheck.validation.finding import Plot
 from rockcheck.validation.suite.results import SEVERITY, Run
 from rockcheck.validation.suite.tables import shown
 
-DATA = Path(str(resources.files("rockcheck.reports"))) / "data"
-#: The folder beside `index.html` that holds everything else.
-PAGES = "pages"
 #: The page to open.
 INDEX = "index.html"
 #: What a page with figures for a paper takes to be made, in pages without. Less than FEW in all are
 #: written by the process itself: it has what draws anyway, and another process takes as long as
 #: twenty pages to have it, too.
 PRINTED, FEW = 25, 40
-
-
-@dataclass(frozen=True)
-class Site:
-    """A folder of pages with one look; `links` are its parts for the navigation, (title, address
-    from the index)."""
-
-    folder: Path
-    name: str
-    links: tuple[tuple[str, str], ...] = ()
-
-    def page(self, address: str, template: str, **context: Any) -> Path:
-        """Write the page `address` (relative to the folder, with slashes) from a template of
-        `data/templates/`."""
-        root = "../" * address.count("/")
-        text = (
-            _environment()
-            .get_template(template)
-            .render(site=self, root=root, address=address, **context)
-        )
-        return write_whole(made(self.folder, *address.split("/")[:-1]) / Path(address).name, text)
-
-    def assets(self) -> None:
-        """Write style sheets, scripts and the plotting library, once for all pages."""
-        target = made(self.folder, PAGES, "assets")
-        for source in sorted((DATA / "assets").iterdir()):
-            write_whole(target / source.name, source.read_bytes())
-        for source in sorted((DATA / "vendor").glob("*/*")):
-            name = source.name if source.name != "LICENSE" else f"LICENSE.{source.parent.name}.txt"
-            write_whole(target / name, source.read_bytes())
-        write_whole(target / "models.css", model_styles())
 
 
 #: Studies of other commands that may stand beside a run.
@@ -350,46 +312,8 @@ def _belongings(page: Path) -> set[str]:
 
 
 def _common(run: Run) -> dict[str, Any]:
-    return {
-        "run": run,
-        "looks": looks(run.models),
-        "channels": CHANNELS,
-    }
-
-
-def model_styles() -> str:
-    """A style sheet with a class `look-<key>` for each look of a model that sets its colour, by day
-    and by night."""
-    rows = (
-        f".look-{look.key} {{ --look: light-dark({look.light}, {look.dark}); }}"
-        for look in (*LOOKS.values(), *SPARE)
-    )
-    return "\n".join(rows) + "\n"
-
-
-@cache
-def _environment() -> Environment:
-    """The templates with what they call. Kept, since compiling a page's templates takes longer than
-    drawing its figures."""
-    environment = Environment(
-        loader=FileSystemLoader(DATA / "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=lambda value: inert(value) if type(value) is str else value,
-    )
-    for filter in (
-        words.number,
-        words.unit,
-        words.duration,
-        words.moment,
-        words.window,
-        words.dash_array,
-        words.readable,
-    ):
-        environment.filters[filter.__name__] = filter
-    for function in (
+    """What every page of a run shows, and calls."""
+    functions = (
         row_cells,
         tables.checks_table,
         tables.measures_table,
@@ -401,7 +325,11 @@ def _environment() -> Environment:
         figure_stem,
         entry,
         outcome_of,
-    ):
-        environment.globals[function.__name__] = function
-    environment.globals |= {"VERDICTS": tables.VERDICTS, "SEVERITY": SEVERITY}
-    return environment
+    )
+    return {
+        "run": run,
+        "looks": looks(run.models),
+        "channels": CHANNELS,
+        "VERDICTS": tables.VERDICTS,
+        "SEVERITY": SEVERITY,
+    } | {function.__name__: function for function in functions}

@@ -1,13 +1,14 @@
-"""The figures of a suite's cells against their references, under any law of impacts, and what else
-is worked out once and kept: the horizon, the landing at which laws part, what a spread of inputs
-makes of figures."""
+"""A suite's cells as they are planned, their figures against references under any law of impacts,
+and what else is worked out once and kept: the horizon, the landing at which laws part, what a
+spread of inputs makes of figures."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import Any
 
 from pydantic import TypeAdapter, field_validator
 
@@ -19,22 +20,68 @@ from rockcheck.validation.discrepancy.compare import Discrepancy, compare, descr
 from rockcheck.validation.discrepancy.figures import Figure, Stored
 from rockcheck.validation.discrepancy.impact_laws import Landing, LawFollowed, parting_landing
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
-from rockcheck.validation.execute import provenance
+from rockcheck.validation.execute import provenance, workers
 from rockcheck.validation.execute.models import build, is_own
 from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
+from rockcheck.validation.study import Task
+from rockcheck.validation.suite.ensembles import Ensemble
 from rockcheck.validation.suite.suites import ModelVariant
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Windowed
 from rockcheck.validation.uncertainty.population import Inputs, propagate
 
-if TYPE_CHECKING:
-    from rockcheck.validation.suite.runner import Planned
-
 #: What is judged by the nearest law. Histories are judged up to the horizon, which ends where the
 #: laws part.
 BY_ANY = ("outcome_agrees", "peak_ratio")
+
+
+@dataclass(frozen=True)
+class Planned(Task):
+    """A cell that is to be played: a scene by a model, or the scenes `numbers` of an `ensemble`,
+    which are drawn from `scene`. Its key is of all that it depends on."""
+
+    scene: Scene = field(compare=False)
+    variant: ModelVariant = field(compare=False)
+    model: str
+    key: str
+    uncertainty: bool = field(default=False, compare=False)
+    ensemble: Ensemble | None = field(default=None, compare=False)
+    numbers: range = field(default=range(0), compare=False)
+
+    @property
+    def place(self) -> str:
+        """Name of the scene, or of the ensemble."""
+        return self.ensemble.name if self.ensemble else self.scene.name
+
+    @property
+    def name(self) -> str:
+        """Name of its files."""
+        part = [f"{self.numbers.start}"] if self.ensemble else []
+        return name_of(self.place, self.variant.label, *part, self.key)
+
+    @property
+    def label(self) -> str:
+        """Scene and model; of an ensemble the first scene, too."""
+        part = f", from {self.numbers.start}" if self.ensemble else ""
+        return f"{self.place}, {self.variant.label}{part}"
+
+    @property
+    def work(self) -> workers.Task | workers.BatchTask:
+        """What a worker needs to know."""
+        model: dict[str, Any] = {
+            "label": self.variant.label,
+            "family": self.variant.family_name,
+            "settings": dict(self.variant.settings),
+            "search_path": self.variant.search_path,
+        }
+        if self.ensemble is None:
+            return workers.Task(scene=self.scene, uncertainty=self.uncertainty, **model)
+        scenes = tuple(self.ensemble.drawn(self.scene, n) for n in self.numbers)
+        return workers.BatchTask(scenes=scenes, **model)
+
+
 #: What a cell is compared with, None for its own figures; and the measures that are asked for over
 #: a window, or on request.
-Asked = tuple["Planned | None", list[Windowed]]
+Asked = tuple[Planned | None, list[Windowed]]
 #: A figure as it is kept: measure, unit, value, window, until, note. Its label is the measure's.
 FigureRow = tuple[str, str, float | None, str, float | None, str]
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from itertools import groupby
 from pathlib import Path
@@ -23,10 +22,10 @@ from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samp
 from rockcheck.validation.execute import provenance, workers
 from rockcheck.validation.execute.models import family, has_wheel, is_own, not_installed
 from rockcheck.validation.execute.pool import Failure
-from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store, name_of
+from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store
 from rockcheck.validation.finding import Finding
-from rockcheck.validation.study import FAULTS, Study, Task, run
-from rockcheck.validation.suite.comparing import Asked, compared, inputs_of
+from rockcheck.validation.study import FAULTS, Study, run
+from rockcheck.validation.suite.comparing import Asked, Planned, compared, inputs_of
 from rockcheck.validation.suite.confidence import explanations, key_of, numerical_of
 from rockcheck.validation.suite.ensembles import Ensemble
 from rockcheck.validation.suite.results import Cell, CostRecord, EnsembleRecord, Run, Strict
@@ -42,51 +41,6 @@ from rockcheck.validation.suite.tolerances import (
 )
 from rockcheck.validation.uncertainty.numerical import Numerical
 from rockcheck.validation.uncertainty.population import Inputs
-
-
-@dataclass(frozen=True)
-class Planned(Task):
-    """A cell that is to be played: a scene by a model, or the scenes `numbers` of an `ensemble`,
-    which are drawn from `scene`. Its key is of all that it depends on."""
-
-    scene: Scene = field(compare=False)
-    variant: ModelVariant = field(compare=False)
-    model: str
-    key: str
-    uncertainty: bool = field(default=False, compare=False)
-    ensemble: Ensemble | None = field(default=None, compare=False)
-    numbers: range = field(default=range(0), compare=False)
-
-    @property
-    def place(self) -> str:
-        """Name of the scene, or of the ensemble."""
-        return self.ensemble.name if self.ensemble else self.scene.name
-
-    @property
-    def name(self) -> str:
-        """Name of its files."""
-        part = [f"{self.numbers.start}"] if self.ensemble else []
-        return name_of(self.place, self.variant.label, *part, self.key)
-
-    @property
-    def label(self) -> str:
-        """Scene and model; of an ensemble the first scene, too."""
-        part = f", from {self.numbers.start}" if self.ensemble else ""
-        return f"{self.place}, {self.variant.label}{part}"
-
-    @property
-    def work(self) -> workers.Task | workers.BatchTask:
-        """What a worker needs to know."""
-        model: dict[str, Any] = {
-            "label": self.variant.label,
-            "family": self.variant.family_name,
-            "settings": dict(self.variant.settings),
-            "search_path": self.variant.search_path,
-        }
-        if self.ensemble is None:
-            return workers.Task(scene=self.scene, uncertainty=self.uncertainty, **model)
-        scenes = tuple(self.ensemble.drawn(self.scene, n) for n in self.numbers)
-        return workers.BatchTask(scenes=scenes, **model)
 
 
 class CellRecord(Stored):
