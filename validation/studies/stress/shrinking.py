@@ -19,6 +19,8 @@ Path = tuple[str | int, ...]
 MOST_TRIALS = 400
 #: In lists of at most so many values each is tried on its own.
 SHORT = 8
+#: What is dropped first, since a block that nothing moves is told soonest.
+FIRST: dict[str | int, int] = {"vertical": 0, "excitation": 1}
 #: What is never dropped or rounded.
 KEPT = ("name", "output_step")
 
@@ -64,7 +66,7 @@ def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
     """The scene's tables with a part left out, a shorter run or list, another scale, and at last
     one number that is zero or has fewer digits."""
     tables = _tables(scene)
-    places = sorted(_places(tables), key=lambda place: len(place[0]))
+    places = sorted(_places(tables), key=lambda place: (len(place[0]), FIRST.get(place[0][0], 2)))
     for path, _ in places:
         yield _with(tables, path)
     unit = math.sqrt(scene.block.radius / scene.gravity)
