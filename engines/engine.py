@@ -4,6 +4,7 @@ that comes out."""
 from __future__ import annotations
 
 import math
+import sys
 import time
 from abc import abstractmethod
 from collections.abc import Mapping
@@ -47,6 +48,8 @@ class Engine(Frozen):
     #: with rockcheck.
     module: ClassVar[str] = ""
     package: ClassVar[str] = ""
+    #: The last Python that the package has wheels for; None where it keeps up.
+    last_python: ClassVar[tuple[int, int] | None] = None
     #: Why its steps cannot vary; "" where they can.
     fixed_because: ClassVar[str] = ""
     #: The settings in which contacts have Newton's coefficient of restitution.
@@ -100,6 +103,11 @@ class Engine(Frozen):
     def installed(cls) -> bool:
         """Whether the module that it needs can be imported."""
         return not cls.module or find_spec(cls.module) is not None
+
+    @classmethod
+    def has_wheel(cls) -> bool:
+        """Whether its package is published in a form that this Python can install as it is."""
+        return cls.last_python is None or sys.version_info[:2] <= cls.last_python
 
     def coarser(self, factor: float) -> Self:
         """The same engine with all steps `factor` times as long; of adaptive ones those at the

@@ -32,6 +32,7 @@ class PyBullet(Engine):
     name: ClassVar[str] = "pybullet"
     module: ClassVar[str] = "pybullet"
     package: ClassVar[str] = "pybullet"
+    last_python: ClassVar[tuple[int, int] | None] = (3, 11)
 
     def rigid_world(self, scene: Scene) -> World:
         """The scene as PyBullet holds it: point contacts of the corners."""

@@ -120,7 +120,17 @@ def not_installed(name: str) -> str:
     if family(name).module != ENGINES:
         return ""
     engine = _class_of(name)
-    return "" if engine.installed() else f"not installed: pip install {engine.package}"
+    if engine.installed():
+        return ""
+    if not engine.has_wheel():
+        this = ".".join(map(str, sys.version_info[:2]))
+        return f"no wheel for Python {this}: pip install {engine.package} compiles it"
+    return f"not installed: pip install {engine.package}"
+
+
+def has_wheel(name: str) -> bool:
+    """Whether that model can be had on this Python without a compiler."""
+    return family(name).module != ENGINES or bool(_class_of(name).has_wheel())
 
 
 def is_own(name: str) -> bool:
