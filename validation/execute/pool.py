@@ -179,7 +179,7 @@ class Pool:
                 ).done
                 if not done:
                     return
-                for future in done:
+                for future in [one for one in running if one in done]:  # as they were begun
                     call, seconds = running.pop(future)
                     if all(other is not call for other, _ in running.values()):
                         self._compiled.add(call.compiles)
