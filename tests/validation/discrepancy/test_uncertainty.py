@@ -20,8 +20,8 @@ from rockcheck import (
 )
 from rockcheck.commands.cli import main
 from rockcheck.ebm.batch import pack, run_batch
+from rockcheck.scenes.experience import Experience, Range, Trust, axes_of, expected, outside
 from rockcheck.scenes.files import load_scene, load_uncertain_scene
-from rockcheck.scenes.trust.experience import Experience, Range, Trust, axes_of, expected, outside
 from rockcheck.validation.suite.confidence import explanations
 from rockcheck.validation.suite.experience import bias_and_scatter
 from rockcheck.validation.suite.runner import run_suite
