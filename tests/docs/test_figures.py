@@ -13,8 +13,8 @@ import pytest
 
 from rockcheck import ContinuousModel, EventBasedModel, MuJoCo, compare, load_scene
 from rockcheck.ebm.core import contacts, modes, motion, rules, series, settle
+from rockcheck.scenes.experience import Experience
 from rockcheck.scenes.kinematics import pivot_height
-from rockcheck.scenes.trust.experience import Experience
 from rockcheck.validation.paper.panels import KEPT, kept_spectra
 from rockcheck.validation.suite.suites import load_suite
 
