@@ -28,8 +28,6 @@ from rockcheck.scenes.progress import announce, announcing, interruptible
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.execute.warming import PARTS
 
-posix = pytest.mark.skipif(os.name != "posix", reason="owners and modes as POSIX has them")
-
 #: A package of one kernel, played in a process of its own; says how many functions were read from
 #: the cache and how many compiled.
 _TINY = """
@@ -198,14 +196,14 @@ class _Planted:
         return os.mkdir, (self.path,)
 
 
-@posix
+@pytest.mark.needs("POSIX")
 def test_the_folder_is_closed_to_others(tmp_path, play):
     play("0 read, 2 compiled")
     (folder,) = (tmp_path / "cache").glob("tiny-kernels-*")
     assert folder.stat().st_mode & 0o777 == 0o700
 
 
-@posix
+@pytest.mark.needs("POSIX")
 @pytest.mark.parametrize(
     "fault", ["open to others", "a link", "below a folder that all may change"]
 )
@@ -227,7 +225,7 @@ def test_a_folder_that_others_may_change_is_not_used(tmp_path, play, fault):
     )
 
 
-@posix
+@pytest.mark.needs("POSIX")
 def test_a_folder_of_another_user_is_not_used(tmp_path, monkeypatch):
     folder = tmp_path / "cache" / "tiny-kernels-0"
     folder.mkdir(parents=True, mode=0o700)
@@ -236,7 +234,7 @@ def test_a_folder_of_another_user_is_not_used(tmp_path, monkeypatch):
     assert not compiled._is_private(folder, os.getuid())
 
 
-@posix
+@pytest.mark.needs("POSIX")
 def test_no_folder_that_could_be_foreseen(tmp_path, play):
     """Where the package's folder cannot be written, the user's own cache is taken, never a common
     one."""
@@ -276,7 +274,7 @@ def test_everything_can_be_imported_without_the_compiler():
     assert done.stdout == "at rest\n"
 
 
-@posix
+@pytest.mark.needs("POSIX")
 def test_the_wait_for_compiled_code_can_be_interrupted(tmp_path):
     """Ctrl-C while a kernel runs for minutes: the process ends at once, with 130."""
     script = tmp_path / "slow.py"
@@ -346,7 +344,7 @@ def test_interruptible_calls_share_a_thread_and_a_forked_process_has_its_own():
         assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
 
 
-@posix
+@pytest.mark.needs("POSIX")
 def test_the_call_after_an_interrupted_one_works_while_that_one_goes_on():
     released = threading.Event()
     previous = signal.signal(signal.SIGINT, signal.default_int_handler)
