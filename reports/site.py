@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from rockcheck.reports import tables
-from rockcheck.reports.document import FIGURES, csv, row_cells, side_by_side
-from rockcheck.reports.drawers import figure_of
+from rockcheck.reports.document import FIGURES, csv, row_cells
+from rockcheck.reports.drawers import figure_of, side_by_side
 from rockcheck.reports.ensembles import EnsembleView
 from rockcheck.reports.figures import (
     figure_stem,

@@ -287,10 +287,10 @@ def test_the_help_names_the_page_that_is_written(name, page, capsys):
 def test_on_a_terminal_colour_progress_and_its_width():
     main(["new", "mine.toml", "-q"])
     said = on_a_terminal(
-        "simulate", "mine.toml", "--model", "pybullet", "--set", "time_step=1e-3", "-o", "a.csv"
+        "simulate", "mine.toml", "--model", "mujoco", "--set", "time_step=1e-3", "-o", "a.csv"
     )
     assert "left" in said
-    assert "mine, pybullet" in said
+    assert "mine, mujoco" in said
     assert "\x1b[" in said
     assert not list(Path().glob("*--*")), "only what was asked for"
     for columns in (60, 80):
@@ -299,7 +299,7 @@ def test_on_a_terminal_colour_progress_and_its_width():
 
 
 def test_models_tell_how_far_they_are():
-    from rockcheck.engines import PyBullet
+    from rockcheck.engines import MuJoCo
 
     scene = Scene(
         name="short",
@@ -312,7 +312,7 @@ def test_models_tell_how_far_they_are():
     for step in (1e-3, "adaptive"):
         heard.clear()
         with listening(lambda done, total, what="": heard.append(done / total)):
-            PyBullet(time_step=step).simulate(scene)
+            MuJoCo(time_step=step).simulate(scene)
         assert heard == sorted(heard)
         assert all(0.0 <= share < 1.0 for share in heard)
         assert len(heard) >= 1
