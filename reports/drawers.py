@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 DRAWERS: dict[str, tuple[str, str]] = {
     "spectra": ("rockcheck.reports.show.spectrum", "figure"),
     "stable-steps": (__name__, "stable_steps"),
+    "strips": (__name__, "strips"),
 }
 #: What writes the scripts of a live plot of such a kind: module and function, which takes the plot
 #: and the folder of figures and returns the scripts that the page reads, in order.
@@ -134,6 +135,30 @@ def stable_steps(plot: Plot) -> Figure:
             ax.set_yticks(range(len(models)), models)
             ax.grid(visible=False)
             ax.set_xlabel(words)
+    return figure
+
+
+def strips(plot: Plot) -> Figure:
+    """A strip a figure: a point a run, a bar from the 16 to the 84 % quantile, and the median."""
+    import numpy as np
+    from matplotlib.figure import Figure
+
+    with figure_style():
+        figure = Figure(figsize=(PAGE, 0.75 * len(plot.data) + 0.1), layout="constrained")
+        rows = figure.subplots(len(plot.data), 1, squeeze=False)[:, 0]
+        for ax, one in zip(rows, plot.data, strict=True):
+            values = np.sort(np.array(one["values"], dtype=float))
+            low, median, high = np.quantile(values, (0.16, 0.5, 0.84))
+            # points that would hide each other go up and down in turn
+            beside = 0.25 * ((np.arange(len(values)) % 3) - 1)
+            ax.barh(0.0, high - low, left=low, height=0.9, color=COLOURS[0][0], alpha=0.15)
+            ax.plot([median, median], [-0.45, 0.45], color=COLOURS[0][0], linewidth=1.6)
+            ax.plot(values, beside, "o", markersize=3.0, color=COLOURS[1][0], alpha=0.8)
+            ax.set_xlim(0.0, max(float(values[-1]) * 1.06, 1e-3))
+            ax.set_ylim(-0.6, 0.6)
+            ax.set_yticks([])
+            ax.grid(axis="y", visible=False)
+            ax.set_ylabel(one["label"], rotation=0, ha="right", va="center")
     return figure
 
 
