@@ -54,53 +54,39 @@ def march_adaptively(
     from rockcheck.engines import stepping
     from rockcheck.scenes.compiled import for_types_of
 
-    contacts, end = contacts_of(scene), float(scene.output_times[-1])
     limits = stepping.limits_of(scene, longest, short)
-    corners = np.array(
-        [(*contact.corner, *contact.normal, contact.distance) for contact in contacts]
-    )
-    starts = np.array([*base.starts, math.inf])
     across, up = (
         (np.array(one.pieces or np.empty((0, 1))), one.interval, one.last)
         for one in (base.across, base.up)
     )
-    most_steps = 100_000 + 20 * int(end / longest)
+    course = stepping.Course(
+        np.array([(*one.corner, *one.normal, one.distance) for one in contacts_of(scene)]),
+        np.array([*base.starts, math.inf]),
+        across,
+        up,
+        float(scene.output_times[-1]),
+    )
+    most_steps = 100_000 + 20 * int(course.end / longest)
 
     run = stepping.begun(
         np.array(kinematics.of_mass(scene.block, scene.initial_state), dtype=float),
         base.velocity(0.0),
-        len(contacts),
+        len(course.corners),
     )
     rows, count = np.empty((_ROOM, stepping.COLUMNS)), 1
     rows[0, :7] = 0.0, *run.state[:6]
-    step = for_types_of(
-        stepping.step, run, corners, starts, across, up, limits, end, 0.0, 0.0, 0.0, rows[0]
-    )
-    going = stepping.plan(run, corners, starts, across, up, limits, end)
+    step = for_types_of(stepping.step, run, course, limits, (0.0, 0.0, 0.0), rows[0])
+    going = stepping.plan(run, course, limits)
     while going:
         x, y, theta, vx, vy, w, dt, ax, ay, impact = run.asked.tolist()
         kicked = push((x, y, theta), (vx, vy, w), dt, (ax, ay), impact != 0.0)
         if count == len(rows):
             rows = np.concatenate([rows, np.empty_like(rows)])
-        going = step(
-            run,
-            corners,
-            starts,
-            across,
-            up,
-            limits,
-            end,
-            kicked[0],
-            kicked[1],
-            kicked[2],
-            rows[count],
-        )
+        going = step(run, course, limits, kicked, rows[count])
         count += 1
         if count % 512 == 0:
-            tell(rows[count - 1, 0], end)
-        if count > most_steps:
-            going = stepping.LOST
-        if going == stepping.LOST:
+            tell(rows[count - 1, 0], course.end)
+        if going == stepping.LOST or count > most_steps:
             raise ModelFailure(
                 f"no end to the events, or a motion that blew up, after {count} steps at t ="
                 f" {rows[count - 1, 0]:g} s"

@@ -12,18 +12,35 @@ from typing import Any, Literal
 from rockcheck.scenes import Scene
 
 Arm = tuple[Any, Any]
+Point = tuple[float, float]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Contact:
-    """One corner of the block and one surface that it can touch."""
+class Surface:
+    """The floor, or a wall: a half-plane that the block can touch."""
 
     surface: Literal["floor", "left", "right"]
-    corner: tuple[float, float]  # from the mass's centre, in the block's own frame, m
-    normal: tuple[float, float]  # out of the surface
+    normal: Point  # out of the surface
     # from the surface to the point of the floor below the centre of the box as it stands, m
     distance: float
+    friction: float
     restitution: float
+
+    def behind(self, depth: float) -> Point:
+        """The point `depth` m behind the surface, straight across from the foot of the block."""
+        back = -(self.distance + depth)
+        return back * self.normal[0], back * self.normal[1]
+
+    def extent(self, thick: float, wide: float) -> tuple[float, float, float]:
+        """Along x, y and z of a slab behind the surface, `thick` along its normal."""
+        return thick if self.normal[0] else wide, wide, thick if self.normal[1] else wide
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Contact(Surface):
+    """One corner of the block and one surface that it can touch."""
+
+    corner: Point  # from the mass's centre, in the block's own frame, m
 
     def arm(self, cos: Any, sin: Any) -> Arm:
         """From the mass's centre to the corner of the block turned by theta, given its cosine and
@@ -64,31 +81,51 @@ def acceleration_of(
     )
 
 
+def surfaces_of(scene: Scene) -> tuple[Surface, ...]:
+    """The floor and the walls of a scene; the walls are smooth."""
+    floor, b = scene.floor, scene.block.half_width
+    return (
+        Surface(
+            surface="floor",
+            normal=(0.0, 1.0),
+            distance=0.0,
+            friction=floor.friction,
+            restitution=floor.restitution,
+        ),
+        *(
+            Surface(
+                surface=wall.side,
+                normal=(1.0 if wall.side == "left" else -1.0, 0.0),
+                distance=b + wall.gap,
+                friction=0.0,
+                restitution=wall.restitution,
+            )
+            for wall in scene.walls
+        ),
+    )
+
+
 def contacts_of(scene: Scene) -> tuple[Contact, ...]:
     """The contacts a scene can use: its lower corners on the floor and, where there is a wall, the
     corners of that side."""
     b, h = scene.block.half_width, scene.block.half_height
     dx, dz = scene.block.offset
-    found = [
+    return tuple(
         Contact(
-            surface="floor",
-            corner=(bx - dx, -h - dz),
-            normal=(0.0, 1.0),
-            distance=0.0,
-            restitution=scene.floor.restitution,
+            surface=face.surface,
+            corner=(bx - dx, bz - dz),
+            normal=face.normal,
+            distance=face.distance,
+            friction=face.friction,
+            restitution=face.restitution,
         )
+        for face in surfaces_of(scene)
         for bx in (-b, b)
-    ]
-    for wall in scene.walls:
-        inward = 1.0 if wall.side == "left" else -1.0
-        found += [
-            Contact(
-                surface=wall.side,
-                corner=(-inward * b - dx, bz - dz),
-                normal=(inward, 0.0),
-                distance=b + wall.gap,
-                restitution=wall.restitution,
-            )
-            for bz in (-h, h)
-        ]
-    return tuple(found)
+        for bz in (-h, h)
+        if bx * face.normal[0] + bz * face.normal[1] < 0.0
+    )
+
+
+def corners_of(scene: Scene) -> list[Point]:
+    """The corners that can touch something, from the mass's centre, m."""
+    return list(dict.fromkeys(contact.corner for contact in contacts_of(scene)))

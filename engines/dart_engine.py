@@ -8,7 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.engines.contacts import Surface, surfaces_of
 from rockcheck.engines.engine import Engine
+from rockcheck.engines.steps import AdaptiveStep
 from rockcheck.engines.world import State, World
 from rockcheck.scenes import Scene
 
@@ -34,7 +36,7 @@ class Dart(Engine):
     def rigid_world(self, scene: Scene) -> World:
         """The scene as DART holds it, in units in which even slow contacts bounce."""
         scale = NATURAL_SPEED / math.sqrt(scene.gravity * scene.block.radius)
-        return _RigidDartWorld(scene, scale, iterative=self.time_step == "adaptive")
+        return _RigidDartWorld(scene, scale, iterative=isinstance(self.steps, AdaptiveStep))
 
     def stock_world(self, scene: Scene) -> World:
         """The scene as DART holds it: a box among boxes."""
@@ -60,63 +62,34 @@ class _DartWorld(World):
         body.setInertia(dartpy.dynamics.Inertia(1.0, np.zeros(3), inertia * np.eye(3)))
         # Restitutions of two bodies multiply, of frictions the smaller counts: the block's leave
         # those of floor and walls.
-        self.contact = self._box(
-            body,
-            (2.0 * b, 2.0 * b, 2.0 * h),
-            scene.floor.friction,
-            1.0,
-            scale * np.array(scene.block.offset),
-        )
+        size = (2.0 * b, 2.0 * b, 2.0 * h)
+        self.contact = self._box(body, size, scene.floor.friction, 1.0)
+        if not scene.block.homogeneous:
+            dx, dz = scale * np.array(scene.block.offset)
+            body.getShapeNode(0).setRelativeTranslation([-dx, 0.0, -dz])
         self.world.addSkeleton(self.block)
-        self._slab("floor", (0.0, 1.0), 0.0, scene.floor.friction, scene.floor.restitution, scale)
-        for wall in scene.walls:
-            inward = 1.0 if wall.side == "left" else -1.0
-            self._slab(
-                wall.side,
-                (inward, 0.0),
-                scene.block.half_width + wall.gap,
-                0.0,
-                wall.restitution,
-                scale,
-            )
+        for surface in surfaces_of(scene):
+            self._slab(surface, scale)
 
-    def _box(
-        self,
-        body: Any,
-        size: tuple[float, float, float],
-        friction: float,
-        restitution: float,
-        offset: FloatArray | None = None,
-    ) -> Any:
-        """A box as a body's shape, by `offset` behind the mass's centre; returns what holds its
-        friction and restitution."""
+    def _box(self, body: Any, size: Any, friction: float, restitution: float) -> Any:
+        """A box as a body's shape; returns what holds its friction and restitution."""
         node = body.createShapeNode(self.dart.dynamics.BoxShape(size))
-        if offset is not None and offset.any():
-            node.setRelativeTranslation([-offset[0], 0.0, -offset[1]])
         node.createCollisionAspect()
         contact = node.createDynamicsAspect()
         contact.setFrictionCoeff(friction)
         contact.setRestitutionCoeff(restitution)
         return contact
 
-    def _slab(
-        self,
-        name: str,
-        normal: tuple[float, float],
-        distance: float,
-        friction: float,
-        restitution: float,
-        scale: float,
-    ) -> None:
-        """A thick box whose face looks along the normal."""
-        slab = self.dart.dynamics.Skeleton(name)
+    def _slab(self, surface: Surface, scale: float) -> None:
+        """A thick box behind a surface."""
+        slab = self.dart.dynamics.Skeleton(surface.surface)
         joint, body = slab.createWeldJointAndBodyNodePair()
-        (nx, nz), depth = normal, distance + SLAB
+        x, z = surface.behind(SLAB)
         place = self.dart.math.Isometry3()
-        place.set_translation([-scale * nx * depth, 0.0, -scale * nz * depth])
+        place.set_translation([scale * x, 0.0, scale * z])
         joint.setTransformFromParentBodyNode(place)
-        thick, wide = 2.0 * scale * SLAB, 2.0 * scale * REACH
-        self._box(body, (thick if nx else wide, wide, thick if nz else wide), friction, restitution)
+        size = surface.extent(2.0 * scale * SLAB, 2.0 * scale * REACH)
+        self._box(body, size, surface.friction, surface.restitution)
         self.world.addSkeleton(slab)
 
     def place(self, state: FloatArray | State) -> None:

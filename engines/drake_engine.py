@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.engines.contacts import contacts_of
+from rockcheck.engines.contacts import corners_of, surfaces_of
 from rockcheck.engines.engine import Engine
 from rockcheck.engines.world import State, World
 from rockcheck.scenes import Floor, ModelFailure, Scene, kinematics
@@ -149,23 +149,18 @@ class _DrakeWorld(World):
         from pydrake.math import RigidTransform
         from pydrake.multibody.plant import CoulombFriction
 
-        b, h, mu = (
-            self.scene.block.half_width,
-            self.scene.block.half_height,
-            self.scene.floor.friction,
-        )
-        rough, smooth = CoulombFriction(mu, mu), CoulombFriction(0.0, 0.0)
+        b, h = self.scene.block.half_width, self.scene.block.half_height
         add, world = self.plant.RegisterCollisionGeometry, self.plant.world_body()
-        dx, dz = self.scene.block.offset
-        add(body, RigidTransform([-dx, 0.0, -dz]), Box(2.0 * b, 2.0 * b, 2.0 * h), "box", rough)
-        logging.getLogger("drake").setLevel(
-            logging.ERROR
-        )  # it would warn that half-spaces do not meet deformable bodies
-        add(world, HalfSpace.MakePose([0.0, 0.0, 1.0], np.zeros(3)), HalfSpace(), "floor", rough)
-        for wall in self.scene.walls:
-            inward = 1.0 if wall.side == "left" else -1.0
-            place = HalfSpace.MakePose([inward, 0.0, 0.0], [-inward * (b + wall.gap), 0.0, 0.0])
-            add(world, place, HalfSpace(), wall.side, smooth)
+        (dx, dz), mu = self.scene.block.offset, self.scene.floor.friction
+        box, place = Box(2.0 * b, 2.0 * b, 2.0 * h), RigidTransform([-dx, 0.0, -dz])
+        add(body, place, box, "box", CoulombFriction(mu, mu))
+        # It would warn that half-spaces do not meet deformable bodies.
+        logging.getLogger("drake").setLevel(logging.ERROR)
+        for surface in surfaces_of(self.scene):
+            (nx, nz), (x, z), rough = surface.normal, surface.behind(0.0), surface.friction
+            place = HalfSpace.MakePose([nx, 0.0, nz], [x, 0.0, z])
+            friction = CoulombFriction(rough, rough)
+            add(world, place, HalfSpace(), surface.surface, friction)
 
 
 class _RigidDrakeWorld(_DrakeWorld):
@@ -222,18 +217,11 @@ class _RigidDrakeWorld(_DrakeWorld):
             return properties
 
         add, world = plant.RegisterCollisionGeometry, plant.world_body()
-        for n, (bx, bz) in enumerate(
-            dict.fromkeys(contact.corner for contact in contacts_of(scene))
-        ):
-            add(
-                body,
-                RigidTransform([bx, 0.0, bz]),
-                Sphere(CORNER_RADIUS),
-                f"corner {n}",
-                material(scene.floor.friction),
-            )
-        for name, contact in {contact.surface: contact for contact in contacts_of(scene)}.items():
-            (nx, nz), depth = contact.normal, contact.distance + CORNER_RADIUS + 0.5 * SLAB
-            box = Box(SLAB if nx else REACH, REACH, SLAB if nz else REACH)
-            mu = scene.floor.friction if name == "floor" else 0.0
-            add(world, RigidTransform([-nx * depth, 0.0, -nz * depth]), box, name, material(mu))
+        rough = material(scene.floor.friction)
+        for n, (bx, bz) in enumerate(corners_of(scene)):
+            place = RigidTransform([bx, 0.0, bz])
+            add(body, place, Sphere(CORNER_RADIUS), f"corner {n}", rough)
+        for surface in surfaces_of(scene):
+            x, z = surface.behind(CORNER_RADIUS + 0.5 * SLAB)
+            box, place = Box(*surface.extent(SLAB, REACH)), RigidTransform([x, 0.0, z])
+            add(world, place, box, surface.surface, material(surface.friction))

@@ -6,20 +6,18 @@ from __future__ import annotations
 import math
 import time
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
-from contextlib import ExitStack
-from functools import partial
+from collections.abc import Mapping
+from contextlib import closing
 from importlib.util import find_spec
 from typing import Any, ClassVar, Literal, Self
 
-import numpy as np
 from pydantic import field_validator, model_validator
 
-from rockcheck.engines.adaptive import march_adaptively
 from rockcheck.engines.base_motion import BaseMotion
 from rockcheck.engines.contacts import contacts_of
 from rockcheck.engines.events import events_of
-from rockcheck.engines.marching import Marched, at_output_times, in_units_of, march_fixed
+from rockcheck.engines.marching import at_output_times, in_units_of
+from rockcheck.engines.steps import AdaptiveStep, FixedStep
 from rockcheck.engines.world import World
 from rockcheck.scenes import Cost, Floor, History, InputError, Scene, kinematics
 from rockcheck.scenes.base import Frozen, Positive
@@ -36,7 +34,8 @@ class Engine(Frozen):
 
     `time_step` in s, or "adaptive": then steps end at the events and are at most `largest_step` s
     long. Those at impacts and just after events are `short_steps` times their usual length. Where
-    no step is given it is "adaptive", or `STOCK_STEP` where the engine cannot vary its steps.
+    no step is given it is "adaptive", or `STOCK_STEP` where the engine cannot vary its steps. A
+    `FixedStep` or `AdaptiveStep` says all three at once.
 
     `settings` "best" is the set-up that converges to rigid contact with Coulomb friction and
     Newton's restitution; "default" is the engine as it comes, a box on a floor with the engine's
@@ -59,10 +58,13 @@ class Engine(Frozen):
 
     @model_validator(mode="before")
     @classmethod
-    def _stock_step(cls, given: Any) -> Any:
-        if isinstance(given, dict) and (cls.fixed_because or given.get("settings") == "default"):
-            return {"time_step": STOCK_STEP, **given}
-        return given
+    def _steps_given(cls, given: Any) -> Any:
+        if not isinstance(given, dict):
+            return given
+        if isinstance(step := given.get("time_step"), FixedStep | AdaptiveStep):
+            given = {**given, **step.settings()}
+        fixed = cls.fixed_because or given.get("settings") == "default"
+        return {"time_step": STOCK_STEP, **given} if fixed else given
 
     @field_validator("time_step", mode="plain")
     @classmethod
@@ -79,15 +81,20 @@ class Engine(Frozen):
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
-        if self.settings == "default" and self.time_step == "adaptive":
-            raise InputError(
-                '"adaptive" is not allowed with settings = "default": give a step in s', "time_step"
-            )
-        if self.fixed_because and self.time_step == "adaptive":
-            raise InputError(
-                f'"adaptive" is not allowed: {self.fixed_because}; give a step in s', "time_step"
-            )
+        stock = self.settings == "default"
+        if isinstance(self.steps, AdaptiveStep) and (stock or self.fixed_because):
+            why = ' with settings = "default"' if stock else f": {self.fixed_because}"
+            separator = ":" if stock else ";"
+            reason = f'"adaptive" is not allowed{why}{separator} give a step in s'
+            raise InputError(reason, "time_step")
         return self
+
+    @property
+    def steps(self) -> FixedStep | AdaptiveStep:
+        """How its steps follow each other."""
+        if self.time_step == "adaptive":
+            return AdaptiveStep(self.largest_step, self.short_steps)
+        return FixedStep(self.time_step)
 
     @classmethod
     def installed(cls) -> bool:
@@ -97,8 +104,8 @@ class Engine(Frozen):
     def coarser(self, factor: float) -> Self:
         """The same engine with all steps `factor` times as long; of adaptive ones those at the
         events, too."""
-        knobs = ("largest_step", "short_steps") if self.time_step == "adaptive" else ("time_step",)
-        return self.model_copy(update={knob: factor * getattr(self, knob) for knob in knobs})
+        longer = {knob: factor * getattr(self, knob) for knob in self.steps.knobs}
+        return self.model_copy(update=longer)
 
     @abstractmethod
     def rigid_world(self, scene: Scene) -> World:
@@ -152,29 +159,20 @@ class Engine(Frozen):
                 f"the engine {self.name} is not installed: pip install {self.package}", self.name
             )
         check_kind(scene, Scene, "load_scene", "scene")
-        step = self.largest_step if self.time_step == "adaptive" else self.time_step
-        if scene.duration / step > MOST_STEPS:
-            key = "largest_step" if self.time_step == "adaptive" else "time_step"
+        steps = self.steps
+        if scene.duration / steps.largest > MOST_STEPS:
             raise InputError(
-                f"{step:g} is not allowed: {scene.duration:g} s would need more than {MOST_STEPS}"
-                " steps",
-                key,
+                f"{steps.largest:g} is not allowed: {scene.duration:g} s would need more than"
+                f" {MOST_STEPS} steps",
+                steps.knobs[0],
             )
         start = time.perf_counter()
-        unit = scene.block.radius if self.settings == "best" else 1.0  # of length, m
+        best = self.settings == "best"
+        unit = scene.block.radius if best else 1.0  # of length, m
         played = in_units_of(unit, scene)
         base = BaseMotion(played)
-        march: Callable[[], Marched]
-        with ExitStack() as stack:
-            world = (
-                self.rigid_world(played) if self.settings == "best" else self.stock_world(played)
-            )
-            stack.callback(world.close)
-            if self.time_step == "adaptive":
-                march = partial(march_adaptively, played, base, world.push, step, self.short_steps)
-            else:
-                times = step * np.arange(math.ceil(scene.output_times[-1] / step - 1e-9) + 1)
-                march = partial(march_fixed, world, played, times, base.felt_acceleration(times))
+        with closing(self.rigid_world(played) if best else self.stock_world(played)) as world:
+            march = steps.ready(world, played, base)
             begin, begin_cpu = time.perf_counter(), time.process_time()
             times, states, felt = march()
             cost = Cost(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.engines.adaptive import Vector
-from rockcheck.engines.contacts import Contact, contacts_of
+from rockcheck.engines.contacts import Contact, Surface, contacts_of, corners_of, surfaces_of
 from rockcheck.engines.engine import Engine
 from rockcheck.engines.world import State, World
 from rockcheck.scenes import ModelFailure, Scene
@@ -246,51 +246,40 @@ def _model(world: str, settings: str = "") -> str:
     return f'<mujoco><option gravity="0 0 0"/>{settings}<worldbody>{world}</worldbody></mujoco>'
 
 
-def _plane(name: str, scene: Scene, inset: float, attributes: str) -> str:
+def _kind(friction: float) -> str:
+    """The attributes of a pair with that friction."""
+    return f'condim="3" friction="{friction!r} {friction!r} 0 0 0"' if friction else 'condim="1"'
+
+
+def _plane(surface: Surface, inset: float, attributes: str) -> str:
     """The floor, or a wall `inset` m behind its surface.
 
     The floor stays where it is and the block is raised instead: a plane nearer to the origin than
     1e-6 m MuJoCo takes to be in it.
     """
-    if name == "floor":
-        return f'<geom name="floor" type="plane" size="0 0 1" {attributes}/>'
-    wall = next(wall for wall in scene.walls if wall.side == name)
-    inward = 1.0 if name == "left" else -1.0
-    place = -inward * (scene.block.half_width + wall.gap + inset)
-    return (
-        f'<geom name="{name}" type="plane" size="0 0 1" pos="{place!r} 0 0"'
-        f' zaxis="{inward!r} 0 0" {attributes}/>'
-    )
+    place = "" if surface.surface == "floor" else f'pos="{surface.behind(inset)[0]!r} 0 0" '
+    (nx, nz), name = surface.normal, surface.surface
+    axis = f'zaxis="{nx!r} 0 {nz!r}"'
+    return f'<geom name="{name}" type="plane" size="0 0 1" {place}{axis} {attributes}/>'
 
 
 def _point_contact_model(scene: Scene) -> str:
     """Corners as tiny spheres, and one contact pair for each contact that the scene can use, in
     their order."""
     off = 'contype="0" conaffinity="0"'
-    contacts = contacts_of(scene)
-    corners = {
-        corner: f"corner {number}"
-        for number, corner in enumerate(dict.fromkeys(contact.corner for contact in contacts))
-    }
+    corners = {corner: f"corner {number}" for number, corner in enumerate(corners_of(scene))}
     spheres = "".join(
         f'<geom name="{name}" type="sphere" size="{CORNER_RADIUS!r}" pos="{bx!r} 0 {bz!r}" {off}/>'
         for (bx, bz), name in corners.items()
     )
-    planes = "".join(
-        _plane(name, scene, CORNER_RADIUS, off)
-        for name in dict.fromkeys(contact.surface for contact in contacts)
-    )
+    planes = "".join(_plane(surface, CORNER_RADIUS, off) for surface in surfaces_of(scene))
     impedance = " ".join(map(repr, IMPEDANCE))
-    # A frictionless floor is a frictionless contact: MuJoCo would raise a coefficient of zero to
+    # A frictionless surface is a frictionless contact: MuJoCo would raise a coefficient of zero to
     # 1e-5.
-    mu = scene.floor.friction
-    kinds = dict.fromkeys(("floor", "left", "right"), 'condim="1"')
-    if mu > 0.0:
-        kinds["floor"] = f'condim="3" friction="{mu!r} {mu!r} 0 0 0"'
     pairs = "".join(
         f'<pair geom1="{contact.surface}" geom2="{corners[contact.corner]}"'
-        f' solimp="{impedance}" {kinds[contact.surface]}/>'
-        for contact in contacts
+        f' solimp="{impedance}" {_kind(contact.friction)}/>'
+        for contact in contacts_of(scene)
     )
     # Without warm start Newton's method needs fewer iterations, and it does not get stuck on the
     # edge of a stiff cone. The 50 iterations of a line search that MuJoCo allows are too few there:
@@ -307,8 +296,14 @@ def _stock_model(scene: Scene, mu: float, settings: str = "") -> str:
     """A box on a plane, beside planes; without `settings` with MuJoCo's default contact parameters,
     solver and cone."""
     block = scene.block
-    planes = _plane("floor", scene, 0.0, f'condim="3" friction="{mu!r} 0 0"')
-    planes += "".join(_plane(wall.side, scene, 0.0, 'condim="1"') for wall in scene.walls)
+    planes = "".join(
+        _plane(
+            surface,
+            0.0,
+            f'condim="3" friction="{mu!r} 0 0"' if surface.surface == "floor" else 'condim="1"',
+        )
+        for surface in surfaces_of(scene)
+    )
     (dx, dz), size = (
         block.offset,
         f"{block.half_width!r} {block.half_width!r} {block.half_height!r}",

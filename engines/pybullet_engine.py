@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.engines.adaptive import Vector
-from rockcheck.engines.contacts import contacts_of
+from rockcheck.engines.contacts import Surface, contacts_of, corners_of, surfaces_of
 from rockcheck.engines.engine import Engine
 from rockcheck.engines.world import State, World
 from rockcheck.scenes import Scene
@@ -73,12 +73,12 @@ class _PyBulletWorld(World):
         self.dt = 0.0
         # A step in the air, in which Bullet takes notice of an inertia that was changed.
         pybullet.stepSimulation(**self.options)
-        self._make_surface(0.0, 1.0, 0.0, scene.floor.friction, scene.floor.restitution)
-        for wall in scene.walls:
-            inward = 1.0 if wall.side == "left" else -1.0
-            self._make_surface(
-                inward, 0.0, scene.block.half_width + wall.gap, 0.0, wall.restitution
-            )
+        for surface in surfaces_of(scene):
+            shape, depth = self.make_shape(surface)
+            x, z = surface.behind(depth)
+            body = pybullet.createMultiBody(0.0, shape, basePosition=[x, 0.0, z], **self.options)
+            contact = {"lateralFriction": surface.friction, "restitution": surface.restitution}
+            pybullet.changeDynamics(body, -1, **contact, **self.options)
 
     def make_block(self, scene: Scene) -> int:
         """A box. Friction and restitution of two bodies multiply: the block's are 1, so that those
@@ -100,25 +100,10 @@ class _PyBulletWorld(World):
             )
         return body
 
-    def _make_surface(
-        self, normal_x: float, normal_z: float, distance: float, friction: float, restitution: float
-    ) -> None:
-        """The floor, or a wall, `distance` m from the point below the block."""
-        shape, depth = self.make_shape(normal_x, normal_z)
-        depth += distance
-        body = self.bullet.createMultiBody(
-            0.0, shape, basePosition=[-normal_x * depth, 0.0, -normal_z * depth], **self.options
-        )
-        self.bullet.changeDynamics(
-            body, -1, lateralFriction=friction, restitution=restitution, **self.options
-        )
-
-    def make_shape(self, normal_x: float, normal_z: float) -> tuple[int, float]:
-        """A thick box whose face looks along the normal, and how far behind that its centre is,
-        m."""
-        extent = [SLAB if normal_x else REACH, REACH, SLAB if normal_z else REACH]
+    def make_shape(self, surface: Surface) -> tuple[int, float]:
+        """A thick box whose face is the surface, and how far behind that its centre is, m."""
         return self.bullet.createCollisionShape(
-            self.bullet.GEOM_BOX, halfExtents=extent, **self.options
+            self.bullet.GEOM_BOX, halfExtents=surface.extent(SLAB, REACH), **self.options
         ), SLAB
 
     def place(self, state: FloatArray | State) -> None:
@@ -146,16 +131,10 @@ class _PyBulletWorld(World):
         (x, _, z), (_, turn, _, whole) = self.bullet.getBasePositionAndOrientation(
             self.body, physicsClientId=self.client
         )
-        (vx, _, vz), (_, w, _) = self.bullet.getBaseVelocity(self.body, physicsClientId=self.client)
-        return x, z, -2.0 * math.atan2(turn, whole), vx, vz, -w
+        return x, z, -2.0 * math.atan2(turn, whole), *self.velocity()
 
-    def push(
-        self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool
-    ) -> Vector:
-        """Velocity after `dt` s with the contacts closed at `pose`."""
-        self.bounce(bouncing)
-        self.place((*pose, *velocity))
-        self.step(felt, dt)
+    def velocity(self) -> Vector:
+        """How fast the block is."""
         (vx, _, vz), (_, w, _) = self.bullet.getBaseVelocity(self.body, physicsClientId=self.client)
         return vx, vz, -w
 
@@ -189,10 +168,7 @@ class _RigidPyBulletWorld(_PyBulletWorld):
     def make_block(self, scene: Scene) -> int:
         """The block as tiny spheres at its corners; a huge inertia about the other axes keeps it in
         its plane."""
-        places = [
-            [bx, 0.0, bz]
-            for bx, bz in dict.fromkeys(contact.corner for contact in contacts_of(scene))
-        ]
+        places = [[bx, 0.0, bz] for bx, bz in corners_of(scene)]
         shape = self.bullet.createCollisionShapeArray(
             shapeTypes=[self.bullet.GEOM_SPHERE] * len(places),
             radii=[CORNER_RADIUS] * len(places),
@@ -219,9 +195,9 @@ class _RigidPyBulletWorld(_PyBulletWorld):
         )
         return body
 
-    def make_shape(self, normal_x: float, normal_z: float) -> tuple[int, float]:
+    def make_shape(self, surface: Surface) -> tuple[int, float]:
         """A plane, behind the surface by the radius of the corners."""
-        normal = [normal_x, 0.0, normal_z]
+        normal = [surface.normal[0], 0.0, surface.normal[1]]
         return self.bullet.createCollisionShape(
             self.bullet.GEOM_PLANE, planeNormal=normal, **self.options
         ), CORNER_RADIUS

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.engines.adaptive import Vector
+from rockcheck.engines.contacts import surfaces_of
 from rockcheck.engines.engine import Engine
 from rockcheck.engines.world import State, World
 from rockcheck.scenes import Scene
@@ -56,16 +57,12 @@ class _PymunkWorld(World):
         )
         self.box.friction = self.box.elasticity = 1.0
         self.space.add(self.body, self.box)
-        surfaces = [
-            ((-REACH, -slab), (REACH, -slab), scene.floor.friction, scene.floor.restitution)
-        ]
-        for wall in scene.walls:
-            place = (b + wall.gap + slab) * (-1.0 if wall.side == "left" else 1.0)
-            surfaces.append(((place, -REACH), (place, REACH), 0.0, wall.restitution))
-        for start, end, friction, restitution in surfaces:
-            surface = pymunk.Segment(self.space.static_body, start, end, slab)
-            surface.friction, surface.elasticity = friction, restitution
-            self.space.add(surface)
+        for surface in surfaces_of(scene):
+            (x, z), (nx, nz) = surface.behind(slab), surface.normal
+            ends = [(x + way * REACH * nz, z + way * REACH * abs(nx)) for way in (-1.0, 1.0)]
+            segment = pymunk.Segment(self.space.static_body, *ends, slab)
+            segment.friction, segment.elasticity = surface.friction, surface.restitution
+            self.space.add(segment)
 
     def place(self, state: FloatArray | State) -> None:
         """Put the block where `state` says."""

@@ -21,6 +21,7 @@ from rockcheck.scenes.compiled import inner_kernel, kernel
 
 Floats = NDArray[np.float64]
 Base = tuple[Floats, float, float]
+Velocity = tuple[float, float, float]  # along x, y and theta
 
 # Lengths in units of the block's radius R, times in units of 1/p.
 CLOSED = 5e-9  # a corner nearer than this touches
@@ -70,6 +71,17 @@ class Limits(NamedTuple):
     staying: float
     gravity: float
     standing: float
+
+
+class Course(NamedTuple):
+    """What a run is given: contacts, times at which the base may set a resting block in motion, the
+    base motion to the right and up, and when it ends, s."""
+
+    corners: Floats
+    starts: Floats
+    across: Base
+    up: Base
+    end: float
 
 
 class March(NamedTuple):
@@ -125,6 +137,21 @@ _arm_of, _gap_of, _acceleration_of = (
 
 
 @inner_kernel
+def seen(corner: Floats, z: Floats, cos: float, sin: float) -> tuple[Any, float, float]:
+    """Arm, gap and rate of a contact."""
+    bx, bz, nx, nz, distance = corner
+    arm = _arm_of(bx, bz, cos, sin)
+    gap = _gap_of(nx, nz, distance, z[X], z[Y], arm)
+    return arm, gap, _rate_of(nx, nz, z[VX], z[VY], z[W], arm)
+
+
+@inner_kernel
+def pulled(corner: Floats, z: Floats, arm: Any) -> float:
+    """The acceleration of a contact's gap."""
+    return _acceleration_of(corner[2], corner[3], z[AX], z[AY], z[SPIN], z[W], arm)
+
+
+@inner_kernel
 def trusted(predicted: float, limits: Limits) -> float:
     """How much of the predicted time to an event one step may take, s."""
     return 0.95 * predicted if predicted > limits.long_approach else predicted
@@ -164,15 +191,10 @@ def length(run: March, corners: Floats, limits: Limits, dt: float) -> tuple[floa
     stops, slowest = False, math.inf
     cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
     for i in range(len(corners)):
-        bx, bz, nx, nz, distance = corners[i]
-        arm = _arm_of(bx, bz, cos, sin)
-        gap, rate = (
-            _gap_of(nx, nz, distance, z[X], z[Y], arm),
-            _rate_of(nx, nz, z[VX], z[VY], z[W], arm),
-        )
+        arm, gap, rate = seen(corners[i], z, cos, sin)
         run.closed[i] = not (gap > limits.closed or rate > leaving)
         if not run.closed[i]:
-            curvature = _acceleration_of(nx, nz, z[AX], z[AY], z[SPIN], z[W], arm) if known else 0.0
+            curvature = pulled(corners[i], z, arm) if known else 0.0
             closing = time_to_close(gap, rate, curvature)
             if closing < dt:
                 dt, stops = max(trusted(closing, limits), limits.shortest), False
@@ -200,12 +222,7 @@ def join(run: March, corners: Floats, limits: Limits, speed: float) -> None:
     z = run.state
     cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
     for i in range(len(corners)):
-        bx, bz, nx, nz, distance = corners[i]
-        arm = _arm_of(bx, bz, cos, sin)
-        gap, rate = (
-            _gap_of(nx, nz, distance, z[X], z[Y], arm),
-            _rate_of(nx, nz, z[VX], z[VY], z[W], arm),
-        )
+        _, gap, rate = seen(corners[i], z, cos, sin)
         run.closed[i] = run.closed[i] or (
             rate < -speed and gap < limits.closed * min(-rate / speed, TOGETHER)
         )
@@ -268,50 +285,34 @@ def smooth(run: March) -> tuple[float, float, float, bool]:
 
 
 @kernel
-def plan(
-    run: March, corners: Floats, starts: Floats, across: Base, up: Base, limits: Limits, end: float
-) -> int:
-    """Asks for the next step; returns OVER at the `end` or where the block lies, else GOES_ON."""
-    z = run.state
-    if not (z[T] < end - 1e-12 and abs(z[THETA]) < math.pi / 2):
+def plan(run: March, course: Course, limits: Limits) -> int:
+    """Asks for the next step; returns OVER at the end or where the block lies, else GOES_ON."""
+    z, starts, left = run.state, course.starts, course.end - run.state[T]
+    if not (z[T] < course.end - 1e-12 and abs(z[THETA]) < math.pi / 2):
         return OVER
     while starts[run.next_start[0]] <= z[T] + 1e-9:
         run.next_start[0] += 1
-    dt, impact = length(run, corners, limits, min(end - z[T], starts[run.next_start[0]] - z[T]))
+    dt, impact = length(run, course.corners, limits, min(left, starts[run.next_start[0]] - z[T]))
     z[T] += dt
-    base_x, base_y = (
-        _velocity_at(z[T], across[0], across[1], across[2]),
-        _velocity_at(z[T], up[0], up[1], up[2]),
-    )
+    base_x = _velocity_at(z[T], *course.across)
+    base_y = _velocity_at(z[T], *course.up)
     run.asked[DT], run.asked[IMPACT] = dt, impact
     run.asked[FELT_X], run.asked[FELT_Y] = (
         (z[BASE_X] - base_x) / dt,
         (z[BASE_Y] - base_y) / dt - limits.gravity,
     )
     z[BASE_X], z[BASE_Y] = base_x, base_y
-    drift(run, corners, dt)
+    drift(run, course.corners, dt)
     return GOES_ON
 
 
 @kernel
-def step(
-    run: March,
-    corners: Floats,
-    starts: Floats,
-    across: Base,
-    up: Base,
-    limits: Limits,
-    end: float,
-    kicked_x: float,
-    kicked_y: float,
-    kicked_w: float,
-    row: Floats,
-) -> int:
-    """Ends the step with the velocity that the engine gave, writes its `row`, and plans the next
-    one; LOST where it has blown up."""
-    z, dt = run.state, run.asked[DT]
+def step(run: March, course: Course, limits: Limits, kicked: Velocity, row: Floats) -> int:
+    """Ends the step with the velocity `kicked` that the engine gave, writes its `row`, and plans
+    the next one; LOST where it has blown up."""
+    z, dt, corners = run.state, run.asked[DT], course.corners
     known = z[KNOWN] != 0.0
-    move(run, kicked_x - run.carry[0], kicked_y - run.carry[1], kicked_w, dt)
+    move(run, kicked[0] - run.carry[0], kicked[1] - run.carry[1], kicked[2], dt)
     put_back(run, corners, limits)
     if not known and (run.closed[0] or run.closed[1]) and settles(z, corners, limits):
         z[Y], z[THETA], z[VY], z[W] = limits.standing, 0.0, 0.0, 0.0
@@ -323,7 +324,7 @@ def step(
         row[1 + i] = z[i]
     if not math.sqrt(z[VX] * z[VX] + z[VY] * z[VY] + z[W] * z[W]) < 1e6:  # nan, too
         return LOST
-    return plan(run, corners, starts, across, up, limits, end)
+    return plan(run, course, limits)
 
 
 @inner_kernel
@@ -356,11 +357,9 @@ def put_back(run: March, corners: Floats, limits: Limits) -> None:
             if run.closed[i]:
                 count, last = count + 1, i
         if count == 1:
-            bx, bz, nx, nz, distance = corners[last]
-            arm = _arm_of(bx, bz, cos, sin)
-            if abs(_rate_of(nx, nz, z[VX], z[VY], z[W], arm)) < limits.resting:
-                gap = _gap_of(nx, nz, distance, z[X], z[Y], arm)
-                z[X], z[Y] = z[X] - nx * gap, z[Y] - nz * gap
+            _, gap, rate = seen(corners[last], z, cos, sin)
+            if abs(rate) < limits.resting:
+                z[X], z[Y] = z[X] - corners[last, 2] * gap, z[Y] - corners[last, 3] * gap
 
 
 @inner_kernel
@@ -369,11 +368,8 @@ def settles(z: Floats, corners: Floats, limits: Limits) -> bool:
     once."""
     cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
     for i in range(FLOOR):
-        bx, bz, nx, nz, distance = corners[i]
-        arm = _arm_of(bx, bz, cos, sin)
-        rate = _rate_of(nx, nz, z[VX], z[VY], z[W], arm)
-        pulled = _acceleration_of(nx, nz, z[AX], z[AY], z[SPIN], z[W], arm)
-        slow = abs(rate) <= max(SETTLING_GAP, -SETTLING_TIME * limits.longest * pulled)
-        if _gap_of(nx, nz, distance, z[X], z[Y], arm) > SETTLING_GAP or not slow:
+        arm, gap, rate = seen(corners[i], z, cos, sin)
+        back = -SETTLING_TIME * limits.longest * pulled(corners[i], z, arm)
+        if gap > SETTLING_GAP or not abs(rate) <= max(SETTLING_GAP, back):
             return False
     return True

@@ -33,6 +33,10 @@ class World(ABC):
     def state(self) -> State:
         """Where the block is."""
 
+    def velocity(self) -> Vector:
+        """How fast the block is."""
+        return self.state()[3:]
+
     def march(self, felt: FloatArray, dt: float) -> FloatArray:
         """States (n, 6) after each of n steps of `dt` s, with the `felt` accelerations (n, 2)."""
         states = np.empty((len(felt), 6))
@@ -51,7 +55,7 @@ class World(ABC):
         self.bounce(bouncing)
         self.place((*pose, *velocity))
         self.step(felt, dt)
-        return self.state()[3:]
+        return self.velocity()
 
     def close(self) -> None:  # noqa: B027 - most engines hold nothing
         """Give back what the engine holds."""

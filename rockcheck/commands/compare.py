@@ -21,9 +21,8 @@ from rockcheck.commands import (
 from rockcheck.scenes import load_scene
 from rockcheck.validation.discrepancy.compare import Discrepancy, compare
 from rockcheck.validation.discrepancy.figures import value_words
-from rockcheck.validation.discrepancy.measured import read_measured
+from rockcheck.validation.discrepancy.measured import read_measured, shifted, time_shift
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
-from rockcheck.validation.discrepancy.repeats import shifted, time_shift
 from rockcheck.validation.suite.changes import Change, changes, judged_otherwise
 from rockcheck.validation.suite.results import Run
 

@@ -13,6 +13,7 @@ import pytest
 from rockcheck.ebm import EventBasedModel
 from rockcheck.engines import Drake, MuJoCo, PyBullet
 from rockcheck.engines.engine import Engine
+from rockcheck.engines.steps import AdaptiveStep, FixedStep
 from rockcheck.scenes import (
     Block,
     Floor,
@@ -102,6 +103,21 @@ def test_steps_are_adaptive_unless_something_else_is_asked_for(varying_engine):
     assert kind(time_step=1e-3).coarser(2.0).time_step == 2e-3
     with pytest.raises(InputError, match='"adaptive" is not allowed with settings = "default"'):
         kind(settings="default", time_step="adaptive")
+
+
+def test_a_step_controller_says_how_steps_follow_each_other(varying_engine, free_rocking):
+    fixed, adaptive = FixedStep(1e-3), AdaptiveStep(largest=2e-3, short=3.0)
+    assert varying_engine(time_step=fixed) == varying_engine(time_step=1e-3)
+    model = varying_engine(time_step=adaptive)
+    assert (model.largest_step, model.short_steps, model.steps) == (2e-3, 3.0, adaptive)
+    assert model.coarser(2.0).steps == AdaptiveStep(4e-3, 6.0)
+    named = varying_engine(time_step="adaptive", largest_step=2e-3, short_steps=3.0)
+    scene = free_rocking(0.5).replace(duration=0.5)
+    one, other = (each.simulate(scene) for each in (model, named))
+    assert one.settings == other.settings
+    np.testing.assert_array_equal(one.channels["theta"], other.channels["theta"])
+    with pytest.raises(InputError, match='"adaptive" is not allowed'):
+        varying_engine(time_step=adaptive, settings="default")
 
 
 @pytest.mark.slow

@@ -41,7 +41,7 @@ from rockcheck.scenes import (
 )
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
 from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.discrepancy.measures import Pair, theta_rms
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, Pair
 from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.suite.results import Cell, Check, Run
 
@@ -345,7 +345,7 @@ def test_the_running_rms_ends_at_the_measure(run_folder: Path) -> None:
     running, t = view.running_rms(bands[0]), view.t[view.t <= 8.0 + 1e-9]
     apart = view.differences("theta", "ebm-unilateral")["mujoco"][: len(t)]
     pair = Pair(view.histories["ebm-unilateral"], view.histories["mujoco"], view.scene, until=8.0)
-    assert running[-1] == pytest.approx(theta_rms(pair), rel=1e-12)
+    assert running[-1] == pytest.approx(DIFFERENCES["theta_rms"].evaluate(pair), rel=1e-12)
     assert running[400] == pytest.approx(
         np.sqrt(np.trapezoid(apart[:401] ** 2, t[:401]) / t[400]), rel=1e-12
     )

@@ -1,9 +1,10 @@
-"""Scenes with a known answer: how far a history is from it. Registered as figures whose perfect
-value is 0."""
+"""Scenes with a known answer: how far a history is from it. Figures whose perfect value is 0,
+computed where they are asked for. Adds them to the book of figures."""
 
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -11,57 +12,29 @@ from rockcheck.scenes import Scene
 from rockcheck.scenes.block import Pivot
 from rockcheck.validation.discrepancy.measures import (
     FIGURES,
-    Definition,
+    Measure,
     Unavailable,
     WindowedHistory,
-    register,
+    by_name,
 )
 
 
-def closed_form(label: str, unit: str) -> Definition:
-    """Register a function of a `WindowedHistory` as its distance from a closed form, computed where
-    it is asked for."""
-    return register(FIGURES, label, unit, ideal=0.0, on_request=True, exact=True)
-
-
-@closed_form("error of sliding distance", "m")
-def sliding_distance_error(motion: WindowedHistory) -> float:
-    """|x at the end - x at the start| - v0^2/(2 mu g): a block that slides flat to a stop on a base
-    at rest, m."""
-    scene = _scene(motion)
-    _need(
-        scene.initial_velocity != 0.0 and not scene.walls and scene.initial_rotation == 0.0,
-        "a block that starts sliding flat",
-    )
+def _sliding_distance(motion: WindowedHistory) -> float:
+    scene = _flat_start(motion, "a block that starts sliding flat", walls=0)
     x = motion.channel("x")
-    return abs(float(x[-1] - x[0])) - scene.initial_velocity**2 / (
-        2.0 * scene.floor.friction * scene.gravity
-    )
+    return abs(float(x[-1] - x[0])) - scene.initial_velocity**2 / _braking(scene)
 
 
-@closed_form("error of wall rebound", "m")
-def wall_rebound_error(motion: WindowedHistory) -> float:
-    """Place where a block that slides flat into a wall stops, less e^2 (v0^2 - 2 mu g gap)/(2 mu g)
-    from the wall, m.
-
-    Case III: it leaves the wall at e times the speed that friction has left it.
-    """
-    scene = _scene(motion)
-    _need(
-        len(scene.walls) == 1 and scene.initial_velocity != 0.0 and scene.initial_rotation == 0.0,
-        "a block that slides flat into a wall",
-    )
+def _wall_rebound(motion: WindowedHistory) -> float:
+    scene = _flat_start(motion, "a block that slides flat into a wall", walls=1)
     wall = scene.walls[0]
-    braking = 2.0 * scene.floor.friction * scene.gravity
-    speed2 = scene.initial_velocity**2 - braking * wall.gap
+    speed2 = scene.initial_velocity**2 - _braking(scene) * wall.gap
     _need(speed2 > 0.0, "a block that reaches the wall")
     from_wall = wall.gap - abs(float(motion.channel("x")[-1]))
-    return from_wall - wall.restitution**2 * speed2 / braking
+    return from_wall - wall.restitution**2 * speed2 / _braking(scene)
 
 
-@closed_form("error of bounce height", "m")
-def bounce_height_error(motion: WindowedHistory) -> float:
-    """Highest point after the first bounce, less e_g^2 h: a block that drops flat from h, m."""
+def _bounce_height(motion: WindowedHistory) -> float:
     scene = _scene(motion)
     height, e = scene.initial_height, scene.floor.restitution
     _need(height > 0.0 and scene.initial_rotation == 0.0, "a block that drops flat")
@@ -73,36 +46,22 @@ def bounce_height_error(motion: WindowedHistory) -> float:
     return float(np.max(hop)) - e**2 * height
 
 
-@closed_form("error of quarter period", "s")
-def quarter_period_error(motion: WindowedHistory) -> float:
-    """Time of the first floor impact, less Housner's quarter period: a block released at theta_0
-    that does not slip, s.
-
-    T/4 = int_0^theta_0 d theta / sqrt(2 p^2 [cos(alpha - theta_0) - cos(alpha - theta)]), without
-    his small angles, with p and alpha of the pivot on the side to which it is tilted.
-    """
+def _quarter_period(motion: WindowedHistory) -> float:
     from scipy.integrate import quad
 
     scene = _scene(motion)
     pivot = _released(motion)[0]
-    tilt, alpha, p = (
-        abs(scene.initial_rotation),
-        pivot.alpha,
-        pivot.frequency_parameter(scene.gravity),
-    )
+    tilt, alpha = abs(scene.initial_rotation), pivot.alpha
+    p = pivot.frequency_parameter(scene.gravity)
 
-    def pace(
-        root: float,
-    ) -> float:  # theta = theta_0 - root^2 takes the singularity at the start away
+    def pace(root: float) -> float:
+        # theta = theta_0 - root^2 takes the singularity at the start away.
         theta = tilt - root**2
-        gap = (
-            2.0 * math.sin(alpha - 0.5 * (tilt + theta)) * math.sin(0.5 * (tilt - theta))
-        )  # cos(a - tilt) - cos(a - theta)
-        return (
-            2.0 * root / (p * math.sqrt(2.0 * gap))
-            if root > 0.0
-            else 2.0 / (p * math.sqrt(2.0 * math.sin(alpha - tilt)))
-        )
+        if root <= 0.0:
+            return 2.0 / (p * math.sqrt(2.0 * math.sin(alpha - tilt)))
+        # cos(alpha - theta_0) - cos(alpha - theta)
+        gap = 2.0 * math.sin(alpha - 0.5 * (tilt + theta)) * math.sin(0.5 * (tilt - theta))
+        return 2.0 * root / (p * math.sqrt(2.0 * gap))
 
     quarter = quad(pace, 0.0, math.sqrt(tilt), epsabs=1e-13, epsrel=1e-13)[0]
     impacts = motion.events("floor impact")
@@ -110,17 +69,7 @@ def quarter_period_error(motion: WindowedHistory) -> float:
     return impacts[0].t - quarter
 
 
-@closed_form("error of impact ratio", "1")
-def impact_ratio_error(motion: WindowedHistory) -> float:
-    """Ratio of angular velocities over the first floor impact, less Housner's 1 - 1.5 sin^2 alpha,
-    for a block released at rest.
-
-    From the turning points before and after it, between which energy is kept: dtheta/dt at the
-    impact is p sqrt(2 [cos(alpha - |theta|) - cos alpha]) with p and alpha of the pivot. A block
-    that is not homogeneous keeps its angular momentum about the new pivot: 1 - a (a + a')/(I/m +
-    R^2), where a is the new pivot's distance from the mass's centre along the floor and a' the old
-    one's.
-    """
+def _impact_ratio(motion: WindowedHistory) -> float:
     scene = _scene(motion)
     old, new = _released(motion)
     impacts = [event.t for event in motion.events("floor impact")]
@@ -137,13 +86,24 @@ def impact_ratio_error(motion: WindowedHistory) -> float:
 
 
 def _scene(motion: WindowedHistory) -> Scene:
-    if (
-        motion.scene is None
-        or motion.scene.excitation.kind != "rest"
-        or motion.scene.vertical.kind != "rest"
-    ):
+    if motion.scene is None or {motion.scene.excitation.kind, motion.scene.vertical.kind} != {
+        "rest"
+    }:
         raise Unavailable("closed forms need a known scene with a base at rest")
     return motion.scene
+
+
+def _flat_start(motion: WindowedHistory, what: str, *, walls: int) -> Scene:
+    """The scene of `what`, which slides flat from the start on."""
+    scene = _scene(motion)
+    slides = scene.initial_velocity != 0.0 and scene.initial_rotation == 0.0
+    _need(slides and len(scene.walls) == walls, what)
+    return scene
+
+
+def _braking(scene: Scene) -> float:
+    """Loss of speed squared by friction on the way, m/s^2."""
+    return 2.0 * scene.floor.friction * scene.gravity
 
 
 def _released(motion: WindowedHistory) -> tuple[Pivot, Pivot]:
@@ -151,13 +111,9 @@ def _released(motion: WindowedHistory) -> tuple[Pivot, Pivot]:
     scene = _scene(motion)
     left, right = scene.block.pivot("left"), scene.block.pivot("right")
     old, new = (left, right) if scene.initial_rotation > 0.0 else (right, left)
-    moving = (
-        scene.initial_velocity != 0.0
-        or scene.initial_angular_velocity != 0.0
-        or scene.initial_height != 0.0
-    )
+    moving = scene.initial_velocity, scene.initial_angular_velocity, scene.initial_height
     _need(
-        0.0 < abs(scene.initial_rotation) < old.alpha and not moving and not scene.walls,
+        0.0 < abs(scene.initial_rotation) < old.alpha and not any(moving) and not scene.walls,
         "a block released at rest from a tilt",
     )
     return old, new
@@ -166,3 +122,54 @@ def _released(motion: WindowedHistory) -> tuple[Pivot, Pivot]:
 def _need(holds: bool, what: str) -> None:
     if not holds:
         raise Unavailable(f"{what} is needed")
+
+
+_error = partial(Measure, on_request=True, exact=True)
+FIGURES |= by_name(
+    _error(
+        "sliding_distance_error",
+        "error of sliding distance",
+        "m",
+        "|x at the end - x at the start| - v0^2/(2 mu g): a block that slides flat to a stop on a"
+        " base at rest, m.",
+        _sliding_distance,
+    ),
+    _error(
+        "wall_rebound_error",
+        "error of wall rebound",
+        "m",
+        "Place where a block that slides flat into a wall stops, less e^2 (v0^2 - 2 mu g gap)/(2 mu"
+        " g) from the wall, m.\n\nCase III: it leaves the wall at e times the speed that friction"
+        " has left it.",
+        _wall_rebound,
+    ),
+    _error(
+        "bounce_height_error",
+        "error of bounce height",
+        "m",
+        "Highest point after the first bounce, less e_g^2 h: a block that drops flat from h, m.",
+        _bounce_height,
+    ),
+    _error(
+        "quarter_period_error",
+        "error of quarter period",
+        "s",
+        "Time of the first floor impact, less Housner's quarter period: a block released at theta_0"
+        " that does not slip, s.\n\nT/4 = int_0^theta_0 d theta / sqrt(2 p^2 [cos(alpha - theta_0)"
+        " - cos(alpha - theta)]), without his small angles, with p and alpha of the pivot on the"
+        " side to which it is tilted.",
+        _quarter_period,
+    ),
+    _error(
+        "impact_ratio_error",
+        "error of impact ratio",
+        "1",
+        "Ratio of angular velocities over the first floor impact, less Housner's 1 - 1.5 sin^2"
+        " alpha, for a block released at rest.\n\nFrom the turning points before and after it,"
+        " between which energy is kept: dtheta/dt at the impact is p sqrt(2 [cos(alpha - |theta|) -"
+        " cos alpha]) with p and alpha of the pivot. A block that is not homogeneous keeps its"
+        " angular momentum about the new pivot: 1 - a (a + a')/(I/m + R^2), where a is the new"
+        " pivot's distance from the mass's centre along the floor and a' the old one's.",
+        _impact_ratio,
+    ),
+)

@@ -1,9 +1,9 @@
-"""The measures: each defined once, by a function whose docstring is its formula and source.
+"""The measures, each defined once, in a table: name, label, unit, formula and source, function.
 
 A *difference* is a function of a `Pair` (reference and candidate on one time axis), a *figure* one
-of a single history. Both return a number, or a number and a remark; they raise `Unavailable` where
-the histories do not hold what is needed. In the formulas r is the reference, c the candidate, d = c
-- r, and <.> the mean over the window, by the trapezoidal rule.
+of a `WindowedHistory`. Both return a number, or a number and a remark; they raise `Unavailable`
+where the histories do not hold what is needed. In the formulas r is the reference, c the candidate,
+d = c - r, and <.> the mean over the window, by the trapezoidal rule.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from inspect import cleandoc
+from functools import cached_property, partial
 from operator import attrgetter
 from typing import Any, Literal
 
@@ -47,8 +46,8 @@ class Undefined(Unavailable):
 
 @dataclass(frozen=True)
 class Measure:
-    """A measure: its name in tolerances and tables, its label for people, its unit and what a
-    perfect candidate scores.
+    """A measure: its name in tolerances and tables, its label for people, its unit, definition and
+    source, and what a perfect candidate scores.
 
     `unit` "angle" stands for alpha, or rad where the block is unknown. `sense` "at most": the
     distance from `ideal` is limited (`ideal` None: from the expected value); "at least": the value
@@ -58,6 +57,7 @@ class Measure:
     name: str
     label: str
     unit: str
+    formula: str
     evaluate: Callable[[Any], Value]
     ideal: float | None = 0.0
     sense: Literal["at most", "at least"] = "at most"
@@ -78,38 +78,10 @@ class Measure:
             return "error"
         return "quantity" if self.resolution else "count"
 
-    @property
-    def formula(self) -> str:
-        """Definition and source, from the function's docstring."""
-        return cleandoc(self.evaluate.__doc__ or "")
 
-
-DIFFERENCES: dict[str, Measure] = {}
-FIGURES: dict[str, Measure] = {}
-
-Definition = Callable[[Callable[[Any], Value]], Callable[[Any], Value]]
-
-
-def register(book: dict[str, Measure], label: str, unit: str, **settings: Any) -> Definition:
-    """A decorator that puts a function into a book of measures, under the function's name."""
-
-    def register(function: Callable[[Any], Value]) -> Callable[[Any], Value]:
-        name = function.__name__
-        book[name] = Measure(name=name, label=label, unit=unit, evaluate=function, **settings)
-        return function
-
-    return register
-
-
-def difference(label: str, unit: str, **settings: Any) -> Definition:
-    """Register a function of a `Pair` as a measure of difference."""
-    return register(DIFFERENCES, label, unit, **settings)
-
-
-def figure(label: str, unit: str, **settings: Any) -> Definition:
-    """Register a function of one `WindowedHistory` as a figure; without an ideal value, so held
-    against an expected one."""
-    return register(FIGURES, label, unit, **{"ideal": None, **settings})
+def by_name(*measures: Measure) -> dict[str, Measure]:
+    """A book of measures."""
+    return {measure.name: measure for measure in measures}
 
 
 def between_rows(unit: str, frequency_parameter: float, gravity: float, step: float) -> float:
@@ -156,19 +128,23 @@ class WindowedHistory:
             raise Unavailable(f"{self.history.model} has no column {name}")
         return np.asarray(self.history.channels[name][self.inside], dtype=float)
 
-    @property
-    def energy(self) -> Array:
-        """Kinetic plus potential energy per unit mass, J/kg (`scenes.kinematics.energy`)."""
-        motion = (self.channel(name) for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
-        return np.asarray(kinematics.energy(self.block, self.gravity, *motion))
-
-    def events(self, *kinds: str) -> list[Event]:
-        """Events of these kinds within the window."""
+    def events(self, *kinds: str, start: float = -math.inf) -> list[Event]:
+        """Events of these kinds within the window, from `start` (s) on. A landing that strikes is a
+        floor impact, whichever name the model has for it."""
         return [
             event
-            for event in _as_impacts(self.history.event_list)
-            if event.kind in kinds and event.t <= self.until + 1e-9
+            for event in map(_impact, self.history.event_list)
+            if event.kind in kinds and start - 1e-9 <= event.t <= self.until + 1e-9
         ]
+
+    def strong(self, kind: str) -> float:
+        """The number of impacts that are not weak (`WEAK_IMPACT`)."""
+        impulses = [abs(event.impulse) for event in self.events(kind)]
+        return float(sum(impulse >= WEAK_IMPACT * max(impulses) for impulse in impulses))
+
+    def heights(self) -> Array:
+        """Height of the lowest corner above the floor, m."""
+        return kinematics.pivot_height(self.block, self.channel("y"), self.channel("theta"))
 
 
 @dataclass(frozen=True)
@@ -283,21 +259,30 @@ class Pair:
         return math.sqrt(self.mean((columns[1] - columns[0]) ** 2))
 
     @cached_property
+    def sprague_geers(self) -> tuple[float, float]:
+        """M and P of theta."""
+        reference, candidate = self.rocking
+        rr, cc, rc = (
+            self.mean(product) for product in (reference**2, candidate**2, reference * candidate)
+        )
+        if cc == 0.0:
+            raise Unavailable("only one of the two rotates")
+        cosine = rc / math.sqrt(rr * cc)
+        phase = math.acos(max(-1.0, min(1.0, cosine))) / math.pi
+        return math.sqrt(cc / rr) - 1.0, phase if math.isfinite(cosine) else math.nan
+
+    @cached_property
     def impacts(self) -> MatchedImpacts:
         """The impacts of both within the common time, matched; a history without any event, unlike
         the other's, does not know them."""
-        both = [self._within(history) for history in (self.reference, self.candidate)]
+        both = [
+            WindowedHistory(one, until=self.end).events(*IMPACTS, *TURNS, start=self.start)
+            for one in (self.reference, self.candidate)
+        ]
         for history, others in ((self.reference, both[1]), (self.candidate, both[0])):
             if others and not history.event_list:
                 raise Unavailable(f"{history.model} has no events")
         return match_impacts(*both)
-
-    def _within(self, history: History) -> list[Event]:
-        return [
-            e
-            for e in _as_impacts(history.event_list)
-            if e.kind in IMPACTS + TURNS and self.start - 1e-9 <= e.t <= self.end + 1e-9
-        ]
 
 
 @dataclass(frozen=True)
@@ -317,148 +302,48 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
     A falling block's end counts as an event of its own kind.
     """
     pairs: list[tuple[Event, Event]] = []
-    left: list[Event] = []
-    right: list[Event] = []
+    alone: tuple[list[Event], list[Event]] = ([], [])
     for kind in IMPACTS + TURNS:
-        first, second = ([e for e in events if e.kind == kind] for events in (reference, candidate))
-        times = np.array([e.t for e in first]), np.array([e.t for e in second])
+        both = [[e for e in events if e.kind == kind] for events in (reference, candidate)]
+        times = np.array([e.t for e in both[1]])
         near = [
-            (abs(times[1][j] - times[0][i]), i, j)
-            for i in range(len(first))
-            for j in range(
-                *np.searchsorted(times[1], [times[0][i] - SAME_IMPACT, times[0][i] + SAME_IMPACT])
-            )
+            (abs(times[j] - first.t), i, j)
+            for i, first in enumerate(both[0])
+            for j in range(*np.searchsorted(times, [first.t - SAME_IMPACT, first.t + SAME_IMPACT]))
         ]
-        taken_first: set[int] = set()
-        taken_second: set[int] = set()
+        taken: tuple[set[int], set[int]] = (set(), set())
         for _, i, j in sorted(near):
-            if i not in taken_first and j not in taken_second:
-                taken_first.add(i)
-                taken_second.add(j)
-                pairs.append((first[i], second[j]))
-        weak = _weak(first), _weak(second)
-        left += [
-            e for i, e in enumerate(first) if i not in taken_first and abs(e.impulse) >= weak[0]
-        ]
-        right += [
-            e for j, e in enumerate(second) if j not in taken_second and abs(e.impulse) >= weak[1]
-        ]
+            if i not in taken[0] and j not in taken[1]:
+                taken[0].add(i)
+                taken[1].add(j)
+                pairs.append((both[0][i], both[1][j]))
+        for left, events, matched in zip(alone, both, taken, strict=True):
+            weak = WEAK_IMPACT * max((abs(e.impulse) for e in events), default=0.0)
+            left += [e for n, e in enumerate(events) if n not in matched and abs(e.impulse) >= weak]
     in_time = attrgetter("t")
     return MatchedImpacts(
-        sorted(pairs, key=lambda two: two[0].t),
-        sorted(left, key=in_time),
-        sorted(right, key=in_time),
+        sorted(pairs, key=lambda two: two[0].t), *(sorted(some, key=in_time) for some in alone)
     )
 
 
-def _as_impacts(events: Sequence[Event]) -> list[Event]:
-    """A landing that strikes is a floor impact, whichever name the model has for it."""
-    return [
-        replace(event, kind="floor impact")
-        if event.kind == "landing" and event.impulse != 0.0
-        else event
-        for event in events
-    ]
+def _impact(event: Event) -> Event:
+    strikes = event.kind == "landing" and event.impulse != 0.0
+    return replace(event, kind="floor impact") if strikes else event
 
 
-def _weak(events: Sequence[Event]) -> float:
-    """The impulse below which one of these is weak beside the strongest."""
-    return WEAK_IMPACT * max((abs(event.impulse) for event in events), default=0.0)
+# Differences
 
 
-# --- differences
+def _peak(columns: tuple[Array, Array]) -> float:
+    return float(np.max(np.abs(columns[1] - columns[0])))
 
 
-@difference("RMS difference of rotation", "angle")
-def theta_rms(pair: Pair) -> float:
-    """sqrt <d^2> of theta, in alpha."""
-    return pair.rms(pair.theta)
-
-
-@difference("peak difference of rotation", "angle")
-def theta_peak(pair: Pair) -> float:
-    """max |d| of theta, in alpha."""
-    return _largest(pair.theta)
-
-
-@difference("RMS difference of x", "m")
-def x_rms(pair: Pair) -> float:
-    """sqrt <d^2> of the centroid's x, m."""
-    return pair.rms(pair.channels("x"))
-
-
-@difference("peak difference of x", "m")
-def x_peak(pair: Pair) -> float:
-    """max |d| of the centroid's x, m."""
-    return _largest(pair.channels("x"))
-
-
-@difference("RMS difference of slip rate", "m/s")
-def slip_rate_rms(pair: Pair) -> float:
-    """sqrt <d^2> of the pivot corner's horizontal velocity V, m/s."""
-    return pair.rms(pair.channels("slip_rate"))
-
-
-@difference("peak difference of slip rate", "m/s")
-def slip_rate_peak(pair: Pair) -> float:
-    """max |d| of the pivot corner's horizontal velocity V, m/s; where the pivot changes it jumps,
-    see `theta_hausdorff`."""
-    return _largest(pair.channels("slip_rate"))
-
-
-@difference("RMS difference of energy", "J/kg")
-def energy_rms(pair: Pair) -> float:
-    """sqrt <d^2> of kinetic plus potential energy per unit mass, J/kg."""
-    return pair.rms(pair.energies)
-
-
-@difference("peak difference of energy", "J/kg")
-def energy_peak(pair: Pair) -> float:
-    """max |d| of kinetic plus potential energy per unit mass, J/kg."""
-    return _largest(pair.energies)
-
-
-@difference("Sprague-Geers M (magnitude)", "1")
-def sprague_geers_m(pair: Pair) -> float:
-    """M = sqrt(<c^2>/<r^2>) - 1 of theta: error of magnitude, blind to phase.
-
-    Sprague & Geers, Commun. Numer. Meth. Engng 20 (2004) 467; Schwer, Engng Comput. 23 (2007) 295.
-    """
-    return _sprague_geers(pair)[0]
-
-
-@difference("Sprague-Geers P (phase)", "1")
-def sprague_geers_p(pair: Pair) -> float:
-    """P = acos(<r c>/sqrt(<r^2><c^2>))/pi of theta: error of phase, blind to magnitude; 0 in phase,
-    1 in opposition.
-
-    Source as for M.
-    """
-    return _sprague_geers(pair)[1]
-
-
-@difference("Sprague-Geers C (both)", "1")
-def sprague_geers_c(pair: Pair) -> float:
-    """C = sqrt(M^2 + P^2) of theta. Source as for M."""
-    return math.hypot(*_sprague_geers(pair))
-
-
-@difference("ratio of peak rotations", "1", ideal=1.0)
-def peak_ratio(pair: Pair) -> float:
-    """max |c| / max |r| of theta."""
+def _peak_ratio(pair: Pair) -> float:
     reference, candidate = (float(np.max(np.abs(column))) for column in pair.rocking)
     return candidate / reference
 
 
-@difference("Hausdorff distance of rotation's graphs", "1")
-def theta_hausdorff(pair: Pair) -> float:
-    """Hausdorff distance of the graphs of theta in the plane (p t, theta/alpha); p is of the
-    scene's gravity, else of 9.81 m/s^2.
-
-    The largest distance from a sample of one graph to the other graph, a broken line, either way.
-    An impact that comes a millisecond late counts as a millisecond, not as the jump that it delays;
-    used so for nonsmooth mechanics by the authors of cardillo.
-    """
+def _hausdorff(pair: Pair) -> float:
     if pair.alpha is None:
         raise Unavailable("the block's size is not known")
     p = pair.known.block.weaker_pivot.frequency_parameter(pair.known.gravity)
@@ -466,108 +351,6 @@ def theta_hausdorff(pair: Pair) -> float:
     if not (np.all(np.isfinite(first)) and np.all(np.isfinite(second))):
         return math.nan
     return max(_farthest(first, second), _farthest(second, first))
-
-
-@difference("events agree until", "s", ideal=None, sense="at least")
-def events_agree_until(pair: Pair) -> tuple[float, str]:
-    """Time up to which each impact (and fall) of either has its counterpart in the other; the
-    remark says what comes then.
-
-    Counterparts are of one kind and within 20 ms; impacts below 1 % of the strongest need none. The
-    window's end if all agree.
-    """
-    matched = pair.impacts
-    alone = [
-        (e.t, f"{e.kind} only in {h.model}")
-        for h, found in _unmatched(pair, matched)
-        for e in found
-    ]
-    return min(alone, default=(pair.end, "all events agree"))
-
-
-@difference("impacts without counterpart", "1", resolution=0.0)
-def unmatched_impacts(pair: Pair) -> tuple[float, str]:
-    """Number of impacts of either that have no counterpart in the other, matched as in
-    `events_agree_until`."""
-    matched = pair.impacts
-    alone = len(matched.only_reference) + len(matched.only_candidate)
-    return float(alone), f"{len(matched.pairs)} impacts matched"
-
-
-@difference("largest impact-time error", "s")
-def impact_time(pair: Pair) -> tuple[float, str]:
-    """max |t_c - t_r| over the impacts that have a counterpart, matched as in `events_agree_until`,
-    s."""
-    pairs = pair.impacts.pairs
-    if not pairs:
-        return 0.0, "no impact has a counterpart"
-    worst = max(pairs, key=lambda two: abs(two[1].t - two[0].t))
-    return abs(worst[1].t - worst[0].t), f"{worst[0].kind} at {worst[0].t:.3f} s"
-
-
-@difference("difference of overturning time", "s")
-def overturning_time(pair: Pair) -> float:
-    """|t_c - t_r| of |theta| = pi/2, s; 0 if neither overturns, infinite if only one does."""
-    first, second = (
-        next((e.t for e in h.event_list if e.kind in TURNS), math.inf)
-        for h in (pair.reference, pair.candidate)
-    )
-    return 0.0 if first == second else abs(second - first)
-
-
-@difference("outcome agrees", "1", resolution=0.0, ideal=1.0, yes_no=True)
-def outcome_agrees(pair: Pair) -> tuple[float, str]:
-    """1 if both overturn to the same side or neither overturns, else 0; of the whole histories,
-    whatever the window."""
-    first, second = pair.reference.outcome, pair.candidate.outcome
-    fates = {outcome if outcome in TURNS else "stays" for outcome in (first, second)}
-    return float(len(fates) == 1), first if first == second else f"{first} / {second}"
-
-
-@difference("ISO/TS 18571 rating", "1", ideal=1.0, on_request=True)
-def iso_18571(pair: Pair) -> float:
-    """ISO/TS 18571 overall rating of theta, 0 to 1 (corridor 0.4, phase 0.2, magnitude 0.2, slope
-    0.2), not rounded.
-
-    By the package objective-rating-metrics, which takes the square of the samples in time and
-    memory, does not look at their times and answers NaN where it has no answer; so both curves are
-    put on one uniform grid of at most 4,000 samples, and curves that are constant or shorter than
-    20 samples have no rating.
-    """
-    try:
-        from objective_rating_metrics.rating import ISO18571
-    except ImportError:
-        raise Unavailable(
-            "needs the package objective-rating-metrics: pip install objective-rating-metrics"
-        ) from None
-    curves = pair.rocking
-    if len(pair.time) < 20 or not all(
-        np.all(np.isfinite(curve)) and np.ptp(curve) > 0.0 for curve in curves
-    ):
-        raise Unavailable("too short, constant or not finite")
-    grid = np.linspace(pair.time[0], pair.time[-1], min(len(pair.time), ISO_MOST_SAMPLES))
-    reference, candidate = (
-        np.column_stack([grid, np.interp(grid, pair.time, curve)]) for curve in curves
-    )
-    rating = ISO18571(reference, candidate, dt=float(grid[1] - grid[0]))
-    return float(rating.overall_rating(ndigits=-1))
-
-
-def _largest(columns: tuple[Array, Array]) -> float:
-    return float(np.max(np.abs(columns[1] - columns[0])))
-
-
-def _sprague_geers(pair: Pair) -> tuple[float, float]:
-    reference, candidate = pair.rocking
-    rr, cc, rc = (
-        pair.mean(product) for product in (reference**2, candidate**2, reference * candidate)
-    )
-    if cc == 0.0:
-        raise Unavailable("only one of the two rotates")
-    cosine = rc / math.sqrt(rr * cc)
-    return math.sqrt(cc / rr) - 1.0, math.acos(
-        max(-1.0, min(1.0, cosine))
-    ) / math.pi if math.isfinite(cosine) else math.nan
 
 
 def _farthest(points: Array, line: Array) -> float:
@@ -589,91 +372,317 @@ def _farthest(points: Array, line: Array) -> float:
     return float(np.max(best))
 
 
-def _unmatched(pair: Pair, matched: MatchedImpacts) -> list[tuple[History, Sequence[Event]]]:
-    return [(pair.reference, matched.only_reference), (pair.candidate, matched.only_candidate)]
+def _agree_until(pair: Pair) -> tuple[float, str]:
+    matched = pair.impacts
+    alone = (pair.reference, matched.only_reference), (pair.candidate, matched.only_candidate)
+    found = [(e.t, f"{e.kind} only in {h.model}") for h, events in alone for e in events]
+    return min(found, default=(pair.end, "all events agree"))
 
 
-# --- figures of one history
+def _unmatched(pair: Pair) -> tuple[float, str]:
+    matched = pair.impacts
+    alone = len(matched.only_reference) + len(matched.only_candidate)
+    return float(alone), f"{len(matched.pairs)} impacts matched"
 
 
-@figure("peak rotation", "angle")
-def peak_rotation(motion: WindowedHistory) -> Value:
-    """max |theta|, in alpha; of a block that has overturned it is no peak, and a note says so."""
+def _impact_time(pair: Pair) -> tuple[float, str]:
+    pairs = pair.impacts.pairs
+    if not pairs:
+        return 0.0, "no impact has a counterpart"
+    first, second = max(pairs, key=lambda two: abs(two[1].t - two[0].t))
+    return abs(second.t - first.t), f"{first.kind} at {first.t:.3f} s"
+
+
+def _overturning_time(pair: Pair) -> float:
+    first, second = (
+        next((e.t for e in h.event_list if e.kind in TURNS), math.inf)
+        for h in (pair.reference, pair.candidate)
+    )
+    return 0.0 if first == second else abs(second - first)
+
+
+def _outcome(pair: Pair) -> tuple[float, str]:
+    first, second = pair.reference.outcome, pair.candidate.outcome
+    fates = {outcome if outcome in TURNS else "stays" for outcome in (first, second)}
+    return float(len(fates) == 1), first if first == second else f"{first} / {second}"
+
+
+def _iso_18571(pair: Pair) -> float:
+    try:
+        from objective_rating_metrics.rating import ISO18571
+    except ImportError:
+        raise Unavailable(
+            "needs the package objective-rating-metrics: pip install objective-rating-metrics"
+        ) from None
+    curves = pair.rocking
+    if len(pair.time) < 20 or not all(
+        np.all(np.isfinite(curve)) and np.ptp(curve) > 0.0 for curve in curves
+    ):
+        raise Unavailable("too short, constant or not finite")
+    grid = np.linspace(pair.time[0], pair.time[-1], min(len(pair.time), ISO_MOST_SAMPLES))
+    reference, candidate = (
+        np.column_stack([grid, np.interp(grid, pair.time, curve)]) for curve in curves
+    )
+    rating = ISO18571(reference, candidate, dt=float(grid[1] - grid[0]))
+    return float(rating.overall_rating(ndigits=-1))
+
+
+DIFFERENCES = by_name(
+    Measure(
+        "theta_rms",
+        "RMS difference of rotation",
+        "angle",
+        "sqrt <d^2> of theta, in alpha.",
+        lambda pair: pair.rms(pair.theta),
+    ),
+    Measure(
+        "theta_peak",
+        "peak difference of rotation",
+        "angle",
+        "max |d| of theta, in alpha.",
+        lambda pair: _peak(pair.theta),
+    ),
+    Measure(
+        "x_rms",
+        "RMS difference of x",
+        "m",
+        "sqrt <d^2> of the centroid's x, m.",
+        lambda pair: pair.rms(pair.channels("x")),
+    ),
+    Measure(
+        "x_peak",
+        "peak difference of x",
+        "m",
+        "max |d| of the centroid's x, m.",
+        lambda pair: _peak(pair.channels("x")),
+    ),
+    Measure(
+        "slip_rate_rms",
+        "RMS difference of slip rate",
+        "m/s",
+        "sqrt <d^2> of the pivot corner's horizontal velocity V, m/s.",
+        lambda pair: pair.rms(pair.channels("slip_rate")),
+    ),
+    Measure(
+        "slip_rate_peak",
+        "peak difference of slip rate",
+        "m/s",
+        "max |d| of the pivot corner's horizontal velocity V, m/s; where the pivot changes it"
+        " jumps, see `theta_hausdorff`.",
+        lambda pair: _peak(pair.channels("slip_rate")),
+    ),
+    Measure(
+        "energy_rms",
+        "RMS difference of energy",
+        "J/kg",
+        "sqrt <d^2> of kinetic plus potential energy per unit mass, J/kg.",
+        lambda pair: pair.rms(pair.energies),
+    ),
+    Measure(
+        "energy_peak",
+        "peak difference of energy",
+        "J/kg",
+        "max |d| of kinetic plus potential energy per unit mass, J/kg.",
+        lambda pair: _peak(pair.energies),
+    ),
+    Measure(
+        "sprague_geers_m",
+        "Sprague-Geers M (magnitude)",
+        "1",
+        "M = sqrt(<c^2>/<r^2>) - 1 of theta: error of magnitude, blind to phase.\n\nSprague &"
+        " Geers, Commun. Numer. Meth. Engng 20 (2004) 467; Schwer, Engng Comput. 23 (2007) 295.",
+        lambda pair: pair.sprague_geers[0],
+    ),
+    Measure(
+        "sprague_geers_p",
+        "Sprague-Geers P (phase)",
+        "1",
+        "P = acos(<r c>/sqrt(<r^2><c^2>))/pi of theta: error of phase, blind to magnitude; 0 in"
+        " phase, 1 in opposition.\n\nSource as for M.",
+        lambda pair: pair.sprague_geers[1],
+    ),
+    Measure(
+        "sprague_geers_c",
+        "Sprague-Geers C (both)",
+        "1",
+        "C = sqrt(M^2 + P^2) of theta. Source as for M.",
+        lambda pair: math.hypot(*pair.sprague_geers),
+    ),
+    Measure(
+        "peak_ratio",
+        "ratio of peak rotations",
+        "1",
+        "max |c| / max |r| of theta.",
+        _peak_ratio,
+        ideal=1.0,
+    ),
+    Measure(
+        "theta_hausdorff",
+        "Hausdorff distance of rotation's graphs",
+        "1",
+        "Hausdorff distance of the graphs of theta in the plane (p t, theta/alpha); p is of"
+        " the scene's gravity, else of 9.81 m/s^2.\n\nThe largest distance from a sample of one"
+        " graph to the other graph, a broken line, either way. An impact that comes a millisecond"
+        " late counts as a millisecond, not as the jump that it delays; used so for nonsmooth"
+        " mechanics by the authors of cardillo.",
+        _hausdorff,
+    ),
+    Measure(
+        "events_agree_until",
+        "events agree until",
+        "s",
+        "Time up to which each impact (and fall) of either has its counterpart in the other;"
+        " the remark says what comes then.\n\nCounterparts are of one kind and within 20 ms;"
+        " impacts below 1 % of the strongest need none. The window's end if all agree.",
+        _agree_until,
+        ideal=None,
+        sense="at least",
+    ),
+    Measure(
+        "unmatched_impacts",
+        "impacts without counterpart",
+        "1",
+        "Number of impacts of either that have no counterpart in the other, matched as in"
+        " `events_agree_until`.",
+        _unmatched,
+        resolution=0.0,
+    ),
+    Measure(
+        "impact_time",
+        "largest impact-time error",
+        "s",
+        "max |t_c - t_r| over the impacts that have a counterpart, matched as in"
+        " `events_agree_until`, s.",
+        _impact_time,
+    ),
+    Measure(
+        "overturning_time",
+        "difference of overturning time",
+        "s",
+        "|t_c - t_r| of |theta| = pi/2, s; 0 if neither overturns, infinite if only one does.",
+        _overturning_time,
+    ),
+    Measure(
+        "outcome_agrees",
+        "outcome agrees",
+        "1",
+        "1 if both overturn to the same side or neither overturns, else 0; of the whole"
+        " histories, whatever the window.",
+        _outcome,
+        ideal=1.0,
+        resolution=0.0,
+        yes_no=True,
+    ),
+    Measure(
+        "iso_18571",
+        "ISO/TS 18571 rating",
+        "1",
+        "ISO/TS 18571 overall rating of theta, 0 to 1 (corridor 0.4, phase 0.2, magnitude 0.2,"
+        " slope 0.2), not rounded.\n\nBy the package objective-rating-metrics, which takes the"
+        " square of the samples in time and memory, does not look at their times and answers NaN"
+        " where it has no answer; so both curves are put on one uniform grid of at most 4,000"
+        " samples, and curves that are constant or shorter than 20 samples have no rating.",
+        _iso_18571,
+        ideal=1.0,
+        on_request=True,
+    ),
+)
+
+
+# Figures of one history
+
+
+def _peak_rotation(motion: WindowedHistory) -> Value:
     at = motion.history.overturned_at
     fell = "" if at is None or at > motion.until else f"the block overturned at {at:.3g} s"
     return float(np.max(np.abs(motion.channel("theta")))) / motion.block.alpha, fell
 
 
-@figure("last rotation", "angle")
-def last_rotation(motion: WindowedHistory) -> float:
-    """theta in the window's last row, in alpha: sees a shift in time that a peak does not."""
-    return float(motion.channel("theta")[-1]) / motion.block.alpha
+def _deepest(motion: WindowedHistory) -> float:
+    gaps, scene = [motion.heights()], motion.scene
+    if scene is not None:
+        place = motion.channel("x"), motion.channel("theta")
+        gaps += [kinematics.wall_gap(scene, wall.side, *place) for wall in scene.walls]
+    return float(np.maximum(np.max([-np.min(gap) for gap in gaps]), 0.0))
 
 
-@figure("last x", "m")
-def last_x(motion: WindowedHistory) -> float:
-    """The centroid's x in the window's last row, m."""
-    return float(motion.channel("x")[-1])
-
-
-@figure("last slip", "m")
-def last_slip(motion: WindowedHistory) -> float:
-    """Where the pivot corner stands along the floor in the window's last row, m from its first
-    place."""
-    return float(motion.channel("slip")[-1])
-
-
-@figure("end of motion", "s")
-def end_time(motion: WindowedHistory) -> float:
-    """Time of the window's last row, s; before the scene's duration where the block overturned."""
-    return float(motion.channel("t")[-1])
-
-
-@figure("floor impacts", "1", resolution=0.0)
-def floor_impacts(motion: WindowedHistory) -> float:
-    """Number of floor impacts stronger than 1 % of the strongest."""
-    return _strong_count(motion, "floor impact")
-
-
-@figure("wall impacts", "1", resolution=0.0)
-def wall_impacts(motion: WindowedHistory) -> float:
-    """Number of wall impacts stronger than 1 % of the strongest."""
-    return _strong_count(motion, "wall impact")
-
-
-@figure("highest hop", "m")
-def highest_hop(motion: WindowedHistory) -> float:
-    """Largest height of the lowest corner above the floor, m; 0 for a model without free flight."""
-    return float(np.maximum(_extreme(motion, np.max), 0.0))
-
-
-@figure("deepest penetration", "m", ideal=0.0)
-def deepest_penetration(motion: WindowedHistory) -> float:
-    """Largest depth of a corner below the floor or behind a wall (walls where the scene is known),
-    m."""
-    deepest = -_extreme(motion, np.min)
-    if motion.scene is not None:
-        for wall in motion.scene.walls:
-            gap = kinematics.wall_gap(
-                motion.scene, wall.side, motion.channel("x"), motion.channel("theta")
-            )
-            deepest = float(np.maximum(deepest, -np.min(gap)))
-    return float(np.maximum(deepest, 0.0))
-
-
-@figure("largest energy gain at an impact", "1", ideal=0.0)
-def energy_gain(motion: WindowedHistory) -> float:
-    """Most kinetic energy that the impact law added at one impact, relative to that before it
-    (`Cost.largest_energy_gain`)."""
-    return motion.history.cost.largest_energy_gain
-
-
-def _strong_count(motion: WindowedHistory, kind: str) -> float:
-    events = motion.events(kind)
-    weak = _weak(events)
-    return float(sum(abs(event.impulse) >= weak for event in events))
-
-
-def _extreme(motion: WindowedHistory, choose: Callable[[Array], Any]) -> float:
-    heights = kinematics.pivot_height(motion.block, motion.channel("y"), motion.channel("theta"))
-    return float(choose(heights))
+#: A figure without an ideal value is held against an expected one.
+_quantity = partial(Measure, ideal=None)
+FIGURES = by_name(
+    _quantity(
+        "peak_rotation",
+        "peak rotation",
+        "angle",
+        "max |theta|, in alpha; of a block that has overturned it is no peak, and a note says so.",
+        _peak_rotation,
+    ),
+    _quantity(
+        "last_rotation",
+        "last rotation",
+        "angle",
+        "theta in the window's last row, in alpha: sees a shift in time that a peak does not.",
+        lambda motion: float(motion.channel("theta")[-1]) / motion.block.alpha,
+    ),
+    _quantity(
+        "last_x",
+        "last x",
+        "m",
+        "The centroid's x in the window's last row, m.",
+        lambda motion: float(motion.channel("x")[-1]),
+    ),
+    _quantity(
+        "last_slip",
+        "last slip",
+        "m",
+        "Where the pivot corner stands along the floor in the window's last row, m from its"
+        " first place.",
+        lambda motion: float(motion.channel("slip")[-1]),
+    ),
+    _quantity(
+        "end_time",
+        "end of motion",
+        "s",
+        "Time of the window's last row, s; before the scene's duration where the block overturned.",
+        lambda motion: float(motion.channel("t")[-1]),
+    ),
+    _quantity(
+        "floor_impacts",
+        "floor impacts",
+        "1",
+        "Number of floor impacts stronger than 1 % of the strongest.",
+        lambda motion: motion.strong("floor impact"),
+        resolution=0.0,
+    ),
+    _quantity(
+        "wall_impacts",
+        "wall impacts",
+        "1",
+        "Number of wall impacts stronger than 1 % of the strongest.",
+        lambda motion: motion.strong("wall impact"),
+        resolution=0.0,
+    ),
+    _quantity(
+        "highest_hop",
+        "highest hop",
+        "m",
+        "Largest height of the lowest corner above the floor, m; 0 for a model without free"
+        " flight.",
+        lambda motion: float(np.maximum(np.max(motion.heights()), 0.0)),
+    ),
+    Measure(
+        "deepest_penetration",
+        "deepest penetration",
+        "m",
+        "Largest depth of a corner below the floor or behind a wall (walls where the scene is"
+        " known), m.",
+        _deepest,
+    ),
+    Measure(
+        "energy_gain",
+        "largest energy gain at an impact",
+        "1",
+        "Most kinetic energy that the impact law added at one impact, relative to that before"
+        " it (`Cost.largest_energy_gain`).",
+        lambda motion: motion.history.cost.largest_energy_gain,
+    ),
+)

@@ -4,19 +4,22 @@ overturning, bias and scatter."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.validation.discrepancy.measures import Measure, Undefined, register
+from rockcheck.validation.discrepancy.measures import Measure, Undefined, by_name
 
 Array = NDArray[np.float64]
 #: Peaks below this (alpha) have no ratio worth a logarithm.
 SMALLEST_PEAK = 1e-3
 CONFIDENCE = 0.95
+#: Why there is no value.
+FAILED = "a model failed in some of the scenes"
+FEW = "fewer than two scenes in which both rock and neither falls"
 
 
 @dataclass(frozen=True)
@@ -55,103 +58,69 @@ class Samples:
         return np.log(c.peaks[usable] / r.peaks[usable])
 
 
-STATISTICS: dict[str, Measure] = {}
+def _distributions(samples: Samples, fallen: float) -> tuple[Array, Array]:
+    """The peaks of both, those of the fallen `fallen` and no peak beyond it."""
+    r, c = (
+        np.where(one.fallen, fallen, np.minimum(one.peaks, fallen))
+        for one in (samples.reference, samples.candidate)
+    )
+    return r, c
 
 
-def statistic(label: str, unit: str, **settings: Any) -> Callable[..., Any]:
-    """Register a function of `Samples` as a measure of ensembles."""
-    return register(STATISTICS, label, unit, **settings)
-
-
-@statistic("Kolmogorov-Smirnov distance", "1", resolution=1e-3)
-def ks_distance(samples: Samples) -> tuple[float, str]:
-    """max |F_c - F_r| of the distributions of peak |theta|/alpha, the fallen beyond all others; the
-    remark gives its p-value.
-
-    Two-sample Kolmogorov-Smirnov test: the probability of such a distance between two samples of
-    one distribution.
-    """
+def _ks_distance(samples: Samples) -> tuple[float, str]:
     from scipy.stats import ks_2samp
 
-    r, c = (
-        np.where(sample.fallen, np.inf, sample.peaks)
-        for sample in (samples.reference, samples.candidate)
-    )
+    r, c = _distributions(samples, math.inf)
     if np.any(np.isnan(r)) or np.any(np.isnan(c)):
-        return math.nan, "a model failed in some of the scenes"
-    ranks = np.unique(np.concatenate([r, c]), return_inverse=True)[
-        1
-    ]  # the test takes no infinities, but only order counts
+        return math.nan, FAILED
+    # The test takes no infinities, but only order counts.
+    ranks = np.unique(np.concatenate([r, c]), return_inverse=True)[1]
     found = ks_2samp(ranks[: len(r)], ranks[len(r) :])
     return float(found.statistic), f"p = {found.pvalue:.2g}"
 
 
-@statistic("area between the distributions", "1", resolution=1e-4)
-def area_metric(samples: Samples) -> tuple[float, str]:
-    """Area between the distribution functions of peak |theta|/alpha (ASME V&V 10-2006; Ferson
-    2008), the fallen at 1, the balance point."""
+def _area_metric(samples: Samples) -> tuple[float, str]:
     from scipy.stats import wasserstein_distance
 
-    r, c = (
-        np.where(sample.fallen, 1.0, np.minimum(sample.peaks, 1.0))
-        for sample in (samples.reference, samples.candidate)
-    )
+    r, c = _distributions(samples, 1.0)
     if np.any(np.isnan(r)) or np.any(np.isnan(c)):
-        return math.nan, "a model failed in some of the scenes"
+        return math.nan, FAILED
     return float(wasserstein_distance(r, c)), ""
 
 
-@statistic("agreement on overturning", "1", ideal=1.0, resolution=1e-3)
-def overturning_accuracy(samples: Samples) -> tuple[float, str]:
-    """Share of scenes in which both fall or both stay; the remark gives its 95 % confidence
-    interval (Wilson 1927)."""
-    agree = samples.reference.fallen == samples.candidate.fallen
-    return _share(int(np.sum(agree)), len(agree))
+def _share(hits: NDArray[np.bool_], of: int) -> tuple[float, str]:
+    from scipy.stats import binomtest
+
+    if of == 0:
+        return 1.0, "none fall"
+    count = int(np.sum(hits))
+    interval = binomtest(count, of).proportion_ci(CONFIDENCE, method="wilson")
+    return count / of, f"[{interval.low:.3f}, {interval.high:.3f}], {count} of {of}"
 
 
-@statistic("precision of overturning", "1", ideal=1.0, resolution=1e-3)
-def overturning_precision(samples: Samples) -> tuple[float, str]:
-    """Share of the scenes in which the candidate falls that the reference falls in too; 1 if it
-    falls in none."""
-    both = int(np.sum(samples.reference.fallen & samples.candidate.fallen))
-    return _share(both, int(np.sum(samples.candidate.fallen)))
+def _share_of(samples: Samples, one: Sample) -> tuple[float, str]:
+    """Of the scenes in which that one falls, the share in which both do."""
+    return _share(samples.reference.fallen & samples.candidate.fallen, int(np.sum(one.fallen)))
 
 
-@statistic("recall of overturning", "1", ideal=1.0, resolution=1e-3)
-def overturning_recall(samples: Samples) -> tuple[float, str]:
-    """Share of the scenes in which the reference falls that the candidate falls in too; 1 if it
-    falls in none."""
-    both = int(np.sum(samples.reference.fallen & samples.candidate.fallen))
-    return _share(both, int(np.sum(samples.reference.fallen)))
-
-
-@statistic("bias of peak rotation", "1", resolution=1e-4)
-def peak_bias(samples: Samples) -> tuple[float, str]:
-    """Mean of ln(c/r) of the peaks where neither falls; the remark gives its 95 % confidence
-    interval (Student)."""
+def _peak_bias(samples: Samples) -> tuple[float, str]:
     from scipy.stats import t
 
     ratios = samples.log_ratios()
     if len(ratios) < 2:
-        return math.nan, "fewer than two scenes in which both rock and neither falls"
-    half = float(
-        t.ppf(0.5 + 0.5 * CONFIDENCE, len(ratios) - 1)
-        * np.std(ratios, ddof=1)
-        / math.sqrt(len(ratios))
-    )
+        return math.nan, FEW
+    most = t.ppf(0.5 + 0.5 * CONFIDENCE, len(ratios) - 1)
+    half = float(most * np.std(ratios, ddof=1) / math.sqrt(len(ratios)))
     mean = float(np.mean(ratios))
     return mean, f"[{mean - half:.2g}, {mean + half:.2g}], {len(ratios)} scenes"
 
 
-@statistic("scatter of peak rotation", "1", resolution=1e-4)
-def peak_scatter(samples: Samples) -> tuple[float, str]:
-    """Standard deviation of ln(c/r) of the peaks where neither falls; the remark gives its 95 %
-    interval (chi-squared)."""
+def _peak_scatter(samples: Samples) -> tuple[float, str]:
     from scipy.stats import chi2
 
     ratios = samples.log_ratios()
     if len(ratios) < 2:
-        return math.nan, "fewer than two scenes in which both rock and neither falls"
+        return math.nan, FEW
     scatter, free = float(np.std(ratios, ddof=1)), len(ratios) - 1
     low, high = (
         scatter * math.sqrt(free / chi2.ppf(0.5 + sign * 0.5 * CONFIDENCE, free))
@@ -160,10 +129,68 @@ def peak_scatter(samples: Samples) -> tuple[float, str]:
     return scatter, f"[{low:.2g}, {high:.2g}]"
 
 
-def _share(hits: int, of: int) -> tuple[float, str]:
-    from scipy.stats import binomtest
-
-    if of == 0:
-        return 1.0, "none fall"
-    interval = binomtest(hits, of).proportion_ci(CONFIDENCE, method="wilson")
-    return hits / of, f"[{interval.low:.3f}, {interval.high:.3f}], {hits} of {of}"
+_agreement = partial(Measure, ideal=1.0, resolution=1e-3)
+#: The measures of ensembles: functions of `Samples`.
+STATISTICS = by_name(
+    Measure(
+        "ks_distance",
+        "Kolmogorov-Smirnov distance",
+        "1",
+        "max |F_c - F_r| of the distributions of peak |theta|/alpha, the fallen beyond all others;"
+        " the remark gives its p-value.\n\nTwo-sample Kolmogorov-Smirnov test: the probability of"
+        " such a distance between two samples of one distribution.",
+        _ks_distance,
+        resolution=1e-3,
+    ),
+    Measure(
+        "area_metric",
+        "area between the distributions",
+        "1",
+        "Area between the distribution functions of peak |theta|/alpha (ASME V&V 10-2006; Ferson"
+        " 2008), the fallen at 1, the balance point.",
+        _area_metric,
+        resolution=1e-4,
+    ),
+    _agreement(
+        "overturning_accuracy",
+        "agreement on overturning",
+        "1",
+        "Share of scenes in which both fall or both stay; the remark gives its 95 % confidence"
+        " interval (Wilson 1927).",
+        lambda two: _share(two.reference.fallen == two.candidate.fallen, len(two.reference.fallen)),
+    ),
+    _agreement(
+        "overturning_precision",
+        "precision of overturning",
+        "1",
+        "Share of the scenes in which the candidate falls that the reference falls in too; 1 if it"
+        " falls in none.",
+        lambda two: _share_of(two, two.candidate),
+    ),
+    _agreement(
+        "overturning_recall",
+        "recall of overturning",
+        "1",
+        "Share of the scenes in which the reference falls that the candidate falls in too; 1 if it"
+        " falls in none.",
+        lambda two: _share_of(two, two.reference),
+    ),
+    Measure(
+        "peak_bias",
+        "bias of peak rotation",
+        "1",
+        "Mean of ln(c/r) of the peaks where neither falls; the remark gives its 95 % confidence"
+        " interval (Student).",
+        _peak_bias,
+        resolution=1e-4,
+    ),
+    Measure(
+        "peak_scatter",
+        "scatter of peak rotation",
+        "1",
+        "Standard deviation of ln(c/r) of the peaks where neither falls; the remark gives its 95 %"
+        " interval (chi-squared).",
+        _peak_scatter,
+        resolution=1e-4,
+    ),
+)

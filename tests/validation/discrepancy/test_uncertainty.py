@@ -28,7 +28,7 @@ from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.scenes.files import load_scene, load_uncertain_scene
 from rockcheck.scenes.observation import observe
 from rockcheck.scenes.trust.experience import Experience, Range, Trust, axes_of, expected, outside
-from rockcheck.validation.discrepancy.repeats import mean_history, shifted, time_shift
+from rockcheck.validation.discrepancy.measured import mean_history, shifted, time_shift
 from rockcheck.validation.suite.confidence import explanations
 from rockcheck.validation.suite.experience import bias_and_scatter
 from rockcheck.validation.suite.runner import run_suite
