@@ -144,7 +144,7 @@ def strips(plot: Plot) -> Figure:
     from matplotlib.figure import Figure
 
     with figure_style():
-        figure = Figure(figsize=(PAGE, 0.75 * len(plot.data) + 0.1), layout="constrained")
+        figure = Figure(figsize=(PAGE, 0.5 * len(plot.data) + 0.1), layout="constrained")
         rows = figure.subplots(len(plot.data), 1, squeeze=False)[:, 0]
         for ax, one in zip(rows, plot.data, strict=True):
             values = np.sort(np.array(one["values"], dtype=float))
@@ -240,6 +240,7 @@ def live_data(plot: Plot) -> dict[str, Any]:
         "along": plot.y.label,
         "intensities": list(panel.series[0].x),
         "curves": curves,
+        "least": plot.y.limits[0] if plot.y.limits else 0.0,
         "most": plot.y.limits[1] if plot.y.limits else None,
         "single": any(series.style == "thin" for series in panel.series),
         **(plot.data or {"per_unit": 0.0, "other_unit": "", "other_label": ""}),

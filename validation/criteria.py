@@ -27,9 +27,9 @@ from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
 #: Samples in one period of a pulse.
 _PER_PERIOD = 400
 #: Frequencies (Hz) at which the sliding estimate looks for its capacity, ends and count.
-_SLOWEST, _FASTEST, _COUNT = 0.05, 20.0, 37
+_SLOWEST, _FASTEST, _COUNT = 0.05, 20.0, 25
 #: Angles, in parts of the last one, at which the rocking estimate compares capacity and demand.
-_ANGLES = 40
+_ANGLES = 20
 #: Damping of the spectrum that the sliding estimate uses.
 _SLIDING_DAMPING = 0.10
 

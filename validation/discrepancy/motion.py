@@ -13,6 +13,8 @@ from rockcheck.scenes import History, Scene, kinematics
 from rockcheck.validation.discrepancy.figures import Stored
 
 Floats = NDArray[np.float64]
+#: A slip below this share of the block's half height is rounding.
+ROUNDING = 1e-14
 
 
 @dataclass(frozen=True)
@@ -74,15 +76,23 @@ def motion_of(history: History, scene: Scene | None = None) -> Motion:
         if "x" in channels:
             places = kinematics.top_corners(block, np.asarray(channels["x"], dtype=float), theta)
             top = float(np.max(np.abs(places - places[:, :1])))
-    if stands and "slip" in channels:
-        slip = float(np.max(np.abs(channels["slip"])))
+    if "slip" in channels:
+        slip = largest_slip(history)
     speeds = wall_speeds(history, scene) if scene is not None else []
     return Motion(
         peak_rotation=peak,
-        slip=slip,
+        slip=slip if stands else None,
         top_displacement=top,
         wall_speed=max(speeds, default=None),
     )
+
+
+def largest_slip(history: History) -> float:
+    """Largest |slip|, m, also of a block that falls; 0 where it is no more than rounding of the
+    pivot's place."""
+    largest = float(np.max(np.abs(history.channels["slip"])))
+    height = history.half_height or 0.0
+    return largest if largest > ROUNDING * height else 0.0
 
 
 def wall_speeds(history: History, scene: Scene) -> list[float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -116,6 +116,8 @@ def finding_of(found: Found) -> Finding:
         [
             sentence_of(found, everything, overturning, quantities),
             *gap_sentences(gaps),
+            *([found.levels.answer] if found.levels else []),
+            *hand_sentences(criteria),
             *certainty_sentences(found, own),
             *change_sentences(found, contributions),
         ]
@@ -128,9 +130,20 @@ def finding_of(found: Found) -> Finding:
         *(found.levels.blocks if found.levels else ()),
         contributions_table(contributions, found),
         *model_blocks(found),
-        *certainty,
+        *[
+            replace(block, folded=True) if isinstance(block, Table) else block
+            for block in certainty
+        ],
         *(inputs_blocks(own.inputs) if own and own.inputs else ()),
         criteria_table(criteria),
+        Table(
+            "methods",
+            [text("name", "method"), text("formula"), text("source"), text("holds", "range")],
+            [[row[key] for key in ("name", "formula", "source", "holds")] for row in criteria],
+            "The hand methods",
+            on="page",
+            folded=True,
+        ),
         *run_blocks(found),
         *notes_of(found),
     ]
@@ -197,7 +210,7 @@ def quantity_of(name: str, runs: Sequence[tuple[str, Ran]]) -> dict[str, Any]:
         if run.motion is not None and not run.fell and getattr(run.motion, name) is not None
     ]
     values = [value for value, _ in known_of]
-    record = max(known_of)[1] if known_of else None
+    record = max(known_of, key=lambda one: one[0])[1] if known_of else None
     return {"unit": unit, **spread(values), "record": record, "of": len(values)}
 
 
@@ -404,6 +417,16 @@ def gap_sentences(gaps: Mapping[str, Any]) -> list[str]:
     return said
 
 
+def hand_sentences(criteria: Sequence[Mapping[str, Any]]) -> list[str]:
+    """How often hand methods say that the block overturns."""
+    said = [
+        f"{row['name']} in {row['predicts']}"
+        for row in criteria
+        if row["event"] == "overturns" and row["of"]
+    ]
+    return [f"By hand methods it overturns: {', '.join(said)}."] if said else []
+
+
 def certainty_sentences(found: Found, own: Sure | None) -> list[str]:
     """How sure the runs are."""
     if found.recorded:
@@ -478,25 +501,24 @@ def outcomes_table(runs: Sequence[tuple[str, Ran]], overturning: Mapping[str, An
         [row for row in rows if row[1] or row[0] == "overturned"],
         "What happens",
         note="The interval is Wilson's; draws of one record count as one record.",
+        on="all" if len(runs) > 1 else "file",
     )
 
 
 def quantities_table(quantities: Mapping[str, Any], found: Found) -> Table:
     """The four figures."""
+    several = len(found.shown) > 1 or any(found.drawn.values())
+    spread_of = [
+        Column(name, label, digits=4, brief=several)
+        for name, label in (("median", ""), ("p16", "16 %"), ("p84", "84 %"))
+    ]
     columns = [
         text("quantity", "how far it moves"),
-        *(
-            Column(name, label, digits=4)
-            for name, label in (
-                ("median", "median"),
-                ("p16", "16 %"),
-                ("p84", "84 %"),
-                ("largest", "largest"),
-            )
-        ),
+        *spread_of,
+        Column("largest", "largest" if several else "value", digits=4),
         text("unit"),
-        text("record", "its record" if found.recorded else "of"),
-        Column("of", "of runs", help="Runs that stand and have the figure."),
+        text("record", "its record", brief=several),
+        Column("of", "of runs", help="Runs that stand and have the figure.", brief=several),
     ]
     shown = {q.name: quantities[q.name] | {"unit": _unit(q.unit)} for q in QUANTITIES}
     rows = [[q.label, *(shown[q.name][c.name] for c in columns[1:])] for q in QUANTITIES]
@@ -562,11 +584,11 @@ def gap_blocks(gaps: Mapping[str, Any]) -> list[Block]:
             ]
             for row in rows
         ],
-        "Which gap is safe",
         note="Runs that strike the wall, also those that then overturn.",
     )
     plot = Plot(
         "gaps",
+        "Which gap is safe",
         panels=[
             Panel("share of the runs", [Series(k, across, v) for k, v in shares.items()]),
             Panel("speed at the wall, m/s", [Series(k, across, v) for k, v in speeds.items()]),
@@ -574,7 +596,7 @@ def gap_blocks(gaps: Mapping[str, Any]) -> list[Block]:
         x=Axis("clear gap, m"),
         shared=False,
     )
-    return [table, plot]
+    return [plot, table]
 
 
 def contributions_table(contributions: Sequence[Mapping[str, Any]], found: Found) -> Table:
@@ -639,7 +661,9 @@ def model_blocks(found: Found) -> list[Block]:
                 Column("scatter", "σ in the suites", kind="percent", digits=3),
             ],
             rows,
-            note=f"Differences in peak rotation from {found.model}.",
+            "Other models",
+            f"Differences in peak rotation from {found.model}.",
+            folded=True,
         )
     ]
 
@@ -656,9 +680,6 @@ def criteria_table(criteria: Sequence[Mapping[str, Any]]) -> Table:
         Column("motion", help="Median of the simulated motion."),
         text("unit"),
         Column("unsafe", help="Runs that moved farther than estimated."),
-        text("formula", brief=False),
-        text("source", brief=False),
-        text("holds", "range", brief=False),
     ]
     rows = []
     for row in criteria:
@@ -729,11 +750,19 @@ def histories(found: Found) -> list[Block]:
             "Histories",
             panels=[Panel("", series)],
             x=Axis("time, s"),
-            y=Axis("θ/α"),
+            y=Axis("θ/α", limits=_around(series)),
             note="Rotation over the slenderness angle, positive to the left; a line a run.",
             live=True,
         )
     ]
+
+
+def _around(series: Sequence[Series]) -> tuple[float, float]:
+    """Limits of an axis for some series, 1e-3 wide at the least, so that noise is not blown up."""
+    values = [value for one in series for value in one.y if value is not None]
+    low, high = min(values), max(values)
+    beyond = max(0.05 * (high - low), 0.5e-3)
+    return low - beyond, high + beyond
 
 
 def _columns(table: str) -> dict[str, NDArray[np.float64]]:

@@ -159,7 +159,7 @@ class Assessment(Study):
             for model in self.models[1:]
             for case in self.cases
         }
-        if self.swift == SWIFT and self.own.scene.walls:
+        if self.model == SWIFT and self.own.scene.walls:
             found |= {
                 (LAW, case): self._run(
                     "other law of impacts", case, SWIFT, [()], settings=OTHER_LAW
@@ -249,10 +249,6 @@ def gaps_of(text: str, scene: Scene) -> tuple[tuple[float, ...], tuple[Side, ...
     known_sides: tuple[Side, ...] = tuple(wall.side for wall in scene.walls)
     if colon and side not in get_args(Side):
         raise InputError(f"{side!r} is not allowed: left or right", "--gaps")
-    if not colon and not known_sides:
-        raise InputError(
-            f"the scene has no wall: say on which side, as in left:{numbers}", "--gaps"
-        )
     try:
         gaps = sorted({float(word) for word in numbers.split(",")})
     except ValueError:
@@ -260,6 +256,10 @@ def gaps_of(text: str, scene: Scene) -> tuple[tuple[float, ...], tuple[Side, ...
     if not all(0.0 <= gap < np.inf for gap in gaps):
         raise InputError(
             f"{text!r} is not allowed: clear gaps in m, 0 or more, with commas between", "--gaps"
+        )
+    if not colon and not known_sides:
+        raise InputError(
+            f"the scene has no wall: say on which side, as in left:{numbers}", "--gaps"
         )
     if not colon:
         return tuple(gaps), known_sides, scene

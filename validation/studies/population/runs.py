@@ -15,7 +15,7 @@ from rockcheck.scenes.writing import columns_text
 from rockcheck.validation.criteria import CRITERIA, base_of
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.discrepancy.impact_laws import parting_landing
-from rockcheck.validation.discrepancy.motion import Motion, largest_reach, motion_of
+from rockcheck.validation.discrepancy.motion import Motion, largest_reach, largest_slip, motion_of
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build
 from rockcheck.validation.study import Task
@@ -122,7 +122,7 @@ def _ran(scene: Scene, model: Any) -> tuple[Ran, History | None]:
     found = Ran(
         outcome=history.outcome,
         motion=motion_of(history, scene),
-        slid=float(np.max(np.abs(history.channels["slip"]))),
+        slid=largest_slip(history),
         reach=reach,
     )
     return found, history
