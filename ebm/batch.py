@@ -24,9 +24,8 @@ from rockcheck.ebm.core.running import Records
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes.compiled import inner_kernel, kernel
 from rockcheck.scenes.errors import InputError, ModelFailure
-from rockcheck.scenes.progress import OnProgress, unheard
+from rockcheck.scenes.progress import OnProgress, threads, unheard
 from rockcheck.scenes.scene import Scene
-from rockcheck.scenes.threads import threads
 
 Floats = NDArray[np.float64]
 _CHUNK = 256

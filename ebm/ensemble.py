@@ -19,8 +19,8 @@ from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes import kinematics
 from rockcheck.scenes.compiled import kernel
 from rockcheck.scenes.errors import ModelFailure
+from rockcheck.scenes.progress import threads
 from rockcheck.scenes.scene import Scene
-from rockcheck.scenes.threads import threads
 
 Floats = NDArray[np.float64]
 _CHUNK = 32

@@ -136,7 +136,7 @@ class EventBasedModel(Frozen):
         start = time.perf_counter()
         from rockcheck.ebm import natural
         from rockcheck.ebm.core import bouc_wen, march, motion
-        from rockcheck.scenes.threads import interruptible
+        from rockcheck.scenes.progress import interruptible
 
         b = natural.setting_of(
             scene,

@@ -6,15 +6,13 @@ import math
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.engines.contacts import Surface, surfaces_of
 from rockcheck.engines.engine import Engine
 from rockcheck.engines.steps import AdaptiveStep
-from rockcheck.engines.world import State, World
+from rockcheck.engines.world import Placed, State, World
 from rockcheck.scenes import Scene
 
-FloatArray = NDArray[np.float64]
 SLAB = 10.0  # half the thickness of floor and walls
 REACH = 100.0  # half their extent
 #: DART drops rebounds slower than 0.1 of its units of length a second, and caps them at 100: sqrt(g
@@ -23,24 +21,6 @@ NATURAL_SPEED = 30.0
 #: Of its iterative solver, which converges where steps are tiny; its direct one gives way by 3e-4 g
 #: dt in each step.
 SWEEPS, TOLERANCE = 100, 1e-8
-
-
-class Dart(Engine):
-    """DART, with FCL's collision detection; at its best penetration is corrected apart from
-    velocity, and nothing sleeps."""
-
-    name: ClassVar[str] = "dart"
-    module: ClassVar[str] = "dartpy"
-    package: ClassVar[str] = "dartpy"
-
-    def rigid_world(self, scene: Scene) -> World:
-        """The scene as DART holds it, in units in which even slow contacts bounce."""
-        scale = NATURAL_SPEED / math.sqrt(scene.gravity * scene.block.radius)
-        return _RigidDartWorld(scene, scale, iterative=isinstance(self.steps, AdaptiveStep))
-
-    def stock_world(self, scene: Scene) -> World:
-        """The scene as DART holds it: a box among boxes."""
-        return _DartWorld(scene)
 
 
 class _DartWorld(World):
@@ -92,13 +72,11 @@ class _DartWorld(World):
         self._box(body, size, surface.friction, surface.restitution)
         self.world.addSkeleton(slab)
 
-    def place(self, state: FloatArray | State) -> None:
-        """Put the block where `state` says."""
+    def place(self, state: Placed) -> None:
         self.block.setPositions(self.scale * state[:3])
         self.block.setVelocities(self.scale * state[3:])
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
-        """One step."""
         if dt != self.dt:
             self.world.setTimeStep(dt)
             self.dt = dt
@@ -107,7 +85,6 @@ class _DartWorld(World):
         self.world.step()
 
     def state(self) -> State:
-        """Where the block is."""
         pose, velocity = (
             self.block.getPositions() / self.scale,
             self.block.getVelocities() / self.scale,
@@ -131,5 +108,21 @@ class _RigidDartWorld(_DartWorld):
         self.world.setDeactivationOptions(sleep)
 
     def bounce(self, bouncing: bool) -> None:
-        """Let contacts have their restitution, or none."""
         self.contact.setRestitutionCoeff(float(bouncing))
+
+
+class Dart(Engine):
+    """DART, with FCL's collision detection; at its best penetration is corrected apart from
+    velocity, and nothing sleeps."""
+
+    name: ClassVar[str] = "dart"
+    module: ClassVar[str] = "dartpy"
+
+    def rigid_world(self, scene: Scene) -> World:
+        """The scene as DART holds it, in units in which even slow contacts bounce."""
+        scale = NATURAL_SPEED / math.sqrt(scene.gravity * scene.block.radius)
+        return _RigidDartWorld(scene, scale, iterative=isinstance(self.steps, AdaptiveStep))
+
+    def stock_world(self, scene: Scene) -> World:
+        """The scene as DART holds it: a box among boxes."""
+        return _DartWorld(scene)

@@ -8,15 +8,13 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.engines.contacts import corners_of, surfaces_of
-from rockcheck.engines.engine import Engine
-from rockcheck.engines.world import State, World
+from rockcheck.engines.engine import Engine, Worlds
+from rockcheck.engines.world import Placed, State, World
 from rockcheck.scenes import Floor, ModelFailure, Scene, kinematics
 from rockcheck.scenes.errors import printable
 
-FloatArray = NDArray[np.float64]
 CORNER_RADIUS = 1e-5  # of the block's radius
 STIFFNESS = 2e8  # of each of two bodies in contact, N/m for a block of 1 kg and R = 1 m
 DISSIPATION = (
@@ -30,58 +28,22 @@ IMPACT_STEPS = 40  # in which an impact can bounce
 SLAB, REACH = 20.0, 600.0  # thickness and extent of floor and walls
 
 
-class Drake(Engine):
-    """Drake's discrete plant; at its best with tiny spheres as corners, stiff contacts, and TAMSI,
-    whose friction does not lift."""
-
-    name: ClassVar[str] = "drake"
-    module: ClassVar[str] = "pydrake"
-    package: ClassVar[str] = "drake"
-    bounces_with: ClassVar[tuple[str, ...]] = ()
-    fixed_because: ClassVar[str] = "Drake's discrete plant keeps the step it was made with"
-
-    def rigid_world(self, scene: Scene) -> World:
-        """The scene as Drake holds it: corners on slabs."""
-        return _RigidDrakeWorld(scene)
-
-    def stock_world(self, scene: Scene) -> World:
-        """The scene as Drake holds it: a box on a half-space."""
-        return _DrakeWorld(scene)
-
-    def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
-        """Corners on slabs, so soft that an impact lasts for some steps, with `restitution` as Hunt
-        and Crossley's dissipation."""
-        floor = Floor(friction=parameters["friction"])
-        return _RigidDrakeWorld(
-            scene.replace(floor=floor),
-            self.tuned(step)["stiffness"],
-            parameters["restitution"],
-            stiction=1e-4,
-        )
-
-    def tuned(self, step: float) -> dict[str, float]:
-        """The stiffness with which a block of 1 kg is in contact for `IMPACT_STEPS`, N/m."""
-        return {"stiffness": (math.pi / (IMPACT_STEPS * step)) ** 2}
-
-
 class _DrakeWorld(World):
     """A plant with a box in its plane, floor and walls, and Drake's default parameters; made when
     the step is known."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.dt = scene, 0.0
-        self.start: FloatArray | State = tuple(
+        self.start: Placed = tuple(
             kinematics.of_mass(scene.block, np.array(scene.initial_state)).tolist()
         )
 
-    def place(self, state: FloatArray | State) -> None:
-        """Put the block where `state` says."""
+    def place(self, state: Placed) -> None:
         self.start = state
         if self.dt:
             self.plant.SetPositionsAndVelocities(self.context, np.asarray(state))
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
-        """One step."""
         if not self.dt:
             self._make(dt)
         self.force.set_value([felt[0], felt[1], 0.0])
@@ -96,7 +58,6 @@ class _DrakeWorld(World):
         raise failure
 
     def state(self) -> State:
-        """Where the block is."""
         state: State = tuple(self.plant.GetPositionsAndVelocities(self.context).tolist())
         return state
 
@@ -144,7 +105,6 @@ class _DrakeWorld(World):
         self.simulator.Initialize()
 
     def shape(self, body: Any) -> None:
-        """Give the block, the floor and the walls their shapes."""
         from pydrake.geometry import Box, HalfSpace
         from pydrake.math import RigidTransform
         from pydrake.multibody.plant import CoulombFriction
@@ -193,7 +153,6 @@ class _RigidDrakeWorld(_DrakeWorld):
         self.simulator.Initialize()
 
     def shape(self, body: Any) -> None:
-        """Give the block, the floor and the walls their shapes."""
         from pydrake.geometry import AddContactMaterial, Box, ProximityProperties, Sphere
         from pydrake.math import RigidTransform
         from pydrake.multibody.plant import CoulombFriction, DiscreteContactApproximation
@@ -225,3 +184,30 @@ class _RigidDrakeWorld(_DrakeWorld):
             x, z = surface.behind(CORNER_RADIUS + 0.5 * SLAB)
             box, place = Box(*surface.extent(SLAB, REACH)), RigidTransform([x, 0.0, z])
             add(world, place, box, surface.surface, material(surface.friction))
+
+
+class Drake(Engine):
+    """Drake's discrete plant; at its best with tiny spheres as corners, stiff contacts, and TAMSI,
+    whose friction does not lift."""
+
+    name: ClassVar[str] = "drake"
+    module: ClassVar[str] = "pydrake"
+    package: ClassVar[str] = "drake"
+    bounces_with: ClassVar[tuple[str, ...]] = ()
+    fixed_because: ClassVar[str] = "Drake's discrete plant keeps the step it was made with"
+    worlds: ClassVar[Worlds] = (_RigidDrakeWorld, _DrakeWorld)
+
+    def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
+        """Corners on slabs, so soft that an impact lasts for some steps, with `restitution` as Hunt
+        and Crossley's dissipation."""
+        floor = Floor(friction=parameters["friction"])
+        return _RigidDrakeWorld(
+            scene.replace(floor=floor),
+            self.tuned(step)["stiffness"],
+            parameters["restitution"],
+            stiction=1e-4,
+        )
+
+    def tuned(self, step: float) -> dict[str, float]:
+        """The stiffness with which a block of 1 kg is in contact for `IMPACT_STEPS`, N/m."""
+        return {"stiffness": (math.pi / (IMPACT_STEPS * step)) ** 2}

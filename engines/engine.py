@@ -4,9 +4,9 @@ that comes out."""
 from __future__ import annotations
 
 import math
+import sys
 import time
-from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from importlib.util import find_spec
 from typing import Any, ClassVar, Literal, Self
@@ -29,6 +29,11 @@ MOST_STEPS = 5_000_000
 STOCK_STEP = 1e-4
 
 
+#: What makes the scene as an engine holds it: at its best, with contacts that stop or bounce within
+#: one step, and with its own parameters of contact.
+Worlds = tuple[Callable[[Scene], World], Callable[[Scene], World]]
+
+
 class Engine(Frozen):
     """A physics engine as a model of the block.
 
@@ -43,10 +48,16 @@ class Engine(Frozen):
     """
 
     name: ClassVar[str]
-    #: The module that it needs, and the package that holds it, as pip knows it; "" where it comes
-    #: with rockcheck.
+    #: The module that it needs, "" where it comes with rockcheck; the package that holds it, as pip
+    #: knows it, where that is called otherwise.
     module: ClassVar[str] = ""
     package: ClassVar[str] = ""
+    worlds: ClassVar[Worlds]
+    #: Digits of its states: "double" or "single" precision.
+    precision: ClassVar[Literal["double", "single"]] = "double"
+    #: The first and the last Python that the package has wheels for; None where it keeps up.
+    first_python: ClassVar[tuple[int, int]] = (3, 11)
+    last_python: ClassVar[tuple[int, int] | None] = None
     #: Why its steps cannot vary; "" where they can.
     fixed_because: ClassVar[str] = ""
     #: The settings in which contacts have Newton's coefficient of restitution.
@@ -101,20 +112,35 @@ class Engine(Frozen):
         """Whether the module that it needs can be imported."""
         return not cls.module or find_spec(cls.module) is not None
 
+    @classmethod
+    def has_wheel(cls) -> bool:
+        """Whether its package is published in a form that this Python can install as it is."""
+        here = sys.version_info[:2]
+        return cls.first_python <= here <= (cls.last_python or here)
+
+    @classmethod
+    def hint(cls) -> str:
+        """What to do where it is not installed."""
+        package = cls.package or cls.module
+        if cls.has_wheel():
+            return f"not installed: pip install {package}"
+        this = ".".join(map(str, sys.version_info[:2]))
+        return f"no wheel for Python {this}: pip install {package} compiles it"
+
     def coarser(self, factor: float) -> Self:
         """The same engine with all steps `factor` times as long; of adaptive ones those at the
         events, too."""
         longer = {knob: factor * getattr(self, knob) for knob in self.steps.knobs}
         return self.model_copy(update=longer)
 
-    @abstractmethod
     def rigid_world(self, scene: Scene) -> World:
         """The scene as this engine holds it at its best: contacts stop or bounce within one step,
         whatever the step."""
+        return self.worlds[0](scene)
 
-    @abstractmethod
     def stock_world(self, scene: Scene) -> World:
         """The scene as this engine holds it with its own contact parameters."""
+        return self.worlds[1](scene)
 
     def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
         """The scene with the engine's own parameters of contact, by default "restitution" and
@@ -155,9 +181,7 @@ class Engine(Frozen):
         is missing, `ModelFailure` if the motion blows up or its events do not end.
         """
         if not self.installed():
-            raise NotInstalled(
-                f"the engine {self.name} is not installed: pip install {self.package}", self.name
-            )
+            raise NotInstalled(f"the engine {self.name}: {self.hint()}", self.name)
         check_kind(scene, Scene, "load_scene", "scene")
         steps = self.steps
         if scene.duration / steps.largest > MOST_STEPS:

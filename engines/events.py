@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.engines.contacts import Contact
+from rockcheck.engines.marching import LYING
 from rockcheck.scenes import Event, Scene, kinematics
 from rockcheck.scenes.observation import STATE, modes_of
 
@@ -74,10 +75,10 @@ def events_of(
     found += [(t[i], "stick", i, 0.0) for i in _falls(slipping) if not flight[i]]
     resting = _held(flat & ~slipping & (np.abs(states[:, 5]) < TURNING), t, REST, value=True)
     found += [(t[i], "settled", i, 0.0) for i in _rises(resting)]
-    if abs(states[-1, 2]) >= math.pi / 2:
+    if abs(states[-1, 2]) >= LYING:
         part = (math.pi / 2 - abs(states[-2, 2])) / (abs(states[-1, 2]) - abs(states[-2, 2]))
         side = "left" if states[-1, 2] > 0 else "right"
-        end = t[-2] + part * (t[-1] - t[-2])
+        end = t[-2] + min(part, 1.0) * (t[-1] - t[-2])
         found = [event for event in found if event[0] < end]
         found.append((end, f"overturned {side}", len(t) - 1, 0.0))
     found.sort(key=lambda event: event[0])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rockcheck.engines.adaptive import Vector
 from rockcheck.engines.contacts import Contact, Surface, contacts_of, corners_of, surfaces_of
 from rockcheck.engines.engine import Engine
-from rockcheck.engines.world import State, World
+from rockcheck.engines.world import Placed, State, World
 from rockcheck.scenes import ModelFailure, Scene
 from rockcheck.scenes.errors import printable
 
@@ -26,46 +26,6 @@ RIGID = 1e7
 SLIDING = 1e-7
 FLATTEST = -0.05  # slope that the secant method trusts
 MOST_CORRECTIONS = 20
-
-
-class MuJoCo(Engine):
-    """MuJoCo, with contacts that remove the approach within one step (Euler, elliptic cone, Newton
-    solver).
-
-    `cone_correction` applies De Saxce's correction to the floor's contacts. MuJoCo's friction is
-    associated: a sliding contact lifts off at mu times its slip rate, whatever the step; the
-    correction takes just that out. It belongs to the "best" settings; the stock engine ("default")
-    has none.
-    """
-
-    name: ClassVar[str] = "mujoco"
-    bounces_with: ClassVar[tuple[str, ...]] = ("best",)
-    cone_correction: bool = True
-
-    def rigid_world(self, scene: Scene) -> World:
-        """The scene as MuJoCo holds it: point contacts of the corners."""
-        friction = scene.floor.friction if self.cone_correction else 0.0
-        return _RigidMuJoCoWorld(_point_contact_model(scene), contacts_of(scene), friction)
-
-    def stock_world(self, scene: Scene) -> World:
-        """The scene as MuJoCo holds it: a box among planes."""
-        return _MuJoCoWorld(_stock_model(scene, scene.floor.friction))
-
-    def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
-        """A box on a plane whose contacts stop within a step, with `restitution` in steps of
-        damping."""
-        friction, damping = parameters["friction"], parameters["restitution"] / step
-        impedance = " ".join(map(repr, IMPEDANCE))
-        solref = f"{-PUSHED_OUT / step**2!r} {-damping!r}"
-        settings = (
-            '<option cone="elliptic"/>'
-            f'<default><geom solref="{solref}" solimp="{impedance}"/></default>'
-        )
-        return _MuJoCoWorld(_stock_model(scene, friction, settings))
-
-    def tuned(self, step: float) -> dict[str, float]:
-        """The share of a penetration that one step removes."""
-        return {"erp": PUSHED_OUT}
 
 
 class _MuJoCoWorld(World):
@@ -86,24 +46,20 @@ class _MuJoCoWorld(World):
         self.force = self.data.qfrc_applied[:2]
         self.dt = 0.0
 
-    def place(self, state: FloatArray | State) -> None:
-        """Put the block where `state` says."""
+    def place(self, state: Placed) -> None:
         self.qpos[:] = state[:3]
         self.qvel[:] = state[3:]
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
-        """One step."""
         self.force[:] = felt
         if dt != self.dt:
             self.model.opt.timestep = self.dt = dt
         self.mujoco.mj_step(self.model, self.data)
 
     def state(self) -> State:
-        """Where the block is."""
         return (*self.qpos.tolist(), *self.qvel.tolist())
 
     def march(self, felt: FloatArray, dt: float) -> FloatArray:
-        """States after each step."""
         states = super().march(felt, dt)
         self.check()
         return states
@@ -148,7 +104,6 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
         )
 
     def march(self, felt: FloatArray, dt: float) -> FloatArray:
-        """States after each step."""
         # Reference acceleration: -(1+e)/dt times the velocity, less a share of the penetration.
         self.stiffness[:] = self.pushing_out / dt**2
         self.damping[:] = self.bouncing / dt
@@ -169,7 +124,6 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
     def push(
         self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool
     ) -> Vector:
-        """Velocity after `dt` s with the contacts closed at `pose`."""
         model, data = self.model, self.data
         self.qpos[:] = pose
         self.qvel[:] = velocity
@@ -311,3 +265,43 @@ def _stock_model(scene: Scene, mu: float, settings: str = "") -> str:
     place = "" if block.centre_of_mass is None else f'pos="{-dx!r} 0 {-dz!r}" '
     box = f'<geom type="box" {place}size="{size}" condim="1" friction="0 0 0"/>'
     return _model(planes + _planar_body(scene, box), settings)
+
+
+class MuJoCo(Engine):
+    """MuJoCo, with contacts that remove the approach within one step (Euler, elliptic cone, Newton
+    solver).
+
+    `cone_correction` applies De Saxce's correction to the floor's contacts. MuJoCo's friction is
+    associated: a sliding contact lifts off at mu times its slip rate, whatever the step; the
+    correction takes just that out. It belongs to the "best" settings; the stock engine ("default")
+    has none.
+    """
+
+    name: ClassVar[str] = "mujoco"
+    bounces_with: ClassVar[tuple[str, ...]] = ("best",)
+    cone_correction: bool = True
+
+    def rigid_world(self, scene: Scene) -> World:
+        """The scene as MuJoCo holds it: point contacts of the corners."""
+        friction = scene.floor.friction if self.cone_correction else 0.0
+        return _RigidMuJoCoWorld(_point_contact_model(scene), contacts_of(scene), friction)
+
+    def stock_world(self, scene: Scene) -> World:
+        """The scene as MuJoCo holds it: a box among planes."""
+        return _MuJoCoWorld(_stock_model(scene, scene.floor.friction))
+
+    def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
+        """A box on a plane whose contacts stop within a step, with `restitution` in steps of
+        damping."""
+        friction, damping = parameters["friction"], parameters["restitution"] / step
+        impedance = " ".join(map(repr, IMPEDANCE))
+        solref = f"{-PUSHED_OUT / step**2!r} {-damping!r}"
+        settings = (
+            '<option cone="elliptic"/>'
+            f'<default><geom solref="{solref}" solimp="{impedance}"/></default>'
+        )
+        return _MuJoCoWorld(_stock_model(scene, friction, settings))
+
+    def tuned(self, step: float) -> dict[str, float]:
+        """The share of a penetration that one step removes."""
+        return {"erp": PUSHED_OUT}

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from rockcheck.engines.adaptive import Vector
 from rockcheck.engines.contacts import Surface, contacts_of, corners_of, surfaces_of
-from rockcheck.engines.engine import Engine
-from rockcheck.engines.world import State, World
+from rockcheck.engines.engine import Engine, Worlds
+from rockcheck.engines.world import Placed, State, World
 from rockcheck.scenes import Scene
 
 FloatArray = NDArray[np.float64]
@@ -23,23 +23,6 @@ SLAB = 10.0  # half the thickness, in m, of floor and walls as the engine comes
 REACH = 300.0  # half their extent
 # share of a penetration that one step removes; none where it would add to a bounce or make one
 FLOOR_ERP = 0.02
-
-
-class PyBullet(Engine):
-    """PyBullet, with its default solver iterated until it has converged, without slop, damping and
-    sleeping."""
-
-    name: ClassVar[str] = "pybullet"
-    module: ClassVar[str] = "pybullet"
-    package: ClassVar[str] = "pybullet"
-
-    def rigid_world(self, scene: Scene) -> World:
-        """The scene as PyBullet holds it: point contacts of the corners."""
-        return _RigidPyBulletWorld(scene)
-
-    def stock_world(self, scene: Scene) -> World:
-        """The scene as PyBullet holds it: a box among boxes."""
-        return _PyBulletWorld(scene)
 
 
 @cache
@@ -106,7 +89,7 @@ class _PyBulletWorld(World):
             self.bullet.GEOM_BOX, halfExtents=surface.extent(SLAB, REACH), **self.options
         ), SLAB
 
-    def place(self, state: FloatArray | State) -> None:
+    def place(self, state: Placed) -> None:
         """Put the block where `state` says. Bullet's y axis points into the plane: its angles are
         clockwise."""
         x, z, theta, vx, vz, w = map(float, state)
@@ -119,7 +102,6 @@ class _PyBulletWorld(World):
         )
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
-        """One step."""
         if dt != self.dt:
             self.bullet.setTimeStep(dt, physicsClientId=self.client)
             self.dt = dt
@@ -127,14 +109,12 @@ class _PyBulletWorld(World):
         self.bullet.stepSimulation(physicsClientId=self.client)
 
     def state(self) -> State:
-        """Where the block is."""
         (x, _, z), (_, turn, _, whole) = self.bullet.getBasePositionAndOrientation(
             self.body, physicsClientId=self.client
         )
         return x, z, -2.0 * math.atan2(turn, whole), *self.velocity()
 
     def velocity(self) -> Vector:
-        """How fast the block is."""
         (vx, _, vz), (_, w, _) = self.bullet.getBaseVelocity(self.body, physicsClientId=self.client)
         return vx, vz, -w
 
@@ -203,15 +183,23 @@ class _RigidPyBulletWorld(_PyBulletWorld):
         ), CORNER_RADIUS
 
     def march(self, felt: FloatArray, dt: float) -> FloatArray:
-        """States after each step."""
         self.bounce(True)
         self.bullet.setPhysicsEngineParameter(contactERP=self.erp, **self.options)
         return super().march(felt, dt)
 
     def bounce(self, bouncing: bool) -> None:
-        """Let all contacts have their restitution, or none."""
         if bouncing is not self.bouncing and (self.bounces or self.bouncing is None):
             self.bullet.setPhysicsEngineParameter(
                 restitutionVelocityThreshold=0.0 if bouncing else 1e30, **self.options
             )
             self.bouncing = bouncing
+
+
+class PyBullet(Engine):
+    """PyBullet, with its default solver iterated until it has converged, without slop, damping and
+    sleeping."""
+
+    name: ClassVar[str] = "pybullet"
+    module: ClassVar[str] = "pybullet"
+    last_python: ClassVar[tuple[int, int] | None] = (3, 11)
+    worlds: ClassVar[Worlds] = (_RigidPyBulletWorld, _PyBulletWorld)

@@ -4,38 +4,18 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rockcheck.engines.adaptive import Vector
 from rockcheck.engines.contacts import surfaces_of
-from rockcheck.engines.engine import Engine
-from rockcheck.engines.world import State, World
+from rockcheck.engines.engine import Engine, Worlds
+from rockcheck.engines.world import Placed, State, World
 from rockcheck.scenes import Scene
 
-FloatArray = NDArray[np.float64]
 # half the thickness of floor and walls: Chipmunk's normals are exact where shapes do not cross each
 # other's middle
 SLAB = 10.0
 REACH = 1000.0  # half their extent
 KEPT = 0.5  # share of a penetration that is left after a second
 ITERATIONS = 200
-
-
-class Pymunk(Engine):
-    """pymunk; at its best with a converged solver and without slop."""
-
-    name: ClassVar[str] = "pymunk"
-    module: ClassVar[str] = "pymunk"
-    package: ClassVar[str] = "pymunk"
-
-    def rigid_world(self, scene: Scene) -> World:
-        """The scene as pymunk holds it, with a converged solver."""
-        return _RigidPymunkWorld(scene)
-
-    def stock_world(self, scene: Scene) -> World:
-        """The scene as pymunk holds it: a box among segments."""
-        return _PymunkWorld(scene)
 
 
 class _PymunkWorld(World):
@@ -64,19 +44,16 @@ class _PymunkWorld(World):
             segment.friction, segment.elasticity = surface.friction, surface.restitution
             self.space.add(segment)
 
-    def place(self, state: FloatArray | State) -> None:
-        """Put the block where `state` says."""
+    def place(self, state: Placed) -> None:
         x, y, theta, vx, vy, w = map(float, state)
         self.body.position, self.body.angle = (x, y), theta
         self.body.velocity, self.body.angular_velocity = (vx, vy), w
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
-        """One step."""
         self.space.gravity = felt
         self.space.step(dt)
 
     def state(self) -> State:
-        """Where the block is."""
         body = self.body
         (x, y), (vx, vy) = body.position, body.velocity
         return x, y, body.angle, vx, vy, body.angular_velocity
@@ -98,7 +75,6 @@ class _RigidPymunkWorld(_PymunkWorld):
         self.aloft = (0.0, 10.0 * scene.block.radius, 0.0, 0.0, 0.0, 0.0)
 
     def bounce(self, bouncing: bool) -> None:
-        """Let contacts have their restitution, or none."""
         self.box.elasticity = float(bouncing)
 
     def push(
@@ -115,3 +91,11 @@ class _RigidPymunkWorld(_PymunkWorld):
         return super().push(
             (x - vx * dt, y - vy * dt, theta - w * dt), velocity, dt, felt, bouncing
         )
+
+
+class Pymunk(Engine):
+    """pymunk; at its best with a converged solver and without slop."""
+
+    name: ClassVar[str] = "pymunk"
+    module: ClassVar[str] = "pymunk"
+    worlds: ClassVar[Worlds] = (_RigidPymunkWorld, _PymunkWorld)

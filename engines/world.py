@@ -11,6 +11,7 @@ from rockcheck.engines.adaptive import Vector
 
 FloatArray = NDArray[np.float64]
 State = tuple[float, float, float, float, float, float]
+Placed = FloatArray | State
 
 
 class World(ABC):
@@ -21,7 +22,7 @@ class World(ABC):
     """
 
     @abstractmethod
-    def place(self, state: FloatArray | State) -> None:
+    def place(self, state: Placed) -> None:
         """Put the block where `state` says."""
 
     @abstractmethod

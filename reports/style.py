@@ -68,6 +68,9 @@ LOOKS = {
         Look("pymunk", "pymunk", "#7a8a00", "#b5c334", (1.0, 1.0), "<"),
         Look("dart", "DART", "#8c564b", "#c58a7f", (6.0, 1.0, 1.0, 1.0), ">"),
         Look("drake", "Drake", "#6a51a3", "#a48fd6", (3.0, 1.0), "p"),
+        Look("box2d", "Box2D", "#3f6fb5", "#86aee8", (1.0, 1.0, 4.0, 1.0), "h"),
+        Look("physx", "PhysX", "#4c7a1e", "#93c25f", (2.0, 2.0), "d"),
+        Look("jolt", "Jolt", "#a03e3e", "#dd8a84", (7.0, 1.5), "*"),
         Look("measured", "measured", "#6e6e6e", "#a0a0a0", (), "x"),
     )
 }

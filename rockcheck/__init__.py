@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         overturning_spectrum,
         predictability_horizon,
     )
-    from rockcheck.engines import Dart, Drake, MuJoCo, PyBullet, Pymunk
+    from rockcheck.engines import Box2D, Dart, Drake, Jolt, MuJoCo, PhysX, PyBullet, Pymunk
     from rockcheck.scenes import (
         Block,
         Cost,
@@ -74,7 +74,16 @@ _HOMES = {
         "predictability_horizon",
     ),
     "rockcheck.cm": ("ContinuousModel", "measured_restitution"),
-    "rockcheck.engines": ("Dart", "Drake", "MuJoCo", "PyBullet", "Pymunk"),
+    "rockcheck.engines": (
+        "Box2D",
+        "Dart",
+        "Drake",
+        "Jolt",
+        "MuJoCo",
+        "PhysX",
+        "PyBullet",
+        "Pymunk",
+    ),
     "rockcheck.validation": ("Discrepancy", "compare"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
@@ -101,9 +110,12 @@ __all__ = [  # noqa: RUF022 - in the order of the table above, which a test hold
     "predictability_horizon",
     "ContinuousModel",
     "measured_restitution",
+    "Box2D",
     "Dart",
     "Drake",
+    "Jolt",
     "MuJoCo",
+    "PhysX",
     "PyBullet",
     "Pymunk",
     "Discrepancy",

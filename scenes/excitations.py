@@ -17,7 +17,7 @@ from pydantic import Field, StringConstraints, model_validator
 
 from rockcheck.scenes.base import Finite, Frozen, Positive
 from rockcheck.scenes.errors import InputError
-from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Reading, Recording, read_record
+from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Reading, read_record
 
 FloatArray = NDArray[np.float64]
 #: Largest peak acceleration that a record may be scaled to, g.
@@ -174,7 +174,13 @@ class Record(Motion):
             reading = Reading(
                 **{name: data.pop(name) for name in Reading.model_fields if name in data}
             )
-            data |= _told(read_record(Path(path), reading), Path(path))
+            found = read_record(Path(path), reading)
+            data |= {
+                "unscaled": tuple(found.samples.tolist()),
+                "time_step": found.time_step,
+                "source": Path(path).name,
+                "notes": found.notes,
+            }
         if isinstance(data, dict) and "pga" in data:
             data = _at_peak(data)
         return data
@@ -231,17 +237,6 @@ def _at_peak(data: Mapping[str, Any]) -> dict[str, Any]:
     if not largest > 0.0:
         raise InputError("the record does not move: no scale gives it a peak", "pga")
     return {**data, "scale": pga * GRAVITY_OF_RECORDS / largest}
-
-
-def _told(found: Recording, path: Path) -> dict[str, Any]:
-    """A file's recording as fields of a `Record`."""
-    samples = tuple(found.samples.tolist())
-    return {
-        "unscaled": samples,
-        "time_step": found.time_step,
-        "source": path.name,
-        "notes": found.notes,
-    }
 
 
 Excitation = Annotated[Rest | Ricker | Sine | Record, Field(discriminator="kind")]

@@ -81,11 +81,12 @@ TARGETS = {
         "tests/scenes/test_scene.py",
         "tests/ebm/test_loaded_blocks.py::test_pivots_of_a_block",
     ],
-    "scenes/trust/inputs.py": [
+    "scenes/files.py": [
         "tests/scenes/test_inputs.py",
+        "tests/scenes/test_files.py",
         UNCERTAINTY,
         "-k",
-        "inputs or scene_file or correlated or faults",
+        "inputs or files or scene_file or correlated or faults",
     ],
     "scenes/recordings/sets.py": [
         "tests/scenes/test_record_sets.py",

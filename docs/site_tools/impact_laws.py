@@ -1,8 +1,8 @@
-"""Makes the tables and the figure of docs/impact_laws.md: which law of impacts each engine follows
-at landings where laws part.
+"""Makes the tables of the report "impact-laws": which law of impacts each engine follows at
+landings where laws part.
 
 `python docs/site_tools/impact_laws.py flush|flat [LANDINGS]` plays them (160 flush ones take half
-an hour) and writes their table, with the flush ones the figure, too. The landings are drawn with a
+an hour) and keeps their table. The landings are drawn with a
 seed. Flush: a random block stands flush against a wall that bounces and comes back to it, most of
 them from a tilt, one in eight after a pulse. Flat: a random block is dropped while it moves.
 """
@@ -10,20 +10,18 @@ them from a tilt, one in eight after a pulse. Flat: a random block is dropped wh
 from __future__ import annotations
 
 import math
-import re
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import numpy as np
+import whole_runs
 
 from rockcheck import engines
 from rockcheck.cm import ContinuousModel
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Ricker, Scene, Wall
-from rockcheck.scenes.writing import markdown_table
 from rockcheck.validation.discrepancy.impact_laws import (
     TELLS,
     Landing,
@@ -31,20 +29,11 @@ from rockcheck.validation.discrepancy.impact_laws import (
     parting_landing,
 )
 from rockcheck.validation.execute.models import Model
+from rockcheck.validation.finding import Column, Table, text
 
 LANDINGS, SEED, PULSED = 160, 1, 8
-DOCS = Path(__file__).parents[1]
 COLUMNS = ("closed", "closed or open", "open", "floor-first", "none")
 FLAT_COLUMNS = ("moreau", "moreau or leading-first", "leading-first", "trailing-first", "none")
-COLOURS = {
-    "closed": "#0072b2",
-    "closed or open": "#56b4e9",
-    "open": "#e69f00",
-    "floor-first": "#009e73",
-    "none": "#999999",
-}
-#: The landing that is drawn, and who is drawn beside the laws.
-EXAMPLE, DRAWN = 3, {"mujoco adaptive": "#d55e00", "dart 1e-05": "#cc79a7", "cm": "#000000"}
 
 
 @dataclass(frozen=True)
@@ -56,7 +45,7 @@ class Row:
     found: Sequence[LawFollowed | None]
     default: Sequence[LawFollowed | None]
 
-    def words(self, columns: Sequence[str]) -> Iterator[str]:
+    def cells(self, columns: Sequence[str]) -> Iterator[str | int | None]:
         """The row of the table."""
         told = [one for one in self.found if one is not None]
         counts = Counter(one.law for one in told)
@@ -68,9 +57,9 @@ class Row:
             and usual is not None
             and set(one.law.split(" or ")) & set(usual.law.split(" or "))
         ]
-        yield f"`{self.model}`"
-        yield from (str(counts[law] or "") for law in columns)
-        yield f"`{np.median(errors):.0e} ({min(errors):.0e} … {max(errors):.0e})`" if errors else ""
+        yield self.model
+        yield from (counts[law] or None for law in columns)
+        yield f"{np.median(errors):.0e} ({min(errors):.0e} … {max(errors):.0e})" if errors else ""
         yield f"{sum(error < TELLS for error in alike)}/{len(alike)}"
 
 
@@ -174,82 +163,17 @@ def _followed(where: Landing, scene: Scene, model: Model) -> LawFollowed | None:
         return None
 
 
-def draw(rows: Sequence[Row], path: Path) -> None:
-    """One landing by all laws and some models; the shares of the laws, a bar a model."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8.0, 4.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    scene = landing(EXAMPLE)
-    where = parting_landing(scene)
-    assert where is not None
-    milliseconds = 1e3 * (scene.output_times - where.t)
-    for law, rotation in where.branches.items():
-        times = milliseconds[where.start :][: len(rotation)]
-        left.plot(
-            times,
-            rotation[: len(times)],
-            color=COLOURS[law],
-            linewidth=3.0,
-            alpha=0.6,
-            label=f"law: {law}",
-        )
-    known = models()
-    for (name, colour), dash in zip(DRAWN.items(), ((4, 2), (1, 1.5), (6, 2, 1, 2)), strict=True):
-        if name in known:
-            rotation = known[name].simulate(scene).channels["theta"] / scene.block.alpha
-            left.plot(
-                milliseconds[: len(rotation)],
-                rotation,
-                color=colour,
-                linewidth=1.2,
-                linestyle=(0, dash),
-                label=name,
-            )
-    wall = scene.walls[0]
-    left.set_title(
-        f"A landing: {wall.side} wall, e = {wall.restitution:g}, α = {scene.block.alpha:.2f} rad",
-        fontsize=9,
-    )
-    left.set_xlabel("time after the landing, ms")
-    left.set_ylabel("rotation θ/α")
-    left.set_xlim(-40.0, 100.0)
-    left.legend(fontsize=7)
-    names = [row.model for row in rows]
-    before = np.zeros(len(rows))
-    for law in COLUMNS:
-        counts = np.array(
-            [sum(one is not None and one.law == law for one in row.found) for row in rows],
-            dtype=float,
-        )
-        right.barh(names, counts, left=before, color=COLOURS[law], label=law)
-        before += counts
-    right.invert_yaxis()
-    right.set_xlabel("landings")
-    right.set_title("The law that is followed", fontsize=9)
-    right.tick_params(labelsize=8)
-    right.legend(
-        fontsize=7,
-        ncols=len(COLUMNS),
-        loc="upper center",
-        bbox_to_anchor=(0.4, -0.14),
-        columnspacing=0.8,
-        handlelength=1.2,
-    )
-    figure.savefig(path, dpi=130)
-
-
 def publish(kind: str, rows: Sequence[Row]) -> None:
-    """Write the table into the page, and the figure beside it."""
-    columns = KINDS[kind][1]
-    head = ("model", *columns, "α off it: median (range)", "as the default")
-    table = markdown_table(head, [tuple(row.words(columns)) for row in rows])
-    page = DOCS / "impact_laws.md"
-    text = page.read_text(encoding="utf-8")
-    place = rf"(<!-- {kind} -->\n).*?(\n<!-- end -->)"
-    page.write_text(re.sub(place, rf"\g<1>\n{table}\n\2", text, flags=re.S), encoding="utf-8")
-    if kind == "flush":
-        draw(rows, DOCS / "images" / "impact-laws.png")
+    """Put the table into the kept report."""
+    columns = [text("model"), *map(Column, KINDS[kind][1]), text("off"), text("alike")]
+    kept = whole_runs.load("impact-laws")
+    blocks = [
+        replace(block, columns=columns, rows=[list(row.cells(KINDS[kind][1])) for row in rows])
+        if isinstance(block, Table) and block.name == kind
+        else block
+        for block in kept.blocks
+    ]
+    whole_runs.keep("impact-laws", replace(kept, blocks=blocks))
 
 
 def main(kind: str, landings: str = str(LANDINGS)) -> None:
@@ -258,7 +182,7 @@ def main(kind: str, landings: str = str(LANDINGS)) -> None:
     rows = []
     for row in played([drawn(number) for number in range(int(landings))]):
         rows.append(row)
-        print(*row.words(columns), sep="; ", file=sys.stderr, flush=True)
+        print(*row.cells(columns), sep="; ", file=sys.stderr, flush=True)
     publish(kind, rows)
 
 

@@ -24,8 +24,7 @@ from rockcheck.commands.validate import chosen_models, record_sets
 from rockcheck.ebm.spectrum import Floats
 from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.errors import printable
-from rockcheck.scenes.files import load_uncertain_scene
-from rockcheck.scenes.trust.inputs import UncertainScene
+from rockcheck.scenes.files import UncertainScene, load_uncertain_scene
 from rockcheck.validation.criteria import sampled
 from rockcheck.validation.studies.population.assess import Assessment, gaps_of
 from rockcheck.validation.studies.population.study import CAPACITIES, Population, fragility, ida

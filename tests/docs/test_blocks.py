@@ -1,12 +1,10 @@
 """Every code block of the README and of docs/ is run, in order, each page in a folder of its own.
 
 - python: executed; the blocks of a page share their names, as in a notebook.
-- a block with `title="file"`: written to that file, and loaded as what it is.
+- a block with `title="file"`: written to that file, and loaded as what it is; a script is run.
 - bash, and indented commands: run; one that fails, fails the page. `make` targets are looked up
   instead of run.
-- an HTML comment that begins with `check`: executed after the blocks before it, and not shown to a
-  reader. It computes figures that the page states: `said("within 0.008")` holds the page to its
-  words, an assertion holds the words to what comes out.
+- text: what a command shows; not run.
 
 Pages of studies hold commands of many minutes; these are run with `@pytest.mark.slow`, the longest
 in their `--quick` form.
@@ -25,11 +23,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+import yaml
 from markdown_it import MarkdownIt
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-CHECK = "<!-- check\n"
 LANGUAGES = {"python", "bash", "toml", "csv", "yaml", "text"}
 #: Commands that take minutes, and the form of them that takes less, where there is one.
 LONG = {"benchmark": "--quick", "spectrum": "", "validate": "", "stress": "--quick"}
@@ -56,17 +54,12 @@ def blocks_of(page: Path) -> Iterator[Block]:
             yield Block(language, title[1] if title else "", token.content, line)
         elif token.type == "code_block":
             yield Block("bash", "", token.content, line)
-        elif token.type == "html_block" and token.content.startswith(CHECK):
-            yield Block(
-                "python", "", token.content.removeprefix(CHECK).strip().removesuffix("-->"), line
-            )
 
 
 def commands_of(text: str) -> list[str]:
-    """The commands of a shell block, without their remarks; a word list after two spaces is a
-    remark, too."""
+    """The commands of a shell block, without their remarks."""
     lines = (line.split(" #")[0].rstrip() for line in text.splitlines())
-    return [re.split(r"(?<=\S)  +", line)[0] for line in lines if line and not line.startswith("#")]
+    return [line for line in lines if line and not line.startswith("#")]
 
 
 def is_long(command: str) -> bool:
@@ -80,25 +73,10 @@ def is_long(command: str) -> bool:
     )
 
 
-def said(phrase: str, page: Path) -> None:
-    """Fails where a page does not have this phrase, however its lines are broken."""
-    text = re.sub(r"<!--.*?-->", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
-    assert " ".join(phrase.split()) in " ".join(text.split()), f"{page.name} does not say: {phrase}"
-
-
-def run_python(block: Block, page: Path, names: dict[str, object]) -> None:
-    """Execute it; a traceback points into the page."""
-    exec(compile("\n" * (block.line - 1) + block.text, str(page), "exec"), names)
-
-
-def run_shell(command: str, folder: Path) -> None:
-    """Run one command; the interpreter of the tests is the first on the path."""
-    words = shlex.split(command)
-    if words[0] == "make":  # the whole set-up: what runs the tests
-        subprocess.run(["make", "-n", *words[1:]], cwd=ROOT, check=True, capture_output=True)
-        return
+def shell(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a command; the interpreter of the tests is the first on the path."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    done = subprocess.run(
+    return subprocess.run(
         ["bash", "-c", command],
         cwd=folder,
         env={**os.environ, "PATH": path},
@@ -106,19 +84,25 @@ def run_shell(command: str, folder: Path) -> None:
         text=True,
         check=False,
     )
+
+
+def run_shell(command: str, folder: Path) -> None:
+    """Run one command that has to succeed; of `make` only whether the target is there."""
+    made = command.startswith("make ")
+    done = shell(command.replace("make", "make -n", 1), ROOT) if made else shell(command, folder)
     assert done.returncode == 0, f"{command}: exit {done.returncode}: {done.stderr or done.stdout}"
 
 
 def show_file(block: Block, folder: Path) -> None:
-    """Write the file that a block shows, and read it as what it is."""
+    """Write the file that a block shows, and read or run it as what it is."""
     path = folder / block.file
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(block.text, encoding="utf-8")
     if block.language == "toml":
         tomllib.loads(block.text)
+    elif block.language == "bash":
+        run_shell(f"set -e; . ./{block.file}", folder)
     elif block.language == "yaml":
-        import yaml
-
         jobs = yaml.safe_load(block.text)["jobs"]
         for step in (step for job in jobs.values() for step in job["steps"] if "run" in step):
             if step["run"].startswith("rockcheck"):
@@ -129,7 +113,7 @@ def show_file(block: Block, folder: Path) -> None:
 def test_every_block_has_a_language(page):
     for block in blocks_of(page):
         assert block.language in LANGUAGES, f"{page.name}, line {block.line}: {block.language!r}"
-        assert block.file or block.language in ("python", "bash"), (
+        assert block.file or block.language in ("python", "bash", "text"), (
             f"{page.name}, line {block.line}: a file without a name is not run"
         )
 
@@ -137,23 +121,15 @@ def test_every_block_has_a_language(page):
 @pytest.mark.long
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_blocks_run(page, tmp_path, monkeypatch):
-    blocks = list(blocks_of(page))
-    if not blocks:
-        return
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.syspath_prepend(ROOT / "docs" / "site_tools")
-    names: dict[str, object] = {
-        "__name__": "__main__",
-        "DOCS": ROOT / "docs",
-        "said": lambda phrase, where=page: said(phrase, where),
-    }
-    for block in blocks:
+    names: dict[str, object] = {"__name__": "__main__"}
+    for block in blocks_of(page):
         if block.file:
             show_file(block, tmp_path)
-        elif block.language == "python":
-            run_python(block, page, names)
-        else:
+        elif block.language == "python":  # a traceback points into the page
+            exec(compile("\n" * (block.line - 1) + block.text, str(page), "exec"), names)
+        elif block.language == "bash":
             for command in commands_of(block.text):
                 if not is_long(command):
                     run_shell(command, tmp_path)
@@ -164,8 +140,9 @@ LONG_COMMANDS = sorted(
         command
         for page in PAGES
         for block in blocks_of(page)
+        if block.language == "bash" and not block.file
         for command in commands_of(block.text)
-        if block.language == "bash" and is_long(command)
+        if is_long(command)
     }
 )
 
@@ -173,15 +150,7 @@ LONG_COMMANDS = sorted(
 @pytest.mark.parametrize("command", LONG_COMMANDS)
 def test_long_commands_are_understood(command, tmp_path):
     """Their words are all known: with one more that is not, only that one is complained of."""
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    done = subprocess.run(
-        ["bash", "-c", f"{command.replace(' [SUITE]', '')} --no-such-option"],
-        cwd=tmp_path,
-        env={**os.environ, "PATH": path},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = shell(f"{command} --no-such-option", tmp_path)
     assert done.returncode == 2
     assert "--no-such-option" in done.stderr
 

@@ -3,6 +3,7 @@ system."""
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -19,6 +20,7 @@ ROOT = Path(__file__).parents[2]
 #: Building the site takes half a minute.
 pytestmark = pytest.mark.long
 SOURCES = sorted(path.stem for path in (ROOT / "docs").glob("*.md"))
+REPORTS = sorted(path.stem for path in (ROOT / "docs" / "runs").glob("*.json"))
 
 
 @pytest.fixture(scope="module")
@@ -112,14 +114,14 @@ def test_no_number_breaks_at_its_hyphen(site, page):
     )
     assert {"1e-12", "ebm-unilateral"} <= {text for text, _ in held}
     assert {lines for _, lines in held} == {1}
-    assert "<!-- check" not in page.content()
+    assert "<!-- " not in page.locator("article").inner_html()
 
 
 @pytest.mark.browser
 def test_the_sample_report_is_one_click_away(site, page):
     page.goto((site / "index.html").as_uri())
     page.get_by_role("link", name="See a sample report").click()
-    assert page.url == (site / "sample" / "index.html").as_uri()
+    assert page.url == (site / "reports" / "smoke" / "index.html").as_uri()
     assert "smoke" in page.inner_text("body")
     links = page.evaluate(
         "[...document.links].map(a => a.href).filter(h => h.startsWith('file:')).map(h =>"
@@ -128,6 +130,20 @@ def test_the_sample_report_is_one_click_away(site, page):
     missing = [link for link in links if not Path(unquote(urlsplit(link).path)).exists()]
     assert len(links) > 5
     assert missing == []
+
+
+@pytest.mark.parametrize("name", REPORTS)
+def test_every_kept_run_has_its_report(site, name):
+    folder = site / "reports" / name
+    assert (folder / "index.html").exists()
+    kept = {
+        f"{table['name']}.csv"
+        for table in json.loads((ROOT / "docs" / "runs" / f"{name}.json").read_text("utf-8"))[
+            "blocks"
+        ]
+        if table["block"] == "table"
+    }
+    assert kept <= {path.name for path in folder.glob("*.csv")}
 
 
 @pytest.mark.browser

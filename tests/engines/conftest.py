@@ -19,23 +19,27 @@ from rockcheck.scenes.scene import PAPER_BLOCK
 ALL = [
     engine for engine in (getattr(engines, name) for name in engines.__all__) if engine.installed()
 ]
+DOUBLE = [engine for engine in ALL if engine.precision == "double"]
+SINGLE = [engine for engine in ALL if engine.precision == "single"]
 VARYING = [engine for engine in ALL if not engine.fixed_because]
-BOUNCING = [engine for engine in ALL if engine.bounces_with]
+BOUNCING = [engine for engine in DOUBLE if engine.bounces_with]
 #: Engines whose tests take their time.
-MARKS = {"dart": pytest.mark.long, "drake": pytest.mark.slow}
+MARKS = {"dart": pytest.mark.long} | dict.fromkeys(("drake", "physx", "jolt"), pytest.mark.slow)
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Every engine that is installed: as a class, as one whose steps can vary, or as a model with
-    its steps; two take their time."""
+    """Every engine that is installed: as a class, as one of that precision, as one whose steps can
+    vary, or as a model in double precision with its steps; some take their time."""
 
     def parameters(models: list[Any]) -> list:
         return [pytest.param(one, marks=MARKS.get(one.name, ())) for one in models]
 
-    fixed, bouncing = ([one(time_step=1e-4) for one in some] for some in (ALL, BOUNCING))
+    fixed, bouncing = ([one(time_step=1e-4) for one in some] for some in (DOUBLE, BOUNCING))
     adaptive = [one(time_step="adaptive") for one in VARYING]
     for name, models in {
         "engine": ALL,
+        "double_engine": DOUBLE,
+        "single_engine": SINGLE,
         "varying_engine": VARYING,
         "bouncing_engine": BOUNCING,
         "model": [*fixed, *adaptive],

@@ -23,13 +23,14 @@ PULSES = (
 )  # amplitude in g tan(alpha), frequency in p
 
 
-def test_fixed_steps_are_of_first_order(engine, free_rocking, rotation_error):
+def test_fixed_steps_are_of_first_order(double_engine, free_rocking, rotation_error):
     """One run may be lucky by a factor of five: it is the median of several starts that falls with
     the step."""
     errors = {}
     for step in (2e-3, 2e-4):
         histories = [
-            (engine(time_step=step).simulate(scene), scene) for scene in map(free_rocking, TILTS)
+            (double_engine(time_step=step).simulate(scene), scene)
+            for scene in map(free_rocking, TILTS)
         ]
         errors[step] = np.median(
             [rotation_error(history.channels["theta"], scene) for history, scene in histories]

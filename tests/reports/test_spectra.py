@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.colors import to_rgba
 
 from rockcheck.ebm import Spectrum
-from rockcheck.reports.document import block_markdown
 from rockcheck.reports.drawers import figure_of, scripts_of
 from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, draw
 from rockcheck.scenes.reading import read_json
+from rockcheck.validation.finding import plain
 from rockcheck.validation.paper.measures import Paper
 from rockcheck.validation.paper.panels import KEPT, kept_spectra, paper_panels
 from rockcheck.validation.paper.sentences import beyond, findings_of
@@ -104,12 +104,12 @@ def test_the_scripts_hold_every_node(tmp_path):
 
 
 def test_the_documentation_shows_the_kept_study():
-    page = (Path(__file__).parents[2] / "docs" / "spectra.md").read_text(encoding="utf-8")
+    kept = read_json(Path(__file__).parents[2] / "docs" / "runs" / "spectrum.json")
+    (shown,) = (block for block in kept["blocks"] if block.get("name") == "agreement")
     found = read_json(KEPT / "agreement.json")
     panels = mapped(paper_panels())
     _, table, by_spectrum, plot = blocks(found, panels, came=True)
-    shown = page.partition("<!-- agreement -->")[2].strip().splitlines()
-    assert block_markdown(table).splitlines()[2:] == shown[2 : 2 + len(table.rows)]
+    assert [list(map(plain, row)) for row in table.rows] == shown["rows"]
     assert len({row[0] for row in by_spectrum.rows}) == 28
     assert all(
         share["nodes"] == 100 for share in found["shares"] if share["model"] not in PLAYED_SHARE

@@ -23,8 +23,8 @@ import pytest
 from rockcheck import ebm
 from rockcheck.commands.cli import main
 from rockcheck.ebm.core import march
-from rockcheck.scenes import compiled, threads
-from rockcheck.scenes.progress import announce, announcing
+from rockcheck.scenes import compiled
+from rockcheck.scenes.progress import announce, announcing, interruptible
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.execute.warming import PARTS
 
@@ -300,7 +300,7 @@ def test_the_wait_for_compiled_code_can_be_interrupted(tmp_path):
 _SLOW = """
 import os, signal, sys
 from rockcheck.scenes.compiled import kernel
-from rockcheck.scenes.threads import interruptible, threads
+from rockcheck.scenes.progress import interruptible, threads
 
 # a shell's background jobs, and all that they start, ignore Ctrl-C
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -327,22 +327,22 @@ except KeyboardInterrupt:
 
 
 def test_an_interruptible_call_is_the_call_itself():
-    assert threads.interruptible(lambda: 3) == 3
+    assert interruptible(lambda: 3) == 3
     with pytest.raises(ZeroDivisionError):
-        threads.interruptible(lambda: 1 // 0)
+        interruptible(lambda: 1 // 0)
 
 
 def test_interruptible_calls_share_a_thread_and_a_forked_process_has_its_own():
-    first = threads.interruptible(threading.get_ident)
+    first = interruptible(threading.get_ident)
     assert first != threading.get_ident()
     with pytest.raises(ZeroDivisionError):
-        threads.interruptible(lambda: 1 // 0)
-    assert threads.interruptible(threading.get_ident) == first
+        interruptible(lambda: 1 // 0)
+    assert interruptible(threading.get_ident) == first
     if hasattr(os, "fork"):
         child = os.fork()
         if child == 0:
             signal.alarm(60)
-            os._exit(threads.interruptible(lambda: 7))
+            os._exit(interruptible(lambda: 7))
         assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
 
 
@@ -352,10 +352,8 @@ def test_the_call_after_an_interrupted_one_works_while_that_one_goes_on():
     previous = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
-            threads.interruptible(
-                lambda: (os.kill(os.getpid(), signal.SIGINT), released.wait(60.0))
-            )
-        assert threads.interruptible(lambda: 3) == 3
+            interruptible(lambda: (os.kill(os.getpid(), signal.SIGINT), released.wait(60.0)))
+        assert interruptible(lambda: 3) == 3
         assert not released.is_set()
     finally:
         released.set()

@@ -101,7 +101,7 @@ DOORS = {
     r"\.mkdir\(": {"scenes/writing.py", "scenes/compiled.py"},
     r"\.read_text\(|\.read_bytes\(": {
         "scenes/compiled.py",
-        "scenes/trust/experience.py",
+        "scenes/experience.py",
         "validation/execute/provenance.py",
     }
     | {"commands/new.py", "validation/studies/work_precision/savings.py", "reports/site.py"}

@@ -90,6 +90,19 @@ FAMILIES: dict[str, Family] = {
     ),
     "dart": Family(ENGINES, "Dart", "the physics engine DART", {}, ("dartpy", *STEPPED)),
     "drake": Family(ENGINES, "Drake", "the physics engine Drake", {}, ("drake", "numpy")),
+    "box2d": Family(
+        ENGINES,
+        "Box2D",
+        "the physics engine Box2D 3 (in two dimensions, single precision)",
+        {},
+        ("pyb2d3", "numpy"),
+    ),
+    "physx": Family(
+        ENGINES, "PhysX", "the physics engine PhysX 5 (single precision)", {}, ("sapien", "numpy")
+    ),
+    "jolt": Family(
+        ENGINES, "Jolt", "the physics engine Jolt (single precision)", {}, ("culverin", "numpy")
+    ),
     "measured": Family(
         "rockcheck.validation.discrepancy.measured",
         "Measured",
@@ -120,7 +133,12 @@ def not_installed(name: str) -> str:
     if family(name).module != ENGINES:
         return ""
     engine = _class_of(name)
-    return "" if engine.installed() else f"not installed: pip install {engine.package}"
+    return "" if engine.installed() else str(engine.hint())
+
+
+def has_wheel(name: str) -> bool:
+    """Whether that model can be had on this Python without a compiler."""
+    return family(name).module != ENGINES or bool(_class_of(name).has_wheel())
 
 
 def is_own(name: str) -> bool:

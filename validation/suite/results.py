@@ -48,6 +48,8 @@ Verdict = Literal["pass", "incomplete", "changed", "fail", "error"]
 #: What fails beside what is out of a limit: nothing; what changed and a model that is not
 #: installed; "both": what got better, too.
 Strict = bool | Literal["both"]
+#: The statuses of a cell whose model is not installed.
+MISSING = ("absent", "unavailable")
 SEVERITY: tuple[Verdict, ...] = ("pass", "incomplete", "changed", "fail", "error")
 #: "numerical": two solutions of the same equations. "model form": the reference forbids free
 #: flight, the candidate does not. "measured": one of the two was measured. "exact": against a
@@ -119,7 +121,8 @@ class Cell(Stored):
     """One scene played by one model.
 
     `status` "failed" means no history (`reason` says why: a model's failure, a crash, a hang,
-    memory), "absent" that the model is not installed (`reason` says what to install). `history` is
+    memory), "absent" that the model is not installed (`reason` says what to install), "unavailable"
+    that it is not and has no wheel for this Python, which weighs nothing in the run. `history` is
     the path of its CSV relative to the run's folder. `read_back` is true where nothing that the
     cell depends on had changed. `figures` are all measures, judged or not; `checks` those with a
     tolerance or in need of one. `numerical` is the run's numerical uncertainty, where the suite
@@ -134,7 +137,7 @@ class Cell(Stored):
     model: str
     settings: dict[str, Any] = Field(default_factory=dict)
     key: str = ""
-    status: Literal["done", "failed", "absent"]
+    status: Literal["done", "failed", "absent", "unavailable"]
     reason: str = ""
     traceback: str = ""
     unexpected: bool = False
@@ -250,7 +253,8 @@ class Run(Stored):
     def verdict(self) -> Verdict:
         """The worst cell's verdict. At least "fail" where there are faults, or where checks were
         asked for and none was made."""
-        found = worst([cell.verdict for cell in self.cells] + (["fail"] if self.faults else []))
+        weighed = [cell.verdict for cell in self.cells if cell.status != "unavailable"]
+        found = worst(weighed + (["fail"] if self.faults else []))
         judged = any(check.verdict != "not defined" for _, check in self.checks())
         return found if judged or not self.judged else worst([found, "fail"])
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import field_validator
@@ -25,7 +25,7 @@ from rockcheck.validation.discrepancy.impact_laws import LawFollowed
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.execute import provenance, workers
-from rockcheck.validation.execute.models import family, is_own, not_installed
+from rockcheck.validation.execute.models import family, has_wheel, is_own, not_installed
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store, name_of
 from rockcheck.validation.finding import Finding
@@ -515,7 +515,7 @@ def _ensemble_cell(
         ),
     }
     if missing := not_installed(variant.family_name):
-        return Cell(**about, status="absent", reason=missing)
+        return Cell(**about, status=_absence(variant), reason=missing)
     if own.failures:
         reason = next(
             outcome
@@ -551,6 +551,11 @@ def _ensemble_cell(
     )
 
 
+def _absence(variant: ModelVariant) -> Literal["absent", "unavailable"]:
+    """What a cell's status is where its model's engine is not installed."""
+    return "absent" if has_wheel(variant.family_name) else "unavailable"
+
+
 def _without_cell(suite: Suite, cells: Container[tuple[str, str]]) -> tuple[str, ...]:
     """Tolerances that nothing in the suite can meet."""
     return tuple(
@@ -578,7 +583,8 @@ def _cell(
         "read_back": read_back,
     }
     if planned in failures:
-        about["status"] = "absent" if not_installed(planned.variant.family_name) else "failed"
+        missing = not_installed(planned.variant.family_name)
+        about["status"] = _absence(planned.variant) if missing else "failed"
         return Cell(**about, reason=failures[planned], settings=dict(planned.variant.settings))
     record = records[planned]
     required = suite.required(scene.name, label)

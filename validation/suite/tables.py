@@ -11,7 +11,7 @@ from rich.text import Text
 
 from rockcheck.scenes.writing import table_text
 from rockcheck.validation.discrepancy.figures import Figure, value_words
-from rockcheck.validation.suite.results import SEVERITY, Cell, Check, Run, Strict, worst
+from rockcheck.validation.suite.results import MISSING, SEVERITY, Cell, Check, Run, Strict, worst
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, apart
 
 #: The most scenes that tables and pages show one by one.
@@ -102,9 +102,7 @@ def outcome_tables(run: Run) -> Iterator[tuple[str, Table]]:
             table.add_column(name, justify="right", no_wrap=True, min_width=8)
         for cell in cells.values():
             words = cell.fate if cell.status == "done" else cell.reason or "failed"
-            colour = (
-                "red" if cell.status == "failed" else "yellow" if cell.status == "absent" else ""
-            )
+            colour = {"failed": "red", "done": ""}.get(cell.status, "yellow")
             row = outcome_row(cell, run.reference)
             peak, apart = (
                 "" if row[name] is None else f"{row[name]:.3g}"
@@ -164,10 +162,10 @@ def summary(run: Run) -> dict[str, Any]:
 def verdict_lines(run: Run) -> Iterator[str]:
     """Why anything is not a pass, a line each."""
     yield from run.faults
-    absent = {cell.model: cell.reason for cell in run.cells if cell.status == "absent"}
+    absent = {cell.model: cell.reason for cell in run.cells if cell.status in MISSING}
     yield from (f"{model}: {reason}" for model, reason in absent.items())
     for cell in run.cells:
-        if cell.status != "absent":
+        if cell.status not in MISSING:
             yield from cell_lines(cell)
     if run.judged and not any(
         cell.status != "done" or any(c.verdict != "not defined" for c in cell.checks)

@@ -48,8 +48,12 @@ def junit(run: Run) -> str:
 
 def _cases(cell: Cell, strict: Strict) -> Iterator[TestCase]:
     place = f"{cell.scene}.{cell.model}"
-    missing = Failure(cell.reason) if strict else Skipped(cell.reason)
-    ran = _case(place, "runs", {"failed": Error(cell.reason), "absent": missing}.get(cell.status))
+    ways = {
+        "failed": Error(cell.reason),
+        "absent": Failure(cell.reason) if strict else Skipped(cell.reason),
+        "unavailable": Skipped(cell.reason),
+    }
+    ran = _case(place, "runs", ways.get(cell.status))
     ran.time = cell.cost.worker_seconds
     yield ran
     if cell.numerical is not None:

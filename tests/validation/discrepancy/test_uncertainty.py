@@ -25,9 +25,9 @@ from rockcheck import (
 )
 from rockcheck.commands.cli import main
 from rockcheck.ebm.batch import pack, run_batch
+from rockcheck.scenes.experience import Experience, Range, Trust, axes_of, expected, outside
 from rockcheck.scenes.files import load_scene, load_uncertain_scene
 from rockcheck.scenes.observation import observe
-from rockcheck.scenes.trust.experience import Experience, Range, Trust, axes_of, expected, outside
 from rockcheck.validation.discrepancy.measured import mean_history, shifted, time_shift
 from rockcheck.validation.suite.confidence import explanations
 from rockcheck.validation.suite.experience import bias_and_scatter

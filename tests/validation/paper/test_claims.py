@@ -4,6 +4,7 @@ say."""
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 from pathlib import Path
 
@@ -15,6 +16,8 @@ from rockcheck.validation.paper.measures import Paper, near_one_impact
 from rockcheck.validation.paper.panels import FIGURES, kept_spectra, paper_panels
 from rockcheck.validation.paper.sentences import claims_of, findings_of
 from rockcheck.validation.studies.spectrum.tiles import nodes_of, play
+
+ROOT = Path(__file__).parents[3]
 
 MODEL = EventBasedModel(tolerance=TOLERANCE)
 
@@ -230,16 +233,6 @@ def test_a_range_is_named_up_to_which_a_side_is_likelier():
     )  # as many rows again
 
 
-def test_the_documentation_says_what_is_found(tmp_path, monkeypatch):
-    docs = Path(__file__).parents[3] / "docs"
-    monkeypatch.syspath_prepend(docs / "site_tools")
-    from claims import PLACE
-    from claims import made as table
-
-    text = (docs / "spectra.md").read_text(encoding="utf-8")
-    assert PLACE.findall(text) == [table(tmp_path)]
-
-
 def test_what_holds_generally_may_have_exceptions():
     """Three in four are not more than that."""
 
@@ -334,10 +327,13 @@ def test_an_undecided_node_is_neither_safe_nor_overturned():
 
 
 def test_the_documentation_tells_the_findings_of_the_kept_spectra():
-    text = (Path(__file__).parents[3] / "docs" / "spectra.md").read_text(encoding="utf-8")
-    part = text.partition("<!-- findings -->")[2].partition("<!-- end -->")[0]
-    shown = [line.strip("| \n").split(" | ") for line in part.splitlines()]
-    assert [row for row in shown if len(row) == 3][1:] == [
+    kept = json.loads((ROOT / "docs" / "runs" / "spectrum.json").read_text(encoding="utf-8"))
+    (table,) = (
+        block
+        for block in kept["blocks"]
+        if (block["block"], block.get("name")) == ("table", "findings")
+    )
+    assert table["rows"] == [
         [one.about["sentence"], f"{one.shown.case} (Fig. {one.shown.figure})", one.words]
         for one in findings_of(Paper(kept_spectra()))
     ]

@@ -126,6 +126,8 @@ def test_the_engines_here_are_those_that_are_installed():
         ("mujoco", "default", {"RC-03", "RC-04", "RC-05", "RC-08", "RC-14"}),
         ("pymunk", "best", set()),
         ("dart", "best", {"RC-03"}),
+        ("box2d", "best", {"RC-03", "RC-05", "RC-06", "RC-07"}),
+        ("box2d", "default", {"RC-02", "RC-05", "RC-06", "RC-07", "RC-09"}),
         pytest.param("drake", "best", set(), marks=pytest.mark.slow),
     ],
 )

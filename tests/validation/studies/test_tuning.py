@@ -19,9 +19,18 @@ def tuned(engine, restitution, **more):
     return Tuning.play(Tune(engine, restitution, **more))
 
 
+#: The largest restitution at a drop of 0.2 m of engines that have not all: one applies it corner by
+#: corner, the other not below 2 m/s.
+MOST = {"box2d": 0.67, "physx": 0.0}
+
+
 @pytest.mark.parametrize("restitution", [0.0, 0.25, 0.5, 0.75])
 @pytest.mark.parametrize("engine", [name for name in HERE if name != "drake"])
 def test_the_wanted_restitution_is_reached(engine, restitution):
+    if restitution > MOST.get(engine, 1.0):
+        with pytest.raises(InputError, match="cannot be reached"):
+            tuned(engine, restitution)
+        return
     found = tuned(engine, restitution)
     assert found.reached
     assert found.restitution == pytest.approx(restitution, abs=5e-3)

@@ -93,6 +93,34 @@ KNOBS: dict[str, Knob] = {
             " and this mass",
         },
     ),
+    "box2d": Knob(
+        (0.0, 1.0),
+        {
+            "block": "restitution=0, friction={friction:.4g} (of two restitutions the larger"
+            " counts, of two frictions the geometric mean)",
+            "floor": "restitution={restitution:.4g}, friction={friction:.4g}",
+            "world": "restitution_threshold=1 (slower contacts do not bounce), contact_hertz=30, 4"
+            " substeps",
+        },
+    ),
+    "physx": Knob(
+        (0.0, 2.0),
+        {
+            "PhysxMaterial(block)": "{friction:.4g}, {friction:.4g}, 0 (of two materials the mean"
+            " counts)",
+            "PhysxMaterial(floor)": "{friction:.4g}, {friction:.4g}, {restitution:.4g}",
+            "set_scene_config": "bounce_threshold=2 (slower contacts do not bounce)",
+        },
+    ),
+    "jolt": Knob(
+        (0.0, 1.2),
+        {
+            "create_body(block)": "friction={friction:.4g}, restitution=0 (of two restitutions the"
+            " larger counts, of two frictions the geometric mean)",
+            "create_body(floor)": "friction={friction:.4g}, restitution={restitution:.4g}",
+            "remark": "contacts below about 1 m/s do not bounce",
+        },
+    ),
 }
 
 

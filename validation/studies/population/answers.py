@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.scenes.trust.experience import WIDTH, known, outside
-from rockcheck.scenes.trust.inputs import UncertainScene
+from rockcheck.scenes.experience import WIDTH, known, outside
+from rockcheck.scenes.files import UncertainScene
 from rockcheck.validation.criteria import CRITERIA
 from rockcheck.validation.discrepancy.motion import QUANTITIES, spread
 from rockcheck.validation.finding import (

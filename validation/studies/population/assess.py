@@ -16,7 +16,7 @@ import numpy as np
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import InputError, Scene, Wall
-from rockcheck.scenes.trust.inputs import UncertainScene
+from rockcheck.scenes.files import UncertainScene
 from rockcheck.validation.execute.models import build, family
 from rockcheck.validation.finding import Finding
 from rockcheck.validation.studies.population.answers import LAW, Found, finding_of

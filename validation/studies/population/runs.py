@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from rockcheck.scenes import History, ModelFailure, Scene
-from rockcheck.scenes.trust.inputs import UncertainScene, with_numbers
+from rockcheck.scenes.files import UncertainScene, with_numbers
 from rockcheck.scenes.writing import columns_text
 from rockcheck.validation.criteria import CRITERIA, base_of
 from rockcheck.validation.discrepancy.figures import Stored

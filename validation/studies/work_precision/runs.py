@@ -68,7 +68,12 @@ ENGINE_STEPS = {
     "pymunk": _STEPS[:3],
     "dart": _STEPS[:3],
     "drake": _STEPS[:2],
+    "box2d": _STEPS[:3],
+    "physx": _STEPS[:3],
+    "jolt": _STEPS[:3],
 }
+#: Engines whose steps cannot vary. Those in single precision are not asked what they converge to.
+FIXED = ("drake", "box2d", "physx", "jolt")
 LINES = {
     line.label: line
     for line in (
@@ -103,7 +108,7 @@ LINES = {
                     "time_step",
                     steps,
                     quick=steps[:3],
-                    converge=_REFINED[: _CONVERGE[engine]],
+                    converge=_REFINED[: _CONVERGE.get(engine, 0)],
                 ),
                 DiagramLine(
                     f"{engine} adaptive",
@@ -122,7 +127,7 @@ LINES = {
                     quick=_STEPS[:2],
                 ),
             )
-            if engine != "drake" or "adaptive" not in line.label  # its steps cannot vary
+            if engine not in FIXED or "adaptive" not in line.label
         ),
     )
 }

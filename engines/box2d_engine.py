@@ -1,0 +1,98 @@
+"""Box2D v3 (pyb2d3) as a model of the rocking block."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Literal
+
+from rockcheck.engines.contacts import surfaces_of
+from rockcheck.engines.engine import Engine, Worlds
+from rockcheck.engines.world import Placed, State, World
+from rockcheck.scenes import Scene
+
+SLAB, REACH = 10.0, 50.0  # half the thickness and half the extent of floor and walls
+SUBSTEPS = 4  # of each step, as Box2D's manual has them
+#: At its best: the stiffness of a contact in cycles a step, its damping ratio, and the speed at
+#: which overlap is pushed out; slower approaches than the threshold do not bounce. Lengths in R.
+STIFFNESS, DAMPING, PUSH, THRESHOLD = 0.25, 10.0, 3.0, 1e-3
+
+
+class _Box2DWorld(World):
+    """A world with a box, floor and walls, and Box2D's default parameters."""
+
+    def __init__(self, scene: Scene) -> None:
+        import pyb2d3
+
+        self.box2d: Any = pyb2d3
+        self.world = pyb2d3.World(gravity=(0.0, 0.0))
+        # Of two frictions the geometric mean counts, of two restitutions the larger.
+        for surface in surfaces_of(scene):
+            slab = self.world.create_static_body(position=surface.behind(SLAB))
+            width, _, height = surface.extent(SLAB, REACH)
+            slab.create_shape(
+                self._shape(surface.friction, surface.restitution), pyb2d3.box(width, height)
+            )
+        self.body = self.world.create_dynamic_body(position=(0.0, scene.block.half_height))
+        b, h, (dx, dz) = scene.block.half_width, scene.block.half_height, scene.block.offset
+        self.body.create_shape(
+            self._shape(scene.floor.friction, 0.0),
+            pyb2d3.box(b, h, center=(-dx, -dz), rotation=0.0),
+        )
+        mass = pyb2d3.MassData()
+        mass.mass, mass.center = 1.0, (0.0, 0.0)
+        mass.rotational_inertia = scene.block.gyration_squared
+        self.body.mass_data = mass
+        self.turned = pyb2d3.Rot(0.0)
+
+    def _shape(self, friction: float, restitution: float) -> Any:
+        material = self.box2d.surface_material(friction=friction, restitution=restitution)
+        return self.box2d.shape_def(material=material)
+
+    def place(self, state: Placed) -> None:
+        """Put the block where `state` says, in single precision."""
+        x, y, theta, vx, vy, w = map(float, state)
+        self.turned.c, self.turned.s = math.cos(theta), math.sin(theta)
+        self.body.set_transform((x, y), self.turned)
+        self.body.linear_velocity, self.body.angular_velocity = (vx, vy), w
+
+    def step(self, felt: tuple[float, float], dt: float) -> None:
+        self.world.gravity = felt
+        self.world.step(dt, SUBSTEPS)
+
+    def state(self) -> State:
+        """Where the block is; its own angle is an approximation."""
+        body = self.body
+        (x, y), (vx, vy), turned = body.position, body.linear_velocity, body.rotation
+        return x, y, math.atan2(turned.s, turned.c), vx, vy, body.angular_velocity
+
+    def close(self) -> None:
+        """Give the world back, of which Box2D holds few."""
+        self.world.destroy()
+
+
+class _RigidBox2DWorld(_Box2DWorld):
+    """Contacts as stiff as a step allows, that bounce however slow, and a block that never
+    sleeps."""
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene)
+        self.world.sleeping_enabled = False
+        self.world.restitution_threshold = THRESHOLD
+        self.dt = 0.0
+
+    def step(self, felt: tuple[float, float], dt: float) -> None:
+        if dt != self.dt:
+            self.world.set_contact_tuning(STIFFNESS / dt, DAMPING, PUSH)
+            self.dt = dt
+        super().step(felt, dt)
+
+
+class Box2D(Engine):
+    """Box2D v3; at its best with contacts as stiff as the step allows, that bounce however slow,
+    and a block that never sleeps."""
+
+    name: ClassVar[str] = "box2d"
+    module: ClassVar[str] = "pyb2d3"
+    precision: ClassVar[Literal["double", "single"]] = "single"
+    fixed_because: ClassVar[str] = "Box2D holds positions in single precision"
+    worlds: ClassVar[Worlds] = (_RigidBox2DWorld, _Box2DWorld)

@@ -1,0 +1,95 @@
+"""Jolt (culverin) as a model of the rocking block."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Literal
+
+from rockcheck.engines.contacts import Point, surfaces_of
+from rockcheck.engines.engine import Engine, Worlds
+from rockcheck.engines.world import Placed, State, World
+from rockcheck.scenes import InputError, Scene
+
+SLAB, REACH = 10.0, 50.0  # half the thickness and half the extent of floor and walls
+#: Of a second's velocity that Jolt takes away, and culverin has no word for.
+DAMPING = 0.05
+#: At its best, units of Jolt in one of the scene: below about 1 a second nothing bounces there.
+SCALE = 100.0
+ROOM = {"max_bodies": 64, "max_pairs": 256, "max_contact_constraints": 256, "num_threads": 1}
+
+
+class _JoltWorld(World):
+    """A world with a box, floor and walls, and Jolt's default parameters; `scale` of its lengths
+    are one of the scene's. Its y axis points up."""
+
+    def __init__(self, scene: Scene, scale: float = 1.0, planar: bool = False) -> None:
+        import culverin
+
+        if not scene.block.homogeneous:
+            raise InputError("Jolt holds a homogeneous block only", "block.centre_of_mass")
+        self.scale, self.jolt = scale, culverin
+        self.world = culverin.PhysicsWorld(settings={"gravity": (0.0, 0.0, 0.0), **ROOM})
+        # Of two frictions the geometric mean counts, of two restitutions the larger.
+        for face in surfaces_of(scene):
+            fixed = {"friction": face.friction, "restitution": face.restitution}
+            size = face.extent(SLAB, REACH)
+            self._box(face.behind(SLAB), size, motion=culverin.MOTION_STATIC, **fixed)
+        b, h = scene.block.half_width, scene.block.half_height
+        freedom = culverin.DOF_PLANE_2D if planar else culverin.DOF_ALL
+        moved = {"friction": scene.floor.friction, "mass": 1.0, "allowed_dofs": freedom}
+        self.body = self._box((0.0, h), (b, b, h), motion=culverin.MOTION_DYNAMIC, **moved)
+        self.world.step(0.0)  # what is made takes part from the next step on
+
+    def _box(self, place: Point, size: tuple[float, float, float], **more: Any) -> int:
+        """A box with these half sizes, across, deep and high."""
+        x, y, width, depth, height = (self.scale * one for one in (*place, *size))
+        made: int = self.world.create_body(
+            pos=(x, y, 0.0), size=(width, height, depth), shape=self.jolt.SHAPE_BOX, **more
+        )
+        return made
+
+    def place(self, state: Placed) -> None:
+        x, y, theta, vx, vy, w = map(float, state)
+        s = self.scale
+        turn = (0.0, 0.0, math.sin(0.5 * theta), math.cos(0.5 * theta))
+        self.world.set_transform(self.body, (s * x, s * y, 0.0), turn)
+        self.world.set_linear_velocity(self.body, s * vx, s * vy, 0.0)
+        self.world.set_angular_velocity(self.body, 0.0, 0.0, w)
+
+    def step(self, felt: tuple[float, float], dt: float) -> None:
+        self.world.set_gravity(self.scale * felt[0], self.scale * felt[1], 0.0)
+        self.world.step(dt)
+
+    def state(self) -> State:
+        world, body, s = self.world, self.body, self.scale
+        (x, y, _), (_, _, turn, whole) = world.get_position(body), world.get_rotation(body)
+        (vx, vy, _), (_, _, w) = world.get_velocity(body), world.get_angular_velocity(body)
+        return x / s, y / s, 2.0 * math.atan2(turn, whole), vx / s, vy / s, w
+
+
+class _RigidJoltWorld(_JoltWorld):
+    """A block that stays in its plane, in units in which slow contacts bounce, with Jolt's damping
+    taken out again."""
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene, SCALE, planar=True)
+
+    def step(self, felt: tuple[float, float], dt: float) -> None:
+        """One step. Jolt makes (v + g dt) (1 - c dt) of a velocity v."""
+        kept = 1.0 - DAMPING * dt
+        world, body = self.world, self.body
+        (vx, vy, _), (_, _, w) = world.get_velocity(body), world.get_angular_velocity(body)
+        world.set_linear_velocity(body, vx / kept, vy / kept, 0.0)
+        world.set_angular_velocity(body, 0.0, 0.0, w / kept)
+        super().step((felt[0] / kept, felt[1] / kept), dt)
+
+
+class Jolt(Engine):
+    """Jolt; at its best in the plane, undamped, and in units in which slow contacts bounce."""
+
+    name: ClassVar[str] = "jolt"
+    module: ClassVar[str] = "culverin"
+    first_python: ClassVar[tuple[int, int]] = (3, 12)
+    precision: ClassVar[Literal["double", "single"]] = "single"
+    fixed_because: ClassVar[str] = "Jolt's velocities are in single precision"
+    worlds: ClassVar[Worlds] = (_RigidJoltWorld, _JoltWorld)

@@ -1,0 +1,202 @@
+"""The figures that pages state, computed again; tables between markers are those of the kept runs;
+pages keep to their budget of words."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+import pytest
+
+from rockcheck import ContinuousModel, EventBasedModel, MuJoCo, compare, load_scene
+from rockcheck.ebm.core import contacts, modes, motion, rules, series, settle
+from rockcheck.scenes.experience import Experience
+from rockcheck.scenes.kinematics import pivot_height
+from rockcheck.validation.paper.panels import KEPT, kept_spectra
+from rockcheck.validation.suite.suites import load_suite
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.glob("*.md"))]
+UNILATERAL = EventBasedModel(pivot="unilateral")
+
+
+@pytest.fixture(autouse=True)
+def tools(monkeypatch):
+    monkeypatch.syspath_prepend(DOCS / "site_tools")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_tables_are_those_of_the_kept_runs(page):
+    import whole_runs
+
+    text = page.read_text(encoding="utf-8")
+    assert whole_runs.filled(text) == text
+
+
+def test_the_documentation_keeps_to_its_budget_of_words():
+    words = {page.stem: len(page.read_text(encoding="utf-8").split()) for page in PAGES}
+    assert words.pop("theory") <= 4000
+    assert words["README"] <= 600
+    assert max(words.values()) <= 1650
+    assert sum(words.values()) <= 17000
+
+
+def rounded(value: float, digits: int = 1) -> float:
+    return float(f"{value:.{digits}g}")
+
+
+def test_the_front_picture():
+    import gallery
+
+    scene = gallery.front_scene().replace(output_step=0.001)
+    paper, found = EventBasedModel().simulate(scene), UNILATERAL.simulate(scene)
+    hop = np.max(pivot_height(scene.block, found.channels["y"], found.channels["theta"]))
+    assert rounded(hop, 2) == 0.0057
+    assert (paper.outcome, found.outcome) == ("overturned right", "at rest")
+    for model in (ContinuousModel(), MuJoCo(time_step=1e-4)):
+        other = model.simulate(scene).channels["theta"]
+        off = np.max(np.abs(other - found.channels["theta"])) / scene.block.alpha
+        assert 1e-4 < off < 0.01
+
+
+def test_the_tutorials_bookcase(tmp_path):
+    from rockcheck.commands.new import run
+
+    run(tmp_path / "bookcase.toml")
+    scene = load_scene(tmp_path / "bookcase.toml")
+    reference = UNILATERAL.simulate(scene)
+    assert rounded(reference.peak_rotation / reference.alpha, 2) == 0.72
+    assert reference.outcome == "at rest"
+    assert sum(event.kind == "wall impact" for event in reference.event_list) == 2
+    error = {
+        name: compare(reference, model.simulate(scene))["theta_rms"]
+        for name, model in (
+            ("ebm", EventBasedModel()),
+            ("cm", ContinuousModel()),
+            ("mujoco", MuJoCo(time_step=1e-3)),
+        )
+    }
+    assert rounded(error["mujoco"]) == 9e-4
+    assert rounded(error["ebm"], 2) == 0.2
+    assert max(error["cm"], error["mujoco"]) < 0.004
+
+
+def settings() -> dict[str, tuple[list[float], float]]:
+    """Errors by kind of scene (alpha) and cost of each setting of the kept benchmark."""
+    import whole_runs
+
+    table = whole_runs.load("benchmark").table("work-precision")
+    return {
+        f"{model} {setting}": ([error for error in errors if error is not None], cost)
+        for model, setting, cost, *errors in table.rows
+    }
+
+
+@pytest.mark.parametrize(
+    ("names", "least", "most", "ratios"),
+    [
+        (["ebm-unilateral tolerance 1e-10"], 3e-15, 2e-10, [1.4]),
+        (["ebm tolerance 1e-10"], 4e-15, 3e-10, [1.0]),
+        (["ebm-bouc-wen yield_displacement 1e-05"], 3e-5, 3e-2, [130.0]),
+        (["cm penetration 1e-08"], 1e-7, 2e-4, [200.0]),
+        (["{} adaptive largest_step 0.001"], 5e-9, 7e-6, [790.0, 860.0]),
+        (["{} time_step 0.0001"], 2e-5, 3e-3, [5500.0, 6100.0]),
+        (["{} time_step 0.001"], 2e-4, 2e-2, [560.0, 640.0]),
+    ],
+)
+def test_the_table_of_choices(names, least, most, ratios):
+    found = settings()
+    engines = ("mujoco", "pybullet")
+    lines = list(dict.fromkeys(name.format(engine) for name in names for engine in engines))
+    errors = [error for line in lines for error in found[line][0]]
+    assert (rounded(min(errors)), rounded(max(errors))) == (least, most)
+    unit = found["ebm tolerance 1e-10"][1]
+    assert sorted(rounded(found[line][1] / unit, 2) for line in lines) == ratios
+
+
+def test_what_the_benchmark_says():
+    found = settings()
+    for model in ("ebm", "ebm-unilateral"):
+        assert found[f"{model} tolerance 1e-12"][1] < 1.075 * found[f"{model} tolerance 0.0001"][1]
+    gains = []
+    for engine in ("mujoco", "pybullet"):
+        coarse, cost = found[f"{engine} time_step 0.001"]
+        fine, less = found[f"{engine} adaptive largest_step 0.004"]
+        gains += [a / b for a, b in zip(coarse, fine, strict=True)]
+        assert less < 0.5 * cost
+    assert 110 <= min(gains) < 120
+    assert 395 < median(gains) < 405
+    bad = [
+        error
+        for engine in ("mujoco", "pybullet")
+        for step in ("0.01", "0.001", "0.0001")
+        for error in found[f"{engine} default time_step {step}"][0]
+    ]
+    assert (rounded(min(bad)), rounded(max(bad))) == (2e-3, 2e-1)
+
+
+def test_thresholds_that_the_limits_name():
+    assert (series.AHEAD, series.NOISE[series.POSITION], series.INSTANT) == (0.02, 1e-13, 1e-9)
+    assert (contacts.CLOSED, contacts.SLOW, motion.LEAST_FRICTION) == (1e-10, 1e-9, 1e-9)
+    assert (settle.SETTLE, settle._QUIET, settle._FASTEST) == (5e-8, 0.025, 2.5e-3)
+    assert (settle._AT_ONCE, settle._IMPACTS, settle._TIMES) == (20, 100, 500)
+    assert (modes.MODES, series.ORDER) == (128, 15)
+    page = (DOCS / "limits.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^\| ([\w ]+) \|", page, flags=re.MULTILINE)) >= set(rules.NAMES)
+
+
+def floor_impulses(scene, step=1e-4, alone=5) -> list[float]:
+    """The floor's vertical impulse per unit mass (m/s) at each wall impact with no other event
+    within `alone` rows: the jump of y_dot."""
+    history = EventBasedModel().simulate(scene.replace(output_step=step))
+    times, rate = history.channels["t"], history.channels["y_dot"]
+    instants = np.array([event.t for event in history.event_list])
+    found = []
+    for t in (event.t for event in history.event_list if event.kind == "wall impact"):
+        after = int(np.searchsorted(times, t, side="right"))
+        single = np.sum(np.abs(instants - t) < alone * step) == 1
+        if single and 2 <= after < len(times) - 1:
+            came = rate[after - 1] + (rate[after - 1] - rate[after - 2]) / step * (
+                t - times[after - 1]
+            )
+            went = rate[after] - (rate[after + 1] - rate[after]) / step * (times[after] - t)
+            found.append(float(went - came))
+    return [one for one in found if abs(one) > 1e-6]  # a block that stands flat has none
+
+
+def test_the_papers_floor_pulls_at_every_wall_impact():
+    found = [one for scene in load_suite("walls").scenes.values() for one in floor_impulses(scene)]
+    assert len(found) == 282
+    assert max(found) < 0.0
+
+
+def test_the_kept_spectra():
+    spectra = kept_spectra()
+    assert (len(spectra), sum(one.outcomes.size for one in spectra)) == (28, 280_000)
+    assert not any(len(one.undecided) for one in spectra)
+    shares = json.loads((KEPT / "agreement.json").read_text())["shares"]
+    nodes = {one["model"]: 2 * one["nodes"] for one in shares}  # near and away
+    assert {nodes[name] for name in ("ebm-unilateral", "cm", "mujoco", "pybullet")} == {200}
+
+
+def test_the_models_bias_and_scatter():
+    import experience
+
+    found = Experience.model_validate_json(experience.KEPT.read_text(encoding="utf-8"))
+    assert experience.tables(found).strip() in (DOCS / "theory.md").read_text(encoding="utf-8")
+
+
+def test_counts_that_are_stated(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "tests" / "stress")
+    import hostile
+
+    assert sum(1 for _ in hostile.cases()) == 211
+    rows = [
+        (ROOT / "tests" / "data" / f"{name}_ricker_cases.csv").read_text().splitlines()[1:]
+        for name in ("ebm", "unilateral")
+    ]
+    assert sum(map(len, rows)) == 960
