@@ -100,8 +100,9 @@ def run(
     jobs: JobsOption = None,
     scheduler: SchedulerOption = None,
 ) -> None:
-    """Does it fall, how far does it move, how sure is that, which gap is safe?
+    """Does it fall, how far does it move, how sure is that?
 
+    And which gap is safe, and at which intensity does it fall.
     Plays the scene under its own base motion, or under each record; says what hand methods say
     beside it. A number that the scene file gives as { value = 0.3, sd = 0.03 } is uncertain.
     --read also takes scale=1.2 and vertical=true for the records.

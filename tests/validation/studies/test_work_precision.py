@@ -155,10 +155,9 @@ def test_the_error_of_adaptive_steps_is_told_at_the_cost_of_fixed_ones() -> None
             )
             for k in range(3)
         ]
-    everything = {
-        row.line: row for row in runs.pooled(some) if row.kind == "all" and row.value == 1e-3
-    }
-    assert everything["mujoco"].at_the_cost == pytest.approx(2e-4)
+    pooled = runs.pooled(some)
+    everything = {row.line: row for row in pooled if (row.family, row.value) == ("all", 1e-3)}
+    assert runs.at_the_cost(everything["mujoco"], pooled) == pytest.approx(2e-4)
     assert everything["mujoco adaptive"].rms_worst == pytest.approx(3e-5)
 
 
