@@ -92,11 +92,7 @@ TARGETS = {
         "tests/scenes/test_record_sets.py",
         "tests/scenes/test_recordings.py",
     ],
-    "scenes/recordings/intensity.py": [
-        "tests/scenes/test_recordings.py",
-        "-k",
-        "intensities or spectral or periods",
-    ],
+    "scenes/recordings/intensity.py": ["tests/scenes/test_intensity.py"],
     "validation/uncertainty/verdict.py": [UNCERTAINTY, "-k", "what_a_difference_says"],
     "validation/uncertainty/numerical.py": [
         UNCERTAINTY,

@@ -278,7 +278,7 @@ str(Path(sys.argv[2]) / "o.csv")]) in (0, 2, 3), path
 """
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX: its limits of memory")
+@pytest.mark.needs("POSIX")
 def test_bombs_stay_below_a_gigabyte_and_a_minute(tmp_path):
     """Files that ask for much are played with 1 GiB of memory: each gives a result or one line."""
     (tmp_path / "in").mkdir()

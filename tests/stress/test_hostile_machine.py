@@ -31,7 +31,6 @@ from rockcheck.validation.study import run
 #: They wait for processes that hang or are killed.
 pytestmark = pytest.mark.long
 ROCKCHECK = [sys.executable, "-m", "rockcheck"]
-posix = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX: its limits and signals")
 
 SMALL_RUN = ["stress", "runs", "--model", "ebm no-slip", "--runs", "30", "--jobs", "1"]
 
@@ -70,7 +69,7 @@ def limited(size: int, *words: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@posix
+@pytest.mark.needs("POSIX")
 def test_disk_full(tmp_path):
     """A history that does not fit: one line that names the file, exit 2, and the old history with
     its events as they were."""
@@ -87,7 +86,7 @@ def test_disk_full(tmp_path):
         assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
-@posix
+@pytest.mark.needs("POSIX")
 @pytest.mark.parametrize("size", [100, 2000, 30_000])
 def test_disk_full_whatever_is_written(tmp_path, size):
     """A scene file, figures and pages: nothing that is there is cut, and the line names the file
@@ -106,7 +105,7 @@ def test_disk_full_whatever_is_written(tmp_path, size):
     assert not leavings(tmp_path)
 
 
-@posix
+@pytest.mark.needs("POSIX")
 def test_what_is_no_file_is_written_as_it_is(tmp_path):
     """A pipe, a device or a link is not replaced by a file."""
     (tmp_path / "link").symlink_to(tmp_path / "out.csv")
@@ -125,7 +124,7 @@ def test_what_is_no_file_is_written_as_it_is(tmp_path):
     assert Path("/dev/stdout").is_symlink()
 
 
-@posix
+@pytest.mark.needs("POSIX")
 def test_disk_full_while_a_study_is_written(tmp_path):
     """Tables that were written stay whole; the file that does not fit leaves nothing; the next run
     writes all."""
@@ -274,11 +273,6 @@ def test_shrinking_interrupted(tmp_path, monkeypatch):
     assert all("not shrunk" in text for text in found.files.values())
 
 
-linux = pytest.mark.skipif(
-    not Path("/proc/self/task").exists(), reason="needs Linux: it tells the children"
-)
-
-
 @pytest.fixture
 def interruptible():
     """What is started here hears SIGINT, also where these tests run in the background of a shell,
@@ -307,7 +301,7 @@ def started(folder: Path) -> subprocess.Popen:
     return subprocess.Popen([*ROCKCHECK, *words, str(folder)], start_new_session=True, **pipes)
 
 
-@linux
+@pytest.mark.needs("Linux")
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize("later", [0.0, 0.2, 0.4, 0.6, 3.0])
 def test_interrupted(tmp_path, later):
@@ -329,7 +323,7 @@ def test_interrupted(tmp_path, later):
     assert not leavings(tmp_path)
 
 
-@linux
+@pytest.mark.needs("Linux")
 def test_killed(tmp_path):
     """A run that is killed leaves no worker behind, however busy, and the next run in its folder is
     whole."""

@@ -269,7 +269,9 @@ def test_similar_scenes_have_the_same_numbers():
     assert other.excitation.period == pytest.approx(math.sqrt(k) * 1.2)
 
 
-@pytest.mark.parametrize("label", ["cm", "mujoco", "pybullet"])
+@pytest.mark.parametrize(
+    "label", ["cm", "mujoco", pytest.param("pybullet", marks=pytest.mark.needs("pybullet"))]
+)
 def test_approximate_models_keep_what_they_state(label):
     player = PLAYERS[label]
     assert isinstance(player, Approximate)

@@ -343,7 +343,7 @@ def test_an_unknown_part_is_refused_in_one_line(capsys: pytest.CaptureFixture[st
 def test_nothing_that_is_skipped_changes_the_motion() -> None:
     """Every saving but those that a scene may need (a sliding pivot's cone, a strong pulse's
     slip)."""
-    found = [one for name, kind in savings.KINDS.items() if name != "batches" for one in kind()]
+    found = [one for name in savings.KINDS if name != "batches" for one in savings.measured(name)]
     needed = {"cone correction", "friction limit"}
     for saving in found:
         reference = 2e-2 if saving.thing in needed or saving.model == "pybullet" else 1e-5

@@ -23,7 +23,8 @@ from rockcheck.validation.studies.work_precision.scenes import pulse
 
 #: A wall that the block cannot reach, m.
 FAR = Wall(side="left", gap=100.0)
-ROUNDS = 5
+#: Rounds, and those of a quick benchmark.
+ROUNDS, QUICK_ROUNDS = 5, 2
 #: Not in the table, and why.
 NOT_MEASURED = (
     "rendering in MuJoCo: it needs a display or a GPU; no model here ever makes a renderer, nor"
@@ -53,18 +54,25 @@ class Saving:
 
 
 Play = Callable[[], float]
+#: What is measured: model, thing and unit, the plays with it and without it, change and remark.
+Pair = tuple[str, str, str, Play, Play, float, str]
 
 
-def _saving(model: str, thing: str, unit: str, dear: Play, cheap: Play, **more: Any) -> Saving:
-    """Median costs with and without, played in turn; a first round warms up."""
-    rounds = [(dear(), cheap()) for _ in range(ROUNDS + 1)][1:]
-    return Saving(model, thing, unit, *map(median, zip(*rounds, strict=True)), **more)
+def measured(name: str, rounds: int = ROUNDS) -> list[Saving]:
+    """The savings of one of `KINDS`: median costs with and without, played in turn; a first round
+    warms up."""
+    found = []
+    for model, thing, unit, dear, cheap, change, remark in KINDS[name]():
+        costs = [(dear(), cheap()) for _ in range(rounds + 1)][1:]
+        first, second = map(median, zip(*costs, strict=True))
+        found.append(Saving(model, thing, unit, first, second, change, remark))
+    return found
 
 
 # --- the event-based model, in batches over a grid of pulses
 
 
-def _batches(nodes: int) -> Iterator[Saving]:
+def _batches(nodes: int) -> Iterator[Pair]:
     from rockcheck.ebm import EventBasedModel
     from rockcheck.ebm.batch import pack_pulses, run_batch
     from rockcheck.validation.studies.work_precision.ebm import grid
@@ -117,9 +125,7 @@ def _batches(nodes: int) -> Iterator[Saving]:
         one, other = dear[1](), cheap[1]()
         apart = np.abs(one.peak - other.peak)[(one.side == 0) & (other.side == 0)]
         change = float(np.max(apart, initial=0.0)) / PAPER_BLOCK.alpha
-        yield _saving(
-            "ebm", thing, "μs a trajectory", dear[0], cheap[0], change=change, remark=remark
-        )
+        yield "ebm", thing, "μs a trajectory", dear[0], cheap[0], change, remark
 
 
 def _timed(start: Callable[[], Any], play: Callable[[Any], object], count: int) -> Play:
@@ -137,7 +143,7 @@ def _timed(start: Callable[[], Any], play: Callable[[Any], object], count: int) 
 # --- histories: every model
 
 
-def _histories() -> Iterator[Saving]:
+def _histories() -> Iterator[Pair]:
     scene = pulse(6.0, 6.0, 0.3)
     scarce = scene.replace(output_step=scene.duration)
     dense = scene.replace(output_step=0.001)
@@ -193,7 +199,7 @@ def _histories() -> Iterator[Saving]:
 
 def _of_histories(
     label: str, thing: str, dear: tuple[Model, Scene], cheap: tuple[Model, Scene], remark: str
-) -> Saving:
+) -> Pair:
     def cost(model: Model, scene: Scene) -> Play:
         return lambda: 1e3 * model.simulate(scene).cost.cpu_seconds / scene.duration
 
@@ -204,8 +210,7 @@ def _of_histories(
     )
     common = first.keys() & second.keys()
     change = max(abs(first[t] - second[t]) for t in common) / PAPER_BLOCK.alpha
-    costs = cost(*dear), cost(*cheap)
-    return _saving(label, thing, "ms a simulated s", *costs, change=change, remark=remark)
+    return label, thing, "ms a simulated s", cost(*dear), cost(*cheap), change, remark
 
 
 # --- steps of the engines themselves, in a row without anything between them
@@ -220,7 +225,7 @@ _TILTED = Scene(
 )
 
 
-def _mujoco_steps() -> Iterator[Saving]:
+def _mujoco_steps() -> Iterator[Pair]:
     import mujoco
     from mujoco import rollout
 
@@ -273,7 +278,7 @@ def _mujoco_steps() -> Iterator[Saving]:
             "against mujoco.rollout",
         ),
     ):
-        yield _saving("mujoco, bare steps", thing, "μs a step", dear, cheap, remark=remark)
+        yield "mujoco, bare steps", thing, "μs a step", dear, cheap, math.nan, remark
 
 
 def _loaded(text: str, change: Callable[[ET.Element], None] = lambda root: None) -> Any:
@@ -359,7 +364,7 @@ def _as_xml(world: Any) -> str:
         return path.read_text(encoding="utf-8")
 
 
-def _pybullet_steps() -> Iterator[Saving]:
+def _pybullet_steps() -> Iterator[Pair]:
     if not_installed("pybullet"):
         return
     from rockcheck.engines import PyBullet
@@ -402,11 +407,11 @@ def _pybullet_steps() -> Iterator[Saving]:
         ("saved states", steps("kept", count=300), "saveState, as save-and-redo would need"),
         ("rendering", steps("drawn", count=300), "64 × 64 pixels in software each step"),
     ):
-        yield _saving("pybullet, bare steps", thing, "μs a step", dear, steps(), remark=remark)
+        yield "pybullet, bare steps", thing, "μs a step", dear, steps(), math.nan, remark
 
 
 #: What is measured, each on its own.
-KINDS: dict[str, Callable[[], Iterator[Saving]]] = {
+KINDS: dict[str, Callable[[], Iterator[Pair]]] = {
     "batches": lambda: _batches(40),
     "batches, quick": lambda: _batches(10),
     "histories": _histories,
