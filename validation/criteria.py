@@ -143,25 +143,23 @@ def reserve_sliding(scene: Scene, base: Base) -> float:
     damped spectrum reaches c_s, the slip is c_s/(2 pi f_es)^2; 0 where it never does. The last
     expression was derived, not read: check it against your copy.
     """
+    from scipy.optimize import brentq
+
     gravity = scene.gravity
     capacity = 2.0 * scene.floor.friction * (gravity - 0.4 * base.vertical)
     if capacity <= 0.0:
         return math.inf
-    frequencies = np.geomspace(_SLOWEST, _FASTEST, _COUNT)
-    before = 0.0, 0.0
-    for frequency in frequencies.tolist():
-        demand = base.spectral(frequency, _SLIDING_DAMPING)
-        if demand >= capacity:
-            found = _crossing(before, (frequency, demand), capacity)
+    slower = 0.0
+
+    def beyond(frequency: float) -> float:
+        return base.spectral(frequency, _SLIDING_DAMPING) - capacity
+
+    for frequency in np.geomspace(_SLOWEST, _FASTEST, _COUNT).tolist():
+        if beyond(frequency) >= 0.0:
+            found = brentq(beyond, slower, frequency, rtol=1e-4) if slower else frequency
             return capacity / (2.0 * math.pi * found) ** 2
-        before = frequency, demand
+        slower = frequency
     return 0.0
-
-
-def _crossing(low: tuple[float, float], high: tuple[float, float], value: float) -> float:
-    """Where a straight line in frequency reaches the value."""
-    (f, a), (g, b) = low, high
-    return g if f == 0.0 else f + (g - f) * (value - a) / (b - a)
 
 
 def reserve_rocking(scene: Scene, base: Base) -> float:
