@@ -44,6 +44,10 @@ def write(name, text):
         (["simulate", "slippery.toml", "--model", "ebm"], "must be below 4/3"),
         (["simulate", "gone.toml", "--model", "ebm"], "gone.toml: cannot be read"),
         (["simulate", "record.toml", "--model", "ebm"], "NPTS says 3, the file has 2 samples"),
+        (
+            ["simulate", "fig4a", "--model", "mujoco", "--set", "time_stp=1e-3"],
+            "mujoco.time_stp: unknown key; did you mean 'time_step'?",
+        ),
         (["compare", "gone.csv", "gone.csv"], "gone.csv: cannot be read"),
         (["compare", "scene.toml", "scene.toml"], "scene.toml"),
         (["report", "."], "no finished run here"),

@@ -100,7 +100,7 @@ def test_restitution_is_between_0_and_1(value):
         # The homogeneous box's own moment of inertia is too much for a centre so near to a corner.
         (block(centre_of_mass=[0.3, 0.9]), "block.moment_of_inertia", "0.386667 is not allowed"),
         (block(moment_of_inertia=0.02), "floor.friction", "must be below 0.2649"),
-        ({"floors": {}}, "floors", "unknown key"),
+        ({"floors": {}}, "floors", "did you mean 'floor'? allowed: block, description, duration"),
         ({"floor": {"friction": 4.0 / 3.0}}, "floor.friction", "below 4/3"),
         (
             {"floor": {"friction": 0.3, "static_friction": 1.5}},
@@ -121,6 +121,7 @@ def test_restitution_is_between_0_and_1(value):
             "two walls on one side",
         ),
         ({"excitation": {"kind": "quake"}}, "excitation", "ricker"),
+        ({"excitation": {"kind": "rickr"}}, "excitation", "did you mean 'ricker'? allowed: record"),
         ({"excitation": {"amplitude": 1.0}}, "excitation", "kind"),
         (
             {"excitation": {"kind": "sine", "amplitude": 1.0, "period": 1.0, "cycles": 0}},
