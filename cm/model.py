@@ -113,7 +113,7 @@ class ContinuousModel(Frozen):
         check_kind(scene, Scene, "load_scene", "scene")
         began = time.perf_counter()
         from rockcheck.cm import kernels
-        from rockcheck.scenes.threads import interruptible
+        from rockcheck.scenes.progress import interruptible
 
         times = scene.output_times
         parameters = self._parameters(scene)

@@ -4,8 +4,7 @@ description."""
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -13,11 +12,11 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table as Grid
 
-from rockcheck.reports.drawers import figure_of, live_data, scripts_of
+from rockcheck.reports.drawers import figure_of, live_data, scripts_of, side_by_side
 from rockcheck.reports.show.words import number
 from rockcheck.reports.style import FORMATS, LOOKS, looks, save, stamp_of, undrawn
 from rockcheck.scenes.writing import json_text, made, markdown_table, table_text, write_whole
-from rockcheck.validation.execute.pool import Call, Pool, cores
+from rockcheck.validation.execute.pool import Call
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Text, plain
 
 #: The sign of a verdict, beside its colour.
@@ -154,21 +153,6 @@ def _undrawn(plots: Sequence[Plot], folder: Path, formats: Sequence[str]) -> Ite
 
 def _draw(plot: Plot, stem: Path, formats: Sequence[str], stamp: str) -> None:
     save(figure_of(plot), stem, formats, stamp=stamp)
-
-
-def side_by_side(calls: Iterable[Call], jobs: int | None = None, least: int = 4) -> Iterator[None]:
-    """Do these calls, in `jobs` processes (default: one a core) if they are at least so many: a
-    process takes a second to have what draws."""
-    waiting = deque(calls)
-    jobs = min(jobs or cores(), len(waiting))
-    if jobs < 2 or len(waiting) < least:
-        yield from (call.function(*call.arguments) for call in waiting)
-        return
-    with Pool(jobs) as pool:
-        for ended in pool.run(waiting):
-            if ended.error is not None:
-                raise ended.error
-            yield
 
 
 def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -> Path:

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rockcheck.reports.style import LOOKS, PAGE, figure_style, log_scales
+from rockcheck.validation.execute.pool import Call, Pool, cores
 from rockcheck.validation.finding import Axis, Panel, Plot, Series
 
 if TYPE_CHECKING:
@@ -229,3 +231,18 @@ def _short(values: Any) -> list[float | None]:
 
 
 __all__ = ["DRAWERS", "Series", "figure_of", "lines", "live_data", "scripts_of"]
+
+
+def side_by_side(calls: Iterable[Call], jobs: int | None = None, least: int = 4) -> Iterator[None]:
+    """Do these calls, in `jobs` processes (default: one a core) if they are at least so many: a
+    process takes a second to have what draws."""
+    waiting = deque(calls)
+    jobs = min(jobs or cores(), len(waiting))
+    if jobs < 2 or len(waiting) < least:
+        yield from (call.function(*call.arguments) for call in waiting)
+        return
+    with Pool(jobs) as pool:
+        for ended in pool.run(waiting):
+            if ended.error is not None:
+                raise ended.error
+            yield

@@ -14,7 +14,7 @@ import numpy as np
 from rockcheck.reports.style import PAGE, figure_style, log_scales, looks, save
 from rockcheck.reports.tables import overrun
 from rockcheck.reports.view import FALL
-from rockcheck.scenes.trust.experience import Trust, known
+from rockcheck.scenes.experience import Trust, known
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.suite.experience import FEWEST, bias_and_scatter, pairs_of
 from rockcheck.validation.suite.results import Cell, Check, Run

@@ -17,7 +17,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from rockcheck.reports import tables, words
-from rockcheck.reports.document import side_by_side
+from rockcheck.reports.drawers import side_by_side
 from rockcheck.reports.ensembles import (
     EnsembleView,
     distributions_figure,

@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.scenes import History, InputError, Scene, kinematics
+from rockcheck.scenes import History, InputError, Scene, experience, kinematics
 from rockcheck.scenes.history import events_path
 from rockcheck.scenes.reading import within
-from rockcheck.scenes.trust import experience
 from rockcheck.validation.suite.results import Cell, Run
 from rockcheck.validation.uncertainty.population import Inputs
 

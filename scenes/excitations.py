@@ -16,7 +16,7 @@ from pydantic import Field, StringConstraints, model_validator
 
 from rockcheck.scenes.base import Finite, Frozen, Positive
 from rockcheck.scenes.errors import InputError
-from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Reading, Recording, read_record
+from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Reading, read_record
 
 FloatArray = NDArray[np.float64]
 
@@ -168,7 +168,13 @@ class Record(Motion):
             reading = Reading(
                 **{name: data.pop(name) for name in Reading.model_fields if name in data}
             )
-            data |= _told(read_record(Path(path), reading), Path(path))
+            found = read_record(Path(path), reading)
+            data |= {
+                "unscaled": tuple(found.samples.tolist()),
+                "time_step": found.time_step,
+                "source": Path(path).name,
+                "notes": found.notes,
+            }
         return data
 
     @classmethod
@@ -211,17 +217,6 @@ class Record(Motion):
     def peak(self) -> float:
         """Largest absolute scaled acceleration in units of standard gravity."""
         return float(np.max(np.abs(self.samples))) / GRAVITY_OF_RECORDS
-
-
-def _told(found: Recording, path: Path) -> dict[str, Any]:
-    """A file's recording as fields of a `Record`."""
-    samples = tuple(found.samples.tolist())
-    return {
-        "unscaled": samples,
-        "time_step": found.time_step,
-        "source": path.name,
-        "notes": found.notes,
-    }
 
 
 Excitation = Annotated[Rest | Ricker | Sine | Record, Field(discriminator="kind")]

@@ -1,20 +1,46 @@
-"""Scene files (TOML) and the scenes that come with the package."""
+"""Scene files (TOML), the scenes of the package, and numbers that are not known exactly:
+`friction = { value = 0.3, sd = 0.03 }`.
+
+
+| written | meaning |
+|---|---|
+| `{ value = 0.3, sd = 0.03 }` | normal: mean and standard deviation |
+| `{ value = 0.3, sd = 0.03, distribution = "lognormal" }` | lognormal of that mean and sd, > 0 |
+| `{ value = 0.3, sd = 0.03, distribution = "uniform" }` | uniform of that mean and sd |
+| `{ low = 0.0, high = 0.1 }` | uniform between these; `value` is the middle unless it is given |
+
+Any number of a scene can be written so. `load_scene` takes the values; `load_uncertain_scene` also
+says what is not known. Numbers are independent unless a table `[correlation]` says otherwise:
+`"block.half_width, block.half_height" = 0.8`.
+"""
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeVar
 
-from rockcheck.scenes.errors import InputError, printable, unknown_name
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import model_validator
+
+from rockcheck.scenes.base import Finite, Frozen, Positive
+from rockcheck.scenes.errors import InputError, printable, suggestion, unknown_name
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.recordings.sets import record_path
 from rockcheck.scenes.scene import Scene
-from rockcheck.scenes.trust.inputs import UncertainScene, split, uncertain_scene
 
+FloatArray = NDArray[np.float64]
+Place = tuple[str | int, ...]
+Part = TypeVar("Part", bound=Frozen)
+#: Keys by which a table of a scene file is known as an uncertain number.
+_KEYS = {"sd", "low", "high"}
+CORRELATION = "correlation"
 DATA = Path(str(resources.files("rockcheck.scenes"))) / "data"
 
 
@@ -33,7 +59,7 @@ def load_scene(source: str | Path) -> Scene:
 
 def load_uncertain_scene(source: str | Path) -> UncertainScene:
     """A scene with what its file says of the numbers that are not known exactly (see
-    `scenes.trust.inputs`). Raises as `load_scene`."""
+    the module). Raises as `load_scene`."""
     return _read(_path_of(source))
 
 
@@ -101,3 +127,206 @@ def read_toml(path: Path) -> dict[str, Any]:
         RecursionError,
     ) as error:  # such as an integer of more digits than Python reads
         raise InputError(f"{printable(path)}: not valid TOML: {printable(error)}") from None
+
+
+class Spread(Frozen):
+    """What is known of a number: its value, and how it is distributed. See the module for the
+    forms."""
+
+    value: Finite | None = None
+    sd: Positive | None = None
+    low: Finite | None = None
+    high: Finite | None = None
+    distribution: Literal["normal", "lognormal", "uniform"] = "normal"
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Spread:
+        if self.sd is not None:
+            if self.low is not None or self.high is not None:
+                raise InputError("cannot be given together with low and high", "sd")
+            if self.value is None:
+                raise InputError("is missing beside sd", "value")
+            if self.distribution == "lognormal" and self.value <= 0.0:
+                raise InputError(
+                    f"{self.value:g} is not allowed: a lognormal number is positive", "value"
+                )
+        elif self.low is None or self.high is None:
+            raise InputError(
+                "is missing: give value and sd, or low and high",
+                "high" if self.low is not None else "low",
+            )
+        elif not self.low < self.high:
+            raise InputError(
+                f"{self.high:g} is not allowed: must be more than low, {self.low:g}", "high"
+            )
+        return self
+
+    @property
+    def nominal(self) -> float:
+        """The value that stands in the scene."""
+        if self.value is not None:
+            return self.value
+        assert self.low is not None
+        assert self.high is not None
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def law(self) -> Any:
+        """The distribution, frozen, of scipy.stats."""
+        from scipy import stats
+
+        if self.sd is None:
+            assert self.low is not None
+            assert self.high is not None
+            return stats.uniform(self.low, self.high - self.low)
+        mean = self.nominal
+        if self.distribution == "uniform":
+            half = math.sqrt(3.0) * self.sd
+            return stats.uniform(mean - half, 2.0 * half)
+        if self.distribution == "lognormal":
+            log_variance = math.log1p((self.sd / mean) ** 2)
+            return stats.lognorm(
+                math.sqrt(log_variance), scale=mean * math.exp(-0.5 * log_variance)
+            )
+        return stats.norm(mean, self.sd)
+
+
+@dataclass(frozen=True)
+class UncertainScene:
+    """A scene and what is not known of it: `spreads` by the place of the number, such as
+    "floor.friction" or "walls.left.gap"."""
+
+    scene: Scene
+    spreads: Mapping[str, Spread]
+    #: Correlation of the numbers in the order of `spreads`; the unit matrix where nothing is said.
+    correlation: FloatArray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The places of the uncertain numbers."""
+        return tuple(self.spreads)
+
+    @property
+    def independent(self) -> bool:
+        """Whether no two numbers are correlated."""
+        return bool(np.array_equal(self.correlation, np.eye(len(self.spreads))))
+
+    def values(self, uniform: FloatArray) -> FloatArray:
+        """Numbers for points of the unit cube (n x count), by a Gaussian copula with the
+        correlation."""
+        from scipy import stats
+
+        if not self.independent:
+            uniform = stats.norm.cdf(
+                stats.norm.ppf(uniform) @ np.linalg.cholesky(self.correlation).T
+            )
+        return np.column_stack(
+            [spread.law.ppf(uniform[:, k]) for k, spread in enumerate(self.spreads.values())]
+        )
+
+    def at(self, values: Sequence[float]) -> Scene:
+        """The scene with these values of its uncertain numbers. Raises `InputError` where one is
+        not allowed."""
+        try:
+            return with_numbers(
+                self.scene, dict(zip(self.names, (float(value) for value in values), strict=True))
+            )
+        except InputError as error:
+            raise InputError(
+                f"{error}; a sample of the scene's inputs:"
+                ' distribution = "lognormal" or bounds keep it inside'
+            ) from None
+
+
+def split(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Spread], Mapping[str, Any]]:
+    """The tables of a scene file with plain numbers, the spread of each uncertain one, and the
+    table of correlations."""
+    spreads: dict[str, Spread] = {}
+    tables = {key: value for key, value in data.items() if key != CORRELATION}
+    plain = _plain(tables, (), spreads)
+    return plain, spreads, data.get(CORRELATION, {})
+
+
+def uncertain_scene(
+    scene: Scene, spreads: Mapping[str, Spread], correlations: Mapping[str, Any]
+) -> UncertainScene:
+    """A scene with what is not known of it; `correlations` maps "a, b" to a number between -1 and
+    1. Raises `InputError`."""
+    names = list(spreads)
+    matrix = np.eye(len(names))
+    for key, value in correlations.items():
+        pair = [part.strip() for part in key.split(",")]
+        where = f"{CORRELATION}.{key}"
+        if len(pair) != 2 or pair[0] == pair[1]:
+            raise InputError(
+                "give two uncertain numbers, as in 'floor.friction, walls.left.gap'", where
+            )
+        for name in pair:
+            if name not in names:
+                raise InputError(
+                    f"{name!r} is not an uncertain number of the scene{suggestion(name, names)}",
+                    where,
+                )
+        if isinstance(value, bool) or not isinstance(value, int | float) or not -1.0 < value < 1.0:
+            raise InputError(f"{value!r} is not allowed: give a number between -1 and 1", where)
+        i, j = (names.index(name) for name in pair)
+        matrix[i, j] = matrix[j, i] = float(value)
+    if names and np.linalg.eigvalsh(matrix)[0] <= 0.0:
+        raise InputError(
+            "these correlations contradict each other: the matrix is not positive definite",
+            CORRELATION,
+        )
+    return UncertainScene(scene, dict(spreads), matrix)
+
+
+def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
+    """The scene with some of its numbers changed, by their places; validated. Raises
+    `InputError`."""
+    change: dict[str, Any] = {}
+    walls = list(scene.walls)
+    for place, value in numbers.items():
+        table, _, name = place.partition(".")
+        if not name:
+            change[table] = value
+        elif table == "walls":
+            side, _, name = name.partition(".")
+            k = next(k for k, wall in enumerate(walls) if wall.side == side)
+            walls[k] = _changed(walls[k], name, value, f"walls.{side}")
+        else:
+            change[table] = _changed(change.get(table, getattr(scene, table)), name, value, table)
+    return scene.replace(**change, walls=tuple(walls))
+
+
+def _changed(part: Part, name: str, value: float, place: str) -> Part:
+    try:
+        return type(part)(
+            **{**{field: getattr(part, field) for field in type(part).model_fields}, name: value}
+        )
+    except InputError as error:
+        raise InputError(error.reason, f"{place}.{error.key}") from None
+
+
+def _plain(value: Any, place: Place, spreads: dict[str, Spread]) -> Any:
+    if isinstance(value, Mapping):
+        if value.keys() & _KEYS:
+            name = ".".join(str(part) for part in place)
+            try:
+                spreads[name] = Spread(**value)
+            except InputError as error:
+                raise InputError(
+                    error.reason, f"{name}.{error.key}" if error.key else name
+                ) from None
+            return spreads[name].nominal
+        return {key: _plain(item, (*place, key), spreads) for key, item in value.items()}
+    if isinstance(value, list):
+        return [
+            _plain(item, (*place, part), spreads)
+            for part, item in zip(_labels(value), value, strict=True)
+        ]
+    return value
+
+
+def _labels(items: Sequence[Any]) -> Iterator[str | int]:
+    """What the tables of a list are called: a wall by its side."""
+    for k, item in enumerate(items):
+        yield str(item["side"]) if isinstance(item, Mapping) and "side" in item else k

@@ -15,12 +15,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict
 
-from rockcheck.scenes.base import LEAST, MOST, Shown
+from rockcheck.scenes.base import MOST, Frozen, NonNegative, Positive, Shown
 from rockcheck.scenes.block import Block
 from rockcheck.scenes.errors import InputError, printable
+from rockcheck.scenes.experience import Expected, expected, known
 from rockcheck.scenes.reading import read_table
-from rockcheck.scenes.trust.experience import Expected, expected, known
 from rockcheck.scenes.writing import columns_text, json_text, write_together, write_whole
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ WORDS = ("kind", "mode_before", "mode_after")
 #: holds words here and nothing there.
 ABOUT = "rockcheck_history"
 #: What it says of a block that is not homogeneous.
-_MASS = ("centre_of_mass", "moment_of_inertia")
+_SIZES, _MASS = ("half_width", "half_height"), ("centre_of_mass", "moment_of_inertia")
 #: The modes of motion that a `mode` column may hold.
 MODES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight", "overturned")
 
@@ -169,7 +170,7 @@ class History(Shown):
 
     def expected(self, quantity: str = "peak_rotation") -> Expected:
         """A figure corrected by what the suites found about this model, with its 95 % interval
-        (rad): `scenes.trust.experience`.
+        (rad): `scenes.experience`.
 
         Raises `InputError` where nothing is known of the model, or of the figure.
         """
@@ -277,7 +278,7 @@ class History(Shown):
             frame.index, pd.RangeIndex
         ):  # pandas would take the first column for names of rows
             raise InputError(f"{shown}: rows have more values than the heading has columns")
-        about = _about(frame, shown)
+        about = _About.of(frame, shown)
         channels = _checked_channels(frame, shown)
         try:
             event_list = tuple(
@@ -292,28 +293,22 @@ class History(Shown):
                     columns=EVENT_COLUMNS
                 ).itertuples(index=False)
             )
-            cost = Cost(
-                **{k: v for k, v in about.get("cost", {}).items() if k in Cost.__dataclass_fields__}
-            )
+            cost = Cost(**{k: v for k, v in about.cost.items() if k in Cost.__dataclass_fields__})
         except (AttributeError, TypeError, ValueError):
             raise InputError(
                 f"{printable(beside)}: not an events table written by rockcheck"
             ) from None
         return cls(
-            name=printable(about.get("name", path.stem), 200),
-            model=printable(about.get("model", "measured"), 200),
+            name=printable(about.name or path.stem, 200),
+            model=printable(about.model, 200),
             channels=channels,
             event_list=event_list,
-            outcome=str(about["outcome"])
-            if about.get("outcome") in OUTCOMES
-            else outcome_of(channels),
+            outcome=about.outcome if about.outcome in OUTCOMES else outcome_of(channels),
             cost=cost,
-            settings=about.get("settings", {}),
-            notes=tuple(printable(note, 1000) for note in about.get("notes", ())),
-            half_width=_size(about, "half_width", shown),
-            half_height=_size(about, "half_height", shown),
-            **_mass(about, shown),
-            uncertainty=_uncertainty(about, shown),
+            settings=about.settings,
+            notes=tuple(printable(note, 1000) for note in about.notes),
+            uncertainty={printable(name): float(u) for name, u in about.uncertainty.items()},
+            **about.block(shown),
         )
 
 
@@ -412,33 +407,44 @@ def _text(value: object) -> str:
     return value if isinstance(value, str) else ""
 
 
-def _about(frame: pd.DataFrame, shown: str) -> dict[str, Any]:
-    """What `save` says of a history in the table's first row; empty for a file of another
-    program."""
-    if ABOUT not in frame.columns or not len(frame):
-        return {}
-    try:
-        about = json.loads(frame[ABOUT].iloc[0])
-    except (TypeError, ValueError, RecursionError):
-        about = None
-    parts = {"cost": dict, "settings": dict, "notes": list}
-    if not isinstance(about, dict) or not all(
-        isinstance(about.get(name, kind()), kind) for name, kind in parts.items()
-    ):
-        raise InputError(f"{shown}: column {ABOUT!r}: not written by rockcheck")
-    return about
+class _About(Frozen):
+    """What `save` says of a history in the table's first row; all of it may be missing in a file of
+    another program."""
 
+    model_config = ConfigDict(extra="ignore")
+    name: Any = None
+    model: Any = "measured"
+    outcome: Any = None
+    half_width: Positive | None = None
+    half_height: Positive | None = None
+    centre_of_mass: Any = None
+    moment_of_inertia: Any = None
+    settings: Mapping[str, Any] = {}
+    notes: tuple[Any, ...] = ()
+    uncertainty: Mapping[str, NonNegative] = {}
+    cost: Mapping[str, Any] = {}
 
-def _size(about: Mapping[str, Any], key: str, shown: str) -> float | None:
-    value = about.get(key)
-    if value is None:
-        return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not LEAST <= value <= MOST:
-        raise InputError(
-            f"{printable(value)} is not allowed: give a length of {LEAST:g} to {MOST:g} m",
-            f"{shown}: {key}",
-        )
-    return float(value)
+    @classmethod
+    def of(cls, frame: pd.DataFrame, shown: str) -> _About:
+        """Read from the table. Raises `InputError`."""
+        if ABOUT not in frame.columns or not len(frame):
+            return cls()
+        try:
+            return cls(**json.loads(frame[ABOUT].iloc[0]))
+        except InputError as error:
+            raise InputError(f"{shown}: column {ABOUT!r}: {error}") from None
+        except (TypeError, ValueError, RecursionError):
+            raise InputError(f"{shown}: column {ABOUT!r}: not written by rockcheck") from None
+
+    def block(self, shown: str) -> dict[str, Any]:
+        """What a history keeps of its block; a mass that is given is checked against the sizes."""
+        given = {name: getattr(self, name) for name in (*_SIZES, *_MASS)}
+        if all(given[name] is None for name in _MASS):
+            return given
+        try:
+            return block_fields(Block(**given))
+        except InputError as error:
+            raise InputError(f"{shown}: column {ABOUT!r}: {error}") from None
 
 
 def block_fields(block: Block) -> dict[str, Any]:
@@ -446,28 +452,6 @@ def block_fields(block: Block) -> dict[str, Any]:
     inertia = None if block.moment_of_inertia is None else block.gyration_squared
     sizes = {"half_width": block.half_width, "half_height": block.half_height}
     return sizes | {"centre_of_mass": block.centre_of_mass, "moment_of_inertia": inertia}
-
-
-def _mass(about: Mapping[str, Any], shown: str) -> dict[str, Any]:
-    """Where the mass of a block that is not homogeneous lies, checked against its sizes."""
-    given = {name: about[name] for name in _MASS if about.get(name) is not None}
-    if not given:
-        return {}
-    try:
-        sizes: dict[str, Any] = {name: about.get(name) for name in ("half_width", "half_height")}
-        found = block_fields(Block(**sizes, **given))
-    except InputError as error:
-        raise InputError(f"{shown}: column {ABOUT!r}: {error}") from None
-    return {name: found[name] for name in _MASS}
-
-
-def _uncertainty(about: Mapping[str, Any], shown: str) -> dict[str, float]:
-    found = about.get("uncertainty", {})
-    if not isinstance(found, dict) or not all(
-        isinstance(u, int | float) and 0.0 <= u < math.inf for u in found.values()
-    ):
-        raise InputError(f"{shown}: column {ABOUT!r}: not written by rockcheck", "uncertainty")
-    return {printable(name): float(u) for name, u in found.items()}
 
 
 def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]]:

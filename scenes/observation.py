@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,14 @@ LARGE = 100.0
 STATE = ("x", "y", "theta", "x_dot", "y_dot", "theta_dot")
 
 
+class About(TypedDict, total=False):
+    """What a model says of a run beside the motion; see `History`."""
+
+    cost: Cost
+    settings: Mapping[str, Any]
+    notes: Sequence[str]
+
+
 def observe(
     scene: Scene,
     model: str,
@@ -26,20 +34,18 @@ def observe(
     mode: NDArray[Any] | None = None,
     events: Sequence[Event] = (),
     outcome: str | None = None,
-    cost: Cost | None = None,
-    settings: Mapping[str, Any] | None = None,
-    notes: Sequence[str] = (),
+    **about: Unpack[About],
 ) -> History:
     """The History of a run whose `state` has one row per output time: x, y, theta, x_dot, y_dot,
     theta_dot (SI).
 
     Fewer rows than `scene.output_times` mean that the run ended early; rows from the first |theta|
     >= pi/2 on are left out. `mode` and `outcome` are derived from the motion where the model does
-    not know them. Adds a note where the record is shorter than the scene.
+    not know them; `about` is what it says beside. Adds a note where the record is shorter than
+    the scene.
     """
     tipped = np.flatnonzero(np.abs(state[:, 2]) >= math.pi / 2)
-    rows = int(tipped[0]) if tipped.size else len(state)
-    rows = max(rows, 1)
+    rows = max(int(tipped[0]) if tipped.size else len(state), 1)
     state = state[:rows]
     channels: dict[str, NDArray[Any]] = {"t": scene.output_times[:rows]}
     channels |= {name: state[:, column] for column, name in enumerate(STATE)}
@@ -56,9 +62,9 @@ def observe(
         channels=channels,
         event_list=tuple(events),
         outcome=outcome,
-        cost=cost or Cost(),
-        settings=dict(settings or {}),
-        notes=(*scene_notes(scene), *notes),
+        cost=about.get("cost", Cost()),
+        settings=dict(about.get("settings", {})),
+        notes=(*scene_notes(scene), *about.get("notes", ())),
         **block_fields(scene.block),
     )
 

@@ -6,6 +6,7 @@ import os
 import shutil
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,10 +15,19 @@ import pytest
 
 from rockcheck.scenes import Event, History
 from rockcheck.scenes.errors import NotInstalled
+from rockcheck.validation.execute.models import not_installed
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
 
+#: What a test marked `needs` may ask for, beside the models of the package by their names: whether
+#: it is here.
+HERE: dict[str, bool] = {
+    "POSIX": os.name == "posix",
+    "Linux": Path("/proc/self/task").exists(),
+    "git": shutil.which("git") is not None,
+    "pyarrow": find_spec("pyarrow") is not None,
+}
 #: What may be skipped while `CI` is set: how the reason begins, and where it is no fault of the
 #: job. All else that is skipped fails it.
 MAY_BE_SKIPPED: dict[str, bool] = {
@@ -55,6 +65,14 @@ def _judged(report: Any) -> None:
     if not _may_be_skipped(reason):
         report.outcome = "failed"
         report.longrepr = f"skipped in CI, and tests/conftest.py lists no such reason: {reason}"
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """A test that is marked as needing what is not here is skipped."""
+    for name in (name for mark in item.iter_markers("needs") for name in mark.args):
+        missing = ("" if HERE[name] else "not here") if name in HERE else not_installed(name)
+        if missing:
+            pytest.skip(f"needs {name}: {missing}")
 
 
 @pytest.hookimpl(wrapper=True)

@@ -81,21 +81,18 @@ TARGETS = {
         "tests/scenes/test_scene.py",
         "tests/ebm/test_loaded_blocks.py::test_pivots_of_a_block",
     ],
-    "scenes/trust/inputs.py": [
+    "scenes/files.py": [
         "tests/scenes/test_inputs.py",
+        "tests/scenes/test_files.py",
         UNCERTAINTY,
         "-k",
-        "inputs or scene_file or correlated or faults",
+        "inputs or files or scene_file or correlated or faults",
     ],
     "scenes/recordings/sets.py": [
         "tests/scenes/test_record_sets.py",
         "tests/scenes/test_recordings.py",
     ],
-    "scenes/recordings/intensity.py": [
-        "tests/scenes/test_recordings.py",
-        "-k",
-        "intensities or spectral or periods",
-    ],
+    "scenes/recordings/intensity.py": ["tests/scenes/test_intensity.py"],
     "validation/uncertainty/verdict.py": [UNCERTAINTY, "-k", "what_a_difference_says"],
     "validation/uncertainty/numerical.py": [
         UNCERTAINTY,

@@ -13,13 +13,13 @@ import os
 import time
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, fields, replace
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 from pydantic import TypeAdapter
 
@@ -28,7 +28,7 @@ from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import OnProgress, announce, unheard
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.pool import THREADS, Call, Ended, Failure, Pool, guarded
+from rockcheck.validation.execute.pool import THREADS, Call, Failure, Pool, guarded
 from rockcheck.validation.execute.remote import Cluster
 from rockcheck.validation.execute.store import RECORDS, Store, name_of
 from rockcheck.validation.finding import Finding, Made
@@ -129,16 +129,6 @@ class Study(ABC):
         return TypeAdapter(self.record)
 
 
-class Workers(Protocol):
-    """Where tasks are played: `Pool`, or `Cluster`; a context."""
-
-    jobs: int
-
-    def run(self, waiting: deque[Call], *, until: float = math.inf) -> Iterator[Ended]:
-        """Runs the calls and yields each as it ends; more may be put into `waiting` meanwhile."""
-        ...  # pragma: no cover
-
-
 def run(
     study: Study,
     folder: Path,
@@ -210,7 +200,7 @@ class _Run:
 
     def _play(self, stack: ExitStack, until: float) -> None:
         """Waves of tasks, until the study has no more."""
-        workers: Workers | None = None
+        workers: Pool | None = None
         while waiting := self._next():
             self._estimate(waiting)
             elsewhere = [task for task in waiting if self._elsewhere(task)]
@@ -259,7 +249,7 @@ class _Run:
             return task.where != "timed"
         return task.where == "worker" and self.jobs > 0
 
-    def _workers(self) -> Any:
+    def _workers(self) -> Pool:
         return (
             Cluster(self.scheduler, self.study.memory_mb)
             if self.scheduler

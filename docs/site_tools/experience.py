@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from rockcheck.scenes.trust.experience import Experience
+from rockcheck.scenes.experience import Experience
 from rockcheck.scenes.writing import markdown_table, write_whole
 from rockcheck.validation.suite.experience import experience_of
 from rockcheck.validation.suite.results import Run

@@ -19,12 +19,14 @@ from pathlib import Path
 
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.reading import read_text
-from rockcheck.scenes.recordings.headed import (
+from rockcheck.scenes.recordings.formats import (
     AT2_HEADER,
     AT2_HEADER_PLAIN,
+    is_volume,
     read_at2,
     read_esm,
     read_knet,
+    read_volume,
 )
 from rockcheck.scenes.recordings.recording import (
     GRAVITY_OF_RECORDS,
@@ -35,7 +37,6 @@ from rockcheck.scenes.recordings.recording import (
     option,
 )
 from rockcheck.scenes.recordings.tables import read_table
-from rockcheck.scenes.recordings.volumes import is_volume, read_volume
 
 __all__ = ["GRAVITY_OF_RECORDS", "UNITS", "Reading", "Recording", "read_components", "read_record"]
 

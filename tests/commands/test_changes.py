@@ -4,7 +4,6 @@ many."""
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -146,7 +145,7 @@ def test_the_peak_of_a_block_that_fell_is_no_figure_that_changes():
     assert list(moment_of(reached(7.8, fell), Path()).figures.values()) == [None]
 
 
-@pytest.mark.skipif(shutil.which("git") is None, reason="needs POSIX tools: git")
+@pytest.mark.needs("git")
 def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys):
     for words in (
         ["init", "-q"],

@@ -44,6 +44,10 @@ def write(name, text):
         (["simulate", "slippery.toml", "--model", "ebm"], "must be below 4/3"),
         (["simulate", "gone.toml", "--model", "ebm"], "gone.toml: cannot be read"),
         (["simulate", "record.toml", "--model", "ebm"], "NPTS says 3, the file has 2 samples"),
+        (
+            ["simulate", "fig4a", "--model", "mujoco", "--set", "time_stp=1e-3"],
+            "mujoco.time_stp: unknown key; did you mean 'time_step'?",
+        ),
         (["compare", "gone.csv", "gone.csv"], "gone.csv: cannot be read"),
         (["compare", "scene.toml", "scene.toml"], "scene.toml"),
         (["report", "."], "no finished run here"),
@@ -92,20 +96,8 @@ def test_a_model_that_fails_is_exit_3(capsys):
 def test_compare_two_histories(capsys):
     write("scene.toml", SCENE)
     for offset in ("0.0", "0.001"):
-        main(
-            [
-                "simulate",
-                "scene.toml",
-                "--model",
-                "faulty:Still",
-                "--allow-code",
-                "faulty:Still",
-                "--set",
-                f"offset={offset}",
-                "-o",
-                f"{offset}.csv",
-            ]
-        )
+        own = "--set", f"offset={offset}", "-o", f"{offset}.csv"
+        main(["simulate", "scene.toml", "--model", *STILL, *own])
     assert main(["compare", "0.0.csv", "0.001.csv"]) == 0
     out = capsys.readouterr().out
     assert "RMS difference of rotation" in out
@@ -169,89 +161,23 @@ floor = { friction = 0.5 }
         "[tolerances.short.near.still]\n"
         "theta_peak = { expected = 0.0038, limit = %s, drift = 0.0001, why = 'a test' }\n"
     )
-    expected = {"0.01": 0, "0.001": 1}
-    for limit, code in expected.items():
+    own = ["mine.toml", "--allow-code", "faulty:Still", "--jobs", "1"]
+    validate, accept = ["validate", *own, "--no-report"], ["accept", *own]
+    for limit, code in {"0.01": 0, "0.001": 1}.items():
         write("mine.toml", suite + line % limit)
-        assert (
-            main(
-                [
-                    "validate",
-                    "mine.toml",
-                    "--allow-code",
-                    "faulty:Still",
-                    "--no-report",
-                    "--jobs",
-                    "1",
-                ]
-            )
-            == code
-        )
+        assert main(validate) == code
         out = capsys.readouterr().out
         assert max(map(len, out.splitlines())) <= 80
         assert f"verdict: {'pass' if code == 0 else 'fail'}" in out
-    assert {path.name for path in Path("rockcheck-report").iterdir()} >= {
-        "run.json",
-        "checks.csv",
-        "figures.csv",
-        "junit.xml",
-        "summary.md",
-    }
+    kept = {path.name for path in Path("rockcheck-report").iterdir()}
+    assert kept >= {"run.json", "checks.csv", "figures.csv", "junit.xml", "summary.md"}
     assert 'failures="1"' in Path("rockcheck-report/junit.xml").read_text()
-    assert (
-        "theta_peak against still: 0.003837 is more than 0.001"
-        in Path("rockcheck-report/summary.md").read_text()
-    )
+    summary = Path("rockcheck-report/summary.md").read_text()
+    assert "theta_peak against still: 0.003837 is more than 0.001" in summary
     write("mine.toml", suite.replace("offset = 1e-3", "offset = 1.2e-3") + line % "0.01")
-    assert (
-        main(
-            ["validate", "mine.toml", "--allow-code", "faulty:Still", "--no-report", "--jobs", "1"]
-        )
-        == 0
-    )
-    assert (
-        main(
-            [
-                "validate",
-                "mine.toml",
-                "--allow-code",
-                "faulty:Still",
-                "--no-report",
-                "--jobs",
-                "1",
-                "--strict",
-            ]
-        )
-        == 1
-    )
+    assert main(validate) == 0
+    assert main([*validate, "--strict"]) == 1
     assert "verdict: changed" in capsys.readouterr().out
-    assert main(["accept", "mine.toml", "--allow-code", "faulty:Still", "--jobs", "1"]) == 1
-    assert (
-        main(
-            [
-                "accept",
-                "mine.toml",
-                "--allow-code",
-                "faulty:Still",
-                "--jobs",
-                "1",
-                "--reason",
-                "it leans more",
-            ]
-        )
-        == 0
-    )
-    assert (
-        main(
-            [
-                "validate",
-                "mine.toml",
-                "--allow-code",
-                "faulty:Still",
-                "--no-report",
-                "--jobs",
-                "1",
-                "--strict",
-            ]
-        )
-        == 0
-    )
+    assert main(accept) == 1
+    assert main([*accept, "--reason", "it leans more"]) == 0
+    assert main([*validate, "--strict"]) == 0

@@ -66,7 +66,7 @@ def test_the_exit_codes_are_told_by_the_help_and_by_the_documentation(capsys):
         assert f"\n| {code} | " in page, code
 
 
-@pytest.mark.skipif(os.name != "posix", reason="pipes of a POSIX shell")
+@pytest.mark.needs("POSIX")
 @pytest.mark.parametrize(
     ("words", "expected"),
     [

@@ -4,7 +4,6 @@ is named, and mended by what is said."""
 from __future__ import annotations
 
 import json
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -160,7 +159,7 @@ def test_parquet_without_its_package_is_refused_before_the_run(type_, monkeypatc
     assert not Path("x.parquet").exists()
 
 
-@pytest.mark.skipif(find_spec("pyarrow") is None, reason="needs pyarrow")
+@pytest.mark.needs("pyarrow")
 def test_a_history_as_parquet_is_that_of_the_csv(type_):
     for name in ("a.csv", "a.parquet"):
         simulated(type_, "Falls", name)

@@ -252,9 +252,6 @@ sys.exit(cli.main(sys.argv[1:]))
 #: Modules that may unpickle or import by a name, and why.
 UNPICKLE = {
     "scenes/compiled.py": "the user's own private folder, owner and mode checked, each file hashed",
-    "validation/execute/remote.py": (
-        "tasks between the workers of one's own cluster and their children"
-    ),
 }
 IMPORT = {
     "rockcheck/__init__.py": "the public names",

@@ -4,7 +4,8 @@
 - a block with `title="file"`: written to that file, and loaded as what it is; a script is run.
 - bash, and indented commands: run; one that fails, fails the page. `make` targets are looked up
   instead of run.
-- text: what a command shows; not run.
+- text: a session is run where it begins with `$ `: what is seen at 80 columns has these words, any
+  number for a number; `...` stands for more.
 
 Pages of studies hold commands of many minutes; these are run with `@pytest.mark.slow`, the longest
 in their `--quick` form.
@@ -93,6 +94,15 @@ def run_shell(command: str, folder: Path) -> None:
     assert done.returncode == 0, f"{command}: exit {done.returncode}: {done.stderr or done.stdout}"
 
 
+def run_session(text: str, folder: Path) -> None:
+    """Run `$ command`, and compare what is seen with what the page shows."""
+    command, _, shown = text.removeprefix("$ ").partition("\n")
+    done = shell(f"COLUMNS=80 {command}", folder)
+    seen, said = (re.sub(r"\d+(\.\d+)*", "#", words) for words in (done.stdout, shown))
+    parts = [re.escape(" ".join(part.split())) for part in said.split("...")]
+    assert re.fullmatch(" ?.*? ?".join(parts), " ".join(seen.split())), done.stdout + done.stderr
+
+
 def show_file(block: Block, folder: Path) -> None:
     """Write the file that a block shows, and read or run it as what it is."""
     path = folder / block.file
@@ -129,6 +139,8 @@ def test_blocks_run(page, tmp_path, monkeypatch):
             show_file(block, tmp_path)
         elif block.language == "python":  # a traceback points into the page
             exec(compile("\n" * (block.line - 1) + block.text, str(page), "exec"), names)
+        elif block.text.startswith("$ "):
+            run_session(block.text, tmp_path)
         elif block.language == "bash":
             for command in commands_of(block.text):
                 if not is_long(command):

@@ -124,7 +124,7 @@ def test_a_step_controller_says_how_steps_follow_each_other(varying_engine, free
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not Drake.installed(), reason="Drake is not installed")
+@pytest.mark.needs("drake")
 def test_drake_goes_on_where_its_solver_stumbles(monkeypatch):
     """Two steps of this record are not solved as they stand: the run ends all the same, and does so
     again."""

@@ -17,8 +17,6 @@ from rockcheck.scenes import InputError
 from rockcheck.validation.execute.store import HISTORIES, Store
 from rockcheck.validation.suite.results import RUN_FILE, Run
 
-POSIX = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with a name are POSIX")
-
 
 @pytest.fixture
 def received(tmp_path: Path, run_folder: Path) -> Path:
@@ -35,7 +33,7 @@ def published(folder: Path) -> None:
     write_site(folder)
 
 
-@POSIX
+@pytest.mark.needs("POSIX")
 def test_no_file_of_a_run_is_written_through(tmp_path: Path, received: Path) -> None:
     """Every file that a run writes (tables, pages, data, figures, scripts), as a link and as a
     pipe."""
@@ -95,7 +93,7 @@ def test_no_folder_of_kept_results_is_a_link(tmp_path: Path, part: str) -> None:
         Store(folder)
 
 
-@POSIX
+@pytest.mark.needs("POSIX")
 @pytest.mark.parametrize("trap", ["a pipe", "a link out", "a folder"])
 @pytest.mark.parametrize("suffix", [".json", ".csv.gz", ".events.csv.gz"])
 def test_a_kept_result_that_is_no_file_of_the_folder_is_none(

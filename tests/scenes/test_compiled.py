@@ -10,9 +10,7 @@ import pickle
 import signal
 import subprocess
 import sys
-import threading
 import time
-from collections import deque
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -23,12 +21,9 @@ import pytest
 from rockcheck import ebm
 from rockcheck.commands.cli import main
 from rockcheck.ebm.core import march
-from rockcheck.scenes import compiled, threads
-from rockcheck.scenes.progress import announce, announcing
-from rockcheck.validation.execute.pool import Call, Pool
+from rockcheck.scenes import compiled
+from rockcheck.scenes.progress import announcing
 from rockcheck.validation.execute.warming import PARTS
-
-posix = pytest.mark.skipif(os.name != "posix", reason="owners and modes as POSIX has them")
 
 #: A package of one kernel, played in a process of its own; says how many functions were read from
 #: the cache and how many compiled.
@@ -139,7 +134,7 @@ def test_what_was_compiled_is_read_back(tmp_path, play):
 
 def test_the_key_is_of_all_that_lies_below_the_package(tmp_path, monkeypatch):
     """A function of rockcheck.ebm.core.march may call one of any module of rockcheck.ebm."""
-    assert compiled._package(march.run.py_func) == Path(ebm.__file__).parent
+    assert compiled._package(march.play.py_func) == Path(ebm.__file__).parent
     monkeypatch.setattr(compiled.config, "CACHE_DIR", str(tmp_path / "cache"))
     below = tmp_path / "package" / "core" / "deep.py"
     below.parent.mkdir(parents=True)
@@ -198,14 +193,14 @@ class _Planted:
         return os.mkdir, (self.path,)
 
 
-@posix
+@pytest.mark.needs("POSIX")
 def test_the_folder_is_closed_to_others(tmp_path, play):
     play("0 read, 2 compiled")
     (folder,) = (tmp_path / "cache").glob("tiny-kernels-*")
     assert folder.stat().st_mode & 0o777 == 0o700
 
 
-@posix
+@pytest.mark.needs("POSIX")
 @pytest.mark.parametrize(
     "fault", ["open to others", "a link", "below a folder that all may change"]
 )
@@ -227,7 +222,7 @@ def test_a_folder_that_others_may_change_is_not_used(tmp_path, play, fault):
     )
 
 
-@posix
+@pytest.mark.needs("POSIX")
 def test_a_folder_of_another_user_is_not_used(tmp_path, monkeypatch):
     folder = tmp_path / "cache" / "tiny-kernels-0"
     folder.mkdir(parents=True, mode=0o700)
@@ -236,7 +231,7 @@ def test_a_folder_of_another_user_is_not_used(tmp_path, monkeypatch):
     assert not compiled._is_private(folder, os.getuid())
 
 
-@posix
+@pytest.mark.needs("POSIX")
 def test_no_folder_that_could_be_foreseen(tmp_path, play):
     """Where the package's folder cannot be written, the user's own cache is taken, never a common
     one."""
@@ -276,7 +271,7 @@ def test_everything_can_be_imported_without_the_compiler():
     assert done.stdout == "at rest\n"
 
 
-@posix
+@pytest.mark.needs("POSIX")
 def test_the_wait_for_compiled_code_can_be_interrupted(tmp_path):
     """Ctrl-C while a kernel runs for minutes: the process ends at once, with 130."""
     script = tmp_path / "slow.py"
@@ -300,7 +295,7 @@ def test_the_wait_for_compiled_code_can_be_interrupted(tmp_path):
 _SLOW = """
 import os, signal, sys
 from rockcheck.scenes.compiled import kernel
-from rockcheck.scenes.threads import interruptible, threads
+from rockcheck.scenes.progress import interruptible, threads
 
 # a shell's background jobs, and all that they start, ignore Ctrl-C
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -324,42 +319,6 @@ except KeyboardInterrupt:
     print("interrupted", flush=True)
     os._exit(130)
 """
-
-
-def test_an_interruptible_call_is_the_call_itself():
-    assert threads.interruptible(lambda: 3) == 3
-    with pytest.raises(ZeroDivisionError):
-        threads.interruptible(lambda: 1 // 0)
-
-
-def test_interruptible_calls_share_a_thread_and_a_forked_process_has_its_own():
-    first = threads.interruptible(threading.get_ident)
-    assert first != threading.get_ident()
-    with pytest.raises(ZeroDivisionError):
-        threads.interruptible(lambda: 1 // 0)
-    assert threads.interruptible(threading.get_ident) == first
-    if hasattr(os, "fork"):
-        child = os.fork()
-        if child == 0:
-            signal.alarm(60)
-            os._exit(threads.interruptible(lambda: 7))
-        assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
-
-
-@posix
-def test_the_call_after_an_interrupted_one_works_while_that_one_goes_on():
-    released = threading.Event()
-    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            threads.interruptible(
-                lambda: (os.kill(os.getpid(), signal.SIGINT), released.wait(60.0))
-            )
-        assert threads.interruptible(lambda: 3) == 3
-        assert not released.is_set()
-    finally:
-        released.set()
-        signal.signal(signal.SIGINT, previous)
 
 
 def compilation(compiling, module):
@@ -394,18 +353,6 @@ def test_a_long_compilation_is_announced_once_a_package(monkeypatch):
     assert gc.isenabled()
 
 
-def test_a_worker_announces_on_the_runs_own_stderr(capfd):
-    """Its output goes nowhere otherwise; and it says nothing where the run does not want to hear of
-    it."""
-    calls = [Call(announce, ("compiling",)), Call(print, ("noise",))]
-    with announcing(lambda words: None), Pool(1) as pool:
-        assert [ended.error for ended in pool.run(deque(calls))] == [None, None]
-    assert capfd.readouterr() == ("", "rockcheck: compiling\n")
-    with Pool(1) as pool:
-        assert [ended.error for ended in pool.run(deque(calls))] == [None, None]
-    assert capfd.readouterr() == ("", "")
-
-
 @pytest.mark.long
 def test_what_is_compiled_ahead_is_not_compiled_again(capsys):
     """`rockcheck warm` covers what commands need; a second time all of it is there."""
@@ -418,8 +365,8 @@ def test_what_is_compiled_ahead_is_not_compiled_again(capsys):
     code = (
         "from rockcheck.validation.execute.warming import PARTS;"
         "[run() for run in PARTS.values()];"
-        "from rockcheck.ebm.core import march; print(sum(march.run.stats.cache_misses.values()),"
-        " len(march.run.signatures) <= 3)"
+        "from rockcheck.ebm.core import march; print(sum(march.play.stats.cache_misses.values()),"
+        " len(march.play.signatures) <= 1)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True

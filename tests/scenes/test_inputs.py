@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rockcheck.scenes import InputError
-from rockcheck.scenes.trust.inputs import Spread, split, uncertain_scene, with_numbers
+from rockcheck.scenes.files import Spread, split, uncertain_scene, with_numbers
 
 
 @pytest.mark.parametrize("cv", [0.05, 0.5, 2.0])

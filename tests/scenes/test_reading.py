@@ -75,9 +75,7 @@ print("read or refused")
 """
 
 
-@pytest.mark.skipif(
-    sys.platform == "win32", reason="limits of processor time are set as POSIX does"
-)
+@pytest.mark.needs("POSIX")
 @pytest.mark.parametrize("name", LONG)
 def test_any_file_of_a_megabyte_is_read_or_refused_within_ten_seconds(tmp_path, name):
     (tmp_path / name).write_text(LONG[name])
@@ -95,7 +93,7 @@ def test_any_file_of_a_megabyte_is_read_or_refused_within_ten_seconds(tmp_path, 
 READERS = (History.load, read_measured, read_record, load_scene, read_toml)
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with a name are POSIX")
+@pytest.mark.needs("POSIX")
 @pytest.mark.parametrize("read", READERS)
 @pytest.mark.parametrize("kind", ["a pipe", "a device", "a folder", "a link to a device"])
 def test_only_regular_files_are_read(tmp_path, read, kind):
@@ -111,7 +109,7 @@ def test_only_regular_files_are_read(tmp_path, read, kind):
         read(path)
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with a name are POSIX")
+@pytest.mark.needs("POSIX")
 def test_what_lies_beside_a_history_or_in_a_run_is_a_regular_file_too(tmp_path):
     (tmp_path / "h.csv").write_text("t,theta\n0,0\n1,0\n")
     os.mkfifo(tmp_path / "h.events.csv")

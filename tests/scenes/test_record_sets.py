@@ -10,7 +10,14 @@ import pytest
 
 from rockcheck.scenes import InputError
 from rockcheck.scenes.recordings import Reading
-from rockcheck.scenes.recordings.sets import files_of, motions_of, verticals_of
+from rockcheck.scenes.recordings.recording import Recording
+from rockcheck.scenes.recordings.sets import (
+    _vertical_file,
+    files_of,
+    is_vertical,
+    motions_of,
+    verticals_of,
+)
 
 
 def table(path, gain=1.0):
@@ -126,3 +133,48 @@ def test_a_motion_has_exactly_one_vertical_component_and_none_is_left_over(folde
     ):
         with pytest.raises(InputError, match=said):
             verticals_of(paths, Reading())
+
+
+@pytest.mark.parametrize(
+    ("name", "form", "component", "vertical"),
+    [
+        ("RSN6_IMPVALL.I_I-ELC-UP.AT2", "PEER AT2", "UP", True),
+        ("RSN6_IMPVALL.I_I-ELC180.AT2", "PEER AT2", "180", False),
+        ("RSN1_DWN.AT2", "PEER AT2", "", True),
+        ("RSN1.AT2", "PEER AT2", "V", True),
+        ("IV.T1213..HNZ.D.ASC", "ESM ASCII", "HNZ", True),
+        ("IV.T1213..HNE.D.ASC", "ESM ASCII", "HNE", False),
+        ("MYG0041103111446.UD", "K-NET ASCII", "U-D", True),
+        ("MYGH041103111446.UD2", "K-NET ASCII", "6", True),
+        ("MYGH041103111446.EW2", "K-NET ASCII", "5", False),
+        ("station.V2", "V2", "up", True),
+        ("station.V2", "V2", "Down", True),
+        ("station.V2", "V2", "90 deg", False),
+        ("table-up.csv", "CSV", "acceleration_g", True),
+        ("cup.csv", "CSV", "acceleration_g", False),
+        ("setup.txt", "table", "column 2", False),
+    ],
+)
+def test_which_component_is_vertical(name, form, component, vertical):
+    recording = Recording(
+        samples=np.zeros(3), time_step=0.01, unit="g", form=form, component=component
+    )
+    assert is_vertical(Path(name), recording) == vertical
+
+
+@pytest.mark.parametrize(
+    ("name", "others", "vertical"),
+    [
+        ("RSN6_IMPVALL.I_I-ELC180.AT2", ("RSN6_IMPVALL.I_I-ELC-UP.AT2", "RSN8_NCALIF-UP.AT2"), 0),
+        ("RSN6_IMPVALL.I_I-ELC180.AT2", ("RSN8_NCALIF-UP.AT2",), None),
+        ("IV.T1213..HNE.D.ASC", ("IV.T1214..HNZ.D.ASC", "IV.T1213..HNZ.D.ASC"), 1),
+        ("MYG0041103111446.EW", ("MYG0041103111446.UD", "MYG0051103111446.UD"), 0),
+        ("MYGH041103111446.NS2", ("MYGH041103111446.UD1", "MYGH041103111446.UD2"), 1),
+        ("ns.csv", ("up.csv",), 0),
+        ("ns.csv", ("up.csv", "down.csv"), None),
+        ("ns.csv", ("elsewhere/up.csv",), None),
+    ],
+)
+def test_which_file_has_the_vertical_component(name, others, vertical):
+    paths = [Path(other) for other in others]
+    assert _vertical_file(Path(name), paths) == (None if vertical is None else paths[vertical])

@@ -4,7 +4,6 @@ is read."""
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,11 +13,9 @@ import pytest
 from numpy.typing import NDArray
 
 from rockcheck.commands.cli import main
-from rockcheck.scenes import InputError, Record, load_scene
-from rockcheck.scenes.observation import scene_notes
+from rockcheck.scenes import InputError, Record
 from rockcheck.scenes.recordings import Reading, intensity, read_components, read_record
-from rockcheck.scenes.recordings.recording import Recording
-from rockcheck.scenes.recordings.sets import _vertical_file, files_of, is_vertical, motions_of
+from rockcheck.scenes.recordings.sets import files_of, motions_of
 
 G = 9.80665
 STEP = 0.01
@@ -280,98 +277,6 @@ def test_k_net_takes_out_the_offset_and_says_so(tmp_path):
         read_record(path)
 
 
-# --- tables, and what has to be told of them
-
-
-@pytest.mark.parametrize(
-    ("text", "options", "samples", "step"),
-    [
-        ("0.1\n0.2\n-0.3\n", {"unit": "g", "time_step": 0.02}, [0.1 * G, 0.2 * G, -0.3 * G], 0.02),
-        ("0.1 0.2\n0.3 0.4\n", {"unit": "m/s2", "time_step": 0.02, "column": 2}, [0.2, 0.4], 0.02),
-        ("0 10\n0.5 20\n", {"unit": "gal"}, [0.1, 0.2], 0.5),
-        ("0 10\n0.5 20\n", {"unit": "mm/s2"}, [0.01, 0.02], 0.5),
-        ("0,0 1,5\n0,5 2,5\n", {"unit": "cm/s2"}, [0.015, 0.025], 0.5),
-        ("0,5\n1,5\n", {"unit": "m/s2", "decimal": ",", "time_step": 0.1}, [0.5, 1.5], 0.1),
-        ("0;1,5\n0,5;2\n", {"unit": "m/s2"}, [1.5, 2.0], 0.5),
-        ("0\t1.5\n0.5\t2\n", {"unit": "m/s2"}, [1.5, 2.0], 0.5),
-        ("17 words\n3 4\n0.5 1\n1.0 2\n", {"unit": "m/s2", "header_lines": 2}, [1.0, 2.0], 0.5),
-        ("time_s,acceleration_cm_s2\n0,100\n0.1,50\n", {}, [1.0, 0.5], 0.1),
-        ("time_s,acceleration_gal\n0,100\n0.1,50\n", {}, [1.0, 0.5], 0.1),
-        ("time_s,acceleration_mm_s2\n0,100\n0.1,50\n", {}, [0.1, 0.05], 0.1),
-        (
-            "time_s,acceleration_g,acceleration_m_s2\n0,9,1\n1,9,2\n",
-            {"column": "acceleration_m_s2"},
-            [1.0, 2.0],
-            1.0,
-        ),
-        ("time (s);acc [cm/s^2]\n0;1\n1;2\n", {}, [0.01, 0.02], 1.0),
-    ],
-)
-def test_tables(text, options, samples, step, tmp_path):
-    path = tmp_path / "motion.txt"
-    for content in (
-        text.encode(),
-        text.encode("utf-8-sig"),
-        text.encode("utf-16"),
-        text.replace("\n", "\r\n").encode(),
-    ):
-        path.write_bytes(content)
-        record = read_record(path, Reading(**options))
-        np.testing.assert_allclose(record.samples, samples, rtol=1e-14)
-        assert record.time_step == pytest.approx(step, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("text", "options", "said"),
-    [
-        (
-            "0 1\n0.5 2\n",
-            {},
-            "the unit of acceleration is not stated; give it:"
-            ' --read unit=g (in a scene file: unit = "g")',
-        ),
-        (
-            "1\n2\n",
-            {"unit": "g"},
-            "no column of times; give the time step: --read time_step=0.01 (in a scene file:"
-            " time_step = 0.01)",
-        ),
-        (
-            "1 2 3\n4 5 6\n",
-            {"unit": "g"},
-            "3 columns; give that of the accelerations: --read column=2 (in a scene file: column ="
-            " 2)",
-        ),
-        ("1 2 3\n4 5 6\n", {"column": 4}, "no single column 4; there are 1 to 3"),
-        (
-            "words\nand more of them\n",
-            {"unit": "g"},
-            "no line of numbers within the first 200; give the lines to leave out: --read"
-            " header_lines",
-        ),
-        (
-            "0,5\n1,5\n",
-            {"unit": "g"},
-            "a comma between columns or before the decimals? --read decimal=,",
-        ),
-        (
-            "time_s,acceleration_g\n0,1\n1,1\n",
-            {"unit": "gal"},
-            "the file states the unit g, not gal",
-        ),
-        ("0 1\n0.5\n", {"unit": "g"}, "line 2: 1 fields where the first line has 2"),
-        ("0 1\n1 2\n", {"component": 1}, "a table has columns; give the option column"),
-    ],
-)
-def test_what_is_not_known_is_asked_for(text, options, said, tmp_path):
-    path = tmp_path / "motion.txt"
-    path.write_text(text)
-    with pytest.raises(InputError) as fault:
-        read_record(path, Reading(**options))
-    assert said in str(fault.value)
-    assert str(fault.value).isprintable()
-
-
 @pytest.mark.parametrize(
     "option",
     [{"column": 1}, {"header_lines": 3}, {"decimal": ","}, {"unit": "gal"}, {"time_step": 0.02}],
@@ -381,94 +286,6 @@ def test_options_do_not_overrule_a_header(option, tmp_path):
     path.write_bytes(at2("N-S"))
     with pytest.raises(InputError, match="leave the option"):
         read_record(path, Reading(**option))
-
-
-@pytest.mark.parametrize(
-    ("rate", "decimals"),
-    [(300, 3), (300, 4), (128, 4), (128, 3), (100, 2), (200, 3), (60, 3), (75, 2)],
-)
-def test_times_are_judged_by_their_digits(rate, decimals, tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text(
-        "time_s,acceleration_g\n" + "".join(f"{n / rate:.{decimals}f},0.1\n" for n in range(1000))
-    )
-    if 10.0**-decimals <= 0.5 / rate or rate in (100, 200):
-        assert read_record(path).time_step == pytest.approx(1 / rate, rel=1e-12)
-    else:
-        with pytest.raises(
-            InputError,
-            match=r"is off the uniform step .*; times of 0.01 s may hide it: --read time_step",
-        ):
-            read_record(path)
-        assert read_record(path, Reading(time_step=1 / rate)).time_step == 1 / rate
-
-
-def test_a_missing_sample_is_not_taken_for_rounding(tmp_path):
-    path = tmp_path / "a.csv"
-    kept = [n for n in range(1000) if n != 500]
-    path.write_text("time_s,acceleration_g\n" + "".join(f"{n / 300:.3f},0.1\n" for n in kept))
-    with pytest.raises(InputError, match="is off the uniform step"):
-        read_record(path)
-
-
-def test_a_late_start_is_zero_for_the_scene_and_a_note_says_so(tmp_path):
-    (tmp_path / "late.csv").write_text("time_s,acceleration_g\n5.0,0\n5.5,0.5\n6.0,0\n")
-    (tmp_path / "a.toml").write_text(
-        "duration = 1.0\nblock = { half_width = 0.3, half_height = 1.0 }\nfloor = { friction = 0.4"
-        " }\n"
-        '[excitation]\nkind = "record"\nfile = "late.csv"\n'
-    )
-    scene = load_scene(tmp_path / "a.toml")
-    np.testing.assert_allclose(scene.excitation.acceleration([0.0, 0.5, 1.0]), [0.0, 0.5 * G, 0.0])
-    assert scene_notes(scene) == ("the horizontal record: the first time is 5 s; it is 0 here",)
-
-
-# --- intensity
-
-
-def test_intensities_of_a_sine_are_its_closed_forms():
-    """a = A sin(w t) over ten cycles: PGV 2 A/w from rest, Arias pi/(2 g) A^2 T/2; resonance builds
-    up as 1 - exp(-z w t)."""
-    amplitude, rate, step = 2.0, 2 * math.pi, 1e-3
-    samples = amplitude * np.sin(rate * step * np.arange(10_001))
-    record = Recording(samples=samples, time_step=step, unit="m/s2", form="CSV")
-    assert intensity.peak_acceleration(record) == pytest.approx(amplitude / G, rel=1e-9)
-    assert intensity.peak_velocity(record) == pytest.approx(2 * amplitude / rate, rel=1e-5)
-    assert intensity.arias(record) == pytest.approx(
-        math.pi / (2 * G) * amplitude**2 * 5.0, rel=1e-5
-    )
-    built_up = amplitude / G / (2 * 0.05) * (1 - math.exp(-0.05 * rate * 10.0))
-    assert intensity.spectral_acceleration(record, 1.0) == pytest.approx(built_up, rel=0.01)
-    assert intensity.spectral_acceleration(record, 0.01) == pytest.approx(amplitude / G, rel=0.01)
-
-
-def test_spectral_accelerations_are_those_of_the_straight_lines_between_samples():
-    """Samples four periods apart, or all motion in the last one: as of the same lines with samples
-    4000 times as dense."""
-    samples = np.array([0.0, 1.0, -0.5, 0.0])
-    dense = Recording(
-        samples=np.interp(np.arange(12_001) / 4000, np.arange(4), samples),
-        time_step=1e-3,
-        unit="m/s2",
-        form="CSV",
-    )
-    for period in (1.0, 2.5):
-        coarse = Recording(samples=samples, time_step=4.0, unit="m/s2", form="CSV")
-        expected = intensity.spectral_acceleration(dense, period)
-        assert intensity.spectral_acceleration(coarse, period) == pytest.approx(expected, rel=2e-3)
-    # A hat of a step's length is, to an oscillator of a far longer period, an impulse; the peak
-    # comes a quarter of a period later.
-    last = Recording(samples=np.array([0.0, 0.0, 1.0]), time_step=1e-2, unit="m/s2", form="CSV")
-    rate, damping = 2 * math.pi / 1.0, 0.05
-    peak = rate * 1e-2 * math.exp(-damping / math.sqrt(1 - damping**2) * math.acos(damping))
-    assert intensity.spectral_acceleration(last, 1.0) == pytest.approx(peak / G, rel=2e-3)
-
-
-def test_periods_of_a_spectrum_leave_no_wide_gap():
-    steps = np.divide(intensity.PERIODS[1:], intensity.PERIODS[:-1])
-    assert np.all((steps > 1.0) & (steps <= 2.0))
-    assert intensity.PERIODS[0] <= 0.1
-    assert intensity.PERIODS[-1] >= 4.0
 
 
 def test_the_command_shows_and_draws(tmp_path, capsys, monkeypatch):
@@ -498,133 +315,6 @@ def test_one_bad_file_does_not_hide_the_others(tmp_path, capsys):
     captured = capsys.readouterr()
     assert json.loads(captured.out)["samples"] == 401
     assert "b.txt, line 1: 3 columns" in captured.err
-
-
-@pytest.mark.parametrize(
-    ("name", "form", "component", "vertical"),
-    [
-        ("RSN6_IMPVALL.I_I-ELC-UP.AT2", "PEER AT2", "UP", True),
-        ("RSN6_IMPVALL.I_I-ELC180.AT2", "PEER AT2", "180", False),
-        ("RSN1_DWN.AT2", "PEER AT2", "", True),
-        ("RSN1.AT2", "PEER AT2", "V", True),
-        ("IV.T1213..HNZ.D.ASC", "ESM ASCII", "HNZ", True),
-        ("IV.T1213..HNE.D.ASC", "ESM ASCII", "HNE", False),
-        ("MYG0041103111446.UD", "K-NET ASCII", "U-D", True),
-        ("MYGH041103111446.UD2", "K-NET ASCII", "6", True),
-        ("MYGH041103111446.EW2", "K-NET ASCII", "5", False),
-        ("station.V2", "V2", "up", True),
-        ("station.V2", "V2", "Down", True),
-        ("station.V2", "V2", "90 deg", False),
-        ("table-up.csv", "CSV", "acceleration_g", True),
-        ("cup.csv", "CSV", "acceleration_g", False),
-        ("setup.txt", "table", "column 2", False),
-    ],
-)
-def test_which_component_is_vertical(name, form, component, vertical):
-    recording = Recording(
-        samples=np.zeros(3), time_step=0.01, unit="g", form=form, component=component
-    )
-    assert is_vertical(Path(name), recording) == vertical
-
-
-@pytest.mark.parametrize(
-    ("name", "others", "vertical"),
-    [
-        ("RSN6_IMPVALL.I_I-ELC180.AT2", ("RSN6_IMPVALL.I_I-ELC-UP.AT2", "RSN8_NCALIF-UP.AT2"), 0),
-        ("RSN6_IMPVALL.I_I-ELC180.AT2", ("RSN8_NCALIF-UP.AT2",), None),
-        ("IV.T1213..HNE.D.ASC", ("IV.T1214..HNZ.D.ASC", "IV.T1213..HNZ.D.ASC"), 1),
-        ("MYG0041103111446.EW", ("MYG0041103111446.UD", "MYG0051103111446.UD"), 0),
-        ("MYGH041103111446.NS2", ("MYGH041103111446.UD1", "MYGH041103111446.UD2"), 1),
-        ("ns.csv", ("up.csv",), 0),
-        ("ns.csv", ("up.csv", "down.csv"), None),
-        ("ns.csv", ("elsewhere/up.csv",), None),
-    ],
-)
-def test_which_file_has_the_vertical_component(name, others, vertical):
-    paths = [Path(other) for other in others]
-    assert _vertical_file(Path(name), paths) == (None if vertical is None else paths[vertical])
-
-
-def run_together(
-    across: int, count: int, width: int, form: str, unit: str = "G"
-) -> tuple[str, NDArray[np.float64]]:
-    """A PEER file in Fortran's columns without a blank between them, and its numbers as they are
-    printed."""
-    values = (
-        np.random.default_rng(3).uniform(1.0, 9.0, count)
-        * np.where(np.arange(count) % 3, 1.0, -1.0)
-        * 1e-2
-    )
-    words = [format(value, form)[-width:].rjust(width) for value in values]
-    lines = ["".join(words[k : k + across]) for k in range(0, count, across)]
-    head = (
-        f"PEER\nA, 1/1/2000, B, 180\nACCELERATION TIME SERIES IN UNITS OF {unit}\n"
-        f"NPTS= {count}, DT= .01 SEC\n"
-    )
-    return head + "\n".join(lines) + "\n", np.array([float(word) for word in words])
-
-
-@pytest.mark.parametrize("count", [1, 4, 5, 6, 23, 25])
-@pytest.mark.parametrize(
-    ("across", "width", "form"), [(5, 11, ".5E"), (5, 12, ".5E"), (8, 8, ".5f"), (1, 11, ".5E")]
-)
-def test_columns_of_fortran_may_run_together(tmp_path, across, width, form, count):
-    """E-011.19 is the end of one number and the beginning of the next."""
-    text, values = run_together(across, count, width, form)
-    (tmp_path / "a.AT2").write_text(text)
-    np.testing.assert_array_equal(read_record(tmp_path / "a.AT2").samples, values * G)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda text: text[:-3] + "\n",
-        lambda text: text.replace("E-0", "E0", 1),
-        lambda text: text + " 1.0\n",
-    ],
-)
-def test_columns_that_are_not_as_the_header_says_are_a_fault(tmp_path, change):
-    (tmp_path / "a.AT2").write_text(change(run_together(5, 23, 11, ".5E")[0]))
-    with pytest.raises(InputError, match="not a finite number"):
-        read_record(tmp_path / "a.AT2")
-
-
-SPELT = {
-    "cm/s2": ["CM/S/S", "CM/SEC/SEC", "CM/S^2", "cm/sec2", "(CM/S**2)", "CM / S / S"],
-    "ft/s2": ["FT/S/S", "ft/s2", "FT/SEC**2"],
-    "m/s2": ["M/S/S", "M/SEC/SEC"],
-    "g": ["G", "g", "G'S", "(G)"],
-    "gal": ["GAL", "gals"],
-}
-
-
-@pytest.mark.parametrize(
-    ("unit", "word"), [(unit, word) for unit, words in SPELT.items() for word in words]
-)
-def test_the_header_states_the_unit(tmp_path, unit, word):
-    (tmp_path / "a.AT2").write_text(
-        f"A\nACCELERATION TIME SERIES IN UNITS OF {word}\nNPTS= 2, DT= .01 SEC\n 1.0 2.0\n"
-    )
-    found = read_record(tmp_path / "a.AT2")
-    assert found.unit == unit
-    np.testing.assert_allclose(
-        found.samples,
-        np.array([1.0, 2.0]) * {"g": G, "cm/s2": 0.01, "gal": 0.01, "ft/s2": 0.3048}.get(unit, 1.0),
-    )
-
-
-def test_feet_are_a_unit_of_tables_too(tmp_path):
-    (tmp_path / "a.csv").write_text("time_s,acceleration_ft_s2\n0,1\n0.01,2\n")
-    np.testing.assert_allclose(read_record(tmp_path / "a.csv").samples, [0.3048, 0.6096])
-
-
-@pytest.mark.parametrize("word", ["CM/S", "CM", "INCHES"])
-def test_a_header_of_velocities_is_no_record(tmp_path, word):
-    (tmp_path / "a.AT2").write_text(
-        f"A\nTIME SERIES IN UNITS OF {word}\nNPTS= 2, DT= .01 SEC\n 1.0 2.0\n"
-    )
-    with pytest.raises(InputError, match="UNITS OF G"):
-        read_record(tmp_path / "a.AT2")
 
 
 def test_a_folder_of_mixed_files_is_read_and_the_odd_one_named(tmp_path):

@@ -25,7 +25,6 @@ from rockcheck.scenes.reading import (
 )
 from rockcheck.scenes.writing import columns_text, made, table_text, write_together, write_whole
 
-POSIX = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with a name are POSIX")
 #: What may stand where a result is to be written, in a folder that somebody sent.
 TRAPS: dict[str, Callable[[Path, Path], None]] = {
     "a link": lambda path, victim: path.symlink_to(victim),
@@ -37,7 +36,7 @@ TRAPS: dict[str, Callable[[Path, Path], None]] = {
 }
 
 
-@POSIX
+@pytest.mark.needs("POSIX")
 @pytest.mark.parametrize("trap", TRAPS)
 @pytest.mark.parametrize("write", [write_whole, lambda path, text: write_together({path: text})])
 def test_nothing_in_the_way_is_written_through(tmp_path, trap, write):
@@ -62,7 +61,7 @@ def test_a_folder_of_results_is_no_link(tmp_path):
     assert made(tmp_path / "mine", "data").is_dir()
 
 
-@POSIX
+@pytest.mark.needs("POSIX")
 @pytest.mark.parametrize(
     "read", [open_regular, read_bytes, read_text, read_json, read_table, read_arrays]
 )
@@ -101,7 +100,7 @@ DOORS = {
     r"\.mkdir\(": {"scenes/writing.py", "scenes/compiled.py"},
     r"\.read_text\(|\.read_bytes\(": {
         "scenes/compiled.py",
-        "scenes/trust/experience.py",
+        "scenes/experience.py",
         "validation/execute/provenance.py",
     }
     | {"commands/new.py", "validation/studies/work_precision/savings.py", "reports/site.py"}

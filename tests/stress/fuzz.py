@@ -20,7 +20,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 with atheris.instrument_imports(
     include=["rockcheck", "tomllib", "json", "csv"], exclude=["rockcheck.scenes.compiled"]
 ):
-    from test_hostile_input import NASTY, READERS, WORDS
+    from nasty import NASTY, WORDS
+    from test_hostile_input import READERS
 
 
 def quoted(word: str) -> str:

@@ -18,9 +18,7 @@ def test_there_are_two_hundred():
     assert len({case.name for case in cases()}) == len(list(cases()))
 
 
-@pytest.mark.skipif(
-    sys.platform == "win32", reason="pipes, devices, limits and signals as POSIX has them"
-)
+@pytest.mark.needs("POSIX")
 @pytest.mark.parametrize("case", list(cases())[::10], ids=lambda case: case.name)
 def test_a_hostile_case_ends_with_a_result_or_one_clear_line(case: Case):
     assert try_case(case) == ""

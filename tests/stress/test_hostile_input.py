@@ -34,6 +34,11 @@ from rockcheck.validation.execute.store import COMPARISONS, SUFFIXES, TABLE, Sto
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.suites import load_suite
 
+sys.path.insert(0, str(Path(__file__).parent))
+import nasty
+
+sys.path.pop(0)
+
 fuzzed = settings(
     max_examples=1000,
     deadline=5000,
@@ -46,175 +51,6 @@ fuzzed = settings(
     ],
 )
 
-AT2 = """PEER NGA STRONG MOTION DATABASE RECORD
-Imperial Valley-02, 5/19/1940, El Centro Array #9, 180
-ACCELERATION TIME SERIES IN UNITS OF G
-NPTS=      6, DT=   .0100 SEC,
-   .1000000E-02  -.2000000E-02   .3000000E-02   .4D-02   .5E-02
-   .6000000E-02
-"""
-CSV = "# a remark\ntime_s,acceleration_m_s2\n0.0,0.1\n0.01,-0.2\n0.02,0.3\n"
-V2 = """Corrected accelerogram   89146-L2500-12044.02       Chan  1: 360 Deg     from
- 100 Integer-header values follow on  10 lines, Format= (10I8)
- 100 Real-header values follow on  4 lines, Format= (10F8.3)
-     0.0     0.0     0.0
-     0.0     0.0     0.0
-     0.0     0.0     0.0
-     0.0     0.0     0.0   0.005
-       9 acceleration pts, approx    0 secs, units=cm/sec2 (04),Format=(8F10.5)
-   0.10000   0.20000   0.30000   0.40000   0.50000  -0.60000   0.70000   0.80000
-   0.90000
- 3 points of accel data equally spaced at  .005 sec, in cm/sec2. (8f10.6)
-  -.000010  -.000009  -.000010
-"""
-ESM = (
-    "EVENT_NAME: X\nSAMPLING_INTERVAL_S: 0.005000\nNDATA: 3\nSTREAM: HNN\nUNITS: cm/s^2\n"
-    "DATA_TYPE: ACCELERATION\n0.1\n-0.2\n0.3\n"
-)
-KNET = """Origin Time       2011/03/11 14:46:00
-Sampling Freq(Hz) 100Hz
-Duration Time(s)  .08
-Dir.              N-S
-Scale Factor      3920(gal)/6182761
-Memo.
-     4711     4712     4709     4711     4715     4711     4700     4711
-"""
-COLUMNS = "of a table\n t [s];acc [cm/s2];x\n5,00;0,1;0\n5,01;0,2;0\n5,02;-0,3;0\n"
-SCENE = """duration = 2.0
-output_step = 0.01
-[block]
-half_width = 0.3
-half_height = 1.0
-[floor]
-friction = 0.4
-[[walls]]
-side = "left"
-gap = 0.02
-restitution = 0.5
-[excitation]
-kind = "ricker"
-amplitude = 4.0
-period = 0.7
-"""
-SUITE = """description = "a suite"
-reference = "ebm"
-scenes = ["fig4a"]
-[models.ebm]
-"""
-HISTORY = "t,theta,x\n0.0,0.1,0.0\n0.1,0.05,0.0\n0.2,-0.01,0.001\n"
-NASTY = (
-    "nan",
-    "inf",
-    "-inf",
-    "1e999999",
-    "1e-999999",
-    "-1",
-    "0",
-    "1" * 400,
-    "9" * 30,
-    "0x10",
-    "1_000",
-    "١٢",
-    "\x00",
-    "\x1b[2J",
-    "\x1b]0;x\x07",
-    "../../../etc/passwd",
-    "/etc/passwd",
-    "..",
-    "~",
-    "<script>alert(1)</script>",
-    "'\"><img src=x onerror=alert(1)>",
-    "{{7*7}}",
-    "%s%n",
-    "$(touch x)",
-    "`id`",
-    "=1+1",
-    "\ufeff",
-    "\u202e",
-    "\ud7ff",
-    "\r",
-    "\n",
-    "\n\n",
-    "\t",
-    ",",
-    ";",
-    "#",
-    "[",
-    "]",
-    "[[",
-    "=",
-    '"',
-    '"""',
-    "\\",
-    "'",
-    "NPTS=",
-    "DT=",
-    "NPTS= 99999999, DT= 0",
-    "[" * 3000,
-    "{" * 3000,
-    "a." * 2000,
-    "file = '/dev/zero'",
-    "file = '.'",
-    "inf = nan",
-    "duration = 1e308",
-    "output_step = 1e-308",
-    "kind = 'record'",
-    "unscaled = [1e308, -1e308]",
-    "time_step = 1e-320",
-    "true",
-    "1979-05-27",
-)
-
-
-WORDS = (
-    "simulate",
-    "compare",
-    "report",
-    "scenes",
-    "new",
-    "accept",
-    "--model",
-    "ebm",
-    "ebm-unilateral",
-    "cm",
-    "fig4a",
-    "a.toml",
-    "h.csv",
-    "h.csv",
-    "-o",
-    "out.csv",
-    "--set",
-    "tolerance=1e-8",
-    "tolerance=nan",
-    "tolerance=[1]",
-    "x=",
-    "=1",
-    "pivot='x'",
-    "most_steps=1",
-    "--until",
-    "--offset",
-    "1",
-    "nan",
-    "-1",
-    "--scene",
-    "--help",
-    "--json",
-    "--quiet",
-    "--no-such",
-    "--",
-    "-",
-    "",
-    ".",
-    "..",
-    "/",
-    "/dev/null/x",
-    "no.toml",
-    "module:Class",
-    "os:system",
-    "posixpath:join",
-    "*",
-    "a" * 5000,
-)
 #: Commands that would run for minutes, were their arguments ever right.
 LONG = {"validate", "accept", "spectrum", "benchmark", "stress"}
 
@@ -326,8 +162,8 @@ def feed_command_line(content: bytes, folder: Path) -> None:
     inside = folder / "inside"
     if not inside.exists():
         inside.mkdir()
-        (inside / "a.toml").write_text(SCENE)
-        (inside / "h.csv").write_text(HISTORY)
+        (inside / "a.toml").write_text(nasty.SCENE)
+        (inside / "h.csv").write_text(nasty.HISTORY)
         for model in (
             "ebm",
             "ebm-unilateral",
@@ -355,15 +191,15 @@ def feed_command_line(content: bytes, folder: Path) -> None:
 
 #: Of each reader: what feeds it, and a valid input.
 READERS: dict[str, tuple[Callable[[bytes, Path], None], Callable[[], str]]] = {
-    "at2": (functools.partial(feed_record, name="a.AT2"), lambda: AT2),
-    "record_csv": (functools.partial(feed_record, name="a.csv"), lambda: CSV),
-    "record_v2": (functools.partial(feed_record, name="a.V2"), lambda: V2),
-    "record_esm": (functools.partial(feed_record, name="a.ASC"), lambda: ESM),
-    "record_knet": (functools.partial(feed_record, name="a.NS"), lambda: KNET),
-    "record_columns": (functools.partial(feed_record, name="a.txt"), lambda: COLUMNS),
-    "scene_toml": (feed_scene, lambda: SCENE),
-    "suite_toml": (feed_suite, lambda: SUITE),
-    "history_csv": (feed_history, lambda: HISTORY),
+    "at2": (functools.partial(feed_record, name="a.AT2"), lambda: nasty.AT2),
+    "record_csv": (functools.partial(feed_record, name="a.csv"), lambda: nasty.CSV),
+    "record_v2": (functools.partial(feed_record, name="a.V2"), lambda: nasty.V2),
+    "record_esm": (functools.partial(feed_record, name="a.ASC"), lambda: nasty.ESM),
+    "record_knet": (functools.partial(feed_record, name="a.NS"), lambda: nasty.KNET),
+    "record_columns": (functools.partial(feed_record, name="a.txt"), lambda: nasty.COLUMNS),
+    "scene_toml": (feed_scene, lambda: nasty.SCENE),
+    "suite_toml": (feed_suite, lambda: nasty.SUITE),
+    "history_csv": (feed_history, lambda: nasty.HISTORY),
     "stored_run": (feed_stored_run, lambda: stored_files()["run.json"].decode()),
     "stored_record": (feed_stored_record, lambda: stored_files()["record"].decode()),
     "command_line": (
@@ -376,7 +212,10 @@ READERS: dict[str, tuple[Callable[[bytes, Path], None], Callable[[], str]]] = {
 def mutated(valid: str) -> st.SearchStrategy[bytes]:
     """A valid text with some pieces cut out and nasty ones put in, or bytes of any kind."""
     piece = st.one_of(
-        st.sampled_from(NASTY), st.text(max_size=8), st.floats().map(str), st.integers().map(str)
+        st.sampled_from(nasty.NASTY),
+        st.text(max_size=8),
+        st.floats().map(str),
+        st.integers().map(str),
     )
     edit = st.tuples(st.integers(0, len(valid)), st.integers(0, 12), piece)
 
@@ -390,7 +229,8 @@ def mutated(valid: str) -> st.SearchStrategy[bytes]:
 
 
 COMMAND_LINES = st.lists(
-    st.one_of(st.sampled_from(WORDS), st.sampled_from(NASTY), st.text(max_size=6)), max_size=7
+    st.one_of(st.sampled_from(nasty.WORDS), st.sampled_from(nasty.NASTY), st.text(max_size=6)),
+    max_size=7,
 ).map(lambda words: BETWEEN.join(words).encode("utf-8", "surrogatepass"))
 
 
@@ -415,40 +255,6 @@ def stored() -> dict[str, str]:
     return stored_files()
 
 
-#: Small files, or small numbers in them, that ask for a great deal.
-BOMBS = {
-    "a.AT2": "UNITS OF G\nNPTS= 9999999, DT= .01 SEC\n1 2 3\n",
-    "b.AT2": "UNITS OF G\nNPTS= 3, DT= 1e-300 SEC\n1 2 3\n",
-    "c.AT2": "UNITS OF G\nNPTS= " + "9" * 100_000 + ", DT= .01\n1\n",
-    "d.AT2": "UNITS OF G\nNPTS= 1, DT= .01 SEC\n" + "9" * 1_000_000 + "\n",
-    "a.csv": "time_s,acceleration_g" + ",x" * 200_000 + "\n0,1\n",
-    "b.csv": "time_s,acceleration_g\n" + '"' + "x\n" * 100_000,
-    "a.toml": SCENE.replace("output_step = 0.01", "output_step = 1e-300"),
-    "b.toml": SCENE.replace("duration = 2.0", "duration = 1e300"),
-    "c.toml": "a = " + "[" * 100_000 + "]" * 100_000,
-    "d.toml": "a" + ".a" * 100_000 + " = 1",
-    "e.toml": SCENE.replace("half_width = 0.3", "half_width = 1e-300"),
-    "f.toml": SCENE.replace("period = 0.7", "period = 1e-300"),
-    "g.toml": SCENE.replace("half_height = 1.0", "half_height = 1e300"),
-    "h.toml": SCENE.replace("amplitude = 4.0", "amplitude = 1e300"),
-    "i.toml": SCENE.replace(
-        'kind = "ricker"\namplitude = 4.0\nperiod = 0.7', 'kind = "record"\nfile = "/dev/zero"'
-    ),
-    "j.toml": SCENE.replace(
-        'kind = "ricker"\namplitude = 4.0\nperiod = 0.7',
-        'kind = "sine"\namplitude = 1.0\nperiod = 1e-9\ncycles = 1000',
-    ),
-    "k.toml": SCENE.replace(
-        'kind = "ricker"\namplitude = 4.0\nperiod = 0.7',
-        'kind = "record"\nunscaled = [1.0, 2.0]\ntime_step = 1e-320',
-    ),
-    "l.toml": SCENE.replace("gap = 0.02", "gap = 1e-320"),
-    "m.toml": SCENE + "gravity = 1e-300\n",
-    "n.toml": "gravity = 1e300\n" + SCENE,
-    "o.toml": "initial_angular_velocity = 1e300\n" + SCENE,
-    "p.toml": "initial_height = 1e300\n" + SCENE,
-}
-
 _PLAY_BOMBS = """
 import resource, sys, time
 from pathlib import Path
@@ -472,12 +278,12 @@ str(Path(sys.argv[2]) / "o.csv")]) in (0, 2, 3), path
 """
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX: its limits of memory")
+@pytest.mark.needs("POSIX")
 def test_bombs_stay_below_a_gigabyte_and_a_minute(tmp_path):
     """Files that ask for much are played with 1 GiB of memory: each gives a result or one line."""
     (tmp_path / "in").mkdir()
     (tmp_path / "out").mkdir()
-    for name, text in BOMBS.items():
+    for name, text in nasty.BOMBS.items():
         (tmp_path / "in" / name).write_text(text)
     script = [sys.executable, "-c", _PLAY_BOMBS, str(tmp_path / "in"), str(tmp_path / "out")]
     done = subprocess.run(script, capture_output=True, text=True, timeout=300, check=False)
@@ -486,23 +292,10 @@ def test_bombs_stay_below_a_gigabyte_and_a_minute(tmp_path):
     assert all(len(line) < 600 for line in done.stderr.splitlines())
 
 
-HOSTILE_NAMES = (
-    "../../outside",
-    "<script>alert(1)</script>",
-    "a\x1b[2Jb",
-    "..",
-    "/etc/x",
-    "a" * 300,
-    "x\ny",
-    "{{7*7}}",
-    "CON",
-)
-
-
-@pytest.mark.parametrize("name", HOSTILE_NAMES)
+@pytest.mark.parametrize("name", nasty.HOSTILE_NAMES)
 def test_names_are_told_from_paths_and_from_markup(tmp_path, name):
     """A scene cannot be called like that; a file name made of any name stays in its folder."""
-    (tmp_path / "a.toml").write_text(f"name = {json.dumps(name)}\n" + SCENE)
+    (tmp_path / "a.toml").write_text(f"name = {json.dumps(name)}\n" + nasty.SCENE)
     if name != "CON":
         with pytest.raises(InputError, match="name") as error:
             load_scene(tmp_path / "a.toml")
@@ -575,34 +368,23 @@ def test_a_heading_in_quotes(tmp_path):
     assert read_measured(path).channels["theta"].tolist() == [math.pi / 2, 0.0]
 
 
-def test_a_heading_with_control_characters(tmp_path):
-    """Found by fuzzing: what a heading has twice is told without the characters that would steer a
-    terminal."""
-    path = tmp_path / "h.csv"
-    path.write_bytes(b"t,theta,\x1b[2Jx,\x1b[2Jx\n0,0,0,0\n")
-    with pytest.raises(InputError) as error:
-        read_measured(path)
-    assert_one_clear_line(str(error.value))
+BOTH = (History.load, read_measured)
+#: Found by fuzzing: histories that ended in a traceback, or were read as another; and who reads.
+HEADINGS = {
+    "control characters": ("t,theta,\x1b[2Jx,\x1b[2Jx\n0,0,0,0\n", "x", BOTH[1:]),
+    "rows longer than the heading": ("t,theta\n0.0,0.1,7\n0.5,0.2,7\n", "more values", BOTH),
+    "a column that is there twice": ("t,theta, t\n0.0,0.1,nan\n0.5,0.2,nan\n", "t", BOTH),
+}
 
 
-def test_rows_longer_than_the_heading(tmp_path):
-    """Found by fuzzing: their first value was left out, and all others were taken for the column
-    before theirs."""
-    path = tmp_path / "h.csv"
-    path.write_text("t,theta\n0.0,0.1,7\n0.5,0.2,7\n")
-    for read in (History.load, read_measured):
-        with pytest.raises(InputError, match="rows have more values than the heading has columns"):
-            read(path)
-
-
-def test_a_column_that_is_there_twice(tmp_path):
-    """Found by fuzzing: names that differ only in blanks around them ended in a traceback."""
-    path = tmp_path / "h.csv"
-    path.write_text("t,theta, t\n0.0,0.1,nan\n0.5,0.2,nan\n")
-    with pytest.raises(InputError, match="two columns 't'"):
-        History.load(path)
-    with pytest.raises(InputError, match="gives t a second time"):
-        read_measured(path)
+@pytest.mark.parametrize("name", HEADINGS)
+def test_a_heading_that_is_wrong_is_told_in_one_line(tmp_path, name):
+    text, said, readers = HEADINGS[name]
+    (tmp_path / "h.csv").write_text(text)
+    for read in readers:
+        with pytest.raises(InputError, match=said) as error:
+            read(tmp_path / "h.csv")
+        assert_one_clear_line(str(error.value))
 
 
 def test_a_path_does_not_steer_the_terminal(tmp_path, monkeypatch, capsys):

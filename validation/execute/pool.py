@@ -168,6 +168,7 @@ class Pool:
         What has not ended at `until` (of `time.monotonic`) is ended and not yielded.
         """
         running: dict[Future[Any], tuple[Call, float]] = {}
+        told: set[Call] = set()
         try:
             while waiting or running:
                 self._begin(waiting, running)
@@ -178,11 +179,14 @@ class Pool:
                 ).done
                 if not done:
                     return
-                for future in done:
+                for future in [one for one in running if one in done]:  # as they were begun
                     call, seconds = running.pop(future)
-                    self._compiled.add(call.compiles)
-                    error = future.exception()
-                    yield Ended(call, None if error else future.result(), error, seconds)
+                    if all(other is not call for other, _ in running.values()):
+                        self._compiled.add(call.compiles)
+                    if call not in told:
+                        told.add(call)
+                        error = self._error(future)
+                        yield Ended(call, None if error else future.result(), error, seconds)
         finally:
             for future in running:
                 future.cancel()
@@ -194,21 +198,31 @@ class Pool:
             call.compiles for call, _ in running.values() if call.compiles
         } - self._compiled
         held: list[Call] = []
-        while waiting and len(running) < AHEAD * self.jobs:
+        room = self._room()
+        while waiting and len(running) < room:
             call = waiting.popleft()
             if call.compiles in compiling:
                 held.append(call)
                 continue
-            seconds = call.seconds
-            if call.compiles and call.compiles not in self._compiled:
-                compiling.add(call.compiles)
-                seconds += COMPILING
-            limit = None if seconds == math.inf else seconds
-            running[self._pool.schedule(call.function, args=call.arguments, timeout=limit)] = (
-                call,
-                seconds,
-            )
+            first = bool(call.compiles) and call.compiles not in self._compiled
+            compiling |= {call.compiles} if first else set()
+            seconds = call.seconds + COMPILING if first else call.seconds
+            futures = self._schedule(call, seconds, first)
+            running.update(dict.fromkeys(futures, (call, seconds)))
         waiting.extendleft(reversed(held))
+
+    def _room(self) -> int:
+        """How many calls may be under way."""
+        return AHEAD * self.jobs
+
+    def _schedule(self, call: Call, seconds: float, first: bool) -> list[Future[Any]]:
+        """Give out a call that may take so long; `first`: the one for which others wait."""
+        limit = None if seconds == math.inf else seconds
+        return [self._pool.schedule(call.function, args=call.arguments, timeout=limit)]
+
+    def _error(self, future: Future[Any]) -> BaseException | None:
+        """What a call ended with in place of a result."""
+        return future.exception()
 
 
 @contextmanager

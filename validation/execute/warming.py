@@ -7,38 +7,28 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Literal
+from typing import Any
 
 from rockcheck.scenes import Scene, load_scene
 from rockcheck.scenes.progress import OnProgress, unheard
+from rockcheck.validation.execute.models import build
 from rockcheck.validation.execute.pool import Call, Pool
 
 
-def _scene() -> Scene:
-    return load_scene("fig5a").replace(duration=0.1)
+def _played(name: str) -> tuple[Any, Scene]:
+    """A model that has played a short scene."""
+    model, scene = build(name), load_scene("fig5a").replace(duration=0.1)
+    model.simulate(scene)
+    return model, scene
 
 
-def _event_based(pivot: Literal["bilateral", "unilateral"]) -> None:
-    from rockcheck.ebm import EventBasedModel
+def _batches(name: str) -> None:
     from rockcheck.ebm.batch import pack, run_batch
     from rockcheck.ebm.ensemble import play_ensemble
 
-    model = EventBasedModel(pivot=pivot)
-    model.simulate(_scene())
-    run_batch(pack([_scene()], model), model, jobs=1)
-    play_ensemble([_scene()], model)
-
-
-def _bouc_wen() -> None:
-    from rockcheck.ebm import EventBasedModel
-
-    EventBasedModel(friction="bouc-wen").simulate(_scene())
-
-
-def _continuous() -> None:
-    from rockcheck.cm import ContinuousModel
-
-    ContinuousModel().simulate(_scene())
+    model, scene = _played(name)
+    run_batch(pack([scene], model), model, jobs=1)
+    play_ensemble([scene], model)
 
 
 def _engine_steps() -> None:
@@ -46,7 +36,8 @@ def _engine_steps() -> None:
     from rockcheck.engines.base_motion import BaseMotion
     from rockcheck.engines.marching import in_units_of
 
-    scene = in_units_of(_scene().block.radius, _scene())
+    scene = load_scene("fig5a").replace(duration=0.1)
+    scene = in_units_of(scene.block.radius, scene)
     march_adaptively(
         scene, BaseMotion(scene), lambda pose, velocity, dt, felt, bouncing: velocity, longest=1e-3
     )
@@ -54,11 +45,11 @@ def _engine_steps() -> None:
 
 #: What is compiled, the longest first. Batches share the loop of histories, so they come after it
 #: and in one process with it.
-PARTS: Mapping[str, Callable[[], None]] = {
-    "the event-based models with the unilateral pivot": partial(_event_based, "unilateral"),
-    "the event-based models: histories, batches, ensembles": partial(_event_based, "bilateral"),
-    "the event-based model with Bouc-Wen friction": _bouc_wen,
-    "the continuous model": _continuous,
+PARTS: Mapping[str, Callable[[], object]] = {
+    "the event-based models with the unilateral pivot": partial(_batches, "ebm-unilateral"),
+    "the event-based models: histories, batches, ensembles": partial(_batches, "ebm"),
+    "the event-based model with Bouc-Wen friction": partial(_played, "ebm-bouc-wen"),
+    "the continuous model": partial(_played, "cm"),
     "the physics engines: their adaptive steps": _engine_steps,
 }
 

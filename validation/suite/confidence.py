@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import Any
 
 from rockcheck.scenes import Scene
-from rockcheck.scenes.trust.inputs import UncertainScene
+from rockcheck.scenes.files import UncertainScene
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.store import COMPARISONS, Store, name_of

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from rockcheck.scenes import Scene
-from rockcheck.scenes.trust.experience import Experience, Range, Trust
+from rockcheck.scenes.experience import Experience, Range, Trust
 from rockcheck.validation.suite.results import Run
 
 #: Figures that have a bias, and the size (alpha) below which a ratio means nothing.
@@ -101,9 +101,9 @@ def bias_and_scatter(pairs: Sequence[tuple[float, float]]) -> tuple[float, float
 
 
 def domain_of(scenes: Iterable[Scene]) -> Mapping[str, Range]:
-    """The range of each axis (`scenes.trust.experience.axes_of`) over some scenes."""
+    """The range of each axis (`scenes.experience.axes_of`) over some scenes."""
     values: dict[str, list[float]] = {}
-    from rockcheck.scenes.trust.experience import axes_of
+    from rockcheck.scenes.experience import axes_of
 
     for scene in scenes:
         for axis, numbers in axes_of(scene).items():

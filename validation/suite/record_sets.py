@@ -25,10 +25,10 @@ from pydantic import Field, StringConstraints
 from rockcheck.scenes import InputError, Record
 from rockcheck.scenes.base import Finite
 from rockcheck.scenes.errors import unknown_name
+from rockcheck.scenes.files import UncertainScene, uncertain_scene
 from rockcheck.scenes.recordings import Reading, Recording
 from rockcheck.scenes.recordings.recording import Word
 from rockcheck.scenes.recordings.sets import files_of, motions_of, verticals_of
-from rockcheck.scenes.trust.inputs import UncertainScene, uncertain_scene
 
 #: Longest name of a scene, and of the part of it that is the record's.
 _LONGEST, _LONGEST_RECORD = 100, 60

@@ -64,13 +64,14 @@ from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.base import Frozen, Positive
 from rockcheck.scenes.errors import printable, unknown_name
 from rockcheck.scenes.files import (
+    UncertainScene,
     load_uncertain_scene,
     named_scenes,
     read_toml,
     scene_from,
+    uncertain_scene,
     uncertain_scene_from,
 )
-from rockcheck.scenes.trust.inputs import UncertainScene, uncertain_scene
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS
 from rockcheck.validation.execute.models import Family, build, check_allowed, family, is_own

@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal, Protocol, Self, runtime_checkable
+from typing import Any, Literal
 
 import numpy as np
 
@@ -46,32 +46,6 @@ LEAST_ORDER = 0.5
 LARGE = 0.1
 
 Verdict = Literal["converged", "not converged"]
-
-
-@runtime_checkable
-class Stepping(Protocol):
-    """A model that steps through time and can do so more coarsely."""
-
-    def coarser(self, factor: float) -> Self:
-        """The same model with steps `factor` (> 1) times as long."""
-        ...  # pragma: no cover
-
-    def simulate(self, scene: Scene) -> History:
-        """The motion of the scene."""
-        ...  # pragma: no cover
-
-
-@runtime_checkable
-class EventBased(Protocol):
-    """A model whose error is that of its tolerance."""
-
-    def finer(self) -> Self:
-        """The same model at a hundredth of its tolerance."""
-        ...  # pragma: no cover
-
-    def simulate(self, scene: Scene) -> History:
-        """The motion of the scene."""
-        ...  # pragma: no cover
 
 
 class Quantity(Stored):
@@ -119,26 +93,28 @@ class Numerical(Stored):
 
 
 def numerical_uncertainty(
-    model: object, scene: Scene, history: History | None = None
+    model: Any, scene: Scene, history: History | None = None
 ) -> Numerical | None:
     """u_num of a model's run of a scene; None for a model that has neither a step nor a tolerance
     to change.
+
+    A model with a step has `coarser(factor)`, the same model with steps `factor` (> 1) times as
+    long; one with a tolerance has `finer()`, the same at a hundredth of it.
 
     `history` is the run at the model's own step, played here where it is not given. Three coarser
     runs (together 13/12 of its cost), or one of an event-based model at a hundredth of its
     tolerance. Raises what `simulate` raises.
     """
-    if isinstance(model, Stepping):
-        finest = history or model.simulate(scene)
-        runs = [finest, *(model.coarser(factor).simulate(scene) for factor in FACTORS[1:])]
+    coarser: Any = getattr(model, "coarser", None)
+    finer: Any = getattr(model, "finer", None)
+    if coarser is None and finer is None:
+        return None
+    given = history or model.simulate(scene)
+    if coarser is not None:
+        runs = [given, *(coarser(factor).simulate(scene) for factor in FACTORS[1:])]
         return Numerical(method="steps h, 2h, 3h and 4h", quantities=_from_steps(scene, runs))
-    if isinstance(model, EventBased):
-        given = history or model.simulate(scene)
-        return Numerical(
-            method="a hundredth of the tolerance",
-            quantities=_from_tolerance(scene, given, model.finer().simulate(scene)),
-        )
-    return None
+    found = _from_tolerance(scene, given, finer().simulate(scene))
+    return Numerical(method="a hundredth of the tolerance", quantities=found)
 
 
 def failed(history: History, reason: str) -> Numerical:

@@ -2,7 +2,7 @@
 together say.
 
 Shares have an interval, and over the intensity of the base motion a lognormal curve. The numbers of
-a scene that have a spread (`scenes.trust.inputs`) are drawn together, quasi-randomly: what comes
+a scene that have a spread (`scenes.files`) are drawn together, quasi-randomly: what comes
 out is u_input, how far a figure may lie from the scene's because the scene itself is not known
 exactly (ASME V&V 20-2009, section 4, by sampling), and Sobol indices: which number matters most.
 """
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE
 from rockcheck.scenes import History, InputError, ModelFailure, Scene, kinematics
-from rockcheck.scenes.trust.inputs import UncertainScene
+from rockcheck.scenes.files import UncertainScene
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.discrepancy.statistics import CONFIDENCE
 

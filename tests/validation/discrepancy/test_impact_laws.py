@@ -97,8 +97,14 @@ ALL_AT_ONCE = Scene(
 )
 
 
+ENGINES = "Dart", "MuJoCo", "PyBullet", "Pymunk"
+
+
 @pytest.mark.parametrize("closed", [stepping.CLOSED, 1.4 * stepping.CLOSED, 4.0 * stepping.CLOSED])
-@pytest.mark.parametrize("engine", ["Dart", "MuJoCo", "PyBullet", "Pymunk"])
+@pytest.mark.parametrize(
+    "engine",
+    [pytest.param(name, marks=pytest.mark.needs(name.lower())) for name in ENGINES],
+)
 @pytest.mark.parametrize(
     "scene", [PIVOT_IS_LIFTED, SLIDES, ALL_AT_ONCE], ids=lambda scene: scene.name
 )
@@ -108,8 +114,6 @@ def test_corners_that_land_at_one_instant_share_the_impact(
     """So with steps that end at events all engines follow the closed branch, however near a corner
     must be to touch."""
     model = getattr(engines, engine)
-    if not model.installed():
-        pytest.skip(f"{engine} is not installed")
     monkeypatch.setattr(stepping, "CLOSED", closed)
     found = law_followed(scene, model(time_step="adaptive").simulate(scene))
     assert found is not None

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rockcheck.commands.cli import main
-from rockcheck.scenes import InputError
-from rockcheck.validation.discrepancy.measured import Measured, read_measured
+from rockcheck.scenes import InputError, load_scene
+from rockcheck.scenes.observation import observe
+from rockcheck.validation.discrepancy.measured import (
+    Measured,
+    mean_history,
+    read_measured,
+    shifted,
+    time_shift,
+)
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 
@@ -145,3 +153,42 @@ def test_a_scene_without_a_file_is_bad_input(tmp_path):
     path.write_text(SUITE, encoding="utf-8")
     with pytest.raises(InputError, match="no measured history of scene 'other'"):
         Measured(files={}).simulate(load_suite(path).scenes["other"])
+
+
+# Repeats of a test
+
+
+def swing(scale=1.0, delay=0.0):
+    t = np.linspace(0.0, 4.0, 401)
+    state = np.zeros((401, 6))
+    state[:, 2] = (
+        0.1 * scale * np.exp(-4.0 * (t - 1.2 - delay) ** 2) * np.cos(3.0 * (t - 1.2 - delay))
+    )
+    return observe(
+        load_scene("bookcase").replace(duration=4.0, output_step=0.01), "measured", state
+    )
+
+
+def test_a_shift_in_time_is_found():
+    for delay in (0.0, 0.35, 1.0):
+        assert time_shift(swing(), swing(delay=delay)) == pytest.approx(-delay, abs=2e-3)
+    assert shifted(swing(), 0.5).channels["t"][0] == 0.5
+    with pytest.raises(InputError, match="no rotation"):
+        time_shift(swing(), swing(scale=0.0))
+
+
+def test_the_interval_of_a_mean_covers_as_often_as_it_says():
+    chance = np.random.default_rng(3)
+    inside = 0
+    for _ in range(400):
+        mean = mean_history([swing(scale) for scale in 1.0 + 0.1 * chance.standard_normal(4)])
+        truth = swing().peak_rotation
+        inside += abs(mean.peak_rotation - truth) <= mean.uncertainty["peak_rotation"]
+    assert 0.92 <= inside / 400 <= 0.98
+
+
+def test_repeats_that_end_differently_have_no_mean():
+    fallen = swing()
+    fallen = replace(fallen, channels={**fallen.channels, "theta": np.linspace(0.0, 1.57, 401)})
+    with pytest.raises(InputError, match="1 of 2 tests overturn"):
+        mean_history([swing(), fallen])

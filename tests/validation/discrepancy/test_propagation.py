@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rockcheck import Block, EventBasedModel, Floor, Scene
-from rockcheck.scenes.trust.inputs import Spread, uncertain_scene
+from rockcheck.scenes.files import Spread, uncertain_scene
 from rockcheck.validation.uncertainty.population import BANDS, SAMPLES, Interval, propagate
 
 BLOCK = Block(half_width=0.3, half_height=1.0)

@@ -39,7 +39,7 @@ def test_the_wanted_restitution_is_reached(engine, restitution):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif("drake" not in HERE, reason="Drake is not installed")
+@pytest.mark.needs("drake")
 def test_drake_bounces_by_its_dissipation_and_says_how_deep():
     found = tuned("drake", 0.5)
     assert found.reached

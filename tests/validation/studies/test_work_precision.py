@@ -155,10 +155,9 @@ def test_the_error_of_adaptive_steps_is_told_at_the_cost_of_fixed_ones() -> None
             )
             for k in range(3)
         ]
-    everything = {
-        row.line: row for row in runs.pooled(some) if row.kind == "all" and row.value == 1e-3
-    }
-    assert everything["mujoco"].at_the_cost == pytest.approx(2e-4)
+    pooled = runs.pooled(some)
+    everything = {row.line: row for row in pooled if (row.family, row.value) == ("all", 1e-3)}
+    assert runs.at_the_cost(everything["mujoco"], pooled) == pytest.approx(2e-4)
     assert everything["mujoco adaptive"].rms_worst == pytest.approx(3e-5)
 
 
@@ -344,7 +343,7 @@ def test_an_unknown_part_is_refused_in_one_line(capsys: pytest.CaptureFixture[st
 def test_nothing_that_is_skipped_changes_the_motion() -> None:
     """Every saving but those that a scene may need (a sliding pivot's cone, a strong pulse's
     slip)."""
-    found = [one for name, kind in savings.KINDS.items() if name != "batches" for one in kind()]
+    found = [one for name in savings.KINDS if name != "batches" for one in savings.measured(name)]
     needed = {"cone correction", "friction limit"}
     for saving in found:
         reference = 2e-2 if saving.thing in needed or saving.model == "pybullet" else 1e-5

@@ -122,7 +122,7 @@ def test_a_damaged_record_is_found_and_made_again(tmp_path, run, damage):
     assert all(cell.read_back for cell in again.cells)
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with a name are POSIX")
+@pytest.mark.needs("POSIX")
 def test_a_record_that_is_a_pipe_is_not_waited_for(tmp_path, run):
     before = plain(run())
     for path in records(tmp_path):

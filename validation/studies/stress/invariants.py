@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,17 +27,19 @@ from rockcheck.scenes import (
     Ricker,
     Scene,
     Sine,
-    kinematics,
 )
 from rockcheck.validation.studies.stress.mechanics import (
     BOOLE,
     GROUP,
-    arms,
+    SLIPS,
+    Motion,
     integrals,
-    tilted_forces,
+    motion_of,
+    not_finite,
 )
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -49,51 +52,45 @@ class Invariant:
 
 
 INVARIANTS = {
-    one.name: one
-    for one in (
-        Invariant(
-            "ends", "the run ends within its caps, in a mode of motion (1: it does not)", 0.0
-        ),
-        Invariant("finite", "values that are not finite", 0.0),
-        Invariant(
-            "outcome", "rows, last event and outcome contradict each other (1: they do)", 0.0
-        ),
-        Invariant("penetration", "depth of a corner in floor or wall, R", 1e-9),
-        Invariant(
-            "floor", "height of the pivot over the floor in modes that have it there, R", 1e-9
-        ),
-        Invariant("stick", "slip rate of a pivot that stands, sqrt(g R)", 1e-9),
-        Invariant(
+    name: Invariant(name, words, bound)
+    for name, words, bound in (
+        ("ends", "the run ends within its caps, in a mode of motion (1: it does not)", 0.0),
+        ("finite", "values that are not finite", 0.0),
+        ("outcome", "rows, last event and outcome contradict each other (1: they do)", 0.0),
+        ("penetration", "depth of a corner in floor or wall, R", 1e-9),
+        ("floor", "height of the pivot over the floor in modes that have it there, R", 1e-9),
+        ("stick", "slip rate of a pivot that stands, sqrt(g R)", 1e-9),
+        (
             "coulomb",
             "friction beyond the cone of a pivot that stands, of the acceleration at play",
             1e-7,
         ),
-        Invariant(
-            "push", "tension in a contact that can only push, of the acceleration at play", 1e-7
+        (
+            "push",
+            "tension in a contact that can only push, of the acceleration at play",
+            1e-7,
         ),
-        Invariant(
+        (
             "energy",
             "energy less the work of base and friction, between events, of the energy at play",
             1e-9,
         ),
-        Invariant(
+        (
             "impacts",
             "relative energy that an impact without restitution, or with the energy cap, adds",
             0.0,
         ),
-        Invariant("mirror", "bits that differ in the mirror image", 0.0),
-        Invariant(
-            "similarity", "rotation of the scene at another scale, within the horizon, rad", 1e-6
-        ),
-        Invariant("tolerance", "rotation at tolerance/100, within the horizon, rad", 1e-6),
+        ("mirror", "bits that differ in the mirror image", 0.0),
+        ("similarity", "rotation of the scene at another scale, within the horizon, rad", 1e-6),
+        ("tolerance", "rotation at tolerance/100, within the horizon, rad", 1e-6),
         # of models that approximate contact
-        Invariant(
+        (
             "depth",
             "penetration over twice the way that a step, or the contact's spring, takes at this"
             " motion",
             1.0,
         ),
-        Invariant(
+        (
             "source",
             "energy beyond that of the start and the work of the base, of all work done",
             0.05,
@@ -108,9 +105,8 @@ DISTURBANCE, SEEN, DISTURBED, EXACT = 1e-7, 5e-7, 6, 1e-10
 #: Rows of an audited history: this fraction of the shortest time in the scene, and at most this
 #: many.
 FINE, MOST_ROWS = 64, 4000
-#: Thresholds of a closed contact and of slip; no condition is checked within this time of an event
-#: or a jump.
-CLOSED, SLIPS, NEAR = 1e-8, 1e-9, 1e-9
+#: No condition is checked within this time (sqrt(R/g)) of an event or a jump.
+NEAR = 1e-9
 #: An integral is used where rules of order 6 and 10 agree to this, relatively: the error of order
 #: 10 is then far smaller.
 RESOLVED = 1e-10
@@ -155,41 +151,38 @@ def check_run(
     """Plays a scene and checks every invariant, or only one. With `audit` also those that ask for
     many rows: energy."""
     played = audited(scene) if audit else scene
-    figures: dict[str, float] = {}
     try:
         history = model.simulate(played)
     except ModelFailure as error:
         return CheckedRun(figures={"ends": 1.0}, failure=str(error))
-    figures["ends"] = 0.0
-    figures["finite"] = _not_finite(history)
+    figures = {"ends": 0.0, "finite": not_finite(history)}
     if figures["finite"]:
         return CheckedRun(figures=figures, outcome=history.outcome)
+    motion, cost = motion_of(played, history), history.cost
     figures["outcome"] = float(_contradicts(played, history))
-    figures |= conditions(model, played, history)
+    figures |= conditions(model, motion)
     if audit:  # at the finer tolerance, whose error does not disturb the balance
         with suppress(ModelFailure):
             energy = _energy(finer(model), played)
             figures |= {"energy": energy} if energy is not None else {}
-    capped = model.energy_cap or not _bounces(scene)
-    gains = history.cost.energy_gains
+    bounces = max([scene.floor.restitution, *(wall.restitution for wall in scene.walls)]) > 0.0
     if model.pivot == "unilateral":
-        figures["impacts"] = history.cost.largest_energy_gain if capped and gains else 0.0
-    horizon = _Horizon(model, played, seed)
-    if only in ("", "mirror"):
-        figures["mirror"] = _mirror(model, played, history)
-    if only in ("", "similarity"):
-        figures["similarity"] = horizon.apart(history, similar(played, seed))
-    if only in ("", "tolerance"):
-        figures["tolerance"] = horizon.apart(history, played, finer(model))
+        counts = cost.energy_gains and (model.energy_cap or not bounces)
+        figures["impacts"] = cost.largest_energy_gain if counts else 0.0
+    horizon = _Horizon(model, motion, seed)
+    later = {
+        "mirror": lambda: _mirror(model, motion),
+        "similarity": lambda: horizon.apart(similar(played, seed)),
+        "tolerance": lambda: horizon.apart(played, finer(model)),
+    }
+    figures |= {name: figure() for name, figure in later.items() if only in ("", name)}
     return CheckedRun(
-        figures=figures
-        if not only
-        else {name: figure for name, figure in figures.items() if name == only},
+        figures={name: figure for name, figure in figures.items() if only in ("", name)},
         outcome=history.outcome,
         events=len(history.event_list),
-        gains=gains,
-        largest_gain=history.cost.largest_energy_gain,
-        rules=history.cost.rules,
+        gains=cost.energy_gains,
+        largest_gain=cost.largest_energy_gain,
+        rules=cost.rules,
         horizons=horizon.found,
         failure=horizon.failure,
         unjudged=("energy",) if audit and "energy" not in figures else (),
@@ -202,10 +195,10 @@ def _energy(model: EventBasedModel, scene: Scene) -> float | None:
     If it is too large, or cannot be judged, it is computed again from rows four times as dense.
     That removes an error of the integral, but not one of the motion.
     """
-    error = energy_error(model, scene, model.simulate(scene))
+    error = energy_error(model, motion_of(scene, model.simulate(scene)))
     if error is None or error > INVARIANTS["energy"].bound:
         near = scene.replace(output_step=scene.output_step / 4.0)
-        closer = energy_error(model, near, model.simulate(near))
+        closer = energy_error(model, motion_of(near, model.simulate(near)))
         error = error if closer is None else closer
     return error
 
@@ -232,20 +225,6 @@ def audited(scene: Scene) -> Scene:
     return scene.replace(output_step=step, duration=min(scene.duration, MOST_ROWS * step))
 
 
-def _bounces(scene: Scene) -> bool:
-    return scene.floor.restitution > 0.0 or any(wall.restitution > 0.0 for wall in scene.walls)
-
-
-def _not_finite(history: History) -> float:
-    return float(
-        sum(
-            np.sum(~np.isfinite(column))
-            for column in history.channels.values()
-            if column.dtype.kind == "f"
-        )
-    )
-
-
 def _contradicts(scene: Scene, history: History) -> bool:
     """Whether the run's end contradicts its outcome."""
     falls = [event for event in history.event_list if event.kind.startswith("overturned")]
@@ -264,141 +243,82 @@ def _contradicts(scene: Scene, history: History) -> bool:
     )
 
 
-def conditions(model: EventBasedModel, scene: Scene, history: History) -> dict[str, float]:
+def conditions(model: EventBasedModel, motion: Motion) -> dict[str, float]:
     """Contacts, Coulomb's law and the signs of forces in every row, away from events."""
-    block, radius, gravity = scene.block, scene.block.radius, scene.gravity
-    unit = math.sqrt(radius / gravity)
-    channels = history.channels
-    t, theta, mode = channels["t"], channels["theta"], channels["mode"]
-    height = kinematics.pivot_height(block, channels["y"], theta) / radius
-    gaps = _gaps(scene, channels["x"], theta)
     # Rounding of x does not count as depth.
-    rounding = 4e-16 * np.abs(channels["x"]) / radius
-    depth = [float(np.max(-height)), *(float(np.max(-gap - rounding)) for gap in gaps.values())]
-    on_floor, stands = np.isin(mode, ON_FLOOR), np.isin(mode, STANDS)
-    speed = np.abs(channels["slip_rate"]) * unit / radius
-    scale = (
-        1.0
-        + 1e-6 * np.abs(channels["x_dot"]) * unit / radius
-        + np.abs(channels["theta_dot"]) * unit
-    )
+    rounding = 4e-16 * np.abs(motion.channels["x"]) / motion.radius
+    depth = [-motion.height, *(-gap - rounding for gap in motion.gaps.values())]
     found = {
-        "penetration": max(0.0, *depth),
-        "floor": float(np.max(np.abs(height[on_floor]), initial=0.0)),
+        "penetration": max(0.0, *(float(np.max(one)) for one in depth)),
+        "floor": _largest(np.abs(motion.height), motion.within(*ON_FLOOR)),
     }
     if model.friction == "bouc-wen":  # its pivot creeps, and its friction is not in a history
         return found
-    found["stick"] = float(np.max((speed / scale)[stands], initial=0.0))
-    clear = _clear(scene, history, t)
-    friction, push = _force_conditions(model, scene, history, gaps, clear)
+    drift = 1e-6 * np.abs(motion.channels["x_dot"]) * motion.unit / motion.radius
+    speed = np.abs(motion.slip) / (1.0 + drift + np.abs(motion.w))
+    found["stick"] = _largest(speed, motion.within(*STANDS))
+    friction, push = _force_conditions(model, motion)
     return found | {"coulomb": friction, "push": push}
 
 
-def _gaps(scene: Scene, x: Floats, theta: Floats) -> dict[str, Floats]:
-    """Clear distance to each wall, R."""
-    return {
-        wall.side: kinematics.wall_gap(scene, wall.side, x, theta) / scene.block.radius
-        for wall in scene.walls
-    }
+def _largest(values: Floats, rows: Mask) -> float:
+    """The largest of these rows, at least 0."""
+    return float(np.max(values[rows], initial=0.0))
 
 
-def _touches(gaps: dict[str, Floats], rows: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """In which rows the block touches the left wall, and the right one."""
-    nowhere = np.full(rows, math.inf)
-    return gaps.get("left", nowhere) < CLOSED, gaps.get("right", nowhere) < CLOSED
+def _jumps(scene: Scene) -> list[float]:
+    """When the base acceleration may jump, s."""
+    moving = (one for one in (scene.excitation, scene.vertical) if one.kind != "rest")
+    return [time for one in moving for time in (0.0, one.quiet_after)]
 
 
-def _clear(scene: Scene, history: History, t: Floats) -> NDArray[np.bool_]:
+def _clear(motion: Motion) -> Mask:
     """Rows that are neither at an event nor at a jump of the base acceleration."""
-    jumps = [event.t for event in history.event_list]
-    for excitation in (scene.excitation, scene.vertical):
-        if excitation.kind != "rest":
-            jumps += [0.0, excitation.quiet_after]
-    places = np.sort(np.array([*jumps, -math.inf, math.inf]))
+    t, events = motion.channels["t"], [event.t for event in motion.history.event_list]
+    places = np.sort(np.array([*events, *_jumps(motion.scene), -math.inf, math.inf]))
     after = np.searchsorted(places, t)
-    unit = math.sqrt(scene.block.radius / scene.gravity)
-    near = NEAR * unit + 1e-12 * np.abs(t)
+    near = NEAR * motion.unit + 1e-12 * np.abs(t)
     return np.asarray((t - places[after - 1] > near) & (places[after] - t > near))
 
 
-def _force_conditions(
-    model: EventBasedModel,
-    scene: Scene,
-    history: History,
-    gaps: dict[str, Floats],
-    clear: NDArray[np.bool_],
-) -> tuple[float, float]:
+def _force_conditions(model: EventBasedModel, motion: Motion) -> tuple[float, float]:
     """Largest friction beyond the cone, and largest tension, relative to 1 + |u| + |vg| + w^2."""
-    channels = history.channels
-    unit = math.sqrt(scene.block.radius / scene.gravity)
-    u = scene.excitation.acceleration(channels["t"]) / scene.gravity
-    g = 1.0 + scene.vertical.acceleration(channels["t"]) / scene.gravity
-    mode, theta = channels["mode"], channels["theta"]
-    w = channels["theta_dot"] * unit
-    slip = channels["slip_rate"] * unit / scene.block.radius
+    scene, clear, theta = motion.scene, _clear(motion), motion.channels["theta"]
+    u, g, w, mu_s = motion.u, 1.0 + motion.vertical, motion.w, motion.scene.floor.mu_s
     scale = 1.0 + np.abs(u) + np.abs(g) + w * w
-    mu_s = scene.floor.mu_s
-    excess = tension = 0.0
-    left, right = _touches(gaps, len(theta))
     unilateral = model.pivot == "unilateral"
-
-    rest = clear & (mode == "rest") & ~left & ~right
+    touching = motion.tip | motion.far
     pivots = scene.block.pivot("left"), scene.block.pivot("right")
     # A base that accelerates to the right tips the block to the left.
     tips = np.where(u > 0.0, *(pivot.arm / pivot.height for pivot in pivots))
     limit = tips if model.friction == "no-slip" else np.minimum(tips, max(mu_s, 1e-9))
-    excess = max(
-        excess, float(np.max(((np.abs(u) - limit * np.abs(g)) / scale)[rest], initial=0.0))
-    )
-    flat = clear & np.isin(mode, ("rest", "slide"))
-    if unilateral:
-        tension = max(tension, float(np.max((-g / scale)[flat], initial=0.0)))
-
-    sign = _pivots(theta)
-    tip, far = np.where(sign > 0, left, right), np.where(sign > 0, right, left)
-    walls = np.isin(mode, ("lean", "ladder"))
-    tilted = (
-        clear
-        & np.isin(mode, ("rock", "slide-rock", "lean", "ladder"))
-        & (theta != 0.0)
-        & ~(walls & (tip == far))
-    )
-    slides = np.isin(mode, ("slide-rock", "ladder"))
-    tilted &= ~(slides & (np.abs(slip) < SLIPS))
+    rest = clear & motion.within("rest") & ~touching
+    excess = _largest((np.abs(u) - limit * np.abs(g)) / scale, rest)
+    flat = clear & motion.within("rest", "slide") & unilateral
+    tension = _largest(-g / scale, flat)
+    tilted = clear & motion.within("rock", "slide-rock", "lean", "ladder") & (theta != 0.0)
+    tilted &= ~(motion.within("lean", "ladder") & (motion.tip == motion.far))
+    slides = motion.within("slide-rock", "ladder")
+    tilted &= ~(slides & (np.abs(motion.slip) < SLIPS))
     if not tilted.any():
         return excess, tension
-    direction = np.where(slides, np.sign(sign * slip), 0.0).astype(np.int8)[tilted]
-    on = np.ones(int(tilted.sum()), dtype=bool)
-    touching = on, (tip & walls)[tilted], (far & walls)[tilted]
-    over, pulls = np.full(len(on), math.inf), np.full(len(on), math.inf)
+    direction = np.where(slides, np.sign(motion.sign * motion.slip), 0.0)
+    beyond, pulls = [], []
     # What happens within NEAR is one event, in the core and here: a spinning block passes through
     # its friction cone in less time. So a condition is broken only where it is broken for that long
     # before and after.
     for moment in (0.0, -NEAR, NEAR):
-        turned = np.abs(theta)[tilted] + moment * (sign * w)[tilted]
-        at = arms(scene.block, sign[tilted], turned)
-        forces = tilted_forces(
-            at,
-            scene.floor.friction,
-            (sign * w)[tilted],
-            (sign * u)[tilted],
-            g[tilted],
-            touching,
-            direction,
-        )
-        over = np.minimum(
-            over, (np.abs(forces.friction) - mu_s * np.abs(forces.normal)) / scale[tilted]
-        )
+        _, forces = motion.forces(tilted, direction, later=moment)
+        beyond.append(np.abs(forces.friction) - mu_s * np.abs(forces.normal))
         floor = -forces.normal if unilateral else -math.inf
-        pulls = np.minimum(
-            pulls, np.maximum(np.maximum(-forces.tip, -forces.far), floor) / scale[tilted]
-        )
+        pulls.append(np.maximum(np.maximum(-forces.tip, -forces.far), floor))
+    over, pull = (np.min(one, axis=0) / scale[tilted] for one in (beyond, pulls))
     if model.friction != "no-slip":
-        excess = max(excess, float(np.max(over[direction == 0], initial=0.0)))
-    return excess, max(tension, float(np.max(pulls, initial=0.0)))
+        excess = max(excess, _largest(over, direction[tilted] == 0))
+    return excess, max(tension, float(np.max(pull, initial=0.0)))
 
 
-def energy_error(model: EventBasedModel, scene: Scene, history: History) -> float | None:
+def energy_error(model: EventBasedModel, motion: Motion) -> float | None:
     """Largest change of energy, over eight rows without event or kink, that the work of base and
     friction does not account for.
 
@@ -407,116 +327,77 @@ def energy_error(model: EventBasedModel, scene: Scene, history: History) -> floa
     hold. None where no eight rows can be judged: the history has fewer, events or kinks lie in all
     of them, or the work is not resolved in any.
     """
-    channels, radius, gravity = history.channels, scene.block.radius, scene.gravity
-    if len(channels["t"]) <= GROUP:
+    scene, radius, vg = motion.scene, motion.radius, motion.vertical
+    if len(motion.channels["t"]) <= GROUP:
         return None
-    unit = math.sqrt(radius / gravity)
-    t = channels["t"]
-    motion = [channels[c] for c in ("y", "theta", "x_dot", "y_dot", "theta_dot")]
-    energy = kinematics.energy(scene.block, gravity, *motion) / (gravity * radius)
-    _, right, up = kinematics.mass_motion(scene.block, *motion)
-    u = scene.excitation.acceleration(t) / gravity
-    vg = scene.vertical.acceleration(t) / gravity
-    speed = radius / unit
-    power = -(u * right + vg * up) / speed
+    energy = motion.energy / (scene.gravity * radius)
+    speed = radius / motion.unit
+    power = -(motion.u * motion.across + vg * motion.up) / speed
     if model.friction != "bouc-wen":
-        power = power + _friction_power(scene, history, u, 1.0 + vg)
-    whole, quiet = _whole_groups(scene, history)
+        power = power + _friction_power(motion)
+    whole, quiet = _whole_groups(scene, motion.history)
     if not whole.any():
         return None
-    step = scene.output_step / unit
+    step = scene.output_step / motion.unit
     work, moved = integrals(step, power), integrals(step, np.abs(power))
     rough = integrals(step, power, BOOLE)
-    change = energy[GROUP::GROUP][: len(work)] - energy[:-1:GROUP][: len(work)]
-    size = 1.0 + np.maximum(energy[GROUP::GROUP][: len(work)], moved)
-    off = (change - work) / size
+    before, after = energy[:-1:GROUP][: len(work)], energy[GROUP::GROUP][: len(work)]
+    size = 1.0 + np.maximum(after, moved)
+    off = (after - before - work) / size
     doubt = np.where(whole, np.abs(work - rough) / size, 0.0)
     # Checked in the groups before and after, too: the difference of the two rules says nothing
     # where it changes its sign.
-    whole &= (
-        np.maximum(doubt, np.maximum(np.append(doubt[1:], 0.0), np.append(0.0, doubt[:-1])))
-        < RESOLVED
-    )
+    beside = np.append(doubt[1:], 0.0), np.append(0.0, doubt[:-1])
+    whole &= np.maximum(doubt, np.maximum(*beside)) < RESOLVED
     if model.friction == "bouc-wen":
-        rise = np.abs(np.diff(up)) / speed / step  # per row; with gravity it is the floor's force
+        rise = (
+            np.abs(np.diff(motion.up)) / speed / step
+        )  # per row; with gravity it is the floor's force
         force = 2.0 + np.max(np.abs(vg)) + rise[: len(work) * GROUP].reshape(-1, GROUP).max(axis=1)
         held = scene.floor.friction * model.yield_displacement / radius * force
-        return float(np.max((off - held / size)[whole], initial=0.0)) if whole.any() else None
+        return _largest(off - held / size, whole) if whole.any() else None
     judged = whole & quiet
-    return float(np.max(np.abs(off)[judged])) if judged.any() else None
+    return _largest(np.abs(off), judged) if judged.any() else None
 
 
-def _pivots(theta: Floats) -> Floats:
-    """The sign of theta in each row; of the next row where it is zero, as a block that is about to
-    tilt has its pivot already."""
-    sign = np.sign(theta)
-    standing = np.flatnonzero(sign[:-1] == 0.0)
-    sign[standing] = sign[standing + 1]
-    return np.where(sign < 0.0, -1.0, 1.0)
-
-
-def _friction_power(scene: Scene, history: History, u: Floats, g: Floats) -> Floats:
+def _friction_power(motion: Motion) -> Floats:
     """Power of the floor's friction, natural units."""
-    channels = history.channels
-    unit = math.sqrt(scene.block.radius / scene.gravity)
-    mode, theta = channels["mode"], channels["theta"]
-    slip = channels["slip_rate"] * unit / scene.block.radius
-    w = channels["theta_dot"] * unit
-    mu = scene.floor.friction
-    power = np.where(mode == "slide", -mu * np.abs(g) * np.abs(slip), 0.0)
-    tilted = np.isin(mode, ("slide-rock", "ladder"))
+    slip, mu = motion.slip, motion.scene.floor.friction
+    flat = -mu * np.abs(1.0 + motion.vertical) * np.abs(slip)
+    power = np.where(motion.within("slide"), flat, 0.0)
+    tilted = motion.within("slide-rock", "ladder")
     if tilted.any():
-        sign = _pivots(theta)
-        gaps = {
-            wall.side: kinematics.wall_gap(scene, wall.side, channels["x"], theta)
-            / scene.block.radius
-            < CLOSED
-            for wall in scene.walls
-        }
-        nowhere = np.zeros(len(theta), dtype=bool)
-        left, right = gaps.get("left", nowhere), gaps.get("right", nowhere)
-        ladder = mode == "ladder"
-        tip, far = (
-            np.where(sign > 0, left, right) & ladder,
-            np.where(sign > 0, right, left) & ladder,
-        )
-        forces = tilted_forces(
-            arms(scene.block, sign[tilted], np.abs(theta)[tilted]),
-            mu,
-            (sign * w)[tilted],
-            (sign * u)[tilted],
-            g[tilted],
-            (np.ones(int(tilted.sum()), dtype=bool), tip[tilted], far[tilted]),
-            np.where(sign * slip >= 0.0, 1, -1).astype(np.int8)[tilted],
-        )
-        power[tilted] = forces.friction * (sign * slip)[tilted]
+        along = motion.sign * slip
+        _, forces = motion.forces(tilted, np.where(along >= 0.0, 1.0, -1.0))
+        power[tilted] = forces.friction * along[tilted]
     return power
 
 
-def _whole_groups(scene: Scene, history: History) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _whole_groups(scene: Scene, history: History) -> tuple[Mask, Mask]:
     """Which groups of eight steps have neither event nor kink inside, and in which the mode of
     motion is the same in all rows."""
     t, mode = history.channels["t"], history.channels["mode"]
     groups = (len(t) - 1) // GROUP
     edges = t[: groups * GROUP + 1 : GROUP]
-    breaks = [event.t for event in history.event_list]
+    events = [event.t for event in history.event_list]
+    breaks = [*events]
     for excitation in (scene.excitation, scene.vertical):
         if isinstance(excitation, Record):
             breaks += list(excitation.time_step * np.arange(len(excitation.unscaled)))
         elif not isinstance(excitation, Rest):
             breaks.append(excitation.quiet_after)
     near = 1e-9 * scene.output_step
-    places = np.sort(np.array([*breaks, math.inf]))
-    whole = np.searchsorted(places, edges[:-1] + near) == np.searchsorted(places, edges[1:] - near)
-    # An event at an edge itself: the row there is from before or after it.
-    events = np.sort(np.array([event.t for event in history.event_list] + [math.inf]))
-    whole &= np.searchsorted(events, edges[:-1] - 1e3 * near) == np.searchsorted(
-        events, edges[1:] + 1e3 * near
-    )
-    for excitation in (
-        scene.excitation,
-        scene.vertical,
-    ):  # the base acceleration jumps where a record ends
+
+    def without(times: list[float], margin: float) -> Mask:
+        """Groups within whose edges, and such a margin, none of the times lies."""
+        places = np.sort(np.array([*times, math.inf]))
+        first, last = edges[:-1] - margin, edges[1:] + margin
+        return np.asarray(np.searchsorted(places, first) == np.searchsorted(places, last))
+
+    # An event at an edge itself: the row there is from before or after it. The base acceleration
+    # jumps where a record ends.
+    whole = without(breaks, -near) & without(events, 1e3 * near)
+    for excitation in (scene.excitation, scene.vertical):
         if isinstance(excitation, Record):
             end = excitation.quiet_after
             whole &= ~((edges[:-1] - 1e3 * near <= end) & (end <= edges[1:] + 1e3 * near))
@@ -524,19 +405,19 @@ def _whole_groups(scene: Scene, history: History) -> tuple[NDArray[np.bool_], ND
     return whole, np.all(nodes == nodes[:, :1], axis=1)
 
 
-def _mirror(model: EventBasedModel, scene: Scene, history: History) -> float:
+def _mirror(model: EventBasedModel, motion: Motion) -> float:
     """How many values differ from those of the mirror image, to the bit; infinitely many where it
     is longer."""
+    history = motion.history
     try:
-        image = model.simulate(scene.mirrored())
+        image = model.simulate(motion.scene.mirrored())
     except ModelFailure:
         return math.inf
-    if len(image.channels["t"]) != len(history.channels["t"]) or len(image.event_list) != len(
-        history.event_list
-    ):
+    ours, theirs = ((len(one.channels["t"]), len(one.event_list)) for one in (history, image))
+    if ours != theirs:
         return math.inf
-    differ = sum(int(np.sum(history.channels[name] != image.channels[name])) for name in EVEN)
-    differ += sum(int(np.sum(history.channels[name] != -image.channels[name])) for name in ODD)
+    differ = sum(int(np.sum(motion.channels[name] != image.channels[name])) for name in EVEN)
+    differ += sum(int(np.sum(motion.channels[name] != -image.channels[name])) for name in ODD)
     differ += sum(
         replace(a, kind=SWAPPED.get(a.kind, a.kind)) != b
         for a, b in zip(history.event_list, image.event_list, strict=True)
@@ -549,7 +430,6 @@ def similar(scene: Scene, seed: int) -> Scene:
     random in 0.01 to 100."""
     k = float(np.exp(np.random.default_rng([seed, 1]).uniform(math.log(1e-2), math.log(1e2))))
     root = math.sqrt(k)
-
     return scene.replace(
         block=scene.block.scaled(k),
         walls=tuple(wall.replace(gap=k * wall.gap) for wall in scene.walls),
@@ -567,58 +447,48 @@ class _Horizon:
     """Compares histories of a scene up to the time at which a small disturbance of its data shows;
     that time is computed only if needed."""
 
-    def __init__(self, model: EventBasedModel, scene: Scene, seed: int) -> None:
-        self.model, self.scene, self.seed = model, scene, seed
-        self._row: int | None = None
+    def __init__(self, model: EventBasedModel, motion: Motion, seed: int) -> None:
+        self.model, self.motion, self.seed = model, motion, seed
         self.found, self.failure = 0, ""
 
-    def apart(self, history: History, scene: Scene, model: EventBasedModel | None = None) -> float:
+    def apart(self, scene: Scene, model: EventBasedModel | None = None) -> float:
         """Largest |difference of theta| in rad within the horizon; infinite where the other run
         fails within it."""
-        played = model or self.model
-        if played.friction == "bouc-wen" and scene.block.radius != self.scene.block.radius:
-            size = played.yield_displacement * scene.block.radius / self.scene.block.radius
+        played, history = model or self.model, self.motion.history
+        if played.friction == "bouc-wen" and scene.block.radius != self.motion.radius:
+            size = played.yield_displacement * scene.block.radius / self.motion.radius
             played = played.model_copy(update={"yield_displacement": size})
         try:
             other = played.simulate(scene)
         except ModelFailure as error:
             self.failure = f"{self.failure}; {error}".strip("; ")
             return math.inf
-        rows, difference = _differences(history, other)
-        if rows == len(history.channels["t"]) == len(other.channels["t"]) and not np.any(
-            difference > SEEN
-        ):
-            return float(np.max(difference, initial=0.0))
-        return float(np.max(difference[: self.row(history)], initial=0.0))
+        difference = _differences(history, other)
+        rows = {len(difference), len(history.channels["t"]), len(other.channels["t"])}
+        whole = len(rows) == 1 and not np.any(difference > SEEN)
+        return float(np.max(difference if whole else difference[: self.row], initial=0.0))
 
-    def row(self, history: History) -> int:
+    @cached_property
+    def row(self) -> int:
         """The first row in which the scene and a disturbed one, or two finer tolerances, part (see
         `SEEN`)."""
-        if self._row is None:
-            self.found = 1
-            self._row = len(history.channels["t"])
-            exact = self.model.model_copy(
-                update={"tolerance": EXACT}
-            )  # the horizon belongs to the scene, however coarse the model is
-            for by in (
-                10.0,
-                100.0,
-            ):  # rounding is a disturbance, too: finer tolerances must agree on the answer
-                with suppress(ModelFailure):
-                    a, b = (finer(exact, times).simulate(self.scene) for times in (by, 100.0 * by))
-                    self._row = min(self._row, _agree(a, b, 0.1 * SEEN))
-            for disturbed in _disturbed(self.scene, self.seed):
-                try:
-                    other = self.model.simulate(disturbed)
-                except ModelFailure:
-                    continue
-                self._row = min(self._row, _agree(history, other, SEEN))
-            grown = np.flatnonzero(_amplified(self.scene, history) > math.log(SEEN / EXACT))
-            self._row = min(self._row, int(grown[0]) if grown.size else self._row)
-        return self._row
+        self.found, scene, history = 1, self.motion.scene, self.motion.history
+        rows = [len(history.channels["t"])]
+        # The horizon belongs to the scene, however coarse the model is. Rounding is a disturbance,
+        # too: finer tolerances must agree on the answer.
+        exact = self.model.model_copy(update={"tolerance": EXACT})
+        for by in (10.0, 100.0):
+            with suppress(ModelFailure):
+                a, b = (finer(exact, times).simulate(scene) for times in (by, 100.0 * by))
+                rows.append(_agree(a, b, 0.1 * SEEN))
+        for disturbed in _disturbed(scene, self.seed):
+            with suppress(ModelFailure):
+                rows.append(_agree(history, self.model.simulate(disturbed), SEEN))
+        grown = np.flatnonzero(_amplified(self.motion) > math.log(SEEN / EXACT))
+        return min(*rows, *(int(first) for first in grown[:1]))
 
 
-def _amplified(scene: Scene, history: History) -> Floats:
+def _amplified(motion: Motion) -> Floats:
     """The logarithm, by each row, of how much sliding friction has amplified a small difference of
     the rotation rate.
 
@@ -627,50 +497,31 @@ def _amplified(scene: Scene, history: History) -> Floats:
     disturbance of the scene's data may have decayed before, and then does not show this growth; a
     rounding error of the moment grows all the same. So the sum starts anew wherever it is negative.
     """
-    channels, step = history.channels, 1e-4
-    unit = math.sqrt(scene.block.radius / scene.gravity)
-    theta, w = channels["theta"], channels["theta_dot"] * unit
-    sign, slip = _pivots(theta), channels["slip_rate"] * unit / scene.block.radius
-    slides = (channels["mode"] == "slide-rock") & (theta != 0.0) & (np.abs(slip) > SLIPS)
+    theta, slip, step = motion.channels["theta"], motion.slip, 1e-4
+    slides = motion.within("slide-rock") & (theta != 0.0) & (np.abs(slip) > SLIPS)
     rate = np.zeros(len(theta))
     if slides.any():
-        at = arms(scene.block, sign[slides], np.abs(theta)[slides])
-        u = (sign * scene.excitation.acceleration(channels["t"]) / scene.gravity)[slides]
-        g = 1.0 + scene.vertical.acceleration(channels["t"])[slides] / scene.gravity
-        on, off = np.ones(len(g), dtype=bool), np.zeros(len(g), dtype=bool)
-        direction = np.sign(sign * slip).astype(np.int8)[slides]
         turns = []
         for change in (step, -step):
-            forces = tilted_forces(
-                at,
-                scene.floor.friction,
-                (sign * w)[slides] + change,
-                u,
-                g,
-                (on, off, off),
-                direction,
-            )
+            at, forces = motion.forces(slides, np.sign(motion.sign * slip), faster=change)
             turns.append(at.spin * (at.pivot[1] * forces.friction - at.pivot[0] * forces.normal))
         rate[slides] = (turns[0] - turns[1]) / (2.0 * step)
-    grown = np.zeros(len(theta))
-    for k in range(1, len(theta)):
-        time = (channels["t"][k] - channels["t"][k - 1]) / unit
-        grown[k] = (
-            max(0.0, grown[k - 1] + 0.5 * (rate[k - 1] + rate[k]) * time) if slides[k] else 0.0
-        )
+    grown, times = np.zeros(len(theta)), np.diff(motion.channels["t"]) / motion.unit
+    for k in np.flatnonzero(slides[1:]).tolist():
+        grown[k + 1] = max(0.0, grown[k] + 0.5 * (rate[k] + rate[k + 1]) * times[k])
     return grown
 
 
-def _differences(a: History, b: History) -> tuple[int, Floats]:
+def _differences(a: History, b: History) -> Floats:
     rows = min(len(a.channels["t"]), len(b.channels["t"]))
-    return rows, np.abs(a.channels["theta"][:rows] - b.channels["theta"][:rows])
+    return np.abs(a.channels["theta"][:rows] - b.channels["theta"][:rows])
 
 
 def _agree(a: History, b: History, seen: float) -> int:
     """In how many rows, from the first on, two histories differ by no more than `seen`, rad."""
-    rows, difference = _differences(a, b)
+    difference = _differences(a, b)
     apart = np.flatnonzero(difference > seen)
-    return int(apart[0]) if apart.size else rows
+    return int(apart[0]) if apart.size else len(difference)
 
 
 def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:

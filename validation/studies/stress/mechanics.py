@@ -18,15 +18,20 @@ alone give:
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.scenes import Block
+from rockcheck.scenes import Block, History, Scene, kinematics
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+#: A contact is closed, R, and a pivot slips, sqrt(g R), beyond these.
+CLOSED, SLIPS = 1e-8, 1e-9
 
 
 @dataclass(frozen=True)
@@ -84,22 +89,15 @@ def tilted_forces(
     """
     (s, c), (tip_s, tip_c), (far_s, far_c) = at.pivot, at.tip, at.far
     zero, one = np.zeros_like(w), np.ones_like(w)
-    rows = np.stack(
-        [
-            _triple(zero, one, -s),
-            _triple(one, zero, c),
-            _triple(one, zero, -tip_c),
-            _triple(-one, zero, -far_c),
-        ],
-        axis=1,
-    )
+    jacobian = (zero, one, -s), (one, zero, c), (one, zero, -tip_c), (-one, zero, -far_c)
+    rows = np.stack([np.stack(row, axis=1) for row in jacobian], axis=1)
     bias = np.stack([c, s, tip_s, far_s], axis=1) * (w * w)[:, None]
     floor, tip, far = touching
     closed = np.stack([floor, floor & (slip == 0), tip, far], axis=1)
     # J M^-1 J^T lambda = -(J a0 + bias), with an open contact's row replaced by "no force".
     inverse_mass = np.array([1.0, 1.0, at.spin])
     matrix = np.einsum("nik,k,njk->nij", rows, inverse_mass, rows)
-    free = _triple(-u, -g, zero)
+    free = np.stack([-u, -g, zero], axis=1)
     right = -(np.einsum("nik,nk->ni", rows, free) + bias)
     matrix = np.where(closed[:, :, None], matrix, np.eye(4))
     right = np.where(closed, right, 0.0)
@@ -127,10 +125,6 @@ def _solved(matrix: Floats, right: Floats) -> Floats:
         return np.asarray((np.linalg.pinv(matrix) @ right[:, :, None])[:, :, 0])
 
 
-def _triple(x: Floats, y: Floats, turn: Floats) -> Floats:
-    return np.stack([x, y, turn], axis=1)
-
-
 #: Weights of the closed Newton-Cotes rule with nine nodes, which is exact up to degree 9.
 NEWTON_COTES = (
     np.array([989.0, 5888.0, -928.0, 10496.0, -4540.0, 10496.0, -928.0, 5888.0, 989.0])
@@ -149,3 +143,104 @@ def integrals(step: float, values: Floats, rule: Floats = NEWTON_COTES) -> Float
     groups = (len(values) - 1) // GROUP
     nodes = values[np.arange(groups)[:, None] * GROUP + np.arange(GROUP + 1)]
     return np.asarray(step * (nodes @ rule))
+
+
+def not_finite(history: History) -> float:
+    """The number of values that are not finite."""
+    columns = (one for one in history.channels.values() if one.dtype.kind == "f")
+    return float(sum(np.sum(~np.isfinite(column)) for column in columns))
+
+
+class Motion(NamedTuple):
+    """A history as the invariants see it, a value a row, in natural units but for `channels`, which
+    are those of the history.
+
+    `radius` (m) and `unit` (s) are the units of length and time. `u` and `vertical` accelerate the
+    base; `w` is the rate of rotation, `slip` that of slip. `sign` is theta's in each row; that of
+    the next row where it is zero, as a block that is about to tilt has its pivot already. `energy`
+    (J/kg) is kinetic plus potential; the mass's centre moves at `across` and `up`, m/s. `height` is
+    that of the lowest corner over the floor, `gaps` are those to the walls. `tip` tells where the
+    top corner touches the wall it tips to, `far` where the lifted bottom corner touches the other.
+    """
+
+    scene: Scene
+    history: History
+    channels: Mapping[str, Any]
+    radius: float
+    unit: float
+    u: Floats
+    vertical: Floats
+    w: Floats
+    slip: Floats
+    sign: Floats
+    energy: Floats
+    across: Floats
+    up: Floats
+    height: Floats
+    gaps: dict[str, Floats]
+    tip: Mask
+    far: Mask
+
+    @property
+    def deepest(self) -> float:
+        """How deep a corner is in floor or wall at most, R."""
+        return max(float(np.max(-gap)) for gap in (self.height, *self.gaps.values()))
+
+    def within(self, *modes: str) -> Mask:
+        """The rows in these modes of motion."""
+        return np.isin(self.channels["mode"], modes)
+
+    def forces(
+        self, rows: Mask, slip: Floats, *, later: float = 0.0, faster: float = 0.0
+    ) -> tuple[Arms, Forces]:
+        """The arms and forces in these rows, in which the block is tilted; `slip` as of
+        `tilted_forces`. `later` they turn on for that time, at a rate that is `faster`."""
+        sign, walls, on = self.sign, self.within("lean", "ladder"), np.ones(int(rows.sum()), bool)
+        w = (sign * self.w)[rows]
+        at = arms(self.scene.block, sign[rows], np.abs(self.channels["theta"])[rows] + later * w)
+        tip, far = ((contact & walls)[rows] for contact in (self.tip, self.far))
+        felt = (sign * self.u)[rows], (1.0 + self.vertical)[rows]
+        friction, direction = self.scene.floor.friction, slip[rows].astype(np.int8)
+        return at, tilted_forces(at, friction, w + faster, *felt, (on, tip, far), direction)
+
+
+def motion_of(scene: Scene, history: History) -> Motion:
+    """The `Motion` of a history whose values are finite."""
+    channels, block, radius, gravity = (
+        history.channels,
+        scene.block,
+        scene.block.radius,
+        scene.gravity,
+    )
+    unit, t, theta = math.sqrt(radius / gravity), channels["t"], channels["theta"]
+    state = [channels[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")]
+    sign = np.sign(theta)
+    standing = np.flatnonzero(sign[:-1] == 0.0)
+    sign[standing] = sign[standing + 1]
+    sign = np.where(sign < 0.0, -1.0, 1.0)
+    gaps: dict[str, Floats] = {
+        wall.side: kinematics.wall_gap(scene, wall.side, channels["x"], theta) / radius
+        for wall in scene.walls
+    }
+    nowhere = np.full(len(t), np.inf)
+    left, right = (gaps.get(side, nowhere) < CLOSED for side in ("left", "right"))
+    _, across, up = kinematics.mass_motion(block, *state)
+    return Motion(
+        scene=scene,
+        history=history,
+        channels=channels,
+        radius=radius,
+        unit=unit,
+        u=scene.excitation.acceleration(t) / gravity,
+        vertical=scene.vertical.acceleration(t) / gravity,
+        w=channels["theta_dot"] * unit,
+        slip=channels["slip_rate"] * unit / radius,
+        sign=sign,
+        energy=np.asarray(kinematics.energy(block, gravity, *state)),
+        across=np.asarray(across),
+        up=np.asarray(up),
+        height=np.asarray(kinematics.pivot_height(block, channels["y"], theta) / radius),
+        gaps=gaps,
+        tip=np.where(sign > 0, left, right),
+        far=np.where(sign > 0, right, left),
+    )

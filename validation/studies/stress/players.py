@@ -6,19 +6,19 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.model import ImpactLaw
-from rockcheck.scenes import History, InputError, ModelFailure, Record, Scene, kinematics
+from rockcheck.scenes import InputError, ModelFailure, Record, Scene
 from rockcheck.scenes.excitations import Excitation
 from rockcheck.validation.execute.models import build
-from rockcheck.validation.studies.stress.exact import exact_scene
-from rockcheck.validation.studies.stress.generator import Kind, random_scene
+from rockcheck.validation.studies.stress.generator import Kind, exact_scene, random_scene
 from rockcheck.validation.studies.stress.invariants import CheckedRun, check_run
+from rockcheck.validation.studies.stress.mechanics import Motion, motion_of, not_finite
 
 Floats = NDArray[np.float64]
 
@@ -46,8 +46,21 @@ class Player(ABC):
         return self.label.startswith("ebm")
 
     @abstractmethod
+    def settings(self, scene: Scene, number: int) -> dict[str, Any]:
+        """What the model is built with for this scene, beside what its name says."""
+
+    @property
+    def model_name(self) -> str:
+        """The model's name for `rockcheck simulate`."""
+        return self.label
+
     def command(self, scene: Scene, number: int) -> str:
         """The options of `rockcheck simulate` with which this run can be made again."""
+        settings = [
+            f"--set {key}={value if isinstance(value, str) else repr(value).lower()}"
+            for key, value in self.settings(scene, number).items()
+        ]
+        return " ".join([f"--model {self.model_name}", *settings])
 
     def scene(self, seed: int, number: int) -> Scene:
         """Its scene of that number."""
@@ -71,39 +84,36 @@ class EventBased(Player):
         """Its scene of that number."""
         return (exact_scene if self.exact else random_scene)(seed, number, self.kind)
 
+    @property
+    def model_name(self) -> str:
+        """The model's name for `rockcheck simulate`."""
+        names = {"unilateral": "ebm-unilateral", "bouc-wen": "ebm-bouc-wen"}
+        return names.get(self.kind, "ebm:EventBasedModel" if self.friction == "no-slip" else "ebm")
+
+    def settings(self, scene: Scene, number: int) -> dict[str, Any]:
+        """Every other unilateral run has the energy cap, Bouc-Wen yields within R/1000."""
+        every: dict[str, tuple[bool, Any]] = {
+            "friction": (self.friction == "no-slip", self.friction),
+            "impacts": (self.impacts != "moreau", self.impacts),
+            "energy_cap": (self.kind == "unilateral" and number % 2 == 1, True),
+            "yield_displacement": (self.friction == "bouc-wen", 1e-3 * scene.block.radius),
+        }
+        return {key: value for key, (given, value) in every.items() if given}
+
     def model(self, scene: Scene, number: int) -> EventBasedModel:
-        """The model as it plays this scene: every other unilateral run has the energy cap, Bouc-Wen
-        yields within R/1000."""
-        return EventBasedModel(
-            pivot="unilateral" if self.kind == "unilateral" else "bilateral",
-            friction=self.friction,
-            impacts=self.impacts,
-            energy_cap=self.kind == "unilateral" and number % 2 == 1,
-            yield_displacement=1e-3 * scene.block.radius,
-            most_steps=MOST_STEPS,
-            most_events=MOST_EVENTS,
-        )
+        """The model as it plays this scene."""
+        fixed: dict[str, Any] = {
+            "pivot": "unilateral" if self.kind == "unilateral" else "bilateral",
+            "friction": self.friction,
+            "most_steps": MOST_STEPS,
+            "most_events": MOST_EVENTS,
+        }
+        return EventBasedModel(**fixed | self.settings(scene, number))
 
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
         """Every invariant; energy in each tenth run."""
         audit = only == "energy" or (not only and number % AUDIT == 0)
         return check_run(self.model(scene, number), scene, seed=seed, audit=audit, only=only)
-
-    def command(self, scene: Scene, number: int) -> str:
-        """The options of `rockcheck simulate` with which this run can be made again."""
-        name = {"unilateral": "ebm-unilateral", "bouc-wen": "ebm-bouc-wen"}.get(self.kind, "ebm")
-        options = [
-            f"--model {name}"
-            if self.friction != "no-slip"
-            else "--model ebm:EventBasedModel --set friction=no-slip"
-        ]
-        if self.impacts != "moreau":
-            options.append(f"--set impacts={self.impacts}")
-        if self.kind == "unilateral" and number % 2 == 1:
-            options.append("--set energy_cap=true")
-        if self.friction == "bouc-wen":
-            options.append(f"--set yield_displacement={1e-3 * scene.block.radius!r}")
-        return " ".join(options)
 
 
 @dataclass(frozen=True)
@@ -128,23 +138,11 @@ class Approximate(Player):
             duration=min(scene.duration, self.longest * unit), output_step=self.step * unit
         )
 
-    def settings(self, scene: Scene) -> dict[str, float]:
+    def settings(self, scene: Scene, number: int = 0) -> dict[str, Any]:
         """What the model is built with for this scene."""
-        unit = math.sqrt(scene.block.radius / scene.gravity)
-        return (
-            {"penetration": DEPTH * scene.block.radius}
-            if self.family == "cm"
-            else {"time_step": self.step * unit}
-        )
-
-    def command(self, scene: Scene, number: int) -> str:
-        """The options of `rockcheck simulate` with which this run can be made again."""
-        return " ".join(
-            [
-                f"--model {self.family}",
-                *(f"--set {key}={value!r}" for key, value in self.settings(scene).items()),
-            ]
-        )
+        if self.family == "cm":
+            return {"penetration": DEPTH * scene.block.radius}
+        return {"time_step": self.step * math.sqrt(scene.block.radius / scene.gravity)}
 
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
         """Checks the run's end, finite numbers, depth and energy. If an engine breaks one of the
@@ -168,54 +166,29 @@ class Approximate(Player):
             history = build(self.family, self.settings(scene)).simulate(scene)
         except (ModelFailure, InputError) as error:
             return CheckedRun(figures={"ends": 1.0}, failure=str(error))
-        bad = sum(
-            float(np.sum(~np.isfinite(column)))
-            for column in history.channels.values()
-            if column.dtype.kind == "f"
-        )
-        figures = {"ends": 0.0, "finite": bad}
-        if not bad:
-            figures |= {
-                "depth": self.depth(scene, history),
-                "source": energy_without_source(scene, history),
-            }
+        figures = {"ends": 0.0, "finite": not_finite(history)}
+        if not figures["finite"]:
+            motion = motion_of(scene, history)
+            figures |= {"depth": self.depth(motion), "source": energy_without_source(motion)}
         return CheckedRun(figures=figures, outcome=history.outcome, events=len(history.event_list))
 
-    def depth(self, scene: Scene, history: History) -> float:
+    def depth(self, motion: Motion) -> float:
         """Deepest penetration over what the model states: for an engine the way of a step, for the
         CM that of a spring."""
-        channels, radius = history.channels, scene.block.radius
-        unit = math.sqrt(radius / scene.gravity)
-        speed = sum(np.max(np.abs(channels[name])) for name in ("x_dot", "y_dot")) * unit / radius
-        speed += float(np.max(np.abs(channels["theta_dot"]))) * unit
-        level = (
-            1.0
-            + sum(
-                np.max(np.abs(e.acceleration(channels["t"])))
-                for e in (scene.excitation, scene.vertical)
-            )
-            / scene.gravity
-        )
-        level += float(np.max(np.abs(channels["theta_dot"]))) ** 2 * unit**2
+        spin = float(np.max(np.abs(motion.channels["theta_dot"])))
+        ways = sum(np.max(np.abs(motion.channels[name])) for name in ("x_dot", "y_dot"))
+        speed = ways * motion.unit / motion.radius + spin * motion.unit
+        bases = motion.scene.excitation, motion.scene.vertical
+        shaken = sum(np.max(np.abs(base.acceleration(motion.channels["t"]))) for base in bases)
+        level = 1.0 + shaken / motion.scene.gravity + spin**2 * motion.unit**2
         if self.family == "cm":
             stated = speed * math.sqrt(DEPTH) + level * DEPTH
         else:
             stated = speed * self.step + level * self.step**2
-        return deepest(scene, history) / (2.0 * stated + 1e-5)
+        return motion.deepest / (2.0 * stated + 1e-5)
 
 
-def deepest(scene: Scene, history: History) -> float:
-    """How deep a corner is in floor or wall at most, R."""
-    channels = history.channels
-    gaps = [kinematics.pivot_height(scene.block, channels["y"], channels["theta"])]
-    gaps += [
-        kinematics.wall_gap(scene, wall.side, channels["x"], channels["theta"])
-        for wall in scene.walls
-    ]
-    return max(float(np.max(-gap)) for gap in gaps) / scene.block.radius
-
-
-def energy_without_source(scene: Scene, history: History) -> float:
+def energy_without_source(motion: Motion) -> float:
     """Largest energy above the start's and the work of the base up to then, relative to all work
     done, at least g R.
 
@@ -224,19 +197,16 @@ def energy_without_source(scene: Scene, history: History) -> float:
     two rows (a record can be finer than they are) where the block stands, and where nothing but the
     base changes its velocity.
     """
-    channels, block, gravity = history.channels, scene.block, scene.gravity
-    motion = [channels[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")]
-    energy = kinematics.energy(block, gravity, *motion)
-    _, right, up = kinematics.mass_motion(block, *motion)
+    scene, energy = motion.scene, motion.energy
     work, moved = np.zeros(len(energy)), np.zeros(len(energy))
-    for excitation, velocity in ((scene.excitation, right), (scene.vertical, up)):
-        impulse = -np.diff(_base_velocity(excitation, channels["t"]))
+    bases = scene.excitation, scene.vertical
+    for excitation, velocity in zip(bases, (motion.across, motion.up), strict=True):
+        impulse = -np.diff(_base_velocity(excitation, motion.channels["t"]))
         part = 0.5 * (velocity[1:] + velocity[:-1]) * impulse
         work[1:] += np.cumsum(part)
         moved[1:] += np.cumsum(np.abs(part))
-    return float(
-        np.max((energy - energy[0] - work) / (gravity * block.radius + np.abs(energy[0]) + moved))
-    )
+    size = scene.gravity * motion.radius + np.abs(energy[0]) + moved
+    return float(np.max((energy - energy[0] - work) / size))
 
 
 def _base_velocity(excitation: Excitation, t: Floats) -> Floats:
@@ -254,6 +224,12 @@ def _base_velocity(excitation: Excitation, t: Floats) -> Floats:
 
 #: Penetration of the CM under the block's weight, R.
 DEPTH = 1e-8
+ROUNDING = "scenes at which rounding decides"
+_LAWS: tuple[tuple[ImpactLaw, int, str], ...] = (
+    ("floor-first", 200, "one contact after another"),
+    ("leading-first", 100, "lands flat on one corner"),
+    ("trailing-first", 100, "on the other one"),
+)
 PLAYERS: dict[str, Player] = {
     player.label: player
     for player in (
@@ -281,75 +257,25 @@ PLAYERS: dict[str, Player] = {
             "regularised friction, which yields within R/1000",
             "bouc-wen",
         ),
-        EventBased(
-            "ebm-unilateral floor-first",
-            "unilateral",
-            20_000,
-            200,
-            "one contact after another",
-            impacts="floor-first",
+        *(
+            EventBased(f"ebm-unilateral {law}", "unilateral", 20_000, quick, words, impacts=law)
+            for law, quick, words in _LAWS
         ),
-        EventBased(
-            "ebm-unilateral leading-first",
-            "unilateral",
-            20_000,
-            100,
-            "lands flat on one corner",
-            impacts="leading-first",
-        ),
-        EventBased(
-            "ebm-unilateral trailing-first",
-            "unilateral",
-            20_000,
-            100,
-            "on the other one",
-            impacts="trailing-first",
-        ),
-        EventBased(
-            "ebm exact", "bilateral", 20_000, 200, "scenes at which rounding decides", exact=True
-        ),
-        EventBased(
-            "ebm no-slip exact",
-            "no-slip",
-            20_000,
-            200,
-            "scenes at which rounding decides",
-            "no-slip",
-            exact=True,
-        ),
-        EventBased(
-            "ebm-unilateral exact",
-            "unilateral",
-            20_000,
-            200,
-            "scenes at which rounding decides",
-            exact=True,
-        ),
-        EventBased(
-            "ebm-bouc-wen exact",
-            "bouc-wen",
-            5000,
-            50,
-            "scenes at which rounding decides",
-            "bouc-wen",
-            exact=True,
-        ),
+        EventBased("ebm exact", "bilateral", 20_000, 200, ROUNDING, exact=True),
+        EventBased("ebm no-slip exact", "no-slip", 20_000, 200, ROUNDING, "no-slip", exact=True),
+        EventBased("ebm-unilateral exact", "unilateral", 20_000, 200, ROUNDING, exact=True),
+        EventBased("ebm-bouc-wen exact", "bouc-wen", 5000, 50, ROUNDING, "bouc-wen", exact=True),
         Approximate("cm", "unilateral", 2000, 40, "continuous model, standing 1e-8 R deep", "cm"),
-        Approximate(
-            "mujoco",
-            "unilateral",
-            2000,
-            40,
-            "MuJoCo, best settings, steps of 0.002 sqrt(R/g)",
-            "mujoco",
-        ),
-        Approximate(
-            "pybullet",
-            "unilateral",
-            2000,
-            40,
-            "PyBullet, best settings, steps of 0.002 sqrt(R/g)",
-            "pybullet",
+        *(
+            Approximate(
+                engine.lower(),
+                "unilateral",
+                2000,
+                40,
+                f"{engine}, best settings, steps of 0.002 sqrt(R/g)",
+                engine.lower(),
+            )
+            for engine in ("MuJoCo", "PyBullet")
         ),
     )
 }

@@ -29,7 +29,8 @@ from rockcheck.scenes import (
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import build, not_installed
-from rockcheck.validation.studies.stress.players import deepest, energy_without_source
+from rockcheck.validation.studies.stress.mechanics import motion_of, not_finite
+from rockcheck.validation.studies.stress.players import energy_without_source
 from rockcheck.validation.study import Task
 
 SLOPE = math.tan(0.25)
@@ -80,47 +81,25 @@ class ModelSetup:
 
 
 SETUPS = {
-    line.label: line
-    for line in (
-        ModelSetup("mujoco default", "mujoco", (("settings", "default"),)),
-        ModelSetup("mujoco", "mujoco", ()),
-        ModelSetup(
-            "mujoco adaptive",
-            "mujoco",
-            (("time_step", "adaptive"),),
-            "largest_step",
-            finest=ADAPTIVE_FINEST,
+    setup.label: setup
+    for setup in (
+        *(
+            setup
+            for engine in ("mujoco", "pybullet", "pymunk", "dart", "drake")
+            for setup in (
+                ModelSetup(f"{engine} default", engine, (("settings", "default"),)),
+                ModelSetup(engine, engine, ()),
+                ModelSetup(
+                    f"{engine} adaptive",
+                    engine,
+                    (("time_step", "adaptive"),),
+                    "largest_step",
+                    PUSHED if engine == "dart" else HOUR,
+                    ADAPTIVE_FINEST,
+                ),
+            )
+            if setup.label != "drake adaptive"  # its steps cannot vary
         ),
-        ModelSetup("pybullet default", "pybullet", (("settings", "default"),)),
-        ModelSetup("pybullet", "pybullet", ()),
-        ModelSetup(
-            "pybullet adaptive",
-            "pybullet",
-            (("time_step", "adaptive"),),
-            "largest_step",
-            finest=ADAPTIVE_FINEST,
-        ),
-        ModelSetup("pymunk default", "pymunk", (("settings", "default"),)),
-        ModelSetup("pymunk", "pymunk", ()),
-        ModelSetup(
-            "pymunk adaptive",
-            "pymunk",
-            (("time_step", "adaptive"),),
-            "largest_step",
-            finest=ADAPTIVE_FINEST,
-        ),
-        ModelSetup("dart default", "dart", (("settings", "default"),)),
-        ModelSetup("dart", "dart", ()),
-        ModelSetup(
-            "dart adaptive",
-            "dart",
-            (("time_step", "adaptive"),),
-            "largest_step",
-            PUSHED,
-            ADAPTIVE_FINEST,
-        ),
-        ModelSetup("drake default", "drake", (("settings", "default"),)),
-        ModelSetup("drake", "drake", ()),
         ModelSetup("cm paper", "cm", (("damping_rule", "paper"),)),
         ModelSetup("cm", "cm", ()),
     )
@@ -185,19 +164,15 @@ def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
         return "sinks" if "through the floor" in str(error) else "blows up"
     except InputError as error:
         return printable(error, 60)
-    channels = history.channels
-    if not all(
-        np.all(np.isfinite(column)) for column in channels.values() if column.dtype.kind == "f"
-    ):
+    if not_finite(history):
         return "blows up"
-    # The distance of one step is no fault.
+    motion = motion_of(scene, history)
+    speed = float(np.max(np.hypot(motion.channels["x_dot"], motion.channels["y_dot"])))
     if (
-        deepest(scene, history)
-        > DEEPEST
-        + 2.0 * step * float(np.max(np.hypot(channels["x_dot"], channels["y_dot"]))) * unit / radius
-    ):
+        motion.deepest > DEEPEST + 2.0 * step * speed * unit / radius
+    ):  # that of one step is no fault
         return "sinks"
-    return "gains energy" if energy_without_source(scene, history) > MOST_ENERGY else ""
+    return "gains energy" if energy_without_source(motion) > MOST_ENERGY else ""
 
 
 #: Push or shaking (at 1 Hz) under which a block should still stand, as a share of what would move

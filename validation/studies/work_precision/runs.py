@@ -6,7 +6,8 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from statistics import median
 from typing import Any
 
@@ -199,8 +200,8 @@ class BenchmarkRun:
 
 @dataclass(frozen=True)
 class Point:
-    """A setting of a line in a family: median error with its 10-90 % band, and median cost a
-    simulated second.
+    """A setting of a line in a family, or in a kind of scenes: median error with its 10-90 % band
+    and the worst, and median cost a simulated second.
 
     A run that failed counts as infinitely wrong.
     """
@@ -220,6 +221,7 @@ class Point:
     wall: float
     set_up: float
     steps: float
+    rms_worst: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -238,26 +240,6 @@ class Trend:
     cpu: float
     at_coarsest: bool
     ratio: float
-
-
-@dataclass(frozen=True)
-class Pooled:
-    """An engine's line at one setting over all scenes of a kind: CPU time (s a simulated second)
-    and errors (RMS, alpha).
-
-    `at_the_cost` is the error of the engine's adaptive line at this CPU time, interpolated; NaN
-    outside its range.
-    """
-
-    kind: str
-    line: str
-    value: float
-    runs: int
-    failed: int
-    cpu: float
-    rms: float
-    rms_worst: float
-    at_the_cost: float
 
 
 def play(task: Play) -> BenchmarkRun:
@@ -289,14 +271,8 @@ def play(task: Play) -> BenchmarkRun:
 
 def lost(task: Play, reason: str) -> BenchmarkRun:
     """What stands in the place of a run that failed."""
-    return BenchmarkRun(
-        task.family,
-        task.member,
-        task.line,
-        task.value,
-        prepared(task.family, task.member).horizon,
-        failure=reason,
-    )
+    horizon = prepared(task.family, task.member).horizon
+    return BenchmarkRun(task.family, task.member, task.line, task.value, horizon, failure=reason)
 
 
 def errors_of(reference: History, history: History) -> dict[str, Any]:
@@ -315,48 +291,47 @@ def errors_of(reference: History, history: History) -> dict[str, Any]:
     }
 
 
+def grouped(found: Iterable[Any], *names: str) -> dict[Any, list[Any]]:
+    """By the values of these fields, in the order in which they come."""
+    groups: dict[Any, list[Any]] = {}
+    for one in found:
+        groups.setdefault(attrgetter(*names)(one), []).append(one)
+    return groups
+
+
 def points_of(samples: Sequence[BenchmarkRun]) -> list[Point]:
     """The settings of all lines in all families, in their order."""
-    groups: dict[tuple[str, str, float], list[BenchmarkRun]] = {}
-    for sample in samples:
-        groups.setdefault((sample.family, sample.line, sample.value), []).append(sample)
     order = {name: n for n, name in enumerate([*FAMILIES, *LINES])}
-    return [
-        _point(groups[key])
-        for key in sorted(groups, key=lambda key: (order[key[0]], order[key[1]], -key[2]))
-    ]
+    ordered = sorted(samples, key=lambda one: (order[one.family], order[one.line], -one.value))
+    return [_point(some) for some in grouped(ordered, "family", "line", "value").values()]
 
 
 def trends_of(points: Sequence[Point]) -> list[Trend]:
     """Order and cost of each line in each family."""
-    lines: dict[tuple[str, str], list[Point]] = {}
-    for point in points:
-        lines.setdefault((point.family, point.line), []).append(point)
-    found = []
+    lines, found = grouped(points, "family", "line"), []
     for (family, label), line in lines.items():
-        base, _ = cost_at(lines.get((family, "ebm"), []))
         cpu, at_coarsest = cost_at(line)
-        found.append(Trend(family, label, order_of(line), cpu, at_coarsest, cpu / base))
+        ratio = cpu / cost_at(lines.get((family, "ebm"), []))[0]
+        found.append(Trend(family, label, order_of(line), cpu, at_coarsest, ratio))
     return found
 
 
 def _point(samples: Sequence[BenchmarkRun]) -> Point:
     good = [sample for sample in samples if not sample.failure]
-    errors = [
-        math.inf if sample.failure or math.isnan(sample.rms) else sample.rms for sample in samples
-    ]
+    errors = [sample.error("ebm-unilateral") for sample in samples]
+    failed = len(samples) - len(good)
 
     def middling(name: str, *, a_second: bool = False) -> float:
         values = [getattr(s, name) / (s.horizon if a_second else 1.0) for s in good]
-        values = [value for value in values if not math.isnan(value)]
-        return median(values) if values else math.nan
+        known = [value for value in values if not math.isnan(value)]
+        return median(known) if known else math.nan
 
     return Point(
         family=samples[0].family,
         line=samples[0].line,
         value=samples[0].value,
         runs=len(samples),
-        failed=len(samples) - len(good),
+        failed=failed,
         rms=quantile(errors, 0.5),
         rms_10=quantile(errors, 0.1),
         rms_90=quantile(errors, 0.9),
@@ -367,74 +342,49 @@ def _point(samples: Sequence[BenchmarkRun]) -> Point:
         wall=middling("wall", a_second=True),
         set_up=middling("set_up"),
         steps=middling("steps", a_second=True),
+        rms_worst=math.inf if failed else max(one.rms for one in good),
     )
 
 
-def pooled(samples: Sequence[BenchmarkRun]) -> Iterable[Pooled]:
-    """Every setting of the engines' lines over all scenes of each kind."""
+def pooled(samples: Sequence[BenchmarkRun]) -> list[Point]:
+    """Every setting of the engines' lines over all scenes of each kind, which is its `family`."""
+    found = []
     for kind, starts in KINDS.items():
-        mine = [s for s in samples if s.family.startswith(starts)]
-        points = {
-            (label, value): _point(group)
+        groups = grouped((s for s in samples if s.family.startswith(starts)), "line", "value")
+        found += [
+            replace(_point(groups[label, value]), family=kind)
             for label, line in LINES.items()
-            if line.model in ENGINE_STEPS
             for value in line.values
-            if (group := [s for s in mine if (s.line, s.value) == (label, value)])
-        }
-        for (label, value), point in points.items():
-            adaptive = [
-                p for (other, _), p in points.items() if other == f"{LINES[label].model} adaptive"
-            ]
-            good = [s.rms for s in mine if (s.line, s.value) == (label, value) and not s.failure]
-            worst = math.inf if point.failed else max(good)
-            yield Pooled(
-                kind,
-                label,
-                value,
-                point.runs,
-                point.failed,
-                point.cpu,
-                point.rms,
-                worst,
-                error_at(adaptive, point.cpu),
-            )
+            if line.model in ENGINE_STEPS and (label, value) in groups
+        ]
+    return found
 
 
-@dataclass(frozen=True)
-class Standing:
-    """A line's place in the league of engines, over pulses and free rocking: NaN where it does not
-    reach so far.
+def at_the_cost(point: Point, points: Sequence[Point]) -> float:
+    """The error of the engine's adaptive line at a point's CPU time, interpolated; NaN outside its
+    range."""
+    adaptive = f"{LINES[point.line].model} adaptive"
+    line = [p for p in points if (p.family, p.line) == (point.family, adaptive)]
+    return error_at(line, point.cpu)
 
-    `error` is the RMS error (alpha) at `EQUAL_COST`, `cost` the CPU time (s a simulated second) of
-    an error of `LEVEL`, `best` the least error at any setting that was played, with its cost.
+
+def league(found: Sequence[Point]) -> list[tuple[str, float, float, float, float]]:
+    """The engines' lines over pulses and free rocking, the cheapest at an error of `LEVEL` first;
+    those that never reach it last, by their best error.
+
+    Line, CPU time (s a simulated second) of an error of `LEVEL`, RMS error (alpha) at `EQUAL_COST`,
+    least error at any setting that was played, and its cost; NaN where it does not reach so far.
     """
-
-    line: str
-    error: float
-    cost: float
-    best: float
-    best_cost: float
-
-
-def league(found: Sequence[Pooled]) -> list[Standing]:
-    """The engines' lines, the cheapest at an error of `LEVEL` first; those that never reach it
-    last, by their best error."""
-    standings = []
-    for label in dict.fromkeys(one.line for one in found):
-        mine = [one for one in found if (one.kind, one.line) == (next(iter(KINDS)), label)]
-        good = [one for one in mine if math.isfinite(one.rms)]
-        if good:
+    rows, kind = [], next(iter(KINDS))
+    for label, mine in grouped((one for one in found if one.family == kind), "line").items():
+        if good := [one for one in mine if math.isfinite(one.rms)]:
             best = min(good, key=lambda one: one.rms)
-            standings.append(
-                Standing(label, error_at(mine, EQUAL_COST), cost_at(mine)[0], best.rms, best.cpu)
-            )
-    return sorted(
-        standings,
-        key=lambda one: (math.isnan(one.cost), one.best if math.isnan(one.cost) else one.cost),
-    )
+            at_cost = error_at(mine, EQUAL_COST)
+            rows.append((label, cost_at(mine)[0], at_cost, best.rms, best.cpu))
+    return sorted(rows, key=lambda row: (math.isnan(row[1]), row[3 if math.isnan(row[1]) else 1]))
 
 
-def error_at(line: Sequence[Point | Pooled], cpu: float) -> float:
+def error_at(line: Sequence[Point], cpu: float) -> float:
     """Median error of a line, coarse to fine, at a CPU time, both interpolated on logarithmic axes;
     NaN outside its range."""
     for a, b in itertools.pairwise(line):
@@ -459,7 +409,7 @@ def order_of(line: Sequence[Point]) -> float:
     return slope((p.value, p.rms) for p in line if FITTED[0] < p.rms < FITTED[1])
 
 
-def cost_at(line: Sequence[Point | Pooled], level: float = LEVEL) -> tuple[float, bool]:
+def cost_at(line: Sequence[Point], level: float = LEVEL) -> tuple[float, bool]:
     """CPU s a simulated second at a median error of `level`, and whether the coarsest setting
     already reaches it.
 
@@ -524,64 +474,39 @@ class Order:
 
 def levels_of(samples: Sequence[BenchmarkRun]) -> list[Level]:
     """The wall scenes' errors by model, reference and setting, coarse to fine."""
-    groups: dict[tuple[str, float], list[BenchmarkRun]] = {}
-    for one in sorted(samples, key=lambda one: (list(LINES).index(one.line), -one.value)):
-        groups.setdefault((one.line, one.value), []).append(one)
-    found = []
+    ordered = sorted(samples, key=lambda one: (list(LINES).index(one.line), -one.value))
+    groups, found = grouped(ordered, "line", "value"), []
     for reference, ((model, value), runs) in itertools.product(REFERENCES, groups.items()):
-        errors, steps = (
-            [one.error(reference) for one in runs],
-            [one.step for one in runs if not one.failure],
-        )
-        step = median(steps) if steps else math.nan
+        errors = [one.error(reference) for one in runs]
+        steps = [one.step for one in runs if not one.failure] or [math.nan]
         within = sum(error <= LEVEL for error in errors)
-        found.append(
-            Level(model, reference, value, step, median(errors), max(errors), len(runs), within)
-        )
+        sizes = median(errors), max(errors), len(runs), within
+        found.append(Level(model, reference, value, median(steps), *sizes))
     return found
 
 
 def orders_of(samples: Sequence[BenchmarkRun], levels: Sequence[Level]) -> list[Order]:
     """Observed orders by model and reference: of the medians, and scene by scene."""
-    found = []
-    for model, reference in itertools.product(
-        dict.fromkeys(level.model for level in levels), REFERENCES
-    ):
-        medians = [
-            (level.step, level.median)
-            for level in levels
-            if (level.model, level.reference) == (model, reference)
-        ]
-        found.append(Order(model, reference, slope(medians)))
-        for scene in WALLS:
-            line = [one for one in samples if (one.line, one.family) == (model, scene)]
-            if line:
-                found.append(
-                    Order(
-                        model,
-                        reference,
-                        slope((one.step, one.error(reference)) for one in line),
-                        scene,
-                    )
-                )
+    lines, found = grouped(samples, "line", "family"), []
+    for (model, reference), mine in grouped(
+        sorted(levels, key=lambda level: list(LINES).index(level.model)), "model", "reference"
+    ).items():
+        medians = slope((level.step, level.median) for level in mine)
+        found.append(Order(model, reference, medians))
+        for scene in (scene for scene in WALLS if (model, scene) in lines):
+            steps = ((one.step, one.error(reference)) for one in lines[model, scene])
+            found.append(Order(model, reference, slope(steps), scene))
     return found
 
 
 def exceptions_of(samples: Sequence[BenchmarkRun], orders: Sequence[Order]) -> Iterable[str]:
     """The wall scenes in which a model does not converge to the unilateral one, a line each."""
-    fitted = {
-        (order.model, order.scene): order.order
-        for order in orders
-        if order.reference == "ebm-unilateral"
-    }
-    for model, scene in ((model, scene) for model, scene in fitted if scene):
-        line = sorted(
-            (one for one in samples if (one.line, one.family) == (model, scene)),
-            key=lambda one: -one.value,
-        )
-        finest, order = line[-1].error("ebm-unilateral"), fitted[model, scene]
-        if math.isfinite(finest) and (
-            finest > LEVEL or (finest > ROUNDED and not order >= LEAST_ORDER)
-        ):
-            errors = " → ".join(f"{one.error('ebm-unilateral'):.1e}" for one in line)
-            yield f"{scene}, {model}: {errors} α, order {order:.2f}"
+    lines = grouped(sorted(samples, key=lambda one: -one.value), "line", "family")
+    for one in orders:
+        if not one.scene or one.reference != REFERENCES[0]:
+            continue
+        errors = [run.error(one.reference) for run in lines[one.model, one.scene]]
+        slow = errors[-1] > ROUNDED and not one.order >= LEAST_ORDER
+        if math.isfinite(errors[-1]) and (errors[-1] > LEVEL or slow):
+            said = " → ".join(f"{error:.1e}" for error in errors)
+            yield f"{one.scene}, {one.model}: {said} α, order {one.order:.2f}"

@@ -7,22 +7,24 @@ import math
 import tempfile
 import time
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 import numpy as np
 
-from rockcheck.scenes import Floor, History, Record, Scene, Wall
+from rockcheck.scenes import Floor, Record, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import Model, build, not_installed
 from rockcheck.validation.studies.work_precision.scenes import pulse
 
 #: A wall that the block cannot reach, m.
 FAR = Wall(side="left", gap=100.0)
-ROUNDS = 5
+#: Rounds, and those of a quick benchmark.
+ROUNDS, QUICK_ROUNDS = 5, 2
 #: Not in the table, and why.
 NOT_MEASURED = (
     "rendering in MuJoCo: it needs a display or a GPU; no model here ever makes a renderer, nor"
@@ -51,28 +53,26 @@ class Saving:
         return self.cost_with / self.cost_without
 
 
-def _medians(variants: Mapping[str, Callable[[], float]]) -> dict[str, float]:
-    """Median cost of each variant, played in turn; a first round warms up."""
-    rounds = [{name: play() for name, play in variants.items()} for _ in range(ROUNDS + 1)][1:]
-    return {name: median(taken[name] for taken in rounds) for name in variants}
+Play = Callable[[], float]
+#: What is measured: model, thing and unit, the plays with it and without it, change and remark.
+Pair = tuple[str, str, str, Play, Play, float, str]
 
 
-def _saving(
-    model: str,
-    thing: str,
-    unit: str,
-    dear: Callable[[], float],
-    cheap: Callable[[], float],
-    **more: Any,
-) -> Saving:
-    cost = _medians({"with": dear, "without": cheap})
-    return Saving(model, thing, unit, cost["with"], cost["without"], **more)
+def measured(name: str, rounds: int = ROUNDS) -> list[Saving]:
+    """The savings of one of `KINDS`: median costs with and without, played in turn; a first round
+    warms up."""
+    found = []
+    for model, thing, unit, dear, cheap, change, remark in KINDS[name]():
+        costs = [(dear(), cheap()) for _ in range(rounds + 1)][1:]
+        first, second = map(median, zip(*costs, strict=True))
+        found.append(Saving(model, thing, unit, first, second, change, remark))
+    return found
 
 
 # --- the event-based model, in batches over a grid of pulses
 
 
-def _batches(nodes: int) -> Iterator[Saving]:
+def _batches(nodes: int) -> Iterator[Pair]:
     from rockcheck.ebm import EventBasedModel
     from rockcheck.ebm.batch import pack_pulses, run_batch
     from rockcheck.validation.studies.work_precision.ebm import grid
@@ -80,71 +80,70 @@ def _batches(nodes: int) -> Iterator[Saving]:
     plain = pulse(4.5, 4.0, 0.3).replace(duration=10.0)
     strengths, periods = grid(plain, nodes)
 
-    def batch(
-        scene: Scene, *, until_decided: bool = True, **settings: Any
-    ) -> tuple[Callable[[], float], Callable[[], Any]]:
+    def batch(scene: Scene, *, until_decided: bool = True, **settings: Any) -> tuple[Play, Any]:
+        """What a trajectory costs, us, and a run of the batch."""
         model = EventBasedModel(tolerance=1e-8, **settings)
         packed = pack_pulses(scene, model, strengths, periods)
-
-        def run() -> Any:
-            return run_batch(packed, model, until_decided=until_decided, strict=False, jobs=1)
-
-        def cost() -> float:
-            began = time.process_time()
-            run()
-            return 1e6 * (time.process_time() - began) / len(packed)
-
-        return cost, run
-
-    def row(thing: str, dear: tuple[Any, Any], cheap: tuple[Any, Any], remark: str = "") -> Saving:
-        peaks = dear[1](), cheap[1]()
-        both = (peaks[0].side == 0) & (peaks[1].side == 0)
-        change = (
-            float(np.max(np.abs(peaks[0].peak - peaks[1].peak)[both], initial=0.0))
-            / PAPER_BLOCK.alpha
-        )
-        return _saving(
-            "ebm", thing, "μs a trajectory", dear[0], cheap[0], change=change, remark=remark
-        )
+        run = partial(run_batch, packed, model, until_decided=until_decided, strict=False, jobs=1)
+        return _timed(lambda: None, lambda _: run(), len(packed)), run
 
     sticky = plain.replace(floor=Floor(friction=1.3))
     still = Record.from_samples(np.zeros(1001), 0.01)
-    yield row(
-        "wall",
-        batch(plain.replace(walls=(FAR,))),
-        batch(plain),
-        "a wall out of reach against none: no guard, earlier decision",
-    )
-    yield row(
-        "friction limit",
-        batch(sticky),
-        batch(sticky, friction="no-slip"),
-        "μ 1.3, where the strongest pulses slip a little, against no slip",
-    )
-    yield row(
-        "free flight",
-        batch(plain, pivot="unilateral"),
-        batch(plain),
-        "unilateral against bilateral, no wall",
-    )
-    yield row(
-        "the tail",
-        batch(plain, until_decided=False),
-        batch(plain),
-        "10 s against: until outcome and peak are certain",
-    )
-    yield row(
-        "vertical motion",
-        batch(plain.replace(vertical=still)),
-        batch(plain),
-        "a record of zeros against none",
-    )
+    basis = batch(plain)
+    for thing, dear, cheap, remark in (
+        (
+            "wall",
+            batch(plain.replace(walls=(FAR,))),
+            basis,
+            "a wall out of reach against none: no guard, earlier decision",
+        ),
+        (
+            "friction limit",
+            batch(sticky),
+            batch(sticky, friction="no-slip"),
+            "μ 1.3, where the strongest pulses slip a little, against no slip",
+        ),
+        (
+            "free flight",
+            batch(plain, pivot="unilateral"),
+            basis,
+            "unilateral against bilateral, no wall",
+        ),
+        (
+            "the tail",
+            batch(plain, until_decided=False),
+            basis,
+            "10 s against: until outcome and peak are certain",
+        ),
+        (
+            "vertical motion",
+            batch(plain.replace(vertical=still)),
+            basis,
+            "a record of zeros against none",
+        ),
+    ):
+        one, other = dear[1](), cheap[1]()
+        apart = np.abs(one.peak - other.peak)[(one.side == 0) & (other.side == 0)]
+        change = float(np.max(apart, initial=0.0)) / PAPER_BLOCK.alpha
+        yield "ebm", thing, "μs a trajectory", dear[0], cheap[0], change, remark
+
+
+def _timed(start: Callable[[], Any], play: Callable[[Any], object], count: int) -> Play:
+    """What one of `count` parts of a play costs, CPU us; `start` is not counted."""
+
+    def cost() -> float:
+        started = start()
+        began = time.process_time()
+        play(started)
+        return 1e6 * (time.process_time() - began) / count
+
+    return cost
 
 
 # --- histories: every model
 
 
-def _histories() -> Iterator[Saving]:
+def _histories() -> Iterator[Pair]:
     scene = pulse(6.0, 6.0, 0.3)
     scarce = scene.replace(output_step=scene.duration)
     dense = scene.replace(output_step=0.001)
@@ -200,26 +199,18 @@ def _histories() -> Iterator[Saving]:
 
 def _of_histories(
     label: str, thing: str, dear: tuple[Model, Scene], cheap: tuple[Model, Scene], remark: str
-) -> Saving:
-    def cost(model: Model, scene: Scene) -> Callable[[], float]:
+) -> Pair:
+    def cost(model: Model, scene: Scene) -> Play:
         return lambda: 1e3 * model.simulate(scene).cost.cpu_seconds / scene.duration
 
-    first, second = (_rows(model.simulate(scene)) for model, scene in (dear, cheap))
-    common = sorted(first.keys() & second.keys())
-    change = max(abs(first[t] - second[t]) for t in common) / PAPER_BLOCK.alpha
-    return _saving(
-        label, thing, "ms a simulated s", cost(*dear), cost(*cheap), change=change, remark=remark
+    # theta by time, to the nanosecond
+    first, second = (
+        dict(zip(found["t"].round(9).tolist(), found["theta"].tolist(), strict=True))
+        for found in (model.simulate(scene).channels for model, scene in (dear, cheap))
     )
-
-
-def _rows(history: History) -> dict[float, float]:
-    """theta by time, to the nanosecond."""
-    return {
-        round(t, 9): theta
-        for t, theta in zip(
-            history.channels["t"].tolist(), history.channels["theta"].tolist(), strict=True
-        )
-    }
+    common = first.keys() & second.keys()
+    change = max(abs(first[t] - second[t]) for t in common) / PAPER_BLOCK.alpha
+    return label, thing, "ms a simulated s", cost(*dear), cost(*cheap), change, remark
 
 
 # --- steps of the engines themselves, in a row without anything between them
@@ -234,48 +225,60 @@ _TILTED = Scene(
 )
 
 
-def _mujoco_steps() -> Iterator[Saving]:
+def _mujoco_steps() -> Iterator[Pair]:
+    import mujoco
+    from mujoco import rollout
+
     from rockcheck.engines import MuJoCo
 
     text = _as_xml(MuJoCo().rigid_world(_TILTED.replace(walls=(FAR,), initial_rotation=0.0)))
     whole, lean = _loaded(text), _loaded(text, _unpaired)
+
+    def one_by_one(model: Any) -> Play:
+        def steps(data: Any) -> None:
+            for _ in range(_STEPS):
+                mujoco.mj_step(model, data)
+
+        return _timed(lambda: _started(model), steps, _STEPS)
+
+    def native(data: Any) -> None:
+        start = np.empty(mujoco.mj_stateSize(lean, mujoco.mjtState.mjSTATE_FULLPHYSICS))
+        mujoco.mj_getState(lean, data, start, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        rollout.rollout(lean, data, start, nstep=_STEPS)
+
     for thing, dear, cheap, remark in (
-        ("contact pairs", whole, lean, "wall pairs out of reach against none"),
+        (
+            "contact pairs",
+            one_by_one(whole),
+            one_by_one(lean),
+            "wall pairs out of reach against none",
+        ),
         (
             "collision search",
-            _loaded(text, _all_collide),
-            whole,
+            one_by_one(_loaded(text, _all_collide)),
+            one_by_one(whole),
             "search among all geoms against listed pairs",
         ),
         (
             "out-of-plane motion",
-            _loaded(text, _solid),
-            whole,
+            one_by_one(_loaded(text, _solid)),
+            one_by_one(whole),
             "a free joint against two slides and a hinge",
         ),
         (
             "unused features",
-            _loaded(text, _flagged),
-            whole,
+            one_by_one(_loaded(text, _flagged)),
+            one_by_one(whole),
             "energies, accelerometer and gyro that nobody reads",
         ),
+        (
+            "Python between steps",
+            one_by_one(lean),
+            _timed(lambda: _started(lean), native, _STEPS),
+            "against mujoco.rollout",
+        ),
     ):
-        yield _saving(
-            "mujoco, bare steps",
-            thing,
-            "μs a step",
-            _one_by_one(dear),
-            _one_by_one(cheap),
-            remark=remark,
-        )
-    cost = _one_by_one(lean), _native(lean)
-    yield _saving(
-        "mujoco, bare steps",
-        "Python between steps",
-        "μs a step",
-        *cost,
-        remark="against mujoco.rollout",
-    )
+        yield "mujoco, bare steps", thing, "μs a step", dear, cheap, math.nan, remark
 
 
 def _loaded(text: str, change: Callable[[ET.Element], None] = lambda root: None) -> Any:
@@ -310,36 +313,6 @@ def _started(model: Any) -> Any:
     else:
         data.qpos[:] = pose[0], 0.0, pose[1], math.cos(0.5 * tilt), 0.0, -math.sin(0.5 * tilt), 0.0
     return data
-
-
-def _one_by_one(model: Any) -> Callable[[], float]:
-    """What a step costs, us, called from Python each."""
-    import mujoco
-
-    def play() -> float:
-        data = _started(model)
-        began = time.process_time()
-        for _ in range(_STEPS):
-            mujoco.mj_step(model, data)
-        return 1e6 * (time.process_time() - began) / _STEPS
-
-    return play
-
-
-def _native(model: Any) -> Callable[[], float]:
-    """What a step costs, us, in one call of `mujoco.rollout`."""
-    import mujoco
-    from mujoco import rollout
-
-    def play() -> float:
-        data = _started(model)
-        start = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
-        mujoco.mj_getState(model, data, start, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-        began = time.process_time()
-        rollout.rollout(model, data, start, nstep=_STEPS)
-        return 1e6 * (time.process_time() - began) / _STEPS
-
-    return play
 
 
 def _found(root: ET.Element, path: str) -> ET.Element:
@@ -378,14 +351,9 @@ def _unpaired(root: ET.Element) -> None:
 def _all_collide(root: ET.Element) -> None:
     """Every corner with every surface, found by the engine's broad phase in place of the pairs."""
     root.remove(_found(root, "contact"))
+    collides = {"contype": "1", "conaffinity": "1", "condim": "3", "friction": "1 0 0"}
     for geom in root.iter("geom"):
-        for key, value in (
-            ("contype", "1"),
-            ("conaffinity", "1"),
-            ("condim", "3"),
-            ("friction", "1 0 0"),
-        ):
-            geom.set(key, value)
+        geom.attrib.update(collides)
 
 
 def _as_xml(world: Any) -> str:
@@ -396,83 +364,54 @@ def _as_xml(world: Any) -> str:
         return path.read_text(encoding="utf-8")
 
 
-def _pybullet_steps() -> Iterator[Saving]:
+def _pybullet_steps() -> Iterator[Pair]:
     if not_installed("pybullet"):
         return
     from rockcheck.engines import PyBullet
 
     start = np.array(_TILTED.initial_state)
 
-    def steps(
-        walls: tuple[Wall, ...] = (),
-        each: Callable[[Any], object] = lambda world: None,
-        count: int = _STEPS,
-    ) -> Callable[[], float]:
-        scene = _TILTED.replace(walls=walls)
+    def steps(each: str = "", walls: tuple[Wall, ...] = (), count: int = _STEPS) -> Play:
+        """What a step costs, us, with what is done after `each`, by the names of its calls."""
 
         def play() -> float:
-            world: Any = PyBullet().rigid_world(scene)
+            world: Any = PyBullet().rigid_world(_TILTED.replace(walls=walls))
+            bullet, options = world.bullet, world.options
+            after = {
+                "read": lambda: (
+                    bullet.getBasePositionAndOrientation(world.body, **options),
+                    bullet.getBaseVelocity(world.body, **options),
+                ),
+                "kept": lambda: bullet.removeState(bullet.saveState(**options), **options),
+                "drawn": lambda: bullet.getCameraImage(64, 64, **options),
+            }.get(each, lambda: None)
+
+            def stepped(_: Any) -> None:
+                for _ in range(count):
+                    bullet.stepSimulation(**options)
+                    after()
+
             try:
                 world.place(start)
-                world.bullet.setTimeStep(1e-3, **world.options)
-                world.bullet.setGravity(0.0, 0.0, -9.81, **world.options)
-                began = time.process_time()
-                for _ in range(count):
-                    world.bullet.stepSimulation(**world.options)
-                    each(world)
-                return 1e6 * (time.process_time() - began) / count
+                bullet.setTimeStep(1e-3, **options)
+                bullet.setGravity(0.0, 0.0, -9.81, **options)
+                return _timed(lambda: None, stepped, count)()
             finally:
                 world.close()
 
         return play
 
-    def read(world: Any) -> None:
-        world.bullet.getBasePositionAndOrientation(world.body, **world.options)
-        world.bullet.getBaseVelocity(world.body, **world.options)
-
-    def render(world: Any) -> None:
-        world.bullet.getCameraImage(64, 64, **world.options)
-
-    def kept(world: Any) -> None:
-        world.bullet.removeState(world.bullet.saveState(**world.options), **world.options)
-
-    name, unit = "pybullet, bare steps", "μs a step"
-    yield _saving(
-        name,
-        "contact pairs",
-        unit,
-        steps((FAR,)),
-        steps(),
-        remark="a wall out of reach against none",
-    )
-    yield _saving(
-        name,
-        "dense output",
-        unit,
-        steps(each=read),
-        steps(),
-        remark="pose and velocity read after each step, as is needed",
-    )
-    yield _saving(
-        name,
-        "saved states",
-        unit,
-        steps(each=kept, count=300),
-        steps(),
-        remark="saveState, as save-and-redo would need",
-    )
-    yield _saving(
-        name,
-        "rendering",
-        unit,
-        steps(each=render, count=300),
-        steps(),
-        remark="64 × 64 pixels in software each step",
-    )
+    for thing, dear, remark in (
+        ("contact pairs", steps(walls=(FAR,)), "a wall out of reach against none"),
+        ("dense output", steps("read"), "pose and velocity read after each step, as is needed"),
+        ("saved states", steps("kept", count=300), "saveState, as save-and-redo would need"),
+        ("rendering", steps("drawn", count=300), "64 × 64 pixels in software each step"),
+    ):
+        yield "pybullet, bare steps", thing, "μs a step", dear, steps(), math.nan, remark
 
 
 #: What is measured, each on its own.
-KINDS: dict[str, Callable[[], Iterator[Saving]]] = {
+KINDS: dict[str, Callable[[], Iterator[Pair]]] = {
     "batches": lambda: _batches(40),
     "batches, quick": lambda: _batches(10),
     "histories": _histories,

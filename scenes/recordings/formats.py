@@ -1,9 +1,16 @@
-"""Formats of one component with a header of its own: PEER AT2, ESM (DYNA) and K-NET/KiK-net
-ASCII."""
+"""Formats with a header of their own: PEER AT2, ESM (DYNA), K-NET/KiK-net ASCII, and V2 files of
+strong-motion networks, COSMOS 1.20 and the older one of CSMIP (CDMG), of one or several channels.
+
+In V2 files numbers stand in fields of the width that the file states, and may touch. Only the
+blocks of acceleration are read. Source: COSMOS Strong Motion Data Format, version 1.20 (2001):
+integer header 54 is the azimuth, real header 62 the time step of these samples in ms, and 34 that
+of the raw record in s, which counts only where 62 is not known.
+"""
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +43,27 @@ _UNITS = re.compile(
 _ESM_LINE = re.compile(r"([A-Z][A-Z0-9_^/]*+)\s*+:(.*+)")
 _KNET_SCALE = re.compile(rf"({NUMBER})\s*+\(gal\)\s*+/\s*+({NUMBER})", re.IGNORECASE)
 _KNET_RATE = re.compile(rf"({NUMBER})\s*+(?:Hz)?", re.IGNORECASE)
+
+#: How many characters of a line may be a header.
+_WIDE = 160
+_FORMAT = r"\(?\s*+(\d{1,3})[FEI](\d{1,3})(?:\.\d++)?"
+COSMOS_BLOCK = re.compile(
+    rf"\s*+(\d++)\s++(?:[a-z]++\.?\s++)?accel[a-z]*+\.?\s++pts\b[^=\d]*+(\d++)?[^=]*+=\s*+([^,(]*+)(?:\((\d++)\))?[^=]*+=\s*+{_FORMAT}",
+    re.IGNORECASE,
+)
+CSMIP_BLOCK = re.compile(
+    rf"\s*+(\d++)\s++points\s++of\s++accel\s++data\s++equally\s++spaced\s++at\s*+({NUMBER})\s*+sec",
+    re.IGNORECASE,
+)
+_HEADER = re.compile(
+    rf"\s*+(\d++)\s++(integer|real)-header\s++values\s++follow\s++on\s++(\d++)\s++lines[^=]*+=\s*+{_FORMAT}",
+    re.IGNORECASE,
+)
+_CSMIP_FORMAT = re.compile(_FORMAT.replace(r"\(?", r"\("), re.IGNORECASE)
+_CSMIP_UNIT = re.compile(r"\b(?:in\s++|units\s*+:\s*+)([a-z/0-9^]++)", re.IGNORECASE)
+_CHANNEL = re.compile(r"\bChan\s*+(\d++):\s*+([A-Za-z0-9]++(?: Deg\b)?)", re.IGNORECASE)
+_COSMOS_UNITS = {"2": "g", "02": "g", "4": "cm/s2", "04": "cm/s2"}
+_UP = {400: "up", 401: "down"}
 
 
 def read_at2(path: Path, lines: list[str], reading: Reading) -> Recording:
@@ -185,3 +213,146 @@ def _check_duration(path: Path, stated: tuple[int, str] | None, hertz: float, fo
                 f"Duration Time(s) {stated[1]} is {expected:.10g} samples, the file has {found}",
                 stated[0],
             )
+
+
+@dataclass
+class _Channel:
+    """What the headers have said so far of the next block of accelerations."""
+
+    name: str = ""
+    step: tuple[int, float] | None = None
+
+
+@dataclass(frozen=True)
+class _Block:
+    """What the headers say of a block of accelerations: how many, the line and the value (s) of the
+    time step, the unit, and that numbers stand `across` on a line, each `width` wide."""
+
+    count: str
+    step: tuple[int, float]
+    unit: str
+    across: int
+    width: int
+
+    @property
+    def height(self) -> int:
+        """Lines of so many numbers."""
+        return -(-int(self.count[:12]) // max(self.across, 1))
+
+
+def is_volume(line: str) -> bool:
+    """Whether this line can only stand in a V2 file."""
+    return bool(
+        _HEADER.match(line[:_WIDE])
+        or CSMIP_BLOCK.match(line[:_WIDE])
+        or re.search(r"\(Format v0*1\.\d", line[:_WIDE], re.IGNORECASE)
+    )
+
+
+def read_volume(path: Path, lines: list[str], reading: Reading) -> list[Recording]:
+    """Every block of acceleration, in the file's order."""
+    only_for_tables(path, reading, "a V2 file")
+    found: list[Recording] = []
+    channel, index = _Channel(), 0
+    while index < len(lines):
+        line = lines[index][:_WIDE]
+        index += 1
+        if header := _HEADER.match(line):
+            index = _heed(path, lines, index, header, channel)
+        elif block := COSMOS_BLOCK.match(line):
+            if channel.step is None:
+                raise fault(path, "no real header before this block states the time step", index)
+            stated = known_unit(block[3]) or _COSMOS_UNITS.get(block[4] or "", "")
+            about = _Block(block[1], channel.step, stated, int(block[5]), int(block[6]))
+            found.append(_recording(path, lines, index, about, channel.name, reading))
+            _check_seconds(path, index, block[2], found[-1])
+            channel, index = _Channel(), index + about.height
+        elif block := CSMIP_BLOCK.match(line):
+            rest = line[block.end() :]
+            shape, unit = _CSMIP_FORMAT.search(rest), _CSMIP_UNIT.search(rest)
+            across, width = map(int, shape.groups()) if shape else (8, 10)
+            stated = known_unit(unit[1]) if unit else ""
+            step = index, number(path, index, block[2])
+            about = _Block(block[1], step, stated, across, width)
+            found.append(_recording(path, lines, index, about, channel.name, reading))
+            channel, index = _Channel(), index + about.height
+        elif named := _CHANNEL.search(line):
+            channel.name = named[2]
+    if not found:
+        raise fault(
+            path,
+            "a V2 file without a block of accelerations; only corrected accelerations can be read",
+        )
+    return found
+
+
+def _heed(
+    path: Path, lines: list[str], index: int, header: re.Match[str], channel: _Channel
+) -> int:
+    """Takes direction and time step from a block of header values; returns the line after it."""
+    across, width = int(header[4]), int(header[5])
+    rows = min(int(header[3][:6]), len(lines) - index)
+
+    def word(place: int) -> tuple[int, str]:
+        row, column = divmod(place - 1, across)
+        return index + row + 1, lines[index + row][
+            column * width : (column + 1) * width
+        ].strip() if row < rows else ""
+
+    if header[2].lower() == "integer":
+        if re.fullmatch(r"[0-9]{1,3}", word(54)[1]):
+            degrees = int(word(54)[1])
+            channel.name = _UP.get(degrees, f"{degrees} deg" if degrees <= 360 else channel.name)
+    else:
+        for place, seconds in ((62, 1e-3), (34, 1.0)):
+            n, text = word(place)
+            if text and (value := number(path, n, text)) > 0.0:
+                channel.step = n, float(f"{value * seconds:.12g}")
+                break
+    return index + rows
+
+
+def _recording(
+    path: Path, lines: list[str], index: int, about: _Block, name: str, reading: Reading
+) -> Recording:
+    count = checked_count(path, index, "the count of points", about.count)
+    if about.across < 1 or about.width < 1:
+        raise fault(path, "a format without fields", index)
+    place, stated = about.step
+    step = checked_step(path, place, "the time step", f"{stated!r}")
+    seconds = settled_step(path, step, reading)
+    unit = settled_unit(path, about.unit, reading)
+    values: list[float] = []
+    for n, line in enumerate(lines[index : index + about.height], index + 1):
+        here = min(about.across, count - len(values))
+        ends = range(0, here * about.width, about.width)
+        words = [line[end : end + about.width].strip() for end in ends]
+        if "" in words:
+            break
+        values += [number(path, n, word) for word in words]
+    if len(values) != count:
+        raise fault(
+            path,
+            f"the header says {count} points of acceleration, the block has {len(values)}",
+            index,
+        )
+    return Recording(
+        samples=np.array(values) * UNITS[unit],
+        time_step=seconds,
+        unit=unit,
+        form="V2",
+        component=printable(name, 30),
+    )
+
+
+def _check_seconds(path: Path, index: int, stated: str | None, record: Recording) -> None:
+    """The whole seconds that a block states must be those of its samples: a time step of another
+    record would be a silent fault."""
+    length = len(record.samples) * record.time_step
+    if stated and abs(length - int(stated[:9])) > 1.0 + 0.01 * length:
+        raise fault(
+            path,
+            f"{len(record.samples)} points every {record.time_step:g} s are {length:.6g} s, not"
+            f" {stated[:9]} secs",
+            index,
+        )

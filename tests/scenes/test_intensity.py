@@ -1,0 +1,58 @@
+"""How strong a recorded motion is, against closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from rockcheck.scenes.recordings import intensity
+from rockcheck.scenes.recordings.recording import Recording
+
+G = 9.80665
+
+
+def test_intensities_of_a_sine_are_its_closed_forms():
+    """a = A sin(w t) over ten cycles: PGV 2 A/w from rest, Arias pi/(2 g) A^2 T/2; resonance builds
+    up as 1 - exp(-z w t)."""
+    amplitude, rate, step = 2.0, 2 * math.pi, 1e-3
+    samples = amplitude * np.sin(rate * step * np.arange(10_001))
+    record = Recording(samples=samples, time_step=step, unit="m/s2", form="CSV")
+    assert intensity.peak_acceleration(record) == pytest.approx(amplitude / G, rel=1e-9)
+    assert intensity.peak_velocity(record) == pytest.approx(2 * amplitude / rate, rel=1e-5)
+    assert intensity.arias(record) == pytest.approx(
+        math.pi / (2 * G) * amplitude**2 * 5.0, rel=1e-5
+    )
+    built_up = amplitude / G / (2 * 0.05) * (1 - math.exp(-0.05 * rate * 10.0))
+    assert intensity.spectral_acceleration(record, 1.0) == pytest.approx(built_up, rel=0.01)
+    assert intensity.spectral_acceleration(record, 0.01) == pytest.approx(amplitude / G, rel=0.01)
+
+
+def test_spectral_accelerations_are_those_of_the_straight_lines_between_samples():
+    """Samples four periods apart, or all motion in the last one: as of the same lines with samples
+    4000 times as dense."""
+    samples = np.array([0.0, 1.0, -0.5, 0.0])
+    dense = Recording(
+        samples=np.interp(np.arange(12_001) / 4000, np.arange(4), samples),
+        time_step=1e-3,
+        unit="m/s2",
+        form="CSV",
+    )
+    for period in (1.0, 2.5):
+        coarse = Recording(samples=samples, time_step=4.0, unit="m/s2", form="CSV")
+        expected = intensity.spectral_acceleration(dense, period)
+        assert intensity.spectral_acceleration(coarse, period) == pytest.approx(expected, rel=2e-3)
+    # A hat of a step's length is, to an oscillator of a far longer period, an impulse; the peak
+    # comes a quarter of a period later.
+    last = Recording(samples=np.array([0.0, 0.0, 1.0]), time_step=1e-2, unit="m/s2", form="CSV")
+    rate, damping = 2 * math.pi / 1.0, 0.05
+    peak = rate * 1e-2 * math.exp(-damping / math.sqrt(1 - damping**2) * math.acos(damping))
+    assert intensity.spectral_acceleration(last, 1.0) == pytest.approx(peak / G, rel=2e-3)
+
+
+def test_periods_of_a_spectrum_leave_no_wide_gap():
+    steps = np.divide(intensity.PERIODS[1:], intensity.PERIODS[:-1])
+    assert np.all((steps > 1.0) & (steps <= 2.0))
+    assert intensity.PERIODS[0] <= 0.1
+    assert intensity.PERIODS[-1] >= 4.0

@@ -1,0 +1,101 @@
+"""The scenes of the stress study: what a seed gives, and what occurs among them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rockcheck.validation.studies.stress.generator import (
+    ALPHA,
+    FRICTION,
+    RADIUS,
+    exact_scene,
+    random_scene,
+)
+
+#: What must occur among random scenes: that of a scene, or of one of its walls.
+OCCURS = {
+    "touching": lambda s: any(wall.gap == 0.0 for wall in s.walls),
+    "plastic": lambda s: any(wall.restitution == 0.0 for wall in s.walls),
+    "elastic": lambda s: any(wall.restitution == 1.0 for wall in s.walls),
+    "balanced": lambda s: abs(s.initial_rotation) == pytest.approx(s.block.alpha),
+    "two frictions": lambda s: s.floor.mu_s > s.floor.friction,
+    "one sample": lambda s: s.excitation.kind == "record" and len(s.excitation.unscaled) == 1,
+    "hop": lambda s: s.initial_height > 0.0,
+    "weightless": lambda s: np.max(-s.vertical.acceleration(s.output_times)) > s.gravity,
+}
+#: And among those at which rounding decides.
+EXACT = {
+    "noise": lambda s: 0.0 < abs(s.initial_rotation) < 1e-12,
+    "slow noise": lambda s: 0.0 < abs(s.initial_angular_velocity) < 1e-12,
+    "equal walls": lambda s: len(s.walls) == 2 and s.walls[0].gap == s.walls[1].gap,
+    "no weight": lambda s: s.vertical.kind == "record" and min(s.vertical.samples) == -s.gravity,
+    "long": lambda s: s.duration == 1e4,
+}
+
+
+@pytest.mark.parametrize("make", [random_scene, exact_scene])
+def test_a_scene_of_a_seed_can_be_made_alone(make):
+    assert make(5, 1234) == make(5, 1234)
+    assert make(5, 1234) not in (make(5, 1235), make(6, 1234))
+
+
+def test_scenes_cover_what_a_user_could_write():
+    """The corners of the ranges are reached, and every kind of excitation, wall and start
+    occurs."""
+    scenes = [random_scene(1, n) for n in range(2000)]
+    for values, (low, high) in (
+        ([scene.block.box_angle for scene in scenes], ALPHA),
+        ([scene.block.half_diagonal for scene in scenes], RADIUS),
+    ):
+        assert low * (1 - 1e-9) <= min(values) < 2.0 * low
+        assert 0.9 * high < max(values) <= high * (1 + 1e-9)
+    friction = [scene.floor.friction for scene in scenes]
+    assert min(friction) == 0.0 < 0.98 * FRICTION[1] < max(friction)
+    kinds = {"rest", "ricker", "sine", "record"}
+    assert {s.excitation.kind for s in scenes} == {s.vertical.kind for s in scenes} == kinds
+    assert len({tuple(wall.side for wall in scene.walls) for scene in scenes}) == 4
+    assert [name for name, has in OCCURS.items() if not any(map(has, scenes))] == []
+
+
+@pytest.mark.parametrize("kind", ["bilateral", "bouc-wen", "no-slip"])
+@pytest.mark.parametrize("make", [random_scene, exact_scene])
+def test_a_kind_of_model_is_asked_for_no_more_than_it_can_play(make, kind):
+    scenes = [make(1, n, kind) for n in range(300)]
+    assert not any(scene.floor.restitution or scene.initial_height for scene in scenes)
+    static = {scene.floor.static_friction for scene in scenes}
+    assert (static == {None}) == (kind == "bouc-wen")
+    assert any(scene.initial_velocity for scene in scenes) == (kind != "no-slip")
+    if make is exact_scene:
+        assert [scene.block for scene in scenes] == [make(1, n).block for n in range(300)]
+
+
+@pytest.mark.parametrize("make", [random_scene, exact_scene])
+def test_a_third_of_the_blocks_are_asymmetric(make):
+    """To either side, with a moment of inertia of their own or without, some with a load in the
+    middle."""
+    scenes = [make(1, n) for n in range(1500)]
+    off = np.array([scene.block.offset[0] for scene in scenes])
+    assert 0.3 < np.mean(off != 0.0) < 0.37
+    assert 0.4 < np.mean(off[off != 0.0] > 0.0) < 0.6
+    loaded = [scene for scene in scenes if not scene.block.homogeneous]
+    assert 0.4 < np.mean([scene.block.moment_of_inertia is None for scene in loaded]) < 0.6
+    assert {tuple(x != 0.0 for x in scene.block.offset) for scene in loaded} >= {
+        (False, True),
+        (True, False),
+    }
+    balanced = [
+        tilt
+        for tilt, block in ((scene.initial_rotation, scene.block) for scene in loaded)
+        if tilt and abs(tilt) == block.pivot("left" if tilt > 0.0 else "right").alpha
+    ]
+    assert min(balanced) < 0.0 < max(balanced)
+
+
+def test_exact_scenes_hold_what_they_are_for():
+    """Numbers of few digits, starts that are noise, walls on both sides, a vertical base that may
+    take all weight, long rest."""
+    scenes = [exact_scene(5, number) for number in range(400)]
+    digits = [len(repr(one)) for s in scenes for one in (s.block.half_width, s.gravity)]
+    assert max(digits) < 8
+    assert [name for name, has in EXACT.items() if not any(map(has, scenes))] == []
