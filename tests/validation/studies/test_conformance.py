@@ -131,11 +131,11 @@ def test_the_engines_here_are_those_that_are_installed():
     ("name", "settings", "failing"),
     [
         ("mujoco", "best", set()),
-        ("mujoco", "default", {"RC-03", "RC-04", "RC-05", "RC-08", "RC-14"}),
+        ("mujoco", "default", {"RC-03", "RC-04", "RC-05", "RC-08", "RC-14", "RC-21", "RC-22"}),
         ("pymunk", "best", set()),
         ("dart", "best", {"RC-03"}),
-        ("box2d", "best", {"RC-03", "RC-05", "RC-06", "RC-07"}),
-        ("box2d", "default", {"RC-02", "RC-05", "RC-06", "RC-07", "RC-09"}),
+        ("box2d", "best", {"RC-03", "RC-05", "RC-06", "RC-07", "RC-22"}),
+        ("box2d", "default", {"RC-02", "RC-05", "RC-06", "RC-07", "RC-09", "RC-21", "RC-24"}),
         pytest.param("drake", "best", set(), marks=pytest.mark.slow),
     ],
 )
