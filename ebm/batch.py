@@ -11,16 +11,17 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, get_type_hints
+from typing import NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import natural
 from rockcheck.ebm.core.ground import Ground
-from rockcheck.ebm.core.march import DONE, FAILURES, OVERTURNED, Control, march, scratch_with
-from rockcheck.ebm.core.motion import THETA, Setting, Side, workspace
-from rockcheck.ebm.core.running import Records
+from rockcheck.ebm.core.march import march
+from rockcheck.ebm.core.motion import Setting, Side
+from rockcheck.ebm.core.names import FAILURES, Ending, Shape
+from rockcheck.ebm.core.state import STATE, Base, Control, Records, Run, rests, workspace
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes.compiled import inner_kernel, kernel
 from rockcheck.scenes.errors import InputError, ModelFailure
@@ -33,9 +34,8 @@ _CHUNK = 256
 SIDE = np.dtype([(name, np.float64) for name in Side._fields])
 SETTING = np.dtype(
     [
-        (name, SIDE if kind is Side else np.float64)
+        (name, SIDE if kind is Side else np.int64 if kind is int else np.float64)
         for name, kind in get_type_hints(Setting).items()
-        if name != "law"
     ]
 )
 GROUND = np.dtype(
@@ -53,14 +53,11 @@ class Packed:
     """Runs as arrays, one row each, natural units: settings (`SETTING`) and grounds (`GROUND`),
     initial states, lengths.
 
-    All rows have one law of impacts at several contacts (see `Setting`).
-
     Recorded samples of all rows stand in one `samples` array, where a row's ground has `count` of
     them from `first` on.
     """
 
     settings: NDArray[np.void]
-    law: int | None
     horizontal: NDArray[np.void]
     vertical: NDArray[np.void]
     states: Floats
@@ -79,7 +76,7 @@ class Packed:
             self.states[part],
             durations[part],
         )
-        return Rows(*some, self.samples, self.law)
+        return Rows(*some, self.samples)
 
 
 class Rows(NamedTuple):
@@ -91,7 +88,20 @@ class Rows(NamedTuple):
     states: Floats
     durations: Floats
     samples: Floats
-    law: int | None
+
+
+class Found(NamedTuple):
+    """What compiled code writes, a row a run (see `Outcomes`)."""
+
+    side: NDArray[np.int8]
+    peak: Floats
+    t_end: Floats
+    series: NDArray[np.int64]
+    ending: NDArray[np.int64]
+    at_rest: NDArray[np.bool_]
+    motion: Floats
+    modes: NDArray[np.int8]
+    written: NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +117,7 @@ class Outcomes:
     peak: Floats
     t_end: Floats
     series: NDArray[np.int64]
-    #: How each run ended, a key of `ebm.core.march.FAILURES` where it failed; and whether it then
+    #: How each run ended, a key of `ebm.core.names.FAILURES` where it failed; and whether it then
     #: was at rest.
     ending: NDArray[np.int64]
     at_rest: NDArray[np.bool_]
@@ -119,7 +129,7 @@ class Outcomes:
     @property
     def failed(self) -> NDArray[np.bool_]:
         """Which runs reached a cap or had no consistent motion."""
-        return (self.ending != DONE) & (self.ending != OVERTURNED)
+        return (self.ending != Ending.DONE) & (self.ending != Ending.OVERTURNED)
 
 
 def pack(scenes: Sequence[Scene], model: EventBasedModel) -> Packed:
@@ -132,14 +142,13 @@ def pack(scenes: Sequence[Scene], model: EventBasedModel) -> Packed:
         raise InputError("a batch has Coulomb's friction or none", "friction")
     for scene in scenes:
         model.check(scene)
-        for ground, rows in zip(natural.grounds_of(scene), (horizontal, vertical), strict=True):
+        for ground, rows in zip(natural.base_of(scene), (horizontal, vertical), strict=True):
             rows.append((*ground[:-1], offset, len(ground.samples)))
             bank.append(ground.samples)
             offset += len(ground.samples)
-    settings = [_without_law(_setting(scene, model)) for scene in scenes]
+    settings = [_setting(scene, model) for scene in scenes]
     return Packed(
         settings=np.array(settings, dtype=SETTING),
-        law=natural.law_of(model.pivot == "unilateral", model.impacts),
         horizontal=np.array(horizontal, dtype=GROUND),
         vertical=np.array(vertical, dtype=GROUND),
         states=np.array([natural.state_of(scene) for scene in scenes]).reshape(len(scenes), 6),
@@ -157,22 +166,20 @@ def pack_pulses(
     unit, count = natural.time_unit(scene), len(amplitudes)
     template = type(scene.excitation)
     pulse = scene.excitation.model_copy(update={"amplitude": 1.0, "period": 1.0})
-    one, _ = natural.grounds_of(scene.replace(excitation=template(**pulse.model_dump())))
+    one = natural.base_of(scene.replace(excitation=template(**pulse.model_dump()))).horizontal
     # A pulse of amplitude a and period T is a times the unit pulse at time t/T.
     ratio = 1.0 / periods
     horizontal = np.repeat(np.array([(*one[:-1], 0, 1)], dtype=GROUND), count)
     for power in range(4):
         horizontal[f"c{power}"] *= amplitudes * (
-            ratio**power if one.kind == natural.GAUSSIAN else 1.0
+            ratio**power if one.kind == Shape.GAUSSIAN else 1.0
         )
-    horizontal["rate"] *= ratio**2 if one.kind == natural.GAUSSIAN else ratio
+    horizontal["rate"] *= ratio**2 if one.kind == Shape.GAUSSIAN else ratio
     horizontal["centre"] *= periods
     horizontal["quiet"] *= periods
-    _, still = natural.grounds_of(scene)
-    setting = _setting(scene, model)
+    still = natural.base_of(scene).vertical
     return Packed(
-        settings=np.repeat(np.array([_without_law(setting)], dtype=SETTING), count),
-        law=setting.law,
+        settings=np.repeat(np.array([_setting(scene, model)], dtype=SETTING), count),
         horizontal=horizontal,
         vertical=np.repeat(np.array([(*still[:-1], 1, len(still.samples))], dtype=GROUND), count),
         states=np.tile(natural.state_of(scene), (count, 1)),
@@ -189,12 +196,6 @@ def _setting(scene: Scene, model: EventBasedModel) -> Setting:
         energy_cap=model.energy_cap,
         impacts=model.impacts,
     )
-
-
-def _without_law(setting: Setting) -> tuple[Any, ...]:
-    """A row of `SETTING`. The law, the last field, is the same for all rows, and its type tells
-    what is compiled."""
-    return setting[:-1]
 
 
 def run_batch(
@@ -230,7 +231,7 @@ def run_batch(
 
     def chunk(first: int) -> int:
         rows = slice(first, min(first + _CHUNK, count))
-        found = (
+        found = Found(
             side[rows],
             peak[rows],
             t_end[rows],
@@ -241,7 +242,7 @@ def run_batch(
             modes[rows],
             written[rows],
         )
-        _run_rows(packed.rows(rows, durations), control, *found)
+        _run_rows(packed.rows(rows, durations), control, found)
         return rows.stop - rows.start
 
     with threads(jobs or os.cpu_count() or 1) as pool:
@@ -303,9 +304,8 @@ def row_side(r):
 
 
 @inner_kernel
-def row_setting(r, law):
-    """Block, floor and walls of a packed row, of the types that a single history has; all rows have
-    one law of impacts, or none."""
+def row_setting(r):
+    """Block, floor and walls of a packed row, of the types that a single history has."""
     return Setting(
         left=row_side(r["left"]),
         right=row_side(r["right"]),
@@ -322,40 +322,46 @@ def row_setting(r, law):
         no_slip=r["no_slip"] != 0.0,
         unilateral=r["unilateral"] != 0.0,
         energy_cap=r["energy_cap"] != 0.0,
-        law=law,
+        law=r["law"],
+        yields=r["yields"],
     )
 
 
 @inner_kernel
-def play_row(rows, i, step, control, records, z, scratch):
-    """Plays row i in z, with rows of the motion a `step` apart (see `ebm.core.march.march`);
-    returns its Tally."""
-    for k in range(6):
-        z[k] = rows.states[i, k]
-    b = row_setting(rows.settings[i], rows.law)
-    gh, gv = (
-        row_ground(rows.horizontal[i], rows.samples),
-        row_ground(rows.vertical[i], rows.samples),
+def play_row(rows, i, step, control, records, states, work):
+    """Plays row i in `states`, an array of one state, with rows of the motion a `step` apart (see
+    `ebm.core.march.march`); returns the state."""
+    state = states[0]
+    motion, begin = state.motion, rows.states[i]
+    motion.x, motion.y, motion.theta = begin[0], begin[1], begin[2]
+    motion.vx, motion.vy, motion.w = begin[3], begin[4], begin[5]
+    state.t_end = rows.durations[i]
+    block = row_setting(rows.settings[i])
+    base = Base(
+        row_ground(rows.horizontal[i], rows.samples), row_ground(rows.vertical[i], rows.samples)
     )
     control = Control(
         control.tolerance, control.most_steps, control.most_events, control.until_decided, step
     )
-    return march(b, gh, gv, z, rows.durations[i], control, None, records, scratch)
+    march(block, base, Run(state, work[0], work[1], control, records))
+    return state
 
 
 @inner_kernel
-def _play_into(rows, i, control, motion, modes, log, z, scratch):
-    """Plays row i and writes its motion; returns its Tally."""
-    step = rows.durations[i] / max(motion.shape[1] - 1, 1)
-    return play_row(rows, i, step, control, Records(motion[i], modes[i], log), z, scratch)
+def _play_into(rows, i, control, found, log, states, work):
+    """Plays row i and writes what is found."""
+    step = rows.durations[i] / max(found.motion.shape[1] - 1, 1)
+    records = Records(found.motion[i], found.modes[i], log)
+    state = play_row(rows, i, step, control, records, states, work)
+    found.ending[i], found.t_end[i], found.peak[i] = state.ending, state.t, state.peak
+    found.at_rest[i] = rests(state.mode)
+    found.series[i], found.written[i] = state.steps, state.rows
+    if state.ending == Ending.OVERTURNED:
+        found.side[i] = -1 if state.motion.theta > 0.0 else 1
 
 
 @kernel
-def _run_rows(rows, control, side, peak, t_end, series, ending, at_rest, motion, modes, written):
-    scratch, z, log = scratch_with(*workspace()), np.empty(6), np.empty((0, 5))
+def _run_rows(rows, control, found):
+    states, work, log = np.zeros(1, STATE), workspace(), np.empty((0, 5))
     for i in range(len(rows.durations)):
-        tally = _play_into(rows, i, control, motion, modes, log, z, scratch)
-        ending[i], t_end[i], peak[i], at_rest[i] = tally.ending, tally.t, tally.peak, tally.at_rest
-        series[i], written[i] = tally.steps, tally.rows
-        if ending[i] == OVERTURNED:
-            side[i] = -1 if z[THETA] > 0.0 else 1
+        _play_into(rows, i, control, found, log, states, work)

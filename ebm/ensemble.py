@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import natural
 from rockcheck.ebm.batch import pack, play_row
-from rockcheck.ebm.core.march import FAILURES, OVERTURNED, Control, scratch_with
-from rockcheck.ebm.core.motion import THETA, X, workspace
-from rockcheck.ebm.core.running import Records
+from rockcheck.ebm.core.names import FAILURES, Ending
+from rockcheck.ebm.core.state import STATE, Control, Records, workspace
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes import kinematics
 from rockcheck.scenes.compiled import kernel
@@ -78,10 +77,10 @@ def play_ensemble(
     if failed.any():
         i = int(np.argmax(failed))
         raise ModelFailure(f"{model.name}: scene {i} of the ensemble: {FAILURES[int(ending[i])]}")
-    side = np.where(ending == OVERTURNED, -np.sign(states[:, THETA]), 0.0).astype(np.int8)
+    side = np.where(ending == Ending.OVERTURNED, -np.sign(states[:, 2]), 0.0).astype(np.int8)
     placed = [natural.to_si(scene, z[None, :])[0] for scene, z in zip(scenes, states, strict=True)]
     slip = [
-        float(kinematics.slip(scene.block, z[X], z[THETA]))
+        float(kinematics.slip(scene.block, z[0], z[2]))
         for scene, z in zip(scenes, placed, strict=True)
     ]
     alpha = np.array([scene.block.alpha for scene in scenes])
@@ -94,9 +93,12 @@ def _sample_rows(rows, control, steps, states, theta, peak, ending):
     ended."""
     count = theta.shape[1]
     records = Records(np.empty((count, 6)), np.empty(count, dtype=np.int8), np.empty((0, 5)))
-    scratch, z = scratch_with(*workspace()), np.empty(6)
+    state, work = np.zeros(1, STATE), workspace()
     for i in range(len(rows.durations)):
-        tally = play_row(rows, i, steps[i], control, records, z, scratch)
-        states[i], ending[i], peak[i] = z, tally.ending, tally.peak
+        found = play_row(rows, i, steps[i], control, records, state, work)
+        motion = found.motion
+        states[i, 0], states[i, 1], states[i, 2] = motion.x, motion.y, motion.theta
+        states[i, 3], states[i, 4], states[i, 5] = motion.vx, motion.vy, motion.w
+        ending[i], peak[i] = found.ending, found.peak
         for k in range(count):
-            theta[i, k] = records.out[k, THETA] if k < tally.rows else z[THETA]
+            theta[i, k] = records.out[k, 2] if k < found.rows else motion.theta

@@ -8,7 +8,7 @@ from itertools import chain
 
 import numpy as np
 
-from rockcheck.ebm.core.rules import FLAT_LANDING, NAMES
+from rockcheck.ebm.core.rules import NAMES, Rule
 from rockcheck.ebm.model import EventBasedModel, ImpactLaw
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.scene import Scene
@@ -19,7 +19,7 @@ PERTURBATION, ALLOWED = 1e-6, 1e-3
 START = ("initial_rotation", "initial_angular_velocity", "initial_velocity", "initial_height")
 #: The choice, as `History.cost.rules` counts it, at which the laws of one bottom corner before the
 #: other part.
-FLAT = NAMES[FLAT_LANDING]
+LANDS_FLAT = NAMES[Rule.FLAT_LANDING]
 
 
 def predictability_horizon(
@@ -51,7 +51,7 @@ def predictability_horizon(
     played = model.simulate(scene)
     undisturbed = played.channels["theta"]
     rows = len(undisturbed)
-    laws = other_laws(model, walls=bool(scene.walls), flat=FLAT in played.cost.rules)
+    laws = other_laws(model, walls=bool(scene.walls), flat=LANDS_FLAT in played.cost.rules)
     others = ((model.model_copy(update={"impacts": law}), scene) for law in laws)
     for other, disturbed in chain(others, _disturbed(scene, model, perturbation)):
         theta = other.simulate(disturbed).channels["theta"][:rows]

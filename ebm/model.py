@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, Strict
@@ -15,12 +16,6 @@ from rockcheck.scenes.errors import InputError, ModelFailure, check_kind
 from rockcheck.scenes.history import Cost, Event, History
 from rockcheck.scenes.observation import observe
 from rockcheck.scenes.scene import Scene
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from rockcheck.ebm.core.march import Tally
-
 
 #: The finest tolerance.
 FINEST = 1e-15
@@ -135,7 +130,7 @@ class EventBasedModel(Frozen):
     def _simulate(self, scene: Scene, tolerance: float) -> History:
         start = time.perf_counter()
         from rockcheck.ebm import natural
-        from rockcheck.ebm.core import bouc_wen, march, motion
+        from rockcheck.ebm.core import march, names, state
         from rockcheck.scenes.progress import interruptible
 
         b = natural.setting_of(
@@ -144,92 +139,80 @@ class EventBasedModel(Frozen):
             no_slip=self.friction == "no-slip",
             energy_cap=self.energy_cap,
             impacts=self.impacts,
+            yields=self.yield_displacement / scene.block.radius,
         )
-        horizontal, vertical = natural.grounds_of(scene)
+        base = natural.base_of(scene)
         unit = natural.time_unit(scene)
-        state = natural.state_of(scene)
         times = scene.output_times
         out = np.empty((len(times), 6))
         out_mode = np.zeros(len(times), dtype=np.int8)
         log = np.empty((self.most_events, 5))
-        yields = None
-        if self.friction == "bouc-wen":
-            yields = self.yield_displacement / scene.block.radius
-        scratch = motion.workspace() if yields is None else (*bouc_wen.friction_workspace(), yields)
-        _compiled(scratch, self.pivot == "unilateral")
+        records, work = state.Records(out, out_mode, log), state.workspace()
+        loop = _compiled(march.play_bouc_wen if self.friction == "bouc-wen" else march.play)
 
-        def play(most_steps: int) -> tuple[Tally, NDArray[np.int64]]:
-            control = march.Control(
+        def play(most_steps: int) -> np.record:
+            control = state.Control(
                 tolerance, most_steps, self.most_events, False, scene.output_step / unit
             )
-            state[:] = natural.state_of(scene)
-            return march.run(
-                b,
-                horizontal,
-                vertical,
-                state,
-                scene.duration / unit,
-                control,
-                out,
-                out_mode,
-                log,
-                *scratch,
-            )
+            states = natural.start_of(scene)
+            loop(b, base, states, work, control, records)
+            return states[0]
 
         ready, cpu = time.perf_counter(), time.process_time()
         # A run of few steps is played here: to hand it over takes longer. Each sample of a record
         # is a step.
         few = min(
             self.most_steps,
-            _AT_ONCE if max(len(horizontal.samples), len(vertical.samples)) < _AT_ONCE else 0,
+            _AT_ONCE if max(len(ground.samples) for ground in base) < _AT_ONCE else 0,
         )
         found = play(few) if few else None
-        if found is None or (found[0].ending == march.TOO_MANY_STEPS and few < self.most_steps):
+        if found is None or (found.ending == names.Ending.TOO_MANY_STEPS and few < self.most_steps):
             found = interruptible(partial(play, self.most_steps))
-        tally, rules = found
         seconds, cpu = time.perf_counter() - ready, time.process_time() - cpu
-        if tally.ending in march.FAILURES:
+        if found.ending in names.FAILURES:
             raise ModelFailure(
-                f"{self.name}: {march.FAILURES[tally.ending]} at t = {tally.t * unit:.6g} s"
+                f"{self.name}: {names.FAILURES[found.ending]} at t = {found.t * unit:.6g} s"
             )
-        rows = max(tally.rows, 1)
-        out[0] = natural.state_of(scene) if tally.rows == 0 else out[0]
-        events = _events(log[: min(tally.events, len(log))], unit, scene.block.radius)
+        rows = max(int(found.rows), 1)
+        out[0] = natural.state_of(scene) if found.rows == 0 else out[0]
+        events = _events(log[: min(found.events, len(log))], unit, scene.block.radius)
         cost = Cost(
             wall_seconds=seconds,
             cpu_seconds=cpu,
             set_up=ready - start,
-            steps=int(tally.steps),  # the loop, interpreted, counts in numpy's integers
-            evaluations=int(tally.steps),
-            energy_gains=int(tally.gains),
-            largest_energy_gain=float(tally.largest_gain),
-            rules={name: int(count) for name, count in zip(NAMES, rules, strict=True) if count},
+            steps=int(found.steps),
+            evaluations=int(found.steps),
+            energy_gains=int(found.gains),
+            largest_energy_gain=float(found.largest_gain),
+            rules={
+                name: int(count) for name, count in zip(NAMES, found.rules, strict=True) if count
+            },
         )
         return observe(
             scene,
             self.name,
             natural.to_si(scene, out[:rows]),
-            mode=np.array(march.MODE_NAMES)[out_mode[:rows]],
+            mode=np.array(names.MODE_NAMES)[out_mode[:rows]],
             events=events,
-            outcome=_outcome(tally, state[2]),
+            outcome=_outcome(found),
             cost=cost,
             settings=self.model_dump(),
         )
 
 
-def _outcome(tally: Tally, theta: float) -> str:
-    from rockcheck.ebm.core import march
+def _outcome(found: np.record) -> str:
+    from rockcheck.ebm.core import names, state
 
-    if tally.ending == march.OVERTURNED:
-        return "overturned left" if theta > 0 else "overturned right"
-    return "at rest" if tally.at_rest else "moving"
+    if found.ending == names.Ending.OVERTURNED:
+        return "overturned left" if found.motion.theta > 0 else "overturned right"
+    return "at rest" if state.rests(found.mode) else "moving"
 
 
 def _events(log: np.ndarray, unit: float, radius: float) -> list[Event]:
     """The event log (natural units) as events (SI)."""
-    from rockcheck.ebm.core import march
+    from rockcheck.ebm.core import names
 
-    modes, kinds, speed = march.MODE_NAMES, march.EVENT_NAMES, radius / unit
+    modes, kinds, speed = names.MODE_NAMES, names.EVENT_NAMES, radius / unit
     return [
         Event(
             t=t * unit,
@@ -247,13 +230,13 @@ def vars_of(history: History) -> dict[str, Any]:
     return {name: getattr(history, name) for name in History.__dataclass_fields__}
 
 
-def _compiled(scratch: tuple[Any, ...], unilateral: bool) -> None:
-    """Loads or compiles the event loop by a run of no steps, so that no run's time holds it."""
-    kind = len(scratch), unilateral
-    if kind in _READY:
-        return
+def _compiled(loop: Any) -> Callable[..., None]:
+    """The machine code of an event loop, loaded or compiled, so that no run's time holds it."""
+    if loop in _READY:
+        return _READY[loop]
     from rockcheck.ebm import natural
-    from rockcheck.ebm.core import march
+    from rockcheck.ebm.core import state
+    from rockcheck.scenes.compiled import for_types_of
     from rockcheck.scenes.excitations import Rest
     from rockcheck.scenes.scene import Block, Floor
 
@@ -264,18 +247,17 @@ def _compiled(scratch: tuple[Any, ...], unilateral: bool) -> None:
         excitation=Rest(),
         duration=1.0,
     )
-    b = natural.setting_of(scene, unilateral=unilateral, no_slip=False, energy_cap=False)
-    control = march.Control(WARM_UP_TOLERANCE, 1, 1, False, 1.0)
-    nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
-    march.run(
-        b, *natural.grounds_of(scene), natural.state_of(scene), 1.0, control, *nothing, *scratch
-    )
-    _READY.add(kind)
+    b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
+    control = state.Control(WARM_UP_TOLERANCE, 1, 1, False, 1.0)
+    nothing = state.Records(np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5)))
+    start = natural.start_of(scene)
+    given = b, natural.base_of(scene), start, state.workspace(), control, nothing
+    _READY[loop] = for_types_of(loop, *given)
+    return _READY[loop]
 
 
 #: Steps that take about as long as to hand a run over to the thread that Ctrl-C need not wait for.
 _AT_ONCE = 500
-#: The variants of the event loop that are compiled: by the friction (its kind of scratch) and by
-#: the pivot.
-_READY: set[tuple[int, bool]] = set()
+#: The event loops that are compiled.
+_READY: dict[Any, Callable[..., None]] = {}
 WARM_UP_TOLERANCE = 0.01

@@ -13,12 +13,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.ebm.core.ground import GAUSSIAN, Ground, ground_of
-from rockcheck.ebm.core.motion import LAWS, LEAST_FRICTION, Setting, Side
+from rockcheck.ebm.core.ground import ground_of
+from rockcheck.ebm.core.motion import LEAST_FRICTION, Setting, Side
+from rockcheck.ebm.core.names import LAWS
+from rockcheck.ebm.core.state import STATE, Base
 from rockcheck.scenes import kinematics
 from rockcheck.scenes.scene import Block, Scene
-
-__all__ = ["GAUSSIAN", "grounds_of", "setting_of", "side_of", "state_of", "time_unit", "to_si"]
 
 
 def time_unit(scene: Scene) -> float:
@@ -27,7 +27,13 @@ def time_unit(scene: Scene) -> float:
 
 
 def setting_of(
-    scene: Scene, *, unilateral: bool, no_slip: bool, energy_cap: bool, impacts: str = "moreau"
+    scene: Scene,
+    *,
+    unilateral: bool,
+    no_slip: bool,
+    energy_cap: bool,
+    impacts: str = "moreau",
+    yields: float = 0.0,
 ) -> Setting:
     """Block, floor and walls of a scene in natural units."""
     radius = scene.block.radius
@@ -48,14 +54,9 @@ def setting_of(
         no_slip=no_slip,
         unilateral=unilateral,
         energy_cap=energy_cap,
-        law=law_of(unilateral, impacts),
+        law=LAWS.index(impacts),
+        yields=yields,
     )
-
-
-def law_of(unilateral: bool, impacts: str) -> int | None:
-    """The law of impacts at several contacts, as the event loop knows it; the bilateral pivot has
-    none."""
-    return LAWS.index(impacts) if unilateral else None
 
 
 def side_of(block: Block, side: Literal["left", "right"]) -> Side:
@@ -89,12 +90,19 @@ def side_of(block: Block, side: Literal["left", "right"]) -> Side:
     )
 
 
-def grounds_of(scene: Scene) -> tuple[Ground, Ground]:
+def base_of(scene: Scene) -> Base:
     """Horizontal and vertical ground motion in natural units."""
     unit = time_unit(scene)
-    return ground_of(scene.excitation, scene.gravity, unit), ground_of(
-        scene.vertical, scene.gravity, unit
-    )
+    sideways = ground_of(scene.excitation, scene.gravity, unit)
+    return Base(sideways, ground_of(scene.vertical, scene.gravity, unit))
+
+
+def start_of(scene: Scene) -> NDArray[np.void]:
+    """One run of the scene, in an array: its state at the start."""
+    states = np.zeros(1, STATE)
+    states["motion"][0] = tuple(state_of(scene))
+    states["t_end"] = scene.duration / time_unit(scene)
+    return states
 
 
 def state_of(scene: Scene) -> NDArray[np.float64]:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 DRAWERS: dict[str, tuple[str, str]] = {
     "spectra": ("rockcheck.reports.show.spectrum", "figure"),
     "stable-steps": (__name__, "stable_steps"),
+    "strips": (__name__, "strips"),
 }
 #: What writes the scripts of a live plot of such a kind: module and function, which takes the plot
 #: and the folder of figures and returns the scripts that the page reads, in order.
@@ -139,6 +140,30 @@ def stable_steps(plot: Plot) -> Figure:
     return figure
 
 
+def strips(plot: Plot) -> Figure:
+    """A strip a figure: a point a run, a bar from the 16 to the 84 % quantile, and the median."""
+    import numpy as np
+    from matplotlib.figure import Figure
+
+    with figure_style():
+        figure = Figure(figsize=(PAGE, 0.5 * len(plot.data) + 0.1), layout="constrained")
+        rows = figure.subplots(len(plot.data), 1, squeeze=False)[:, 0]
+        for ax, one in zip(rows, plot.data, strict=True):
+            values = np.sort(np.array(one["values"], dtype=float))
+            low, median, high = np.quantile(values, (0.16, 0.5, 0.84))
+            # points that would hide each other go up and down in turn
+            beside = 0.25 * ((np.arange(len(values)) % 3) - 1)
+            ax.barh(0.0, high - low, left=low, height=0.9, color=COLOURS[0][0], alpha=0.15)
+            ax.plot([median, median], [-0.45, 0.45], color=COLOURS[0][0], linewidth=1.6)
+            ax.plot(values, beside, "o", markersize=3.0, color=COLOURS[1][0], alpha=0.8)
+            ax.set_xlim(0.0, max(float(values[-1]) * 1.06, 1e-3))
+            ax.set_ylim(-0.6, 0.6)
+            ax.set_yticks([])
+            ax.grid(axis="y", visible=False)
+            ax.set_ylabel(one["label"], rotation=0, ha="right", va="center")
+    return figure
+
+
 def _scale(ax: Axes, x: Axis, y: Axis) -> None:
     for axis, scale, limit in ((x, ax.set_xscale, ax.set_xlim), (y, ax.set_yscale, ax.set_ylim)):
         if axis.log:
@@ -217,6 +242,7 @@ def live_data(plot: Plot) -> dict[str, Any]:
         "along": plot.y.label,
         "intensities": list(panel.series[0].x),
         "curves": curves,
+        "least": plot.y.limits[0] if plot.y.limits else 0.0,
         "most": plot.y.limits[1] if plot.y.limits else None,
         "single": any(series.style == "thin" for series in panel.series),
         **(plot.data or {"per_unit": 0.0, "other_unit": "", "other_label": ""}),

@@ -377,9 +377,14 @@ class _Inner(CPUDispatcher):
         """For numba: a constant is compiled as a number, else each would be a copy of its own.
         Where the code is placed it is one again."""
         return super().get_call_template(
-            [types.unliteral(a) for a in args],
-            {name: types.unliteral(a) for name, a in kws.items()},
+            [_as_number(a) for a in args], {name: _as_number(a) for name, a in kws.items()}
         )
+
+
+def _as_number(kind: Any) -> Any:
+    """The type of a constant, or of a member of an enumeration, as that of a number."""
+    kind = types.unliteral(kind)
+    return kind.dtype if isinstance(kind, types.IntEnumMember) else kind
 
 
 def _inner(function: Callable[..., Any], **options: bool) -> Any:

@@ -7,6 +7,7 @@ m/s^2, horizontal motion positive to the right, vertical motion positive upward.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -19,6 +20,8 @@ from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Reading, read_record
 
 FloatArray = NDArray[np.float64]
+#: Largest peak acceleration that a record may be scaled to, g.
+MOST_PGA = 1000.0
 
 
 class Motion(Frozen):
@@ -139,8 +142,9 @@ class Record(Motion):
     """A sampled ground motion: linear between its samples, zero after the last one.
 
     Usually made by `Record.from_file` or `Record.from_samples`. `unscaled` holds the samples in
-    m/s^2 as recorded, and `scale` multiplies them. A scene longer than its record goes on with a
-    base at rest. `notes` say what the file's reader did, such as a first time that is not 0.
+    m/s^2 as recorded, and `scale` multiplies them; `pga` (g) in its place is the peak that they
+    then have. A scene longer than its record goes on with a base at rest. `notes` say what the
+    file's reader did, such as a first time that is not 0.
     """
 
     _size: ClassVar[str] = "scale"
@@ -159,6 +163,8 @@ class Record(Motion):
     def _read_file(cls, data: Any) -> Any:
         if isinstance(data, dict) and "file" in data:
             extra = {"unscaled", "source", "notes"} & data.keys()
+            if {"pga", "scale"} <= data.keys():
+                raise InputError("cannot be given together with scale", "pga")
             if extra:
                 raise InputError("cannot be given together with file", sorted(extra)[0])
             data = dict(data)
@@ -175,6 +181,8 @@ class Record(Motion):
                 "source": Path(path).name,
                 "notes": found.notes,
             }
+        if isinstance(data, dict) and "pga" in data:
+            data = _at_peak(data)
         return data
 
     @classmethod
@@ -217,6 +225,18 @@ class Record(Motion):
     def peak(self) -> float:
         """Largest absolute scaled acceleration in units of standard gravity."""
         return float(np.max(np.abs(self.samples))) / GRAVITY_OF_RECORDS
+
+
+def _at_peak(data: Mapping[str, Any]) -> dict[str, Any]:
+    """A record's fields with the `scale` that gives it a peak acceleration of `pga` (g)."""
+    data = dict(data)
+    pga, largest = data.pop("pga"), max(map(abs, data.get("unscaled", ())), default=0.0)
+    number = isinstance(pga, int | float) and not isinstance(pga, bool)
+    if not number or not 0.0 < pga <= MOST_PGA:
+        raise InputError(f"{pga!r} is not allowed: a number above 0, at most {MOST_PGA:g}", "pga")
+    if not largest > 0.0:
+        raise InputError("the record does not move: no scale gives it a peak", "pga")
+    return {**data, "scale": pga * GRAVITY_OF_RECORDS / largest}
 
 
 Excitation = Annotated[Rest | Ricker | Sine | Record, Field(discriminator="kind")]

@@ -15,6 +15,9 @@ import numpy as np
 from rockcheck.scenes.block import Block
 from rockcheck.scenes.scene import Scene
 
+#: The sign of a side: x of the box's centre grows to the right.
+OUTWARD = {"left": 1.0, "right": -1.0}
+
 
 def slip(block: Block, x: Any, theta: Any) -> Any:
     """How far the pivot corner (the lower one) stands from its first place along the floor, m.
@@ -36,17 +39,31 @@ def pivot_height(block: Block, y: Any, theta: Any) -> Any:
     return y - block.half_diagonal * np.cos(block.box_angle - np.abs(theta))
 
 
+def clearance(block: Block, side: str, gap: float, x: Any, theta: Any) -> Any:
+    """Distance of the block from a place on `side`, `gap` (m) from it as it stands, m: negative is
+    beyond."""
+    reach = block.half_diagonal * np.sin(block.box_angle + np.abs(theta))
+    return OUTWARD[side] * x + block.half_width + gap - reach
+
+
+def reach_rate(block: Block, side: str, theta: Any, x_dot: Any, theta_dot: Any) -> Any:
+    """Velocity of the block's outermost corner toward `side`, m/s."""
+    tilt = np.where(theta == 0.0, np.abs(theta_dot), np.sign(theta) * theta_dot)
+    return (
+        block.half_diagonal * np.cos(block.box_angle + np.abs(theta)) * tilt - OUTWARD[side] * x_dot
+    )
+
+
 def wall_gap(scene: Scene, side: str, x: Any, theta: Any) -> Any:
     """Clear distance between the block and the wall on `side`, m: negative is a penetration."""
-    outward = 1.0 if side == "left" else -1.0
     wall = next(w for w in scene.walls if w.side == side)
-    block = scene.block
-    return (
-        outward * x
-        + block.half_width
-        + wall.gap
-        - block.half_diagonal * np.sin(block.box_angle + np.abs(theta))
-    )
+    return clearance(scene.block, side, wall.gap, x, theta)
+
+
+def top_corners(block: Block, x: Any, theta: Any) -> Any:
+    """Horizontal places of the two top corners (2, ...), m."""
+    b, h = block.half_width, block.half_height
+    return np.stack([x + d * np.cos(theta) - h * np.sin(theta) for d in (-b, b)])
 
 
 def of_mass(block: Block, states: Any) -> Any:

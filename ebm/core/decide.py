@@ -6,25 +6,11 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.core.ground import GAUSSIAN, STILL, acceleration, impulse_ahead, largest_ahead
-from rockcheck.ebm.core.motion import (
-    FAMILY,
-    FAR,
-    FLAT,
-    FLOOR,
-    HEIGHT,
-    STICK,
-    THETA,
-    TILT,
-    TIP,
-    VX,
-    VY,
-    S,
-    W,
-    side_of,
-)
-from rockcheck.ebm.core.running import PIVOT, QUIET, SWUNG, T
-from rockcheck.ebm.core.series import NOISE, POSITION
+from rockcheck.ebm.core.ground import acceleration, impulse_ahead, largest_ahead
+from rockcheck.ebm.core.motion import side_of
+from rockcheck.ebm.core.names import Family, Kind, Pivot, Shape
+from rockcheck.ebm.core.series import NOISE
+from rockcheck.ebm.core.state import on_wall, rocks
 from rockcheck.scenes.compiled import inner_kernel
 
 # A pulse is over when its acceleration is below this share of the tolerance. The second is the
@@ -36,32 +22,38 @@ _TINIEST = math.ulp(0.0)
 
 
 @inner_kernel
-def quiet_from(gh, gv, tolerance):
+def quiet_from(base, tolerance):
     """The time from which the base stands still as far as an outcome can tell."""
-    if gv.kind == STILL and gh.kind == GAUSSIAN:
-        return gh.centre + math.sqrt(-math.log(_LEFT * tolerance) / gh.rate)
-    return 0.0 if gv.kind == STILL and gh.kind == STILL else max(gh.quiet, gv.quiet)
+    if base.vertical.kind == Shape.STILL and base.horizontal.kind == Shape.GAUSSIAN:
+        return base.horizontal.centre + math.sqrt(
+            -math.log(_LEFT * tolerance) / base.horizontal.rate
+        )
+    return (
+        0.0
+        if base.vertical.kind == Shape.STILL and base.horizontal.kind == Shape.STILL
+        else max(base.horizontal.quiet, base.vertical.quiet)
+    )
 
 
 @inner_kernel
-def decided(b, m, z, gh, gv, t, quiet, peak):
+def decided(block, base, state):
     """The final peak rotation (>= pi/2: overturns) if the rest of the motion is certain, else
     -1."""
-    still = gv.kind == STILL
+    t, quiet, peak, theta = state.t, state.quiet_from, state.peak, state.motion.theta
+    still = base.vertical.kind == Shape.STILL
     ahead = 0.0
     if t < quiet:
-        at_its_peak = (
-            t <= gh.quiet and abs(z[THETA]) >= peak
-        )  # which is not certain, however little is to come
-        ahead = math.inf if at_its_peak or not still else impulse_ahead(gh, t)
-    verdict = _by_energy(b, m, z, ahead, peak)
-    if verdict <= 0.0 and still and abs(z[THETA]) > side_of(b, z[THETA]).alpha:
-        verdict = _falls(b, m, z, gh, t)
+        # Which is not certain, however little is to come.
+        at_its_peak = t <= base.horizontal.quiet and abs(theta) >= peak
+        ahead = math.inf if at_its_peak or not still else impulse_ahead(base.horizontal, t)
+    verdict = _by_energy(block, state, ahead)
+    if verdict <= 0.0 and still and abs(theta) > side_of(block, theta).alpha:
+        verdict = _falls(block, base, state)
     return verdict
 
 
 @inner_kernel
-def _by_energy(b, m, z, ahead, peak):
+def _by_energy(block, state, ahead):
     """What the energy that the block has and can still gain says of its outcome.
 
     `ahead` bounds the integral of |u| to come, I. The energy E of block and floor, counted from
@@ -71,44 +63,46 @@ def _by_energy(b, m, z, ahead, peak):
     excitation a block that only rocks conserves its energy up to its next impact, so that its peak
     is known at once, unless with as much it would turn farther on its other corner.
     """
-    phi = abs(z[THETA])
+    mode, motion, peak = state.mode, state.motion, state.peak
+    phi = abs(motion.theta)
     if ahead > 0.0 and phi >= peak:
         return -1.0
-    energy = energy_of(b, z)
-    side, other = side_of(b, m[S]), side_of(b, -m[S])
-    corner = min(side.radius, other.radius) - b.height
+    energy = energy_of(block, motion)
+    side, other = side_of(block, mode.sense), side_of(block, -mode.sense)
+    corner = min(side.radius, other.radius) - block.height
     most = 0.5 * (math.sqrt(2.0 * max(energy, 0.0)) + ahead) ** 2
-    margin = _MARGIN if b.walls else 1.0
-    rocks = (
-        m[FAMILY] == TILT
-        and m[FLOOR] == STICK
-        and m[TIP] == 0
-        and m[FAR] == 0
-        and not b.walls
-        and ahead == 0.0
-    )
-    rocks = rocks and (b.no_slip or _sticks_for_good(b, energy))
+    margin = _MARGIN if block.walls else 1.0
+    free = rocks(mode) and not block.walls and ahead == 0.0
+    free = free and (block.no_slip or _sticks_for_good(block, energy))
     if most < corner and phi < side.alpha:
-        highest = _highest(b, side, most)
-        beyond = _highest(b, other, most)
-        if rocks and beyond <= max(peak, highest):
-            return max(peak, highest if m[S] * z[W] > 0.0 else phi)
+        highest = _highest(block, side, most)
+        beyond = _highest(block, other, most)
+        if free and beyond <= max(peak, highest):
+            return max(peak, highest if mode.sense * motion.w > 0.0 else phi)
         return (
             max(peak, _TINIEST) if max(highest, beyond) <= peak and most < margin * corner else -1.0
         )
-    if rocks and m[S] * z[W] >= 0.0 and (phi > side.alpha or energy > side.radius - b.height):
+    if (
+        free
+        and mode.sense * motion.w >= 0.0
+        and (phi > side.alpha or energy > side.radius - block.height)
+    ):
         return 0.5 * math.pi
     return -1.0
 
 
 @inner_kernel
-def energy_of(b, z):
+def energy_of(block, motion):
     """The block's energy relative to the floor, counted from standing."""
-    return 0.5 * (z[VX] * z[VX] + z[VY] * z[VY] + z[W] * z[W] / b.spin) + z[HEIGHT] - b.height
+    return (
+        0.5 * (motion.vx * motion.vx + motion.vy * motion.vy + motion.w * motion.w / block.spin)
+        + motion.y
+        - block.height
+    )
 
 
 @inner_kernel
-def swings_again(b, m, energy, pivot, tolerance, now):
+def swings_again(state, energy):
     """Whether this swing, which turns back in a step that starts now with this energy, is the last
     one again: then so are all to come.
 
@@ -116,15 +110,16 @@ def swings_again(b, m, energy, pivot, tolerance, now):
     Beside a wall that takes no energy a block may rock so for ever, however near its balance it
     turns back. Only what sticks to the floor and touches no wall swings.
     """
-    if now[T] < now[QUIET] or m[FLOOR] != STICK or m[TIP] != 0 or m[FAR] != 0:
+    mode = state.mode
+    if state.t < state.quiet_from or mode.pivot != Pivot.STICK or on_wall(mode):
         return False
-    place = m[S] * pivot
-    error = swing_error(tolerance)
+    place = mode.sense * state.place
+    error = swing_error(state.tolerance_rad)
     again = (
-        abs(energy - now[SWUNG]) <= error * math.sqrt(2.0 * max(energy, 0.0))
-        and abs(place - now[PIVOT]) <= error
+        abs(energy - state.swing_energy) <= error * math.sqrt(2.0 * max(energy, 0.0))
+        and abs(place - state.swing_place) <= error
     )
-    now[SWUNG], now[PIVOT] = energy, place
+    state.swing_energy, state.swing_place = energy, place
     return again
 
 
@@ -132,17 +127,17 @@ def swings_again(b, m, energy, pivot, tolerance, now):
 def swing_error(tolerance):
     """The error of rotation and speed after a swing: a step errs by the tolerance, or by rounding.
     Energy errs by that times the speed."""
-    return _STEPS * (tolerance + NOISE[POSITION])
+    return _STEPS * (tolerance + NOISE[Kind.POSITION])
 
 
 @inner_kernel
-def _highest(b, side, energy):
+def _highest(block, side, energy):
     """The rotation on this side to which so much energy lifts the block."""
-    return side.alpha - math.acos(min((b.height + energy) / side.radius, 1.0))
+    return side.alpha - math.acos(min((block.height + energy) / side.radius, 1.0))
 
 
 @inner_kernel
-def _falls(b, m, z, gh, t):
+def _falls(block, base, state):
     """pi/2 if a block past its balance point falls whatever the rest of the excitation does, else
     -1.
 
@@ -150,37 +145,36 @@ def _falls(b, m, z, gh, t):
     outward in every mode: sticking by (3), slipping by (7), by an impulse of the floor, or not at
     all in flight. Walls it could meet are left out.
     """
-    if m[FAMILY] == FLAT or m[S] * z[W] < 0.0 or (b.gap_left if m[S] > 0 else b.gap_right) < np.inf:
+    mode, motion, t = state.mode, state.motion, state.t
+    gap = block.gap_left if mode.sense > 0 else block.gap_right
+    if mode.family == Family.FLAT or mode.sense * motion.w < 0.0 or gap < np.inf:
         return -1.0
-    steepness = math.tan(abs(z[THETA]) - side_of(b, m[S]).alpha)
-    if (
-        (not b.no_slip and steepness <= b.mu_s)
-        or steepness <= abs(acceleration(gh, t))
-        or steepness <= largest_ahead(gh, t)
-    ):
+    steepness = math.tan(abs(motion.theta) - side_of(block, mode.sense).alpha)
+    strongest = max(abs(acceleration(base.horizontal, t)), largest_ahead(base.horizontal, t))
+    if (not block.no_slip and steepness <= block.mu_s) or steepness <= strongest:
         return -1.0
     return 0.5 * math.pi
 
 
 @inner_kernel
-def _sticks_for_good(b, energy):
+def _sticks_for_good(block, energy):
     """Whether neither pivot can slip in free rocking of this energy (up to its balance point),
     impacts included."""
-    return _pivot_sticks(b, b.left, energy) and _pivot_sticks(b, b.right, energy)
+    return _pivot_sticks(block, block.left, energy) and _pivot_sticks(block, block.right, energy)
 
 
 @inner_kernel
-def _pivot_sticks(b, side, energy):
+def _pivot_sticks(block, side, energy):
     """Whether this pivot sticks while the block rocks about it, and as it lands on it.
 
     With k = 1/(I + R^2): |Q| <= max(k s c, s w^2) and P >= 1 - k s^2 - R w^2, with w^2 <= 2 k
     energy; the landing sticks if mu >= k s c/(1 - k s^2), for a homogeneous block 3 t/(4 + t^2), t
     = tan alpha.
     """
-    s, c = side.arm, b.height
+    s, c = side.arm, block.height
     square = 2.0 * side.share * energy
     push = 1.0 - side.share * s * s - side.radius * square
     # s c rises with s only up to 45 degrees.
     pull = side.share * (s * c if side.alpha < 0.25 * math.pi else 0.5 * side.radius * side.radius)
     lands = side.share * s * c / (1.0 - side.share * s * s)
-    return push > 0.0 and b.mu_s * push >= max(pull, s * square) and b.mu_s >= lands
+    return push > 0.0 and block.mu_s * push >= max(pull, s * square) and block.mu_s >= lands

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.ebm.core.names import Shape
 from rockcheck.scenes.compiled import inner_kernel
 from rockcheck.scenes.excitations import Record, Rest, Ricker, Sine
 
-STILL, GAUSSIAN, SINE, SAMPLED = range(4)
 NEVER = np.inf
 
 
@@ -47,7 +47,7 @@ _SAME, _EPSILON = 2.0**-30, 2.0**-52
 _SOME = 30
 #: The sign with which an acceleration leaves zero is read so much later.
 _SOON = 1e-6
-STILL_GROUND = Ground(STILL, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _NO_SAMPLES)
+STILL_GROUND = Ground(int(Shape.STILL), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _NO_SAMPLES)
 _RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, 40)])
 
 
@@ -59,7 +59,7 @@ def ground_of(
     if isinstance(excitation, Ricker):
         c0, c1, c2, c3 = (c * time_unit**k / gravity for k, c in enumerate(excitation.polynomial))
         return Ground(
-            GAUSSIAN,
+            int(Shape.GAUSSIAN),
             c0,
             c1,
             c2,
@@ -73,14 +73,32 @@ def ground_of(
     if isinstance(excitation, Sine):
         rate = 2.0 * math.pi * time_unit / excitation.period
         return Ground(
-            SINE, excitation.amplitude / gravity, 0.0, 0.0, 0.0, rate, 0.0, quiet, 0.0, _NO_SAMPLES
+            int(Shape.SINE),
+            excitation.amplitude / gravity,
+            0.0,
+            0.0,
+            0.0,
+            rate,
+            0.0,
+            quiet,
+            0.0,
+            _NO_SAMPLES,
         )
     if isinstance(excitation, Record):
         samples = np.ascontiguousarray(excitation.samples / gravity)
         if not samples.any():
             return STILL_GROUND
         return Ground(
-            SAMPLED, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, quiet, excitation.time_step / time_unit, samples
+            int(Shape.SAMPLED),
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            quiet,
+            excitation.time_step / time_unit,
+            samples,
         )
     return STILL_GROUND
 
@@ -100,14 +118,14 @@ def acceleration(g, t):
 @inner_kernel
 def _with_rate(g, t):
     """Acceleration at time t, and its rate; where they jump those just after."""
-    if g.kind == GAUSSIAN:
+    if g.kind == Shape.GAUSSIAN:
         tau = t - g.centre
         bell, fall = math.exp(-g.rate * tau * tau), -2.0 * g.rate * tau
         shape = g.c0 + tau * (g.c1 + tau * (g.c2 + tau * g.c3))
         return shape * bell, (g.c1 + tau * (2.0 * g.c2 + tau * 3.0 * g.c3) + shape * fall) * bell
-    if g.kind == SINE and t < g.quiet:
+    if g.kind == Shape.SINE and t < g.quiet:
         return g.c0 * math.sin(g.rate * t), g.c0 * g.rate * math.cos(g.rate * t)
-    if g.kind == SAMPLED:
+    if g.kind == Shape.SAMPLED:
         i = interval(g, t)
         if i + 1 < g.samples.size:
             rise = g.samples[i + 1] - g.samples[i]
@@ -118,7 +136,7 @@ def _with_rate(g, t):
 @inner_kernel
 def fill_series(g, t, sign, n, a, row):
     """Taylor coefficients 0..n of sign * acceleration about t, to the right of t, into a[row]."""
-    if g.kind == GAUSSIAN:
+    if g.kind == Shape.GAUSSIAN:
         tau = t - g.centre
         size = sign * math.exp(-g.rate * tau * tau)
         q0 = size * (g.c0 + tau * (g.c1 + tau * (g.c2 + tau * g.c3)))
@@ -145,13 +163,13 @@ def fill_series(g, t, sign, n, a, row):
         return
     for k in range(n + 1):
         a[row, k] = 0.0
-    if g.kind == SINE and t < g.quiet:
+    if g.kind == Shape.SINE and t < g.quiet:
         a[row, 0] = sign * g.c0 * math.sin(g.rate * t)
         if n > 0:
             a[row, 1] = sign * g.c0 * g.rate * math.cos(g.rate * t)
         for k in range(2, n + 1):
             a[row, k] = -g.rate * g.rate * a[row, k - 2] / (k * (k - 1))
-    elif g.kind == SAMPLED:
+    elif g.kind == Shape.SAMPLED:
         i = interval(g, t)
         if i + 1 < g.samples.size:
             rise = g.samples[i + 1] - g.samples[i]
@@ -168,7 +186,7 @@ def next_kink(g, t):
     In the rise of a pulse exp(-rate tau^2) the terms of a series still grow where it is cut off,
     unless it is a short one.
     """
-    if g.kind == GAUSSIAN:
+    if g.kind == Shape.GAUSSIAN:
         tau = t - g.centre
         if tau >= 0.0 or g.rate * tau * tau < 4.0:
             return NEVER
@@ -177,10 +195,10 @@ def next_kink(g, t):
             if g.rate * tau * tau > 36.0001
             else t - 4.0 / (g.rate * tau)
         )
-    if g.kind == SAMPLED:
+    if g.kind == Shape.SAMPLED:
         i = interval(g, t)
         return (i + 1) * g.step if i + 1 < g.samples.size else NEVER
-    if g.kind == SINE:
+    if g.kind == Shape.SINE:
         return g.quiet if t < g.quiet else NEVER
     return NEVER
 
@@ -209,13 +227,13 @@ def weightless_at(g, t):
 def _next_extremum(g, t):
     """The next time after t up to which the motion is monotone; NEVER where it is monotone (and
     dying out) for good."""
-    if g.kind == SAMPLED:
+    if g.kind == Shape.SAMPLED:
         return next_kink(g, t)
-    if g.kind == SINE:
+    if g.kind == Shape.SINE:
         quarter = 0.5 * math.pi / g.rate
         k = math.floor((t / quarter + 1.0) / 2.0 + _SAME)
         return min((2.0 * k + 1.0) * quarter, g.quiet) if t < g.quiet else NEVER
-    if g.kind == STILL:
+    if g.kind == Shape.STILL:
         return NEVER
     # Extrema within _SAME pulse widths of t count as passed, or rounding would find the same one
     # for ever.
@@ -245,12 +263,12 @@ def _next_extremum(g, t):
 def largest_ahead(g, t):
     """A bound on |acceleration| from time t on: its value now and at the extrema to come; a
     record's largest sample."""
-    if t > g.quiet or g.kind == STILL:
+    if t > g.quiet or g.kind == Shape.STILL:
         return 0.0
-    if g.kind == SINE:
+    if g.kind == Shape.SINE:
         return abs(g.c0)
     largest = 0.0
-    if g.kind == SAMPLED:
+    if g.kind == Shape.SAMPLED:
         for i in range(max(interval(g, t), 0), g.samples.size):
             largest = max(largest, abs(g.samples[i]))
         return largest
@@ -264,11 +282,11 @@ def largest_ahead(g, t):
 def impulse_ahead(g, t):
     """A bound on the integral of |acceleration| from time t on: exact in a pulse's last lobe,
     infinite before it."""
-    if t > g.quiet or g.kind == STILL:
+    if t > g.quiet or g.kind == Shape.STILL:
         return 0.0
     tau = t - g.centre
     if (
-        g.kind != GAUSSIAN or tau < 0.0 or g.rate * tau * tau < 1.5
+        g.kind != Shape.GAUSSIAN or tau < 0.0 or g.rate * tau * tau < 1.5
     ):  # the last zero, which a symmetric pulse has before it
         return NEVER
     v2 = -g.c3 / (
@@ -323,7 +341,7 @@ def next_exceedance(g, t, low, high, noise, ahead):
         if end == NEVER:
             return NEVER
         there = (
-            g.samples[interval(g, end)] if g.kind == SAMPLED else acceleration(g, end)
+            g.samples[interval(g, end)] if g.kind == Shape.SAMPLED else acceleration(g, end)
         )  # just before it, where a record ends
         if there < low - noise or there > high + noise:
             level, beyond = (low, low - noise) if there < low else (high, high + noise)

@@ -32,14 +32,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rockcheck.ebm.core.ground import STILL, fill_series
+from rockcheck.ebm.core.ground import fill_series
 from rockcheck.ebm.core.lanes import LANES, first, load, put, ramp, shifted, store, zeros
+from rockcheck.ebm.core.names import Family, Pivot, Row, Shape
 from rockcheck.ebm.core.series import WIDTH, slope, value
-from rockcheck.scenes.compiled import inner_kernel, kernel
-
-#: The laws of impacts at several contacts (see ebm.core.laws.contact_impacts).
-LAWS = ("moreau", "closed", "open", "floor-first", "leading-first", "trailing-first")
-MOREAU, CLOSED_BRANCH, OPEN_BRANCH, FLOOR_FIRST, LEADING_FIRST, TRAILING_FIRST = range(6)
+from rockcheck.ebm.core.state import on_wall, rocks
+from rockcheck.scenes.compiled import inner_kernel
 
 
 class Side(NamedTuple):
@@ -88,127 +86,96 @@ class Setting(NamedTuple):
     unilateral: bool
     #: An impact that would add energy uses the largest restitution that does not, instead of e.
     energy_cap: bool
-    #: The law of impacts at several contacts, an index into LAWS. None with the bilateral pivot,
-    #: which needs none: the event loop is then compiled without it.
-    law: int | None
+    #: The law of impacts at several contacts, a Law; the bilateral pivot needs none.
+    law: int
+    #: Of Bouc-Wen friction: the yield displacement.
+    yields: float
 
 
 #: Static friction of a frictionless floor. With less, rounding in the tail of a base acceleration
 #: would move a resting block.
 LEAST_FRICTION = 1e-9
 
-# A mode is a small integer vector.
-FAMILY, S, FLOOR, SLIP, PULL, TIP, FAR = range(7)
-MODE_SIZE = 7
-# m[FAMILY]: FLAT has theta = 0. m[S] is the sign of theta; at phi = 0, the sign that it is about to
-# take.
-FLAT, TILT = 0, 1
-# m[FLOOR]: what the pivot (or, flat, the base) does; m[SLIP] is the direction of slip (frame; world
-# where flat).
-OFF, STICK, SLIPPING = 0, 1, 2
-# m[PULL]: sign assumed for the normal force P, which gives friction its sense; -1 only with the
-# bilateral pivot. m[TIP], m[FAR]: the corner rests on the wall it tips to, or on the other one.
-# Where flat: the side rests on the left wall, on the right wall; on the floor a block at rest is
-# then held on that side, whatever the base does.
-
-# Rows of the workspace that hold series.
-(
-    PHI,
-    OMEGA,
-    SIN,
-    COS,
-    U,
-    G,
-    XI,
-    Y,
-    P,
-    Q,
-    NA,
-    NB,
-    GUARD,
-    KNOWN,
-    FORCE,
-    FLOOR_ARM,
-    WALL_ARM,
-    WALL_PUSH,
-) = range(18)
-# Rows in which the small linear system of the contacts is put together, three each.
-ROW, COLUMN, MATRIX, INVERSE = range(18, 30, 3)
-# The last angle whose sine and cosine were taken, and these: the end of a step is the start of the
-# next one.
-ANGLE = 30
-# The guards of the mode, a row each: the weights of the series in it (see ebm.core.guards).
-TABLE = 31
-ROWS = TABLE + 14
-
 RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, WIDTH + 2)])
-
-# The state vector: world frame.
-X, HEIGHT, THETA, VX, VY, W = range(6)
-
-
-@kernel
-def workspace(rows=ROWS):
-    """Scratch for one trajectory: the series (G = 1: no vertical motion), and the stack of the root
-    search."""
-    series = np.zeros((rows, WIDTH))
-    series[G, 0] = series[ANGLE, 2] = 1.0
-    return series, np.zeros((48, WIDTH))
 
 
 @inner_kernel
 def sine_cosine(angle, a):
     """Sine and cosine of the angle. The workspace keeps the last ones."""
-    if a[ANGLE, 0] != angle:
-        a[ANGLE, 0], a[ANGLE, 1], a[ANGLE, 2] = angle, np.sin(angle), np.cos(angle)
-    return a[ANGLE, 1], a[ANGLE, 2]
+    if a[Row.ANGLE, 0] != angle:
+        a[Row.ANGLE, 0], a[Row.ANGLE, 1], a[Row.ANGLE, 2] = angle, np.sin(angle), np.cos(angle)
+    return a[Row.ANGLE, 1], a[Row.ANGLE, 2]
 
 
 @inner_kernel
-def side_of(b, sense):
+def side_of(block, sense):
     """The side to which a block tips whose rotation has this sign."""
-    return b.left if sense > 0 else b.right
+    return block.left if sense > 0 else block.right
 
 
 @inner_kernel
-def delta(b, m, tip):
+def wall_turn(side, tip):
+    """(S, C) of the corner on the tip wall, or on the far wall (see `Side`)."""
+    return (side.tip_sin, side.tip_cos) if tip else (side.far_sin, side.far_cos)
+
+
+@inner_kernel
+def delta(block, mode, tip):
     """Distance from the mass's initial centre to the wall on the tip side (or the far side), R."""
-    left = (m[S] > 0) == tip
-    return b.left.arm + b.gap_left if left else b.right.arm + b.gap_right
+    left = (mode.sense > 0) == tip
+    return block.left.arm + block.gap_left if left else block.right.arm + block.gap_right
 
 
 @inner_kernel
-def tilt_series(b, m, z, gh, gv, t, order, enough, reach, a):
-    """Fills the workspace with the series of a tilted block's motion about time t; returns their
+def base_series(base, t, sign, order, a):
+    """Fills in the series of the base motion in the frame of this sign, u and G."""
+    fill_series(base.horizontal, t, sign, order, a, Row.U)
+    if base.vertical.kind != Shape.STILL:  # otherwise G is 1 throughout, as the run has set it
+        fill_series(base.vertical, t, 1.0, order, a, Row.G)
+        a[Row.G, 0] += 1.0
+
+
+@inner_kernel
+def turned(block, run):
+    """Writes the start of the series of rotation, sine and cosine; returns the side that it tips
+    to."""
+    mode, motion, a = run.state.mode, run.state.motion, run.a
+    sign = float(mode.sense)
+    a[Row.PHI, 0] = sign * motion.theta
+    a[Row.OMEGA, 0] = sign * motion.w
+    side = side_of(block, mode.sense)
+    sine, cosine = sine_cosine(side.alpha - a[Row.PHI, 0], a)
+    a[Row.SIN, 0], a[Row.COS, 0] = side.radius * sine, side.radius * cosine
+    return side
+
+
+@inner_kernel
+def tilt_series(block, base, run, order, enough, reach):
+    """Fills the workspace with the series of a tilted block's motion from now on; returns their
     order.
 
     The order is `order`, or less where the terms fall below `enough` within `reach` (the longest
     step there can be). ROCK, whose motion does not depend on P and Q, has them where the setting
     asks for a guard on them.
     """
-    sign = float(m[S])
-    fill_series(gh, t, sign, order, a, U)
-    if gv.kind != STILL:  # otherwise G is 1 throughout, as the run has set it
-        fill_series(gv, t, 1.0, order, a, G)
-        a[G, 0] += 1.0
-    a[PHI, 0] = sign * z[THETA]
-    a[OMEGA, 0] = sign * z[W]
-    side = side_of(b, m[S])
-    sine, cosine = sine_cosine(side.alpha - a[PHI, 0], a)
-    a[SIN, 0], a[COS, 0] = side.radius * sine, side.radius * cosine
-    if m[FLOOR] == STICK and m[TIP] == 0 and m[FAR] == 0:
-        return _rock_series(
-            side.share, gv.kind == STILL, order, enough, reach, b.unilateral or not b.no_slip, a
-        )
-    a[XI, 0] = sign * z[X]
-    a[XI, 1] = sign * z[VX]
-    a[Y, 0] = z[HEIGHT]
-    a[Y, 1] = z[VY]
-    if m[FLOOR] == STICK and m[TIP] != m[FAR]:
-        return _lean_series(b, side, m[TIP] != 0, order, a)
-    if m[FLOOR] == SLIPPING and m[TIP] == 0 and m[FAR] == 0:
-        return _slide_series(b.spin, b.mu_k * m[SLIP] * m[PULL], order, enough, reach, a)
-    return _contact_series(b, side, m, order, enough, reach, a)
+    mode, motion, a = run.state.mode, run.state.motion, run.a
+    base_series(base, run.state.t, float(mode.sense), order, a)
+    side = turned(block, run)
+    sign = float(mode.sense)
+    if rocks(mode):
+        still = base.vertical.kind == Shape.STILL
+        forces = block.unilateral or not block.no_slip
+        return _rock_series(side.share, still, order, enough, reach, forces, a)
+    a[Row.XI, 0] = sign * motion.x
+    a[Row.XI, 1] = sign * motion.vx
+    a[Row.Y, 0] = motion.y
+    a[Row.Y, 1] = motion.vy
+    if mode.pivot == Pivot.STICK and mode.tip != mode.far:
+        return _lean_series(block, side, mode.tip != 0, order, a)
+    if mode.pivot == Pivot.SLIPPING and not on_wall(mode):
+        kappa = block.mu_k * mode.slip * mode.pull
+        return _slide_series(block.spin, kappa, order, enough, reach, a)
+    return _contact_series(block, mode, order, enough, reach, a)
 
 
 @inner_kernel
@@ -232,7 +199,7 @@ def _products(a, x, y, first, last, n):
 def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
     """ROCK, (3): theta'' = (u c - S s G0)/(I + R^2), the pivot sticking; xi and y are s and c up to
     a constant."""
-    w0, s0, c0, u0 = a[OMEGA, 0], a[SIN, 0], a[COS, 0], a[U, 0]
+    w0, s0, c0, u0 = a[Row.OMEGA, 0], a[Row.SIN, 0], a[Row.COS, 0], a[Row.U, 0]
     w, s, c = w0, s0, c0
     ds, dc, push = w0 * c0, w0 * s0, u0 * c0
     # Lane i of `of_w` is w's coefficient i + 1. Lane i of `more_ds` is what is known of the sum
@@ -247,11 +214,11 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
         if not still_vertical:
             weight = 0.0
             for j in range(k + 1):
-                weight += a[G, j] * a[SIN, k - j]
+                weight += a[Row.G, j] * a[Row.SIN, k - j]
         r = RECIPROCAL[k + 1]
-        a[PHI, k + 1] = w * r
-        w, s, c, u = share * r * (push - weight), -ds * r, dc * r, a[U, k + 1]
-        a[OMEGA, k + 1], a[SIN, k + 1], a[COS, k + 1] = w, s, c
+        a[Row.PHI, k + 1] = w * r
+        w, s, c, u = share * r * (push - weight), -ds * r, dc * r, a[Row.U, k + 1]
+        a[Row.OMEGA, k + 1], a[Row.SIN, k + 1], a[Row.COS, k + 1] = w, s, c
         ds = first(more_ds) + w0 * c + w * c0
         dc = first(more_dc) + w0 * s + w * s0
         push = first(more_push) + u0 * c + u * c0
@@ -264,7 +231,7 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
         # A uniform rotation has no higher rates, but its sine and cosine do.
         small = small + 1 if (abs(w) + abs(s) + abs(c)) * scale < enough else 0
         if (
-            not still_vertical and abs(a[G, k]) * scale >= enough
+            not still_vertical and abs(a[Row.G, k]) * scale >= enough
         ):  # at its balance point only P feels the vertical motion
             small = 0
         if small == 3:
@@ -273,9 +240,9 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
     if need_forces:
         for half in (0, LANES):
             bend = (ramp() + (half + 1.0)) * (ramp() + (half + 2.0))
-            store(a, P, half, load(a, COS, half + 2) * bend + load(a, G, half))
-            store(a, Q, half, load(a, SIN, half + 2) * bend + load(a, U, half))
-        a[P, order - 1] = a[P, order] = a[Q, order - 1] = a[Q, order] = 0.0
+            store(a, Row.P, half, load(a, Row.COS, half + 2) * bend + load(a, Row.G, half))
+            store(a, Row.Q, half, load(a, Row.SIN, half + 2) * bend + load(a, Row.U, half))
+        a[Row.P, order - 1] = a[Row.P, order] = a[Row.Q, order - 1] = a[Row.Q, order] = 0.0
     return order
 
 
@@ -283,11 +250,15 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
 def _slide_series(spin, kappa, order, enough, reach, a):
     """SLIDE-ROCK, (7): of the contacts only the pivot's acts, with P and Q = -kappa P. The general
     solution, written out for speed."""
-    sine, cosine = a[SIN, 0], a[COS, 0]
+    sine, cosine = a[Row.SIN, 0], a[Row.COS, 0]
     arm = sine + kappa * cosine
     share = 1.0 / (1.0 + spin * sine * arm)
-    a[PHI, 1], a[SIN, 1], a[COS, 1] = a[OMEGA, 0], -a[OMEGA, 0] * cosine, a[OMEGA, 0] * sine
-    w0, s, c = a[OMEGA, 0], a[SIN, 1], a[COS, 1]
+    a[Row.PHI, 1], a[Row.SIN, 1], a[Row.COS, 1] = (
+        a[Row.OMEGA, 0],
+        -a[Row.OMEGA, 0] * cosine,
+        a[Row.OMEGA, 0] * sine,
+    )
+    w0, s, c = a[Row.OMEGA, 0], a[Row.SIN, 1], a[Row.COS, 1]
     ds, dc, moment = -w0 * c, w0 * s, 0.0
     first_push = last_arm = 0.0
     # As for ROCK. The products with P, which is known one order later than the others, are one
@@ -299,14 +270,18 @@ def _slide_series(spin, kappa, order, enough, reach, a):
     for k in range(order - 1):
         # s, c: of order k + 1; ds, dc: their rates of that order, but for the term of phi's
         # acceleration of order k, the unknown.
-        push = share * (dc * (k + 1.0) + a[G, k] + sine * spin * moment)
-        turn, slide, rise = spin * (moment - arm * push), -a[U, k] - kappa * push, push - a[G, k]
+        push = share * (dc * (k + 1.0) + a[Row.G, k] + sine * spin * moment)
+        turn, slide, rise = (
+            spin * (moment - arm * push),
+            -a[Row.U, k] - kappa * push,
+            push - a[Row.G, k],
+        )
         size = abs(turn) + abs(slide) + abs(rise) + abs(s) + abs(c) + abs(push) + abs(kappa * push)
-        a[P, k], a[Q, k] = push, -kappa * push
+        a[Row.P, k], a[Row.Q, k] = push, -kappa * push
         once, twice = RECIPROCAL[k + 1], RECIPROCAL[k + 1] * RECIPROCAL[k + 2]
-        a[XI, k + 2], a[Y, k + 2] = slide * twice, rise * twice
+        a[Row.XI, k + 2], a[Row.Y, k + 2] = slide * twice, rise * twice
         w = turn * once
-        a[OMEGA, k + 1], a[PHI, k + 2] = w, turn * twice
+        a[Row.OMEGA, k + 1], a[Row.PHI, k + 2] = w, turn * twice
         of_w = put(of_w, k, w)
         more_ds = shifted(more_ds) + of_w * c + of_c * w
         more_dc = shifted(more_dc) + of_w * s + of_s * w
@@ -320,159 +295,205 @@ def _slide_series(spin, kappa, order, enough, reach, a):
         last_arm = s + kappa * c
         moment = -first(more_moment) - last_arm * first_push
         s, c = (ds - w * cosine) * RECIPROCAL[k + 2], (dc + w * sine) * RECIPROCAL[k + 2]
-        a[SIN, k + 2], a[COS, k + 2] = s, c
+        a[Row.SIN, k + 2], a[Row.COS, k + 2] = s, c
         ds, dc = -first(more_ds) - w0 * c, first(more_dc) + w0 * s
         scale *= reach
         small = small + 1 if size * scale < enough else 0
         if small == 3:
             order = k + 2
             break
-    a[OMEGA, order] = a[P, order - 1] = a[P, order] = a[Q, order - 1] = a[Q, order] = 0.0
-    return order
-
-
-@inner_kernel
-def _lean_series(b, side, tip, order, a):
-    """LEAN: nothing moves, and the wall takes the moment about the pivot.
-
-    Written out: the arm of a far wall can be so short that the general solution loses all its
-    digits.
-    """
-    s, c = a[SIN, 0], a[COS, 0]
-    wall = 1.0 if tip else -1.0
-    arm = (
-        c + side.tip_sin * s + side.tip_cos * c
-        if tip
-        else (b.left.arm + b.right.arm) * np.sin(a[PHI, 0])
-    )  # c - c'
-    push = NA if tip else NB
-    for k in range(order + 1):
-        a[P, k] = a[Q, k] = a[NA, k] = a[NB, k] = 0.0
-        if k > 0:
-            a[PHI, k] = a[OMEGA, k] = a[SIN, k] = a[COS, k] = a[XI, k] = a[Y, k] = 0.0
-    a[OMEGA, 0] = 0.0
-    for k in range(order - 1):
-        a[P, k] = a[G, k]
-        a[push, k] = wall * (a[U, k] * c - a[G, k] * s) / arm
-        a[Q, k] = a[U, k] - wall * a[push, k]
-    return order
-
-
-@inner_kernel
-def _contact_rows(b, side, kappa, floor, stick, tip, far, a):
-    """Constraint rows, force columns (xi, y, moment) and the inverse of their matrix at the start;
-    returns their number."""
-    s, c = a[SIN, 0], a[COS, 0]
-    tip_arm, far_arm = side.tip_sin * s + side.tip_cos * c, side.far_sin * s + side.far_cos * c
-    n = 0
-    for which in range(4):
-        if not (floor, stick, tip, far)[which]:
-            continue
-        for k in range(3):
-            a[ROW + n, k] = a[COLUMN + n, k] = 0.0
-        if which == 0:
-            a[ROW + n, 1], a[ROW + n, 2] = 1.0, -s
-            a[COLUMN + n, 0], a[COLUMN + n, 1], a[COLUMN + n, 2] = -kappa, 1.0, -s - kappa * c
-        else:
-            along = 1.0 if which < 3 else -1.0
-            a[ROW + n, 0] = a[COLUMN + n, 0] = along
-            a[ROW + n, 2] = a[COLUMN + n, 2] = (
-                c if which == 1 else (-tip_arm if which == 2 else -far_arm)
-            )
-        n += 1
-    for i in range(n):
-        for j in range(n):
-            a[MATRIX + i, j] = a[ROW + i, 0] * a[COLUMN + j, 0] + a[ROW + i, 1] * a[COLUMN + j, 1]
-            a[MATRIX + i, j] += b.spin * a[ROW + i, 2] * a[COLUMN + j, 2]
-    inverse_of(a, MATRIX, INVERSE, n)
-    return n
-
-
-@inner_kernel
-def _contact_series(b, side, m, order, enough, reach, a):
-    """Newton-Euler with the mode's constraints, solved term by term: the matrix of the unknown
-    forces is the same each time."""
-    floor, tip, far = m[FLOOR] != OFF, m[TIP] != 0, m[FAR] != 0
-    static = tip and far
-    stick = m[FLOOR] == STICK and not static  # wedged between two walls the block needs no friction
-    kappa = b.mu_k * m[SLIP] * m[PULL] if m[FLOOR] == SLIPPING else 0.0  # Q = -kappa P
-    n = _contact_rows(b, side, kappa, floor, stick, tip, far, a)
-    s0, c0 = a[SIN, 0], a[COS, 0]
-    scale = 1.0
-    small = 0
-    for k in range(order + 1):
-        a[P, k] = a[Q, k] = a[NA, k] = a[NB, k] = 0.0
-    a[PHI, 1], a[SIN, 1], a[COS, 1] = a[OMEGA, 0], -a[OMEGA, 0] * c0, a[OMEGA, 0] * s0
-    for k in range(order - 1):
-        i = k + 2
-        # The rates of sine and cosine at order k + 1 lack only the term of phi's acceleration at
-        # order k, the unknown.
-        ds = -_products(a, OMEGA, COS, 0, k, k + 1)
-        dc = _products(a, OMEGA, SIN, 0, k, k + 1)
-        moment = _moment_of_lower_orders(side, kappa, floor, stick, tip, far, k, a)
-        ax, ay, aphi = _accelerations(
-            b, side, n, kappa, floor, stick, tip, far, ds * (i - 1.0), dc * (i - 1.0), moment, k, a
-        )
-        if static:
-            ax = aphi = 0.0
-            ay = 0.0 if floor else ay
-        twice = RECIPROCAL[i] * RECIPROCAL[k + 1]
-        a[XI, i], a[Y, i] = ax * twice, ay * twice
-        a[OMEGA, k + 1] = aphi * RECIPROCAL[k + 1]
-        a[PHI, i] = a[OMEGA, k + 1] * RECIPROCAL[i]
-        a[SIN, i] = (ds - a[OMEGA, k + 1] * c0) * RECIPROCAL[i]
-        a[COS, i] = (dc + a[OMEGA, k + 1] * s0) * RECIPROCAL[i]
-        scale *= reach
-        size = abs(aphi) + abs(ax) + abs(ay) + abs(a[SIN, k + 1]) + abs(a[COS, k + 1])
-        size += abs(a[P, k]) + abs(a[Q, k]) + abs(a[NA, k]) + abs(a[NB, k])
-        small = small + 1 if size * scale < enough else 0
-        if small == 3:
-            order = i
-            break
-    i = order
-    a[OMEGA, i] = 0.0
-    a[P, i] = a[P, i - 1] = a[Q, i] = a[Q, i - 1] = a[NA, i] = a[NA, i - 1] = a[NB, i] = a[
-        NB, i - 1
+    a[Row.OMEGA, order] = a[Row.P, order - 1] = a[Row.P, order] = a[Row.Q, order - 1] = a[
+        Row.Q, order
     ] = 0.0
     return order
 
 
 @inner_kernel
-def _moment_of_lower_orders(side, kappa, floor, stick, tip, far, k, a):
+def _lean_series(block, side, tip, order, a):
+    """LEAN: nothing moves, and the wall takes the moment about the pivot.
+
+    Written out: the arm of a far wall can be so short that the general solution loses all its
+    digits.
+    """
+    s, c = a[Row.SIN, 0], a[Row.COS, 0]
+    wall = 1.0 if tip else -1.0
+    arm = (
+        c + side.tip_sin * s + side.tip_cos * c
+        if tip
+        else (block.left.arm + block.right.arm) * np.sin(a[Row.PHI, 0])
+    )  # c - c'
+    push = Row.NA if tip else Row.NB
+    for k in range(order + 1):
+        a[Row.P, k] = a[Row.Q, k] = a[Row.NA, k] = a[Row.NB, k] = 0.0
+        if k > 0:
+            a[Row.PHI, k] = a[Row.OMEGA, k] = a[Row.SIN, k] = a[Row.COS, k] = a[Row.XI, k] = a[
+                Row.Y, k
+            ] = 0.0
+    a[Row.OMEGA, 0] = 0.0
+    for k in range(order - 1):
+        a[Row.P, k] = a[Row.G, k]
+        a[push, k] = wall * (a[Row.U, k] * c - a[Row.G, k] * s) / arm
+        a[Row.Q, k] = a[Row.U, k] - wall * a[push, k]
+    return order
+
+
+class _Acting(NamedTuple):
+    """The contacts of a mode: the side that the block tips to, 1/I, the friction of a slipping
+    pivot (Q = -kappa P), and which of them act; `stick` is the pivot's tangent."""
+
+    side: Side
+    spin: float
+    kappa: float
+    floor: bool
+    stick: bool
+    tip: bool
+    far: bool
+
+
+@inner_kernel
+def _acts(acting, which):
+    """Whether contact `which` acts: floor, stick, tip wall, far wall."""
+    return (acting.floor, acting.stick, acting.tip, acting.far)[which]
+
+
+@inner_kernel
+def _wall_arms(side, s, c):
+    """c' of the corners on the tip wall and on the far wall."""
+    return side.tip_sin * s + side.tip_cos * c, side.far_sin * s + side.far_cos * c
+
+
+@inner_kernel
+def _contact_rows(acting, a):
+    """Constraint rows, force columns (xi, y, moment) and the inverse of their matrix at the start;
+    returns their number."""
+    s, c, kappa = a[Row.SIN, 0], a[Row.COS, 0], acting.kappa
+    tip_arm, far_arm = _wall_arms(acting.side, s, c)
+    n = 0
+    for which in range(4):
+        if not _acts(acting, which):
+            continue
+        for k in range(3):
+            a[Row.CONSTRAINT + n, k] = a[Row.COLUMN + n, k] = 0.0
+        if which == 0:
+            a[Row.CONSTRAINT + n, 1], a[Row.CONSTRAINT + n, 2] = 1.0, -s
+            a[Row.COLUMN + n, 0], a[Row.COLUMN + n, 1], a[Row.COLUMN + n, 2] = (
+                -kappa,
+                1.0,
+                -s - kappa * c,
+            )
+        else:
+            along = 1.0 if which < 3 else -1.0
+            a[Row.CONSTRAINT + n, 0] = a[Row.COLUMN + n, 0] = along
+            a[Row.CONSTRAINT + n, 2] = a[Row.COLUMN + n, 2] = (
+                c if which == 1 else (-tip_arm if which == 2 else -far_arm)
+            )
+        n += 1
+    for i in range(n):
+        for j in range(n):
+            a[Row.MATRIX + i, j] = (
+                a[Row.CONSTRAINT + i, 0] * a[Row.COLUMN + j, 0]
+                + a[Row.CONSTRAINT + i, 1] * a[Row.COLUMN + j, 1]
+            )
+            a[Row.MATRIX + i, j] += acting.spin * a[Row.CONSTRAINT + i, 2] * a[Row.COLUMN + j, 2]
+    inverse_of(a, Row.MATRIX, Row.INVERSE, n)
+    return n
+
+
+@inner_kernel
+def _contact_series(block, mode, order, enough, reach, a):
+    """Newton-Euler with the mode's constraints, solved term by term: the matrix of the unknown
+    forces is the same each time."""
+    floor, tip, far = mode.pivot != Pivot.OFF, mode.tip != 0, mode.far != 0
+    static = tip and far
+    stick = (
+        mode.pivot == Pivot.STICK and not static
+    )  # wedged between two walls the block needs no friction
+    kappa = (
+        block.mu_k * mode.slip * mode.pull if mode.pivot == Pivot.SLIPPING else 0.0
+    )  # Q = -kappa P
+    side = side_of(block, mode.sense)
+    acting = _Acting(side, block.spin, kappa, floor, stick, tip, far)
+    n = _contact_rows(acting, a)
+    s0, c0 = a[Row.SIN, 0], a[Row.COS, 0]
+    scale = 1.0
+    small = 0
+    for k in range(order + 1):
+        a[Row.P, k] = a[Row.Q, k] = a[Row.NA, k] = a[Row.NB, k] = 0.0
+    a[Row.PHI, 1], a[Row.SIN, 1], a[Row.COS, 1] = (
+        a[Row.OMEGA, 0],
+        -a[Row.OMEGA, 0] * c0,
+        a[Row.OMEGA, 0] * s0,
+    )
+    for k in range(order - 1):
+        i = k + 2
+        # The rates of sine and cosine at order k + 1 lack only the term of phi's acceleration at
+        # order k, the unknown.
+        ds = -_products(a, Row.OMEGA, Row.COS, 0, k, k + 1)
+        dc = _products(a, Row.OMEGA, Row.SIN, 0, k, k + 1)
+        moment = _moment_of_lower_orders(acting, k, a)
+        free = ds * (i - 1.0), dc * (i - 1.0), moment
+        ax, ay, aphi = _accelerations(acting, n, free, k, a)
+        if static:
+            ax = aphi = 0.0
+            ay = 0.0 if floor else ay
+        twice = RECIPROCAL[i] * RECIPROCAL[k + 1]
+        a[Row.XI, i], a[Row.Y, i] = ax * twice, ay * twice
+        a[Row.OMEGA, k + 1] = aphi * RECIPROCAL[k + 1]
+        a[Row.PHI, i] = a[Row.OMEGA, k + 1] * RECIPROCAL[i]
+        a[Row.SIN, i] = (ds - a[Row.OMEGA, k + 1] * c0) * RECIPROCAL[i]
+        a[Row.COS, i] = (dc + a[Row.OMEGA, k + 1] * s0) * RECIPROCAL[i]
+        scale *= reach
+        size = abs(aphi) + abs(ax) + abs(ay) + abs(a[Row.SIN, k + 1]) + abs(a[Row.COS, k + 1])
+        size += abs(a[Row.P, k]) + abs(a[Row.Q, k]) + abs(a[Row.NA, k]) + abs(a[Row.NB, k])
+        small = small + 1 if size * scale < enough else 0
+        if small == 3:
+            order = i
+            break
+    i = order
+    a[Row.OMEGA, i] = 0.0
+    a[Row.P, i] = a[Row.P, i - 1] = a[Row.Q, i] = a[Row.Q, i - 1] = a[Row.NA, i] = a[
+        Row.NA, i - 1
+    ] = a[Row.NB, i] = a[Row.NB, i - 1] = 0.0
+    return order
+
+
+@inner_kernel
+def _moment_of_lower_orders(acting, k, a):
     """Coefficient k of the moment that the forces' coefficients below k give, by their arms' later
     terms; none where both walls hold it."""
     moment = 0.0
-    if floor:
-        a[FLOOR_ARM, k] = a[SIN, k] + kappa * a[COS, k]
-        moment -= _products(a, FLOOR_ARM, P, 1, k, k)
-    if stick:
-        moment += _products(a, COS, Q, 1, k, k)
-    if tip or far:
-        along, across = (side.tip_sin, side.tip_cos) if tip else (side.far_sin, side.far_cos)
-        a[WALL_ARM, k] = along * a[SIN, k] + across * a[COS, k]
-        moment -= _products(a, WALL_ARM, WALL_PUSH, 1, k, k)
+    if acting.floor:
+        a[Row.FLOOR_ARM, k] = a[Row.SIN, k] + acting.kappa * a[Row.COS, k]
+        moment -= _products(a, Row.FLOOR_ARM, Row.P, 1, k, k)
+    if acting.stick:
+        moment += _products(a, Row.COS, Row.Q, 1, k, k)
+    if acting.tip or acting.far:
+        along, across = wall_turn(acting.side, acting.tip)
+        a[Row.WALL_ARM, k] = along * a[Row.SIN, k] + across * a[Row.COS, k]
+        moment -= _products(a, Row.WALL_ARM, Row.WALL_PUSH, 1, k, k)
     return moment
 
 
 @inner_kernel
-def _accelerations(b, side, n, kappa, floor, stick, tip, far, ks, kc, moment, k, a):
+def _accelerations(acting, n, free, k, a):
     """Coefficient k of the accelerations (xi, y, phi) and of the n contact forces, so that the
     constraints hold.
 
-    `ks`, `kc` are the accelerations of sine and cosine but for phi's own, `moment` that of the
-    forces' lower coefficients.
+    `free` are the accelerations of sine and cosine but for phi's own, and the moment of the forces'
+    lower coefficients.
     """
+    side, (ks, kc, moment) = acting.side, free
     tip_reach, far_reach = (
         side.tip_sin * kc - side.tip_cos * ks,
         side.far_sin * kc - side.far_cos * ks,
     )  # of s'
-    s, c = a[SIN, 0], a[COS, 0]
-    tip_arm, far_arm = side.tip_sin * s + side.tip_cos * c, side.far_sin * s + side.far_cos * c
-    ax, ay, aphi = -a[U, k], -a[G, k], b.spin * moment
+    s, c = a[Row.SIN, 0], a[Row.COS, 0]
+    tip_arm, far_arm = _wall_arms(side, s, c)
+    ax, ay, aphi = -a[Row.U, k], -a[Row.G, k], acting.spin * moment
     r = 0
     for which in range(4):
-        if (floor, stick, tip, far)[which]:
-            a[KNOWN, r] = (
+        if _acts(acting, which):
+            a[Row.KNOWN, r] = (
                 kc - ay + s * aphi,
                 ks - ax - c * aphi,
                 tip_reach - ax + tip_arm * aphi,
@@ -482,19 +503,19 @@ def _accelerations(b, side, n, kappa, floor, stick, tip, far, ks, kc, moment, k,
     for r in range(n):
         force = 0.0
         for j in range(n):
-            force += a[INVERSE + r, j] * a[KNOWN, j]
-        a[FORCE, r] = force
-        ax += a[COLUMN + r, 0] * force
-        ay += a[COLUMN + r, 1] * force
-        aphi += b.spin * a[COLUMN + r, 2] * force
+            force += a[Row.INVERSE + r, j] * a[Row.KNOWN, j]
+        a[Row.FOUND, r] = force
+        ax += a[Row.COLUMN + r, 0] * force
+        ay += a[Row.COLUMN + r, 1] * force
+        aphi += acting.spin * a[Row.COLUMN + r, 2] * force
     r = 0
     for which in range(4):
-        if (floor, stick, tip, far)[which]:
-            a[(P, Q, NA, NB)[which], k] = a[FORCE, r]
+        if _acts(acting, which):
+            a[(Row.P, Row.Q, Row.NA, Row.NB)[which], k] = a[Row.FOUND, r]
             r += 1
-    if not stick:
-        a[Q, k] = -kappa * a[P, k]
-    a[WALL_PUSH, k] = a[NA, k] + a[NB, k]
+    if not acting.stick:
+        a[Row.Q, k] = -acting.kappa * a[Row.P, k]
+    a[Row.WALL_PUSH, k] = a[Row.NA, k] + a[Row.NB, k]
     return ax, ay, aphi
 
 
@@ -528,83 +549,90 @@ def inverse_of(a, matrix, inverse, n):
 
 
 @inner_kernel
-def flat_series(b, m, z, gh, gv, t, order, a):
+def flat_series(block, base, run, order):
     """Fills the workspace with the series of a block that only translates (world frame); returns
     their order.
 
     Q is the floor's friction, P its normal force on both corners together, N_a the force of a wall
     that presses.
     """
-    fill_series(gh, t, 1.0, order, a, U)
-    if gv.kind != STILL:  # otherwise G is 1 throughout, as the run has set it
-        fill_series(gv, t, 1.0, order, a, G)
-        a[G, 0] += 1.0
-    a[XI, 0], a[XI, 1], a[Y, 0], a[Y, 1] = z[X], z[VX], z[HEIGHT], z[VY]
-    press = m[TIP] - m[FAR]
+    mode, motion, a = run.state.mode, run.state.motion, run.a
+    base_series(base, run.state.t, 1.0, order, a)
+    a[Row.XI, 0], a[Row.XI, 1], a[Row.Y, 0], a[Row.Y, 1] = motion.x, motion.vx, motion.y, motion.vy
+    press = mode.tip - mode.far
     for k in range(order - 1):
-        a[P, k] = a[G, k] if m[FLOOR] != OFF else 0.0
-        a[Q, k] = a[NA, k] = 0.0
-        if m[FLOOR] == SLIPPING:
-            a[Q, k] = -b.mu_k * m[SLIP] * m[PULL] * a[P, k]
-        if m[FLOOR] == STICK:
-            a[Q, k] = a[U, k]
+        a[Row.P, k] = a[Row.G, k] if mode.pivot != Pivot.OFF else 0.0
+        a[Row.Q, k] = a[Row.NA, k] = 0.0
+        if mode.pivot == Pivot.SLIPPING:
+            a[Row.Q, k] = -block.mu_k * mode.slip * mode.pull * a[Row.P, k]
+        if mode.pivot == Pivot.STICK:
+            a[Row.Q, k] = a[Row.U, k]
         elif press != 0:
-            a[NA, k] = press * a[U, k]
-        a[XI, k + 2] = (press * a[NA, k] + a[Q, k] - a[U, k]) / ((k + 2) * (k + 1))
-        a[Y, k + 2] = (a[P, k] - a[G, k]) / ((k + 2) * (k + 1))
+            a[Row.NA, k] = press * a[Row.U, k]
+        a[Row.XI, k + 2] = (press * a[Row.NA, k] + a[Row.Q, k] - a[Row.U, k]) / ((k + 2) * (k + 1))
+        a[Row.Y, k + 2] = (a[Row.P, k] - a[Row.G, k]) / ((k + 2) * (k + 1))
     for k in range(order - 1, order + 1):
-        a[P, k] = a[Q, k] = a[NA, k] = 0.0
+        a[Row.P, k] = a[Row.Q, k] = a[Row.NA, k] = 0.0
     return order
 
 
 @inner_kernel
-def tilt_state(b, m, order, tau, pivot, a, z):
-    """Writes the state at tau after the start of the series into z, on the contacts to rounding.
-
-    `pivot` is the place of a sticking pivot, xi - s.
-    """
-    sign = float(m[S])
-    phi = value(a, PHI, order, tau)
-    w = value(a, OMEGA, order - 1, tau)
-    if (m[FLOOR] == STICK and (m[TIP] != 0 or m[FAR] != 0)) or (m[TIP] != 0 and m[FAR] != 0):
-        phi, w = a[PHI, 0], 0.0
-    side = side_of(b, m[S])
+def _tilt_at(block, run, tau, motion):
+    """Writes the motion of a tilted block, on the contacts to rounding."""
+    mode, order, pivot, a = run.state.mode, run.state.order, run.state.place, run.a
+    sign = float(mode.sense)
+    phi = value(a, Row.PHI, order, tau)
+    w = value(a, Row.OMEGA, order - 1, tau)
+    if (mode.pivot == Pivot.STICK and on_wall(mode)) or (mode.tip != 0 and mode.far != 0):
+        phi, w = a[Row.PHI, 0], 0.0
+    side = side_of(block, mode.sense)
     sine, cosine = sine_cosine(side.alpha - phi, a)
     s, c = side.radius * sine, side.radius * cosine
-    if m[FLOOR] == STICK:
+    if mode.pivot == Pivot.STICK:
         xi, v = pivot + s, -c * w
-    elif m[TIP] != 0 or m[FAR] != 0:
-        wall = 1.0 if m[TIP] != 0 else -1.0
-        other = side_of(b, -m[S])
+    elif on_wall(mode):
+        wall = 1.0 if mode.tip != 0 else -1.0
+        other = side_of(block, -mode.sense)
         radius, angle = (
             (side.top_radius, side.top_alpha + phi)
-            if m[TIP] != 0
+            if mode.tip != 0
             else (other.radius, other.alpha + phi)
         )
         reach, reach_rate = radius * np.sin(angle), radius * np.cos(angle)
-        xi, v = wall * (reach - delta(b, m, m[TIP] != 0)), wall * reach_rate * w
+        xi, v = wall * (reach - delta(block, mode, mode.tip != 0)), wall * reach_rate * w
     else:
-        xi, v = value(a, XI, order, tau), slope(a, XI, order, tau)
-    if m[FLOOR] != OFF:
+        xi, v = value(a, Row.XI, order, tau), slope(a, Row.XI, order, tau)
+    if mode.pivot != Pivot.OFF:
         y, vy = c, s * w
     else:
-        y, vy = value(a, Y, order, tau), slope(a, Y, order, tau)
-    z[X], z[HEIGHT], z[THETA], z[VX], z[VY], z[W] = sign * xi, y, sign * phi, sign * v, vy, sign * w
+        y, vy = value(a, Row.Y, order, tau), slope(a, Row.Y, order, tau)
+    motion.x, motion.y, motion.theta = sign * xi, y, sign * phi
+    motion.vx, motion.vy, motion.w = sign * v, vy, sign * w
 
 
 @inner_kernel
-def flat_state(b, m, order, tau, a, z):
-    """Writes the state of a translating block at tau after the start of the series into z."""
-    if m[TIP] == 0 and m[FAR] == 0 and m[FLOOR] != STICK:
-        z[X] = value(a, XI, order, tau)
-        z[VX] = slope(a, XI, order, tau)
+def _flat_at(block, run, tau, motion):
+    """Writes the motion of a translating block."""
+    mode, order, a = run.state.mode, run.state.order, run.a
+    if not on_wall(mode) and mode.pivot != Pivot.STICK:
+        motion.x = value(a, Row.XI, order, tau)
+        motion.vx = slope(a, Row.XI, order, tau)
     else:
-        z[X] = a[XI, 0]
-        z[VX] = 0.0
-    if m[FLOOR] == OFF:
-        z[HEIGHT] = value(a, Y, order, tau)
-        z[VY] = slope(a, Y, order, tau)
+        motion.x = a[Row.XI, 0]
+        motion.vx = 0.0
+    if mode.pivot == Pivot.OFF:
+        motion.y = value(a, Row.Y, order, tau)
+        motion.vy = slope(a, Row.Y, order, tau)
     else:
-        z[HEIGHT] = b.height
-        z[VY] = 0.0
-    z[THETA] = z[W] = 0.0
+        motion.y = block.height
+        motion.vy = 0.0
+    motion.theta = motion.w = 0.0
+
+
+@inner_kernel
+def motion_at(block, run, tau, motion):
+    """Writes the motion at tau after the start of the series into `motion`."""
+    if run.state.mode.family == Family.FLAT:
+        _flat_at(block, run, tau, motion)
+    else:
+        _tilt_at(block, run, tau, motion)

@@ -39,7 +39,6 @@ AHEAD = 2e-2
 #: Error bounds of a position, a velocity and a force: a coefficient below its bound is rounding.
 #: They are one bound, seen after AHEAD: a velocity or a force of this size moves a position by its
 #: bound. So a contact that pulls by more than noise opens by more, too.
-POSITION, RATE, FORCE = range(3)
 _ERROR = 1e-13
 NOISE = np.array([_ERROR, _ERROR / AHEAD, 2.0 * _ERROR / AHEAD**2])
 #: The zero in time: an event's time is not known better, so what happens within it is one event.

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rockcheck.ebm.core.rules import ENDLESS_STAGES, RATTLES
+from rockcheck.ebm.core.rules import Rule
 from rockcheck.ebm.core.series import INSTANT
 from rockcheck.scenes.compiled import inner_kernel
 
@@ -21,33 +21,33 @@ SETTLE = 5e-8
 _IMPACTS, _QUIET, _FASTEST, _TIMES = 100, 2.5e-2, 2.5e-3, 500
 #: After this many impacts at one instant the next ones are plastic.
 _AT_ONCE = 20
-_SPEED, _SINCE, _LAST, _COUNT, _FULL, _SAME = range(6)
 
 
 @inner_kernel
-def no_impacts(rattle):
-    """Begins the memory: the settling speed, when the count began, the last impact, the count, how
-    often it was full, at once."""
-    rattle[:] = 0.0
-    rattle[_SPEED], rattle[_SINCE], rattle[_LAST] = SETTLE, -1.0, -1.0
+def no_impacts(state):
+    """Begins the memory of impacts."""
+    state.settling_speed, state.counted_since, state.last_impact = SETTLE, -1.0, -1.0
+    state.counted = state.full = state.at_once = 0
 
 
 @inner_kernel
-def settling_speed(rattle, t, rules):
-    """The speed below which a contact that is struck at time t stays closed."""
-    if t - rattle[_LAST] > _QUIET:
-        rattle[_SPEED], rattle[_FULL] = SETTLE, 0.0
-    if t - rattle[_SINCE] > _QUIET:
-        rattle[_SINCE], rattle[_COUNT] = t, 0.0
-    rattle[_SAME] = rattle[_SAME] + 1.0 if t - rattle[_LAST] <= INSTANT else 0.0
-    rattle[_LAST] = t
-    rattle[_COUNT] += 1.0
-    if rattle[_COUNT] >= _IMPACTS:
-        rattle[_COUNT] = 0.0
-        rattle[_FULL] += 1.0
-        rules[RATTLES] += 1
-        rattle[_SPEED] = min(10.0 * rattle[_SPEED], _FASTEST) if rattle[_FULL] < _TIMES else np.inf
-    if rattle[_SAME] >= _AT_ONCE:
-        rules[ENDLESS_STAGES] += 1
+def settling_speed(state):
+    """The speed below which a contact that is struck now stays closed."""
+    t = state.t
+    if t - state.last_impact > _QUIET:
+        state.settling_speed, state.full = SETTLE, 0
+    if t - state.counted_since > _QUIET:
+        state.counted_since, state.counted = t, 0
+    state.at_once = state.at_once + 1 if t - state.last_impact <= INSTANT else 0
+    state.last_impact = t
+    state.counted += 1
+    if state.counted >= _IMPACTS:
+        state.counted = 0
+        state.full += 1
+        state.rules[Rule.RATTLES] += 1
+        raised = min(10.0 * state.settling_speed, _FASTEST)
+        state.settling_speed = raised if state.full < _TIMES else np.inf
+    if state.at_once >= _AT_ONCE:
+        state.rules[Rule.ENDLESS_STAGES] += 1
         return np.inf
-    return rattle[_SPEED]
+    return state.settling_speed

@@ -36,14 +36,10 @@ COMMANDS = {
         "rockcheck simulate fig5a --model mujoco --set time_step=1e-3 -o mujoco.csv",
     ),
     "compare": ("compare", "rockcheck compare ebm.csv mujoco.csv --until 8"),
-    "uncertainty": (
-        "uncertainty",
-        "rockcheck uncertainty fig5a --model mujoco --set time_step=1e-3",
-    ),
     "validate": ("validate", "rockcheck validate smoke --out rockcheck-report"),
     "accept": ("accept", 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"'),
+    "assess": ("assess", "rockcheck assess shelf.toml records --gaps 0.02,0.05,0.1"),
     "spectrum": ("spectrum", "rockcheck spectrum fig8 --size 50 --refine"),
-    "ida": ("ida", "rockcheck ida shelf.toml records --intensity sa:0.5"),
     "benchmark": ("benchmark", "rockcheck benchmark --quick"),
     "conformance": ("conformance", "rockcheck conformance --engine mujoco --settings default"),
     "stress": ("stress", "rockcheck stress --quick"),
@@ -58,6 +54,8 @@ GONE = {
     "figure": "rockcheck report DIR --scene NAME -o FILE",
     "convergence": "rockcheck benchmark convergence",
     "calibrate": "rockcheck conformance --tune E",
+    "uncertainty": "rockcheck assess SCENE",
+    "ida": "rockcheck assess SCENE RECORDS --levels pga:0.05:2:40",
 }
 #: Commands that are not listed.
 HIDDEN = ("warm",)

@@ -143,7 +143,7 @@ def run(
                 f"{printable(what)} is a scene, and nothing of it is judged: give a suite",
                 "--strict",
             )
-        sets = _record_sets(records or (), read or ())
+        sets = record_sets(records or (), read or ())
         suite = scene_suite(
             what, chosen_models(models, settings or ()), records=sets, allow_code=allow_code or ()
         )
@@ -185,7 +185,7 @@ def run(
     raise typer.Exit(finished.exit_code)
 
 
-def _record_sets(records: Sequence[str], read: Sequence[str]) -> list[RecordSet]:
+def record_sets(records: Sequence[str], read: Sequence[str]) -> list[RecordSet]:
     """The records, and how they are read. Raises `InputError`."""
     given = dict(setting_of(word, "--read") for word in read)
     if not records:

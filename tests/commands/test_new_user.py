@@ -80,15 +80,15 @@ def test_from_a_v2_record_to_a_report_and_a_curve_in_four_commands(type_):
             / f"{place.replace(', ', '-').replace(' ', '-')}.html"
         ).exists()
 
-    told = type_("ida rack.toml station.V2 --levels 0.05:2:8")
-    assert "report: rockcheck-report/ida/index.html\n" in told
+    told = type_("assess rack.toml station.V2 --levels 0.05:2:8")
+    assert "report: rockcheck-report/assess/index.html\n" in told
     rows = list(
         csv.DictReader(
-            Path("rockcheck-report/ida/ida.csv").read_text(encoding="utf-8").splitlines()
+            Path("rockcheck-report/assess/ida.csv").read_text(encoding="utf-8").splitlines()
         )
     )
     assert len(rows) == 2 * 2 * 8  # components, directions, intensities
-    assert {row["record"] for row in rows} == {"station.V2 360 deg", "station.V2 90 deg"}
+    assert {row["record"] for row in rows} == {"station 360 deg", "station 90 deg"}
 
 
 def test_a_folder_of_24_files_in_eight_formats_shakes_the_rack(type_):
@@ -96,7 +96,7 @@ def test_a_folder_of_24_files_in_eight_formats_shakes_the_rack(type_):
     Path("records").mkdir()
     assert len(made.folder_of_records(Path("records"))) == 24
     type_("new rack.toml")
-    told = json.loads(type_("ida rack.toml records --levels 0.1:0.6:3 --json"))
+    told = json.loads(type_("assess rack.toml records --levels 0.1:0.6:3 --json"))
     assert len(told["left_out"]) == 8
     assert all("U-D" in name for name in told["left_out"])
     assert len(told["tables"]["motions"]) == 16

@@ -340,12 +340,12 @@ def test_slips_are_named(capsys, words, said):
     ],
 )
 def test_a_population_takes_the_same_sets(told, words):
-    found = told("ida", "rack.toml", "--levels", "1:2:2", *words, "--json")
-    assert [one["motion"] for one in found["tables"]["motions"]] == ["RSN1_H1.AT2", "RSN1_H2.AT2"]
+    found = told("assess", "rack.toml", "--levels", "1:2:2", *words, "--json")
+    assert [one["motion"] for one in found["tables"]["motions"]] == ["RSN1_H1", "RSN1_H2"]
     assert found["left_out"] == list(words[2:3] and ["RSN1_V.AT2"])
 
 
-@pytest.mark.parametrize("command", ["validate", "ida"])
+@pytest.mark.parametrize("command", ["validate", "assess"])
 def test_a_file_of_a_folder_that_is_no_record_is_named_and_left_out(told, command):
     Path("records/README.txt").write_text("where they are from\n", encoding="utf-8")
     rest = STILL if command == "validate" else ("--levels", "0.1:1:2", "--json")

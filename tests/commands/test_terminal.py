@@ -265,7 +265,7 @@ def test_the_time_left_counts_what_is_done_here(monkeypatch):
 
 @pytest.mark.parametrize(
     ("name", "page"),
-    [("ida", "index.html"), ("spectrum", "index.html"), ("validate", "index.html")],
+    [("assess", "index.html"), ("spectrum", "index.html"), ("validate", "index.html")],
 )
 def test_the_help_names_the_page_that_is_written(name, page, capsys):
     main([name, "--help"])

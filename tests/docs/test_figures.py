@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from rockcheck import ContinuousModel, EventBasedModel, MuJoCo, compare, load_scene
-from rockcheck.ebm.core import contacts, modes, motion, rules, series, settle
+from rockcheck.ebm.core import contacts, motion, rules, series, settle, state
+from rockcheck.ebm.core.names import Kind
 from rockcheck.scenes.experience import Experience
 from rockcheck.scenes.kinematics import pivot_height
 from rockcheck.validation.paper.panels import KEPT, kept_spectra
@@ -140,11 +141,11 @@ def test_what_the_benchmark_says():
 
 
 def test_thresholds_that_the_limits_name():
-    assert (series.AHEAD, series.NOISE[series.POSITION], series.INSTANT) == (0.02, 1e-13, 1e-9)
+    assert (series.AHEAD, series.NOISE[Kind.POSITION], series.INSTANT) == (0.02, 1e-13, 1e-9)
     assert (contacts.CLOSED, contacts.SLOW, motion.LEAST_FRICTION) == (1e-10, 1e-9, 1e-9)
     assert (settle.SETTLE, settle._QUIET, settle._FASTEST) == (5e-8, 0.025, 2.5e-3)
     assert (settle._AT_ONCE, settle._IMPACTS, settle._TIMES) == (20, 100, 500)
-    assert (modes.MODES, series.ORDER) == (128, 15)
+    assert (state.MODES, series.ORDER) == (128, 15)
     page = (DOCS / "limits.md").read_text(encoding="utf-8")
     assert set(re.findall(r"^\| ([\w ]+) \|", page, flags=re.MULTILINE)) >= set(rules.NAMES)
 

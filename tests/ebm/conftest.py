@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
-import numpy as np
 import pytest
 
 from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
+
+# For `stepping`, which the tests below share.
+sys.path.insert(0, str(Path(__file__).parent))
 
 
 @dataclass(frozen=True)
@@ -50,10 +54,12 @@ def block() -> Block:
 def run_to_end() -> Runner:
     """Runs a scene to its end without sampling it; the compiled loop is called as the model calls
     it."""
-    from rockcheck.ebm import natural
-    from rockcheck.ebm.core import march, motion
+    from stepping import play
 
-    scratch = motion.workspace()
+    from rockcheck.ebm import natural
+    from rockcheck.ebm.core.state import Control, workspace
+
+    work = workspace()
 
     def run(
         scene: Scene, *, pivot: str = "bilateral", tolerance: float = 1e-12, impacts: str = "moreau"
@@ -65,28 +71,17 @@ def run_to_end() -> Runner:
             energy_cap=False,
             impacts=impacts,
         )
-        state = natural.state_of(scene)
-        control = march.Control(tolerance, 1_000_000, 200_000, False, 1.0)
-        unit, radius = natural.time_unit(scene), scene.block.radius
-        nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
-        tally, _ = march.run(
-            setting,
-            *natural.grounds_of(scene),
-            state,
-            scene.duration / unit,
-            control,
-            *nothing,
-            *scratch,
-        )
+        control = Control(tolerance, 1_000_000, 200_000, False, 1.0)
+        found = play(scene, setting, control, work)
         return Run(
-            ending=tally.ending,
-            t=tally.t * unit,
-            x=state[0] * radius,
-            theta=state[2],
-            peak=tally.peak / scene.block.alpha,
-            wall_impacts=tally.wall_impacts,
-            steps=tally.steps,
-            energy_gains=tally.gains,
+            ending=int(found.ending),
+            t=found.t * natural.time_unit(scene),
+            x=found.motion.x * scene.block.radius,
+            theta=found.motion.theta,
+            peak=found.peak / scene.block.alpha,
+            wall_impacts=int(found.wall_impacts),
+            steps=int(found.steps),
+            energy_gains=int(found.gains),
         )
 
     return run

@@ -18,6 +18,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from stepping import TILTED, run_at
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Block, Floor, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
@@ -566,9 +567,9 @@ def test_series_begin_with_the_closed_forms(name, side, case):
     states, to 1e-12."""
     from rockcheck.ebm import natural
     from rockcheck.ebm.core import motion
+    from rockcheck.ebm.core.names import Pivot, Row
 
     rng = np.random.default_rng(20240229)
-    a, _ = motion.workspace()
     for _ in range(200):
         scene = random_scene(rng, side)
         paper = PaperModel(scene)
@@ -596,22 +597,22 @@ def test_series_begin_with_the_closed_forms(name, side, case):
         mode = Mode(S, d, mode.Sw, sign(paper.motion(mode, t, y)[2]))
         expected = np.array(paper.motion(mode, t, y)) / [g, g / R, g, g, g]
 
-        m = np.zeros(motion.MODE_SIZE, dtype=np.int64)
-        m[motion.FAMILY], m[motion.S], m[motion.SLIP], m[motion.PULL] = (
-            motion.TILT,
-            S,
-            S * d,
-            mode.sense,
-        )
-        m[motion.FLOOR] = motion.SLIPPING if d else motion.STICK
-        m[motion.TIP], m[motion.FAR] = mode.Sw == S, mode.Sw == -S
         s = math.sin(paper.alpha - abs(theta))
-        z = np.array([x / R, c, theta, v * unit / R, S * s * w * unit, w * unit])
-        order = motion.tilt_series(b, m, z, *natural.grounds_of(scene), t / unit, 8, 0.0, 0.0, a)
+        run = run_at(
+            [x / R, c, theta, v * unit / R, S * s * w * unit, w * unit],
+            t=t / unit,
+            **TILTED | {"pull": mode.sense},
+            sense=S,
+            slip=S * d,
+            pivot=Pivot.SLIPPING if d else Pivot.STICK,
+            tip=mode.Sw == S,
+            far=mode.Sw == -S,
+        )
+        order, a = motion.tilt_series(b, natural.base_of(scene), run, 8, 0.0, 0.0), run.a
         assert order == 8
-        x2 = S * 2.0 * a[motion.XI, 2] if name != "rock" else S * 2.0 * a[motion.SIN, 2]
-        push = a[motion.NA, 0] + a[motion.NB, 0] if mode.Sw else 0.0
-        found = [x2, S * a[motion.OMEGA, 1], a[motion.P, 0], S * a[motion.Q, 0], push]
+        x2 = S * 2.0 * a[Row.XI, 2] if name != "rock" else S * 2.0 * a[Row.SIN, 2]
+        push = a[Row.NA, 0] + a[Row.NB, 0] if mode.Sw else 0.0
+        found = [x2, S * a[Row.OMEGA, 1], a[Row.P, 0], S * a[Row.Q, 0], push]
         scale = 1.0 + np.abs(expected).max()
         # The forces of a block that leans on its own pivot's side are as ill-conditioned as
         # 1/(c + C).

@@ -104,30 +104,20 @@ def test_a_run_leaves_no_trace(pivot, pulse_scene):
 
 def test_compiled_scratch_is_scratch(pulse_scene):
     """What the loop finds in its work arrays, however wild, does not matter."""
+    from stepping import play, six
+
     from rockcheck.ebm import natural
-    from rockcheck.ebm.core import march, motion
+    from rockcheck.ebm.core.state import Control, workspace
 
     scene = pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0))
-    unit = natural.time_unit(scene)
     setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
-    control = march.Control(1e-10, 100_000, 100_000, False, 1.0)
+    control = Control(1e-10, 100_000, 100_000, False, 1.0)
     found = []
     for filling in (0.0, np.nan, 1e300):
-        a, stack = motion.workspace()
+        a, stack = workspace()
         a[:], stack[:] = filling, filling
-        state = natural.state_of(scene)
-        nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
-        tally, _ = march.run(
-            setting,
-            *natural.grounds_of(scene),
-            state,
-            scene.duration / unit,
-            control,
-            *nothing,
-            a,
-            stack,
-        )
-        found.append((tally.peak, tally.steps, tally.events, tally.t, *state))
+        end = play(scene, setting, control, (a, stack))
+        found.append((end.peak, end.steps, end.events, end.t, *six(end.motion)))
     assert found[0] == found[1] == found[2]
 
 

@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
+from stepping import TILTED, run_at
 
 from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.scenes import Block, Floor, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
@@ -261,9 +262,9 @@ def test_series_begin_with_newton_and_euler(mode, case):
     """Accelerations and forces of the models' series in every mode at 200 random loaded blocks and
     states, to 1e-10."""
     from rockcheck.ebm.core import motion
+    from rockcheck.ebm.core.names import Pivot, Row
 
     rng = np.random.default_rng(11)
-    a, _ = motion.workspace()
     for _ in range(200):
         b, h = rng.uniform(0.1, 0.5), rng.uniform(0.5, 1.5)
         place = (rng.uniform(-0.6, 0.6) * b, rng.uniform(-0.6, 0.6) * h)
@@ -311,25 +312,25 @@ def test_series_begin_with_newton_and_euler(mode, case):
         )
         if mode in ("slide-rock", "ladder") and expected[3] < 0.0:
             continue  # the floor pulls: friction acts the other way
-        m = np.zeros(motion.MODE_SIZE, dtype=np.int64)
-        m[motion.FAMILY], m[motion.S], m[motion.SLIP], m[motion.PULL] = (
-            motion.TILT,
-            S,
-            S * d if mode in ("slide-rock", "ladder") else 0,
-            1,
+        run = run_at(
+            [0.0, c / R, theta, vx * unit / R, S * s * w * unit / R, w * unit],
+            **TILTED,
+            sense=S,
+            slip=S * d if mode in ("slide-rock", "ladder") else 0,
+            pivot=Pivot.STICK if mode in ("rock", "lean") else Pivot.SLIPPING,
+            tip=wall == S,
+            far=wall == -S,
         )
-        m[motion.FLOOR] = motion.STICK if mode in ("rock", "lean") else motion.SLIPPING
-        m[motion.TIP], m[motion.FAR] = wall == S, wall == -S
-        z = np.array([0.0, c / R, theta, vx * unit / R, S * s * w * unit / R, w * unit])
-        motion.tilt_series(setting, m, z, *natural.grounds_of(scene), 0.0, 12, 0.0, 0.0, a)
-        push = a[motion.NA, 0] - a[motion.NB, 0]
+        motion.tilt_series(setting, natural.base_of(scene), run, 12, 0.0, 0.0)
+        a = run.a
+        push = a[Row.NA, 0] - a[Row.NB, 0]
         found = np.array(
             [
                 0.0,
                 0.0,
-                S * a[motion.OMEGA, 1] / unit**2,
-                a[motion.P, 0] * G,
-                S * a[motion.Q, 0] * G,
+                S * a[Row.OMEGA, 1] / unit**2,
+                a[Row.P, 0] * G,
+                S * a[Row.Q, 0] * G,
                 S * push * G,
             ]
         )
@@ -446,35 +447,32 @@ def test_unilateral_walls_conserve_momentum_about_the_right_corners():
 def test_bouc_wens_series_keep_the_corner_on_its_wall(case):
     """x follows the corner's reach, +-s', in every term of the series, for 100 loaded blocks that
     turn along a wall."""
-    from rockcheck.ebm.core import bouc_wen, motion
+    from rockcheck.ebm.core import bouc_wen
+    from rockcheck.ebm.core.names import Pivot, Row
 
     rng, order = np.random.default_rng(14), 8
-    a, _ = bouc_wen.friction_workspace()
     for _ in range(100):
         scene = random_scene(rng).replace(
             walls=(Wall(side="left", gap=0.01), Wall(side="right", gap=0.01))
         )
-        b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
+        b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False, yields=0.1)
         S = int(rng.choice([-1, 1]))
         side = b.left if S > 0 else b.right
         sine, cosine = (side.tip_sin, side.tip_cos) if case > 0 else (side.far_sin, side.far_cos)
         phi, w = rng.uniform(0.1, 0.8) * side.alpha, rng.uniform(-0.3, 0.3)
         s, c = side.radius * math.sin(side.alpha - phi), side.radius * math.cos(side.alpha - phi)
-        m = np.zeros(motion.MODE_SIZE, dtype=np.int64)
-        m[motion.FAMILY], m[motion.S], m[motion.FLOOR], m[motion.PULL], m[motion.SLIP] = (
-            motion.TILT,
-            S,
-            motion.SLIPPING,
-            1,
-            1 if w > 0 else -1,
+        run = run_at(
+            [0.0, c, S * phi, S * case * (sine * s + cosine * c) * w, S * S * s * w, S * w],
+            t=1.0,
+            **TILTED,
+            sense=S,
+            pivot=Pivot.SLIPPING,
+            slip=1 if w > 0 else -1,
+            tip=case > 0,
+            far=case < 0,
         )
-        m[motion.TIP], m[motion.FAR] = case > 0, case < 0
-        z = np.array(
-            [0.0, c, S * phi, S * case * (sine * s + cosine * c) * w, S * S * s * w, S * w]
-        )
-        bouc_wen.friction_series(
-            b, m, z, 0.3, False, 0.1, *natural.grounds_of(scene), 1.0, order, a
-        )
+        bouc_wen.friction_series(b, natural.base_of(scene), run, 0.3, False, order)
+        a = run.a
         for k in range(1, order - 1):
-            reach = case * (sine * a[motion.COS, k] - cosine * a[motion.SIN, k])
-            assert a[motion.XI, k] == pytest.approx(reach, rel=1e-10, abs=1e-10), k
+            reach = case * (sine * a[Row.COS, k] - cosine * a[Row.SIN, k])
+            assert a[Row.XI, k] == pytest.approx(reach, rel=1e-10, abs=1e-10), k

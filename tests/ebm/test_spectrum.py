@@ -12,7 +12,7 @@ import pytest
 
 from rockcheck.ebm import EventBasedModel, batch, natural, overturning_spectrum
 from rockcheck.ebm.core.decide import quiet_from
-from rockcheck.ebm.core.march import TOO_MANY_STEPS
+from rockcheck.ebm.core.names import Ending
 from rockcheck.ebm.spectrum import node_scene, play_motions, play_nodes
 from rockcheck.scenes import Floor, InputError, Record, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
@@ -145,7 +145,7 @@ def test_a_run_that_fails_is_made_again_at_a_finer_tolerance(monkeypatch):
         found = run(packed, model, **rest)
         tolerances.append((len(packed), model.tolerance))
         if len(tolerances) == 1:
-            found.ending[1], found.side[1] = TOO_MANY_STEPS, 0
+            found.ending[1], found.side[1] = Ending.TOO_MANY_STEPS, 0
         return found
 
     monkeypatch.setattr(batch, "run_batch", failing)
@@ -222,7 +222,7 @@ def test_beside_a_wall_a_safe_block_is_known_before_the_pulse_is_over():
     )
     np.testing.assert_array_equal(early.side, whole.side)
     np.testing.assert_allclose(early.peak, whole.peak, rtol=1e-6)
-    quiet = np.array([quiet_from(*natural.grounds_of(node), model.tolerance) for node in nodes])
+    quiet = np.array([quiet_from(natural.base_of(node), model.tolerance) for node in nodes])
     safe = (early.side == 0) & (early.peak > 0.0)
     assert np.count_nonzero(early.t_end[safe] < quiet[safe]) > 0.8 * np.count_nonzero(safe) > 20
 

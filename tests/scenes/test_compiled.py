@@ -134,7 +134,7 @@ def test_what_was_compiled_is_read_back(tmp_path, play):
 
 def test_the_key_is_of_all_that_lies_below_the_package(tmp_path, monkeypatch):
     """A function of rockcheck.ebm.core.march may call one of any module of rockcheck.ebm."""
-    assert compiled._package(march.run.py_func) == Path(ebm.__file__).parent
+    assert compiled._package(march.play.py_func) == Path(ebm.__file__).parent
     monkeypatch.setattr(compiled.config, "CACHE_DIR", str(tmp_path / "cache"))
     below = tmp_path / "package" / "core" / "deep.py"
     below.parent.mkdir(parents=True)
@@ -365,8 +365,8 @@ def test_what_is_compiled_ahead_is_not_compiled_again(capsys):
     code = (
         "from rockcheck.validation.execute.warming import PARTS;"
         "[run() for run in PARTS.values()];"
-        "from rockcheck.ebm.core import march; print(sum(march.run.stats.cache_misses.values()),"
-        " len(march.run.signatures) <= 3)"
+        "from rockcheck.ebm.core import march; print(sum(march.play.stats.cache_misses.values()),"
+        " len(march.play.signatures) <= 1)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True

@@ -120,7 +120,7 @@ def test_the_sliding_estimate_is_the_displacement_of_its_oscillator(shaken, vert
     slip = criteria.reserve_sliding(scene, base)
     capacity = 2.0 * 0.35 * (G - 0.4 * vertical)
     frequency = math.sqrt(capacity / slip) / (2.0 * math.pi)
-    assert base.spectral(frequency, 0.10) == pytest.approx(capacity, rel=0.02)
+    assert base.spectral(frequency, 0.10) == pytest.approx(capacity, rel=1e-3)
     assert base.spectral(0.8 * frequency, 0.10) < capacity
 
 

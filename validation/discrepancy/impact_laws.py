@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.ebm.horizon import FLAT, may_fly
+from rockcheck.ebm.horizon import LANDS_FLAT, may_fly
 from rockcheck.ebm.model import ImpactLaw
 from rockcheck.scenes import History, Scene
 from rockcheck.validation.discrepancy.figures import Stored
@@ -103,7 +103,7 @@ def parting_landing(scene: Scene) -> Landing | None:
     `simulate` raises.
     """
     laws = [FLUSH_LAWS] if any(wall.restitution > 0.0 for wall in scene.walls) else []
-    if may_fly(scene) and FLAT in _played(scene, "moreau").cost.rules:
+    if may_fly(scene) and LANDS_FLAT in _played(scene, "moreau").cost.rules:
         laws.append(FLAT_LAWS)
     found = [landing for some in laws if (landing := _parting(scene, some)) is not None]
     return min(found, key=lambda landing: landing.t, default=None)

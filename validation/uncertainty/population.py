@@ -373,7 +373,8 @@ def sensitivities(
         found = sobol_indices(**how, rng=np.random.default_rng(seed))
     except TypeError:  # scipy before 1.15 calls it random_state
         found = sobol_indices(**how, random_state=np.random.default_rng(seed))
-    first, total = found.first_order[0], found.total_order[0]
+    # of one input scipy gives numbers in place of rows
+    first, total = (np.reshape(some, (2, -1))[0] for some in (found.first_order, found.total_order))
     if not np.any(total):
         return ()
     rows = [

@@ -27,49 +27,73 @@ where it lands flat while it slides. No law that is right there follows from rig
 
 from __future__ import annotations
 
-import itertools
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rockcheck.ebm.core.contacts import CLOSED, SLOW
-from rockcheck.ebm.core.motion import (
-    CLOSED_BRANCH,
-    FLOOR_FIRST,
-    LEADING_FIRST,
-    MOREAU,
-    OPEN_BRANCH,
-    TRAILING_FIRST,
-    side_of,
-)
-from rockcheck.ebm.core.series import NOISE, POSITION
+from rockcheck.ebm.core.motion import side_of
+from rockcheck.ebm.core.names import CONTACT_SETS, CONTACTS, Contact, Found, Friction, Kind, Law
+from rockcheck.ebm.core.series import NOISE
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
-F, E, TIP_TOP, TIP_BOTTOM, FAR_BOTTOM, FAR_TOP = range(6)
-CONTACTS = 6
+Numbers = NDArray[np.float64]
 #: Rows of scratch that an impact needs.
 WORK = 20
-_TANGENT = 6
-_NONE, _STICK, _PLUS, _MINUS = range(4)
 # Every set of at most three contacts: their number, the contacts, and these as bits.
-_CHOSEN = [some for n in range(4) for some in itertools.combinations(range(CONTACTS), n)]
 _SETS = np.array(
-    [[len(some), *some, *[0] * (3 - len(some)), sum(1 << j for j in some)] for some in _CHOSEN]
+    [[len(some), *some, *[0] * (3 - len(some)), sum(1 << j for j in some)] for some in CONTACT_SETS]
 )
 # By the contacts that take part, as bits: the sets of no others, by their numbers, and then -1.
 _WITHIN = np.full((1 << CONTACTS, len(_SETS) + 1), -1, dtype=np.int8)
 for _bits in range(1 << CONTACTS):
     _inside = np.flatnonzero(_SETS[:, 4] & ~_bits == 0)
     _WITHIN[_bits, : len(_inside)] = _inside
-_ON_FLOOR = 1 << F | 1 << E
+_ON_FLOOR = 1 << Contact.FOOT | 1 << Contact.OTHER
 # Rounding of a velocity, of the velocities at play; rows of contacts that are nearer to parallel
 # than this give no solution.
-_ROUNDING, _PARALLEL = NOISE[POSITION], CLOSED
+_ROUNDING, _PARALLEL = NOISE[Kind.POSITION], CLOSED
 _MOST_STAGES = 40
-#: What came of an impact: all stages obey the law; a stage only violates it by least; or the stages
-#: do not end.
-ENDLESS, FITS, LEAST_WRONG = range(3)
-_HALVINGS = 45
+_HALVINGS, _FRICTIONS = 45, len(Friction)
+
+
+class Impact(NamedTuple):
+    """Contacts that touch at one instant.
+
+    The block tips by phi to `sense`; `touching[6]` says which gaps are closed (not 0), `resting` is
+    the approach speed below which a contact closes for good, and v (xi, y, phi rates) becomes the
+    velocities after the impact.
+    """
+
+    sense: float
+    phi: float
+    touching: Numbers
+    e_tip: float
+    e_far: float
+    resting: float
+    v: Numbers
+
+
+class Stage(NamedTuple):
+    """What a stage of an impact works on: rows of the contacts, a linear system, of a trial the
+    impulses and the velocities; of each contact its restitution, the velocity that it is to leave
+    with, its impulse, its approach, how far its next impact is ahead, whether it takes part, and
+    its full rebound; the velocities after the stage."""
+
+    rows: Numbers
+    system: Numbers
+    lam: Numbers
+    trial: Numbers
+    restitution: Numbers
+    target: Numbers
+    part: Numbers
+    approach: Numbers
+    ahead: Numbers
+    after: Numbers
+    taking: Numbers
+    full: Numbers
 
 
 @inner_kernel
@@ -79,13 +103,22 @@ def contact_rows(b, sense, phi, rows):
     pivot, other = side_of(b, sense), side_of(b, -sense)
     s, c = pivot.radius * math.sin(pivot.alpha - phi), pivot.radius * math.cos(pivot.alpha - phi)
     rows[:] = 0.0
-    rows[F, 1], rows[F, 2] = 1.0, -s
-    rows[E, 1], rows[E, 2] = 1.0, other.radius * math.sin(other.alpha + phi)
-    rows[TIP_TOP, 0], rows[TIP_TOP, 2] = 1.0, -pivot.top_radius * math.cos(pivot.top_alpha + phi)
-    rows[TIP_BOTTOM, 0], rows[TIP_BOTTOM, 2] = 1.0, c
-    rows[FAR_BOTTOM, 0], rows[FAR_BOTTOM, 2] = -1.0, -other.radius * math.cos(other.alpha + phi)
-    rows[FAR_TOP, 0], rows[FAR_TOP, 2] = -1.0, other.top_radius * math.cos(other.top_alpha - phi)
-    rows[_TANGENT, 0], rows[_TANGENT, 2] = 1.0, c
+    rows[Contact.FOOT, 1], rows[Contact.FOOT, 2] = 1.0, -s
+    rows[Contact.OTHER, 1], rows[Contact.OTHER, 2] = 1.0, other.radius * math.sin(other.alpha + phi)
+    rows[Contact.TIP_TOP, 0], rows[Contact.TIP_TOP, 2] = (
+        1.0,
+        -pivot.top_radius * math.cos(pivot.top_alpha + phi),
+    )
+    rows[Contact.TIP_BOTTOM, 0], rows[Contact.TIP_BOTTOM, 2] = 1.0, c
+    rows[Contact.FAR_BOTTOM, 0], rows[Contact.FAR_BOTTOM, 2] = (
+        -1.0,
+        -other.radius * math.cos(other.alpha + phi),
+    )
+    rows[Contact.FAR_TOP, 0], rows[Contact.FAR_TOP, 2] = (
+        -1.0,
+        other.top_radius * math.cos(other.top_alpha - phi),
+    )
+    rows[Contact.TANGENT, 0], rows[Contact.TANGENT, 2] = 1.0, c
 
 
 @inner_kernel
@@ -144,35 +177,36 @@ def _fits(number, friction, slippery):
     """Whether a set is to be tried with this friction: at most three unknowns, friction where the
     floor is in it."""
     on_floor = _SETS[number, 4] & _ON_FLOOR != 0
-    if friction == _STICK:
+    if friction == Friction.HELD:
         return on_floor and _SETS[number, 0] <= 2
-    return on_floor != (friction == _NONE) or (slippery and friction == _NONE)
+    return on_floor != (friction == Friction.FREE) or (slippery and friction == Friction.FREE)
 
 
 @inner_kernel
 def _push(rows, index, kappa, k):
     """What a contact's impulse does to velocity k, times the mass: its row, and of a slipping
     floor's the friction."""
-    return rows[index, k] - (kappa * rows[_TANGENT, k] if index <= E else 0.0)
+    return rows[index, k] - (kappa * rows[Contact.TANGENT, k] if index <= Contact.OTHER else 0.0)
 
 
 @inner_kernel
-def _try_set(rows, spin, number, friction, target, mu_k, v, system, trial, lam):
+def _try_set(block, stage, v, number, friction):
     """The impulses of the contacts in the set, and the velocities after them; False where there are
     none."""
+    rows, system, lam, trial = stage.rows, stage.system, stage.lam, stage.trial
+    spin, mu_k, target = block.spin, block.mu_k, stage.target
     count = _SETS[number, 0]
-    n = count + (1 if friction == _STICK else 0)
-    kappa = mu_k if friction == _PLUS else (-mu_k if friction == _MINUS else 0.0)
+    n = count + (1 if friction == Friction.HELD else 0)
+    kappa = mu_k if friction == Friction.PLUS else (-mu_k if friction == Friction.MINUS else 0.0)
     for i in range(n):
-        row = _SETS[number, 1 + i] if i < count else _TANGENT
+        row = _SETS[number, 1 + i] if i < count else Contact.TANGENT
         system[i, n] = target[row] if i < count else 0.0
         for k in range(3):
             system[i, n] -= rows[row, k] * v[k]
         for j in range(n):
-            column = _SETS[number, 1 + j] if j < count else _TANGENT
-            system[i, j] = rows[row, 0] * _push(rows, column, kappa, 0) + rows[row, 1] * _push(
-                rows, column, kappa, 1
-            )
+            column = _SETS[number, 1 + j] if j < count else Contact.TANGENT
+            x, y = _push(rows, column, kappa, 0), _push(rows, column, kappa, 1)
+            system[i, j] = rows[row, 0] * x + rows[row, 1] * y
             system[i, j] += spin * rows[row, 2] * _push(rows, column, kappa, 2)
     if not solve(system, n):
         return False
@@ -180,37 +214,38 @@ def _try_set(rows, spin, number, friction, target, mu_k, v, system, trial, lam):
         trial[k], lam[k] = v[k], 0.0
     for j in range(n):
         lam[j] = system[j, n]
-        index = _SETS[number, 1 + j] if j < count else _TANGENT
+        index = _SETS[number, 1 + j] if j < count else Contact.TANGENT
         for k in range(3):
             trial[k] += (spin if k == 2 else 1.0) * _push(rows, index, kappa, k) * lam[j]
     return True
 
 
 @inner_kernel
-def _violation(rows, number, friction, taking, target, mu_s, trial, lam):
+def _violation(block, stage, number, friction):
     """By how much a solution violates the law: a pull, a contact that still closes, friction beyond
     its cone or in the wrong sense."""
+    rows, lam, trial = stage.rows, stage.lam, stage.trial
     count = _SETS[number, 0]
     worst = 0.0
     floor_normal = 0.0
     for i in range(count):
         worst = max(worst, -lam[i])
-        if _SETS[number, 1 + i] <= E:
+        if _SETS[number, 1 + i] <= Contact.OTHER:
             floor_normal += lam[i]
-    slip = _dot(rows[_TANGENT], trial)
-    if friction == _STICK:
-        worst = max(worst, abs(lam[count]) - mu_s * floor_normal)
-    elif friction != _NONE:
-        worst = max(worst, -slip if friction == _PLUS else slip)
+    slip = _dot(rows[Contact.TANGENT], trial)
+    if friction == Friction.HELD:
+        worst = max(worst, abs(lam[count]) - block.mu_s * floor_normal)
+    elif friction != Friction.FREE:
+        worst = max(worst, -slip if friction == Friction.PLUS else slip)
     for j in range(CONTACTS):
-        if taking[j] != 0.0:
-            worst = max(worst, target[j] - _dot(rows[j], trial))
+        if stage.taking[j] != 0.0:
+            worst = max(worst, stage.target[j] - _dot(rows[j], trial))
     return worst
 
 
 @called_kernel
-def _strike(rows, spin, taking, target, mu_s, mu_k, v, after, impulse, system):
-    """One stage over the contacts in `taking`: writes the velocities after it and the impulses;
+def _strike(block, stage, v):
+    """One stage over the contacts that take part: writes the velocities after it and the impulses;
     False where only the least wrong fits.
 
     Every set of contacts is tried with every friction. Of those that obey the law the one that
@@ -218,73 +253,80 @@ def _strike(rows, spin, taking, target, mu_s, mu_k, v, after, impulse, system):
     (Painleve), the one that contradicts it least.
     """
     least, lowest = np.inf, np.inf
-    lam, trial = system[3], system[4]
     bits = 0
     for j in range(CONTACTS):
-        bits |= (1 if taking[j] != 0.0 else 0) << j
+        bits |= (1 if stage.taking[j] != 0.0 else 0) << j
     for place in range(_WITHIN.shape[1]):
         number = _WITHIN[bits, place]
         if number < 0:
             break
-        for friction in range(4):
-            if not _fits(number, friction, mu_s == 0.0) or not _try_set(
-                rows, spin, number, friction, target, mu_k, v, system, trial, lam
-            ):
+        for friction in range(_FRICTIONS):
+            if not _fits(number, friction, block.mu_s == 0.0):
                 continue
-            scale = _size(v) + _size(trial) + _size(lam)
-            wrong = _violation(rows, number, friction, taking, target, mu_s, trial, lam)
+            if not _try_set(block, stage, v, number, friction):
+                continue
+            scale = _size(v) + _size(stage.trial) + _size(stage.lam)
+            wrong = _violation(block, stage, number, friction)
             wrong = 0.0 if wrong <= _ROUNDING * scale else wrong
-            energy = kinetic_energy(spin, trial)
-            if not wrong < least and not (
-                wrong == least and energy < lowest - _ROUNDING * scale * scale
-            ):
-                continue
-            least, lowest = wrong, energy
-            impulse[:] = 0.0
-            for i in range(_SETS[number, 0]):
-                impulse[_SETS[number, 1 + i]] = max(lam[i], 0.0)
-            for k in range(3):
-                after[k] = trial[k]
-            if friction == _STICK:
-                after[0] -= _dot(rows[_TANGENT], after)  # rounding only: the pivot stands
+            energy = kinetic_energy(block.spin, stage.trial)
+            lower = wrong == least and energy < lowest - _ROUNDING * scale * scale
+            if wrong < least or lower:
+                least, lowest = wrong, energy
+                _keep(stage, number, friction)
     return least == 0.0
 
 
 @inner_kernel
-def _moreau(law, touching, approach, restitution, rounding, taking):
-    """Whatever touches takes part; at an elastic wall only the corners that approach."""
-    for j in range(CONTACTS):
-        rests = law != OPEN_BRANCH and (law == CLOSED_BRANCH or restitution[j] < 1.0)
-        taking[j] = (
-            1.0 if touching[j] != 0.0 and (j <= E or approach[j] < -rounding or rests) else 0.0
-        )
+def _keep(stage, number, friction):
+    """Keeps what was tried."""
+    stage.part[:] = 0.0
+    for i in range(_SETS[number, 0]):
+        stage.part[_SETS[number, 1 + i]] = max(stage.lam[i], 0.0)
+    for k in range(3):
+        stage.after[k] = stage.trial[k]
+    if friction == Friction.HELD:
+        # Rounding only: the pivot stands.
+        stage.after[0] -= _dot(stage.rows[Contact.TANGENT], stage.after)
 
 
 @inner_kernel
-def _one_corner(law, approach, slip, taking):
+def _moreau(law, stage, touching, rounding):
+    """Whatever touches takes part; at an elastic wall only the corners that approach."""
+    for j in range(CONTACTS):
+        elastic = law != Law.CLOSED_BRANCH and not stage.restitution[j] < 1.0
+        rests = j <= Contact.OTHER or (law != Law.OPEN_BRANCH and not elastic)
+        takes = touching[j] != 0.0 and (rests or stage.approach[j] < -rounding)
+        stage.taking[j] = 1.0 if takes else 0.0
+
+
+@inner_kernel
+def _one_corner(law, stage, slip):
     """Of two bottom corners that approach the floor only the one that the law puts first takes
     part.
 
     F stands on the side of negative slip. Without slip neither leads, and both take part.
     """
-    if law != LEADING_FIRST and law != TRAILING_FIRST:
+    if law != Law.LEADING_FIRST and law != Law.TRAILING_FIRST:
         return
-    if max(approach[F], approach[E]) < -SLOW and abs(slip) >= SLOW:
-        taking[E if (slip < 0.0) == (law == LEADING_FIRST) else F] = 0.0
+    approach = stage.approach
+    if max(approach[Contact.FOOT], approach[Contact.OTHER]) < -SLOW and abs(slip) >= SLOW:
+        trails = (slip < 0.0) == (law == Law.LEADING_FIRST)
+        stage.taking[Contact.OTHER if trails else Contact.FOOT] = 0.0
 
 
 @inner_kernel
-def _floor_first(touching, approach, stage, rounding, ahead, taking):
+def _floor_first(stage, touching, number, rounding):
     """The contacts that are struck next, in the order of a neighbouring trajectory, and those that
     rest meanwhile.
 
     `ahead` keeps how far each contact is from its next impact there: where the floor is struck
     first, a wall is one unit away.
     """
-    floor = approach[F] < -rounding or approach[E] < -rounding
-    if stage == 0:
+    approach, ahead, taking = stage.approach, stage.ahead, stage.taking
+    floor = approach[Contact.FOOT] < -rounding or approach[Contact.OTHER] < -rounding
+    if number == 0:
         for j in range(CONTACTS):
-            ahead[j] = 1.0 if floor and j > E else 0.0
+            ahead[j] = 1.0 if floor and j > Contact.OTHER else 0.0
     soonest = np.inf
     for j in range(CONTACTS):
         if approach[j] < -rounding:
@@ -299,21 +341,50 @@ def _floor_first(touching, approach, stage, rounding, ahead, taking):
             taking[j] = 1.0 if abs(approach[j]) <= rounding and ahead[j] <= _PARALLEL else 0.0
 
 
-@called_kernel
-def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, tally, work):
-    """All stages at one instant; v (xi, y, phi rates) becomes the velocities after them. Returns
-    FITS, LEAST_WRONG or ENDLESS.
+@inner_kernel
+def _approaches(block, impact, stage, plastic, rounding):
+    """Writes how each contact approaches and rebounds; whether any approaches."""
+    closes = False
+    for j in range(CONTACTS):
+        touches = impact.touching[j] != 0.0
+        stage.approach[j] = _dot(stage.rows[j], impact.v) if touches else 0.0
+        closes = closes or stage.approach[j] < -rounding
+        e_wall = impact.e_tip if j <= Contact.TIP_BOTTOM else impact.e_far
+        stage.restitution[j] = block.e_floor if j <= Contact.OTHER else e_wall
+        if plastic:
+            stage.restitution[j] = 0.0
+    return closes
 
-    The block tips by phi to `sense`. `touching[6]` says which gaps are closed (not 0), `resting` is
-    the approach speed below which a contact closes for good. `work` is scratch, such as that of the
-    root search: `WORK` rows. `impulse[2]` gathers the normal impulses of floor and walls;
-    `tally[0]` counts stages that added energy and `tally[1]` keeps the largest relative gain.
+
+@inner_kernel
+def _choose(law, impact, stage, number, rounding):
+    """Writes which contacts take part in stage `number` by this law, and the velocities that they
+    are to leave with."""
+    if law == Law.FLOOR_FIRST:
+        _floor_first(stage, impact.touching, number, rounding)
+    else:
+        _moreau(law, stage, impact.touching, rounding)
+        _one_corner(law, stage, _dot(stage.rows[Contact.TANGENT], impact.v))
+    for j in range(CONTACTS):
+        rebounds = stage.taking[j] != 0.0 and stage.approach[j] < -impact.resting
+        stage.target[j] = -stage.restitution[j] * stage.approach[j] if rebounds else 0.0
+
+
+@called_kernel
+def contact_impact(block, impact, state, work):
+    """All stages of an `Impact`; returns what came of it, a Found.
+
+    `work` is scratch, such as that of the root search: `WORK` rows. The state gathers the normal
+    impulses of floor and walls, counts the stages that added energy and keeps the largest relative
+    gain.
     """
-    rows, system = (
-        work[:7],
+    v, touching, rows = impact.v, impact.touching, work[:7]
+    # The impulses and velocities of a trial stand below the system.
+    stage = Stage(
+        rows,
         work[7:12],
-    )  # the impulses and velocities of a trial stand below the system
-    restitution, target, part, approach, ahead, after, taking, full = (
+        work[10],
+        work[11],
         work[12],
         work[13],
         work[14],
@@ -323,82 +394,69 @@ def contact_impact(b, sense, phi, touching, e_tip, e_far, resting, v, impulse, t
         work[18],
         work[19],
     )
-    contact_rows(b, sense, phi, rows)
-    part[:] = 0.0
-    after[:] = 0.0
+    contact_rows(block, impact.sense, impact.phi, rows)
+    stage.part[:] = 0.0
+    stage.after[:] = 0.0
     rounding = _ROUNDING * _size(v)
-    found = FITS
-    for stage in range(_MOST_STAGES):
-        plastic = (
-            2 * stage >= _MOST_STAGES
-        )  # impacts that alternate between floor and wall without end become plastic
-        closes = False
-        for j in range(CONTACTS):
-            approach[j] = _dot(rows[j], v) if touching[j] != 0.0 else 0.0
-            closes = closes or approach[j] < -rounding
-            restitution[j] = (
-                0.0 if plastic else (b.e_floor if j <= E else (e_tip if j <= TIP_BOTTOM else e_far))
-            )
-        if not closes:
-            _close(rows, b.spin, touching, resting, v, system)
+    found = Found.FITS
+    for number in range(_MOST_STAGES):
+        # Impacts that alternate between floor and wall without end become plastic.
+        plastic = 2 * number >= _MOST_STAGES
+        if not _approaches(block, impact, stage, plastic, rounding):
+            _close(block.spin, stage, impact)
             return found
-        law = MOREAU if plastic else b.law
-        if law == FLOOR_FIRST:
-            _floor_first(touching, approach, stage, rounding, ahead, taking)
-        else:
-            _moreau(law, touching, approach, restitution, rounding, taking)
-            _one_corner(law, approach, _dot(rows[_TANGENT], v), taking)
-        for j in range(CONTACTS):
-            target[j] = (
-                -restitution[j] * approach[j]
-                if taking[j] != 0.0 and approach[j] < -resting
-                else 0.0
-            )
-        before = kinetic_energy(b.spin, v)
-        if not _strike(rows, b.spin, taking, target, b.mu_s, b.mu_k, v, after, part, system):
-            found = LEAST_WRONG
+        _choose(Law.MOREAU if plastic else block.law, impact, stage, number, rounding)
+        before = kinetic_energy(block.spin, v)
+        if not _strike(block, stage, v):
+            found = Found.LEAST_WRONG
         noise = 2.0 * _ROUNDING * before
-        if b.energy_cap and not plastic and kinetic_energy(b.spin, after) - before > noise:
-            _strike_without_gain(b, rows, taking, target, v, after, part, system, before, full)
-        gain = kinetic_energy(b.spin, after) - before
+        gains = kinetic_energy(block.spin, stage.after) - before > noise
+        if block.energy_cap and not plastic and gains:
+            _strike_without_gain(block, stage, v, before)
+        gain = kinetic_energy(block.spin, stage.after) - before
         if gain > noise:
-            tally[0] += 1.0
-            tally[1] = max(tally[1], gain / before)
+            state.gains += 1
+            state.largest_gain = max(state.largest_gain, gain / before)
         for j in range(CONTACTS):
-            impulse[0 if j <= E else 1] += part[j]
+            if j <= Contact.OTHER:
+                state.floor_impulse += stage.part[j]
+            else:
+                state.wall_impulse += stage.part[j]
         for k in range(3):
-            v[k] = after[k]
-    if touching[TIP_TOP] != 0.0 and touching[FAR_BOTTOM] != 0.0:
+            v[k] = stage.after[k]
+    if touching[Contact.TIP_TOP] != 0.0 and touching[Contact.FAR_BOTTOM] != 0.0:
         # Its diagonal just fits between two walls, with a lever so short that no impulse can be
         # solved for: it jams.
         v[0] = v[2] = 0.0
-    return ENDLESS
+    return Found.ENDLESS
 
 
 @called_kernel
-def _strike_without_gain(b, rows, taking, target, v, after, part, system, before, full):
+def _strike_without_gain(block, stage, v, before):
     """Strikes with the largest share of the rebound at which no energy is gained."""
     for j in range(CONTACTS):
-        full[j] = target[j]
+        stage.full[j] = stage.target[j]
     low, high = 0.0, 1.0
     for trial in range(_HALVINGS + 1):
         scale = low if trial == _HALVINGS else 0.5 * (low + high)
         for j in range(CONTACTS):
-            target[j] = scale * full[j]
-        _strike(rows, b.spin, taking, target, b.mu_s, b.mu_k, v, after, part, system)
-        if kinetic_energy(b.spin, after) > before:
+            stage.target[j] = scale * stage.full[j]
+        _strike(block, stage, v)
+        if kinetic_energy(block.spin, stage.after) > before:
             high = scale
         else:
             low = scale
 
 
 @called_kernel
-def _close(rows, spin, touching, resting, v, system):
+def _close(spin, stage, impact):
     """Contacts that part more slowly than `resting` are closed: the velocity is projected onto
     them, mass-orthogonally."""
-    members, count = system[3], 0
+    rows, system, v = stage.rows, stage.system, impact.v
+    members, count = stage.lam, 0
     for j in range(CONTACTS):
-        if touching[j] != 0.0 and count < 3 and abs(_dot(rows[j], v)) < resting:
+        slow = abs(_dot(rows[j], v)) < impact.resting
+        if impact.touching[j] != 0.0 and count < 3 and slow:
             members[count] = j
             count += 1
     while count > 0:

@@ -13,33 +13,55 @@ on the pivot.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from rockcheck.ebm.core.contacts import CLOSED
 from rockcheck.ebm.core.motion import side_of
-from rockcheck.ebm.core.series import NOISE, POSITION
+from rockcheck.ebm.core.names import Branch, Kind, Landing
+from rockcheck.ebm.core.series import NOISE
 from rockcheck.scenes.compiled import inner_kernel
 
-STICK, SLIP, FLAT_END = 0, 1, 2
-#: The wall cascade's branches, as the paper's Fig. 3 letters them.
-A_STICK, B_STICK, C_STICK, D_SLIP, E_SLIP, NO_BRANCH = range(6)
+
+class Corner(NamedTuple):
+    """A corner that strikes a wall, and the pivot: S, Sw, s, c, C = S Sw c', the pivot's k, and
+    `spin`."""
+
+    S: float
+    Sw: float
+    s: float
+    c: float
+    C: float
+    share: float
+    spin: float
+
+
+class Pivots(NamedTuple):
+    """A block that lands: S, s and k of the new pivot, s of the old one, c, and `spin`."""
+
+    S2: float
+    s2: float
+    share: float
+    s1: float
+    c: float
+    spin: float
 
 
 @inner_kernel
-def floor_stick(s1, s2, c, k2, S2, w1, v1):
-    """Floor impact on the other corner, which sticks (e_g = 0): w2, P, Q; s1, s2, k2 of the old and
-    the new pivot.
+def floor_stick(on, w1, v1):
+    """Floor impact on the other corner, which sticks (e_g = 0): w2, P, Q.
 
     The angular momentum about the new pivot stays what it is: with v1 = 0, w2/w1 = 1 - k2 s2 (s1 +
     s2), Housner's ratio 1 - 1.5 s^2.
     """
+    s1, s2, c, k2 = on.s1, on.s2, on.c, on.share
     w2 = (1.0 - k2 * (s1 + s2) * s2) * w1 - k2 * c * v1
-    return w2, S2 * (s2 * (w1 + w2) + (s1 - s2) * w1), c * (w1 - w2) - v1
+    return w2, on.S2 * (s2 * (w1 + w2) + (s1 - s2) * w1), c * (w1 - w2) - v1
 
 
 @inner_kernel
-def floor_slip(s1, s2, c, spin, S2, d, mu_k, w1, v1):
-    """Floor impact on the other corner, which slips toward d (e_g = 0): w2, v2, P; s1, s2 of the
-    old and the new pivot."""
+def floor_slip(on, d, mu_k, w1, v1):
+    """Floor impact on the other corner, which slips toward d (e_g = 0): w2, v2, P."""
+    s1, s2, c, spin, S2 = on.s1, on.s2, on.c, on.spin, on.S2
     old, new = s1 * s2 + mu_k * d * S2 * s1 * c, s2 * s2 + mu_k * d * S2 * s2 * c
     w2 = w1 * (1.0 - spin * old) / (1.0 + spin * new)
     p = (s1 + s2) * abs(w1) / (1.0 + spin * new)
@@ -48,34 +70,36 @@ def floor_slip(s1, s2, c, spin, S2, d, mu_k, w1, v1):
 
 @inner_kernel
 def floor_impact(b, S1, w1, v1, mu_s, mu_k):
-    """Floor impact as theta passes zero, from pivot S1 of the block b (a `Setting`) to -S1: form
-    (STICK, SLIP, FLAT_END), w2, v2, P.
+    """Floor impact as theta passes zero, from pivot S1 of the block b (a `Setting`) to -S1: form (a
+    Landing), w2, v2, P.
 
     Sticks if it can, else slips against the friction; where neither lets the block turn on it stays
     flat (squat blocks, much friction), and v2 is then the velocity with which it slides.
     """
     S2 = -S1
-    s1, s2, c, k2 = side_of(b, S1).arm, side_of(b, S2).arm, b.height, side_of(b, S2).share
-    rounding = NOISE[POSITION] * (abs(w1) + abs(v1))
-    w2, p, q = floor_stick(s1, s2, c, k2, S2, w1, v1)
+    new = side_of(b, S2)
+    on = Pivots(float(S2), new.arm, new.share, side_of(b, S1).arm, b.height, b.spin)
+    s1, c = on.s1, on.c
+    rounding = NOISE[Kind.POSITION] * (abs(w1) + abs(v1))
+    w2, p, q = floor_stick(on, w1, v1)
     if S2 * w2 >= 0.0 and p >= 0.0 and abs(q) <= mu_s * p + rounding:
-        return STICK, w2, 0.0, p
+        return Landing.HELD_FAST, w2, 0.0, p
     stuck = w2, p
     turns = False
     toward = -1.0 if q > 0.0 else 1.0
     for d in (toward, -toward):
-        w2, v2, p = floor_slip(s1, s2, c, b.spin, S2, d, mu_k, w1, v1)
+        w2, v2, p = floor_slip(on, d, mu_k, w1, v1)
         turns = turns or S2 * w2 >= 0.0
         if S2 * w2 >= 0.0 and d * v2 >= -rounding:
-            return SLIP, w2, v2, p
+            return Landing.SLID, w2, v2, p
     if turns and mu_s > mu_k and S2 * stuck[0] >= 0.0:
         # Static friction above kinetic leaves a gap in which neither form is consistent: sticking
         # is the nearer one.
-        return STICK, stuck[0], 0.0, stuck[1]
+        return Landing.HELD_FAST, stuck[0], 0.0, stuck[1]
     p = s1 * abs(w1)
     xdot = v1 - c * w1
     return (
-        FLAT_END,
+        Landing.FLAT_END,
         0.0,
         (0.0 if abs(xdot) <= mu_s * p else xdot - math.copysign(mu_k * p, xdot)),
         p,
@@ -83,69 +107,82 @@ def floor_impact(b, S1, w1, v1, mu_s, mu_k):
 
 
 @inner_kernel
-def wall_stick(S, Sw, s, c, C, spin, w1, xdot1, e):
+def wall_stick(corner, e, w1, xdot1):
     """(25), (26): the corner rebounds with e, the pivot sticks: w2, xdot2, P, Q."""
+    S, s, c, C = corner.S, corner.s, corner.c, corner.C
     w2 = e * (xdot1 - C * w1) / (C + c)
     xdot2 = -c * w2
     p = S * s * (w2 - w1)
-    return w2, xdot2, p, (S * s * p + C * (xdot2 - xdot1) + (w2 - w1) / spin) / (c + C)
+    return w2, xdot2, p, (S * s * p + C * (xdot2 - xdot1) + (w2 - w1) / corner.spin) / (c + C)
 
 
 @inner_kernel
-def wall_slip(S, s, c, C, spin, w1, xdot1, e, mu_k, Sr, sy):
+def wall_slip(corner, e, w1, xdot1, kappa):
     """(30): the corner rebounds with e, the pivot slips toward Sr under a P of sign sy: w2, xdot2,
-    P, Q."""
-    k = S * s + (c + C) * mu_k * Sr * sy
+    P, Q = -kappa P, with kappa = mu_k Sr sy."""
+    S, s, c, C, spin = corner.S, corner.s, corner.c, corner.C, corner.spin
+    k = S * s + (c + C) * kappa
     w2 = (w1 / spin + k * S * s * w1 - e * C * C * w1 + (1.0 + e) * C * xdot1) / (
         1.0 / spin + k * S * s + C * C
     )
     p = S * s * (w2 - w1)
-    return w2, C * w2 - e * (xdot1 - C * w1), p, -mu_k * Sr * sy * p
+    return w2, C * w2 - e * (xdot1 - C * w1), p, -kappa * p
 
 
 @inner_kernel
-def _stops(branch, S, Sw, s, w1, xdot1):
+def _stops(branch, corner, w1, xdot1):
     """The block stops, by what impulses of wall and floor that takes."""
-    return branch, 0.0, 0.0, max(0.0, -Sw * xdot1), -S * s * w1, 0.0
+    return branch, 0.0, 0.0, max(0.0, -corner.Sw * xdot1), -corner.S * corner.s * w1, 0.0
 
 
 @inner_kernel
-def wall_impact(S, Sw, s, c, c_prime, share, spin, w1, xdot1, e, mu_s, mu_k, no_slip):
+def wall_impact(b, corner, e, w1, xdot1):
     """A corner strikes the wall, case I (top, S = Sw) or II (bottom): branch, w2, xdot2, N, P, v2,
     after the cascade of Fig. 3.
 
-    `share` is the pivot's k, N >= 0 is the wall's impulse. (31) is the identity map while the pivot
-    is on the floor, so it does not appear.
+    N >= 0 is the wall's impulse. (31) is the identity map while the pivot is on the floor, so it
+    does not appear. Of `b` (a `Setting`) friction is used.
     """
-    C = S * Sw * c_prime
-    rounding = NOISE[POSITION] * (abs(w1) + abs(xdot1))
-    w2, xdot2, p, q = wall_stick(S, Sw, s, c, C, spin, w1, xdot1, e)
-    if math.isfinite(w2) and (no_slip or abs(q) <= mu_s * abs(p) + rounding):
+    Sw = corner.Sw
+    rounding = NOISE[Kind.POSITION] * (abs(w1) + abs(xdot1))
+    w2, xdot2, p, q = wall_stick(corner, e, w1, xdot1)
+    if math.isfinite(w2) and (b.no_slip or abs(q) <= b.mu_s * abs(p) + rounding):
         n = Sw * (xdot2 - xdot1 - q)
         if n >= 0.0:  # (21)
-            return A_STICK, w2, xdot2, n, p, 0.0
-        w2 = share * (
-            w1 / spin - c * xdot1 + S * s * (S * s * w1)
-        )  # (27): no impulse from the wall
-        xdot2 = -c * w2
-        if Sw * (xdot2 - C * w2) >= 0.0:  # (22)
-            return B_STICK, w2, xdot2, 0.0, S * s * (w2 - w1), 0.0
-        return _stops(C_STICK, S, Sw, s, w1, xdot1)  # (28)
+            return Branch.A_STICK, w2, xdot2, n, p, 0.0
+        return _without_wall(corner, w1, xdot1)
     for Sr in (1.0, -1.0):
         for sy in (1.0, -1.0):
-            w2, xdot2, p, q = wall_slip(S, s, c, C, spin, w1, xdot1, e, mu_k, Sr, sy)
-            v2 = xdot2 + c * w2
+            kappa = b.mu_k * Sr * sy
+            w2, xdot2, p, q = wall_slip(corner, e, w1, xdot1, kappa)
+            v2 = xdot2 + corner.c * w2
             if p * sy < -rounding or v2 * Sr < -rounding:
                 continue
             n = Sw * (xdot2 - xdot1 - q)
             if n >= 0.0:
-                return D_SLIP, w2, xdot2, n, p, v2
-            k = -mu_k * Sr * sy
-            if (
-                abs(k * S * s - C) <= CLOSED
-            ):  # friction and wall have one lever: no speed meets both
-                return _stops(NO_BRANCH, S, Sw, s, w1, xdot1)
-            w2 = (k * S * s * w1 - xdot1) / (k * S * s - C)  # (32)
-            xdot2 = C * w2
-            return E_SLIP, w2, xdot2, 0.0, S * s * (w2 - w1), xdot2 + c * w2
-    return _stops(NO_BRANCH, S, Sw, s, w1, xdot1)
+                return Branch.D_SLIP, w2, xdot2, n, p, v2
+            return _slips_without_wall(corner, w1, xdot1, -kappa)
+    return _stops(Branch.NO_BRANCH, corner, w1, xdot1)
+
+
+@inner_kernel
+def _without_wall(corner, w1, xdot1):
+    """(27), (28): the pivot sticks without an impulse from the wall, or the block stops."""
+    S, s, c, C = corner.S, corner.s, corner.c, corner.C
+    w2 = corner.share * (w1 / corner.spin - c * xdot1 + S * s * (S * s * w1))
+    xdot2 = -c * w2
+    if corner.Sw * (xdot2 - C * w2) >= 0.0:  # (22)
+        return Branch.B_STICK, w2, xdot2, 0.0, S * s * (w2 - w1), 0.0
+    return _stops(Branch.C_STICK, corner, w1, xdot1)
+
+
+@inner_kernel
+def _slips_without_wall(corner, w1, xdot1, k):
+    """(32): the pivot slips without an impulse from the wall."""
+    S, s, C = corner.S, corner.s, corner.C
+    # Friction and wall have one lever: no speed meets both.
+    if abs(k * S * s - C) <= CLOSED:
+        return _stops(Branch.NO_BRANCH, corner, w1, xdot1)
+    w2 = (k * S * s * w1 - xdot1) / (k * S * s - C)
+    xdot2 = C * w2
+    return Branch.E_SLIP, w2, xdot2, 0.0, S * s * (w2 - w1), xdot2 + corner.c * w2

@@ -53,22 +53,14 @@ def homes(rule: str) -> set[str]:
                 found |= {
                     name
                     for part in ast.walk(node.target.slice)
-                    if isinstance(part, ast.Name) and part.id == rule
+                    if isinstance(part, ast.Attribute) and part.attr == rule
                 }
     return found
 
 
 def names_of_rules() -> dict[str, str]:
-    """The constants of ebm.core.rules and the names that they stand for."""
-    constants = {
-        key: value
-        for key, value in vars(rules).items()
-        if key.isupper() and isinstance(value, int) and key != "RULES"
-    }
-    return {
-        key: rules.NAMES[value]
-        for key, value in sorted(constants.items(), key=lambda item: item[1])
-    }
+    """The choices of ebm.core.rules and the names that they stand for."""
+    return {rule.name: rules.NAMES[rule] for rule in rules.Rule}
 
 
 def complexities() -> list[tuple[int, str]]:

@@ -14,10 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from stepping import ROCKS, TILTED, run_at
 
 from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import contacts as contacts_of_the_core
-from rockcheck.ebm.core import ground, guards, march, modes, motion, rules, series
+from rockcheck.ebm.core import ground, guards, modes, motion, moving, series
+from rockcheck.ebm.core.names import GUARDS, Family, Guard, Kind, Pivot, Row
+from rockcheck.ebm.core.rules import Rule
+from rockcheck.ebm.core.state import code_of, workspace
 from rockcheck.scenes import Block, Floor, Record, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
@@ -54,7 +58,7 @@ class Core:
 
     @staticmethod
     def first_root(
-        coefficients, h: float, noise: float = series.NOISE[series.POSITION]
+        coefficients, h: float, noise: float = series.NOISE[Kind.POSITION]
     ) -> float | None:
         """First time in [0, h] at which the polynomial (constant first) turns negative."""
         row, stack = _row(coefficients), np.zeros((48, series.WIDTH))
@@ -62,7 +66,7 @@ class Core:
         return None if found == series.NO_ROOT else found
 
     @staticmethod
-    def leading(coefficients, noise: float = series.NOISE[series.POSITION]) -> int:
+    def leading(coefficients, noise: float = series.NOISE[Kind.POSITION]) -> int:
         """Sign with which the polynomial leaves zero."""
         return series.leading(_row(coefficients), 0, len(coefficients) - 1, noise, series.AHEAD)
 
@@ -71,83 +75,66 @@ class Core:
         self.setting = natural.setting_of(
             scene, unilateral=pivot == "unilateral", no_slip=friction == "no-slip", energy_cap=False
         )
-        self.grounds = natural.grounds_of(scene)
-        self.work = motion.workspace()[0]
+        self.base = natural.base_of(scene)
 
     def select(self, state) -> Mode | None:
         """The mode in which the state (x, y, theta and their rates) goes on."""
-        m, tried, memory = (
-            np.zeros(motion.MODE_SIZE, dtype=np.int64),
-            np.zeros(modes.MODES, dtype=bool),
-            np.zeros(modes.MEMORY),
-        )
-        modes.forget(tried, memory, 0.0)
-        chosen = np.zeros(rules.RULES, dtype=np.int64)
-        if not modes.select(
-            self.setting, np.array(state), *self.grounds, 0.0, m, tried, memory, chosen, self.work
-        ):
+        run = run_at(state)
+        found = run.state
+        if not modes.select(self.setting, self.base, run):
             return None
-        if chosen[rules.LEAST_CONTRADICTION]:
+        if found.rules[Rule.LEAST_CONTRADICTION]:
             return None
-        floor = {motion.OFF: "off", motion.STICK: "stick", motion.SLIPPING: "slip"}[m[motion.FLOOR]]
-        at = (bool(m[motion.TIP]), bool(m[motion.FAR]))
-        return Mode(
-            m[motion.FAMILY] == motion.TILT,
-            int(m[motion.S]),
-            floor,
-            int(m[motion.SLIP]),
-            int(m[motion.PULL]),
-            *at,
-        )
+        mode = found.mode
+        floor = {Pivot.OFF: "off", Pivot.STICK: "stick", Pivot.SLIPPING: "slip"}[mode.pivot]
+        at = (bool(mode.tip), bool(mode.far))
+        tilted = bool(mode.family == Family.TILT)
+        return Mode(tilted, int(mode.sense), floor, int(mode.slip), int(mode.pull), *at)
 
     def guards(self, mode: Mode, state) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
         """Guards of a tilted mode as polynomials of time, and the motion (phi, xi, y) that they
         follow."""
-        m = np.zeros(motion.MODE_SIZE, dtype=np.int64)
-        m[motion.FAMILY], m[motion.S], m[motion.SLIP], m[motion.PULL] = (
-            motion.TILT,
-            mode.side,
-            mode.slip,
-            mode.pull,
+        run = run_at(
+            state,
+            **TILTED | {"pull": mode.pull},
+            sense=mode.side,
+            slip=mode.slip,
+            pivot={"off": Pivot.OFF, "stick": Pivot.STICK, "slip": Pivot.SLIPPING}[mode.floor],
+            tip=mode.tip,
+            far=mode.far,
         )
-        m[motion.FLOOR] = {"off": motion.OFF, "stick": motion.STICK, "slip": motion.SLIPPING}[
-            mode.floor
-        ]
-        m[motion.TIP], m[motion.FAR] = mode.tip, mode.far
-        z = np.array(state)
-        order = motion.tilt_series(
-            self.setting, m, z, *self.grounds, 0.0, ORDER, 0.0, 0.0, self.work
-        )
-        pivot = mode.side * z[0] - self.work[motion.SIN, 0]
+        order = motion.tilt_series(self.setting, self.base, run, ORDER, 0.0, 0.0)
+        a = self.work = run.a
+        pivot = run.state.place = mode.side * state[0] - a[Row.SIN, 0]
         names = {
-            "far gap": guards.G_FAR_GAP,
-            "tip gap": guards.G_TIP_GAP,
-            "landing": guards.G_LANDING,
+            "far gap": Guard.FAR_GAP,
+            "tip gap": Guard.TIP_GAP,
+            "landing": Guard.LANDING,
         }
         names |= {
-            "push": guards.G_PUSH,
-            "tip push": guards.G_TIP_PUSH,
-            "far push": guards.G_FAR_PUSH,
+            "push": Guard.FLOOR_PUSH,
+            "tip push": Guard.TIP_PUSH,
+            "far push": Guard.FAR_PUSH,
         }
         names |= {
-            "cone +": guards.G_CONE_PLUS,
-            "cone -": guards.G_CONE_MINUS,
-            "slip": guards.G_SLIP,
+            "cone +": Guard.CONE_PLUS,
+            "cone -": Guard.CONE_MINUS,
+            "slip": Guard.SLIP,
         }
-        names |= {"topple": guards.G_TOPPLE, "phi": guards.G_PHI}
-        guards.fill_guards(self.setting, m, pivot, self.work)
+        names |= {"topple": Guard.TOPPLE, "phi": Guard.PHI}
+        guards.fill_guards(self.setting, run)
         found = {}
         for name, which in names.items():
-            degree = guards.guard(which, order, self.work)
+            degree = guards.guard(which, order, a)
             if degree >= 0:
-                found[name] = self.work[motion.GUARD, : degree + 1].copy()
+                found[name] = a[Row.GUARD, : degree + 1].copy()
         rock = mode.floor == "stick" and not mode.tip and not mode.far
-        rows = {"phi": self.work[motion.PHI, : order + 1].copy()}
-        xi = self.work[motion.SIN if rock else motion.XI, : order + 1].copy()
+        rows = {"phi": a[Row.PHI, : order + 1].copy()}
+        xi = a[Row.SIN if rock else Row.XI, : order + 1].copy()
         xi[0] += pivot if rock else 0.0
         return found, rows | {
             "xi": xi,
-            "y": self.work[motion.COS if rock else motion.Y, : order + 1].copy(),
+            "y": a[Row.COS if rock else Row.Y, : order + 1].copy(),
         }
 
 
@@ -248,7 +235,7 @@ def test_a_zero_at_the_start_is_divided_out():
 @pytest.mark.parametrize("start", [-0.9, -0.4, 0.0, 0.4, 0.9])
 def test_a_guard_that_begins_as_noise_ends_its_mode_where_it_is_more_than_noise(start):
     """So it does not matter how a motion is cut into steps, nor with which noise one begins."""
-    noise = series.NOISE[series.FORCE]
+    noise = series.NOISE[Kind.FORCE]
     falls = noise * np.array([start, -0.01, -1.0])  # noise throughout the time AHEAD
     end = -0.005 + math.sqrt(0.005**2 + 1.0 + start)
     for cut in (0.0, 0.3 * end, 0.7 * end):
@@ -312,25 +299,33 @@ def test_touching_is_no_root_and_dipping_is_one(place):
 def test_a_force_that_only_touches_zero_ends_no_mode(dip):
     """A step ends where the force is positive again if it falls by less than noise, else in an
     event, as where it begins below."""
-    place, a = 0.1, motion.workspace()[0]
-    for which in range(guards.GUARDS):
+    place, run = 0.1, run_at()
+    a, state = run.a, run.state
+
+    def first(length: float) -> tuple[float, int]:
+        state.order, state.length = 2, length
+        guards.first_event(run)
+        return float(state.tau), int(state.guard)
+
+    for which in range(GUARDS):
         guards.drop(a, which)
-    a[motion.TABLE + guards.G_PUSH] = 0.0
-    a[motion.TABLE + guards.G_PUSH, motion.P] = 1.0
-    a[motion.P, :3] = place * place - dip, -2.0 * place, 1.0
-    tau, which = guards.first_event(2, 1.0, 1.0, a, np.zeros((48, series.WIDTH)))
-    a[motion.P, 0] = -1e-8
-    assert guards.first_event(2, 1.0, 1.0, a, np.zeros((48, series.WIDTH))) == (0.0, guards.G_PUSH)
-    a[motion.P, 0] = place * place - dip
-    if dip > series.NOISE[series.FORCE]:
-        assert (tau, which) == (pytest.approx(place - math.sqrt(dip), abs=1e-12), guards.G_PUSH)
+    a[Row.TABLE + Guard.FLOOR_PUSH] = 0.0
+    a[Row.TABLE + Guard.FLOOR_PUSH, Row.P] = 1.0
+    a[Row.P, :3] = place * place - dip, -2.0 * place, 1.0
+    tau, which = first(1.0)
+    a[Row.P, 0] = -1e-8
+    assert first(1.0) == (0.0, Guard.FLOOR_PUSH)
+    a[Row.P, 0] = place * place - dip
+    if dip > series.NOISE[Kind.FORCE]:
+        assert (tau, which) == (pytest.approx(place - math.sqrt(dip), abs=1e-12), Guard.FLOOR_PUSH)
     else:
-        assert (tau, which) == (pytest.approx(place + math.sqrt(dip), abs=3e-9), -1) or (
-            dip == 0.0 and (tau, which) == (1.0, -1)
+        touched = pytest.approx(place + math.sqrt(dip), abs=3e-9)
+        assert (tau, which) == (touched, Guard.NONE) or (
+            dip == 0.0 and (tau, which) == (1.0, Guard.NONE)
         )
-        a[motion.P, 0] += tau * (a[motion.P, 1] + tau)  # the series about tau
-        a[motion.P, 1] += 2.0 * tau
-        assert guards.first_event(2, 0.5, 1.0, a, np.zeros((48, series.WIDTH))) == (0.5, -1)
+        a[Row.P, 0] += tau * (a[Row.P, 1] + tau)  # the series about tau
+        a[Row.P, 1] += 2.0 * tau
+        assert first(0.5) == (0.5, Guard.NONE)
 
 
 @pytest.mark.parametrize("noise", NOISES)
@@ -792,7 +787,7 @@ def test_series_obey_newton_and_euler_in_every_term(mode):
         Mode(True, 1, floor, slip, pull, tip=False, far=False), (0.0, c, phi, v - c * w, s * w, w)
     )
     rows = {
-        name: core.work[getattr(motion, name), : ORDER + 1]
+        name: core.work[Row[name], : ORDER + 1]
         for name in ("PHI", "OMEGA", "SIN", "COS", "XI", "Y", "P", "Q", "U", "G")
     }
     known = ORDER - 1  # accelerations have two terms fewer
@@ -849,39 +844,36 @@ def test_a_block_that_hangs_flat_is_counted_once():
     at = Situation(alpha, 0.5, 0.5, 0.0, -0.2, (0.0, math.cos(alpha), 0.0, 0.0, 0.0, 0.0))
     history = EventBasedModel().simulate(at.scene.replace(duration=0.02, output_step=0.01))
     assert history.cost.rules == {"hangs flat": 1}
-    m = np.zeros(motion.MODE_SIZE, dtype=np.int64)
-    m[motion.FAMILY], m[motion.FLOOR], m[motion.PULL] = motion.FLAT, motion.STICK, -1
-    assert modes.hangs_flat(m)
-    for place in (motion.TIP, motion.FAR):
-        held = m.copy()
-        held[place] = 1
-        assert not modes.hangs_flat(held)
+    hangs = {"family": Family.FLAT, "pivot": Pivot.STICK, "pull": -1}
+    assert modes.hangs_flat(run_at(**hangs).state.mode)
+    for wall in ("tip", "far"):
+        assert not modes.hangs_flat(run_at(**hangs, **{wall: 1}).state.mode)
 
 
 def test_what_was_tried_at_an_instant():
     """A new instant knows of nothing and has no slack; a mode that a force ended may go on there,
     once; one that a gap ended may not."""
-    m, memory = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.full(modes.MEMORY, 7.0)
-    m[motion.FAMILY], m[motion.S] = motion.TILT, 1
-    tried = np.ones(modes.MODES, dtype=bool)
-    modes.forget(tried, memory, 3.0)
-    assert not tried.any()
-    assert memory[modes.SLACK] == 1.0
-    modes.slacken(memory)
-    assert memory[modes.SLACK] == 1.0, "the least slack is one noise"
-    modes.slacken(memory)
-    assert memory[modes.SLACK] == 2.0
+    state = run_at(t=3.0, **TILTED, sense=1).state
+    state.tried[:], state.slack, state.least_slack = 1, 7.0, 7.0
+    modes.forget(state)
+    assert not state.tried.any()
+    assert state.slack == 1.0
+    modes.slacken(state)
+    assert state.slack == 1.0, "the least slack is one noise"
+    modes.slacken(state)
+    assert state.slack == 2.0
     for kind, began, may in (
-        (series.FORCE, 2.0, True),
-        (series.FORCE, 3.0, False),
-        (series.POSITION, 2.0, False),
+        (Kind.FORCE, 2.0, True),
+        (Kind.FORCE, 3.0, False),
+        (Kind.POSITION, 2.0, False),
     ):
-        modes.forget(tried, memory, 3.0)
-        memory[modes.BEGAN] = began
-        modes.leave(m, tried, memory, 3.0, kind)
-        assert tried[modes.code_of(m)] != may
-    modes.leave(m, tried, memory, 4.0, series.RATE)
-    assert tried.sum() == 1, "what was tried at an earlier instant is forgotten"
+        modes.forget(state)
+        state.began = began
+        modes.leave(state, kind)
+        assert state.tried[code_of(state.mode)] != may
+    state.t = 4.0
+    modes.leave(state, Kind.RATE)
+    assert state.tried.sum() == 1, "what was tried at an earlier instant is forgotten"
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
@@ -896,27 +888,16 @@ def test_a_spin_of_rounding_is_taken_from_a_block_that_leans_on_a_wall(side):
     setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
     touches = math.sin(alpha + phi) - math.sin(alpha) - gap  # where the top corner meets the wall
     for away, spin in ((0.0, 0.0), (0.05, 0.1 * contacts_of_the_core.SLOW)):
-        z = np.zeros(6)
-        z[motion.X], z[motion.HEIGHT], z[motion.THETA] = (
-            sign * (touches + away),
-            math.cos(alpha - phi),
-            sign * phi,
-        )
-        z[motion.W] = 0.1 * contacts_of_the_core.SLOW
+        turns = 0.1 * contacts_of_the_core.SLOW
+        place = [sign * (touches + away), math.cos(alpha - phi), sign * phi]
+        z = run_at([*place, 0.0, 0.0, turns]).state.motion
         modes._clean(setting, z, True)
-        assert z[motion.W] == spin
+        assert z.w == spin
 
 
 def test_a_block_that_lies_down_along_a_wall_meets_it_while_it_turns_over():
     """However slowly it turns; one that turns back, or has some way to go, does not."""
-    m, z, count = (
-        np.zeros(motion.MODE_SIZE, dtype=np.int64),
-        np.zeros(6),
-        np.zeros(rules.RULES, dtype=np.int64),
-    )
-    m[motion.FAMILY], m[motion.FLOOR] = motion.TILT, motion.STICK
     for sign in (1, -1):
-        m[motion.S] = sign
         for left, spin, lies in (
             (1e-6, 0.5, True),
             (1e-6, 1e-3, True),
@@ -924,33 +905,26 @@ def test_a_block_that_lies_down_along_a_wall_meets_it_while_it_turns_over():
             (1e-6, -0.5, False),
             (1e-3, 0.5, False),
         ):
-            z[motion.THETA], z[motion.W] = sign * (0.5 * math.pi - left), sign * spin
-            before = count[rules.LANDS_ALONG]
-            assert march._lies_along_wall(m, z, guards.G_TIP_GAP, count) == lies
-            assert count[rules.LANDS_ALONG] == before + lies
-            assert not march._lies_along_wall(m, z, guards.G_FAR_GAP, count)
+            start = [0.0, 0.0, sign * (0.5 * math.pi - left), 0.0, 0.0, sign * spin]
+            state = run_at(start, **ROCKS, sense=sign).state
+            state.guard = Guard.TIP_GAP
+            assert moving.lies_along_wall(state) == lies
+            assert state.rules[Rule.LANDS_ALONG] == lies
+            state.guard = Guard.FAR_GAP
+            assert not moving.lies_along_wall(state)
 
 
 def test_a_mode_that_must_go_on_has_twice_the_slack_each_time():
     """Where all modes were tried at an instant the one that fits goes on, counted each time, with a
     slack of 1, 2, 4 noises."""
     core = Core(upright(0.1, 1.0, 0.3, 0.5, 0.5).scene, "unilateral")
-    z, chosen = (
-        np.array(upright(0.1, 1.0, 0.3, 0.5, 0.5).state),
-        np.zeros(rules.RULES, dtype=np.int64),
-    )
-    m, tried, memory = (
-        np.zeros(motion.MODE_SIZE, dtype=np.int64),
-        np.ones(modes.MODES, dtype=bool),
-        np.zeros(modes.MEMORY),
-    )
-    memory[modes.SLACK] = memory[modes.LEAST_SLACK] = 1.0
+    run = run_at(upright(0.1, 1.0, 0.3, 0.5, 0.5).state)
+    state, mode = run.state, run.state.mode
+    state.tried[:] = 1
     for count, slack in enumerate((1.0, 2.0, 4.0), 1):
-        assert modes.select(
-            core.setting, z, *core.grounds, 0.0, m, tried, memory, chosen, core.work
-        )
-        assert (m[motion.FAMILY], m[motion.FLOOR]) == (motion.FLAT, motion.STICK)
-        assert (memory[modes.SLACK], chosen[rules.MODE_AGAIN], chosen.sum()) == (
+        assert modes.select(core.setting, core.base, run)
+        assert (mode.family, mode.pivot) == (Family.FLAT, Pivot.STICK)
+        assert (state.slack, state.rules[Rule.MODE_AGAIN], state.rules.sum()) == (
             slack,
             count,
             count,
@@ -966,7 +940,9 @@ def test_the_model_starts_as_the_selection_says():
         at = upright(a, 1.0, alpha, mu, mu)
         history = EventBasedModel().simulate(at.scene.replace(duration=0.02, output_step=0.01))
         assert history.channels["mode"][1] == Core(at.scene, "bilateral").select(at.state).name
-        assert ground.acceleration(Core(at.scene, "bilateral").grounds[0], 0.0) == pytest.approx(a)
+        assert ground.acceleration(
+            Core(at.scene, "bilateral").base.horizontal, 0.0
+        ) == pytest.approx(a)
 
 
 def test_uplift_is_found_to_rounding_in_few_evaluations(monkeypatch):
@@ -985,7 +961,7 @@ def test_uplift_is_found_to_rounding_in_few_evaluations(monkeypatch):
             excitation=pulse,
             duration=5.0,
         )
-        base, _ = natural.grounds_of(scene)
+        base = natural.base_of(scene).horizontal
         t = ground.next_exceedance(base, 0.0, -limit, limit, 0.0, 0.0)
         assert abs(real(base, t)) >= limit * (1.0 - 1e-15)
         assert abs(real(base, t * (1.0 - 1e-14))) < limit
@@ -996,7 +972,7 @@ def test_uplift_is_found_to_rounding_in_few_evaluations(monkeypatch):
 @pytest.mark.parametrize("seed", range(40))
 def test_what_stays_below_a_level_is_below_it(seed):
     r = np.random.default_rng(seed)
-    a, _ = motion.workspace()
+    a, _ = workspace()
     n, tau = 8, r.uniform(0.1, 2.0)
     a[0, : n + 1] = r.normal(size=n + 1) / np.cumprod(np.arange(1.0, n + 2.0))
     highest = max(series.value(a, 0, n, t) for t in np.linspace(0.0, tau, 2001))
@@ -1010,7 +986,7 @@ def test_what_stays_below_a_level_is_below_it(seed):
 def test_the_bound_of_what_stays_below_is_as_it_says(degree):
     """Of t - t^degree, whose curvature is largest at the end: d^2/8 of it above the largest of five
     values, and no more."""
-    a, _ = motion.workspace()
+    a, _ = workspace()
     a[0, 1], a[0, degree] = 1.0, -1.0
     highest = max(series.value(a, 0, degree, t) for t in (0.0, 0.25, 0.5, 0.75, 1.0))
     rise = 0.25**2 / 8.0 * degree * (degree - 1.0)

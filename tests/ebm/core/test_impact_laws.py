@@ -8,11 +8,14 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from stepping import ROCKS, run_at, six
 
 from rockcheck.ebm import EventBasedModel, natural
-from rockcheck.ebm.core import contacts, guards, motion, rules, settle
+from rockcheck.ebm.core import contacts, settle
 from rockcheck.ebm.core.laws import contact_impacts as ci
 from rockcheck.ebm.core.laws import impacts, strike
+from rockcheck.ebm.core.names import CONTACTS, Branch, Contact, Family, Found, Guard, Pivot
+from rockcheck.ebm.core.rules import Rule
 from rockcheck.scenes import Block, Floor, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
@@ -52,43 +55,43 @@ def test_each_branch_of_the_wall_cascade(parting):
     for alpha, phi, sw, w1, xdot1, e, mu, no_slip in random_strikes(4000, parting):
         s, c, cp = math.sin(alpha - phi), math.cos(alpha - phi), math.cos(alpha + phi)
         C = sw * cp
-        branch, w2, xdot2, n, p, v2 = impacts.wall_impact(
-            1.0, sw, s, c, cp, 0.75, 3.0, w1, xdot1, e, mu, mu, no_slip
-        )
+        corner = impacts.Corner(1.0, sw, s, c, C, 0.75, 3.0)
+        floor = setting_of(alpha, mu, 0.0)._replace(mu_s=mu, no_slip=no_slip)
+        branch, w2, xdot2, n, p, v2 = impacts.wall_impact(floor, corner, e, w1, xdot1)
         seen[branch] += 1
         assert n >= 0.0
         # (27): without an impulse of the wall, the pivot held: angular momentum about it stays what
         # it is.
         alone = 0.75 * (w1 / 3.0 - c * xdot1 + s * s * w1)
         leaves = sw * (-c * alone - C * alone)
-        if branch == impacts.A_STICK:
+        if branch == Branch.A_STICK:
             assert sw * (xdot2 - C * w2) == pytest.approx(-e * sw * (xdot1 - C * w1), abs=1e-11)
             assert xdot2 == pytest.approx(-c * w2, abs=1e-12)
-        elif branch == impacts.B_STICK:
+        elif branch == Branch.B_STICK:
             assert leaves >= 0.0  # (22)
             assert (w2, xdot2) == pytest.approx((alone, -c * alone), abs=1e-12)
             assert (n, v2) == (0.0, 0.0)
-        elif branch == impacts.C_STICK:
+        elif branch == Branch.C_STICK:
             assert leaves < 0.0
             assert (w2, xdot2, v2) == (0.0, 0.0, 0.0)
             assert p == pytest.approx(-s * w1, abs=1e-12)
         else:
-            assert branch in (impacts.D_SLIP, impacts.E_SLIP)
+            assert branch in (Branch.D_SLIP, Branch.E_SLIP)
             assert not no_slip
             assert p == pytest.approx(s * (w2 - w1), abs=1e-11)
             assert v2 == pytest.approx(xdot2 + c * w2, abs=1e-11)
             q = xdot2 - xdot1 - sw * n
             assert abs(q) == pytest.approx(mu * abs(p), abs=1e-10)
-        if branch == impacts.D_SLIP:
+        if branch == Branch.D_SLIP:
             assert sw * (xdot2 - C * w2) == pytest.approx(-e * sw * (xdot1 - C * w1), abs=1e-10)
             assert q * v2 <= 1e-12
-        if branch == impacts.E_SLIP:
+        if branch == Branch.E_SLIP:
             assert n == 0.0
             assert xdot2 == pytest.approx(C * w2, abs=1e-10)  # (32): the corner stays on the wall
             # The friction is that of the slip which (30) would have, were it not for its pull of
             # the wall.
             slips = (
-                (sr, sy, impacts.wall_slip(1.0, s, c, C, 3.0, w1, xdot1, e, mu, sr, sy))
+                (sr, sy, impacts.wall_slip(corner, e, w1, xdot1, mu * sr * sy))
                 for sr in (1, -1)
                 for sy in (1, -1)
             )
@@ -99,11 +102,11 @@ def test_each_branch_of_the_wall_cascade(parting):
             )
             assert q == pytest.approx(-mu * sense * p, abs=1e-10)
     least = {
-        impacts.A_STICK: 20,
-        impacts.B_STICK: 20,
-        impacts.E_SLIP if parting else impacts.D_SLIP: 500,
+        Branch.A_STICK: 20,
+        Branch.B_STICK: 20,
+        Branch.E_SLIP if parting else Branch.D_SLIP: 500,
     }
-    least |= {impacts.C_STICK: 10} if parting else {}
+    least |= {Branch.C_STICK: 10} if parting else {}
     assert seen.keys() == least.keys()
     assert all(seen[branch] > count for branch, count in least.items()), seen
 
@@ -132,23 +135,12 @@ def landing(
 ) -> tuple[np.ndarray, float]:
     """Velocities after a tilted block lands on its corner with restitution e, and the largest
     relative gain of energy."""
-    touching = np.zeros(ci.CONTACTS, dtype=bool)
-    touching[ci.F] = True
-    after, impulse, tally = np.array(v), np.zeros(2), np.zeros(2)
-    assert ci.contact_impact(
-        setting_of(alpha, mu, e, cap),
-        1.0,
-        phi,
-        touching,
-        0.0,
-        0.0,
-        1e-9,
-        after,
-        impulse,
-        tally,
-        work(),
-    )
-    return after, float(tally[1])
+    touching = np.zeros(CONTACTS, dtype=bool)
+    touching[Contact.FOOT] = True
+    after, state = np.array(v), run_at().state
+    impact = ci.Impact(1.0, phi, touching, 0.0, 0.0, 1e-9, after)
+    assert ci.contact_impact(setting_of(alpha, mu, e, cap), impact, state, work())
+    return after, float(state.largest_gain)
 
 
 def test_an_impact_reads_no_scratch_that_it_has_not_written():
@@ -163,27 +155,18 @@ def test_an_impact_reads_no_scratch_that_it_has_not_written():
             1e-9,
         )
         phi = float(rng.choice([0.0, 1e-8, 0.1 * alpha]))
-        can = range(ci.CONTACTS) if phi == 0.0 else (ci.F, ci.TIP_TOP, ci.FAR_BOTTOM)
-        touching = np.isin(np.arange(ci.CONTACTS), can) & (rng.integers(0, 2, ci.CONTACTS) == 1)
+        can = range(CONTACTS) if phi == 0.0 else (Contact.FOOT, Contact.TIP_TOP, Contact.FAR_BOTTOM)
+        touching = np.isin(np.arange(CONTACTS), can) & (rng.integers(0, 2, CONTACTS) == 1)
         v = rng.normal(0.0, 0.5, 3) * 10.0 ** rng.uniform(-9.0, 0.0, 3)
         setting = setting_of(alpha, mu, e, cap=bool(rng.integers(0, 2)))
         found = []
         for scratch in (0.0, np.nan, 1e9):
-            after, impulse, tally = v.copy(), np.zeros(2), np.zeros(2)
-            end = ci.contact_impact(
-                setting,
-                1.0,
-                phi,
-                touching,
-                e,
-                e,
-                resting,
-                after,
-                impulse,
-                tally,
-                np.full((ci.WORK, 6), scratch),
-            )
-            found.append((end, *after, *impulse, *tally))
+            after, state = v.copy(), run_at().state
+            impact = ci.Impact(1.0, phi, touching, e, e, resting, after)
+            filled = np.full((ci.WORK, 6), scratch)
+            end = ci.contact_impact(setting, impact, state, filled)
+            impulses = state.floor_impulse, state.wall_impulse
+            found.append((end, *after, *impulses, state.gains, state.largest_gain))
         assert found[0] == found[1] == found[2]
 
 
@@ -196,7 +179,7 @@ def test_the_floor_takes_friction_within_its_cone():
         alpha, mu, e = rng.uniform(0.1, 1.2), rng.uniform(0.05, 1.2), float(rng.choice([0.0, 0.5]))
         phi, v = alpha * rng.uniform(0.05, 0.9), rng.normal(0.0, 0.5, 3)
         rows = rows_of(setting_of(alpha, mu, e), 1.0, phi)
-        if rows[ci.F] @ v > -1e-3:
+        if rows[Contact.FOOT] @ v > -1e-3:
             continue
         after = landing(alpha, phi, mu, e, v, cap=False)[0]
         along, up = (after - v)[:2]  # of a unit mass
@@ -219,7 +202,7 @@ def test_the_energy_cap_takes_the_largest_restitution_that_adds_none():
         alpha, mu, e = rng.uniform(0.3, 1.2), rng.uniform(0.2, 1.33), rng.uniform(0.5, 0.99)
         phi = alpha * rng.uniform(0.05, 0.9)
         v = rng.normal(0.0, 0.5, 3)
-        row = rows_of(setting_of(alpha, mu, e), 1.0, phi)[ci.F]
+        row = rows_of(setting_of(alpha, mu, e), 1.0, phi)[Contact.FOOT]
         if row @ v > -1e-3:
             continue
         plain, gain = landing(alpha, phi, mu, e, v, cap=False)
@@ -252,25 +235,17 @@ def test_the_energy_cap_leaves_an_elastic_impact_as_it_is():
         )
         plain, held = v.copy(), v.copy()
         for after, cap in ((plain, False), (held, True)):
-            assert ci.contact_impact(
-                setting_of(alpha, mu, 0.9, cap),
-                1.0,
-                0.0,
-                touching,
-                1.0,
-                0.0,
-                1e-9,
-                after,
-                np.zeros(2),
-                np.zeros(2),
-                work(),
-            )
+            impact = ci.Impact(1.0, 0.0, touching, 1.0, 0.0, 1e-9, after)
+            block = setting_of(alpha, mu, 0.9, cap)
+            assert ci.contact_impact(block, impact, run_at().state, work())
         np.testing.assert_array_equal(held, plain)
         assert plain == pytest.approx(-v, rel=1e-12)
 
 
 @pytest.mark.parametrize(
-    "wall", [(ci.TIP_TOP, ci.TIP_BOTTOM), (ci.FAR_BOTTOM, ci.FAR_TOP)], ids=["tip", "far"]
+    "wall",
+    [(Contact.TIP_TOP, Contact.TIP_BOTTOM), (Contact.FAR_BOTTOM, Contact.FAR_TOP)],
+    ids=["tip", "far"],
 )
 def test_floor_first_is_a_trajectory_beside_a_wall_that_stands_farther_off(wall):
     """A block that lands flush, without friction: its corners strike one by one, each as it arrives
@@ -289,15 +264,15 @@ def test_floor_first_is_a_trajectory_beside_a_wall_that_stands_farther_off(wall)
         rows, v, mass = rows_of(setting, 1, 0.0), rng.normal(0.0, 0.5, 3), np.array([1.0, 1.0, 3.0])
         v[0] = math.copysign(v[0], -rows[wall[0], 0])  # toward the wall
         away, struck, after = (
-            dict.fromkeys((ci.F, ci.E), 0.0) | dict.fromkeys(wall, 1.0),
+            dict.fromkeys((Contact.FOOT, Contact.OTHER), 0.0) | dict.fromkeys(wall, 1.0),
             [],
             v.copy(),
         )
         if (
-            not min(rows[ci.F] @ v, rows[ci.E] @ v)
+            not min(rows[Contact.FOOT] @ v, rows[Contact.OTHER] @ v)
             < -1e-3
             < 1e-3
-            < max(rows[ci.F] @ v, rows[ci.E] @ v)
+            < max(rows[Contact.FOOT] @ v, rows[Contact.OTHER] @ v)
         ):
             continue  # one corner lands
         while True:
@@ -307,7 +282,7 @@ def test_floor_first_is_a_trajectory_beside_a_wall_that_stands_farther_off(wall)
                 break
             first = min(coming, key=coming.__getitem__)
             away = {j: gap + rates[j] * coming[first] for j, gap in away.items()} | {first: 0.0}
-            restitution = floor_e if first in (ci.F, ci.E) else wall_e
+            restitution = floor_e if first in (Contact.FOOT, Contact.OTHER) else wall_e
             after = (
                 after
                 - (1.0 + restitution)
@@ -317,25 +292,11 @@ def test_floor_first_is_a_trajectory_beside_a_wall_that_stands_farther_off(wall)
                 * rows[first]
             )
             struck.append(first)
-        touching = np.isin(np.arange(ci.CONTACTS), (ci.F, ci.E, *wall))
+        touching = np.isin(np.arange(CONTACTS), (Contact.FOOT, Contact.OTHER, *wall))
         found = v.copy()
         if len(struck) < 20:  # of more stages the rest are plastic
-            assert (
-                ci.contact_impact(
-                    setting,
-                    1,
-                    0.0,
-                    touching,
-                    wall_e,
-                    wall_e,
-                    1e-9,
-                    found,
-                    np.zeros(2),
-                    np.zeros(2),
-                    work(),
-                )
-                == ci.FITS
-            )
+            impact = ci.Impact(1.0, 0.0, touching, wall_e, wall_e, 1e-9, found)
+            assert ci.contact_impact(setting, impact, run_at().state, work()) == Found.FITS
             np.testing.assert_allclose(found, after, rtol=0.0, atol=1e-9)
             both += set(wall) <= set(struck)
     assert both > 30
@@ -380,35 +341,32 @@ def test_a_block_is_put_onto_the_contact_that_closes(side):
     scene = Scene(name="touch", block=block, floor=Floor(friction=0.5), walls=walls, duration=1.0)
     b = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
     for tilt in (0.0, 0.15):
-        family, tip = (motion.TILT, side) if tilt else (motion.FLAT, 1)
+        family, tip = (Family.TILT, side) if tilt else (Family.FLAT, 1)
         for which, floor, wall in (
-            (guards.G_LANDING, motion.OFF, 0),
-            (guards.G_TIP_GAP, motion.STICK, tip),
-            (guards.G_TIP_GAP, motion.SLIPPING, tip),
-            (guards.G_FAR_GAP, motion.SLIPPING, -tip),
+            (Guard.LANDING, Pivot.OFF, 0),
+            (Guard.TIP_GAP, Pivot.STICK, tip),
+            (Guard.TIP_GAP, Pivot.SLIPPING, tip),
+            (Guard.FAR_GAP, Pivot.SLIPPING, -tip),
         ):
-            z = np.array([0.0, math.cos(alpha - tilt), side * tilt, 0.0, 0.0, 0.0])
+            place = [0.0, math.cos(alpha - tilt), side * tilt, 0.0, 0.0, 0.0]
+            state = run_at(place, family=family, sense=tip, pivot=floor).state
+            z = state.motion
             if wall:
-                z[motion.X] = -wall * (contacts.wall_gap(b, z, wall) - off)
+                z.x = -wall * (contacts.wall_gap(b, z, wall) - off)
             else:
-                z[motion.HEIGHT] += off
-            m, before = np.zeros(motion.MODE_SIZE, dtype=np.int64), z.copy()
-            m[motion.FAMILY], m[motion.S], m[motion.FLOOR] = family, tip, floor
-            strike.touch(b, m, z, which)
-            assert (
-                contacts.wall_gap(b, z, wall) if wall else contacts.floor_gap(b, z)
-            ) == pytest.approx(0.0, abs=1e-13)
-            assert np.max(np.abs(z - before)) == pytest.approx(off, rel=1.0)
-            if wall and tilt and floor == motion.STICK:
-                pivots = [
-                    one[motion.X] - side * math.sin(alpha - abs(one[motion.THETA]))
-                    for one in (before, z)
-                ]
+                z.y += off
+            before = six(z)
+            strike.touch(b, state.mode, z, which)
+            gap = contacts.wall_gap(b, z, wall) if wall else contacts.floor_gap(b, z)
+            assert gap == pytest.approx(0.0, abs=1e-13)
+            assert np.max(np.abs(six(z) - before)) == pytest.approx(off, rel=1.0)
+            if wall and tilt and floor == Pivot.STICK:
+                pivots = [one[0] - side * math.sin(alpha - abs(one[2])) for one in (before, six(z))]
                 assert pivots[1] == pytest.approx(pivots[0], abs=1e-15)
                 assert contacts.floor_gap(b, z) == 0.0
             else:
-                kept = [k for k in range(6) if k != (motion.X if wall else motion.HEIGHT)]
-                np.testing.assert_array_equal(z[kept], before[kept])
+                kept = [k for k in range(6) if k != (0 if wall else 1)]
+                np.testing.assert_array_equal(six(z)[kept], before[kept])
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -423,20 +381,15 @@ def test_a_flush_landing_rebounds_as_the_wall_does_that_it_meets(side):
     scene = Scene(name="flush", block=block, floor=Floor(friction=0.5), walls=walls, duration=1.0)
     b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
     e, w = (0.7 if side > 0 else 0.3), -0.2 * side
-    m, impulse, counts = (
-        np.zeros(motion.MODE_SIZE, dtype=np.int64),
-        np.zeros(2),
-        np.zeros(rules.RULES, dtype=np.int64),
-    )
-    m[motion.FAMILY], m[motion.S], m[motion.FLOOR] = motion.TILT, side, motion.STICK
-    z = np.array([0.0, math.cos(0.4), 0.0, -math.cos(0.4) * w, 0.0, w])
-    assert not strike._floor_impact(b, m, z, 1e-9, impulse, counts)
-    assert z[motion.W] == pytest.approx(-e * w, abs=1e-15)
-    assert (z[motion.VX], z[motion.VY]) == pytest.approx(
-        (math.cos(0.4) * e * w, -side * math.sin(0.4) * e * w), abs=1e-15
-    )
-    assert impulse.tolist() == [pytest.approx((1.0 + e) * math.sin(0.4) * abs(w)), 0.0]
-    assert (counts[rules.FLUSH_LANDING], counts.sum()) == (1, 1)
+    start = [0.0, math.cos(0.4), 0.0, -math.cos(0.4) * w, 0.0, w]
+    state = run_at(start, **ROCKS, sense=side).state
+    assert not strike._floor_impact(b, state, 1e-9)
+    after = [-e * w, math.cos(0.4) * e * w, -side * math.sin(0.4) * e * w]
+    found = [state.motion.w, state.motion.vx, state.motion.vy]
+    assert found == pytest.approx(after, abs=1e-15)
+    assert state.floor_impulse == pytest.approx((1.0 + e) * math.sin(0.4) * abs(w))
+    assert state.wall_impulse == 0.0
+    assert (state.rules[Rule.FLUSH_LANDING], state.rules.sum()) == (1, 1)
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -450,16 +403,13 @@ def test_a_corner_rebounds_as_the_wall_does_that_it_strikes(side):
     block = Block(half_width=math.sin(0.4), half_height=math.cos(0.4))
     scene = Scene(name="corner", block=block, floor=Floor(friction=0.5), walls=walls, duration=1.0)
     b = natural.setting_of(scene, unilateral=False, no_slip=True, energy_cap=False)
-    m, counts = np.zeros(motion.MODE_SIZE, dtype=np.int64), np.zeros(rules.RULES, dtype=np.int64)
-    m[motion.FAMILY], m[motion.S], m[motion.FLOOR] = motion.TILT, side, motion.STICK
     w = 0.3 * side
-    z = np.array(
-        [0.0, math.cos(0.25), 0.15 * side, -math.cos(0.25) * w, math.sin(0.25) * abs(w), w]
-    )
-    assert strike._wall_impact(b, m, z, True, 1e-9, np.zeros(2), np.zeros(2), counts)
+    start = [0.0, math.cos(0.25), 0.15 * side, -math.cos(0.25) * w, math.sin(0.25) * abs(w), w]
+    state = run_at(start, **ROCKS, sense=side).state
+    assert strike._wall_impact(b, state, True, 1e-9)
     e = 0.3 if side > 0 else 0.7
-    assert z[motion.W] == pytest.approx(-e * w, abs=1e-15)
-    assert z[motion.VX] == pytest.approx(math.cos(0.25) * e * w, abs=1e-15)
+    assert state.motion.w == pytest.approx(-e * w, abs=1e-15)
+    assert state.motion.vx == pytest.approx(math.cos(0.25) * e * w, abs=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -472,46 +422,52 @@ def test_a_block_that_lands_with_less_spin_than_counts_slides_on(slip, kept):
     scene = Scene(name="lands", block=block, floor=Floor(friction=0.5), duration=1.0)
     b = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
     for bounce, stays in ((0.1, False), (4e-8, True)):
-        z = np.array([0.2, math.cos(0.4), 0.0, slip, bounce, 3e-8])
-        v, counts = contacts.slip_velocity(b, z), np.zeros(rules.RULES, dtype=np.int64)
-        strike._settle_flat(b, z, settle.SETTLE, counts)
-        assert z[:3].tolist() == [0.2, math.cos(0.4), 0.0]
-        assert z[motion.VX] == (v if kept else 0.0)
-        assert z[motion.VY] == (0.0 if stays else bounce)
-        assert z[motion.W] == 0.0
-        assert (counts[rules.SETTLES], counts.sum()) == (1, 1)
+        state = run_at([0.2, math.cos(0.4), 0.0, slip, bounce, 3e-8]).state
+        v, z = contacts.slip_velocity(b, state.motion), state.motion
+        strike._settle_flat(b, state, settle.SETTLE)
+        assert six(z).tolist() == [
+            0.2,
+            math.cos(0.4),
+            0.0,
+            v if kept else 0.0,
+            0.0 if stays else bounce,
+            0.0,
+        ]
+        assert (state.rules[Rule.SETTLES], state.rules.sum()) == (1, 1)
 
 
-def no_impacts() -> np.ndarray:
-    rattle = np.empty(6)
-    settle.no_impacts(rattle)
-    return rattle
+def struck_at(state, t: float) -> float:
+    """The settling speed as an impact at this time finds it."""
+    state.t = t
+    return settle.settling_speed(state)
 
 
 def test_the_settling_speed_rises_as_impacts_accumulate():
     """Tenfold with every hundred impacts up to 2.5e-3, without a bound after five hundred times as
     many; back after a quiet 0.025."""
-    counts, rattle, t = np.zeros(rules.RULES, dtype=np.int64), no_impacts(), 0.0
+    state, t = run_at().state, 0.0
+    settle.no_impacts(state)
     speeds = []
     for _ in range(50_100):
         t += 2.5e-7
-        speeds.append(settle.settling_speed(rattle, t, counts))
+        speeds.append(struck_at(state, t))
     rises = [k + 1 for k in range(1, len(speeds)) if speeds[k] != speeds[k - 1]]
     assert rises == [100, 200, 300, 400, 500, 50_000]
     np.testing.assert_allclose(
         [speeds[0], *(speeds[k - 1] for k in rises)], [5e-8, 5e-7, 5e-6, 5e-5, 5e-4, 2.5e-3, np.inf]
     )
-    assert counts[rules.RATTLES] == 501
-    assert settle.settling_speed(rattle, t + 0.024, counts) == np.inf
-    assert settle.settling_speed(rattle, t + 0.024 + 0.026, counts) == 5e-8
-    slow = no_impacts()
+    assert state.rules[Rule.RATTLES] == 501
+    assert struck_at(state, t + 0.024) == np.inf
+    assert struck_at(state, t + 0.024 + 0.026) == 5e-8
+    settle.no_impacts(state)
     for k in range(300):  # as many in a longer time are no rattle
-        assert settle.settling_speed(slow, 3e-4 * k, np.zeros(rules.RULES, dtype=np.int64)) == 5e-8
+        assert struck_at(state, 3e-4 * k) == 5e-8
 
 
 def test_impacts_at_one_instant_end_plastic():
-    counts, rattle = np.zeros(rules.RULES, dtype=np.int64), no_impacts()
-    speeds = [settle.settling_speed(rattle, 1.0, counts) for _ in range(21)]
+    state = run_at().state
+    settle.no_impacts(state)
+    speeds = [struck_at(state, 1.0) for _ in range(21)]
     assert speeds == [5e-8] * 20 + [np.inf]  # the first, and twenty more at its instant
-    assert counts[rules.ENDLESS_STAGES] == 1
-    assert settle.settling_speed(rattle, 1.001, counts) == 5e-8
+    assert state.rules[Rule.ENDLESS_STAGES] == 1
+    assert struck_at(state, 1.001) == 5e-8

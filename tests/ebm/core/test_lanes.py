@@ -9,8 +9,10 @@ from fractions import Fraction
 import numba
 import numpy as np
 import pytest
+import stepping
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from stepping import TILTED, run_at
 
 from rockcheck.ebm import natural
 from rockcheck.ebm.core import lanes, motion, series
@@ -29,6 +31,7 @@ from rockcheck.ebm.core.lanes import (
     upto,
     zeros,
 )
+from rockcheck.ebm.core.names import Pivot, Row
 from rockcheck.scenes import Floor, Ricker, Scene
 from rockcheck.scenes.scene import PAPER_BLOCK
 
@@ -150,39 +153,24 @@ def test_what_is_written_out_is_the_general_solution(slip, vertical):
         **({"vertical": shaken} if vertical else {}),
     )
     b = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
-    grounds, a = natural.grounds_of(scene), motion.workspace()[0]
-    m = np.zeros(motion.MODE_SIZE, dtype=np.int64)
-    m[motion.FAMILY], m[motion.PULL], m[motion.SLIP] = motion.TILT, 1, slip
-    m[motion.FLOOR] = motion.SLIPPING if slip else motion.STICK
-    rows = [motion.PHI, motion.OMEGA, motion.SIN, motion.COS, motion.P, motion.Q] + [
-        motion.XI,
-        motion.Y,
-    ] * (slip != 0)
+    run = run_at(**TILTED, slip=slip, pivot=Pivot.SLIPPING if slip else Pivot.STICK)
+    state, mode, a = run.state, run.state.mode, run.a
+    rows = [Row.PHI, Row.OMEGA, Row.SIN, Row.COS, Row.P, Row.Q] + [Row.XI, Row.Y] * (slip != 0)
     for _ in range(20):
-        m[motion.S] = rng.choice([-1, 1])
-        theta, w = m[motion.S] * rng.uniform(0.0, 1.2) * b.left.alpha, rng.uniform(-0.5, 0.5)
+        mode.sense = rng.choice([-1, 1])
+        theta, w = mode.sense * rng.uniform(0.0, 1.2) * b.left.alpha, rng.uniform(-0.5, 0.5)
         lean = b.left.alpha - abs(theta)
         s, c = math.sin(lean), math.cos(lean)
-        z = np.array(
-            [
-                m[motion.S] * s,
-                c,
-                theta,
-                m[motion.S] * (rng.uniform(-1.0, 1.0) if slip else 0.0) - c * w,
-                m[motion.S] * s * w,
-                w,
-            ]
-        )
-        t = rng.uniform(0.5, 2.5)
-        order = motion.tilt_series(b, m, z, *grounds, t, series.ORDER, 0.0, 1.0, a)
+        slides = mode.sense * (rng.uniform(-1.0, 1.0) if slip else 0.0)
+        z = [mode.sense * s, c, theta, slides - c * w, mode.sense * s * w, w]
+        stepping.put(state.motion, z)
+        state.t = rng.uniform(0.5, 2.5)
+        order = motion.tilt_series(b, natural.base_of(scene), run, series.ORDER, 0.0, 1.0)
         assert order == series.ORDER
-        a[motion.OMEGA, order] = 0.0  # ROCK has one more
+        a[Row.OMEGA, order] = 0.0  # ROCK has one more
         found = a[rows, : order + 1].copy()
-        a[motion.XI, :2], a[motion.Y, :2] = (
-            [m[motion.S] * z[motion.X], m[motion.S] * z[motion.VX]],
-            [z[motion.HEIGHT], z[motion.VY]],
-        )
-        motion._contact_series(b, motion.side_of(b, m[motion.S]), m, order, 0.0, 1.0, a)
+        a[Row.XI, :2], a[Row.Y, :2] = [mode.sense * z[0], mode.sense * z[3]], [z[1], z[4]]
+        motion._contact_series(b, mode, order, 0.0, 1.0, a)
         wanted = a[rows, : order + 1]
         # Rounding of an early term spreads over all that follow: it is relative to the largest one
         # so far.

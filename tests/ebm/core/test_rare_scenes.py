@@ -226,17 +226,24 @@ def test_impulse_ahead_is_the_integral(symmetric):
 def test_inner_kernels_return_no_arrays(monkeypatch):
     """They are compiled without reference counts, so that an array that they returned would be
     freed too early."""
+    from stepping import nothing
+
     from rockcheck.ebm import natural
     from rockcheck.ebm.core import (
+        bouc_wen,
         contacts,
+        coulomb,
         decide,
         ground,
         guards,
         march,
         modes,
         motion,
+        moving,
+        rest,
         series,
         settle,
+        state,
     )
     from rockcheck.ebm.core.lanes import LANES
     from rockcheck.ebm.core.laws import contact_impacts, impacts, strike
@@ -257,7 +264,7 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
         return call
 
     # The event loop in the interpreter, with every function of it that is no kernel under watch.
-    run, scratch, scene = march.run.py_func, motion.workspace(), SCENES["wedged"]
+    scene, work = SCENES["wedged"], state.workspace()
     for module in (
         contact_impacts,
         contacts,
@@ -266,10 +273,15 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
         guards,
         impacts,
         march,
+        bouc_wen,
+        coulomb,
         modes,
         motion,
+        moving,
+        rest,
         series,
         settle,
+        state,
         strike,
     ):
         for name, function in list(vars(module).items()):
@@ -280,18 +292,12 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
                 module, name, function.py_func if counts_references else watched(function.py_func)
             )
     setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
-    control = march.Control(1e-8, 200, 200, False, 1.0)
-    nothing = np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5))
+    states, control = natural.start_of(scene), state.Control(1e-8, 200, 200, False, 1.0)
+    states["t_end"] = 3.0
+    march_there = march.loop_with(coulomb).py_func
+    run = state.Run(states[0], *work, control, nothing())
     with np.errstate(all="ignore"):
-        run(
-            setting,
-            *natural.grounds_of(scene),
-            natural.state_of(scene),
-            3.0,
-            control,
-            *nothing,
-            *scratch,
-        )
+        march_there(setting, natural.base_of(scene), run)
     assert len(seen) > 30
 
 

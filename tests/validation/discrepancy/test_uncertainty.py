@@ -277,7 +277,8 @@ def test_the_domain_names_the_axis_that_leaves_it():
 
 
 def test_the_command_says_converged_and_not(uncertain, capsys, tmp_path):
-    assert main(["uncertainty", str(uncertain), "--samples", "16", "--json"]) == 0
+    out = ["--out", str(tmp_path / "out"), "--json"]
+    assert main(["assess", str(uncertain), "--samples", "16", *out]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["converged"] is True
     assert {"name", "value", "u_num", "order", "verdict"} <= found["quantities"][0].keys()
@@ -285,15 +286,15 @@ def test_the_command_says_converged_and_not(uncertain, capsys, tmp_path):
     assert (
         main(
             [
-                "uncertainty",
+                "assess",
                 str(uncertain),
-                "--model",
+                "--models",
                 "mujoco",
                 "--set",
                 "time_step=4e-3",
                 "--samples",
                 "2",
-                "--json",
+                *out,
             ]
         )
         == 1
@@ -359,10 +360,10 @@ def test_two_outcomes_are_explained_by_inputs_that_decide_them():
     assert found.verdict == verdict.INPUTS
 
 
-def test_a_motion_that_depends_on_the_law_of_impacts_is_not_sure(capsys):
+def test_a_motion_that_depends_on_the_law_of_impacts_is_not_sure(capsys, tmp_path):
     """It lands flat while it slides: no step tells which corner is first."""
     scene = Path(__file__).parents[2] / "data" / "modelling_choices" / "flat-landing.toml"
-    assert main(["uncertainty", str(scene), "--json"]) == 1
+    assert main(["assess", str(scene), "--out", str(tmp_path), "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert not found["converged"]
     assert 0.0 < found["depends_on_law_from_s"] < 3.0

@@ -78,6 +78,7 @@ def records(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rack.toml").write_text(TOML, encoding="utf-8")
     (tmp_path / "records").mkdir()
+    (tmp_path / "empty").mkdir()
     for name, one in MOTIONS:
         rows = "\n".join(f"{0.02 * k:.2f},{a!r}" for k, a in enumerate(one.samples.tolist()))
         path = tmp_path / "records" / f"{name}.csv"
@@ -360,48 +361,54 @@ def test_a_curve_never_counts_a_failed_run_as_safe():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ([], "records: are needed: the scene's excitation is no pulse"),
-        (["records/H1.csv"], "records: 1 is too few"),
-        (
-            ["records", "--intensity", "pgd"],
-            "--intensity: unknown intensity 'pgd'; did you mean 'pgv'",
-        ),
-        (["records", "--intensity", "sa"], "unknown intensity 'sa'"),
-        (["records", "--intensity", "sa:0"], "unknown intensity 'sa:0'"),
-        (["records", "--levels", "2:1:9"], "--levels"),
+        ([], "records: are needed: the base of the scene is at rest"),
+        (["records/H1.csv", "--levels", "pga:1:2:3"], "records: 1 is too few"),
+        (["records", "--levels", "pgd:1:2:3"], "unknown intensity 'pgd'; did you mean 'pgv'"),
+        (["records", "--levels", "sa:1:2:3"], "unknown intensity 'sa'"),
+        (["records", "--levels", "sa:0:1:2:3"], "unknown intensity 'sa:0'"),
+        (["records", "--levels", "pga:2:1:9"], "--levels"),
         (["records", "--levels", "1:2"], "--levels"),
         (["records", "--levels", "0.1:nan:9"], "--levels"),
         (["records/X*.csv"], "no such files"),
-        (["records", "--model", "free"], "--model: unknown model 'free'"),
+        (["records", "--models", "free"], "unknown model 'free'"),
+        (["records", "--gaps", "0,-0.1"], "--gaps: '0,-0.1' is not allowed: clear gaps in m"),
+        (["records", "--gaps", "0.1,"], "--gaps"),
+        (["records", "--gaps", "0.1,nan"], "--gaps"),
+        (["records", "--gaps", "0.1"], "say on which side, as in left:0.1"),
+        (["records", "--gaps", "up:0.1"], "--gaps: 'up' is not allowed: left or right"),
+        (["records", "--samples", "64"], "--samples: no number of the scene is uncertain"),
+        (["empty"], "empty: a folder without files"),
         (["records", "--read", "unitt=g"], "unitt: unknown key"),
         (["records", "--read", "unit"], "--read: 'unit': write key=value"),
         (["none.csv"], "none.csv"),
     ],
 )
 def test_slips_are_named(records, capsys, words, said):
-    assert main(["ida", "rack.toml", *words]) == 2
+    assert main(["assess", "rack.toml", *words]) == 2
     err = capsys.readouterr().err
     assert said in err
     assert err.count("\n") == 1
 
 
 def test_the_command_writes_curves_tables_and_page(records, capsys, tmp_path):
-    words = "ida rack.toml records/H*.csv --levels 0.2:1.2:6 --capacity 0.5 --json"
+    words = "assess rack.toml records/H*.csv --levels 0.2:1.2:6 --capacity 0.5 --json"
     assert main(words.split()) == 0
     answer = json.loads(capsys.readouterr().out)
     assert (answer["unit"], answer["capacities"], answer["left_out"]) == ("g", [0.5], [])
-    folder = tmp_path / "rockcheck-report" / "ida"
+    folder = tmp_path / "rockcheck-report" / "assess"
     assert len((folder / "ida.csv").read_text(encoding="utf-8").splitlines()) == 1 + 3 * 2 * 6
     assert "peak above 0.5 α" in (folder / "index.html").read_text(encoding="utf-8")
     assert {path.name for path in (folder / "figures").glob("*.svg")} == {
         "lines.svg",
         "fragility.svg",
+        "motion.svg",
+        "histories.svg",
     }
 
 
 def test_without_records_pulses_of_the_scenes_kind_tell_the_probability(records, capsys):
     assert main(["new", "pulse.toml", "-q"]) == 0
-    assert main(["ida", "pulse.toml", "--levels", "1:6:6", "--json"]) == 0
+    assert main(["assess", "pulse.toml", "--levels", "1:6:6", "--json"]) == 0
     fits = json.loads(capsys.readouterr().out)["tables"]["fits"]
     assert len(fits) == 2
     assert all(1.0 < fit["median"] < 6.0 for fit in fits)

@@ -85,6 +85,12 @@ class Batch(Task):
         cell = provenance.cell_key(self.scene, self.model, dict(self.settings))
         return cell, self.factors, provenance.code_digest(play.__module__)
 
+    def play(self) -> Runs:
+        """The runs."""
+        motions = map(self.scene.excitation.scaled, self.factors)
+        scenes = [self.scene.replace(excitation=motion) for motion in motions]
+        return play(scenes, build(self.model, dict(self.settings)))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Population(Study):
@@ -138,13 +144,6 @@ class Population(Study):
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Batch]:
         """All batches at once."""
         return [batch for some in self.batches.values() for batch in some]
-
-    @staticmethod
-    def play(task: Batch) -> Runs:
-        """The runs of a batch."""
-        motions = map(task.scene.excitation.scaled, task.factors)
-        scenes = [task.scene.replace(excitation=motion) for motion in motions]
-        return play(scenes, build(task.model, dict(task.settings)))
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """A curve a case and event; of one case also the lines of all motions."""
@@ -314,7 +313,7 @@ def measure_of(word: str) -> Measure:
     if found and (at := float(found[1])) >= 1e-3:
         return f"Sa({at:g} s), 5 %", "g", lambda r, scene: intensity.spectral_acceleration(r, at)
     if word not in MEASURES:
-        raise InputError(str(unknown_name("intensity", word, [*MEASURES, "sa:0.5"])), "--intensity")
+        raise InputError(str(unknown_name("intensity", word, [*MEASURES, "sa:0.5"])), "--levels")
     return MEASURES[word]
 
 
@@ -340,7 +339,7 @@ def ida(
     motions: Motions,
     levels: Floats,
     *,
-    measure: str = "pga",
+    measure: str = "",
     capacities: Sequence[float] = CAPACITIES,
     model: str = "ebm-unilateral",
     left_out: Sequence[str] = (),
@@ -349,7 +348,7 @@ def ida(
 
     Raises `InputError` for an unknown measure, fewer than two motions, or one without motion.
     """
-    label, unit, of = measure_of(measure)
+    label, unit, of = measure_of(measure or "pga")
     return Population(
         name="ida",
         title=f"Incremental dynamic analysis: {scene.name}",

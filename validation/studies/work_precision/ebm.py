@@ -233,7 +233,7 @@ def right_hand_side_seconds(count: int = 400_000) -> float:
     a polynomial."""
     from rockcheck.ebm import natural
 
-    ground, _ = natural.grounds_of(_scene())
+    ground = natural.base_of(_scene()).horizontal
     _right_hand_sides(ground, PAPER_BLOCK.alpha, 1)
     taken = []
     for _ in range(5):

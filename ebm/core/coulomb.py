@@ -1,0 +1,136 @@
+"""Coulomb's friction behind its four doors: `expand`, `locate`, `advance` and `after_event`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rockcheck.ebm.core.contacts import CLOSED, stand, stop
+from rockcheck.ebm.core.guards import fill_guards, first_event, rock_guards_hold
+from rockcheck.ebm.core.modes import select
+from rockcheck.ebm.core.motion import flat_series, tilt_series
+from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Row, Shape
+from rockcheck.ebm.core.series import (
+    AHEAD,
+    NO_ROOT,
+    NOISE,
+    ORDER,
+    first_root,
+    longest_step,
+    size_of,
+    step_size,
+)
+from rockcheck.ebm.core.state import code_of, mode_code, note, on_wall, rests, rocks
+from rockcheck.scenes.compiled import inner_kernel
+
+#: Whether rest is looked past, to the next uplift or slip.
+LOOKS_AHEAD = True
+#: A step reaches at most so many times as far as the last ones went: where a block rattles, its
+#: series need few terms.
+_FARTHER = 8.0
+
+
+@inner_kernel
+def expand(block, base, run, reach):
+    """Series of the mode's motion: their order, the place of a sticking pivot, and the step they
+    are good for."""
+    state, mode, motion, a = run.state, run.state.mode, run.state.motion, run.a
+    reach = min(reach, _FARTHER * state.stride)
+    state.place = 0.0
+    if mode.family == Family.FLAT:
+        order = state.order = flat_series(block, base, run, ORDER)
+        state.length = step_size(a, Row.U, Row.G, order, state.last_term_rad, reach)
+        return
+    # The tolerance is relative to a motion that is still tiny, since it may grow.
+    enough = 0.01 * state.tolerance_rad * min(1.0, 1e2 * (abs(motion.theta) + abs(motion.w)))
+    order = state.order = tilt_series(block, base, run, ORDER, enough, reach)
+    state.place = mode.sense * motion.x - a[Row.SIN, 0]
+    state.length = reach
+    if order == ORDER:
+        last = size_of(a, Row.PHI, Row.COS, order)
+        before = size_of(a, Row.PHI, Row.COS, order - 1)
+        free = rocks(mode)
+        if not free:
+            last = max(last, size_of(a, Row.XI, Row.Y, order))
+            before = max(before, size_of(a, Row.XI, Row.Y, order - 1))
+        if not free or base.vertical.kind != Shape.STILL:  # forces follow the base acceleration
+            last = max(last, size_of(a, Row.U, Row.G, order))
+            before = max(before, size_of(a, Row.U, Row.G, order - 1))
+        state.length = longest_step(last, before, order, state.last_term_rad, reach)
+
+
+@inner_kernel
+def locate(block, run):
+    """The first time within the step at which a guard ends the mode, and which."""
+    state, mode, h = run.state, run.state.mode, run.state.length
+    if rocks(mode) and mode.pull > 0 and rock_guards_hold(block, run):
+        noise = min(state.slack * NOISE[Kind.POSITION], CLOSED)
+        tau = first_root(run.a, Row.PHI, state.order, h, h, noise, AHEAD, run.stack)
+        none = tau == NO_ROOT
+        state.tau, state.guard = h if none else tau, (Guard.NONE if none else Guard.PHI)
+        return
+    fill_guards(block, run)
+    first_event(run)
+
+
+@inner_kernel
+def advance(run):
+    """Nothing but the motion: friction has no state of its own."""
+
+
+@inner_kernel
+def after_event(block, base, run):
+    """Selects the mode that follows, and notes the event that ended the one before, unless it goes
+    on."""
+    state, mode = run.state, run.state.mode
+    if state.known:
+        state.known = False
+        tell(run, state.event)
+        return
+    if state.guard > Guard.FAR_GAP:
+        state.event = _release(block, state)
+    event, ended = state.event, code_of(mode)
+    if not select(block, base, run):
+        state.ending = Ending.NOT_FINITE
+        return
+    # Events that are changes of mode and nothing else.
+    changes = event == Event.UPLIFT or event == Event.SLIPS or event == Event.LIFT_OFF
+    if (changes or event == Event.RELEASE) and code_of(mode) == ended:
+        return
+    tell(run, event)
+
+
+@inner_kernel
+def tell(run, event):
+    """Notes an event, and one more where an impact ends in rest. The end of rest is named by the
+    mode that follows."""
+    state, mode = run.state, run.state.mode
+    rest = mode_code(state) == 0
+    if event == Event.UNTOLD or (event == Event.LEAVES_REST and rest):
+        return
+    if event == Event.LEAVES_REST:
+        state.t_rest = np.nan
+        event = Event.SLIPS if mode.family == Family.FLAT else Event.UPLIFT
+    note(run, event, state.before)
+    impact = event == Event.FLOOR_IMPACT or event == Event.WALL_IMPACT or event == Event.LANDS
+    if impact and rest and run.records.log.shape[0] > state.events:
+        note(run, Event.SETTLED, state.before)
+
+
+@inner_kernel
+def _release(block, state):
+    """Prepares the motion for a change of mode without impact, and names it."""
+    mode, which = state.mode, state.guard
+    if which == Guard.SLIP:
+        if on_wall(mode):
+            stop(state.motion)
+        stand(block, state.motion)
+        return Event.STICKS
+    if not block.unilateral and rests(mode) and not on_wall(mode):
+        # Or hangs on, or lands again: the next mode says which.
+        return Event.LEAVES_REST
+    if which == Guard.CONE_PLUS or which == Guard.CONE_MINUS:
+        return Event.SLIPS
+    if which == Guard.UPLIFT_PLUS or which == Guard.UPLIFT_MINUS:
+        return Event.UPLIFT
+    lifts = which == Guard.FLOOR_PUSH and block.unilateral
+    return Event.LIFT_OFF if lifts else Event.RELEASE

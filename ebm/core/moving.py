@@ -1,0 +1,142 @@
+"""A step of a moving block: whether there is one, its rows, its end, and what ends no mode."""
+
+from __future__ import annotations
+
+import math
+
+from rockcheck.ebm.core.contacts import CLOSED
+from rockcheck.ebm.core.decide import decided, energy_of, swing_error, swings_again
+from rockcheck.ebm.core.motion import motion_at
+from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Pivot, Row, Shape
+from rockcheck.ebm.core.rest import write
+from rockcheck.ebm.core.rules import Rule
+from rockcheck.ebm.core.series import AHEAD, INSTANT, NOISE, first_root, slope, stays_below, value
+from rockcheck.ebm.core.state import mode_code, note, on_wall
+from rockcheck.scenes.compiled import inner_kernel
+
+#: Of a longer step before, this share counts after each further one.
+_FADES = 0.25
+
+
+@inner_kernel
+def may_go_on(block, base, run):
+    """Whether the run goes on; else why it ends here: its time is up, its outcome is certain, or it
+    has taken too many steps."""
+    state, motion = run.state, run.state.motion
+    if state.t >= state.t_end:
+        state.ending = Ending.DONE
+        return False
+    if run.control.until_decided:
+        if state.repeats:
+            state.ending = Ending.DONE
+            return False
+        verdict = decided(block, base, state)
+        if verdict > 0.0:
+            state.peak = verdict
+            state.ending = Ending.DONE
+            if verdict >= 0.5 * math.pi:
+                motion.theta = math.copysign(verdict, motion.theta)
+                state.ending = Ending.OVERTURNED
+            return False
+    if state.steps >= run.control.most_steps:
+        state.ending = Ending.TOO_MANY_STEPS
+        return False
+    state.steps += 1
+    return True
+
+
+@inner_kernel
+def sample(block, run):
+    """The rows of this step."""
+    state, records = run.state, run.records
+    t, step, code = state.t, run.control.output_step, mode_code(state)
+    state.whole = state.guard == Guard.NONE and state.tau >= state.smooth_until - t
+    until = state.smooth_until if state.whole else t + state.tau
+    while state.rows < records.out.shape[0] and state.rows * step < until:
+        motion_at(block, run, state.rows * step - t, state.sampled)
+        write(records, state.rows, state.sampled, code)
+        state.rows += 1
+
+
+@inner_kernel
+def advance(block, base, run):
+    """Moves the state to the end of the step; keeps the largest rotation on the way."""
+    state, mode, motion, a = run.state, run.state.mode, run.state.motion, run.a
+    order, tau, t = state.order, state.tau, state.t
+    rises = mode.family == Family.TILT and a[Row.OMEGA, 0] > 0.0
+    energy = energy_of(block, motion)
+    motion_at(block, run, tau, motion)
+    turns = rises and mode.sense * motion.w < 0.0
+    if turns and not stays_below(a, Row.PHI, order, tau, state.peak):
+        noise = NOISE[Kind.POSITION]
+        top = first_root(a, Row.OMEGA, order - 1, tau, tau, noise, AHEAD, run.stack)
+        if top > 0.0:
+            state.peak = max(state.peak, value(a, Row.PHI, order, top))
+    if turns and run.control.until_decided:
+        state.repeats = swings_again(state, energy)
+    state.peak = max(state.peak, abs(motion.theta))
+    state.swing = max(state.swing, abs(motion.w))
+    state.stride = max(tau, INSTANT, _FADES * min(state.stride, state.length))
+    state.t = state.smooth_until if state.whole else t + tau
+
+
+@inner_kernel
+def passes_on(block, base, run):
+    """Whether the event that ends the step ends no mode: the block only grazes the floor, or the
+    run is over."""
+    state, motion = run.state, run.state.motion
+    if state.guard == Guard.PHI and not block.unilateral and _grazes(block, base, run):
+        return True
+    state.swing = 0.0
+    if state.events + 1 >= run.control.most_events:
+        state.ending = Ending.TOO_MANY_EVENTS
+        return True
+    if state.guard != Guard.TOPPLE and not lies_along_wall(state):
+        return False
+    motion.theta = math.copysign(0.5 * math.pi, motion.theta)
+    state.peak = 0.5 * math.pi
+    side = Event.FELL_LEFT if state.mode.sense > 0 else Event.FELL_RIGHT
+    note(run, side, mode_code(state))
+    state.ending = Ending.OVERTURNED
+    return True
+
+
+@inner_kernel
+def _grazes(block, base, run):
+    """Whether a hanging block that comes down with less energy than a swing errs by does not land.
+    It is then put where it turns back.
+
+    A block at rest whose floor falls away swings back to just where it started. That cannot be told
+    from a touch.
+    """
+    state, mode, motion, a = run.state, run.state.mode, run.state.motion, run.a
+    order, tau = state.order, state.tau
+    if base.vertical.kind == Shape.STILL or on_wall(mode) or value(a, Row.G, order, tau) >= 0.0:
+        return False
+    back = slope(a, Row.OMEGA, order - 1, tau)
+    past = 2.0 * abs(motion.w) / back
+    energy = swing_error(state.tolerance_rad) * state.swing
+    little = 0.5 * motion.w * motion.w < energy * min(1.0, 10.0 * back)
+    if not (little and 0.0 < past <= state.length - tau):
+        return False
+    state.rules[Rule.GRAZES] += 1
+    state.t += past
+    motion_at(block, run, tau + past, motion)
+    lifted = max(abs(motion.theta), 2.0 * NOISE[Kind.POSITION])
+    motion.theta = math.copysign(lifted, float(mode.sense))
+    return True
+
+
+@inner_kernel
+def lies_along_wall(state):
+    """Whether a block that turns over about a standing pivot meets the wall as it comes to lie.
+
+    Its gap goes with the square of the angle that is left.
+    """
+    mode, motion = state.mode, state.motion
+    left = math.cos(motion.theta)
+    stands = mode.family == Family.TILT and mode.pivot == Pivot.STICK
+    down = left * left < CLOSED and mode.sense * motion.w > 0.0
+    lies = state.guard == Guard.TIP_GAP and stands and down
+    state.rules[Rule.LANDS_ALONG] += lies
+    return lies

@@ -1,0 +1,228 @@
+"""The state of a run: one named record, made once and passed as one argument.
+
+Compiled code reads a field of a record at the cost of an array's element. Natural units: lengths in
+R, accelerations in g, time in sqrt(R/g), unit mass.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.ebm.core.ground import Ground
+from rockcheck.ebm.core.names import ROWS, Event, Family, Pivot, Row
+from rockcheck.ebm.core.rules import RULES
+from rockcheck.ebm.core.series import WIDTH
+from rockcheck.scenes.compiled import inner_kernel, kernel
+
+Numbers = NDArray[np.float64]
+#: How many modes there are.
+MODES = 128
+
+
+def record(**fields: object) -> np.dtype[np.void]:
+    """The type of a record with these fields, which Python reads by name, too."""
+    return np.dtype((np.record, np.dtype(list(fields.items()), align=True)))
+
+
+#: Of the mass's centre, which stands at x = 0 at first; world frame.
+MOTION = record(x="f8", y="f8", theta="f8", vx="f8", vy="f8", w="f8")
+MODE = record(
+    # A Family.
+    family="i8",
+    # The sign of theta; at phi = 0, the sign that it is about to take.
+    sense="i8",
+    # A Pivot, and the direction in which it slips (frame; world where flat).
+    pivot="i8",
+    slip="i8",
+    # The sign assumed for the normal force P, which gives friction its sense; -1 only with the
+    # bilateral pivot.
+    pull="i8",
+    # Whether the corner rests on the wall it tips to, or on the other one. Where flat: whether the
+    # side rests on the left wall, on the right wall; on the floor a block at rest is then held on
+    # that side, whatever the base does.
+    tip="i8",
+    far="i8",
+)
+STATE = record(
+    motion=MOTION,
+    mode=MODE,
+    # Why the run has ended, an Ending.
+    ending="i8",
+    # Clock: now, and when the run ends; since when the block rests; from when the base is quiet;
+    # how long the last steps were.
+    t="f8",
+    t_end="f8",
+    t_rest="f8",
+    quiet_from="f8",
+    stride="f8",
+    # What the series are asked for, in rad: the tolerance, and how large the last term may be so
+    # that the terms left out stay below it.
+    tolerance_rad="f8",
+    last_term_rad="f8",
+    # The step: the order of its series, the place of a sticking pivot, how far the series are good;
+    # where it ends, and the Guard that ends it; whether that is where the base motion has a kink,
+    # or the run its end, and when that is.
+    order="i8",
+    place="f8",
+    length="f8",
+    tau="f8",
+    guard="i8",
+    whole="?",
+    smooth_until="f8",
+    # Largest |theta|, and largest |omega| since the last event.
+    peak="f8",
+    swing="f8",
+    # The last swing on a quiet base: its energy and pivot, and whether it was as the one before.
+    swing_energy="f8",
+    swing_place="f8",
+    repeats="?",
+    # Whether an event has ended the mode: which one, the mode's code, and whether `mode` is already
+    # the one that follows.
+    changing="?",
+    event="i8",
+    before="i8",
+    known="?",
+    # Selections at one instant: the mode's slack (in units of noise), the least slack of the next
+    # mode that does not fit; when the instant began, when the mode was selected; which mode a force
+    # has just ended (its code, or -1); which modes were tried.
+    slack="f8",
+    least_slack="f8",
+    since="f8",
+    began="f8",
+    ended="i8",
+    tried=("i1", (MODES,)),
+    # Impacts that accumulate (see ebm.core.settle): the settling speed, when the count began, the
+    # last impact; the count, how often it was full, how many at one instant.
+    settling_speed="f8",
+    counted_since="f8",
+    last_impact="f8",
+    counted="i8",
+    full="i8",
+    at_once="i8",
+    # Impulses of the last impact.
+    floor_impulse="f8",
+    wall_impulse="f8",
+    # Bouc-Wen friction: its variable z, and whether the pivot has not yielded.
+    zeta="f8",
+    holds="?",
+    # Counts: steps, events, wall impacts, rows written; impacts that added energy, and the largest
+    # gain; the modelling choices, a Rule each.
+    steps="i8",
+    events="i8",
+    wall_impacts="i8",
+    rows="i8",
+    gains="i8",
+    largest_gain="f8",
+    rules=("i8", (RULES,)),
+    # Scratch: a motion between the ends of a step.
+    sampled=MOTION,
+)
+
+
+class Base(NamedTuple):
+    """The motion of the base, sideways and upward."""
+
+    horizontal: Ground
+    vertical: Ground
+
+
+class Control(NamedTuple):
+    """What a run is asked for."""
+
+    #: Of a Taylor step, in alpha.
+    tolerance: float
+    most_steps: int
+    most_events: int
+    #: Stop as soon as the outcome and the peak are decided.
+    until_decided: bool
+    #: Spacing of the rows of `out`; with no rows nothing is sampled.
+    output_step: float
+
+
+class Records(NamedTuple):
+    """Where a run writes: rows of states, their modes, the log of events."""
+
+    out: Numbers
+    out_mode: NDArray[np.int8]
+    log: Numbers
+
+
+class Run(NamedTuple):
+    """A run: its state, the series of its step and the stack of the search for roots, what it is
+    asked for, and where it writes."""
+
+    state: np.record
+    a: Numbers
+    stack: Numbers
+    control: Control
+    records: Records
+
+
+@kernel
+def workspace():
+    """Scratch for one trajectory: the series (G = 1: no vertical motion), and the stack of the root
+    search."""
+    series = np.zeros((ROWS, WIDTH))
+    series[Row.G, 0] = series[Row.ANGLE, 2] = 1.0
+    return series, np.zeros((48, WIDTH))
+
+
+@inner_kernel
+def place(mode, family, sense, pivot, slip):
+    """Makes a mode without walls, on a floor that pushes."""
+    mode.family, mode.sense, mode.pivot, mode.slip = family, sense, pivot, slip
+    mode.pull, mode.tip, mode.far = 1, 0, 0
+
+
+@inner_kernel
+def on_wall(mode):
+    """Whether a wall takes part."""
+    return mode.tip != 0 or mode.far != 0
+
+
+@inner_kernel
+def rocks(mode):
+    """Whether the block rocks, free of walls: ROCK."""
+    return mode.family == Family.TILT and mode.pivot == Pivot.STICK and not on_wall(mode)
+
+
+@inner_kernel
+def rests(mode):
+    """Whether the block stands at rest on its base."""
+    return mode.family == Family.FLAT and mode.pivot == Pivot.STICK
+
+
+@inner_kernel
+def code_of(mode):
+    """A number for the mode, below MODES."""
+    floor = 3 if mode.pivot == Pivot.OFF else mode.slip + 1
+    tilts = mode.family * 2 + (mode.sense > 0)
+    return ((tilts * 4 + floor) * 2 + (mode.pull > 0)) * 4 + mode.tip + 2 * mode.far
+
+
+@inner_kernel
+def mode_code(state):
+    """The mode's index in MODE_NAMES."""
+    mode = state.mode
+    if mode.pivot == Pivot.OFF:
+        return 6
+    if mode.family == Family.FLAT:
+        return 0 if mode.pivot == Pivot.STICK else 1
+    wall = 2 if on_wall(mode) else 0
+    return wall + (2 if mode.pivot == Pivot.STICK or state.holds else 3)
+
+
+@inner_kernel
+def note(run, event, before):
+    """One row of the log; a change at rest has no impulse."""
+    state, log = run.state, run.records.log
+    count = state.events
+    state.events = count + 1
+    if count < log.shape[0]:
+        strikes = event == Event.FLOOR_IMPACT or event == Event.WALL_IMPACT or event == Event.LANDS
+        log[count, 0], log[count, 1], log[count, 2] = state.t, event, before
+        log[count, 3] = 0 if event == Event.SETTLED else mode_code(state)
+        log[count, 4] = state.floor_impulse + state.wall_impulse if strikes else 0.0

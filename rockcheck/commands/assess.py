@@ -1,0 +1,195 @@
+"""`rockcheck assess`: does it fall, how far does it move, how sure is that."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from rockcheck.commands import (
+    OUT,
+    JobsOption,
+    OutOption,
+    SchedulerOption,
+    model_names,
+    scene_names,
+    studied,
+    tell_left_out,
+)
+from rockcheck.commands.record import ReadOption, RecordsArgument
+from rockcheck.commands.validate import chosen_models, record_sets
+from rockcheck.ebm.spectrum import Floats
+from rockcheck.scenes import InputError, Scene
+from rockcheck.scenes.errors import printable
+from rockcheck.scenes.files import UncertainScene, load_uncertain_scene
+from rockcheck.validation.criteria import sampled
+from rockcheck.validation.studies.population.assess import Assessment, gaps_of
+from rockcheck.validation.studies.population.study import CAPACITIES, Population, fragility, ida
+from rockcheck.validation.suite.record_sets import under_records
+
+MOST_LEVELS, MOST_SAMPLES = 1000, 1 << 16
+#: Of the pulses of a fragility curve, omega_p/p.
+FREQUENCIES = (0.5, 8.0)
+#: Draws of the numbers of a single run.
+SAMPLES = 1024
+REFERENCE = "ebm-unilateral"
+
+
+def run(
+    scene: Annotated[
+        str, typer.Argument(help="A named scene or a .toml file.", autocompletion=scene_names)
+    ],
+    records: RecordsArgument = None,
+    models: Annotated[
+        str,
+        typer.Option(
+            "--models",
+            help="The model that plays, and others to compare with it, with commas between.",
+            autocompletion=model_names,
+        ),
+    ] = REFERENCE,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="A setting of the first model, such as time_step=1e-4, or MODEL.key=value;"
+            " repeatable.",
+        ),
+    ] = None,
+    samples: Annotated[
+        int | None,
+        typer.Option(
+            "--samples",
+            min=2,
+            max=MOST_SAMPLES,
+            help="Draws of the scene's uncertain numbers for each record (a power of two is taken;"
+            f" default without records: {SAMPLES}).",
+        ),
+    ] = None,
+    gaps: Annotated[
+        str | None,
+        typer.Option(
+            "--gaps",
+            metavar="[SIDE:]GAP,GAP...",
+            help="Clear gaps (m) to try, such as 0,0.05,0.1 or left:0.05,0.1.",
+        ),
+    ] = None,
+    levels: Annotated[
+        str | None,
+        typer.Option(
+            "--levels",
+            metavar="MEASURE:LOW:HIGH:COUNT",
+            help="Intensities to scale the records to: pga (g), pgv (m/s), pga-ratio, pgv-ratio or"
+            " sa:PERIOD (g), such as pga:0.05:2:40. Without records: pulses, over g tan(alpha).",
+        ),
+    ] = None,
+    capacity: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--capacity",
+            help="Peak rotation (alpha) of a fragility curve; repeatable.",
+            min=1e-6,
+            max=1.0,
+        ),
+    ] = None,
+    read: ReadOption = None,
+    out: OutOption = OUT / "assess",
+    jobs: JobsOption = None,
+    scheduler: SchedulerOption = None,
+) -> None:
+    """Does it fall, how far does it move, how sure is that?
+
+    And which gap is safe, and at which intensity does it fall.
+    Plays the scene under its own base motion, or under each record; says what hand methods say
+    beside it. A number that the scene file gives as { value = 0.3, sd = 0.03 } is uncertain.
+    --read also takes scale=1.2 and vertical=true for the records.
+
+    Exit 0: done; of a single run: converged. 1: a single run that is not converged. 3: a model
+    failed.
+    """
+    given = load_uncertain_scene(scene)
+    words = [
+        word if "." in word.partition("=")[0] else f"{models.split(',')[0]}.{word}"
+        for word in settings or ()
+    ]
+    chosen = chosen_models(models, words)
+    tried: tuple[float, ...] = ()
+    sides = tuple(wall.side for wall in given.scene.walls)
+    if gaps is not None:
+        tried, sides, changed = gaps_of(gaps, given.scene)
+        given = UncertainScene(changed, given.spreads, given.correlation)
+    sets = record_sets(records or (), read or ())
+    cases, left_out = under_records({given.scene.name: given}, sets, Path())
+    if not records:
+        check_moves(given.scene)
+    if samples is not None and not given.spreads:
+        raise InputError(
+            "no number of the scene is uncertain: write one as { value = 0.3, sd = 0.03 }",
+            "--samples",
+        )
+    draws = samples or (0 if records or not given.spreads else SAMPLES)
+    named = {str(getattr(one.scene.excitation, "source", name)): one for name, one in cases.items()}
+    study = Assessment(
+        own=given,
+        cases=named if records else cases,
+        models=tuple(chosen),
+        settings=chosen,
+        gaps=tried,
+        sides=sides,
+        samples=1 << max(1, (draws - 1).bit_length()) if draws else 0,
+        recorded=bool(records),
+        levels=None
+        if levels is None
+        else population_of(levels, given.scene, named, capacity)
+        if records
+        else pulses_of(levels, given.scene),
+        left_out=left_out,
+    )
+    tell_left_out(left_out, "--read vertical=true plays such a component with the horizontal ones")
+    studied(study, out, jobs=jobs, scheduler=scheduler)
+
+
+def check_moves(scene: Scene) -> None:
+    """Raises `InputError` for a scene in which nothing happens."""
+    begins = any((scene.initial_rotation, scene.initial_angular_velocity, scene.initial_velocity))
+    still = scene.excitation.kind == scene.vertical.kind == "rest"
+    if still and not begins and not scene.initial_height:
+        raise InputError("are needed: the base of the scene is at rest", "records")
+
+
+def population_of(
+    text: str, scene: Scene, cases: dict[str, UncertainScene], capacity: list[float] | None
+) -> Population:
+    """The incremental dynamic analysis that --levels asks for. Raises `InputError`."""
+    measure, values = levels_of(text)
+    motions = [
+        (name, sampled(one.scene.excitation, one.scene.duration)) for name, one in cases.items()
+    ]
+    return ida(scene, motions, values, measure=measure or "pga", capacities=capacity or CAPACITIES)
+
+
+def pulses_of(text: str, scene: Scene) -> Population:
+    """The fragility under pulses of the scene's kind. Raises `InputError`."""
+    measure, values = levels_of(text)
+    if measure not in ("", "pga-ratio"):
+        raise InputError(f"{measure} needs records; of pulses it is pga-ratio", "--levels")
+    return fragility(scene, [], values, FREQUENCIES, model=REFERENCE)
+
+
+def levels_of(text: str) -> tuple[str, Floats]:
+    """The measure and the intensities that MEASURE:LOW:HIGH:COUNT means. Raises `InputError`."""
+    *measure, low, high, count = ["", "", "", *text.split(":")]
+    try:
+        first, last, number = float(low), float(high), float(count)
+    except ValueError:
+        first = last = number = 0.0
+    if not (0.0 < first < last < math.inf and number in range(2, MOST_LEVELS + 1)):
+        said = (
+            "give MEASURE:LOW:HIGH:COUNT such as pga:0.05:2:40, 0 < LOW < HIGH, 2 to"
+            f" {MOST_LEVELS} of them, not {text!r}"
+        )
+        raise InputError(printable(said, 160), "--levels")
+    return ":".join(filter(None, measure)), np.linspace(first, last, int(number))

@@ -1,0 +1,259 @@
+"""An assessment against a loop of one's own, and what it says."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+from dask.distributed import LocalCluster
+
+from rockcheck.commands.cli import main
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import Record, load_scene
+from rockcheck.validation.criteria import CRITERIA, base_of
+from rockcheck.validation.discrepancy.motion import motion_of, spread, wall_speeds
+
+CABINET = """
+duration = 12.0
+[block]
+half_width = 0.3
+half_height = 1.0
+[floor]
+friction = 0.4
+[[walls]]
+side = "right"
+gap = 0.05
+[excitation]
+kind = "ricker"
+amplitude = 5.0
+period = 0.9
+"""
+GAPS = (0.0, 0.05, 0.15, 0.4)
+COUNT = 12
+
+
+def noise(seed: int) -> Record:
+    """A seeded motion of 10 s, coloured and with an envelope, of 4 to 12 m/s^2."""
+    random = np.random.default_rng(seed)
+    t = 0.02 * np.arange(500)
+    tones = np.arange(0.4, 5.0, 0.2)
+    phases = random.uniform(0.0, 2.0 * math.pi, len(tones))
+    samples = np.sin(2.0 * math.pi * np.outer(t, tones) + phases) @ (1.0 / tones)
+    samples *= np.minimum(t / 2.0, 1.0) * np.exp(-np.maximum(t - 5.0, 0.0))
+    return Record.from_samples(samples * random.uniform(4.0, 12.0) / np.abs(samples).max(), 0.02)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The cabinet's file, and its records."""
+    path = tmp_path_factory.mktemp("assess")
+    (path / "cabinet.toml").write_text(CABINET, encoding="utf-8")
+    uncertain = CABINET.replace("friction = 0.4", "friction = { value = 0.4, sd = 0.04 }")
+    (path / "uncertain.toml").write_text(uncertain, encoding="utf-8")
+    (path / "records").mkdir()
+    for seed in range(COUNT):
+        record = noise(seed)
+        times = record.time_step * np.arange(len(record.unscaled))
+        rows = zip(times.tolist(), record.unscaled, strict=True)
+        text = "".join(f"{t!r},{a!r}\n" for t, a in rows)
+        (path / "records" / f"R{seed:02d}.csv").write_text(
+            f"time_s,acceleration_m_s2\n{text}", encoding="utf-8"
+        )
+    return path
+
+
+@pytest.fixture
+def assess(folder, tmp_path, monkeypatch, capsys):
+    """Runs the command in the folder and returns what --json says."""
+    monkeypatch.chdir(folder)
+
+    def run(words: str):
+        code = main([*f"assess {words} --json".split(), "--out", str(tmp_path / "out")])
+        said = json.loads(capsys.readouterr().out)
+        assert code == said["exit_code"] == (0 if said.get("converged", True) else 1)
+        return said
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def loop(folder):
+    """What a user would write: the histories by gap (inf: without the wall) and record."""
+    scene, model = load_scene(folder / "cabinet.toml"), EventBasedModel(pivot="unilateral")
+    found = {}
+    for gap in (*GAPS, math.inf):
+        walls = [] if math.isinf(gap) else [scene.walls[0].replace(gap=gap)]
+        for path in sorted((folder / "records").glob("*.csv")):
+            shaken = scene.replace(walls=walls, excitation=Record.from_file(path))
+            found[gap, path.stem] = shaken, model.simulate(shaken)
+    return found
+
+
+def test_counts_motions_and_gaps_are_those_of_a_loop_of_ones_own(assess, loop):
+    said = assess(f"cabinet.toml records --gaps {','.join(map(str, GAPS))}")
+    own = {name: loop[0.05, name][1] for gap, name in loop if gap == 0.05}
+    outcomes = [history.outcome for history in own.values()]
+    assert said["runs"] == COUNT
+    assert said["outcomes"] == {name: outcomes.count(name) for name in said["outcomes"]}
+    fallen = sum(one.startswith("overturned") for one in outcomes)
+    assert 0 < fallen < COUNT, "the records tell falling from standing"
+    assert said["overturning"]["count"] == fallen
+    assert said["overturning"]["probability"] == pytest.approx(fallen / COUNT)
+    stand = {k: h.frame for k, h in own.items() if not h.outcome.startswith("overturned")}
+    top = {
+        name: max(
+            np.max(np.abs(f.x + d * (np.cos(f.theta) - 1.0) - np.sin(f.theta))) for d in (-0.3, 0.3)
+        )
+        for name, f in stand.items()
+    }
+    expected = {
+        "peak_rotation": {k: np.max(np.abs(f.theta)) / math.atan(0.3) for k, f in stand.items()},
+        "slip": {k: np.max(np.abs(f.slip)) for k, f in stand.items()},
+        "top_displacement": top,
+    }
+    for name, values in expected.items():
+        one = said["quantities"][name]
+        assert one["of"] == len(stand)
+        assert one["median"] == pytest.approx(np.median(list(values.values())), rel=1e-9)
+        assert one["largest"] == pytest.approx(max(values.values()), rel=1e-9)
+        assert one["record"] == max(values, key=values.get)
+    for row in said["gaps"]:
+        runs = [history for (gap, _), (_, history) in loop.items() if gap == row["gap"]]
+        fell = sum(history.outcome.startswith("overturned") for history in runs)
+        struck = sum("wall impact" in set(history.events.kind) for history in runs)
+        assert (row["runs"], row["overturned"], row["struck"]) == (COUNT, fell, struck)
+    free = [history.frame for (gap, _), (_, history) in loop.items() if math.isinf(gap)]
+    reach = [
+        np.max(np.hypot(0.3, 1.0) * np.sin(math.atan(0.3) + np.abs(f.theta)) - 0.3 + f.x)
+        for f in free
+    ]
+    assert said["clearance"] == pytest.approx(max(reach), rel=1e-9)
+    fallen_at = [row["overturned"] for row in said["gaps"]]
+    safe = [gap for k, gap in enumerate(GAPS) if not any(fallen_at[: k + 1])]
+    assert said["none_overturns_up_to"] == (max(safe) if safe else None)
+    assert said["monotonic"] == (fallen_at == sorted(fallen_at))
+
+
+def test_the_speed_at_the_wall_is_that_of_the_outermost_corner_as_it_strikes(loop):
+    """Against the same motion with a hundred times as many rows."""
+    for scene, history in [loop[0.05, f"R{k:02d}"] for k in range(4)]:
+        fine = EventBasedModel(pivot="unilateral").simulate(scene.replace(output_step=5e-5))
+        if wall_speeds(fine, scene):
+            speeds = [motion_of(one, scene).wall_speed for one in (history, fine)]
+            assert speeds[0] == pytest.approx(speeds[1], rel=5e-3)
+
+
+def test_hand_methods_stand_beside_the_simulation(assess, loop):
+    said = assess("cabinet.toml records")["criteria"]
+    runs = [loop[0.05, f"R{k:02d}"] for k in range(COUNT)]
+    for criterion, row in zip(CRITERIA, said, strict=True):
+        says = [criterion.says(scene, base_of(scene))[0] for scene, _ in runs]
+        assert (row["of"], row["predicts"]) == (COUNT, sum(says))
+        if criterion.event == "overturns":
+            falls = [history.outcome.startswith("overturned") for _, history in runs]
+            assert row["simulated"] == sum(falls)
+            assert row["agrees"] == sum(a == b for a, b in zip(says, falls, strict=True))
+
+
+def test_contributions_are_shares_and_the_largest_comes_first(assess):
+    said = assess("uncertain.toml records --samples 8 --models ebm-unilateral,ebm")
+    shares = [row["share"] for row in said["contributions"]]
+    assert {row["source"] for row in said["contributions"]} == {
+        "records",
+        "inputs",
+        "numerical error",
+        "model form",
+        "impact law",
+    }
+    assert sum(shares) == pytest.approx(1.0)
+    assert shares == sorted(shares, reverse=True)
+    assert said["runs"] == 8 * COUNT
+    assert said["overturning"]["low"] < said["overturning"]["probability"]
+
+
+def test_draws_are_the_same_in_any_number_of_processes_and_are_read_back(
+    assess, folder, tmp_path, capsys
+):
+    words = "uncertain.toml records --samples 4 --gaps 0.05,0.2"
+    first = assess(words)
+    made = first.pop("made")
+    again = assess(f"{words} --jobs 1")
+    assert again.pop("made")["jobs"] == 1 != made["jobs"] or made["jobs"] == 1
+    assert again == first
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        out = ["--out", str(tmp_path / "dask"), "--scheduler", cluster.scheduler_address]
+        assert main(["assess", *words.split(), *out, "--json"]) == 0
+    there = json.loads(capsys.readouterr().out)
+    assert there["gaps"] == first["gaps"]
+
+
+def test_one_run_says_how_sure_it_is(assess):
+    said = assess("uncertain.toml --samples 16")
+    assert (said["runs"], said["converged"]) == (1, True)
+    assert {q["name"] for q in said["quantities"]} >= {"peak_rotation", "last_slip", "outcome"}
+    assert said["numerical"]["quantities"] == said["quantities"]
+    assert said["inputs"]["samples"] == 16
+    assert said["inputs"]["sensitivities"][0]["name"] == "floor.friction"
+    assert said["motion"]["top_displacement"]["of"] == 1
+
+
+def test_a_gap_on_a_side_without_a_wall_puts_one_there(assess):
+    said = assess("cabinet.toml records/R00.csv --gaps left:0.01,0.5")
+    assert [row["gap"] for row in said["gaps"]] == [0.01, 0.5]
+    assert said["gaps"][0]["struck"] == 1
+
+
+def test_the_history_of_each_run_and_its_tables_are_written(assess, folder, tmp_path, loop):
+    assess("cabinet.toml records/R0*.csv --gaps 0.05")
+    out = tmp_path / "out"
+    page = (out / "index.html").read_text(encoding="utf-8")
+    for name in ("R00", "R09"):
+        assert f'href="histories/{name}.csv"' in page
+        text = (out / "histories" / f"{name}.csv").read_text(encoding="utf-8")
+        rows = list(csv.DictReader(text.splitlines()))
+        theta = [float(row["theta"]) for row in rows]
+        frame = loop[0.05, name][1].frame
+        every = -(-len(frame) // 2000)
+        assert theta == pytest.approx(frame.theta[::every].tolist(), abs=1e-15)
+    for table in ("outcomes", "quantities", "gaps", "contributions", "criteria", "runs"):
+        assert (out / f"{table}.csv").is_file()
+    assert (out / "summary.md").read_text(encoding="utf-8").startswith("# Assessment: cabinet")
+
+
+def test_an_engine_may_play_and_is_compared(assess):
+    said = assess("cabinet.toml --models mujoco,ebm-unilateral --set time_step=4e-3")
+    assert said["model"] == "mujoco"
+    assert said["quantities"][0]["u_num"] != 0.0
+    assert [row["model"] for row in said["tables"]["models"]] == ["ebm-unilateral"]
+
+
+def test_a_scene_in_which_nothing_is_known_of_a_figure_has_none():
+    assert spread([]) == {"median": None, "p16": None, "p84": None, "largest": None}
+
+
+def test_a_peak_acceleration_scales_the_record_of_a_scene(folder):
+    name = folder / "records" / "R01.csv"
+    scaled = load_scene(write(folder, f'file = "{name}"\npga = 0.5')).excitation
+    assert scaled.peak == pytest.approx(0.5, rel=1e-12)
+    assert scaled.unscaled == Record.from_file(name).unscaled
+
+
+@pytest.mark.parametrize(
+    "more", ["pga = 0.5\nscale = 2.0", "pga = -1.0", "pga = 1e9", 'pga = "0.5 g"']
+)
+def test_a_peak_acceleration_that_cannot_be_is_named(folder, more, capsys):
+    path = write(folder, f'file = "{folder / "records" / "R01.csv"}"\n{more}')
+    assert main(["assess", str(path)]) == 2
+    err = capsys.readouterr().err
+    assert "excitation.pga" in err
+    assert err.count("\n") == 1
+
+
+def write(folder, excitation):
+    path = folder / "pga.toml"
+    head = CABINET.partition("[excitation]")[0]
+    path.write_text(f'{head}[excitation]\nkind = "record"\n{excitation}\n', encoding="utf-8")
+    return path
