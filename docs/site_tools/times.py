@@ -24,7 +24,6 @@ COMMANDS = {
     "spectrum --out paper-spectra": "28 spectra of 10,000 pulses",
     "conformance --engine mujoco --out conformance": "18 cards of an engine",
     "benchmark --quick --out quick": "run time against error, in small",
-    "benchmark convergence --out convergence": "252 runs beside a wall",
     "stress --quick --out stress": "some thousand random runs",
 }
 
