@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: How an event is drawn on a model's track: kind, marker, size.
 TRACKED = (("floor impact", "|", 5.0), ("wall impact", "D", 2.6))
+#: The least that the axis of a thumbnail shows to either side, alpha: noise is not blown up.
+LEAST = 1e-3
 #: Below this share of a channel's largest value differences are drawn on a linear scale.
 FINE = 1e-3
 LEGEND_COLUMNS = 6
@@ -110,6 +112,8 @@ def thumbnail(curves: Iterable[tuple[Any, Any, Look]], *, step: bool = False) ->
         else:
             ax.axhline(0.0, color="#bbbbbb", linewidth=0.4, zorder=0)
             ax.margins(x=0.0, y=0.08)
+            low, high = ax.get_ylim()
+            ax.set_ylim(min(low, -LEAST), max(high, LEAST))
         ax.set_axis_off()
     return figure
 
