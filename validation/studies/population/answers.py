@@ -732,13 +732,16 @@ def histories(found: Found) -> list[Block]:
         return []
     end = max(one["t"][-1] for one in columns.values())
     times, alpha = np.linspace(0.0, end, POINTS), found.own.scene.block.alpha
+    fell = {case: run.fell for case, run in found.nominal.items()}
     series = [
         Series(
             case,
             times.tolist(),
             [
                 float(value) if math.isfinite(value) else None
-                for value in np.interp(times, one["t"], one["theta"] / alpha, right=math.nan)
+                for value in np.interp(
+                    times, one["t"], one["theta"] / alpha, right=math.nan if fell[case] else None
+                )
             ],
             style="thin" if len(columns) > 1 else "smooth",
         )
