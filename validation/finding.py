@@ -96,8 +96,8 @@ def table_of(name: str, kind: type, records: Sequence[Any], **more: Any) -> Tabl
 class Series:
     """One line of a panel. `low` and `high` bound a band around it; `look` names a model's colour.
 
-    `style`: a line, "smooth" or "dashed" (without marks), points only, dots (a fit), "thin" (one of many behind
-    the others), or "level", a horizontal line at the only `y`, for reference.
+    `style`: a line, "smooth" or "dashed" (without marks), points only, dots (a fit), "thin" (one of
+    many behind the others), or "level", a horizontal line at the only `y`, for reference.
     """
 
     label: str
@@ -106,9 +106,7 @@ class Series:
     low: Sequence[float | None] = ()
     high: Sequence[float | None] = ()
     look: str = ""
-    style: Literal[
-        "line", "smooth", "dashed", "points", "dots", "thin", "level", "marked"
-    ] = "line"
+    style: Literal["line", "smooth", "dashed", "points", "dots", "thin", "level", "marked"] = "line"
 
 
 @dataclass(frozen=True)
