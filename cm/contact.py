@@ -46,12 +46,11 @@ def friction_force(
     stiffness: float,
     damping: float,
     mobility: float,
-    mu_s: float,
+    holds: float,
     mu_k: float,
     normal: float,
     stretch: float,
     rate: float,
-    slipping: bool,
 ) -> tuple[float, bool]:
     """Stick-slip friction: a spring-damper whose force stays within Coulomb's cone. Returns force
     and whether it slips.
@@ -59,11 +58,11 @@ def friction_force(
     `stretch` (m) is the spring's memory, `rate` (m/s) the corner's tangential velocity as it would
     be without this force, and `mobility` how much of that velocity a unit of force takes away: the
     damper acts on the velocity that is left (implicit, so that it may be stiff; then friction
-    follows the normal force without lag). A sticking corner slips beyond mu_s `normal`; a slipping
-    one is held at mu_k `normal` and sticks again when the spring-damper asks for less.
+    follows the normal force without lag). A corner sticks up to `holds` `normal`: mu_s where it
+    stuck before, mu_k where it slipped. Else it is held at mu_k `normal`.
     """
     force = -(stiffness * stretch + damping * rate) / (1.0 + damping * mobility)
-    if abs(force) <= (mu_k if slipping else mu_s) * normal:
+    if abs(force) <= holds * normal:
         return force, False
     return math.copysign(mu_k * normal, force), True
 

@@ -45,7 +45,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.cm import contact
-from rockcheck.scenes.compiled import kernel
+from rockcheck.scenes.compiled import inner_kernel, kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -110,6 +110,54 @@ class Parameters(NamedTuple):
     time_step: float
 
 
+class Contacts(NamedTuple):
+    """The contacts of a run: `memory` holds one row a contact, `friction` the floor's; `surfaces`
+    lists those of the scene, the floor last."""
+
+    memory: Floats
+    friction: Floats
+    parameters: Parameters
+    surfaces: Integers
+
+
+class Step(NamedTuple):
+    """A step, seen from its middle: the place of the mass's centre and of the corners, the velocity
+    before it, its length, and the time."""
+
+    x: float
+    y: float
+    corners: Corners
+    v0: Velocity
+    length: float
+    t: float
+
+
+class Arrival(NamedTuple):
+    """A corner (0 or 1) that comes to a surface: its offset, its mobility, that of the surface's
+    other corner and what couples them, its rate (< 0) and slip; gap and rate of the other one."""
+
+    surface: int
+    corner: int
+    rx: float
+    ry: float
+    mobility: float
+    other: float
+    coupling: float
+    rate: float
+    slip: float
+    other_gap: float
+    other_rate: float
+
+
+class Shaking(NamedTuple):
+    """Samples of the base acceleration, sideways and upward, and how many there are a second."""
+
+    horizontal: Floats
+    horizontal_rate: float
+    vertical: Floats
+    vertical_rate: float
+
+
 @kernel
 def sampled(samples: Floats, rate: float, t: float) -> float:
     """Linear interpolation in `samples`, `rate` of them a second, the first at t = 0; zero after
@@ -139,56 +187,36 @@ def kicked(
     return v[0] + nx * impulse, v[1] + ny * impulse, v[2] + inverse * lever * impulse
 
 
-@kernel
+@inner_kernel
 def with_forces(
-    memory: Floats,
-    friction: Floats,
-    inverse: float,
-    surface: int,
-    corners: Corners,
-    v: Velocity,
-    step: float,
+    contacts: Contacts, surface: int, corners: Corners, v: Velocity, step: float
 ) -> Velocity:
     """Velocity after the remembered forces of a surface have acted for `step`."""
+    memory, inverse = contacts.memory, contacts.parameters.inverse_inertia
     nx, ny, ax, ay, bx, by = facing(surface, corners)
     v = kicked(v, inverse, nx, ny, ax * ny - ay * nx, step * memory[2 * surface, FORCE])
     v = kicked(v, inverse, nx, ny, bx * ny - by * nx, step * memory[2 * surface + 1, FORCE])
     if surface == FLOOR:
-        v = kicked(v, inverse, 1.0, 0.0, -min(ay, by), step * friction[SHEAR])
+        v = kicked(v, inverse, 1.0, 0.0, -min(ay, by), step * contacts.friction[SHEAR])
     return v
 
 
-@kernel
-def closes(
-    memory: Floats,
-    parameters: Parameters,
-    inverse: float,
-    surface: int,
-    corner: int,
-    rx: float,
-    ry: float,
-    mobility: float,
-    other: float,
-    coupling: float,
-    rate: float,
-    slip: float,
-    other_gap: float,
-    other_rate: float,
-    t: float,
-) -> float:
+@inner_kernel
+def closes(contacts: Contacts, arrival: Arrival, t: float) -> float:
     """A contact closes at `t`: choose spring and damper, begin a strike if it was open for long.
     Returns the step that it asks for.
 
-    The corner arrives at `rate` < 0 and slides at `slip`; `other` is the mobility of the surface's
-    other corner. When that one arrives within the contact's own time, the two share the block's
+    When the surface's other corner arrives within the contact's own time, the two share the block's
     mass as their speeds say. Where the mass lies nearer to one of them, equal springs would turn
     the block, and neither corner would leave with the scene's restitution: there each spring is as
     stiff as its share is large.
     """
-    one = 2 * surface + corner
+    memory, parameters = contacts.memory, contacts.parameters
+    inverse = parameters.inverse_inertia
+    one = 2 * arrival.surface + arrival.corner
     contact_time = 1.0 / math.sqrt(parameters.stiffness)
     memory[one, CLOSED] = 1.0
-    if rate > -GENTLE * parameters.gravity * contact_time:
+    if arrival.rate > -GENTLE * parameters.gravity * contact_time:
         return math.inf
     if t - memory[one, LAST_CLOSED] > STRIKE:
         memory[one, STRUCK] = t
@@ -196,29 +224,41 @@ def closes(
     if parameters.calibrated:
         left, right, bottom, top = parameters.reach
         spring = 1.0
-        both = other_rate < 0.1 * rate and other_gap < -other_rate * contact_time
-        mass = shared_mass(mobility, other, coupling, other_rate / rate)
-        if both and (left != right if surface == FLOOR else bottom != top) and mass > 0.0:
+        both = (
+            arrival.other_rate < 0.1 * arrival.rate
+            and arrival.other_gap < -arrival.other_rate * contact_time
+        )
+        mass = shared_mass(
+            arrival.mobility, arrival.other, arrival.coupling, arrival.other_rate / arrival.rate
+        )
+        if both and (left != right if arrival.surface == FLOOR else bottom != top) and mass > 0.0:
             spring = 2.0 * mass
         elif both:
-            mass = 1.0 / (mobility + coupling * min(1.0, other_rate / rate))
-        elif surface == FLOOR:
+            mass = 1.0 / (
+                arrival.mobility + arrival.coupling * min(1.0, arrival.other_rate / arrival.rate)
+            )
+        elif arrival.surface == FLOOR:
             mass = effective_mass(
-                mobility,
-                1.0 + inverse * ry * ry,
-                -inverse * rx * ry,
-                rate,
-                slip,
+                arrival.mobility,
+                1.0 + inverse * arrival.ry * arrival.ry,
+                -inverse * arrival.rx * arrival.ry,
+                arrival.rate,
+                arrival.slip,
                 parameters.mu_s,
-                parameters.restitution[surface],
+                parameters.restitution[arrival.surface],
             )
         else:
-            mass = 1.0 / mobility
+            mass = 1.0 / arrival.mobility
         memory[one, STIFFNESS] = spring * parameters.stiffness
         memory[one, DAMPING] = (
-            2.0 * parameters.damping_ratio[surface] * math.sqrt(spring * mass) / contact_time
+            2.0
+            * parameters.damping_ratio[arrival.surface]
+            * math.sqrt(spring * mass)
+            / contact_time
         )
-    return min(FINE * contact_time, FINE_DAMPER / (memory[one, DAMPING] * mobility + 1e-300))
+    return min(
+        FINE * contact_time, FINE_DAMPER / (memory[one, DAMPING] * arrival.mobility + 1e-300)
+    )
 
 
 @kernel
@@ -272,31 +312,21 @@ def is_closed(
     return closed
 
 
-@kernel
+@inner_kernel
 def press(
-    memory: Floats,
-    friction: Floats,
-    parameters: Parameters,
-    inverse: float,
-    surface: int,
-    x: float,
-    y: float,
-    corners: Corners,
-    v: Velocity,
-    v0: Velocity,
-    step: float,
-    ahead: float,
-    t: float,
+    contacts: Contacts, surface: int, now: Step, v: Velocity, ahead: float
 ) -> tuple[Velocity, float, float]:
     """The forces of one surface over a step, from the velocity `v` that the block would have
-    without them and `v0` before it.
+    without them and `now.v0` before it.
 
     `ahead` is how far (s) the springs look ahead: the step for contacts that have settled
     (implicit, so that the step need not resolve them), zero while one is young. Returns the
     velocity with the forces; the time until an open contact closes; the step that a contact which
     closes asks for, else infinity.
     """
-    k = parameters.stiffness
+    memory, friction, parameters = contacts.memory, contacts.friction, contacts.parameters
+    x, y, corners, v0, step, t = now
+    k, inverse = parameters.stiffness, parameters.inverse_inertia
     nx, ny, ax, ay, bx, by = facing(surface, corners)
     away = nx * x + ny * y + parameters.distance[surface]
     gap1, gap2 = away + nx * ax + ny * ay, away + nx * bx + ny * by
@@ -330,20 +360,8 @@ def press(
             if memory[one, CLOSED] == 0.0:
                 slip = v[0] - v[2] * ay
                 fine = closes(
-                    memory,
-                    parameters,
-                    inverse,
-                    surface,
-                    0,
-                    ax,
-                    ay,
-                    k11,
-                    k22,
-                    k12,
-                    rate1,
-                    slip,
-                    gap2,
-                    rate2,
+                    contacts,
+                    Arrival(surface, 0, ax, ay, k11, k22, k12, rate1, slip, gap2, rate2),
                     t,
                 )
             f1, d1 = response(
@@ -353,20 +371,8 @@ def press(
             if memory[two, CLOSED] == 0.0:
                 slip = v[0] - v[2] * by
                 asked = closes(
-                    memory,
-                    parameters,
-                    inverse,
-                    surface,
-                    1,
-                    bx,
-                    by,
-                    k22,
-                    k11,
-                    k12,
-                    rate2,
-                    slip,
-                    gap1,
-                    rate1,
+                    contacts,
+                    Arrival(surface, 1, bx, by, k22, k11, k12, rate2, slip, gap1, rate1),
                     t,
                 )
                 fine = min(fine, asked)
@@ -399,7 +405,6 @@ def press(
                 1.0,
                 friction[STRETCH],
                 slip,
-                False,
             )
             force1, force2 = normal_forces(
                 f1 - d1 * kt1 * free,
@@ -416,12 +421,11 @@ def press(
                 k,
                 parameters.friction_damping,
                 step * ktt,
-                parameters.mu_s,
+                parameters.mu_k if friction[SLIPPED] != 0.0 else parameters.mu_s,
                 parameters.mu_k,
                 force1 + force2,
                 friction[STRETCH],
                 slip,
-                friction[SLIPPED] != 0.0,
             )
             if slips:
                 mu = math.copysign(parameters.mu_k, shear)
@@ -473,34 +477,23 @@ def flush(memory: Floats, until: float, events: Floats, n_events: int) -> int:
     return n_events
 
 
-@kernel
+@inner_kernel
 def kick(
-    memory: Floats,
-    friction: Floats,
-    parameters: Parameters,
-    inverse: float,
-    surfaces: Integers,
-    x: float,
-    y: float,
-    corners: Corners,
-    v: Velocity,
-    v0: Velocity,
-    step: float,
-    settled: bool,
-    t: float,
+    contacts: Contacts, now: Step, v: Velocity, settled: bool
 ) -> tuple[Velocity, float, float, int]:
     """The forces of all surfaces over a step, from the velocity `v` that the block would have
-    without them and `v0` before it.
+    without them and `now.v0` before it.
 
     One surface alone is solved at once. Where a wall touches too, each surface in turn takes back
     its force (first that of the last step) and replaces it, until they agree. Returns the velocity;
     the time until an open contact closes; the step that a contact which closes asks for, else
     infinity; the sweeps over the surfaces.
     """
+    memory, surfaces, corners, step = contacts.memory, contacts.surfaces, now.corners, now.length
     touching = wall_force(memory) > 0.0
     if touching:
         for surface in surfaces:
-            v = with_forces(memory, friction, inverse, surface, corners, v, step)
+            v = with_forces(contacts, surface, corners, v, step)
     closing = young = math.inf
     sweeps = 0
     for _ in range(MOST_SWEEPS):
@@ -508,23 +501,9 @@ def kick(
         closing, change, whole = math.inf, 0.0, 0.0
         for surface in surfaces:
             if touching:
-                v = with_forces(memory, friction, inverse, surface, corners, v, -step)
+                v = with_forces(contacts, surface, corners, v, -step)
             force1, force2 = memory[2 * surface, FORCE], memory[2 * surface + 1, FORCE]
-            v, next_closing, fine = press(
-                memory,
-                friction,
-                parameters,
-                inverse,
-                surface,
-                x,
-                y,
-                corners,
-                v,
-                v0,
-                step,
-                step if settled else 0.0,
-                t,
-            )
+            v, next_closing, fine = press(contacts, surface, now, v, step if settled else 0.0)
             closing, young = min(closing, next_closing), min(young, fine)
             change += abs(memory[2 * surface, FORCE] - force1) + abs(
                 memory[2 * surface + 1, FORCE] - force2
@@ -536,18 +515,12 @@ def kick(
     return v, closing, young, sweeps
 
 
-@kernel
-def stretch(
-    memory: Floats,
-    friction: Floats,
-    parameters: Parameters,
-    corners: Corners,
-    v: Velocity,
-    v0: Velocity,
-    step: float,
-) -> None:
+@inner_kernel
+def stretch(contacts: Contacts, now: Step, v: Velocity) -> None:
     """The friction spring follows the lower corner over a step; one that slips keeps the length of
     its largest force."""
+    memory, friction, parameters = contacts.memory, contacts.friction, contacts.parameters
+    corners, v0, step = now.corners, now.v0, now.length
     friction[SLIPPED] = friction[SLIPS]
     load = memory[2 * FLOOR, FORCE] + memory[2 * FLOOR + 1, FORCE]
     if load > 0.0:
@@ -564,17 +537,11 @@ def stretch(
 
 @kernel
 def advance(
-    parameters: Parameters,
+    contacts: Contacts,
     first_row: int,
     output_step: float,
-    surfaces: Integers,
-    horizontal: Floats,
-    horizontal_rate: float,
-    vertical: Floats,
-    vertical_rate: float,
+    base: Shaking,
     state: Floats,
-    memory: Floats,
-    friction: Floats,
     output: Floats,
     events: Floats,
 ) -> tuple[int, int, int, int, int, float]:
@@ -583,11 +550,11 @@ def advance(
 
     `state` goes on with the time until which a contact is young, the step that it asks for, the
     time until an open contact closes, the energy allowed by the work done on the block, and that
-    work with every part of it counted as positive. `surfaces` lists those of the scene, the floor
-    last; `memory` holds one row a contact, `friction` the floor's. `events` gets rows (onset time,
+    work with every part of it counted as positive. `events` gets rows (onset time,
     contact, impulse). Returns how it ended, the rows and events written, the steps taken, the
     sweeps over the surfaces that they took, and the time reached.
     """
+    parameters, memory = contacts.parameters, contacts.memory
     left, right, bottom, top = parameters.reach
     inverse = parameters.inverse_inertia
     contact_time = 1.0 / math.sqrt(parameters.stiffness)
@@ -626,27 +593,14 @@ def advance(
             )
             v0 = v
             u, vg = (
-                sampled(horizontal, horizontal_rate, middle),
-                sampled(vertical, vertical_rate, middle),
+                sampled(base.horizontal, base.horizontal_rate, middle),
+                sampled(base.vertical, base.vertical_rate, middle),
             )
             v = v[0] - step * u, v[1] - step * (parameters.gravity + vg), v[2]
-            v, closing, young, swept = kick(
-                memory,
-                friction,
-                parameters,
-                inverse,
-                surfaces,
-                x,
-                y,
-                corners,
-                v,
-                v0,
-                step,
-                settled,
-                middle,
-            )
+            now = Step(x, y, corners, v0, step, middle)
+            v, closing, young, swept = kick(contacts, now, v, settled)
             sweeps += swept
-            stretch(memory, friction, parameters, corners, v, v0, step)
+            stretch(contacts, now, v)
             if young < math.inf:
                 fine = young if settled else min(young, fine)
                 calm = middle + YOUNG * contact_time

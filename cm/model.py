@@ -138,19 +138,16 @@ class ContinuousModel(Frozen):
             (len(memory) * (math.ceil(rows_a_slab * scene.output_step / kernels.STRIKE) + 2), 3)
         )
 
+        contacts = kernels.Contacts(memory, friction, parameters, surfaces)
+        base = kernels.Shaking(horizontal, horizontal_rate, vertical, vertical_rate)
+
         def advance(row: int, rows: int) -> tuple[int, int, int, int, int, float]:
             return kernels.advance(
-                parameters,
+                contacts,
                 row,
                 scene.output_step,
-                surfaces,
-                horizontal,
-                horizontal_rate,
-                vertical,
-                vertical_rate,
+                base,
                 state,
-                memory,
-                friction,
                 output[row : row + rows],
                 events,
             )

@@ -52,6 +52,9 @@ TARGETS = {
         "tests/validation/suite/test_impact_laws.py",
         "tests/commands/test_cli.py",
     ],
+    "validation/criteria.py": ["tests/validation/test_criteria.py"],
+    "validation/discrepancy/motion.py": ["tests/validation/studies/test_assess.py"],
+    "validation/studies/population/answers.py": ["tests/validation/studies/test_assess.py"],
     "validation/discrepancy/statistics.py": [
         "tests/validation/suite/test_verdicts.py",
         "tests/validation/suite/test_ensembles.py",

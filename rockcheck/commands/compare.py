@@ -23,6 +23,7 @@ from rockcheck.validation.discrepancy.compare import Discrepancy, compare
 from rockcheck.validation.discrepancy.figures import value_words
 from rockcheck.validation.discrepancy.measured import read_measured, shifted, time_shift
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
+from rockcheck.validation.discrepancy.motion import motion_of
 from rockcheck.validation.suite.changes import Change, changes, judged_otherwise
 from rockcheck.validation.suite.results import Run
 
@@ -91,6 +92,13 @@ def run(
     found = compare(given, shifted(other, shift), until=until, scene=what)
     out = console()
     out.print(headline(found), style="bold")
+    motions = {
+        role: motion_of(history, what)
+        for role, history in (("reference", given), ("candidate", other))
+    }
+    for role, motion in motions.items():
+        if words := motion.words():
+            out.print(f"{role}: {', '.join(words)}", soft_wrap=True)
     table = Table(box=None, pad_edge=False)
     for name in ("measure", "value", "unit", ""):
         table.add_column(name, justify="right" if name == "value" else "left")
@@ -121,6 +129,7 @@ def run(
             "shift": shift,
             "gap": found.gap,
             "headline": headline(found),
+            "motion": {role: motion.model_dump() for role, motion in motions.items()},
             "notes": {"reference": given.notes, "candidate": other.notes},
             "figures": [
                 {"measure": f.measure, "value": f.value, "unit": f.unit, "note": f.note}

@@ -22,15 +22,6 @@ from rockcheck.commands import (
 )
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable, unknown_name
-from rockcheck.scenes.writing import write_whole
-
-ENGINE_TOML = """\
-engine = "my engine"
-version = "1.0"
-settings = "as it comes"
-step = 1e-3  # s
-lacks = []  # or ["restitution"]
-"""
 
 
 def run(
@@ -113,17 +104,15 @@ def run(
 
 def _export(folder: Path) -> None:
     from rockcheck.reports.scene_file import write_scene_file
+    from rockcheck.validation.studies.conformance.exchange import export
     from rockcheck.validation.studies.conformance.phenomena import SCENES
-    from rockcheck.validation.studies.conformance.study import ABOUT
 
     for name, scene in SCENES.items():
         write_scene_file(scene, folder, name)
-    if not (folder / ABOUT).exists():
-        write_whole(folder / ABOUT, ENGINE_TOML)
+    names = export(folder)
     console().print(
-        f"{len(SCENES)} scenes in {folder}: play each, write t_s, x_m, y_m, theta_rad of the"
-        f" centroid,\nrelative to the base, as NAME.csv beside NAME.toml, fill in {ABOUT}, then:\n"
+        f"{len(names)} scenes in {folder}, README.md says how they are meant; then:\n"
         f"  rockcheck conformance --histories {folder}",
         soft_wrap=True,
     )
-    answer({"folder": folder, "scenes": {name: f"{name}.toml" for name in SCENES}})
+    answer({"folder": folder, "scenes": {name: f"{name}.toml" for name in names}})

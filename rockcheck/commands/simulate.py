@@ -27,6 +27,7 @@ from rockcheck.scenes import History, InputError, ModelFailure, Scene, load_scen
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.history import check_format
 from rockcheck.scenes.progress import listening
+from rockcheck.validation.discrepancy.motion import motion_of
 from rockcheck.validation.execute import workers
 from rockcheck.validation.execute.models import FAMILIES, build, check_allowed, family, is_own
 from rockcheck.validation.execute.pool import Call, Failure, Pool, guarded
@@ -82,10 +83,10 @@ def run(
         raise InputError(
             f"{printable(path)}: cannot be written: {error.strerror}", "--output"
         ) from None
-    peak = None if history.overturned_at is not None else history.peak_rotation / what.block.alpha
-    reached = "" if peak is None else f", peak rotation {peak:.4g} alpha"
+    motion = motion_of(history, what)
     took = f"simulated in {history.cost.wall_seconds:.2g} s"
-    console().print(f"{what.name}, {model}: {history.fate}{reached}, {took}")
+    moved = ", ".join([history.fate, *motion.words(), took])
+    console().print(f"{what.name}, {model}: {moved}", soft_wrap=True)
     tell_notes(history)
     console().print(f"history: {path}", soft_wrap=True)
     if plot is not None:
@@ -95,7 +96,8 @@ def run(
             "scene": what.name,
             "model": model,
             "outcome": history.outcome,
-            "peak_rotation_alpha": peak,
+            "peak_rotation_alpha": motion.peak_rotation,
+            "motion": motion.model_dump(),
             "overturned_at_s": history.overturned_at,
             "wall_seconds": history.cost.wall_seconds,
             "rules": dict(history.cost.rules),

@@ -110,20 +110,19 @@ def test_friction_sticks_up_to_static_and_slips_at_kinetic_friction():
         "stiffness": 100.0,
         "damping": 0.0,
         "mobility": 0.0,
-        "mu_s": 0.5,
         "mu_k": 0.3,
         "normal": 10.0,
         "rate": 0.0,
     }
-    assert friction_force(stretch=0.04, slipping=False, **law) == (pytest.approx(-4.0), False)
-    assert friction_force(stretch=0.04, slipping=True, **law) == (pytest.approx(-3.0), True)
-    assert friction_force(stretch=-0.06, slipping=False, **law) == (pytest.approx(3.0), True)
-    assert friction_force(stretch=0.02, slipping=True, **law) == (pytest.approx(-2.0), False)
+    assert friction_force(stretch=0.04, holds=0.5, **law) == (pytest.approx(-4.0), False)
+    assert friction_force(stretch=0.04, holds=0.3, **law) == (pytest.approx(-3.0), True)
+    assert friction_force(stretch=-0.06, holds=0.5, **law) == (pytest.approx(3.0), True)
+    assert friction_force(stretch=0.02, holds=0.3, **law) == (pytest.approx(-2.0), False)
 
 
 def test_stiff_friction_stops_the_corner_at_once():
     mobility, rate = 1e-5, 0.2
-    force, slipping = friction_force(0.0, 1e12, mobility, 1.0, 1.0, 1e9, 0.0, rate, False)
+    force, slipping = friction_force(0.0, 1e12, mobility, 1.0, 1.0, 1e9, 0.0, rate)
     assert not slipping
     assert rate + mobility * force == pytest.approx(0.0, abs=1e-7)
 

@@ -42,8 +42,8 @@ def test_the_documentation_keeps_to_its_budget_of_words():
     words = {page.stem: len(page.read_text(encoding="utf-8").split()) for page in PAGES}
     assert words.pop("theory") <= 4000
     assert words["README"] <= 600
-    assert max(words.values()) <= 1650
-    assert sum(words.values()) <= 17000
+    assert max(words.values()) <= 1500
+    assert sum(words.values()) <= 16000
 
 
 def rounded(value: float, digits: int = 1) -> float:

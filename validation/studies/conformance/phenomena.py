@@ -7,9 +7,10 @@ judged.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,12 @@ from numpy.typing import NDArray
 from rockcheck.scenes import Block, Floor, History, InputError, Record, Scene, Sine, Wall
 from rockcheck.scenes.kinematics import energy
 from rockcheck.scenes.scene import PAPER_BLOCK as SLENDER
+from rockcheck.validation.criteria import (
+    newmark_slip,
+    overturning_velocity,
+    overturns_without_impact,
+    rectangular_pulse_ratio,
+)
 
 FloatArray = NDArray[np.float64]
 G = 9.81
@@ -306,6 +313,107 @@ def moving_base(loose: Motion, light: Motion, falling: Motion) -> float:
     return max(strayed, _apart(light.theta, falling.theta) / SLENDER.alpha)
 
 
+# Hand methods that are exact. A base motion of 3 % less, and of 3 % more, than what decides.
+
+MARGINS = (0.97, 1.03)
+KICK, RESTED = 1e-3, 2.0  # s: of a step of the base's velocity; before a base moves that had not
+#: Of all shapes the one whose corner slips least under a step of velocity: not at all from 4/3 on.
+STUBBY = Block(half_width=0.5, half_height=1.0)
+#: So slender that its motion is linear, and what it loses at an impact nothing.
+NEEDLE = Block(half_width=0.02, half_height=1.0)
+NEEDLE_P = NEEDLE.frequency_parameter
+PUSH, PUSHED = 6.0, 0.25  # a rectangular pulse, m/s^2 and s
+PUSH_SLIP = newmark_slip(PUSH * PUSHED, PUSH, 0.3 * G)
+
+
+def _pulsed(name: str, block: Block, pulse: Record | Sine, **more: Any) -> Scene:
+    floor = {"floor": Floor(friction=1.333)}
+    return Scene(name=name, block=block, excitation=pulse, **{"duration": 6.0, **floor, **more})
+
+
+def _rectangle(size: float, length: float) -> Record:
+    return Record.from_samples([size, size], time_step=length)
+
+
+STEPS = tuple(
+    _pulsed(
+        f"step-{part:g}", STUBBY, _rectangle(part * overturning_velocity(STUBBY, G) / KICK, KICK)
+    )
+    for part in MARGINS
+)
+LENGTH = 0.4  # s
+RECTANGLES = tuple(
+    _pulsed(
+        f"rectangle-{part:g}",
+        NEEDLE,
+        _rectangle(part * rectangular_pulse_ratio(LENGTH, NEEDLE_P) * G * NEEDLE.slope, LENGTH),
+    )
+    for part in MARGINS
+)
+#: Amplitudes of one sine of four times the block's frequency, in g alpha: just too small, and not.
+SINES = tuple(
+    _pulsed(
+        f"sine-{ratio:g}",
+        NEEDLE,
+        Sine(amplitude=ratio * G * NEEDLE.alpha, period=0.5 * math.pi / NEEDLE_P, cycles=1),
+    )
+    for ratio in (5.1, 5.4)
+)
+#: Towers of one shape under one sine: the two small ones fall.
+SIZES = {0.25: True, 0.5: True, 1.0: False, 2.0: False, 4.0: False}  # R, m
+TOWERS = tuple(
+    _pulsed(
+        f"tower-{radius:g}",
+        Block(half_width=radius * math.sin(0.2), half_height=radius * math.cos(0.2)),
+        Sine(amplitude=2.0 * 9.80665 * math.tan(0.2), period=0.5, cycles=1),
+        gravity=9.80665,
+    )
+    for radius in SIZES
+)
+NEWMARK = _pulsed(
+    "newmark", SQUAT, _rectangle(PUSH, PUSHED), floor=Floor(friction=0.3), duration=1.5
+)
+WAKE = _pulsed(
+    "wake",
+    SQUAT,
+    Record.from_samples(PUSH * (np.arange(0.0, RESTED + PUSHED, 5e-4) >= RESTED), time_step=5e-4),
+    floor=Floor(friction=0.3),
+    duration=RESTED + 1.5,
+)
+ALMOST_FLUSH = tuple(
+    Scene(
+        name=f"almost-flush-{tilt:g}",
+        block=SLENDER,
+        floor=Floor(friction=0.6),
+        initial_rotation=tilt,
+        duration=1.0,
+    )
+    for tilt in (1e-5, 1e-4, 1e-3)
+)
+
+
+def _direct(m: Motion) -> float:
+    """1 if the block overturns without an impact, else 0."""
+    return falls(m) * float(min(-np.min(m.theta), np.max(m.theta)) < 0.01 * NEEDLE.alpha)
+
+
+def _wrong(must: Iterable[bool], seen: Callable[[Motion], float], *motions: Motion) -> float:
+    """How many blocks do not do what they must."""
+    return float(sum(seen(m) != one for m, one in zip(motions, must, strict=True)))
+
+
+def _integral(scene: Scene) -> bool:
+    """Whether the sine overturns the needle before its first impact."""
+    t = np.linspace(0.0, scene.excitation.quiet_after, 20001)
+    ratios = scene.excitation.acceleration(t) / (G * NEEDLE.alpha)
+    return overturns_without_impact(NEEDLE_P * t, ratios)
+
+
+def _lift(*motions: Motion) -> float:
+    """How far the block's centre rises above where it was released, mm."""
+    return 1e3 * max(float(np.max(m.y) - m.y[0]) for m in motions)
+
+
 COULOMB, NEWTON, HOUSNER = "Coulomb 1785; momentum", "Newton's law of impact", "Housner 1963"
 
 #: By their names.
@@ -531,6 +639,90 @@ PHENOMENA: dict[str, Phenomenon] = {
             "Not a fault: two corners that land at one instant may share the impulse in several"
             " ways.",
             "nothing",
+        ),
+        Phenomenon(
+            "RC-19",
+            "a step of the base's velocity overturns",
+            STEPS,
+            partial(_wrong, (False, True), falls),
+            0.0,
+            0.0,
+            "wrong outcomes",
+            "Housner 1963: energy after the step",
+            "A blow topples what should stand, or not what should fall.",
+            "contact points at the very corners; how the base is driven",
+        ),
+        Phenomenon(
+            "RC-20",
+            "slip under a pulse of the base",
+            (NEWMARK,),
+            lambda m: abs(m.x[-1] - m.x[0]) / PUSH_SLIP,
+            1.0,
+            0.02,
+            "of V²/(2N) (1 − N/A)",
+            "Newmark 1965",
+            "What slides in an earthquake ends up elsewhere.",
+            "friction, and how the base is driven",
+        ),
+        Phenomenon(
+            "RC-21",
+            "a rectangular pulse overturns a slender block",
+            RECTANGLES,
+            partial(_wrong, (False, True), falls),
+            0.0,
+            0.0,
+            "wrong outcomes",
+            "Housner 1963: 1/(1 − exp(−p t))",
+            "Towers fall too early or too late.",
+            "contact points at the very corners; inertia; hidden damping",
+        ),
+        Phenomenon(
+            "RC-22",
+            "overturning without impact",
+            SINES,
+            lambda *ms: _wrong(map(_integral, SINES), _direct, *ms),
+            0.0,
+            0.0,
+            "wrong outcomes",
+            "integral of a exp(−p t) from uplift on",
+            "Towers fall too early or too late.",
+            "contact points at the very corners; inertia; hidden damping",
+        ),
+        Phenomenon(
+            "RC-23",
+            "of five sizes the two small ones fall",
+            TOWERS,
+            partial(_wrong, SIZES.values(), falls),
+            0.0,
+            0.0,
+            "wrong outcomes",
+            "size effect: Housner 1963; two event-based programs",
+            "Large and small are confused.",
+            "absolute tolerances: slop, margins and thresholds in m and m/s",
+        ),
+        Phenomenon(
+            "RC-24",
+            "what rests wakes when the base moves",
+            (WAKE,),
+            lambda m: abs(m.x[-1] - m.x[0]) / PUSH_SLIP,
+            1.0,
+            0.05,
+            "of V²/(2N) (1 − N/A)",
+            "Newmark 1965",
+            "What has come to rest sleeps through the earthquake.",
+            "sleeping: switch it off; a changed gravity wakes nothing",
+        ),
+        Phenomenon(
+            "RC-25",
+            "almost flush: nothing is thrown up",
+            ALMOST_FLUSH,
+            _lift,
+            0.0,
+            0.05,
+            "mm",
+            "first law",
+            "A box that lies almost flat jumps: two faces make contacts that are not there.",
+            "collision of box on box: a plane as floor, or points as corners",
         ),
     )
 }

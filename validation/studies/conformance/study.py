@@ -11,10 +11,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from junitparser import Error, JUnitXml, Skipped, TestCase, TestSuite
 from junitparser import Failure as Failed
 
-from rockcheck.scenes import InputError, ModelFailure
+from rockcheck.scenes import History, InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.files import read_toml
 from rockcheck.scenes.reading import read_json
@@ -180,6 +181,9 @@ class Conformance(Study):
             reason = f"the engine has no {what.needs} with these settings"
             return Seen(None, "lacks", reason, version)
         histories = [model.simulate(scene) for scene in what.scenes]
+        if who.model == "measured":
+            for scene, history in zip(what.scenes, histories, strict=True):
+                _in_units(scene, history)
         try:
             value = float(what.value(*map(Motion, histories)))
         except (ValueError, IndexError) as error:  # what is asked for does not happen in the motion
@@ -205,6 +209,28 @@ class Conformance(Study):
             "fail" if failing else "pass",
             int(failing > 0),
             files={"junit.xml": junit(cards)},
+        )
+
+
+def _in_units(scene: Scene, history: History) -> None:
+    """Raises `ModelFailure` for a history that does not begin as its scene does, or does not last:
+    as a rule a column in other units than its name says."""
+    t, size = history.channels["t"], scene.block.radius
+    begins = dict(zip(("x", "y", "theta"), scene.initial_state, strict=False))
+    for name, value in begins.items():
+        first = float(history.channels.get(name, [value])[0])
+        if not abs(first - value) <= 0.02 * (1.0 if name == "theta" else size):
+            raise ModelFailure(
+                f"unit? {name} begins at {first:.4g}, and the scene at {value:.4g}: columns are in"
+                " SI units unless their names say otherwise, such as x_mm, theta_deg"
+            )
+    turned = float(np.max(np.abs(history.channels["theta"])))
+    if turned > math.pi:
+        raise ModelFailure(f"unit? theta reaches {turned:.4g} rad: degrees are called theta_deg")
+    if turned < 1.0 and t[-1] < 0.9 * scene.duration - scene.output_step:
+        raise ModelFailure(
+            f"unit? t ends at {t[-1]:.4g} s, and the scene at {scene.duration:g} s: milliseconds"
+            " are called t_ms"
         )
 
 
