@@ -180,6 +180,8 @@ def read_table(path: Path, **options: Any) -> pd.DataFrame:
     import pandas as pd
 
     shown = printable(path)
+    if pd.__version__ < "3":  # whose reader loses the last bit of a number unless it is told
+        options = {"float_precision": "round_trip", **options}
     try:
         with open_table(path) as stream:
             _check_lines(stream, shown)
