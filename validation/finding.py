@@ -100,9 +100,9 @@ def table_of(name: str, kind: type, records: Sequence[Any], **more: Any) -> Tabl
 class Series:
     """One line of a panel. `low` and `high` bound a band around it; `look` names a model's colour.
 
-    `style`: a line, "smooth" (without marks), points only, dots (a fit), "thin" (one of many behind
-    the others), "level", a horizontal line at the only `y`, for reference, "step" (each value up to
-    the next), or "cross" (points that stand out).
+    `style`: a line, "smooth" or "dashed" (without marks), points only, dots (a fit), "thin" (one of
+    many behind the others), "level", a horizontal line at the only `y`, for reference, "step" (each
+    value up to the next), or "cross" (points that stand out).
     """
 
     label: str
@@ -112,7 +112,7 @@ class Series:
     high: Sequence[float | None] = ()
     look: str = ""
     style: Literal[
-        "line", "smooth", "points", "dots", "thin", "level", "marked", "step", "cross"
+        "line", "smooth", "dashed", "points", "dots", "thin", "level", "marked", "step", "cross"
     ] = "line"
 
 

@@ -22,7 +22,7 @@ COMMANDS = {
     "validate paper --out paper": "the paper's scenes",
     "spectrum fig8 --size 40 --out fig8": "seven spectra of 1,600 pulses",
     "spectrum --out paper-spectra": "28 spectra of 10,000 pulses",
-    "conformance --engine mujoco --out conformance": "18 cards of an engine",
+    "conformance --engine mujoco --out conformance": "the cards of an engine",
     "benchmark --quick --out quick": "run time against error, in small",
     "stress --quick --out stress": "some thousand random runs",
 }

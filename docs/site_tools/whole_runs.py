@@ -34,7 +34,11 @@ from rockcheck.validation.finding import Finding, Made, Mark, Plot, Table, Text,
 DOCS = Path(__file__).parents[1]
 RUNS, BUILD = DOCS / "runs", DOCS.parent / "build" / "reports"
 #: Made when the site is built: what they need takes seconds, and they have pages of their own.
-COMMANDS = {"smoke": ("validate", "smoke"), "fig8": ("spectrum", "fig8", "--size", "40")}
+COMMANDS = {
+    "smoke": ("validate", "smoke"),
+    "assess": ("assess", "bookcase", "--gaps", "0,0.02,0.05,0.1"),
+    "fig8": ("spectrum", "fig8", "--size", "40"),
+}
 #: What the pages show, and what they offer to keep.
 SHOWN = {".html", ".css", ".js", ".svg", ".png", ".pdf", ".csv", ".json", ".xml", ".toml", ".md"}
 #: Folders of results that wait for the next run.

@@ -97,7 +97,7 @@ def run(
     }
     for role, motion in motions.items():
         if words := motion.words():
-            out.print(f"{role}: {', '.join(words)}", soft_wrap=True)
+            out.print(f"{role}: {', '.join(words)}")
     table = Table(box=None, pad_edge=False)
     for name in ("measure", "value", "unit", ""):
         table.add_column(name, justify="right" if name == "value" else "left")

@@ -86,7 +86,7 @@ def run(
     motion = motion_of(history, what)
     took = f"simulated in {history.cost.wall_seconds:.2g} s"
     moved = ", ".join([history.fate, *motion.words(), took])
-    console().print(f"{what.name}, {model}: {moved}", soft_wrap=True)
+    console().print(f"{what.name}, {model}: {moved}")
     tell_notes(history)
     console().print(f"history: {path}", soft_wrap=True)
     if plot is not None:

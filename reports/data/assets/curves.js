@@ -19,7 +19,7 @@ document.addEventListener("DOMContentLoaded", () => {
     for (const curve of chart.curves) {
       const add = (values, look) => { data.push(values); series.push({ points: { show: false }, stroke: () => ink(curve.colour), ...look }); owner.push(curve); return data.length - 1; };
       if (curve.high.length) bands.push({ series: [add(curve.high, { width: 0 }), add(curve.low, { width: 0 })], fill: () => ink(curve.colour) + "26" });
-      add(curve.values, { width: curve.width });
+      add(curve.values, { width: curve.width, dash: curve.dash });
       if (curve.fit.length) add(curve.fit, { width: 1.2, dash: [2, 3] });
       if (chart.single && curve.width < 1) continue;
       const entry = document.createElement("span"), swatch = document.createElement("i");

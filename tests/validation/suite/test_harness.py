@@ -91,8 +91,8 @@ FAULTS = [
     (
         "NaN at the end",
         "scenes/observation.py",
-        r"    rows = max\(rows, 1\)\n",
-        "    rows = max(rows, 1)\n    state[rows - 1] = np.nan\n",
+        r"    state = state\[:rows\]\n",
+        "    state = state[:rows]\n    state[rows - 1] = np.nan\n",
         0,
     ),
     (
@@ -106,8 +106,8 @@ FAULTS = [
     (
         "a swapped left and right",
         "engines/contacts.py",
-        r'inward = 1\.0 if wall\.side == "left"',
-        'inward = 1.0 if wall.side == "right"',
+        r'1\.0 if wall\.side == "left"',
+        '1.0 if wall.side == "right"',
         15,
     ),
     (

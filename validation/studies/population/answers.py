@@ -162,7 +162,7 @@ def finding_of(found: Found) -> Finding:
         "left_out": list(found.left_out),
     }
     if found.levels is not None:
-        data |= {**found.levels.data, "model": found.model}
+        data = {**found.levels.data, **data}
     if not found.recorded:
         data |= numerical | {"inputs": own.inputs.model_dump() if own and own.inputs else None}
     reasons = {
@@ -732,13 +732,16 @@ def histories(found: Found) -> list[Block]:
         return []
     end = max(one["t"][-1] for one in columns.values())
     times, alpha = np.linspace(0.0, end, POINTS), found.own.scene.block.alpha
+    fell = {case: run.fell for case, run in found.nominal.items()}
     series = [
         Series(
             case,
             times.tolist(),
             [
                 float(value) if math.isfinite(value) else None
-                for value in np.interp(times, one["t"], one["theta"] / alpha, right=math.nan)
+                for value in np.interp(
+                    times, one["t"], one["theta"] / alpha, right=math.nan if fell[case] else None
+                )
             ],
             style="thin" if len(columns) > 1 else "smooth",
         )

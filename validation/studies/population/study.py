@@ -250,7 +250,7 @@ def lines_of(motions: Sequence[str], peaks: Floats, levels: Floats, across: Colu
             for name, sign, line in lines
         ),
         *(
-            Series(f"{100.0 * share:g} %", x, line, style="smooth")
+            Series(f"{100.0 * share:g} %", x, line, style="smooth" if share == 0.5 else "dashed")
             for share, line in zip(BAND, quantiles.tolist(), strict=True)
         ),
     ]
