@@ -199,7 +199,7 @@ def outcome_of(cell: Cell) -> str:
 
 
 def _side(outcome: str) -> str:
-    """The side to which a block falls, empty where it stays."""
+    """'left', 'right', or '' if the block does not overturn."""
     words = outcome.split()
     return words[1] if words and words[0] in ("overturned", "falling") else ""
 

@@ -57,10 +57,10 @@ from rockcheck.scenes.compiled import inner_kernel
 #: Rest is stepped through.
 LOOKS_AHEAD = False
 _LOOK = 6
-# z tends to 1 and never reaches it. Within this distance the difference is noise (a block may tip
-# just as it slips): it has yielded.
+# z tends to 1 and never reaches it. Within this distance z counts as yielded: the difference is
+# noise (a block may tip just as it slips).
 _YIELDS = 1e-6
-# It has also yielded within this multiple of the tolerance, and within rounding.
+# z also counts as yielded where 1 - abs(z) < this multiple of max(tolerance, rounding).
 _NEARLY = 10.0
 
 

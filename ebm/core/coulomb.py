@@ -24,8 +24,7 @@ from rockcheck.scenes.compiled import inner_kernel
 
 #: Whether rest is looked past, to the next uplift or slip.
 LOOKS_AHEAD = True
-#: A step reaches at most so many times as far as the last ones went: where a block rattles, its
-#: series need few terms.
+#: Largest ratio of successive steps; where a block rattles, short steps need few terms.
 _FARTHER = 8.0
 
 

@@ -224,7 +224,7 @@ def _above(context: Any, b: Any, kinds: Any, values: Any) -> Any:
 
 
 def falls(v: Numbers) -> Numbers:
-    """The negative numbers, and 0 for the positive ones. What is no number stays."""
+    """The negative numbers, and 0 for the positive ones. NaN stays NaN."""
     return np.where(v > 0.0, 0.0, v)
 
 

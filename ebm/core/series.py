@@ -80,8 +80,8 @@ def least_change(low, high, h):
     """A bound from below on c(tau) - c(0) for 0 <= tau <= h, at most 0; of the polynomial with
     these halves.
 
-    Terms that fall count in full, those that rise count only where they make up for the ones behind
-    them: c_1 for c_2 and all others, c_2 for the others. What is no number gives none.
+    Negative terms count in full. Positive terms may only cancel negative terms of higher order: c_1
+    those of c_2 and all others, c_2 those of the others. NaN in the input gives no bound.
     """
     low, high = low * powers(h), high * (eighth(h) * powers(h))
     least = total(above(falls(low), 2) + falls(high))
@@ -159,7 +159,7 @@ def force_step(a, row, order, tolerance, reach):
     error of its rate moves nothing.
 
     Friction that winds up under a constant acceleration is a series of every fourth power. So the
-    two terms before count, too: below what the tolerance is for them where terms shrink alike.
+    two terms before count, too. Limit of term k: tolerance^(k/(order-1)), for geometric decay.
     """
     longest, bound = math.inf, math.log(tolerance)  # logarithms
     for k in range(max(order - 3, 1), order + 1):

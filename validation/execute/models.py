@@ -142,7 +142,7 @@ def has_wheel(name: str) -> bool:
 
 
 def is_own(name: str) -> bool:
-    """Whether that is a model of the user's own: code that may lie beside the suite or in the
+    """True for a user-defined model (module:Class); its code may lie beside the suite or in the
     working directory."""
     return ":" in name
 

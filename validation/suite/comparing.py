@@ -79,8 +79,8 @@ class Planned(Task):
         return workers.BatchTask(scenes=scenes, **model)
 
 
-#: What a cell is compared with, None for its own figures; and the measures that are asked for over
-#: a window, or on request.
+#: Reference cell, or None for a cell's own measures; and extra measures, over a window or on
+#: request.
 Asked = tuple[Planned | None, list[Windowed]]
 #: A figure as it is kept: measure, unit, value, window, until, note. Its label is the measure's.
 FigureRow = tuple[str, str, float | None, str, float | None, str]
