@@ -112,7 +112,7 @@ def connected(address: str) -> Iterator[Any]:
             )
         with (
             LocalCluster(
-                n_workers=int(count), threads_per_worker=1, dashboard_address=None
+                n_workers=int(count), threads_per_worker=1, dashboard_address="127.0.0.1:0"
             ) as cluster,
             Client(cluster) as client,
         ):

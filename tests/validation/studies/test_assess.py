@@ -183,7 +183,9 @@ def test_draws_are_the_same_in_any_number_of_processes_and_are_read_back(
     again = assess(f"{words} --jobs 1")
     assert again.pop("made")["jobs"] == 1 != made["jobs"] or made["jobs"] == 1
     assert again == first
-    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0"
+    ) as cluster:
         out = ["--out", str(tmp_path / "dask"), "--scheduler", cluster.scheduler_address]
         assert main(["assess", *words.split(), *out, "--json"]) == 0
     there = json.loads(capsys.readouterr().out)
