@@ -180,9 +180,7 @@ def measures_table(view: SceneView, against: str) -> Table:
     ]
     title = f"All measures against {_label(against)}"
     columns = [text("measure"), *map(Column, models)]
-    return Table(
-        "measures", columns, rows, title, folded=against != next(iter(view.references), None)
-    )
+    return Table("measures", columns, rows, title, folded=True)
 
 
 def _measure(figure: Figure) -> Mark:
@@ -257,7 +255,8 @@ def runs_table(
         *map(Column, names),
         *map(text, ("outcome and remarks", "history", "events")[: 1 if histories is None else 3]),
     ]
-    return Table("models", columns, rows, "Models, settings and run times")
+    title = "Models, settings and run times"
+    return Table("models", columns, rows, title, folded=histories is not None)
 
 
 def _costs(cell: Cell, of: str, base: Cell | None) -> list[str]:

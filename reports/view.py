@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rockcheck.scenes import History, InputError, Scene, experience, kinematics
 from rockcheck.scenes.history import events_path
 from rockcheck.scenes.reading import within
+from rockcheck.validation.discrepancy.motion import QUANTITIES, motion_of
 from rockcheck.validation.suite.results import Cell, Run
 from rockcheck.validation.uncertainty.population import Inputs
 
@@ -106,6 +107,21 @@ class SceneView:
     def histories(self) -> dict[str, History]:
         """By model, in the run's order: the histories that could be read."""
         return self._read[0]
+
+    @cached_property
+    def moved(self) -> list[dict[str, Any]]:
+        """Slip, top displacement and speed at the wall by model (label, unit, values), where one is
+        known."""
+        motions = {model: motion_of(one, self.scene) for model, one in self.histories.items()}
+        rows: list[dict[str, Any]] = [
+            {
+                "label": q.label,
+                "unit": q.unit,
+                "by_model": {model: getattr(one, q.name) for model, one in motions.items()},
+            }
+            for q in QUANTITIES[1:]
+        ]
+        return [row for row in rows if any(v is not None for v in row["by_model"].values())]
 
     @property
     def printed(self) -> bool:

@@ -350,7 +350,7 @@ def test_the_explanation_and_the_figures_are_folded(visit: Visit) -> None:
     assert not page.locator(".paper img").first.is_visible()
     page.locator("#paper summary").click()
     assert page.locator(".paper img").first.is_visible()
-    assert page.locator("#result tbody tr").count() == 5
+    assert page.locator("#result tbody tr").count() == 8
 
 
 def test_by_night_no_figure_is_white(visits: Visits) -> None:
