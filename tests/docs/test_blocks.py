@@ -30,6 +30,8 @@ from markdown_it import MarkdownIt
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 LANGUAGES = {"python", "bash", "toml", "csv", "yaml", "text"}
+#: Pages whose commands take half a minute and more: every night.
+LATE = ("ci", "conformance", "running")
 #: Commands that take minutes, and the form of them that takes less, where there is one.
 LONG = {"benchmark": "--quick", "spectrum": "", "validate": "", "stress": "--quick"}
 
@@ -129,7 +131,13 @@ def test_every_block_has_a_language(page):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, id=page.stem, marks=[pytest.mark.slow] * (page.stem in LATE))
+        for page in PAGES
+    ],
+)
 def test_blocks_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)

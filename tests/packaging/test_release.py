@@ -117,7 +117,7 @@ def runner(tmp_path, project):
     return run
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_action_judges_marks_and_keeps(runner, project):
     """Its steps on a machine of their own: pass, then fail with an annotation a figure."""
     fine = runner(suite="rockcheck.toml", arguments="--strict --no-report", out="kept")
