@@ -58,7 +58,7 @@ def test_a_run_twice_is_one_run(single_engine, settings, pulse):
     np.testing.assert_array_equal(one.channels["theta"], other.channels["theta"])
 
 
-@pytest.mark.skipif(not engines.Box2D.installed(), reason="needs pyb2d3: not installed")
+@pytest.mark.needs("box2d")
 def test_box2d_sleeps_through_a_pulse_as_it_comes(pulse):
     """A body that has come to rest does not wake when gravity changes; at its best it is near."""
     scene = pulse(2.4, 2.6, friction=0.3, duration=2.5)
