@@ -149,6 +149,21 @@ class Arrival(NamedTuple):
     other_rate: float
 
 
+class Pair(NamedTuple):
+    """The two corners that face a surface: their forces as if these did not move them, how much a
+    unit of velocity lowers these, their mobilities and what couples them, and their levers."""
+
+    f1: float
+    f2: float
+    d1: float
+    d2: float
+    k11: float
+    k12: float
+    k22: float
+    lever1: float
+    lever2: float
+
+
 class Shaking(NamedTuple):
     """Samples of the base acceleration, sideways and upward, and how many there are a second."""
 
@@ -313,6 +328,71 @@ def is_closed(
 
 
 @inner_kernel
+def pushed(
+    contacts: Contacts, arrival: Arrival, gap: float, before: float, now: Step, ahead: float
+) -> tuple[float, float, float]:
+    """What `response` says of a closed contact; and the step that it asks for if it has just
+    closed, else infinity."""
+    memory, one = contacts.memory, 2 * arrival.surface + arrival.corner
+    fine = math.inf
+    if memory[one, CLOSED] == 0.0:
+        fine = closes(contacts, arrival, now.t)
+    k, damping = memory[one, STIFFNESS], memory[one, DAMPING]
+    force, lowers = response(
+        k, damping, arrival.mobility, gap, before, arrival.rate, now.length, ahead
+    )
+    return force, lowers, fine
+
+
+@inner_kernel
+def floor_forces(
+    contacts: Contacts, pair: Pair, arm: float, slip: float, step: float
+) -> tuple[float, float, float]:
+    """The normal forces of the floor and its friction, which is written down, too.
+
+    Friction acts at the lower corner, with the cone of both: they slip together or not at all.
+    First as if it stuck.
+    """
+    f1, f2, d1, d2, k11, k12, k22, lever1, lever2 = pair
+    friction, parameters = contacts.friction, contacts.parameters
+    k, inverse = parameters.stiffness, parameters.inverse_inertia
+    kt1, kt2, ktt = -inverse * arm * lever1, -inverse * arm * lever2, 1.0 + inverse * arm * arm
+    stop = parameters.friction_damping * step / (1.0 + parameters.friction_damping * step * ktt)
+    free, _ = friction_force(
+        k, parameters.friction_damping, step * ktt, 1e300, 1e300, 1.0, friction[STRETCH], slip
+    )
+    force1, force2 = normal_forces(
+        f1 - d1 * kt1 * free,
+        f2 - d2 * kt2 * free,
+        d1,
+        d2,
+        k11 - stop * kt1 * kt1,
+        k12 - stop * kt1 * kt2,
+        k12 - stop * kt2 * kt1,
+        k22 - stop * kt2 * kt2,
+    )
+    slip += step * (kt1 * force1 + kt2 * force2)
+    shear, slips = friction_force(
+        k,
+        parameters.friction_damping,
+        step * ktt,
+        parameters.mu_k if friction[SLIPPED] != 0.0 else parameters.mu_s,
+        parameters.mu_k,
+        force1 + force2,
+        friction[STRETCH],
+        slip,
+    )
+    if slips:
+        mu = math.copysign(parameters.mu_k, shear)
+        force1, force2 = normal_forces(
+            f1, f2, d1, d2, k11 + mu * kt1, k12 + mu * kt1, k12 + mu * kt2, k22 + mu * kt2
+        )
+        shear = mu * (force1 + force2)
+    friction[SHEAR], friction[SLIPS] = shear, 1.0 if slips else 0.0
+    return force1, force2, shear
+
+
+@inner_kernel
 def press(
     contacts: Contacts, surface: int, now: Step, v: Velocity, ahead: float
 ) -> tuple[Velocity, float, float]:
@@ -326,7 +406,7 @@ def press(
     """
     memory, friction, parameters = contacts.memory, contacts.friction, contacts.parameters
     x, y, corners, v0, step, t = now
-    k, inverse = parameters.stiffness, parameters.inverse_inertia
+    inverse = parameters.inverse_inertia
     nx, ny, ax, ay, bx, by = facing(surface, corners)
     away = nx * x + ny * y + parameters.distance[surface]
     gap1, gap2 = away + nx * ax + ny * ay, away + nx * bx + ny * by
@@ -352,89 +432,26 @@ def press(
         is_closed(memory, one, gap1, rate1, ahead, t),
         is_closed(memory, two, gap2, rate2, ahead, t),
     )
-    fine = math.inf
-    force1 = force2 = 0.0
+    fine = asked = math.inf
+    force1 = force2 = f1 = f2 = d1 = d2 = 0.0
+    slip1, slip2 = v[0] - v[2] * ay, v[0] - v[2] * by
+    if closed1:
+        comes = Arrival(surface, 0, ax, ay, k11, k22, k12, rate1, slip1, gap2, rate2)
+        f1, d1, fine = pushed(contacts, comes, gap1, before1, now, ahead)
+    if closed2:
+        comes = Arrival(surface, 1, bx, by, k22, k11, k12, rate2, slip2, gap1, rate1)
+        f2, d2, asked = pushed(contacts, comes, gap2, before2, now, ahead)
+    fine = min(fine, asked)
     if closed1 or closed2:
-        f1 = f2 = d1 = d2 = 0.0
-        if closed1:
-            if memory[one, CLOSED] == 0.0:
-                slip = v[0] - v[2] * ay
-                fine = closes(
-                    contacts,
-                    Arrival(surface, 0, ax, ay, k11, k22, k12, rate1, slip, gap2, rate2),
-                    t,
-                )
-            f1, d1 = response(
-                memory[one, STIFFNESS], memory[one, DAMPING], k11, gap1, before1, rate1, step, ahead
-            )
-        if closed2:
-            if memory[two, CLOSED] == 0.0:
-                slip = v[0] - v[2] * by
-                asked = closes(
-                    contacts,
-                    Arrival(surface, 1, bx, by, k22, k11, k12, rate2, slip, gap1, rate1),
-                    t,
-                )
-                fine = min(fine, asked)
-            f2, d2 = response(
-                memory[two, STIFFNESS], memory[two, DAMPING], k22, gap2, before2, rate2, step, ahead
-            )
         if surface != FLOOR:
             force1, force2 = normal_forces(f1, f2, d1, d2, k11, k12, k12, k22)
         else:
-            # Friction acts at the lower corner, with the cone of both: they slip together or not at
-            # all. First as if it stuck.
+            pair = Pair(f1, f2, d1, d2, k11, k12, k22, lever1, lever2)
             arm, place = (ay, ax) if ay < by else (by, bx)
-            kt1, kt2, ktt = (
-                -inverse * arm * lever1,
-                -inverse * arm * lever2,
-                1.0 + inverse * arm * arm,
-            )
-            stop = (
-                parameters.friction_damping
-                * step
-                / (1.0 + parameters.friction_damping * step * ktt)
-            )
             slip = v[0] - v[2] * arm - turn * place
-            free, _ = friction_force(
-                k,
-                parameters.friction_damping,
-                step * ktt,
-                1e300,
-                1e300,
-                1.0,
-                friction[STRETCH],
-                slip,
-            )
-            force1, force2 = normal_forces(
-                f1 - d1 * kt1 * free,
-                f2 - d2 * kt2 * free,
-                d1,
-                d2,
-                k11 - stop * kt1 * kt1,
-                k12 - stop * kt1 * kt2,
-                k12 - stop * kt2 * kt1,
-                k22 - stop * kt2 * kt2,
-            )
-            slip += step * (kt1 * force1 + kt2 * force2)
-            shear, slips = friction_force(
-                k,
-                parameters.friction_damping,
-                step * ktt,
-                parameters.mu_k if friction[SLIPPED] != 0.0 else parameters.mu_s,
-                parameters.mu_k,
-                force1 + force2,
-                friction[STRETCH],
-                slip,
-            )
-            if slips:
-                mu = math.copysign(parameters.mu_k, shear)
-                force1, force2 = normal_forces(
-                    f1, f2, d1, d2, k11 + mu * kt1, k12 + mu * kt1, k12 + mu * kt2, k22 + mu * kt2
-                )
-                shear = mu * (force1 + force2)
-            friction[SHEAR], friction[SLIPS] = shear, 1.0 if slips else 0.0
+            force1, force2, shear = floor_forces(contacts, pair, arm, slip, step)
             v = kicked(v, inverse, 1.0, 0.0, -arm, step * shear)
+            kt1, kt2 = -inverse * arm * lever1, -inverse * arm * lever2
             rate1, rate2 = rate1 + step * kt1 * shear, rate2 + step * kt2 * shear
         v = kicked(
             kicked(v, inverse, nx, ny, lever1, step * force1),
@@ -478,6 +495,28 @@ def flush(memory: Floats, until: float, events: Floats, n_events: int) -> int:
 
 
 @inner_kernel
+def sweep(
+    contacts: Contacts, now: Step, v: Velocity, ahead: float, takes_back: bool
+) -> tuple[Velocity, float, float, float, float]:
+    """Each surface in turn takes back its force, or has none yet, and replaces it: what `press`
+    returns of all surfaces, by how much the forces have changed, and their sum."""
+    memory = contacts.memory
+    closing = young = math.inf
+    change = whole = 0.0
+    for surface in contacts.surfaces:
+        if takes_back:
+            v = with_forces(contacts, surface, now.corners, v, -now.length)
+        force1, force2 = memory[2 * surface, FORCE], memory[2 * surface + 1, FORCE]
+        v, next_closing, fine = press(contacts, surface, now, v, ahead)
+        closing, young = min(closing, next_closing), min(young, fine)
+        change += abs(memory[2 * surface, FORCE] - force1) + abs(
+            memory[2 * surface + 1, FORCE] - force2
+        )
+        whole += memory[2 * surface, FORCE] + memory[2 * surface + 1, FORCE]
+    return v, closing, young, change, whole
+
+
+@inner_kernel
 def kick(
     contacts: Contacts, now: Step, v: Velocity, settled: bool
 ) -> tuple[Velocity, float, float, int]:
@@ -498,17 +537,9 @@ def kick(
     sweeps = 0
     for _ in range(MOST_SWEEPS):
         sweeps += 1
-        closing, change, whole = math.inf, 0.0, 0.0
-        for surface in surfaces:
-            if touching:
-                v = with_forces(contacts, surface, corners, v, -step)
-            force1, force2 = memory[2 * surface, FORCE], memory[2 * surface + 1, FORCE]
-            v, next_closing, fine = press(contacts, surface, now, v, step if settled else 0.0)
-            closing, young = min(closing, next_closing), min(young, fine)
-            change += abs(memory[2 * surface, FORCE] - force1) + abs(
-                memory[2 * surface + 1, FORCE] - force2
-            )
-            whole += memory[2 * surface, FORCE] + memory[2 * surface + 1, FORCE]
+        ahead = step if settled else 0.0
+        v, closing, fine, change, whole = sweep(contacts, now, v, ahead, touching)
+        young = min(young, fine)
         if (not touching and wall_force(memory) == 0.0) or change <= SWEPT * whole:
             break
         touching = True
@@ -535,6 +566,100 @@ def stretch(contacts: Contacts, now: Step, v: Velocity) -> None:
         friction[:] = 0.0
 
 
+@inner_kernel
+def corners_at(parameters: Parameters, theta: float) -> Corners:
+    """Offsets of the corners from the mass's centre."""
+    left, right, bottom, top = parameters.reach
+    s, c = math.sin(theta), math.cos(theta)
+    return (
+        -left * c + bottom * s,
+        -left * s - bottom * c,
+        right * c + bottom * s,
+        right * s - bottom * c,
+        -left * c - top * s,
+        -left * s + top * c,
+        right * c - top * s,
+        right * s + top * c,
+    )
+
+
+@inner_kernel
+def first_of(memory: Floats) -> float:
+    """When the first of the strikes began that have not been written yet."""
+    first = math.inf
+    for i in range(len(memory)):
+        first = min(first, memory[i, STRUCK])
+    return first
+
+
+@inner_kernel
+def gather(memory: Floats, step: float, first_strike: float) -> None:
+    """Adds a step's forces to the impulses, if any contact is struck."""
+    if first_strike < math.inf:
+        for i in range(len(memory)):
+            memory[i, IMPULSE] += step * memory[i, FORCE]
+
+
+@inner_kernel
+def run_to(
+    contacts: Contacts,
+    base: Shaking,
+    times: tuple[float, float],
+    state: Floats,
+    events: Floats,
+    n_events: int,
+) -> tuple[bool, int, int, int, float]:
+    """Steps from one of two times to the other, and moves `state` along (see `advance`): whether
+    the block overturns, the events written, the steps and the sweeps that this took, and the time
+    reached."""
+    parameters, memory = contacts.parameters, contacts.memory
+    contact_time = 1.0 / math.sqrt(parameters.stiffness)
+    x, y, theta, vx, vy, w, calm, fine, closing, allowed, gross = state
+    v = vx, vy, w
+    first_strike = first_of(memory)
+    steps = sweeps = 0
+    t, end = times
+    while t < end and abs(theta) < 0.5 * math.pi:
+        settled = t >= calm
+        step = max(min(parameters.time_step if settled else fine, closing), SHORTEST * contact_time)
+        if t + step > end - SHORTEST * contact_time:
+            step = end - t
+        half = 0.5 * step
+        middle = t + half
+        t = end if step == end - t else t + step
+        steps += 1
+        # Half a step of motion, then the kick.
+        x += half * v[0]
+        y += half * v[1]
+        theta += half * v[2]
+        v0 = v
+        u, vg = (
+            sampled(base.horizontal, base.horizontal_rate, middle),
+            sampled(base.vertical, base.vertical_rate, middle),
+        )
+        v = v[0] - step * u, v[1] - step * (parameters.gravity + vg), v[2]
+        now = Step(x, y, corners_at(parameters, theta), v0, step, middle)
+        v, closing, young, swept = kick(contacts, now, v, settled)
+        sweeps += swept
+        stretch(contacts, now, v)
+        if young < math.inf:
+            fine = young if settled else min(young, fine)
+            calm = middle + YOUNG * contact_time
+            first_strike = first_of(memory)
+        gather(memory, step, first_strike)
+        work = -half * (u * (v0[0] + v[0]) + vg * (v0[1] + v[1]))
+        allowed += work
+        gross += abs(work)
+        x += half * v[0]
+        y += half * v[1]
+        theta += half * v[2]
+        if t - first_strike >= STRIKE:
+            n_events = flush(memory, t - STRIKE, events, n_events)
+            first_strike = first_of(memory)
+    state[:] = x, y, theta, v[0], v[1], v[2], calm, fine, closing, allowed, gross
+    return abs(theta) >= 0.5 * math.pi, n_events, steps, sweeps, t
+
+
 @kernel
 def advance(
     contacts: Contacts,
@@ -554,77 +679,21 @@ def advance(
     contact, impulse). Returns how it ended, the rows and events written, the steps taken, the
     sweeps over the surfaces that they took, and the time reached.
     """
-    parameters, memory = contacts.parameters, contacts.memory
-    left, right, bottom, top = parameters.reach
-    inverse = parameters.inverse_inertia
-    contact_time = 1.0 / math.sqrt(parameters.stiffness)
-    x, y, theta, vx, vy, w, calm, fine, closing, allowed, gross = state
-    v = vx, vy, w
-    first_strike = float(np.min(memory[:, STRUCK]))
+    parameters = contacts.parameters
     n_events = steps = sweeps = 0
     t = (first_row - 1) * output_step
     for row in range(len(output)):
         end = (first_row + row) * output_step
-        while t < end:
-            settled = t >= calm
-            step = max(
-                min(parameters.time_step if settled else fine, closing), SHORTEST * contact_time
-            )
-            if t + step > end - SHORTEST * contact_time:
-                step = end - t
-            half = 0.5 * step
-            middle = t + half
-            t = end if step == end - t else t + step
-            steps += 1
-            # Half a step of motion, then the kick.
-            x += half * v[0]
-            y += half * v[1]
-            theta += half * v[2]
-            s, c = math.sin(theta), math.cos(theta)
-            corners = (
-                -left * c + bottom * s,
-                -left * s - bottom * c,
-                right * c + bottom * s,
-                right * s - bottom * c,
-                -left * c - top * s,
-                -left * s + top * c,
-                right * c - top * s,
-                right * s + top * c,
-            )
-            v0 = v
-            u, vg = (
-                sampled(base.horizontal, base.horizontal_rate, middle),
-                sampled(base.vertical, base.vertical_rate, middle),
-            )
-            v = v[0] - step * u, v[1] - step * (parameters.gravity + vg), v[2]
-            now = Step(x, y, corners, v0, step, middle)
-            v, closing, young, swept = kick(contacts, now, v, settled)
-            sweeps += swept
-            stretch(contacts, now, v)
-            if young < math.inf:
-                fine = young if settled else min(young, fine)
-                calm = middle + YOUNG * contact_time
-                first_strike = float(np.min(memory[:, STRUCK]))
-            if first_strike < math.inf:
-                for i in range(len(memory)):
-                    memory[i, IMPULSE] += step * memory[i, FORCE]
-            work = -half * (u * (v0[0] + v[0]) + vg * (v0[1] + v[1]))
-            allowed += work
-            gross += abs(work)
-            x += half * v[0]
-            y += half * v[1]
-            theta += half * v[2]
-            if t - first_strike >= STRIKE:
-                n_events = flush(memory, t - STRIKE, events, n_events)
-                first_strike = float(np.min(memory[:, STRUCK]))
-            if abs(theta) >= 0.5 * math.pi:
-                state[:6] = x, y, theta, v[0], v[1], v[2]
-                return OVERTURNED, row, n_events, steps, sweeps, t
-        energy = 0.5 * (v[0] ** 2 + v[1] ** 2 + v[2] ** 2 / inverse) + parameters.gravity * (
-            y - bottom
+        falls, n_events, taken, swept, t = run_to(contacts, base, (t, end), state, events, n_events)
+        steps += taken
+        sweeps += swept
+        if falls:
+            return OVERTURNED, row, n_events, steps, sweeps, t
+        vx, vy, w, allowed, gross = state[3], state[4], state[5], state[9], state[10]
+        energy = 0.5 * (vx**2 + vy**2 + w**2 / parameters.inverse_inertia) + parameters.gravity * (
+            state[1] - parameters.reach[2]
         )
         if not (energy <= allowed + ENERGY * gross and energy < 1e300):
             return BLOWN_UP, row, n_events, steps, sweeps, t
-        output[row, :] = x, y, theta, v[0], v[1], v[2]
-    state[:] = x, y, theta, v[0], v[1], v[2], calm, fine, closing, allowed, gross
+        output[row, :] = state[:6]
     return DONE, len(output), n_events, steps, sweeps, t

@@ -1,107 +1,63 @@
-"""Many runs of the event-based model at once, compiled and on all cores: outcomes and peaks, and
-their motion where it is asked for.
+"""Runs of the event-based model, one or many, compiled: many on all cores, with their outcomes and
+peaks, and their motion where it is asked for.
 
-Scenes are packed into plain arrays, one row a run, so that the loop over them never comes back to
-Python. Threads take chunks of rows; the result of a row does not depend on the others, nor on the
-number of threads.
+Scenes are packed into arrays of records, one row a run, so that the loop over them never comes back
+to Python. Threads take chunks of rows; the result of a row does not depend on the others, nor on
+the number of threads.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple, get_type_hints
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import natural
-from rockcheck.ebm.core.ground import Ground
-from rockcheck.ebm.core.march import march
-from rockcheck.ebm.core.motion import Setting, Side
-from rockcheck.ebm.core.names import FAILURES, Ending, Shape
-from rockcheck.ebm.core.state import STATE, Base, Control, Records, Run, rests, workspace
+from rockcheck.ebm.core import march
+from rockcheck.ebm.core.block import SETTING, filled
+from rockcheck.ebm.core.ground import FORM
+from rockcheck.ebm.core.names import FAILURES, Ending, Family, Pivot, Shape
+from rockcheck.ebm.core.state import CONTROL, MOTION, STATE, Records, Rows, workspace
 from rockcheck.ebm.model import EventBasedModel
-from rockcheck.scenes.compiled import inner_kernel, kernel
+from rockcheck.scenes.compiled import for_types_of
 from rockcheck.scenes.errors import InputError, ModelFailure
 from rockcheck.scenes.progress import OnProgress, threads, unheard
 from rockcheck.scenes.scene import Scene
 
 Floats = NDArray[np.float64]
 _CHUNK = 256
-#: Rows of settings and grounds, by the names of their fields.
-SIDE = np.dtype([(name, np.float64) for name in Side._fields])
-SETTING = np.dtype(
-    [
-        (name, SIDE if kind is Side else np.int64 if kind is int else np.float64)
-        for name, kind in get_type_hints(Setting).items()
-    ]
-)
-GROUND = np.dtype(
-    [
-        (name, np.int64 if kind == "int" else np.float64)
-        for name, kind in Ground.__annotations__.items()
-        if name != "samples"
-    ]
-    + [("first", np.int64), ("count", np.int64)]
-)
+#: The event loops that are compiled, by whether friction is Bouc-Wen's.
+_READY: dict[bool, Callable[..., None]] = {}
+#: What a batch keeps of a run's state, by its field there.
+_KEPT = {"peak": "peak", "t_end": "t", "series": "steps", "ending": "ending", "written": "rows"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Packed:
-    """Runs as arrays, one row each, natural units: settings (`SETTING`) and grounds (`GROUND`),
-    initial states, lengths.
+    """Runs as arrays, one row each, natural units: what compiled code is given, the motion at the
+    start, and the duration."""
 
-    Recorded samples of all rows stand in one `samples` array, where a row's ground has `count` of
-    them from `first` on.
-    """
-
-    settings: NDArray[np.void]
-    horizontal: NDArray[np.void]
-    vertical: NDArray[np.void]
-    states: Floats
+    rows: Rows
+    starts: NDArray[np.void]
     durations: Floats
-    samples: Floats
 
     def __len__(self) -> int:
         return len(self.durations)
 
-    def rows(self, part: slice, durations: Floats) -> Rows:
-        """Some of the rows, for compiled code, with these durations of all rows."""
-        some = (
-            self.settings[part],
-            self.horizontal[part],
-            self.vertical[part],
-            self.states[part],
-            durations[part],
+    def part(self, part: slice) -> Packed:
+        """Some of the runs. The samples stay those of all."""
+        rows = self.rows
+        return Packed(
+            rows=Rows(
+                rows.settings[part], rows.horizontal[part], rows.vertical[part], rows.samples
+            ),
+            starts=self.starts[part],
+            durations=self.durations[part],
         )
-        return Rows(*some, self.samples)
-
-
-class Rows(NamedTuple):
-    """Rows of a `Packed` as compiled code takes them."""
-
-    settings: NDArray[np.void]
-    horizontal: NDArray[np.void]
-    vertical: NDArray[np.void]
-    states: Floats
-    durations: Floats
-    samples: Floats
-
-
-class Found(NamedTuple):
-    """What compiled code writes, a row a run (see `Outcomes`)."""
-
-    side: NDArray[np.int8]
-    peak: Floats
-    t_end: Floats
-    series: NDArray[np.int64]
-    ending: NDArray[np.int64]
-    at_rest: NDArray[np.bool_]
-    motion: Floats
-    modes: NDArray[np.int8]
-    written: NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,7 +78,7 @@ class Outcomes:
     ending: NDArray[np.int64]
     at_rest: NDArray[np.bool_]
     #: Of each run `written` rows, equally spaced from its start on: x, y, theta and their rates, as
-    #: in `Packed.states`.
+    #: in `Packed.starts`.
     motion: Floats
     written: NDArray[np.int64]
 
@@ -134,26 +90,21 @@ class Outcomes:
 
 def pack(scenes: Sequence[Scene], model: EventBasedModel) -> Packed:
     """Packs a list of scenes; raises `InputError` where the model cannot play one of them."""
-    bank: list[Floats] = []
-    offset = 0
-    horizontal: list[tuple[float, ...]] = []
-    vertical: list[tuple[float, ...]] = []
-    if model.friction == "bouc-wen":
-        raise InputError("a batch has Coulomb's friction or none", "friction")
     for scene in scenes:
         model.check(scene)
-        for ground, rows in zip(natural.base_of(scene), (horizontal, vertical), strict=True):
-            rows.append((*ground[:-1], offset, len(ground.samples)))
-            bank.append(ground.samples)
-            offset += len(ground.samples)
-    settings = [_setting(scene, model) for scene in scenes]
+    bases = [natural.base_of(scene) for scene in scenes]
+    grounds = [ground for base in bases for ground in base]
+    forms = np.array([ground.form for ground in grounds], dtype=FORM)
+    forms["first"] = np.cumsum(forms["count"]) - forms["count"]
     return Packed(
-        settings=np.array(settings, dtype=SETTING),
-        horizontal=np.array(horizontal, dtype=GROUND),
-        vertical=np.array(vertical, dtype=GROUND),
-        states=np.array([natural.state_of(scene) for scene in scenes]).reshape(len(scenes), 6),
+        rows=Rows(
+            np.array([_setting(scene, model) for scene in scenes], dtype=SETTING),
+            forms[::2].copy(),
+            forms[1::2].copy(),
+            np.concatenate([np.empty(0), *(ground.samples for ground in grounds)]),
+        ),
+        starts=np.array([tuple(natural.state_of(scene)) for scene in scenes], dtype=MOTION),
         durations=np.array([scene.duration / natural.time_unit(scene) for scene in scenes]),
-        samples=np.concatenate(bank) if bank else np.zeros(1),
     )
 
 
@@ -169,32 +120,35 @@ def pack_pulses(
     one = natural.base_of(scene.replace(excitation=template(**pulse.model_dump()))).horizontal
     # A pulse of amplitude a and period T is a times the unit pulse at time t/T.
     ratio = 1.0 / periods
-    horizontal = np.repeat(np.array([(*one[:-1], 0, 1)], dtype=GROUND), count)
+    horizontal = np.full(count, one.form, dtype=FORM)
     for power in range(4):
         horizontal[f"c{power}"] *= amplitudes * (
-            ratio**power if one.kind == Shape.GAUSSIAN else 1.0
+            ratio**power if one.form.kind == Shape.GAUSSIAN else 1.0
         )
-    horizontal["rate"] *= ratio**2 if one.kind == Shape.GAUSSIAN else ratio
+    horizontal["rate"] *= ratio**2 if one.form.kind == Shape.GAUSSIAN else ratio
     horizontal["centre"] *= periods
     horizontal["quiet"] *= periods
     still = natural.base_of(scene).vertical
     return Packed(
-        settings=np.repeat(np.array([_setting(scene, model)], dtype=SETTING), count),
-        horizontal=horizontal,
-        vertical=np.repeat(np.array([(*still[:-1], 1, len(still.samples))], dtype=GROUND), count),
-        states=np.tile(natural.state_of(scene), (count, 1)),
+        rows=Rows(
+            np.full(count, _setting(scene, model), dtype=SETTING),
+            horizontal,
+            np.full(count, still.form, dtype=FORM),
+            still.samples,
+        ),
+        starts=np.full(count, np.array(tuple(natural.state_of(scene)), dtype=MOTION)),
         durations=np.full(count, scene.duration / unit),
-        samples=np.concatenate([np.zeros(1), still.samples]),
     )
 
 
-def _setting(scene: Scene, model: EventBasedModel) -> Setting:
+def _setting(scene: Scene, model: EventBasedModel) -> np.record:
     return natural.setting_of(
         scene,
         unilateral=model.pivot == "unilateral",
         no_slip=model.friction == "no-slip",
         energy_cap=model.energy_cap,
         impacts=model.impacts,
+        yields=model.yield_displacement / scene.block.radius,
     )
 
 
@@ -216,152 +170,83 @@ def run_batch(
     `on_progress` is told the rows done. Where a row reaches a cap or has no consistent motion:
     `ModelFailure` if `strict`, else only its `ending` says so.
     """
+    refuse_bouc_wen(model)
     count, kept = len(packed), parts + 1 if parts and not until_decided else 0
-    side, peak, t_end = np.zeros(count, dtype=np.int8), np.zeros(count), np.zeros(count)
-    series, ending, written = (np.zeros(count, dtype=np.int64) for _ in range(3))
-    at_rest, motion, modes = (
-        np.zeros(count, dtype=bool),
-        np.zeros((count, kept, 6)),
-        np.zeros((count, kept), dtype=np.int8),
-    )
-    control = Control(
-        model.tolerance, min(model.most_steps, 2_000_000), model.most_events, until_decided, 1.0
-    )
-    durations = np.full(count, 1e6) if until_decided else packed.durations
+    motion, modes = np.zeros((count, kept, 6)), np.zeros((count, kept), dtype=np.int8)
+    most = min(model.most_steps, 2_000_000)
+    if until_decided:
+        packed = replace(packed, durations=np.full(count, 1e6))
 
-    def chunk(first: int) -> int:
+    def chunk(first: int) -> dict[str, NDArray[Any]]:
         rows = slice(first, min(first + _CHUNK, count))
-        found = Found(
-            side[rows],
-            peak[rows],
-            t_end[rows],
-            series[rows],
-            ending[rows],
-            at_rest[rows],
-            motion[rows],
-            modes[rows],
-            written[rows],
-        )
-        _run_rows(packed.rows(rows, durations), control, found)
-        return rows.stop - rows.start
+        some = packed.part(rows)
+        states = starts_of(some, model, some.durations / max(kept - 1, 1), most, until_decided)
+        records = Records(motion[rows], modes[rows], np.empty((len(some), 0, 5)))
+        play(model, some.rows, states, records)
+        return _told(states)
 
+    found: list[dict[str, NDArray[Any]]] = []
     with threads(jobs or os.cpu_count() or 1) as pool:
         done = 0
-        for rows in pool.map(chunk, range(0, count, _CHUNK)):
-            done += rows
+        for told in pool.map(chunk, range(0, max(count, 1), _CHUNK)):
+            found.append(told)
+            done += len(told["side"])
             on_progress(done, count)
-    found = Outcomes(
-        side=side,
-        peak=peak,
-        t_end=t_end,
-        series=series,
-        ending=ending,
-        at_rest=at_rest,
-        motion=motion,
-        written=written,
+    columns = {name: np.concatenate([told[name] for told in found]) for name in found[0]}
+    outcomes = Outcomes(**columns, motion=motion)
+    if strict and outcomes.failed.any():
+        first = int(np.argmax(outcomes.failed))
+        why = FAILURES[int(outcomes.ending[first])]
+        raise ModelFailure(f"{model.name}: run {first} of the batch: {why}")
+    return outcomes
+
+
+def refuse_bouc_wen(model: EventBasedModel) -> None:
+    """Raises `InputError`: a batch knows when a run is decided by Coulomb's friction or none."""
+    if model.friction == "bouc-wen":
+        raise InputError("a batch has Coulomb's friction or none", "friction")
+
+
+def _told(states: NDArray[np.void]) -> dict[str, NDArray[Any]]:
+    """What a batch keeps of runs that have ended."""
+    found = {name: states[field].copy() for name, field in _KEPT.items()}
+    falls = np.where(states["ending"] == Ending.OVERTURNED, states["motion"]["theta"], 0.0)
+    mode = states["mode"]
+    at_rest = (mode["family"] == Family.FLAT) & (mode["pivot"] == Pivot.STICK)
+    return found | {"side": -np.sign(falls).astype(np.int8), "at_rest": at_rest}
+
+
+def starts_of(
+    packed: Packed,
+    model: EventBasedModel,
+    steps: Floats | float,
+    most_steps: int,
+    until_decided: bool = False,
+) -> NDArray[np.void]:
+    """The states of runs at their start, with rows of the motion `steps` apart."""
+    states = np.zeros(len(packed), STATE)
+    states["motion"], states["t_end"] = packed.starts, packed.durations
+    states["control"] = filled(
+        CONTROL,
+        tolerance=model.tolerance,
+        most_steps=most_steps,
+        most_events=model.most_events,
+        until_decided=until_decided,
     )
-    if strict and found.failed.any():
-        first = int(np.argmax(found.failed))
-        raise ModelFailure(
-            f"{model.name}: run {first} of the batch: {FAILURES[int(ending[first])]}"
-        )
-    return found
+    states["control"]["output_step"] = steps
+    return states
 
 
-@inner_kernel
-def row_ground(row, samples):
-    """The base motion of a packed row, of the types that a single history has: the loop is then
-    compiled once for both."""
-    return Ground(
-        kind=int(row["kind"]),
-        c0=row["c0"],
-        c1=row["c1"],
-        c2=row["c2"],
-        c3=row["c3"],
-        rate=row["rate"],
-        centre=row["centre"],
-        quiet=row["quiet"],
-        step=row["step"],
-        samples=samples[row["first"] : row["first"] + row["count"]],
-    )
+def play(model: EventBasedModel, rows: Rows, states: NDArray[np.void], records: Records) -> None:
+    """Plays runs with the model's friction, in `states`."""
+    given = rows, states, workspace(), records
+    loop_of(model, *given)(*given)
 
 
-@inner_kernel
-def row_side(r):
-    """One side of the block of a packed row."""
-    return Side(
-        alpha=r["alpha"],
-        radius=r["radius"],
-        arm=r["arm"],
-        top_alpha=r["top_alpha"],
-        top_radius=r["top_radius"],
-        tip_sin=r["tip_sin"],
-        tip_cos=r["tip_cos"],
-        far_sin=r["far_sin"],
-        far_cos=r["far_cos"],
-        share=r["share"],
-    )
-
-
-@inner_kernel
-def row_setting(r):
-    """Block, floor and walls of a packed row, of the types that a single history has."""
-    return Setting(
-        left=row_side(r["left"]),
-        right=row_side(r["right"]),
-        height=r["height"],
-        spin=r["spin"],
-        mu_s=r["mu_s"],
-        mu_k=r["mu_k"],
-        e_floor=r["e_floor"],
-        gap_left=r["gap_left"],
-        gap_right=r["gap_right"],
-        e_left=r["e_left"],
-        e_right=r["e_right"],
-        walls=r["walls"] != 0.0,
-        no_slip=r["no_slip"] != 0.0,
-        unilateral=r["unilateral"] != 0.0,
-        energy_cap=r["energy_cap"] != 0.0,
-        law=r["law"],
-        yields=r["yields"],
-    )
-
-
-@inner_kernel
-def play_row(rows, i, step, control, records, states, work):
-    """Plays row i in `states`, an array of one state, with rows of the motion a `step` apart (see
-    `ebm.core.march.march`); returns the state."""
-    state = states[0]
-    motion, begin = state.motion, rows.states[i]
-    motion.x, motion.y, motion.theta = begin[0], begin[1], begin[2]
-    motion.vx, motion.vy, motion.w = begin[3], begin[4], begin[5]
-    state.t_end = rows.durations[i]
-    block = row_setting(rows.settings[i])
-    base = Base(
-        row_ground(rows.horizontal[i], rows.samples), row_ground(rows.vertical[i], rows.samples)
-    )
-    control = Control(
-        control.tolerance, control.most_steps, control.most_events, control.until_decided, step
-    )
-    march(block, base, Run(state, work[0], work[1], control, records))
-    return state
-
-
-@inner_kernel
-def _play_into(rows, i, control, found, log, states, work):
-    """Plays row i and writes what is found."""
-    step = rows.durations[i] / max(found.motion.shape[1] - 1, 1)
-    records = Records(found.motion[i], found.modes[i], log)
-    state = play_row(rows, i, step, control, records, states, work)
-    found.ending[i], found.t_end[i], found.peak[i] = state.ending, state.t, state.peak
-    found.at_rest[i] = rests(state.mode)
-    found.series[i], found.written[i] = state.steps, state.rows
-    if state.ending == Ending.OVERTURNED:
-        found.side[i] = -1 if state.motion.theta > 0.0 else 1
-
-
-@kernel
-def _run_rows(rows, control, found):
-    states, work, log = np.zeros(1, STATE), workspace(), np.empty((0, 5))
-    for i in range(len(rows.durations)):
-        _play_into(rows, i, control, found, log, states, work)
+def loop_of(model: EventBasedModel, *given: Any) -> Callable[..., None]:
+    """The machine code of the event loop with the model's friction, loaded or compiled, for what it
+    is given: always of the same types."""
+    bouc_wen = model.friction == "bouc-wen"
+    if bouc_wen not in _READY:
+        _READY[bouc_wen] = for_types_of(march.play_bouc_wen if bouc_wen else march.play, *given)
+    return _READY[bouc_wen]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from functools import partial
 from typing import Annotated, Any, Literal, Self
 
@@ -114,11 +113,10 @@ class EventBasedModel(Frozen):
     def simulate(self, scene: Scene) -> History:
         """The motion of the scene on its output grid. Raises `InputError` (see `check`) or
         `ModelFailure`."""
-        self.check(scene)
-        history = self._simulate(scene, self.tolerance)
+        history = self._simulate(scene)
         if not self.estimate_error:
             return history
-        finer = self._simulate(scene, max(self.tolerance / 100.0, FINEST))
+        finer = self.finer()._simulate(scene)
         rows = min(len(finer.channels["theta"]), len(history.channels["theta"]))
         change = (
             np.max(np.abs(finer.channels["theta"][:rows] - history.channels["theta"][:rows]))
@@ -127,44 +125,33 @@ class EventBasedModel(Frozen):
         cost = Cost(**(vars(history.cost) | {"error_estimate": float(change)}))
         return History(**(vars_of(history) | {"cost": cost}))
 
-    def _simulate(self, scene: Scene, tolerance: float) -> History:
-        start = time.perf_counter()
-        from rockcheck.ebm import natural
-        from rockcheck.ebm.core import march, names, state
+    def _simulate(self, scene: Scene) -> History:
+        began = time.perf_counter()
+        from rockcheck.ebm import batch, natural
+        from rockcheck.ebm.core import names, state
         from rockcheck.scenes.progress import interruptible
 
-        b = natural.setting_of(
-            scene,
-            unilateral=self.pivot == "unilateral",
-            no_slip=self.friction == "no-slip",
-            energy_cap=self.energy_cap,
-            impacts=self.impacts,
-            yields=self.yield_displacement / scene.block.radius,
+        packed, unit = batch.pack([scene], self), natural.time_unit(scene)
+        shape = 1, len(scene.output_times)
+        records = state.Records(
+            out=np.empty((*shape, 6)),
+            out_mode=np.zeros(shape, dtype=np.int8),
+            log=np.empty((1, self.most_events, 5)),
         )
-        base = natural.base_of(scene)
-        unit = natural.time_unit(scene)
-        times = scene.output_times
-        out = np.empty((len(times), 6))
-        out_mode = np.zeros(len(times), dtype=np.int8)
-        log = np.empty((self.most_events, 5))
-        records, work = state.Records(out, out_mode, log), state.workspace()
-        loop = _compiled(march.play_bouc_wen if self.friction == "bouc-wen" else march.play)
+        start = partial(batch.starts_of, packed, self, scene.output_step / unit)
+        work = state.workspace()
+        # Compiled or loaded here, so that no run's time holds it.
+        loop = batch.loop_of(self, packed.rows, start(0), work, records)
 
         def play(most_steps: int) -> np.record:
-            control = state.Control(
-                tolerance, most_steps, self.most_events, False, scene.output_step / unit
-            )
-            states = natural.start_of(scene)
-            loop(b, base, states, work, control, records)
+            states = start(most_steps)
+            loop(packed.rows, states, work, records)
             return states[0]
 
         ready, cpu = time.perf_counter(), time.process_time()
         # A run of few steps is played here: to hand it over takes longer. Each sample of a record
         # is a step.
-        few = min(
-            self.most_steps,
-            _AT_ONCE if max(len(ground.samples) for ground in base) < _AT_ONCE else 0,
-        )
+        few = min(self.most_steps, _AT_ONCE if len(packed.rows.samples) < _AT_ONCE else 0)
         found = play(few) if few else None
         if found is None or (found.ending == names.Ending.TOO_MANY_STEPS and few < self.most_steps):
             found = interruptible(partial(play, self.most_steps))
@@ -173,13 +160,14 @@ class EventBasedModel(Frozen):
             raise ModelFailure(
                 f"{self.name}: {names.FAILURES[found.ending]} at t = {found.t * unit:.6g} s"
             )
+        out, modes, log = (rows[0] for rows in records)
         rows = max(int(found.rows), 1)
         out[0] = natural.state_of(scene) if found.rows == 0 else out[0]
         events = _events(log[: min(found.events, len(log))], unit, scene.block.radius)
         cost = Cost(
             wall_seconds=seconds,
             cpu_seconds=cpu,
-            set_up=ready - start,
+            set_up=ready - began,
             steps=int(found.steps),
             evaluations=int(found.steps),
             energy_gains=int(found.gains),
@@ -192,7 +180,7 @@ class EventBasedModel(Frozen):
             scene,
             self.name,
             natural.to_si(scene, out[:rows]),
-            mode=np.array(names.MODE_NAMES)[out_mode[:rows]],
+            mode=np.array(names.MODE_NAMES)[modes[:rows]],
             events=events,
             outcome=_outcome(found),
             cost=cost,
@@ -230,34 +218,5 @@ def vars_of(history: History) -> dict[str, Any]:
     return {name: getattr(history, name) for name in History.__dataclass_fields__}
 
 
-def _compiled(loop: Any) -> Callable[..., None]:
-    """The machine code of an event loop, loaded or compiled, so that no run's time holds it."""
-    if loop in _READY:
-        return _READY[loop]
-    from rockcheck.ebm import natural
-    from rockcheck.ebm.core import state
-    from rockcheck.scenes.compiled import for_types_of
-    from rockcheck.scenes.excitations import Rest
-    from rockcheck.scenes.scene import Block, Floor
-
-    scene = Scene(
-        name="warm-up",
-        block=Block(half_width=1.0, half_height=4.0),
-        floor=Floor(friction=0.5),
-        excitation=Rest(),
-        duration=1.0,
-    )
-    b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
-    control = state.Control(WARM_UP_TOLERANCE, 1, 1, False, 1.0)
-    nothing = state.Records(np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5)))
-    start = natural.start_of(scene)
-    given = b, natural.base_of(scene), start, state.workspace(), control, nothing
-    _READY[loop] = for_types_of(loop, *given)
-    return _READY[loop]
-
-
 #: Steps that take about as long as to hand a run over to the thread that Ctrl-C need not wait for.
 _AT_ONCE = 500
-#: The event loops that are compiled.
-_READY: dict[Any, Callable[..., None]] = {}
-WARM_UP_TOLERANCE = 0.01

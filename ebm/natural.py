@@ -13,10 +13,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.ebm.core.block import LEAST_FRICTION, SETTING, SIDE, filled
 from rockcheck.ebm.core.ground import ground_of
-from rockcheck.ebm.core.motion import LEAST_FRICTION, Setting, Side
 from rockcheck.ebm.core.names import LAWS
-from rockcheck.ebm.core.state import STATE, Base
+from rockcheck.ebm.core.state import Base
 from rockcheck.scenes import kinematics
 from rockcheck.scenes.scene import Block, Scene
 
@@ -34,11 +34,12 @@ def setting_of(
     energy_cap: bool,
     impacts: str = "moreau",
     yields: float = 0.0,
-) -> Setting:
+) -> np.record:
     """Block, floor and walls of a scene in natural units."""
     radius = scene.block.radius
     left, right = scene.wall("left"), scene.wall("right")
-    return Setting(
+    return filled(
+        SETTING,
         left=side_of(scene.block, "left"),
         right=side_of(scene.block, "right"),
         height=math.cos(scene.block.alpha),
@@ -59,12 +60,14 @@ def setting_of(
     )
 
 
-def side_of(block: Block, side: Literal["left", "right"]) -> Side:
+def side_of(block: Block, side: Literal["left", "right"]) -> np.record:
     """One side of a block, lengths in R of its weaker pivot."""
     alpha = block.alpha
     if block.homogeneous:
         arm, sine, cosine = math.sin(alpha), math.sin(2.0 * alpha), math.cos(2.0 * alpha)
-        return Side(alpha, 1.0, arm, alpha, 1.0, sine, cosine, sine, cosine, 0.75)
+        turns = {"tip_sin": sine, "tip_cos": cosine, "far_sin": sine, "far_cos": cosine}
+        corners = {"alpha": alpha, "radius": 1.0, "top_alpha": alpha, "top_radius": 1.0}
+        return filled(SIDE, **corners, **turns, arm=arm, share=0.75)
     pivot, other, unit = (
         block.pivot(side),
         block.pivot("right" if side == "left" else "left"),
@@ -75,7 +78,8 @@ def side_of(block: Block, side: Literal["left", "right"]) -> Side:
         pivot.radius**2,
         pivot.radius / unit,
     )
-    return Side(
+    return filled(
+        SIDE,
         alpha=pivot.alpha,
         radius=radius,
         arm=radius
@@ -95,14 +99,6 @@ def base_of(scene: Scene) -> Base:
     unit = time_unit(scene)
     sideways = ground_of(scene.excitation, scene.gravity, unit)
     return Base(sideways, ground_of(scene.vertical, scene.gravity, unit))
-
-
-def start_of(scene: Scene) -> NDArray[np.void]:
-    """One run of the scene, in an array: its state at the start."""
-    states = np.zeros(1, STATE)
-    states["motion"][0] = tuple(state_of(scene))
-    states["t_end"] = scene.duration / time_unit(scene)
-    return states
 
 
 def state_of(scene: Scene) -> NDArray[np.float64]:

@@ -25,12 +25,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-CLOSED = "tests/ebm/test_closed_forms.py::test_"
+CLOSED = "tests/ebm/test_impact_balances.py::test_"
 POPULATION = "tests/validation/studies/test_population.py"
 UNCERTAINTY = "tests/validation/discrepancy/test_uncertainty.py"
 #: Where faults are planted, and the tests that should notice them, the quickest first.
 TARGETS = {
-    "ebm/core/series.py": ["tests/ebm/core/test_core_parts.py"],
+    "ebm/core/series.py": ["tests/ebm/core/test_series.py", "tests/ebm/core/test_guards.py"],
     "ebm/core/laws/impacts.py": [
         "tests/ebm/core/test_impact_laws.py",
         f"{CLOSED}wall_impact_balances_momentum",
@@ -41,8 +41,12 @@ TARGETS = {
         f"{CLOSED}contact_impact_leaves_no_approach",
         "tests/ebm/test_edges.py",
     ],
-    "ebm/core/guards.py": ["tests/ebm/core/test_core_parts.py", "tests/ebm/test_edges.py"],
-    "ebm/core/modes.py": ["tests/ebm/core/test_core_parts.py", "tests/ebm/test_edges.py"],
+    "ebm/core/guards.py": [
+        "tests/ebm/core/test_guards.py",
+        "tests/ebm/core/test_selection.py",
+        "tests/ebm/test_edges.py",
+    ],
+    "ebm/core/modes.py": ["tests/ebm/core/test_selection.py", "tests/ebm/test_edges.py"],
     "validation/suite/tolerances.py": [
         "tests/validation/suite/test_verdicts.py",
         "tests/validation/suite/test_tolerances.py",
@@ -71,15 +75,15 @@ TARGETS = {
         "tests/validation/suite/test_verdicts.py",
         "tests/commands/test_cli.py",
     ],
-    "ebm/core/settle.py": ["tests/ebm/core/test_impact_laws.py", "tests/ebm/test_edges.py"],
+    "ebm/core/settle.py": ["tests/ebm/core/test_strike.py", "tests/ebm/test_edges.py"],
     "ebm/core/laws/strike.py": [
-        "tests/ebm/core/test_impact_laws.py",
+        "tests/ebm/core/test_strike.py",
         f"{CLOSED}wall_impact_balances_momentum",
         f"{CLOSED}floor_impact_balances_momentum",
         f"{CLOSED}contact_impact_leaves_no_approach",
         "tests/ebm/test_edges.py",
     ],
-    "ebm/core/march.py": ["tests/ebm/core/test_core_parts.py", "tests/ebm/test_edges.py"],
+    "ebm/core/march.py": ["tests/ebm/core/test_guards.py", "tests/ebm/test_edges.py"],
     "scenes/block.py": [
         "tests/scenes/test_scene.py",
         "tests/ebm/test_loaded_blocks.py::test_pivots_of_a_block",

@@ -24,19 +24,13 @@ from __future__ import annotations
 
 import math
 
+from rockcheck.ebm.core.block import LEAST_FRICTION, side_of, wall_turn
 from rockcheck.ebm.core.contacts import SLOW, closed_wall, slip_velocity, stop, upright
 from rockcheck.ebm.core.coulomb import tell
 from rockcheck.ebm.core.ground import acceleration, acceleration_after, fill_series, weightless_at
 from rockcheck.ebm.core.guards import drop, fill_guards, first_event, guard
-from rockcheck.ebm.core.modes import hangs_flat, slacken, tips_first
-from rockcheck.ebm.core.motion import (
-    LEAST_FRICTION,
-    flat_series,
-    side_of,
-    tilt_series,
-    turned,
-    wall_turn,
-)
+from rockcheck.ebm.core.modes import hangs_flat, slacken, tips_first, touched_walls
+from rockcheck.ebm.core.motion import flat_series, tilt_series, turned
 from rockcheck.ebm.core.names import Event, Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.rules import Rule
 from rockcheck.ebm.core.series import (
@@ -48,11 +42,12 @@ from rockcheck.ebm.core.series import (
     first_root,
     force_step,
     leading,
+    product,
     step_size,
     value,
 )
 from rockcheck.ebm.core.state import code_of, mode_code, note, on_wall, place
-from rockcheck.scenes.compiled import inner_kernel
+from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 #: Rest is stepped through.
 LOOKS_AHEAD = False
@@ -65,27 +60,43 @@ _NEARLY = 10.0
 
 
 @inner_kernel
-def _product(a, x, y, k):
-    """Coefficient k of the product of two rows."""
-    total = 0.0
-    for j in range(k + 1):
-        total += a[x, j] * a[y, k - j]
-    return total
-
-
-@inner_kernel
-def _fill_z(block, run, k, loads, yielded):
+def _fill_z(block, a, k, loads, yielded):
     """Coefficient k + 1 of z by (9) with beta = gamma = 1/2 and n = 2, given those of V and z up to
     k."""
-    a = run.a
     if yielded:
         a[Row.Z, k + 1] = 0.0
         return
     rate = a[Row.V, k]
     if loads:
-        a[Row.Z2, k] = _product(a, Row.Z, Row.Z, k)
-        rate -= _product(a, Row.V, Row.Z2, k)
+        a[Row.Z2, k] = product(a, Row.Z, Row.Z, k)
+        rate -= product(a, Row.V, Row.Z2, k)
     a[Row.Z, k + 1] = rate / (block.yields * (k + 1))
+
+
+@inner_kernel
+def _less_later(value, a, x, y, k):
+    """A value less the products of x's later coefficients, to be divided by its first one for y's
+    coefficient k."""
+    for j in range(1, k + 1):
+        value -= a[x, j] * a[y, k - j]
+    return value
+
+
+@inner_kernel
+def _loads(mode, a):
+    """Whether the pivot loads: V z > 0."""
+    return mode.slip * a[Row.Z, 0] > -NOISE[Kind.POSITION]
+
+
+@inner_kernel
+def _flat_friction_series(block, mode, a, friction, yielded, order):
+    loads = _loads(mode, a)
+    for k in range(order - 1):
+        a[Row.P, k] = a[Row.G, k]
+        a[Row.Q, k] = -friction * product(a, Row.Z, Row.P, k)
+        a[Row.XI, k + 2] = (a[Row.Q, k] - a[Row.U, k]) / ((k + 2) * (k + 1))
+        a[Row.V, k] = (k + 1) * a[Row.XI, k + 1]
+        _fill_z(block, a, k, loads, yielded)
 
 
 @inner_kernel
@@ -103,37 +114,38 @@ def friction_series(block, base, run, zeta, yielded, order):
     which is (7), (8) with z for d where Sw = 0, and LADDER with z for d otherwise. Flat: P = G0,
     x'' = Q - u.
     """
-    mode, motion, a = run.state.mode, run.state.motion, run.a
-    sign = float(mode.sense)
-    fill_series(base.horizontal, run.state.t, sign, order, a, Row.U)
-    fill_series(base.vertical, run.state.t, 1.0, order, a, Row.G)
+    state, a = run.state, run.a
+    fill_series(base.horizontal, state.t, float(state.mode.sense), order, a, Row.U)
+    fill_series(base.vertical, state.t, 1.0, order, a, Row.G)
     a[Row.G, 0] += 1.0
+    _fill_friction_series(block, state, a, zeta, yielded, order)
+
+
+@called_kernel
+def _fill_friction_series(block, state, a, zeta, yielded, order):
+    mode, motion = state.mode, state.motion
+    sign = float(mode.sense)
     a[Row.XI, 0], a[Row.XI, 1] = sign * motion.x, sign * motion.vx
     a[Row.Z, 0] = sign * zeta
-    loads = mode.slip * a[Row.Z, 0] > -NOISE[Kind.POSITION]
+    loads = _loads(mode, a)
     friction = block.mu_k * mode.pull
     for k in range(order + 1):
         a[Row.P, k] = a[Row.Q, k] = a[Row.NA, k] = a[Row.NB, k] = 0.0
     if mode.family == Family.FLAT:
-        for k in range(order - 1):
-            a[Row.P, k] = a[Row.G, k]
-            a[Row.Q, k] = -friction * _product(a, Row.Z, Row.P, k)
-            a[Row.XI, k + 2] = (a[Row.Q, k] - a[Row.U, k]) / ((k + 2) * (k + 1))
-            a[Row.V, k] = (k + 1) * a[Row.XI, k + 1]
-            _fill_z(block, run, k, loads, yielded)
+        _flat_friction_series(block, mode, a, friction, yielded, order)
         return
     wall = float(mode.tip - mode.far)
     push = Row.NA if mode.tip != 0 else Row.NB
-    wall_sin, wall_cos = wall_turn(turned(block, run), mode.tip != 0)
+    wall_sin, wall_cos = wall_turn(turned(block, state, a), mode.tip != 0)
     for k in range(order):
         a[Row.PHI, k + 1] = a[Row.OMEGA, k] / (k + 1)
-        a[Row.SIN, k + 1] = -_product(a, Row.OMEGA, Row.COS, k) / (k + 1)
-        a[Row.COS, k + 1] = _product(a, Row.OMEGA, Row.SIN, k) / (k + 1)
+        a[Row.SIN, k + 1] = -product(a, Row.OMEGA, Row.COS, k) / (k + 1)
+        a[Row.COS, k + 1] = product(a, Row.OMEGA, Row.SIN, k) / (k + 1)
         a[Row.V, k] = (k + 1) * (a[Row.XI, k + 1] - a[Row.SIN, k + 1])
         if k == order - 1:
             break
-        a[Row.SPIN2, k] = _product(a, Row.OMEGA, Row.OMEGA, k)
-        a[Row.WEIGHT, k] = a[Row.G, k] - _product(a, Row.COS, Row.SPIN2, k)  # g
+        a[Row.SPIN2, k] = product(a, Row.OMEGA, Row.OMEGA, k)
+        a[Row.WEIGHT, k] = a[Row.G, k] - product(a, Row.COS, Row.SPIN2, k)  # g
         a[Row.TURN, k] = wall * (wall_sin * a[Row.SIN, k] + wall_cos * a[Row.COS, k])  # C
         a[Row.ARM, k] = a[Row.COS, k] + a[Row.TURN, k]
         a[Row.INERTIA, k] = 1.0 / block.spin if k == 0 else 0.0
@@ -141,37 +153,31 @@ def friction_series(block, base, run, zeta, yielded, order):
         normal = a[Row.WEIGHT, k] / block.spin
         if wall != 0.0:
             a[Row.REACH, k] = wall_sin * a[Row.COS, k] - wall_cos * a[Row.SIN, k]  # s'
-            a[Row.INERTIA, k] += _product(a, Row.TURN, Row.TURN, k)
-            a[Row.LOAD, k] = a[Row.U, k] - wall * _product(a, Row.REACH, Row.SPIN2, k)
-            a[Row.PUSH, k] = _product(a, Row.TURN, Row.LOAD, k)  # C f
-            normal = _product(a, Row.WEIGHT, Row.INERTIA, k) - _product(a, Row.SIN, Row.PUSH, k)
-        a[Row.ZA, k] = _product(a, Row.Z, Row.ARM, k)
+            a[Row.INERTIA, k] += product(a, Row.TURN, Row.TURN, k)
+            a[Row.LOAD, k] = a[Row.U, k] - wall * product(a, Row.REACH, Row.SPIN2, k)
+            a[Row.PUSH, k] = product(a, Row.TURN, Row.LOAD, k)  # C f
+            normal = product(a, Row.WEIGHT, Row.INERTIA, k) - product(a, Row.SIN, Row.PUSH, k)
+        a[Row.ZA, k] = product(a, Row.Z, Row.ARM, k)
         a[Row.LEVER, k] = a[Row.SIN, k] + friction * a[Row.ZA, k]  # s + k (c + C)
-        a[Row.DEN, k] = a[Row.INERTIA, k] + _product(a, Row.SIN, Row.LEVER, k)
-        for j in range(1, k + 1):
-            normal -= a[Row.DEN, j] * a[Row.P, k - j]
-        a[Row.P, k] = normal / a[Row.DEN, 0]
-        a[Row.Q, k] = -friction * _product(a, Row.Z, Row.P, k)
-        moment = -_product(a, Row.LEVER, Row.P, k)
+        a[Row.DEN, k] = a[Row.INERTIA, k] + product(a, Row.SIN, Row.LEVER, k)
+        a[Row.P, k] = _less_later(normal, a, Row.DEN, Row.P, k) / a[Row.DEN, 0]
+        a[Row.Q, k] = -friction * product(a, Row.Z, Row.P, k)
+        moment = -product(a, Row.LEVER, Row.P, k)
         if wall != 0.0:
-            moment -= a[Row.PUSH, k]
-            for j in range(1, k + 1):
-                moment -= a[Row.INERTIA, j] * a[Row.TORQUE, k - j]
+            moment = _less_later(moment - a[Row.PUSH, k], a, Row.INERTIA, Row.TORQUE, k)
         a[Row.TORQUE, k] = moment / a[Row.INERTIA, 0]  # theta''
         a[Row.OMEGA, k + 1] = a[Row.TORQUE, k] / (k + 1)
         along = a[Row.Q, k] - a[Row.U, k]
         # The corner slides on the wall: x'' = Sw (c' theta'' - s' w^2), which takes the force N.
         if wall != 0.0:
-            held = _product(a, Row.TURN, Row.TORQUE, k) - wall * _product(
-                a, Row.REACH, Row.SPIN2, k
-            )
+            held = product(a, Row.TURN, Row.TORQUE, k) - wall * product(a, Row.REACH, Row.SPIN2, k)
             a[push, k] = wall * (held - along)
             along = held
         a[Row.XI, k + 2] = along / ((k + 2) * (k + 1))
-        _fill_z(block, run, k, loads, yielded)
+        _fill_z(block, a, k, loads, yielded)
 
 
-@inner_kernel
+@called_kernel
 def _held(block, base, state):
     """Whether a flat block without speed stays at rest: the base neither lifts nor slides it, or
     presses it on a wall.
@@ -214,7 +220,7 @@ def _hangs_on(base, state):
     return stands and still and acceleration_after(base.vertical, t) < -1.0
 
 
-@inner_kernel
+@called_kernel
 def _rest(block, base, state):
     """The mode of a block at rest on its base."""
     mode, motion = state.mode, state.motion
@@ -233,7 +239,7 @@ def _waits(base, state):
         state.t = weightless_at(base.vertical, state.t)
 
 
-@inner_kernel
+@called_kernel
 def _leave_rest(block, base, run):
     """The block at rest starts to slide, or to tilt, as u grows to the side to which it tips first;
     returns z = -u/(mu_k G0), +-1 if it slides."""
@@ -264,7 +270,7 @@ def _leave_rest(block, base, run):
     return -float(sense)
 
 
-@inner_kernel
+@called_kernel
 def _tip(block, base, run, first, zeta, free):
     """Lets a flat block tilt to the side on which its rotation grows, `first` if it can; returns
     whether there is one.
@@ -290,7 +296,7 @@ def _tilts(block, base, run, sense, v, zeta):
     _close_walls(block, base, run, zeta, Guard.NONE)
 
 
-@inner_kernel
+@called_kernel
 def _starts(block, base, run, zeta):
     """The contacts of a block that starts, or goes on after an impact; returns z, changed only
     where it was at rest."""
@@ -309,7 +315,7 @@ def _starts(block, base, run, zeta):
     return zeta
 
 
-@inner_kernel
+@called_kernel
 def _wedged_series(block, base, run, zeta, order, reach):
     """The series of a block that both walls hold (see ebm.core.motion), and the share of its
     friction in what they carry."""
@@ -329,7 +335,7 @@ def _wedged_series(block, base, run, zeta, order, reach):
     return order
 
 
-@inner_kernel
+@called_kernel
 def _close_walls(block, base, run, zeta, which):
     """Lets the corners of a tilting block rest on the touched walls that would push them. Sets with
     more walls are tried first.
@@ -338,51 +344,61 @@ def _close_walls(block, base, run, zeta, which):
     however near to zero it still is. The slack multiplies what counts as noise: at one instant it
     doubles with each further event.
     """
-    state, mode, motion, a = run.state, run.state.mode, run.state.motion, run.a
+    state, mode, motion = run.state, run.state.mode, run.state.motion
     ended = mode.pull if which == Guard.FLOOR_PUSH else 0
     lets_go = 1 if which == Guard.TIP_PUSH else (2 if which == Guard.FAR_PUSH else 0)
-    touched = (1 if closed_wall(block, motion, mode.sense, False) else 0) + (
-        2 if closed_wall(block, motion, -mode.sense, True) else 0
-    )
-    for attempt in range(5):  # where none fits, but for rounding, it rests on all that it touches
-        walls = 3 - attempt if attempt < 4 else touched
-        if walls & touched != walls or (attempt < 4 and walls & lets_go):
-            continue
-        mode.tip, mode.far = walls & 1, walls >> 1
-        if walls == 3:  # wedged
-            mode.pivot, mode.pull = Pivot.STICK, 1
-            _wedged_series(block, base, run, zeta, _LOOK, 0.0)
-            mode.pull = 1 if a[Row.P, 0] >= 0.0 else -1
-            aimed = True
-        else:
-            mode.pivot = Pivot.SLIPPING
-            aimed = _aim(block, base, run, zeta, ended)
-        if attempt == 4:
-            state.rules[Rule.LEAST_CONTRADICTION] += 1
-            if ended != 0:
-                mode.pull = -ended  # in turn, until the slack allows one
-        if attempt == 4 or (aimed and _walls_hold(block, run, touched)):
-            if walls == 3:
-                stop(motion)
-            return
+    touched, fits = touched_walls(block, motion, mode.sense, False), False
+    for walls in range(3, -1, -1):
+        if walls & touched == walls and not walls & lets_go:
+            fits = _fits_walls(block, base, run, zeta, (walls, touched), ended)
+        if fits:
+            break
+    if not fits:  # but for rounding it rests on all that it touches
+        _try_walls(block, base, run, zeta, touched, ended)
+        state.rules[Rule.LEAST_CONTRADICTION] += 1
+        if ended != 0:
+            mode.pull = -ended  # in turn, until the slack allows one
+    if mode.tip != 0 and mode.far != 0:
+        stop(motion)
 
 
 @inner_kernel
-def _walls_hold(block, run, touched):
-    """Whether the mode's walls push, and the block leaves all other walls that it touches."""
-    mode, slack, a = run.state.mode, run.state.slack, run.a
-    for which in range(2):
-        if (mode.tip if which == 0 else mode.far) != 0:
-            push = Row.NA if which == 0 else Row.NB
-            if leading(a, push, _LOOK - 2, slack * NOISE[Kind.FORCE], AHEAD) < 0:
-                return False
-        elif touched >> which & 1:
-            fill_guards(block, run)
-            guard(Guard.TIP_GAP if which == 0 else Guard.FAR_GAP, _LOOK, a)
-            a[Row.GUARD, 0] = a[Row.GUARD, 1] = 0.0  # it is closed: its acceleration decides
-            if leading(a, Row.GUARD, _LOOK, slack * NOISE[Kind.POSITION], AHEAD) < 0:
-                return False
+def _try_walls(block, base, run, zeta, walls, ended):
+    """Writes the mode with these walls; False where no sign of P fits."""
+    mode, a = run.state.mode, run.a
+    mode.tip, mode.far = walls & 1, walls >> 1
+    if walls != 3:
+        mode.pivot = Pivot.SLIPPING
+        return _aim(block, base, run, zeta, ended)
+    mode.pivot, mode.pull = Pivot.STICK, 1
+    _wedged_series(block, base, run, zeta, _LOOK, 0.0)
+    mode.pull = 1 if a[Row.P, 0] >= 0.0 else -1
     return True
+
+
+@inner_kernel
+def _fits_walls(block, base, run, zeta, walls, ended):
+    """Whether the mode with these walls, of those that are touched, fits. It is left in the
+    state."""
+    leans, touched = walls
+    if not _try_walls(block, base, run, zeta, leans, ended):
+        return False
+    return _wall_holds(block, run, True, touched) and _wall_holds(block, run, False, touched)
+
+
+@called_kernel
+def _wall_holds(block, run, tip, touched):
+    """Whether a wall of the mode pushes, or the block leaves it where it only touches it."""
+    mode, slack, a = run.state.mode, run.state.slack, run.a
+    if (mode.tip if tip else mode.far) != 0:
+        push = Row.NA if tip else Row.NB
+        return leading(a, push, _LOOK - 2, slack * NOISE[Kind.FORCE], AHEAD) >= 0
+    if touched & (1 if tip else 2) == 0:
+        return True
+    fill_guards(block, run.state, run.a)
+    guard(Guard.TIP_GAP if tip else Guard.FAR_GAP, _LOOK, a)
+    a[Row.GUARD, 0] = a[Row.GUARD, 1] = 0.0  # it is closed: its acceleration decides
+    return leading(a, Row.GUARD, _LOOK, slack * NOISE[Kind.POSITION], AHEAD) >= 0
 
 
 @inner_kernel
@@ -417,7 +433,7 @@ def _has_sign(a, sign, ended):
     return sign * leading(a, Row.P, _LOOK - 2, NOISE[Kind.FORCE], AHEAD) >= 0
 
 
-@inner_kernel
+@called_kernel
 def _initial_friction(block, base, run):
     """z at the start: sgn V for a pivot that slips, else the value that lets it stand still (at
     most 1 in size)."""
@@ -469,7 +485,7 @@ def locate(block, run):
     """The first event of the step, as with Coulomb's friction; one more is that z comes to the sign
     of V, from where the pivot loads."""
     state, mode, a = run.state, run.state.mode, run.a
-    fill_guards(block, run)
+    fill_guards(block, run.state, run.a)
     # The friction of a wedged block, which does not slip, is what z makes it: it has no cone to
     # leave.
     if mode.family == Family.TILT:
@@ -503,7 +519,7 @@ def advance(run):
     state.zeta = zeta
 
 
-@inner_kernel
+@called_kernel
 def after_event(block, base, run):
     """The contacts that follow an event, or the start; notes the event."""
     state = run.state
@@ -525,7 +541,7 @@ def after_event(block, base, run):
     tell(run, state.event)
 
 
-@inner_kernel
+@called_kernel
 def _follow(block, base, run):
     """What follows an event that is no impact: the Event that is told, or none."""
     state, mode, which = run.state, run.state.mode, run.state.guard

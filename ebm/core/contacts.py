@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.core.motion import side_of
+from rockcheck.ebm.core.block import side_of
 from rockcheck.scenes.compiled import inner_kernel
 
 #: The zero of position (R) and of velocity (sqrt(g R)): a contact nearer and slower than this is

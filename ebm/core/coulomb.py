@@ -51,7 +51,9 @@ def expand(block, base, run, reach):
         if not free:
             last = max(last, size_of(a, Row.XI, Row.Y, order))
             before = max(before, size_of(a, Row.XI, Row.Y, order - 1))
-        if not free or base.vertical.kind != Shape.STILL:  # forces follow the base acceleration
+        if (
+            not free or base.vertical.form.kind != Shape.STILL
+        ):  # forces follow the base acceleration
             last = max(last, size_of(a, Row.U, Row.G, order))
             before = max(before, size_of(a, Row.U, Row.G, order - 1))
         state.length = longest_step(last, before, order, state.last_term_rad, reach)
@@ -67,7 +69,7 @@ def locate(block, run):
         none = tau == NO_ROOT
         state.tau, state.guard = h if none else tau, (Guard.NONE if none else Guard.PHI)
         return
-    fill_guards(block, run)
+    fill_guards(block, run.state, run.a)
     first_event(run)
 
 

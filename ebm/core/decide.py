@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from rockcheck.ebm.core.block import side_of
 from rockcheck.ebm.core.ground import acceleration, impulse_ahead, largest_ahead
-from rockcheck.ebm.core.motion import side_of
 from rockcheck.ebm.core.names import Family, Kind, Pivot, Shape
 from rockcheck.ebm.core.series import NOISE
 from rockcheck.ebm.core.state import on_wall, rocks
@@ -24,14 +24,14 @@ _TINIEST = math.ulp(0.0)
 @inner_kernel
 def quiet_from(base, tolerance):
     """The time from which the base stands still as far as an outcome can tell."""
-    if base.vertical.kind == Shape.STILL and base.horizontal.kind == Shape.GAUSSIAN:
-        return base.horizontal.centre + math.sqrt(
-            -math.log(_LEFT * tolerance) / base.horizontal.rate
+    if base.vertical.form.kind == Shape.STILL and base.horizontal.form.kind == Shape.GAUSSIAN:
+        return base.horizontal.form.centre + math.sqrt(
+            -math.log(_LEFT * tolerance) / base.horizontal.form.rate
         )
     return (
         0.0
-        if base.vertical.kind == Shape.STILL and base.horizontal.kind == Shape.STILL
-        else max(base.horizontal.quiet, base.vertical.quiet)
+        if base.vertical.form.kind == Shape.STILL and base.horizontal.form.kind == Shape.STILL
+        else max(base.horizontal.form.quiet, base.vertical.form.quiet)
     )
 
 
@@ -40,13 +40,14 @@ def decided(block, base, state):
     """The final peak rotation (>= pi/2: overturns) if the rest of the motion is certain, else
     -1."""
     t, quiet, peak, theta = state.t, state.quiet_from, state.peak, state.motion.theta
-    still = base.vertical.kind == Shape.STILL
+    still = base.vertical.form.kind == Shape.STILL
     ahead = 0.0
     if t < quiet:
         # Which is not certain, however little is to come.
-        at_its_peak = t <= base.horizontal.quiet and abs(theta) >= peak
+        at_its_peak = t <= base.horizontal.form.quiet and abs(theta) >= peak
         ahead = math.inf if at_its_peak or not still else impulse_ahead(base.horizontal, t)
-    verdict = _by_energy(block, state, ahead)
+    turning = ahead > 0.0 and abs(theta) >= peak
+    verdict = -1.0 if turning else _by_energy(block, state, ahead)
     if verdict <= 0.0 and still and abs(theta) > side_of(block, theta).alpha:
         verdict = _falls(block, base, state)
     return verdict
@@ -63,32 +64,29 @@ def _by_energy(block, state, ahead):
     excitation a block that only rocks conserves its energy up to its next impact, so that its peak
     is known at once, unless with as much it would turn farther on its other corner.
     """
-    mode, motion, peak = state.mode, state.motion, state.peak
+    mode, motion = state.mode, state.motion
     phi = abs(motion.theta)
-    if ahead > 0.0 and phi >= peak:
-        return -1.0
     energy = energy_of(block, motion)
     side, other = side_of(block, mode.sense), side_of(block, -mode.sense)
     corner = min(side.radius, other.radius) - block.height
     most = 0.5 * (math.sqrt(2.0 * max(energy, 0.0)) + ahead) ** 2
-    margin = _MARGIN if block.walls else 1.0
-    free = rocks(mode) and not block.walls and ahead == 0.0
-    free = free and (block.no_slip or _sticks_for_good(block, energy))
+    free = ahead == 0.0 and _rocks_for_good(block, mode, energy)
     if most < corner and phi < side.alpha:
-        highest = _highest(block, side, most)
-        beyond = _highest(block, other, most)
-        if free and beyond <= max(peak, highest):
-            return max(peak, highest if mode.sense * motion.w > 0.0 else phi)
-        return (
-            max(peak, _TINIEST) if max(highest, beyond) <= peak and most < margin * corner else -1.0
-        )
-    if (
-        free
-        and mode.sense * motion.w >= 0.0
-        and (phi > side.alpha or energy > side.radius - block.height)
-    ):
-        return 0.5 * math.pi
-    return -1.0
+        return _safe(block, state, most, corner, free)
+    falls = phi > side.alpha or energy > side.radius - block.height
+    return 0.5 * math.pi if free and falls and mode.sense * motion.w >= 0.0 else -1.0
+
+
+@inner_kernel
+def _safe(block, state, most, corner, free):
+    """The peak of a block that never has the energy of standing on its lower `corner`, else -1."""
+    mode, motion, peak = state.mode, state.motion, state.peak
+    highest = _highest(block, side_of(block, mode.sense), most)
+    beyond = _highest(block, side_of(block, -mode.sense), most)
+    if free and beyond <= max(peak, highest):
+        return max(peak, highest if mode.sense * motion.w > 0.0 else abs(motion.theta))
+    least = (_MARGIN if block.walls else 1.0) * corner
+    return max(peak, _TINIEST) if max(highest, beyond) <= peak and most < least else -1.0
 
 
 @inner_kernel
@@ -157,10 +155,14 @@ def _falls(block, base, state):
 
 
 @inner_kernel
-def _sticks_for_good(block, energy):
-    """Whether neither pivot can slip in free rocking of this energy (up to its balance point),
-    impacts included."""
-    return _pivot_sticks(block, block.left, energy) and _pivot_sticks(block, block.right, energy)
+def _rocks_for_good(block, mode, energy):
+    """Whether the block rocks and neither pivot can slip in free rocking of this energy (up to its
+    balance point), impacts included."""
+    if block.walls or not rocks(mode):
+        return False
+    return block.no_slip or (
+        _pivot_sticks(block, block.left, energy) and _pivot_sticks(block, block.right, energy)
+    )
 
 
 @inner_kernel

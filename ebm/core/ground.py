@@ -12,30 +12,37 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.ebm.core.block import filled, record
 from rockcheck.ebm.core.names import Shape
-from rockcheck.scenes.compiled import inner_kernel
+from rockcheck.scenes.compiled import called_kernel, inner_kernel
 from rockcheck.scenes.excitations import Record, Rest, Ricker, Sine
 
 NEVER = np.inf
 
 
+#: One component of the base motion but for its samples. GAUSSIAN is (c0 + c1 tau + c2 tau^2 + c3
+#: tau^3) exp(-rate tau^2), tau from `centre`; SINE is c0 sin(rate t) up to `quiet`; SAMPLED is
+#: linear between samples, every `step`, of which it has `count` from `first` on. After `quiet`
+#: there is no motion.
+FORM = record(
+    kind="i8",
+    c0="f8",
+    c1="f8",
+    c2="f8",
+    c3="f8",
+    rate="f8",
+    centre="f8",
+    quiet="f8",
+    step="f8",
+    first="i8",
+    count="i8",
+)
+
+
 class Ground(NamedTuple):
-    """One component of the base motion.
+    """One component of the base motion: its FORM, and its samples."""
 
-    GAUSSIAN is (c0 + c1 tau + c2 tau^2 + c3 tau^3) exp(-rate tau^2), tau from `centre`; SINE is c0
-    sin(rate t) up to `quiet`; SAMPLED is linear between `samples`, every `step`. After `quiet`
-    there is no motion.
-    """
-
-    kind: int
-    c0: float
-    c1: float
-    c2: float
-    c3: float
-    rate: float
-    centre: float
-    quiet: float
-    step: float
+    form: np.record
     samples: NDArray[np.float64]
 
 
@@ -47,7 +54,6 @@ _SAME, _EPSILON = 2.0**-30, 2.0**-52
 _SOME = 30
 #: The sign with which an acceleration leaves zero is read so much later.
 _SOON = 1e-6
-STILL_GROUND = Ground(int(Shape.STILL), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _NO_SAMPLES)
 _RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, 40)])
 
 
@@ -55,58 +61,32 @@ def ground_of(
     excitation: Rest | Ricker | Sine | Record, gravity: float, time_unit: float
 ) -> Ground:
     """The compiled form of an excitation, in units of `gravity` (m/s^2) and `time_unit` (s)."""
-    quiet = excitation.quiet_after / time_unit
+    samples, given = _NO_SAMPLES, {"kind": Shape.STILL, "quiet": 0.0}
     if isinstance(excitation, Ricker):
-        c0, c1, c2, c3 = (c * time_unit**k / gravity for k, c in enumerate(excitation.polynomial))
-        return Ground(
-            int(Shape.GAUSSIAN),
-            c0,
-            c1,
-            c2,
-            c3,
-            excitation.rate * time_unit**2,
-            excitation.centre / time_unit,
-            quiet,
-            0.0,
-            _NO_SAMPLES,
-        )
-    if isinstance(excitation, Sine):
-        rate = 2.0 * math.pi * time_unit / excitation.period
-        return Ground(
-            int(Shape.SINE),
-            excitation.amplitude / gravity,
-            0.0,
-            0.0,
-            0.0,
-            rate,
-            0.0,
-            quiet,
-            0.0,
-            _NO_SAMPLES,
-        )
-    if isinstance(excitation, Record):
+        given = {
+            f"c{k}": c * time_unit**k / gravity for k, c in enumerate(excitation.polynomial)
+        } | {
+            "kind": Shape.GAUSSIAN,
+            "rate": excitation.rate * time_unit**2,
+            "centre": excitation.centre / time_unit,
+        }
+    elif isinstance(excitation, Sine):
+        given = {
+            "kind": Shape.SINE,
+            "c0": excitation.amplitude / gravity,
+            "rate": 2.0 * math.pi * time_unit / excitation.period,
+        }
+    elif isinstance(excitation, Record) and excitation.samples.any():
         samples = np.ascontiguousarray(excitation.samples / gravity)
-        if not samples.any():
-            return STILL_GROUND
-        return Ground(
-            int(Shape.SAMPLED),
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            quiet,
-            excitation.time_step / time_unit,
-            samples,
-        )
-    return STILL_GROUND
+        given = {"kind": Shape.SAMPLED, "step": excitation.time_step / time_unit}
+    quiet = {"quiet": excitation.quiet_after / time_unit}
+    return Ground(filled(FORM, **quiet | given, count=len(samples)), samples)
 
 
 @inner_kernel
 def interval(g, t):
     """Index of the sample interval that holds t; its right end belongs to the next one."""
-    return int(math.floor(t / g.step + _SAME))
+    return int(math.floor(t / g.form.step + _SAME))
 
 
 @inner_kernel
@@ -118,64 +98,73 @@ def acceleration(g, t):
 @inner_kernel
 def _with_rate(g, t):
     """Acceleration at time t, and its rate; where they jump those just after."""
-    if g.kind == Shape.GAUSSIAN:
-        tau = t - g.centre
-        bell, fall = math.exp(-g.rate * tau * tau), -2.0 * g.rate * tau
-        shape = g.c0 + tau * (g.c1 + tau * (g.c2 + tau * g.c3))
-        return shape * bell, (g.c1 + tau * (2.0 * g.c2 + tau * 3.0 * g.c3) + shape * fall) * bell
-    if g.kind == Shape.SINE and t < g.quiet:
-        return g.c0 * math.sin(g.rate * t), g.c0 * g.rate * math.cos(g.rate * t)
-    if g.kind == Shape.SAMPLED:
+    if g.form.kind == Shape.GAUSSIAN:
+        tau = t - g.form.centre
+        bell, fall = math.exp(-g.form.rate * tau * tau), -2.0 * g.form.rate * tau
+        shape = g.form.c0 + tau * (g.form.c1 + tau * (g.form.c2 + tau * g.form.c3))
+        return shape * bell, (
+            g.form.c1 + tau * (2.0 * g.form.c2 + tau * 3.0 * g.form.c3) + shape * fall
+        ) * bell
+    if g.form.kind == Shape.SINE and t < g.form.quiet:
+        return g.form.c0 * math.sin(g.form.rate * t), g.form.c0 * g.form.rate * math.cos(
+            g.form.rate * t
+        )
+    if g.form.kind == Shape.SAMPLED:
         i = interval(g, t)
         if i + 1 < g.samples.size:
             rise = g.samples[i + 1] - g.samples[i]
-            return g.samples[i] + (t / g.step - i) * rise, rise / g.step
+            return g.samples[i] + (t / g.form.step - i) * rise, rise / g.form.step
     return 0.0, 0.0
 
 
 @inner_kernel
+def _fill_gaussian(g, t, sign, n, a, row):
+    tau = t - g.form.centre
+    size = sign * math.exp(-g.form.rate * tau * tau)
+    q0 = size * (g.form.c0 + tau * (g.form.c1 + tau * (g.form.c2 + tau * g.form.c3)))
+    q1 = size * (g.form.c1 + tau * (2.0 * g.form.c2 + 3.0 * tau * g.form.c3))
+    q2 = size * (g.form.c2 + 3.0 * tau * g.form.c3)
+    q3 = size * g.form.c3
+    bell, e1, e2, e3 = (
+        1.0,
+        0.0,
+        0.0,
+        0.0,
+    )  # coefficients k to k-3 of the bell by its value, which obeys bell' = -2 rate tau bell
+    spread = -2.0 * g.form.rate
+    fall = spread * tau
+    for k in range(n + 1):
+        a[row, k] = q0 * bell + q1 * e1 + q2 * e2 + q3 * e3
+        r = _RECIPROCAL[k + 1]
+        bell, e1, e2, e3 = (
+            (fall * r) * bell + (spread * r) * e1,
+            bell,
+            e1,
+            e2,
+        )  # two operations from one coefficient to the next
+
+
+@called_kernel
 def fill_series(g, t, sign, n, a, row):
     """Taylor coefficients 0..n of sign * acceleration about t, to the right of t, into a[row]."""
-    if g.kind == Shape.GAUSSIAN:
-        tau = t - g.centre
-        size = sign * math.exp(-g.rate * tau * tau)
-        q0 = size * (g.c0 + tau * (g.c1 + tau * (g.c2 + tau * g.c3)))
-        q1 = size * (g.c1 + tau * (2.0 * g.c2 + 3.0 * tau * g.c3))
-        q2 = size * (g.c2 + 3.0 * tau * g.c3)
-        q3 = size * g.c3
-        bell, e1, e2, e3 = (
-            1.0,
-            0.0,
-            0.0,
-            0.0,
-        )  # coefficients k to k-3 of the bell by its value, which obeys bell' = -2 rate tau bell
-        spread = -2.0 * g.rate
-        fall = spread * tau
-        for k in range(n + 1):
-            a[row, k] = q0 * bell + q1 * e1 + q2 * e2 + q3 * e3
-            r = _RECIPROCAL[k + 1]
-            bell, e1, e2, e3 = (
-                (fall * r) * bell + (spread * r) * e1,
-                bell,
-                e1,
-                e2,
-            )  # two operations from one coefficient to the next
+    if g.form.kind == Shape.GAUSSIAN:
+        _fill_gaussian(g, t, sign, n, a, row)
         return
     for k in range(n + 1):
         a[row, k] = 0.0
-    if g.kind == Shape.SINE and t < g.quiet:
-        a[row, 0] = sign * g.c0 * math.sin(g.rate * t)
+    if g.form.kind == Shape.SINE and t < g.form.quiet:
+        a[row, 0] = sign * g.form.c0 * math.sin(g.form.rate * t)
         if n > 0:
-            a[row, 1] = sign * g.c0 * g.rate * math.cos(g.rate * t)
+            a[row, 1] = sign * g.form.c0 * g.form.rate * math.cos(g.form.rate * t)
         for k in range(2, n + 1):
-            a[row, k] = -g.rate * g.rate * a[row, k - 2] / (k * (k - 1))
-    elif g.kind == Shape.SAMPLED:
+            a[row, k] = -g.form.rate * g.form.rate * a[row, k - 2] / (k * (k - 1))
+    elif g.form.kind == Shape.SAMPLED:
         i = interval(g, t)
         if i + 1 < g.samples.size:
             rise = g.samples[i + 1] - g.samples[i]
-            a[row, 0] = sign * (g.samples[i] + (t / g.step - i) * rise)
+            a[row, 0] = sign * (g.samples[i] + (t / g.form.step - i) * rise)
             if n > 0:
-                a[row, 1] = sign * rise / g.step
+                a[row, 1] = sign * rise / g.form.step
 
 
 @inner_kernel
@@ -186,20 +175,20 @@ def next_kink(g, t):
     In the rise of a pulse exp(-rate tau^2) the terms of a series still grow where it is cut off,
     unless it is a short one.
     """
-    if g.kind == Shape.GAUSSIAN:
-        tau = t - g.centre
-        if tau >= 0.0 or g.rate * tau * tau < 4.0:
+    if g.form.kind == Shape.GAUSSIAN:
+        tau = t - g.form.centre
+        if tau >= 0.0 or g.form.rate * tau * tau < 4.0:
             return NEVER
         return (
-            g.centre - 6.0 / math.sqrt(g.rate)
-            if g.rate * tau * tau > 36.0001
-            else t - 4.0 / (g.rate * tau)
+            g.form.centre - 6.0 / math.sqrt(g.form.rate)
+            if g.form.rate * tau * tau > 36.0001
+            else t - 4.0 / (g.form.rate * tau)
         )
-    if g.kind == Shape.SAMPLED:
+    if g.form.kind == Shape.SAMPLED:
         i = interval(g, t)
-        return (i + 1) * g.step if i + 1 < g.samples.size else NEVER
-    if g.kind == Shape.SINE:
-        return g.quiet if t < g.quiet else NEVER
+        return (i + 1) * g.form.step if i + 1 < g.samples.size else NEVER
+    if g.form.kind == Shape.SINE:
+        return g.form.quiet if t < g.form.quiet else NEVER
     return NEVER
 
 
@@ -224,51 +213,65 @@ def weightless_at(g, t):
 
 
 @inner_kernel
-def _next_extremum(g, t):
-    """The next time after t up to which the motion is monotone; NEVER where it is monotone (and
-    dying out) for good."""
-    if g.kind == Shape.SAMPLED:
-        return next_kink(g, t)
-    if g.kind == Shape.SINE:
-        quarter = 0.5 * math.pi / g.rate
-        k = math.floor((t / quarter + 1.0) / 2.0 + _SAME)
-        return min((2.0 * k + 1.0) * quarter, g.quiet) if t < g.quiet else NEVER
-    if g.kind == Shape.STILL:
-        return NEVER
+def _root_of_square(a, b, c, branch):
+    """One root of a q^2 + b q + c; -1 where it is none."""
+    if a == 0.0:
+        return -c / b if b != 0.0 else -1.0
+    return (-b + branch * math.sqrt(max(b * b - 4.0 * a * c, 0.0))) / (2.0 * a)
+
+
+@inner_kernel
+def _next_extremum_of_pulse(f, t):
     # Extrema within _SAME pulse widths of t count as passed, or rounding would find the same one
     # for ever.
-    past = t - g.centre + _SAME / math.sqrt(g.rate)
+    past = t - f.centre + _SAME / math.sqrt(f.rate)
     best = NEVER
     if (
-        g.c1 == 0.0 and g.c3 == 0.0
+        f.c1 == 0.0 and f.c3 == 0.0
     ):  # (c0 + c2 tau^2) bell: at 0 and where c2 = rate (c0 + c2 tau^2)
-        a, b, c = 0.0, -g.rate * g.c2, g.c2 - g.rate * g.c0
+        a, b, c = 0.0, -f.rate * f.c2, f.c2 - f.rate * f.c0
         if past < 0.0:
             best = 0.0
     else:  # (c1 tau + c3 tau^3) bell: c1 + (3 c3 - 2 rate c1) q - 2 rate c3 q^2 = 0 with q = tau^2
-        a, b, c = -2.0 * g.rate * g.c3, 3.0 * g.c3 - 2.0 * g.rate * g.c1, g.c1
+        a, b, c = (
+            -2.0 * f.rate * f.c3,
+            3.0 * f.c3 - 2.0 * f.rate * f.c1,
+            f.c1,
+        )
     for branch in (-1.0, 1.0):
-        if a == 0.0:
-            square = -c / b if b != 0.0 else -1.0
-        else:
-            square = (-b + branch * math.sqrt(max(b * b - 4.0 * a * c, 0.0))) / (2.0 * a)
-        if square > 0.0:
-            for root in (-math.sqrt(square), math.sqrt(square)):
-                if root > past:
-                    best = min(best, root)
-    return best + g.centre if best < NEVER else NEVER
+        square = _root_of_square(a, b, c, branch)
+        place = math.sqrt(max(square, 0.0))
+        for root in (-place, place):
+            if square > 0.0 and root > past:
+                best = min(best, root)
+    return best + f.centre if best < NEVER else NEVER
+
+
+@inner_kernel
+def _next_extremum(g, t):
+    """The next time after t up to which the motion is monotone; NEVER where it is monotone (and
+    dying out) for good."""
+    if g.form.kind == Shape.SAMPLED:
+        return next_kink(g, t)
+    if g.form.kind == Shape.SINE:
+        quarter = 0.5 * math.pi / g.form.rate
+        k = math.floor((t / quarter + 1.0) / 2.0 + _SAME)
+        return min((2.0 * k + 1.0) * quarter, g.form.quiet) if t < g.form.quiet else NEVER
+    if g.form.kind == Shape.STILL:
+        return NEVER
+    return _next_extremum_of_pulse(g.form, t)
 
 
 @inner_kernel
 def largest_ahead(g, t):
     """A bound on |acceleration| from time t on: its value now and at the extrema to come; a
     record's largest sample."""
-    if t > g.quiet or g.kind == Shape.STILL:
+    if t > g.form.quiet or g.form.kind == Shape.STILL:
         return 0.0
-    if g.kind == Shape.SINE:
-        return abs(g.c0)
+    if g.form.kind == Shape.SINE:
+        return abs(g.form.c0)
     largest = 0.0
-    if g.kind == Shape.SAMPLED:
+    if g.form.kind == Shape.SAMPLED:
         for i in range(max(interval(g, t), 0), g.samples.size):
             largest = max(largest, abs(g.samples[i]))
         return largest
@@ -282,18 +285,18 @@ def largest_ahead(g, t):
 def impulse_ahead(g, t):
     """A bound on the integral of |acceleration| from time t on: exact in a pulse's last lobe,
     infinite before it."""
-    if t > g.quiet or g.kind == Shape.STILL:
+    if t > g.form.quiet or g.form.kind == Shape.STILL:
         return 0.0
-    tau = t - g.centre
+    tau = t - g.form.centre
     if (
-        g.kind != Shape.GAUSSIAN or tau < 0.0 or g.rate * tau * tau < 1.5
+        g.form.kind != Shape.GAUSSIAN or tau < 0.0 or g.form.rate * tau * tau < 1.5
     ):  # the last zero, which a symmetric pulse has before it
         return NEVER
-    v2 = -g.c3 / (
-        2.0 * g.rate
+    v2 = -g.form.c3 / (
+        2.0 * g.form.rate
     )  # the velocity of the base is (v0 + v1 tau + v2 tau^2) exp(-rate tau^2)
-    v0 = (2.0 * v2 - g.c1) / (2.0 * g.rate)
-    return abs(v0 + tau * (g.c0 + tau * v2)) * math.exp(-g.rate * tau * tau)
+    v0 = (2.0 * v2 - g.form.c1) / (2.0 * g.form.rate)
+    return abs(v0 + tau * (g.form.c0 + tau * v2)) * math.exp(-g.form.rate * tau * tau)
 
 
 @inner_kernel
@@ -326,6 +329,27 @@ def _passage(g, a, b, fa, fb, level):
 
 
 @inner_kernel
+def _leaves(g, times, values, level, beyond, ahead):
+    """The time between two `times` at which the acceleration passes the level, but at most `ahead`
+    before it is `beyond`; it is monotone in between, with these values at the ends."""
+    (t, end), (here, there) = times, values
+    passed = t
+    if (here - level) * (there - level) <= 0.0:
+        passed = _passage(g, t, end, here - level, there - level, level)
+    soon = passed + ahead
+    if soon < end and (acceleration(g, soon) - beyond) * (there - beyond) > 0.0:
+        return passed  # it passes the limit by the noise sooner than `ahead`
+    left = _passage(g, passed, end, acceleration(g, passed) - beyond, there - beyond, beyond)
+    return max(passed, left - ahead)
+
+
+@inner_kernel
+def _just_before(g, t):
+    """Acceleration at time t; where a record ends that just before."""
+    return g.samples[interval(g, t)] if g.form.kind == Shape.SAMPLED else acceleration(g, t)
+
+
+@inner_kernel
 def next_exceedance(g, t, low, high, noise, ahead):
     """The time from t on at which the acceleration passes below `low` or above `high`, on that
     side, to be beyond by `noise`; else NEVER.
@@ -340,25 +364,10 @@ def next_exceedance(g, t, low, high, noise, ahead):
         end = _next_extremum(g, t)
         if end == NEVER:
             return NEVER
-        there = (
-            g.samples[interval(g, end)] if g.kind == Shape.SAMPLED else acceleration(g, end)
-        )  # just before it, where a record ends
+        there = _just_before(g, end)
         if there < low - noise or there > high + noise:
             level, beyond = (low, low - noise) if there < low else (high, high + noise)
-            passed = (
-                t
-                if (here - level) * (there - level) > 0.0
-                else _passage(g, t, end, here - level, there - level, level)
-            )
-            if (
-                passed + ahead < end
-                and (acceleration(g, passed + ahead) - beyond) * (there - beyond) > 0.0
-            ):
-                return passed  # it passes the limit by the noise sooner than `ahead`
-            left = _passage(
-                g, passed, end, acceleration(g, passed) - beyond, there - beyond, beyond
-            )
-            return max(passed, left - ahead)
+            return _leaves(g, (t, end), (here, there), level, beyond, ahead)
         if end <= t:
             return NEVER
         t, here = end, acceleration(g, end)

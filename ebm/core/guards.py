@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 
+from rockcheck.ebm.core.block import LEAST_FRICTION, side_of, wall_turn
 from rockcheck.ebm.core.contacts import CLOSED, SLOW, closed_gap
 from rockcheck.ebm.core.lanes import (
     LANES,
@@ -26,7 +27,7 @@ from rockcheck.ebm.core.lanes import (
     upto,
     zeros,
 )
-from rockcheck.ebm.core.motion import LEAST_FRICTION, delta, side_of, wall_turn
+from rockcheck.ebm.core.motion import delta
 from rockcheck.ebm.core.names import GUARDS, Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.series import (
     AHEAD,
@@ -42,7 +43,7 @@ from rockcheck.ebm.core.series import (
     value,
 )
 from rockcheck.ebm.core.state import on_wall, rocks
-from rockcheck.scenes.compiled import inner_kernel
+from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 # What a guard is; a rate is the rate of its combination.
 KIND = np.array(
@@ -72,13 +73,13 @@ _ANY = 2.0**400
 
 
 @inner_kernel
-def _has(a, which, shorter):
-    """Enters a guard into the table: so many terms shorter than the series, its weights and its
-    constant still zero."""
+def _enter(a, which, shorter, series, weight):
+    """Enters a guard into the table: so many terms shorter than the series, with the weight of one
+    of them; its other weights and its constant are zero."""
     row = Row.TABLE + which
     for k in range(_MOST):
         a[row, _COMBINES[which, k]] = 0.0
-    a[row, _CONSTANT], a[row, _SHORTER] = 0.0, shorter
+    a[row, series], a[row, _CONSTANT], a[row, _SHORTER] = weight, 0.0, shorter
 
 
 @inner_kernel
@@ -87,65 +88,56 @@ def drop(a, which):
     a[Row.TABLE + which, _SHORTER] = -1.0
 
 
-@inner_kernel
-def fill_guards(block, run):
+@called_kernel
+def fill_guards(block, state, a):
     """Writes the guards of the mode into the table."""
-    mode, a = run.state.mode, run.a
+    mode = state.mode
     for which in range(GUARDS):
         drop(a, which)
     if mode.family == Family.FLAT:
         _fill_flat(block, mode, a)
         return
-    _has(a, Guard.PHI, 0)
-    a[Row.TABLE + Guard.PHI, Row.PHI] = 1.0
-    if (
-        a[Row.PHI, 0] >= 0.5 or mode.pivot == Pivot.OFF
-    ):  # else no step on the floor is long enough to turn the block over
-        _has(a, Guard.TOPPLE, 0)
-        a[Row.TABLE + Guard.TOPPLE, Row.PHI], a[Row.TABLE + Guard.TOPPLE, _CONSTANT] = (
-            -1.0,
-            0.5 * math.pi,
-        )
+    _enter(a, Guard.PHI, 0, Row.PHI, 1.0)
+    # Else no step on the floor is long enough to turn the block over.
+    if a[Row.PHI, 0] >= 0.5 or mode.pivot == Pivot.OFF:
+        _enter(a, Guard.TOPPLE, 0, Row.PHI, -1.0)
+        a[Row.TABLE + Guard.TOPPLE, _CONSTANT] = 0.5 * math.pi
     if mode.pivot == Pivot.OFF:
-        _has(a, Guard.LANDING, 0)
-        a[Row.TABLE + Guard.LANDING, Row.Y], a[Row.TABLE + Guard.LANDING, Row.COS] = 1.0, -1.0
+        _enter(a, Guard.LANDING, 0, Row.Y, 1.0)
+        a[Row.TABLE + Guard.LANDING, Row.COS] = -1.0
     else:
         _fill_friction(block, mode, block.mu_s * mode.pull, a)
-    if mode.pivot == Pivot.SLIPPING:
-        _has(a, Guard.SLIP, 1)
-        along_wall = on_wall(mode)
+    if mode.pivot == Pivot.SLIPPING and on_wall(mode):
         # Along a wall V = (c + C) dtheta/dt, and C = -c at theta = 0: the rotation tells the sense
         # of slip everywhere.
-        a[Row.TABLE + Guard.SLIP, Row.PHI if along_wall else Row.XI] = mode.slip
-        a[Row.TABLE + Guard.SLIP, Row.SIN] = 0.0 if along_wall else -mode.slip
+        _enter(a, Guard.SLIP, 1, Row.PHI, float(mode.slip))
+    elif mode.pivot == Pivot.SLIPPING:
+        _enter(a, Guard.SLIP, 1, Row.XI, float(mode.slip))
+        a[Row.TABLE + Guard.SLIP, Row.SIN] = -mode.slip
     if block.walls:
-        _fill_gap(block, run, True)
-        _fill_gap(block, run, False)
+        _fill_gap(block, state, a, True)
+        _fill_gap(block, state, a, False)
         if mode.tip != 0:
-            _has(a, Guard.TIP_PUSH, 2)
-            a[Row.TABLE + Guard.TIP_PUSH, Row.NA] = 1.0
+            _enter(a, Guard.TIP_PUSH, 2, Row.NA, 1.0)
         if mode.far != 0:
-            _has(a, Guard.FAR_PUSH, 2)
-            a[Row.TABLE + Guard.FAR_PUSH, Row.NB] = 1.0
+            _enter(a, Guard.FAR_PUSH, 2, Row.NB, 1.0)
 
 
 @inner_kernel
 def _fill_friction(block, mode, mu, a):
     """The floor's push, and the two sides of the friction cone |Q| <= mu P."""
     if block.unilateral or mode.pivot == Pivot.SLIPPING:
-        _has(a, Guard.FLOOR_PUSH, 2)
-        a[Row.TABLE + Guard.FLOOR_PUSH, Row.P] = mode.pull
+        _enter(a, Guard.FLOOR_PUSH, 2, Row.P, float(mode.pull))
     if mode.pivot == Pivot.STICK and not block.no_slip:
-        _has(a, Guard.CONE_PLUS, 2)
-        _has(a, Guard.CONE_MINUS, 2)
-        a[Row.TABLE + Guard.CONE_PLUS, Row.P] = a[Row.TABLE + Guard.CONE_MINUS, Row.P] = mu
+        _enter(a, Guard.CONE_PLUS, 2, Row.P, mu)
+        _enter(a, Guard.CONE_MINUS, 2, Row.P, mu)
         a[Row.TABLE + Guard.CONE_PLUS, Row.Q], a[Row.TABLE + Guard.CONE_MINUS, Row.Q] = -1.0, 1.0
 
 
 @inner_kernel
-def _fill_gap(block, run, tip):
+def _fill_gap(block, state, a, tip):
     """The clear gap of the corner that faces the tip wall, +-xi + delta - s', or the far wall."""
-    mode, pivot, a = run.state.mode, run.state.place, run.a
+    mode, pivot = state.mode, state.place
     which = Guard.TIP_GAP if tip else Guard.FAR_GAP
     distance = delta(block, mode, tip)
     if (mode.tip if tip else mode.far) != 0 or distance == np.inf:
@@ -156,10 +148,10 @@ def _fill_gap(block, run, tip):
         # About a fixed pivot the far gap shrinks with phi, down to this value as the block lands:
         # it cannot close before.
         return
-    _has(a, which, 0)
-    row, side = Row.TABLE + which, side_of(block, mode.sense)
-    along, across = wall_turn(side, tip)
-    a[row, Row.COS], a[row, Row.SIN], a[row, _CONSTANT] = -along, across, distance
+    row = Row.TABLE + which
+    along, across = wall_turn(side_of(block, mode.sense), tip)
+    _enter(a, which, 0, Row.COS, -along)
+    a[row, Row.SIN], a[row, _CONSTANT] = across, distance
     if rock:  # xi is s and a constant
         a[row, Row.SIN] += sense
         a[row, _CONSTANT] += sense * pivot
@@ -171,60 +163,59 @@ def _fill_gap(block, run, tip):
 def _fill_flat(block, mode, a):
     """The guards of a translating block; the tip wall is the left one, the far wall the right
     one."""
-    walls = on_wall(mode)
     hangs = mode.pivot != Pivot.OFF and mode.pull < 0  # a floor that pulls at what a wall holds
-    for wall in (Guard.TIP_GAP, Guard.FAR_GAP):
-        gap = block.gap_left if wall == Guard.TIP_GAP else block.gap_right
-        if gap < np.inf and (mode.tip if wall == Guard.TIP_GAP else mode.far) == 0:
-            _has(a, wall, 0)
-            a[Row.TABLE + wall, Row.XI] = 1.0 if wall == Guard.TIP_GAP else -1.0
-            a[Row.TABLE + wall, _CONSTANT] = gap
-    if mode.tip != mode.far and (
-        mode.pivot == Pivot.OFF or hangs
-    ):  # on the floor, Q is the base acceleration that the wall takes
-        _has(a, Guard.TIP_PUSH, 2)
-        a[Row.TABLE + Guard.TIP_PUSH, Row.NA if mode.pivot == Pivot.OFF else Row.Q] = (
-            1.0 if mode.pivot == Pivot.OFF else mode.tip - mode.far
-        )
+    if block.gap_left < np.inf and mode.tip == 0:
+        _enter(a, Guard.TIP_GAP, 0, Row.XI, 1.0)
+        a[Row.TABLE + Guard.TIP_GAP, _CONSTANT] = block.gap_left
+    if block.gap_right < np.inf and mode.far == 0:
+        _enter(a, Guard.FAR_GAP, 0, Row.XI, -1.0)
+        a[Row.TABLE + Guard.FAR_GAP, _CONSTANT] = block.gap_right
+    if mode.tip != mode.far and mode.pivot == Pivot.OFF:
+        _enter(a, Guard.TIP_PUSH, 2, Row.NA, 1.0)
+    elif mode.tip != mode.far and hangs:
+        # On the floor, Q is the base acceleration that the wall takes.
+        _enter(a, Guard.TIP_PUSH, 2, Row.Q, float(mode.tip - mode.far))
     if mode.pivot == Pivot.OFF:
-        _has(a, Guard.LANDING, 0)
-        a[Row.TABLE + Guard.LANDING, Row.Y], a[Row.TABLE + Guard.LANDING, _CONSTANT] = (
-            1.0,
-            -block.height,
-        )
-        return
-    if mode.pivot == Pivot.SLIPPING:
-        _has(a, Guard.SLIP, 1)
-        a[Row.TABLE + Guard.SLIP, Row.XI] = mode.slip
-    if (
-        block.mu_s == LEAST_FRICTION
-    ):  # a force below rounding, which is to stay what it is where P vanishes
-        _fill_friction(block, mode, 0.0, a)
-        a[Row.TABLE + Guard.CONE_PLUS, _CONSTANT] = a[Row.TABLE + Guard.CONE_MINUS, _CONSTANT] = (
-            block.mu_s
-        )
+        _enter(a, Guard.LANDING, 0, Row.Y, 1.0)
+        a[Row.TABLE + Guard.LANDING, _CONSTANT] = -block.height
     else:
-        _fill_friction(block, mode, block.mu_s, a)
+        _fill_flat_floor(block, mode, hangs, a)
+
+
+@inner_kernel
+def _fill_flat_floor(block, mode, hangs, a):
+    """The guards of a translating block that the floor holds."""
+    if mode.pivot == Pivot.SLIPPING:
+        _enter(a, Guard.SLIP, 1, Row.XI, float(mode.slip))
+    # A force below rounding is to stay what it is where P vanishes.
+    least = block.mu_s == LEAST_FRICTION
+    _fill_friction(block, mode, 0.0 if least else block.mu_s, a)
+    if least:
+        a[Row.TABLE + Guard.CONE_PLUS, _CONSTANT] = block.mu_s
+        a[Row.TABLE + Guard.CONE_MINUS, _CONSTANT] = block.mu_s
     drop(a, Guard.FLOOR_PUSH)
-    if block.unilateral or walls or hangs:  # otherwise the paper's floor holds what no wall does
-        _has(a, Guard.FLOOR_PUSH, 2)
-        a[Row.TABLE + Guard.FLOOR_PUSH, Row.P] = mode.pull
-    for plus in (True, False):
-        held = (mode.tip if plus else mode.far) != 0
-        uplift = Guard.UPLIFT_PLUS if plus else Guard.UPLIFT_MINUS
-        if mode.pivot != Pivot.STICK or not held:
-            # A block that hangs by both corners tips as soon as anything favours one side, however
-            # little.
-            hangs_flat = hangs and not walls
-            _has(a, uplift, 2)
-            a[Row.TABLE + uplift, Row.P] = (
-                0.0 if hangs_flat else (block.left.arm if plus else block.right.arm)
-            )
-            a[Row.TABLE + uplift, Row.Q] = (-block.height if plus else block.height) * (
-                _ANY if hangs_flat else 1.0
-            )
-        if held or hangs:
-            drop(a, Guard.CONE_PLUS if plus else Guard.CONE_MINUS)
+    # Otherwise the paper's floor holds what no wall does.
+    if block.unilateral or on_wall(mode) or hangs:
+        _enter(a, Guard.FLOOR_PUSH, 2, Row.P, float(mode.pull))
+    _fill_uplift(block, mode, hangs, True, a)
+    _fill_uplift(block, mode, hangs, False, a)
+
+
+@inner_kernel
+def _fill_uplift(block, mode, hangs, plus, a):
+    """The guard against a tilt to one side, unless a wall holds the block there."""
+    held = (mode.tip if plus else mode.far) != 0
+    uplift = Guard.UPLIFT_PLUS if plus else Guard.UPLIFT_MINUS
+    if mode.pivot != Pivot.STICK or not held:
+        # A block that hangs by both corners tips as soon as anything favours one side, however
+        # little.
+        hangs_flat = hangs and not on_wall(mode)
+        arm = block.left.arm if plus else block.right.arm
+        _enter(a, uplift, 2, Row.P, 0.0 if hangs_flat else arm)
+        moment = -block.height if plus else block.height
+        a[Row.TABLE + uplift, Row.Q] = moment * (_ANY if hangs_flat else 1.0)
+    if held or hangs:
+        drop(a, Guard.CONE_PLUS if plus else Guard.CONE_MINUS)
 
 
 @inner_kernel
@@ -335,12 +326,15 @@ def _stays_positive(which, order, until, slack, a):
 
 
 @inner_kernel
-def _past_a_touch(degree, root, noise, a):
-    """Where the guard in the workspace is positive again if it falls below zero by less than the
-    noise, by its parabola; else the root.
+def _past_a_touch(which, degree, times, noise, a):
+    """Where a force in the workspace is positive again if it falls below zero by less than the
+    noise, by its parabola; else its root. `times` are that root and the step.
 
     The two roots of a touch are known less well than an INSTANT apart.
     """
+    root, h = times
+    if KIND[which] != Kind.FORCE or not 0.0 < root <= _NEARBY * h:
+        return root
     begin, fall, half_bend, power = (
         value(a, Row.GUARD, degree, root),
         slope(a, Row.GUARD, degree, root),
@@ -352,6 +346,12 @@ def _past_a_touch(degree, root, noise, a):
         power *= root
     touches = fall < 0.0 and fall * fall < 4.0 * half_bend * (begin + noise)
     return root + max(-fall / half_bend, INSTANT) if touches else root
+
+
+@inner_kernel
+def _latest(tau, which, other):
+    """The time before which a root of another guard takes the place of this one's at tau."""
+    return tau - INSTANT if 0 <= which <= Guard.FAR_GAP < other else tau
 
 
 @inner_kernel
@@ -368,24 +368,19 @@ def first_event(run):
         if _stays_positive(k, order, tau, slack, a):
             continue
         degree = guard(k, order, a)
-        if degree < 0:
-            continue
         noise = _with_slack(k, slack, a)
         # Compared in h, not tau: a mirror image has its guards in another order.
         root = first_root(a, Row.GUARD, degree, h, tau, noise, seen(KIND[k], h), run.stack)
         if math.isnan(root):
             tau, which = root, k
             break
-        closes = 0 <= which <= Guard.FAR_GAP < k
-        if root == NO_ROOT or root >= tau - (INSTANT if closes else 0.0):
+        if root == NO_ROOT or root >= _latest(tau, which, k):
             continue
-        past = root
-        if KIND[k] == Kind.FORCE and 0.0 < root <= _NEARBY * h:
-            past = _past_a_touch(degree, root, noise, a)
+        past = _past_a_touch(k, degree, (root, h), noise, a)
+        if past < tau:
+            tau, which = past, Guard.NONE
         if past == root:
             tau, which = root, k
-        elif past < tau:
-            tau, which = past, Guard.NONE
     if which >= 0 and KIND[which] == Kind.FORCE and tau > _NEARBY * h:
         tau, which = 0.9 * tau, Guard.NONE
     state.tau, state.guard = tau, which
@@ -405,7 +400,7 @@ def rock_guards_hold(block, run):
     if block.walls:
         for which in (Guard.TIP_GAP, Guard.FAR_GAP):
             drop(a, which)
-            _fill_gap(block, run, which == Guard.TIP_GAP)
+            _fill_gap(block, run.state, a, which == Guard.TIP_GAP)
             if a[Row.TABLE + which, _SHORTER] == 0.0 and not _rock_gap_holds(
                 Row.TABLE + which, order, h, a
             ):

@@ -15,7 +15,7 @@ import numpy as np
 from rockcheck.ebm.core import bouc_wen, coulomb
 from rockcheck.ebm.core.contacts import closed_floor
 from rockcheck.ebm.core.decide import quiet_from
-from rockcheck.ebm.core.ground import next_kink
+from rockcheck.ebm.core.ground import Ground, next_kink
 from rockcheck.ebm.core.guards import KIND
 from rockcheck.ebm.core.laws.strike import strike
 from rockcheck.ebm.core.modes import forget, leave
@@ -24,12 +24,12 @@ from rockcheck.ebm.core.names import Ending, Event, Guard, Row
 from rockcheck.ebm.core.rest import rest, sample_rest, waits
 from rockcheck.ebm.core.series import ORDER
 from rockcheck.ebm.core.settle import no_impacts, settling_speed
-from rockcheck.ebm.core.state import Run, mode_code
+from rockcheck.ebm.core.state import Base, Records, Run, mode_code
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 
 def loop_with(friction: ModuleType) -> object:
-    """The event loop with a law of friction, by its four doors."""
+    """What plays a row of `play`: the event loop with a law of friction, by its four doors."""
     expand, locate, looks_ahead = friction.expand, friction.locate, friction.LOOKS_AHEAD
     advance_friction, after_event = friction.advance, friction.after_event
 
@@ -45,25 +45,43 @@ def loop_with(friction: ModuleType) -> object:
             elif looks_ahead and waits(base, state):
                 rest(block, base, run)
             elif may_go_on(block, base, run):
-                reach = smooth_until(base, state) - state.t
-                expand(block, base, run, reach)
-                if finite(state, state.length > 0.0):
-                    locate(block, run)
-                    if finite(state, math.isfinite(state.tau)):
-                        sample(block, run)
-                        advance(block, base, run)
-                        advance_friction(run)
-                        if state.guard != Guard.NONE and not passes_on(block, base, run):
-                            resolve(block, base, run)
+                step(block, base, run)
         end(run)
 
-    return march
+    @inner_kernel
+    def step(block, base, run):
+        """One Taylor step, and the event that ends it."""
+        state = run.state
+        expand(block, base, run, smooth_until(base, state) - state.t)
+        if not finite(state, state.length > 0.0):
+            return
+        locate(block, run)
+        if not finite(state, math.isfinite(state.tau)):
+            return
+        sample(block, run)
+        advance(block, base, run)
+        advance_friction(run)
+        if state.guard != Guard.NONE and not passes_on(block, base, run):
+            resolve(block, base, run)
+
+    @inner_kernel
+    def play_row(rows, i, states, work, records):
+        """Plays row i."""
+        sideways, upward, samples = rows.horizontal[i], rows.vertical[i], rows.samples
+        base = Base(
+            Ground(sideways, samples[sideways.first : sideways.first + sideways.count]),
+            Ground(upward, samples[upward.first : upward.first + upward.count]),
+        )
+        written = Records(records.out[i], records.out_mode[i], records.log[i])
+        march(rows.settings[i], base, Run(states[i], work[0], work[1], written))
+
+    return play_row
 
 
 @inner_kernel
 def begin(block, base, run):
     """Prepares the first mode at t = 0."""
-    state, motion, control = run.state, run.state.motion, run.control
+    state, motion, control = run.state, run.state.motion, run.state.control
     state.ending, state.t = Ending.GOING, 0.0
     state.t_rest = state.zeta = state.swing_energy = state.swing_place = np.nan
     state.peak, state.stride, state.swing, state.repeats = abs(motion.theta), np.inf, 0.0, False
@@ -132,26 +150,27 @@ def end(run):
     state = run.state
     if state.ending == Ending.DONE and not math.isfinite(state.motion.theta):
         state.ending = Ending.NOT_FINITE
-    if state.ending == Ending.DONE and not run.control.until_decided:
+    if state.ending == Ending.DONE and not run.state.control.until_decided:
         sample_rest(run, np.inf)
 
 
-#: The loop with each law of friction.
-march, march_bouc_wen = loop_with(coulomb), loop_with(bouc_wen)
+_play_row, _play_row_bouc_wen = loop_with(coulomb), loop_with(bouc_wen)
 
 
 @kernel
-def play(block, base, states, work, control, records):
-    """Plays a run in `states`, an array of one STATE with its motion and t_end, with a
+def play(rows, states, work, records):
+    """Plays runs in `states`, a row each with its motion, t_end and control, with a
     `workspace()` and Coulomb's friction.
 
-    Row i of `records.out` (n x 6) is the motion at i * output_step, `out_mode` its mode; `log` (n x
-    5) takes one row an event: time, kind, mode before, mode after, impulse.
+    Of row i `records.out[i]` (n x 6) has the motion at k * output_step, `out_mode[i]` its modes;
+    `log[i]` (m x 5) takes one row an event: time, kind, mode before, mode after, impulse.
     """
-    march(block, base, Run(states[0], work[0], work[1], control, records))
+    for i in range(len(states)):
+        _play_row(rows, i, states, work, records)
 
 
 @kernel
-def play_bouc_wen(block, base, states, work, control, records):
+def play_bouc_wen(rows, states, work, records):
     """As `play`, with Bouc-Wen friction."""
-    march_bouc_wen(block, base, Run(states[0], work[0], work[1], control, records))
+    for i in range(len(states)):
+        _play_row_bouc_wen(rows, i, states, work, records)

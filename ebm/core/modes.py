@@ -16,6 +16,7 @@ instant doubles the least slack. It soon exceeds all forces, and time goes on.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,7 +37,7 @@ from rockcheck.ebm.core.names import GUARDS, Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.rules import Rule
 from rockcheck.ebm.core.series import INSTANT, NOISE, WIDTH, contradiction, leading
 from rockcheck.ebm.core.state import MODES, code_of, on_wall, rests
-from rockcheck.scenes.compiled import inner_kernel
+from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 #: Order of the series that a selection looks at.
 _LOOK = 6
@@ -138,32 +139,36 @@ def wrong_by(block, base, run, measured):
     else:
         order = tilt_series(block, base, run, look, 0.0, 0.0)
         state.place = mode.sense * state.motion.x - a[Row.SIN, 0]
-    fill_guards(block, run)
+    fill_guards(block, run.state, run.a)
     smooth = min(next_kink(base.horizontal, t), next_kink(base.vertical, t)) - t
     worst = 0.0
     for which in range(GUARDS):
-        noise, ahead = NOISE[KIND[which]], seen(KIND[which], smooth)
-        if starts_positive(which, ahead, a):
-            continue
-        degree = guard(which, order, a)
-        if which <= Guard.FAR_GAP and a[Row.GUARD, 1] < -SLOW:
-            continue  # a closing contact is the impact handler's
-        sign = leading(a, Row.GUARD, degree, noise, ahead)
-        if not math.isfinite(a[Row.GUARD, 0]) or (
-            sign <= 0 and which == Guard.PHI and (mode.pivot != Pivot.OFF or sign < 0)
-        ):
-            return np.inf
-        undecided = sign == 0 and which == Guard.SLIP
-        if not measured and (sign < 0 or undecided):
-            return np.inf
-        if sign < 0:
-            worst = max(worst, contradiction(a, Row.GUARD, degree, noise, ahead) / noise)
-        elif undecided:
-            worst = max(worst, 1.0)
+        ahead = seen(KIND[which], smooth)
+        if not starts_positive(which, ahead, a):
+            worst = max(worst, _guard_wrong_by(mode, which, order, ahead, a, measured))
+            if worst == np.inf:
+                break
     return worst
 
 
 @inner_kernel
+def _guard_wrong_by(mode, which, order, ahead, a, measured):
+    """What one guard adds to `wrong_by`."""
+    noise, degree = NOISE[KIND[which]], guard(which, order, a)
+    if which <= Guard.FAR_GAP and a[Row.GUARD, 1] < -SLOW:
+        return 0.0  # a closing contact is the impact handler's
+    sign = leading(a, Row.GUARD, degree, noise, ahead)
+    never = sign <= 0 and which == Guard.PHI and (mode.pivot != Pivot.OFF or sign < 0)
+    if never or not math.isfinite(a[Row.GUARD, 0]):
+        return np.inf
+    if sign > 0 or (sign == 0 and which != Guard.SLIP):
+        return 0.0
+    if not measured:
+        return np.inf
+    return contradiction(a, Row.GUARD, degree, noise, ahead) / noise if sign < 0 else 1.0
+
+
+@called_kernel
 def _favoured(block, base, state):
     """The side to which a flat block at rest would rather tip, +1 left or -1 right; 0 where the
     scene is its own mirror image.
@@ -219,40 +224,45 @@ def _write(number, first, mode):
 
 
 @inner_kernel
-def _possible(block, mode, motion, v, floor, walls):
-    """Whether the contacts of m are closed and its slip agrees with the slip rate v; `walls` are
-    the touched ones, as bits."""
+def _possible(block, mode, motion, at):
+    """Whether the contacts of the mode are closed and its slip agrees with the motion."""
     flat, mine = mode.family == Family.FLAT, mode.tip + 2 * mode.far
-    if (not block.unilateral and floor) if mode.pivot == Pivot.OFF else not floor:
+    if (not block.unilateral and at.floor) if mode.pivot == Pivot.OFF else not at.floor:
         return False
-    stays = not block.unilateral and (
-        (not flat and not block.no_slip) or (flat and (hangs_flat(mode) or mine != 0))
-    )
-    if mode.pivot != Pivot.OFF and mode.pull < 0 and not stays:
+    if mode.pivot != Pivot.OFF and mode.pull < 0 and not _may_pull(block, mode, flat, mine):
         return False
     if block.no_slip and mode.pivot == Pivot.SLIPPING:
         return False
-    if flat:
-        # At rest it is held on the walls that it touches; sliding it touches none; between two
-        # walls that it fills it leans on both.
-        held = mode.pivot == Pivot.STICK or (mode.pivot == Pivot.OFF and walls == 3)
-        if (held and mine != walls) or (mode.pivot == Pivot.SLIPPING and mine != 0):
-            return False
-        v = motion.vx
-    elif mode.pivot == Pivot.STICK and mine == 2 and motion.theta * motion.theta < CLOSED:
-        # Near phi = 0 the far gap goes with phi^2: it lands along that wall, and does not lean on
-        # it.
+    if flat and not _flat_on(mode, mine, at.upright_walls):
         return False
-    else:
-        # Along a wall the pivot slips as the block turns.
-        v = mode.sense * (v if mine == 0 else motion.w)
+    # Near phi = 0 the far gap goes with phi^2: it lands along that wall, and does not lean on it.
+    lies = mine == 2 and motion.theta * motion.theta < CLOSED
+    if not flat and mode.pivot == Pivot.STICK and lies:
+        return False
+    # Along a wall the pivot slips as the block turns.
+    v = motion.vx if flat else mode.sense * (at.v if mine == 0 else motion.w)
     if mode.pivot == Pivot.STICK:
         return v == 0.0
     return mode.pivot == Pivot.OFF or mode.slip * v >= 0.0
 
 
 @inner_kernel
-def _touched(block, motion, sense, flat):
+def _may_pull(block, mode, flat, mine):
+    """Whether the floor can hold the block down in this mode."""
+    stays = (flat and (hangs_flat(mode) or mine != 0)) or (not flat and not block.no_slip)
+    return stays and not block.unilateral
+
+
+@inner_kernel
+def _flat_on(mode, mine, walls):
+    """Whether a flat block rests on the right walls, of those that it touches: at rest it is held
+    on these; sliding it touches none; between two walls that it fills it leans on both."""
+    held = mode.pivot == Pivot.STICK or (mode.pivot == Pivot.OFF and walls == 3)
+    return (mine == walls or not held) and (mine == 0 or mode.pivot != Pivot.SLIPPING)
+
+
+@inner_kernel
+def touched_walls(block, motion, sense, flat):
     """The walls that the block touches, as bits: flat, left and right; else, as it tips to `sense`,
     the tip wall and the far one."""
     if not block.walls:
@@ -278,58 +288,100 @@ def _clean(block, motion, floor):
         upright(block, motion)
 
 
+class _Touching(NamedTuple):
+    """What a selection begins with: the side to which the block would rather tip (0: either), that
+    to which it is first asked to, whether it touches the floor, its slip velocity; the walls that
+    it touches, as bits: flat (left and right), as it tips to the first side, to the other; and the
+    row of the candidates."""
+
+    favoured: int
+    first: int
+    floor: bool
+    v: float
+    upright_walls: int
+    near: int
+    away: int
+    tries: int
+
+
 @inner_kernel
+def _touching(block, base, state):
+    motion = state.motion
+    floor = not block.unilateral or closed_floor(block, motion)
+    _clean(block, motion, floor)
+    v = slip_velocity(block, motion)
+    if motion.theta != 0.0 or motion.w != 0.0:
+        first = 1 if (motion.theta if motion.theta != 0.0 else motion.w) > 0.0 else -1
+        near = touched_walls(block, motion, first, False)
+        return _Touching(first, first, floor, v, 0, near, 0, near)
+    favoured = _favoured(block, base, state)
+    first = 1 if favoured >= 0 else -1
+    walls = touched_walls(block, motion, 1, True)
+    near, away = (
+        touched_walls(block, motion, first, False),
+        touched_walls(block, motion, -first, False),
+    )
+    return _Touching(favoured, first, floor, v, walls, near, away, _FLAT_TRIES)
+
+
+@called_kernel
 def select(block, base, run):
     """Writes the consistent mode into the state, or the one that is wrong by least. False where the
     state is not finite."""
-    state, mode, motion = run.state, run.state.mode, run.state.motion
+    state, mode = run.state, run.state.mode
     state.began = state.t
-    floor = not block.unilateral or closed_floor(block, motion)
-    _clean(block, motion, floor)
-    flat = motion.theta == 0.0 and motion.w == 0.0
-    lean = motion.theta if motion.theta != 0.0 else motion.w
-    favoured = _favoured(block, base, state) if flat else (1 if lean > 0.0 else -1)
-    first = 1 if favoured >= 0 else -1
-    upright_walls = _touched(block, motion, 1, True) if flat else 0
-    near = _touched(block, motion, first, False)
-    away = _touched(block, motion, -first, False) if flat else 0
-    v = slip_velocity(block, motion)
-    tries = _FLAT_TRIES if flat else near
+    at = _touching(block, base, state)
     least, chosen = np.inf, -1
     # One that fits; else that which is wrong by least, among those not tried and those tried.
     for trial in range(3):
-        again = trial == 2
-        for place in range(_TRIES.shape[1]):
-            number = _TRIES[tries, place]
-            if number < 0:
-                break
-            tilts = _CANDIDATES[number, 0] == Family.TILT
-            walls = (near if _CANDIDATES[number, 1] > 0 else away) if tilts else upright_walls
-            touched = walls if tilts or first > 0 else walls >> 1 | (walls & 1) << 1
-            if _CANDIDATES[number, 5] & ~touched or (tilts and favoured == 0):
-                # It does not lean on a wall that it does not touch; where nothing tells left from
-                # right it does not tilt.
-                continue
-            _write(number, first, mode)
-            if (state.tried[code_of(mode)] != 0) != again:
-                continue
-            if not _possible(block, mode, motion, v, floor, walls):
-                continue
-            wrong = wrong_by(block, base, run, trial > 0)
-            if wrong == 0.0 and not again:
-                # One that goes on, since what ended it was noise, is allowed twice that: else the
-                # same noise would end it again and again.
-                state.slack = 2.0 if code_of(mode) == state.ended else 1.0
-                state.rules[Rule.HANGS] += hangs_flat(mode)
-                return True
-            wrong = max(wrong, state.least_slack if again else 0.0)
-            if wrong < least:
-                least, chosen = wrong, number
+        wrong, number = _least_wrong(block, base, run, at, trial)
+        if wrong == 0.0:
+            # One that goes on, since what ended it was noise, is allowed twice that: else the same
+            # noise would end it again and again.
+            state.slack = 2.0 if code_of(mode) == state.ended else 1.0
+            state.rules[Rule.HANGS] += hangs_flat(mode)
+            return True
+        if wrong < least:
+            least, chosen = wrong, number
     if chosen < 0:
         return False
-    _write(chosen, first, mode)
+    _write(chosen, at.first, mode)
     rule = Rule.MODE_AGAIN if least <= state.least_slack else Rule.LEAST_CONTRADICTION
     state.rules[rule] += 1
     state.slack = max(least, state.least_slack)
     state.least_slack *= 2.0
     return True
+
+
+@inner_kernel
+def _least_wrong(block, base, run, at, trial):
+    """By how much the candidate is wrong that is wrong by least, and which; the first one that fits
+    is left in the state. The last trial looks at the modes that have been tried at this instant."""
+    least, chosen = np.inf, -1
+    for place in range(_TRIES.shape[1]):
+        number = _TRIES[at.tries, place]
+        if number < 0 or least == 0.0:
+            break
+        if _comes_up(block, run.state, at, number, trial == 2):
+            wrong = wrong_by(block, base, run, trial > 0)
+            wrong = max(wrong, run.state.least_slack if trial == 2 else 0.0)
+            if wrong < least:
+                least, chosen = wrong, number
+    return least, chosen
+
+
+@inner_kernel
+def _comes_up(block, state, at, number, again):
+    """Writes a candidate, if the walls that it leans on are touched; whether it is possible, and
+    has been tried at this instant (`again`) or not."""
+    mode = state.mode
+    tilts = _CANDIDATES[number, 0] == Family.TILT
+    touched = (at.near if _CANDIDATES[number, 1] > 0 else at.away) if tilts else at.upright_walls
+    if not tilts and at.first < 0:
+        touched = touched >> 1 | (touched & 1) << 1
+    if _CANDIDATES[number, 5] & ~touched or (tilts and at.favoured == 0):
+        # Where nothing tells left from right it does not tilt.
+        return False
+    _write(number, at.first, mode)
+    tried = state.tried[code_of(mode)] != 0
+    return tried == again and _possible(block, mode, state.motion, at)

@@ -28,73 +28,17 @@ only translates.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from rockcheck.ebm.core.block import side_of, wall_turn
 from rockcheck.ebm.core.ground import fill_series
 from rockcheck.ebm.core.lanes import LANES, first, load, put, ramp, shifted, store, zeros
 from rockcheck.ebm.core.names import Family, Pivot, Row, Shape
-from rockcheck.ebm.core.series import WIDTH, slope, value
+from rockcheck.ebm.core.series import WIDTH, product, slope, value
 from rockcheck.ebm.core.state import on_wall, rocks
-from rockcheck.scenes.compiled import inner_kernel
-
-
-class Side(NamedTuple):
-    """One side of the block as it stands: its lower corner, which is the pivot where the block tips
-    to that side, and its top corner.
-
-    alpha and radius are a corner's angle from the upright and its distance, seen from the mass's
-    centre. The arms of corners on a wall, s' and c', are linear in those of the pivot, s' = S c - C
-    s and c' = S s + C c, with (S, C) = (tip_sin, tip_cos) for the top corner of this side and
-    (far_sin, far_cos) for the lower corner of the other one.
-    """
-
-    alpha: float
-    radius: float
-    #: Horizontal distance of the corners from the mass's centre.
-    arm: float
-    top_alpha: float
-    top_radius: float
-    tip_sin: float
-    tip_cos: float
-    far_sin: float
-    far_cos: float
-    #: 1/(I + R^2): 3/4 for a homogeneous block.
-    share: float
-
-
-class Setting(NamedTuple):
-    """Block, floor and walls in natural units; a gap is infinite where there is no wall."""
-
-    left: Side
-    right: Side
-    #: Height of the mass's centre where the block stands, and 1/I.
-    height: float
-    spin: float
-    mu_s: float
-    mu_k: float
-    e_floor: float
-    gap_left: float
-    gap_right: float
-    e_left: float
-    e_right: float
-    walls: bool
-    #: The pivot sticks whatever the friction force (Housner's block): no slip guard.
-    no_slip: bool
-    #: The floor can only push (otherwise it can also hold the pivot down: the paper's model).
-    unilateral: bool
-    #: An impact that would add energy uses the largest restitution that does not, instead of e.
-    energy_cap: bool
-    #: The law of impacts at several contacts, a Law; the bilateral pivot needs none.
-    law: int
-    #: Of Bouc-Wen friction: the yield displacement.
-    yields: float
-
-
-#: Static friction of a frictionless floor. With less, rounding in the tail of a base acceleration
-#: would move a resting block.
-LEAST_FRICTION = 1e-9
+from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, WIDTH + 2)])
 
@@ -108,18 +52,6 @@ def sine_cosine(angle, a):
 
 
 @inner_kernel
-def side_of(block, sense):
-    """The side to which a block tips whose rotation has this sign."""
-    return block.left if sense > 0 else block.right
-
-
-@inner_kernel
-def wall_turn(side, tip):
-    """(S, C) of the corner on the tip wall, or on the far wall (see `Side`)."""
-    return (side.tip_sin, side.tip_cos) if tip else (side.far_sin, side.far_cos)
-
-
-@inner_kernel
 def delta(block, mode, tip):
     """Distance from the mass's initial centre to the wall on the tip side (or the far side), R."""
     left = (mode.sense > 0) == tip
@@ -130,16 +62,16 @@ def delta(block, mode, tip):
 def base_series(base, t, sign, order, a):
     """Fills in the series of the base motion in the frame of this sign, u and G."""
     fill_series(base.horizontal, t, sign, order, a, Row.U)
-    if base.vertical.kind != Shape.STILL:  # otherwise G is 1 throughout, as the run has set it
+    if base.vertical.form.kind != Shape.STILL:  # otherwise G is 1 throughout, as the run has set it
         fill_series(base.vertical, t, 1.0, order, a, Row.G)
         a[Row.G, 0] += 1.0
 
 
 @inner_kernel
-def turned(block, run):
+def turned(block, state, a):
     """Writes the start of the series of rotation, sine and cosine; returns the side that it tips
     to."""
-    mode, motion, a = run.state.mode, run.state.motion, run.a
+    mode, motion = state.mode, state.motion
     sign = float(mode.sense)
     a[Row.PHI, 0] = sign * motion.theta
     a[Row.OMEGA, 0] = sign * motion.w
@@ -160,10 +92,10 @@ def tilt_series(block, base, run, order, enough, reach):
     """
     mode, motion, a = run.state.mode, run.state.motion, run.a
     base_series(base, run.state.t, float(mode.sense), order, a)
-    side = turned(block, run)
+    side = turned(block, run.state, run.a)
     sign = float(mode.sense)
     if rocks(mode):
-        still = base.vertical.kind == Shape.STILL
+        still = base.vertical.form.kind == Shape.STILL
         forces = block.unilateral or not block.no_slip
         return _rock_series(side.share, still, order, enough, reach, forces, a)
     a[Row.XI, 0] = sign * motion.x
@@ -210,11 +142,7 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
     scale = 1.0
     small = 0
     for k in range(order):
-        weight = s
-        if not still_vertical:
-            weight = 0.0
-            for j in range(k + 1):
-                weight += a[Row.G, j] * a[Row.SIN, k - j]
+        weight = s if still_vertical else product(a, Row.G, Row.SIN, k)
         r = RECIPROCAL[k + 1]
         a[Row.PHI, k + 1] = w * r
         w, s, c, u = share * r * (push - weight), -ds * r, dc * r, a[Row.U, k + 1]
@@ -308,7 +236,7 @@ def _slide_series(spin, kappa, order, enough, reach, a):
     return order
 
 
-@inner_kernel
+@called_kernel
 def _lean_series(block, side, tip, order, a):
     """LEAN: nothing moves, and the wall takes the moment about the pivot.
 
@@ -341,7 +269,7 @@ class _Acting(NamedTuple):
     """The contacts of a mode: the side that the block tips to, 1/I, the friction of a slipping
     pivot (Q = -kappa P), and which of them act; `stick` is the pivot's tangent."""
 
-    side: Side
+    side: Any
     spin: float
     kappa: float
     floor: bool
@@ -368,38 +296,27 @@ def _contact_rows(acting, a):
     returns their number."""
     s, c, kappa = a[Row.SIN, 0], a[Row.COS, 0], acting.kappa
     tip_arm, far_arm = _wall_arms(acting.side, s, c)
+    along, upward = (0.0, 1.0, 1.0, -1.0), (1.0, 0.0, 0.0, 0.0)
+    turns, slips = (-s, c, -tip_arm, -far_arm), (kappa, 0.0, 0.0, 0.0)
     n = 0
     for which in range(4):
-        if not _acts(acting, which):
-            continue
-        for k in range(3):
-            a[Row.CONSTRAINT + n, k] = a[Row.COLUMN + n, k] = 0.0
-        if which == 0:
-            a[Row.CONSTRAINT + n, 1], a[Row.CONSTRAINT + n, 2] = 1.0, -s
-            a[Row.COLUMN + n, 0], a[Row.COLUMN + n, 1], a[Row.COLUMN + n, 2] = (
-                -kappa,
-                1.0,
-                -s - kappa * c,
-            )
-        else:
-            along = 1.0 if which < 3 else -1.0
-            a[Row.CONSTRAINT + n, 0] = a[Row.COLUMN + n, 0] = along
-            a[Row.CONSTRAINT + n, 2] = a[Row.COLUMN + n, 2] = (
-                c if which == 1 else (-tip_arm if which == 2 else -far_arm)
-            )
-        n += 1
-    for i in range(n):
+        if _acts(acting, which):
+            row, column = Row.CONSTRAINT + n, Row.COLUMN + n
+            a[row, 0], a[row, 1], a[row, 2] = along[which], upward[which], turns[which]
+            a[column, 0], a[column, 1] = -kappa if which == 0 else along[which], upward[which]
+            a[column, 2] = turns[which] - slips[which] * c
+            n += 1
+    for i in range(Row.CONSTRAINT, Row.CONSTRAINT + n):
+        row = i - Row.CONSTRAINT + Row.MATRIX
         for j in range(n):
-            a[Row.MATRIX + i, j] = (
-                a[Row.CONSTRAINT + i, 0] * a[Row.COLUMN + j, 0]
-                + a[Row.CONSTRAINT + i, 1] * a[Row.COLUMN + j, 1]
-            )
-            a[Row.MATRIX + i, j] += acting.spin * a[Row.CONSTRAINT + i, 2] * a[Row.COLUMN + j, 2]
+            column = Row.COLUMN + j
+            a[row, j] = a[i, 0] * a[column, 0] + a[i, 1] * a[column, 1]
+            a[row, j] += acting.spin * a[i, 2] * a[column, 2]
     inverse_of(a, Row.MATRIX, Row.INVERSE, n)
     return n
 
 
-@inner_kernel
+@called_kernel
 def _contact_series(block, mode, order, enough, reach, a):
     """Newton-Euler with the mode's constraints, solved term by term: the matrix of the unknown
     forces is the same each time."""
@@ -577,9 +494,9 @@ def flat_series(block, base, run, order):
 
 
 @inner_kernel
-def _tilt_at(block, run, tau, motion):
+def _tilt_at(block, state, a, tau, motion):
     """Writes the motion of a tilted block, on the contacts to rounding."""
-    mode, order, pivot, a = run.state.mode, run.state.order, run.state.place, run.a
+    mode, order, pivot = state.mode, state.order, state.place
     sign = float(mode.sense)
     phi = value(a, Row.PHI, order, tau)
     w = value(a, Row.OMEGA, order - 1, tau)
@@ -611,9 +528,9 @@ def _tilt_at(block, run, tau, motion):
 
 
 @inner_kernel
-def _flat_at(block, run, tau, motion):
+def _flat_at(block, state, a, tau, motion):
     """Writes the motion of a translating block."""
-    mode, order, a = run.state.mode, run.state.order, run.a
+    mode, order = state.mode, state.order
     if not on_wall(mode) and mode.pivot != Pivot.STICK:
         motion.x = value(a, Row.XI, order, tau)
         motion.vx = slope(a, Row.XI, order, tau)
@@ -629,10 +546,10 @@ def _flat_at(block, run, tau, motion):
     motion.theta = motion.w = 0.0
 
 
-@inner_kernel
-def motion_at(block, run, tau, motion):
+@called_kernel
+def motion_at(block, state, a, tau, motion):
     """Writes the motion at tau after the start of the series into `motion`."""
-    if run.state.mode.family == Family.FLAT:
-        _flat_at(block, run, tau, motion)
+    if state.mode.family == Family.FLAT:
+        _flat_at(block, state, a, tau, motion)
     else:
-        _tilt_at(block, run, tau, motion)
+        _tilt_at(block, state, a, tau, motion)

@@ -26,7 +26,7 @@ def may_go_on(block, base, run):
     if state.t >= state.t_end:
         state.ending = Ending.DONE
         return False
-    if run.control.until_decided:
+    if run.state.control.until_decided:
         if state.repeats:
             state.ending = Ending.DONE
             return False
@@ -38,7 +38,7 @@ def may_go_on(block, base, run):
                 motion.theta = math.copysign(verdict, motion.theta)
                 state.ending = Ending.OVERTURNED
             return False
-    if state.steps >= run.control.most_steps:
+    if state.steps >= run.state.control.most_steps:
         state.ending = Ending.TOO_MANY_STEPS
         return False
     state.steps += 1
@@ -49,11 +49,11 @@ def may_go_on(block, base, run):
 def sample(block, run):
     """The rows of this step."""
     state, records = run.state, run.records
-    t, step, code = state.t, run.control.output_step, mode_code(state)
+    t, step, code = state.t, run.state.control.output_step, mode_code(state)
     state.whole = state.guard == Guard.NONE and state.tau >= state.smooth_until - t
     until = state.smooth_until if state.whole else t + state.tau
     while state.rows < records.out.shape[0] and state.rows * step < until:
-        motion_at(block, run, state.rows * step - t, state.sampled)
+        motion_at(block, state, run.a, state.rows * step - t, state.sampled)
         write(records, state.rows, state.sampled, code)
         state.rows += 1
 
@@ -65,14 +65,14 @@ def advance(block, base, run):
     order, tau, t = state.order, state.tau, state.t
     rises = mode.family == Family.TILT and a[Row.OMEGA, 0] > 0.0
     energy = energy_of(block, motion)
-    motion_at(block, run, tau, motion)
+    motion_at(block, state, run.a, tau, motion)
     turns = rises and mode.sense * motion.w < 0.0
     if turns and not stays_below(a, Row.PHI, order, tau, state.peak):
         noise = NOISE[Kind.POSITION]
         top = first_root(a, Row.OMEGA, order - 1, tau, tau, noise, AHEAD, run.stack)
         if top > 0.0:
             state.peak = max(state.peak, value(a, Row.PHI, order, top))
-    if turns and run.control.until_decided:
+    if turns and run.state.control.until_decided:
         state.repeats = swings_again(state, energy)
     state.peak = max(state.peak, abs(motion.theta))
     state.swing = max(state.swing, abs(motion.w))
@@ -88,7 +88,7 @@ def passes_on(block, base, run):
     if state.guard == Guard.PHI and not block.unilateral and _grazes(block, base, run):
         return True
     state.swing = 0.0
-    if state.events + 1 >= run.control.most_events:
+    if state.events + 1 >= run.state.control.most_events:
         state.ending = Ending.TOO_MANY_EVENTS
         return True
     if state.guard != Guard.TOPPLE and not lies_along_wall(state):
@@ -111,7 +111,11 @@ def _grazes(block, base, run):
     """
     state, mode, motion, a = run.state, run.state.mode, run.state.motion, run.a
     order, tau = state.order, state.tau
-    if base.vertical.kind == Shape.STILL or on_wall(mode) or value(a, Row.G, order, tau) >= 0.0:
+    if (
+        base.vertical.form.kind == Shape.STILL
+        or on_wall(mode)
+        or value(a, Row.G, order, tau) >= 0.0
+    ):
         return False
     back = slope(a, Row.OMEGA, order - 1, tau)
     past = 2.0 * abs(motion.w) / back
@@ -121,7 +125,7 @@ def _grazes(block, base, run):
         return False
     state.rules[Rule.GRAZES] += 1
     state.t += past
-    motion_at(block, run, tau + past, motion)
+    motion_at(block, state, run.a, tau + past, motion)
     lifted = max(abs(motion.theta), 2.0 * NOISE[Kind.POSITION])
     motion.theta = math.copysign(lifted, float(mode.sense))
     return True

@@ -11,19 +11,19 @@ from rockcheck.ebm.core.modes import leave
 from rockcheck.ebm.core.names import Ending, Event, Guard, Kind, Shape
 from rockcheck.ebm.core.series import AHEAD, NOISE
 from rockcheck.ebm.core.state import mode_code, rests
-from rockcheck.scenes.compiled import inner_kernel
+from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 
 @inner_kernel
 def waits(base, state):
     """Whether the block rests on a base that only moves sideways."""
-    return rests(state.mode) and base.vertical.kind == Shape.STILL
+    return rests(state.mode) and base.vertical.form.kind == Shape.STILL
 
 
-@inner_kernel
+@called_kernel
 def rest(block, base, run):
     """Straight to the next uplift or slip."""
-    state, mode, control = run.state, run.state.mode, run.control
+    state, mode, control = run.state, run.state.mode, run.state.control
     to_left, to_right = block.left.arm / block.height, block.right.arm / block.height
     if not block.no_slip:
         to_left, to_right = min(to_left, block.mu_s), min(to_right, block.mu_s)
@@ -49,7 +49,7 @@ def sample_rest(run, until):
     """Rows of a block that does not change, up to a time."""
     state, records = run.state, run.records
     code = mode_code(state)
-    while state.rows < records.out.shape[0] and state.rows * run.control.output_step <= until:
+    while state.rows < records.out.shape[0] and state.rows * run.state.control.output_step <= until:
         write(records, state.rows, state.motion, code)
         state.rows += 1
 

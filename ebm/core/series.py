@@ -62,6 +62,15 @@ def eighth(tau):
 
 
 @inner_kernel
+def product(a, x, y, k):
+    """Coefficient k of the product of two rows."""
+    total = 0.0
+    for j in range(k + 1):
+        total += a[x, j] * a[y, k - j]
+    return total
+
+
+@inner_kernel
 def value(a, row, n, tau):
     """c(tau) for a polynomial of degree n."""
     low, high = halves(a, row, n)
@@ -170,7 +179,7 @@ def force_step(a, row, order, tolerance, reach):
     return min(reach, math.exp(longest))
 
 
-@inner_kernel
+@called_kernel
 def leading(a, row, n, floor, ahead):
     """The sign with which c leaves tau = 0: +1, -1, or 0 where it is zero throughout the time
     `ahead`, at most AHEAD."""
@@ -267,16 +276,11 @@ def _isolate(stack, n):
     """
     top = 0
     stack[0, _SPAN], stack[0, _START] = 1.0, 0.0
-    while True:
+    while top >= 0:
         width, begin = stack[top, _SPAN], stack[top, _START]
         if stack[top, 0] <= 0.0:
             return begin
-        low, high_slope, end = 0.0, 0.0, 0.0
-        for k in range(n, 0, -1):
-            low = min(low, 0.0) + stack[top, k]
-            high_slope = max(high_slope, 0.0) + k * stack[top, k]
-            end += stack[top, k]
-        low, end = stack[top, 0] + min(low, 0.0), stack[top, 0] + end
+        low, high_slope, end = _bounds(stack, top, n)
         if not math.isfinite(end):  # no halving would end
             return np.nan
         rootless = low > 0.0 or (high_slope < 0.0 and end > 0.0)
@@ -284,21 +288,45 @@ def _isolate(stack, n):
             return begin + width * _falling_root(stack, top, n, end)
         if rootless or width == _NARROWEST or top + 2 >= stack.shape[0]:
             top -= 1
-            if top < 0:
-                return NO_ROOT
-            for i in range(n):  # Taylor shift by one interval, to the right half
-                for k in range(n - 1, i - 1, -1):
-                    stack[top, k] += stack[top, k + 1]
-            stack[top, _START] += stack[top, _SPAN]
+            _to_right_half(stack, top, n)
         else:
-            half = 1.0
-            for k in range(n + 1):
-                stack[top, k] *= half
-                stack[top + 1, k] = stack[top, k]
-                half *= 0.5
-            stack[top, _SPAN] = stack[top + 1, _SPAN] = 0.5 * width
-            stack[top + 1, _START] = begin
+            _halve(stack, top, n)
             top += 1
+    return NO_ROOT
+
+
+@inner_kernel
+def _bounds(stack, top, n):
+    """A bound from below on [0, 1], one of the slope from above, and the end value."""
+    low, high_slope, end = 0.0, 0.0, 0.0
+    for k in range(n, 0, -1):
+        low = min(low, 0.0) + stack[top, k]
+        high_slope = max(high_slope, 0.0) + k * stack[top, k]
+        end += stack[top, k]
+    return stack[top, 0] + min(low, 0.0), high_slope, stack[top, 0] + end
+
+
+@inner_kernel
+def _to_right_half(stack, top, n):
+    """The Taylor shift of a left half by one interval."""
+    if top < 0:
+        return
+    for i in range(n):
+        for k in range(n - 1, i - 1, -1):
+            stack[top, k] += stack[top, k + 1]
+    stack[top, _START] += stack[top, _SPAN]
+
+
+@inner_kernel
+def _halve(stack, top, n):
+    """Halves an interval: its left half in place, once more above it."""
+    half = 1.0
+    for k in range(n + 1):
+        stack[top, k] *= half
+        stack[top + 1, k] = stack[top, k]
+        half *= 0.5
+    stack[top, _SPAN] = stack[top + 1, _SPAN] = 0.5 * stack[top, _SPAN]
+    stack[top + 1, _START] = stack[top, _START]
 
 
 @inner_kernel

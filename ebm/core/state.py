@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.ebm.core.block import record
 from rockcheck.ebm.core.ground import Ground
 from rockcheck.ebm.core.names import ROWS, Event, Family, Pivot, Row
 from rockcheck.ebm.core.rules import RULES
@@ -20,11 +21,6 @@ from rockcheck.scenes.compiled import inner_kernel, kernel
 Numbers = NDArray[np.float64]
 #: How many modes there are.
 MODES = 128
-
-
-def record(**fields: object) -> np.dtype[np.void]:
-    """The type of a record with these fields, which Python reads by name, too."""
-    return np.dtype((np.record, np.dtype(list(fields.items()), align=True)))
 
 
 #: Of the mass's centre, which stands at x = 0 at first; world frame.
@@ -46,7 +42,19 @@ MODE = record(
     tip="i8",
     far="i8",
 )
+#: What a run is asked for.
+CONTROL = record(
+    # Of a Taylor step, in alpha.
+    tolerance="f8",
+    most_steps="i8",
+    most_events="i8",
+    # Stop as soon as the outcome and the peak are decided.
+    until_decided="?",
+    # Spacing of the rows of the history; with no rows nothing is sampled.
+    output_step="f8",
+)
 STATE = record(
+    control=CONTROL,
     motion=MOTION,
     mode=MODE,
     # Why the run has ended, an Ending.
@@ -129,21 +137,18 @@ class Base(NamedTuple):
     vertical: Ground
 
 
-class Control(NamedTuple):
-    """What a run is asked for."""
+class Rows(NamedTuple):
+    """What runs are given, a row each: a SETTING, two FORMs, and the samples of all."""
 
-    #: Of a Taylor step, in alpha.
-    tolerance: float
-    most_steps: int
-    most_events: int
-    #: Stop as soon as the outcome and the peak are decided.
-    until_decided: bool
-    #: Spacing of the rows of `out`; with no rows nothing is sampled.
-    output_step: float
+    settings: NDArray[np.void]
+    horizontal: NDArray[np.void]
+    vertical: NDArray[np.void]
+    samples: Numbers
 
 
 class Records(NamedTuple):
-    """Where a run writes: rows of states, their modes, the log of events."""
+    """Where a run writes: rows of states, their modes, the log of events; arrays of these where
+    there are several runs."""
 
     out: Numbers
     out_mode: NDArray[np.int8]
@@ -151,13 +156,12 @@ class Records(NamedTuple):
 
 
 class Run(NamedTuple):
-    """A run: its state, the series of its step and the stack of the search for roots, what it is
-    asked for, and where it writes."""
+    """A run: its state, the series of its step and the stack of the search for roots, and where it
+    writes."""
 
     state: np.record
     a: Numbers
     stack: Numbers
-    control: Control
     records: Records
 
 

@@ -56,23 +56,16 @@ def run_to_end() -> Runner:
     it."""
     from stepping import play
 
-    from rockcheck.ebm import natural
-    from rockcheck.ebm.core.state import Control, workspace
+    from rockcheck.ebm import EventBasedModel, natural
+    from rockcheck.ebm.core.state import workspace
 
     work = workspace()
 
     def run(
         scene: Scene, *, pivot: str = "bilateral", tolerance: float = 1e-12, impacts: str = "moreau"
     ) -> Run:
-        setting = natural.setting_of(
-            scene,
-            unilateral=pivot == "unilateral",
-            no_slip=False,
-            energy_cap=False,
-            impacts=impacts,
-        )
-        control = Control(tolerance, 1_000_000, 200_000, False, 1.0)
-        found = play(scene, setting, control, work)
+        model = EventBasedModel(pivot=pivot, tolerance=tolerance, impacts=impacts)
+        found = play(scene, model, work)
         return Run(
             ending=int(found.ending),
             t=found.t * natural.time_unit(scene),

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.ebm import natural
+from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.batch import pack, starts_of
 from rockcheck.ebm.core import march, modes
 from rockcheck.ebm.core.names import Family, Pivot
-from rockcheck.ebm.core.state import STATE, Control, Records, Run, workspace
-from rockcheck.scenes import Scene
+from rockcheck.ebm.core.state import STATE, Records, Run, workspace
+from rockcheck.scenes import Block, Scene
 
 
 def nothing() -> Records:
@@ -29,7 +30,16 @@ def run_at(motion: Sequence[float] = (0.0,) * 6, *, t: float = 0.0, **mode: int)
     for name, value in mode.items():
         setattr(state.mode, name, value)
     modes.forget(state)
-    return Run(state, *workspace(), Control(1e-10, 100, 100, False, 1.0), nothing())
+    state.control = (1e-10, 100, 100, False, 1.0)
+    return Run(state, *workspace(), nothing())
+
+
+def changed(setting: Any, **values: float) -> Any:
+    """A record with other values in these fields."""
+    other = setting.copy()
+    for name, value in values.items():
+        setattr(other, name, value)
+    return other
 
 
 def put(motion: Any, values: Sequence[float]) -> None:
@@ -43,12 +53,18 @@ def six(motion: Any) -> np.ndarray:
     return np.array(motion.tolist())
 
 
-def play(scene: Scene, setting: Any, control: Control, work: Any = None) -> Any:
+def play(scene: Scene, model: EventBasedModel, work: Any = None) -> Any:
     """The state after the compiled loop has played the scene, without rows."""
-    states = natural.start_of(scene)
-    march.play(setting, natural.base_of(scene), states, work or workspace(), control, nothing())
+    packed = pack([scene], model)
+    states = starts_of(packed, model, 1.0, model.most_steps)
+    records = Records(*(part[None] for part in nothing()))
+    march.play(packed.rows, states, work or workspace(), records)
     return states[0]
 
 
 TILTED = {"family": Family.TILT, "pull": 1}
 ROCKS = TILTED | {"pivot": Pivot.STICK}
+
+
+def block_of(alpha: float, radius: float = 1.0) -> Block:
+    return Block(half_width=radius * math.sin(alpha), half_height=radius * math.cos(alpha))

@@ -106,17 +106,15 @@ def test_compiled_scratch_is_scratch(pulse_scene):
     """What the loop finds in its work arrays, however wild, does not matter."""
     from stepping import play, six
 
-    from rockcheck.ebm import natural
-    from rockcheck.ebm.core.state import Control, workspace
+    from rockcheck.ebm.core.state import workspace
 
     scene = pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0))
-    setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
-    control = Control(1e-10, 100_000, 100_000, False, 1.0)
+    model = EventBasedModel(pivot="unilateral")
     found = []
     for filling in (0.0, np.nan, 1e300):
         a, stack = workspace()
         a[:], stack[:] = filling, filling
-        end = play(scene, setting, control, (a, stack))
+        end = play(scene, model, (a, stack))
         found.append((end.peak, end.steps, end.events, end.t, *six(end.motion)))
     assert found[0] == found[1] == found[2]
 

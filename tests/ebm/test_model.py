@@ -194,7 +194,7 @@ def test_restitution_of_one_and_walls_that_touch():
         np.testing.assert_allclose(np.abs(history.channels["x_dot"]), 1.0, rtol=0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("package", ["ebm", "scenes"])
+@pytest.mark.parametrize("package", ["ebm", "scenes", "cm"])
 def test_import_is_light(package):
     """Importing a package loads neither the compiler, nor tables, nor pictures, nor engines."""
     heavy = "{'numba', 'pandas', 'matplotlib', 'mujoco', 'pybullet', 'scipy'}"

@@ -33,8 +33,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.ebm.core.block import side_of
 from rockcheck.ebm.core.contacts import CLOSED, SLOW
-from rockcheck.ebm.core.motion import side_of
 from rockcheck.ebm.core.names import CONTACT_SETS, CONTACTS, Contact, Found, Friction, Kind, Law
 from rockcheck.ebm.core.series import NOISE
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
@@ -153,14 +153,8 @@ def solve(system, n):
     give.
     """
     for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(system[i, k]) > abs(system[best, k]):
-                best = i
-        if not abs(system[best, k]) > _PARALLEL:
+        if not _pivots(system, n, k):
             return False
-        for j in range(k, n + 1):
-            system[k, j], system[best, j] = system[best, j], system[k, j]
         for i in range(k + 1, n):
             factor = system[i, k] / system[k, k]
             for j in range(k, n + 1):
@@ -170,6 +164,18 @@ def solve(system, n):
             system[k, n] -= system[k, j] * system[j, n]
         system[k, n] /= system[k, k]
     return True
+
+
+@inner_kernel
+def _pivots(system, n, k):
+    """Puts the row with the largest entry of column k in place k; False where all are too small."""
+    best = k
+    for i in range(k + 1, n):
+        if abs(system[i, k]) > abs(system[best, k]):
+            best = i
+    for j in range(k, n + 1):
+        system[k, j], system[best, j] = system[best, j], system[k, j]
+    return abs(system[k, k]) > _PARALLEL
 
 
 @inner_kernel
@@ -190,21 +196,26 @@ def _push(rows, index, kappa, k):
 
 
 @inner_kernel
+def _unknown(number, i):
+    """The contact of unknown i of a set; behind its contacts, the floor's tangent."""
+    return _SETS[number, 1 + i] if i < _SETS[number, 0] else Contact.TANGENT
+
+
+@inner_kernel
 def _try_set(block, stage, v, number, friction):
     """The impulses of the contacts in the set, and the velocities after them; False where there are
     none."""
-    rows, system, lam, trial = stage.rows, stage.system, stage.lam, stage.trial
-    spin, mu_k, target = block.spin, block.mu_k, stage.target
-    count = _SETS[number, 0]
-    n = count + (1 if friction == Friction.HELD else 0)
+    rows, system, lam, trial, spin = stage.rows, stage.system, stage.lam, stage.trial, block.spin
+    n = _SETS[number, 0] + (1 if friction == Friction.HELD else 0)
+    mu_k = block.mu_k
     kappa = mu_k if friction == Friction.PLUS else (-mu_k if friction == Friction.MINUS else 0.0)
     for i in range(n):
-        row = _SETS[number, 1 + i] if i < count else Contact.TANGENT
-        system[i, n] = target[row] if i < count else 0.0
+        row = _unknown(number, i)
+        system[i, n] = 0.0 if row == Contact.TANGENT else stage.target[row]
         for k in range(3):
             system[i, n] -= rows[row, k] * v[k]
         for j in range(n):
-            column = _SETS[number, 1 + j] if j < count else Contact.TANGENT
+            column = _unknown(number, j)
             x, y = _push(rows, column, kappa, 0), _push(rows, column, kappa, 1)
             system[i, j] = rows[row, 0] * x + rows[row, 1] * y
             system[i, j] += spin * rows[row, 2] * _push(rows, column, kappa, 2)
@@ -214,16 +225,16 @@ def _try_set(block, stage, v, number, friction):
         trial[k], lam[k] = v[k], 0.0
     for j in range(n):
         lam[j] = system[j, n]
-        index = _SETS[number, 1 + j] if j < count else Contact.TANGENT
+        index = _unknown(number, j)
         for k in range(3):
             trial[k] += (spin if k == 2 else 1.0) * _push(rows, index, kappa, k) * lam[j]
     return True
 
 
 @inner_kernel
-def _violation(block, stage, number, friction):
-    """By how much a solution violates the law: a pull, a contact that still closes, friction beyond
-    its cone or in the wrong sense."""
+def _violation(block, stage, number, friction, rounding):
+    """By how much a solution violates the law, 0 within the rounding: a pull, a contact that still
+    closes, friction beyond its cone or in the wrong sense."""
     rows, lam, trial = stage.rows, stage.lam, stage.trial
     count = _SETS[number, 0]
     worst = 0.0
@@ -240,7 +251,7 @@ def _violation(block, stage, number, friction):
     for j in range(CONTACTS):
         if stage.taking[j] != 0.0:
             worst = max(worst, stage.target[j] - _dot(rows[j], trial))
-    return worst
+    return 0.0 if worst <= rounding else worst
 
 
 @called_kernel
@@ -253,27 +264,31 @@ def _strike(block, stage, v):
     (Painleve), the one that contradicts it least.
     """
     least, lowest = np.inf, np.inf
-    bits = 0
-    for j in range(CONTACTS):
-        bits |= (1 if stage.taking[j] != 0.0 else 0) << j
+    bits = _bits_of(stage.taking)
     for place in range(_WITHIN.shape[1]):
         number = _WITHIN[bits, place]
         if number < 0:
             break
         for friction in range(_FRICTIONS):
-            if not _fits(number, friction, block.mu_s == 0.0):
-                continue
-            if not _try_set(block, stage, v, number, friction):
+            fits = _fits(number, friction, block.mu_s == 0.0)
+            if not fits or not _try_set(block, stage, v, number, friction):
                 continue
             scale = _size(v) + _size(stage.trial) + _size(stage.lam)
-            wrong = _violation(block, stage, number, friction)
-            wrong = 0.0 if wrong <= _ROUNDING * scale else wrong
+            wrong = _violation(block, stage, number, friction, _ROUNDING * scale)
             energy = kinetic_energy(block.spin, stage.trial)
             lower = wrong == least and energy < lowest - _ROUNDING * scale * scale
             if wrong < least or lower:
                 least, lowest = wrong, energy
                 _keep(stage, number, friction)
     return least == 0.0
+
+
+@inner_kernel
+def _bits_of(taking):
+    bits = 0
+    for j in range(CONTACTS):
+        bits |= (1 if taking[j] != 0.0 else 0) << j
+    return bits
 
 
 @inner_kernel
@@ -315,6 +330,16 @@ def _one_corner(law, stage, slip):
 
 
 @inner_kernel
+def _soonest(approach, ahead, rounding):
+    """When the next of the contacts that approach is struck."""
+    soonest = np.inf
+    for j in range(CONTACTS):
+        if approach[j] < -rounding:
+            soonest = min(soonest, ahead[j] / -approach[j])
+    return soonest
+
+
+@inner_kernel
 def _floor_first(stage, touching, number, rounding):
     """The contacts that are struck next, in the order of a neighbouring trajectory, and those that
     rest meanwhile.
@@ -323,14 +348,11 @@ def _floor_first(stage, touching, number, rounding):
     first, a wall is one unit away.
     """
     approach, ahead, taking = stage.approach, stage.ahead, stage.taking
-    floor = approach[Contact.FOOT] < -rounding or approach[Contact.OTHER] < -rounding
     if number == 0:
+        floor = min(approach[Contact.FOOT], approach[Contact.OTHER]) < -rounding
         for j in range(CONTACTS):
-            ahead[j] = 1.0 if floor and j > Contact.OTHER else 0.0
-    soonest = np.inf
-    for j in range(CONTACTS):
-        if approach[j] < -rounding:
-            soonest = min(soonest, ahead[j] / -approach[j])
+            ahead[j] = floor * (j > Contact.OTHER)
+    soonest = _soonest(approach, ahead, rounding)
     for j in range(CONTACTS):
         taking[j] = 0.0
         if approach[j] < -rounding and ahead[j] <= -approach[j] * soonest * (1.0 + _PARALLEL):
@@ -338,7 +360,8 @@ def _floor_first(stage, touching, number, rounding):
             taking[j] = 1.0
         elif touching[j] != 0.0:
             ahead[j] = max(0.0, ahead[j] + approach[j] * soonest)
-            taking[j] = 1.0 if abs(approach[j]) <= rounding and ahead[j] <= _PARALLEL else 0.0
+            rests = abs(approach[j]) <= rounding and ahead[j] <= _PARALLEL
+            taking[j] = 1.0 if rests else 0.0
 
 
 @inner_kernel
@@ -417,18 +440,24 @@ def contact_impact(block, impact, state, work):
         if gain > noise:
             state.gains += 1
             state.largest_gain = max(state.largest_gain, gain / before)
-        for j in range(CONTACTS):
-            if j <= Contact.OTHER:
-                state.floor_impulse += stage.part[j]
-            else:
-                state.wall_impulse += stage.part[j]
-        for k in range(3):
-            v[k] = stage.after[k]
+        _end_stage(stage, v, state)
     if touching[Contact.TIP_TOP] != 0.0 and touching[Contact.FAR_BOTTOM] != 0.0:
         # Its diagonal just fits between two walls, with a lever so short that no impulse can be
         # solved for: it jams.
         v[0] = v[2] = 0.0
     return Found.ENDLESS
+
+
+@inner_kernel
+def _end_stage(stage, v, state):
+    """Gathers the impulses of a stage, and makes its velocities those of the block."""
+    for j in range(CONTACTS):
+        if j <= Contact.OTHER:
+            state.floor_impulse += stage.part[j]
+        else:
+            state.wall_impulse += stage.part[j]
+    for k in range(3):
+        v[k] = stage.after[k]
 
 
 @called_kernel
@@ -452,22 +481,30 @@ def _strike_without_gain(block, stage, v, before):
 def _close(spin, stage, impact):
     """Contacts that part more slowly than `resting` are closed: the velocity is projected onto
     them, mass-orthogonally."""
-    rows, system, v = stage.rows, stage.system, impact.v
+    rows, v = stage.rows, impact.v
     members, count = stage.lam, 0
     for j in range(CONTACTS):
         slow = abs(_dot(rows[j], v)) < impact.resting
         if impact.touching[j] != 0.0 and count < 3 and slow:
             members[count] = j
             count += 1
-    while count > 0:
-        for i in range(count):
-            row = rows[int(members[i])]
-            for j in range(count):
-                system[i, j] = _mass_dot(spin, row, rows[int(members[j])])
-            system[i, count] = -_dot(row, v)
-        if solve(system, count):
-            for i in range(count):
-                for k in range(3):
-                    v[k] += (spin if k == 2 else 1.0) * rows[int(members[i]), k] * system[i, count]
-            return
+    while count > 0 and not _project(spin, stage, v, count):
         count -= 1
+
+
+@inner_kernel
+def _project(spin, stage, v, count):
+    """Takes the rates of the first so many of the contacts in `lam` out of the velocity; False
+    where their rows are parallel."""
+    rows, system, members = stage.rows, stage.system, stage.lam
+    for i in range(count):
+        row = rows[int(members[i])]
+        for j in range(count):
+            system[i, j] = _mass_dot(spin, row, rows[int(members[j])])
+        system[i, count] = -_dot(row, v)
+    if not solve(system, count):
+        return False
+    for i in range(count):
+        for k in range(3):
+            v[k] += (spin if k == 2 else 1.0) * rows[int(members[i]), k] * system[i, count]
+    return True

@@ -15,8 +15,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from rockcheck.ebm.core.block import side_of
 from rockcheck.ebm.core.contacts import CLOSED
-from rockcheck.ebm.core.motion import side_of
 from rockcheck.ebm.core.names import Branch, Kind, Landing
 from rockcheck.ebm.core.series import NOISE
 from rockcheck.scenes.compiled import inner_kernel

@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from rockcheck.ebm.core.block import side_of
 from rockcheck.ebm.core.contacts import (
     CLOSED,
     SLOW,
@@ -28,7 +29,6 @@ from rockcheck.ebm.core.contacts import (
 from rockcheck.ebm.core.laws import impacts
 from rockcheck.ebm.core.laws.contact_impacts import WORK, Impact, contact_impact
 from rockcheck.ebm.core.modes import tips_first
-from rockcheck.ebm.core.motion import side_of
 from rockcheck.ebm.core.names import (
     Branch,
     Contact,
@@ -47,7 +47,7 @@ from rockcheck.ebm.core.state import on_wall, place
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 
-@inner_kernel
+@called_kernel
 def strike(block, base, run, resting):
     """Resolves the impact at the gap that has closed: what it was, an Event, and whether the mode
     is already the one that follows. What is slower than `resting` comes to rest."""

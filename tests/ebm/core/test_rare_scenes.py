@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.ebm.batch import pack, run_batch
+from rockcheck.ebm.batch import pack, run_batch, starts_of
 from rockcheck.scenes import (
     Block,
     Floor,
@@ -228,7 +228,6 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
     freed too early."""
     from stepping import nothing
 
-    from rockcheck.ebm import natural
     from rockcheck.ebm.core import (
         bouc_wen,
         contacts,
@@ -291,13 +290,14 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
             monkeypatch.setattr(
                 module, name, function.py_func if counts_references else watched(function.py_func)
             )
-    setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
-    states, control = natural.start_of(scene), state.Control(1e-8, 200, 200, False, 1.0)
+    model = EventBasedModel(pivot="unilateral", tolerance=1e-8)
+    packed = pack([scene], model)
+    states = starts_of(packed, model, 1.0, 200)
     states["t_end"] = 3.0
-    march_there = march.loop_with(coulomb).py_func
-    run = state.Run(states[0], *work, control, nothing())
+    records = state.Records(*(part[None] for part in nothing()))
+    monkeypatch.setattr(march, "_play_row", march.loop_with(coulomb).py_func)
     with np.errstate(all="ignore"):
-        march_there(setting, natural.base_of(scene), run)
+        march.play.py_func(packed.rows, states, work, records)
     assert len(seen) > 30
 
 

@@ -1,0 +1,85 @@
+"""The block with its floor and walls, a record that compiled code reads by name: SETTING."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rockcheck.scenes.compiled import inner_kernel
+
+
+def record(**fields: object) -> np.dtype[np.void]:
+    """The type of a record with these fields, which Python reads by name, too."""
+    return np.dtype((np.record, np.dtype(list(fields.items()), align=True)))
+
+
+def filled(kind: np.dtype[np.void], /, **values: object) -> np.record:
+    """A record with these values; a field that is not named is zero."""
+    rows = np.zeros(1, kind)
+    for name, value in values.items():
+        rows[name] = value
+    found: np.record = rows[0]
+    return found
+
+
+#: One side of the block as it stands: its lower corner, which is the pivot where the block tips to
+#: that side, and its top corner.
+SIDE = record(
+    # Angle from the upright and distance of the lower corner, seen from the mass's centre.
+    alpha="f8",
+    radius="f8",
+    # Horizontal distance of the corners from the mass's centre.
+    arm="f8",
+    # As alpha and radius, of the top corner.
+    top_alpha="f8",
+    top_radius="f8",
+    # The arms of corners on a wall, s' and c', are linear in those of the pivot, s' = S c - C s and
+    # c' = S s + C c, with (S, C) = (tip_sin, tip_cos) for the top corner of this side and (far_sin,
+    # far_cos) for the lower corner of the other one.
+    tip_sin="f8",
+    tip_cos="f8",
+    far_sin="f8",
+    far_cos="f8",
+    # 1/(I + R^2): 3/4 for a homogeneous block.
+    share="f8",
+)
+#: Block, floor and walls in natural units; a gap is infinite where there is no wall.
+SETTING = record(
+    left=SIDE,
+    right=SIDE,
+    # Height of the mass's centre where the block stands, and 1/I.
+    height="f8",
+    spin="f8",
+    mu_s="f8",
+    mu_k="f8",
+    e_floor="f8",
+    gap_left="f8",
+    gap_right="f8",
+    e_left="f8",
+    e_right="f8",
+    walls="?",
+    # The pivot sticks whatever the friction force (Housner's block): no slip guard.
+    no_slip="?",
+    # The floor can only push (otherwise it can also hold the pivot down: the paper's model).
+    unilateral="?",
+    # An impact that would add energy uses the largest restitution that does not, instead of e.
+    energy_cap="?",
+    # The law of impacts at several contacts, a Law; the bilateral pivot needs none.
+    law="i8",
+    # Of Bouc-Wen friction: the yield displacement.
+    yields="f8",
+)
+#: Static friction of a frictionless floor. With less, rounding in the tail of a base acceleration
+#: would move a resting block.
+LEAST_FRICTION = 1e-9
+
+
+@inner_kernel
+def side_of(block, sense):
+    """The side to which a block tips whose rotation has this sign."""
+    return block.left if sense > 0 else block.right
+
+
+@inner_kernel
+def wall_turn(side, tip):
+    """(S, C) of the corner on the tip wall, or on the far wall (see SIDE)."""
+    return (side.tip_sin, side.tip_cos) if tip else (side.far_sin, side.far_cos)

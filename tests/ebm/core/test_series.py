@@ -1,0 +1,261 @@
+"""Polynomials in time: their first roots, the signs with which they leave zero, and bounds."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from situations import Core, _row, value
+from stepping import run_at
+
+from rockcheck.ebm.core import (
+    guards,
+    series,
+)
+from rockcheck.ebm.core.names import GUARDS, Guard, Kind, Row
+from rockcheck.ebm.core.state import workspace
+
+NOISES = series.NOISE.tolist()
+
+
+def assert_first_root(coefficients, h: float, found: float | None, noise: float = 1e-13) -> None:
+    """By the definition: not negative before, negative just after."""
+    before = np.linspace(0.0, h if found is None else found, 4001)
+    assert np.min(value(coefficients, before)) >= -noise
+    if found is not None and found < h:
+        assert found >= 0.0
+        after = np.minimum(found + h * np.logspace(-9, -3, 25), h)
+        assert np.min(value(coefficients, after)) < 0.0
+
+
+@pytest.mark.parametrize("noise", NOISES)
+def test_first_root_of_random_polynomials(noise):
+    """Against all roots that numpy finds, of 3,000 polynomials of degree 1 to 14, positive at 0."""
+    rng = np.random.default_rng(41)
+    judged = {True: 0, False: 0}
+    for _ in range(1000):
+        degree, h = int(rng.integers(1, 15)), float(rng.choice([0.03, 0.4, 1.0, 2.0]))
+        c = rng.normal(0.0, 1.0, degree + 1) / h ** np.arange(degree + 1)
+        c[0] = abs(c[0]) + 0.01
+        roots = np.roots(c[::-1])
+        near = roots[np.abs(roots.imag) < 1e-4 * h]
+        if (
+            np.any(np.abs(near.imag) > 0.0)
+            or np.any(np.abs(near.real - h) < 1e-6 * h)
+            or np.any(np.diff(np.sort(near.real)) < 1e-4 * h)
+        ):
+            # About to touch, or two roots in one place: whether they are roots is a matter of
+            # rounding.
+            continue
+        expected = min((r for r in near.real if 0.0 < r < h), default=None)
+        found = Core.first_root(c, h, noise)
+        judged[found is None] += 1
+        assert (found is None) == (expected is None), (c, h, found, expected)
+        if found is not None:
+            assert found == pytest.approx(expected, abs=1e-9 * h)
+        assert_first_root(c, h, found)
+    assert min(judged.values()) > 200
+
+
+def test_first_root_among_many():
+    """Of up to six roots inside the step the first is found, to 1e-12, wherever the others lie."""
+    rng = np.random.default_rng(42)
+    for _ in range(500):
+        count = int(rng.integers(1, 7))
+        roots = np.sort(rng.uniform(0.02, 1.0, count))
+        if count > 1 and np.min(np.diff(roots)) < 0.02:
+            continue
+        c = np.polynomial.polynomial.polyfromroots(roots)
+        c *= math.copysign(1.0, c[0])
+        gradient = abs(value(np.polynomial.polynomial.polyder(c), roots[0]))
+        assert Core.first_root(c, 1.0) == pytest.approx(roots[0], abs=1e-12 + 1e-14 / gradient)
+        assert Core.first_root(c, 0.999 * roots[0]) is None
+
+
+def test_signs_of_all_short_patterns():
+    """`leading` is the sign of the first coefficient that is not zero: all patterns of -1, 0, 1 up
+    to degree 5."""
+    for pattern in itertools.product((-1.0, 0.0, 1.0), repeat=6):
+        first = next((c for c in pattern if c), 0.0)
+        for size in (1.0, 1e-3, 40.0):
+            assert Core.leading(size * np.array(pattern)) == first, pattern
+        found = Core.first_root(pattern, 1e-3)
+        assert found == (0.0 if first < 0.0 else None), pattern
+
+
+def test_a_zero_at_the_start_is_divided_out():
+    """tau^k q(tau) with q(0) > 0: the event that was just met is not met again, and the next one is
+    found."""
+    rng = np.random.default_rng(43)
+    for k in (1, 2, 3):
+        for _ in range(100):
+            root = rng.uniform(0.05, 0.9)
+            c = np.concatenate([np.zeros(k), [root, -1.0], np.zeros(4)])
+            c[:k] = rng.normal(0.0, 1e-15, k)  # what rounding leaves of the zeros
+            assert Core.leading(c) == 1
+            assert Core.first_root(c, 1.0) == pytest.approx(root, abs=1e-9)
+            assert Core.first_root(c, 0.9 * root) is None
+            assert Core.leading(-c) == -1
+            assert Core.first_root(-c, 1.0) == 0.0
+
+
+@pytest.mark.parametrize("start", [-0.9, -0.4, 0.0, 0.4, 0.9])
+def test_a_guard_that_begins_as_noise_ends_its_mode_where_it_is_more_than_noise(start):
+    """So it does not matter how a motion is cut into steps, nor with which noise one begins."""
+    noise = series.NOISE[Kind.FORCE]
+    falls = noise * np.array([start, -0.01, -1.0])  # noise throughout the time AHEAD
+    end = -0.005 + math.sqrt(0.005**2 + 1.0 + start)
+    for cut in (0.0, 0.3 * end, 0.7 * end):
+        moved = np.array([value(falls, cut), falls[1] + 2.0 * falls[2] * cut, falls[2]])
+        assert cut + Core.first_root(moved, 2.0, noise) == pytest.approx(end, rel=1e-12)
+
+
+def test_a_force_may_change_faster_than_what_it_moves():
+    """Its step is the one at which its own last two terms are below the tolerance; a position's is
+    shorter, for those of its rate to be."""
+    terms = _row([1.0, 1e3, 1e6, 1e9])
+    assert series.force_step(terms, 0, 3, 1e-9, 1.0) == pytest.approx(math.sqrt(1e-15))
+    assert series.force_step(terms, 0, 3, 1e-9, 1e-8) == 1e-8
+    assert series.force_step(_row([1.0, 0.0, 0.0]), 0, 2, 1e-9, 1.0) == 1.0
+    assert series.step_size(terms, 0, 0, 3, 1e-9, 1.0) < 1e-8
+
+
+@pytest.mark.parametrize("order", [12, 13, 14, 15])
+def test_a_force_of_which_only_every_fourth_power_is_there_has_a_step(order):
+    """Friction that winds up under a constant acceleration: tanh(tau^2) has a radius of sqrt(pi/2),
+    and no step may come near it."""
+    terms = np.zeros(order + 1)
+    powers = [1.0, -1.0 / 3.0, 2.0 / 15.0, -17.0 / 315.0]
+    terms[2::4] = powers[: len(terms[2::4])]
+    step = series.force_step(_row(terms), 0, order, 1e-10, 10.0)
+    assert 0.15 < step < 0.35
+
+
+@pytest.mark.parametrize("rate", [-np.inf, np.nan])
+def test_a_search_for_a_root_ends_where_the_series_is_not_finite(rate):
+    """Its halvings would not: no bound holds for what is not a number."""
+    with np.errstate(invalid="ignore"):
+        root = series.first_root(
+            _row([1.0, rate, np.inf, 0.0]),
+            0,
+            3,
+            1.0,
+            1.0,
+            1e-13,
+            series.AHEAD,
+            np.zeros((48, series.WIDTH)),
+        )
+    assert math.isnan(root)
+
+
+@pytest.mark.parametrize("place", [0.3, 0.5, 0.7310585])
+def test_touching_is_no_root_and_dipping_is_one(place):
+    """A double root lifted by 1e-12 is none; lowered by as much it is one, to the square root of
+    that. A triple one crosses."""
+    touch = np.array([place * place, -2.0 * place, 1.0])
+    lift = np.array([1e-12, 0.0, 0.0])
+    assert Core.first_root(touch + lift, 1.0) is None
+    assert Core.first_root(touch - lift, 1.0) == pytest.approx(place - 1e-6, abs=1e-9)
+    falls = np.array([place**3, -3.0 * place**2, 3.0 * place, -1.0])
+    assert Core.first_root(falls, 1.0) == pytest.approx(place, abs=1e-4)
+    two = np.polynomial.polynomial.polymul(touch, [0.9, -1.0])  # touches, then crosses
+    assert Core.first_root([two[0] + 1e-12, *two[1:]], 1.0) == pytest.approx(0.9, abs=1e-9)
+
+
+@pytest.mark.parametrize("dip", [0.0, 1e-16, 1e-10, 4e-10, 1e-9, 1e-6])
+def test_a_force_that_only_touches_zero_ends_no_mode(dip):
+    """A step ends where the force is positive again if it falls by less than noise, else in an
+    event, as where it begins below."""
+    place, run = 0.1, run_at()
+    a, state = run.a, run.state
+
+    def first(length: float) -> tuple[float, int]:
+        state.order, state.length = 2, length
+        guards.first_event(run)
+        return float(state.tau), int(state.guard)
+
+    for which in range(GUARDS):
+        guards.drop(a, which)
+    a[Row.TABLE + Guard.FLOOR_PUSH] = 0.0
+    a[Row.TABLE + Guard.FLOOR_PUSH, Row.P] = 1.0
+    a[Row.P, :3] = place * place - dip, -2.0 * place, 1.0
+    tau, which = first(1.0)
+    a[Row.P, 0] = -1e-8
+    assert first(1.0) == (0.0, Guard.FLOOR_PUSH)
+    a[Row.P, 0] = place * place - dip
+    if dip > series.NOISE[Kind.FORCE]:
+        assert (tau, which) == (pytest.approx(place - math.sqrt(dip), abs=1e-12), Guard.FLOOR_PUSH)
+    else:
+        touched = pytest.approx(place + math.sqrt(dip), abs=3e-9)
+        assert (tau, which) == (touched, Guard.NONE) or (
+            dip == 0.0 and (tau, which) == (1.0, Guard.NONE)
+        )
+        a[Row.P, 0] += tau * (a[Row.P, 1] + tau)  # the series about tau
+        a[Row.P, 1] += 2.0 * tau
+        assert first(0.5) == (0.5, Guard.NONE)
+
+
+@pytest.mark.parametrize("noise", NOISES)
+def test_noise_is_no_sign(noise):
+    """A value below the noise tells nothing: what follows it does."""
+    for sign in (1.0, -1.0):
+        assert Core.leading([sign * 0.5 * noise], noise) == 0
+        assert Core.leading([sign * 2.0 * noise], noise) == sign
+        assert Core.leading([-sign * 0.5 * noise, sign], noise) == sign
+        assert Core.leading([0.0, -sign * 0.5 * noise / series.AHEAD, sign], noise) == sign
+    assert Core.first_root([0.5 * noise, 0.0, -1.0], 1.0, noise) == 0.0
+    assert Core.first_root([-0.5 * noise, 0.0, 1.0], 1.0, noise) is None
+    assert Core.first_root([-0.5 * noise, 0.0, 0.0], 1.0, noise) is None
+    # Negative, but for less than an instant: an event's time is not known better than that.
+    assert Core.leading([-1e-10, 1.0]) == 1
+    assert Core.leading([-1e-8, 1.0]) == -1
+
+
+@pytest.mark.parametrize("noise", NOISES)
+def test_what_is_noise_at_first_may_grow(noise):
+    """In a long step a guard that starts as noise and falls is met where it has become more than
+    noise."""
+    c = [0.0, 0.0, 0.0, 0.0, -noise]  # -noise tau^4
+    assert Core.leading(c, noise) == 0
+    assert Core.first_root(c, 0.9, noise) is None
+    found = Core.first_root(c, 10.0, noise)
+    assert found is not None
+    assert 0.9 < found < 1.2
+    # Met where it has fallen by the noise: noise tau^4 / 16 is that at tau = 2.
+    assert Core.first_root([0.0, 0.0, 0.0, 0.0, -noise / 16.0], 10.0, noise) == pytest.approx(
+        2.0, rel=1e-9
+    )
+
+
+def test_terms_beyond_the_third_drown_no_earlier_one():
+    """Where friction nearly jams the pivot they grow without bound: the noise that they bring is
+    not that of a slope."""
+    assert Core.leading([0.0, -1e-7, 0.0, 1e12]) == -1
+    assert Core.leading([0.0, -1e-7, 1e12]) == 1, "the third one does"
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_what_stays_below_a_level_is_below_it(seed):
+    r = np.random.default_rng(seed)
+    a, _ = workspace()
+    n, tau = 8, r.uniform(0.1, 2.0)
+    a[0, : n + 1] = r.normal(size=n + 1) / np.cumprod(np.arange(1.0, n + 2.0))
+    highest = max(series.value(a, 0, n, t) for t in np.linspace(0.0, tau, 2001))
+    for level in highest + np.array([-0.5, -1e-3, -1e-9, 0.1, 2.0]):
+        if series.stays_below(a, 0, n, tau, level):
+            assert highest < level
+    assert series.stays_below(a, 0, n, tau, abs(highest) + 1e3)
+
+
+@pytest.mark.parametrize("degree", [2, 3, 6])
+def test_the_bound_of_what_stays_below_is_as_it_says(degree):
+    """Of t - t^degree, whose curvature is largest at the end: d^2/8 of it above the largest of five
+    values, and no more."""
+    a, _ = workspace()
+    a[0, 1], a[0, degree] = 1.0, -1.0
+    highest = max(series.value(a, 0, degree, t) for t in (0.0, 0.25, 0.5, 0.75, 1.0))
+    rise = 0.25**2 / 8.0 * degree * (degree - 1.0)
+    assert series.stays_below(a, 0, degree, 1.0, (highest + rise) * 1.00001)
+    assert not series.stays_below(a, 0, degree, 1.0, (highest + rise) * 0.99999)

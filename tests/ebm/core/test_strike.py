@@ -1,0 +1,189 @@
+"""What an impact does to a block: onto its contact, landings, rebounds from walls, and the Zeno
+rule."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from stepping import ROCKS, run_at, six
+
+from rockcheck.ebm import EventBasedModel, natural
+from rockcheck.ebm.core import contacts, settle
+from rockcheck.ebm.core.laws import strike
+from rockcheck.ebm.core.names import Family, Guard, Pivot
+from rockcheck.ebm.core.rules import Rule
+from rockcheck.scenes import Block, Floor, Scene, Wall
+from rockcheck.scenes.scene import PAPER_BLOCK
+
+
+@pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
+def test_a_block_rocks_on_until_its_rate_is_a_ten_millionth(pivot):
+    """Housner's impacts follow each other down to a rate of 1e-6 sqrt(g/R) at least; with the
+    paper's pivot all to 5e-8."""
+    alpha = PAPER_BLOCK.alpha
+    tilt, ratio = 0.3 * alpha, 1.0 - 1.5 * math.sin(alpha) ** 2
+    scene = Scene(
+        name="still",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=0.8),
+        initial_rotation=tilt,
+        duration=12.0,
+        output_step=0.1,
+    )
+    history = EventBasedModel(pivot=pivot).simulate(scene)
+    assert history.outcome == "at rest"
+    speed = math.sqrt(scene.gravity * PAPER_BLOCK.radius)
+    rates = [
+        event.impulse / speed / (math.sin(alpha) * (1.0 + ratio))
+        for event in history.event_list
+        if event.kind == "floor impact"
+    ]
+    first = math.sqrt(1.5 * (math.cos(alpha - tilt) - math.cos(alpha)))
+    np.testing.assert_allclose(rates[:100], first * ratio ** np.arange(100), rtol=1e-6)
+    assert rates[-1] < 1e-6
+    if pivot == "bilateral":
+        assert len(rates) == math.ceil(math.log(5e-8 / first) / math.log(ratio))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_block_is_put_onto_the_contact_that_closes(side):
+    """The gap is zero to rounding, whichever it was and whatever the pivot does; what need not give
+    way keeps its place."""
+    alpha, gap, off = 0.4, 0.05, 1e-7
+    walls = (Wall(side="left", gap=gap), Wall(side="right", gap=2.0 * gap))
+    block = Block(half_width=math.sin(alpha), half_height=math.cos(alpha))
+    scene = Scene(name="touch", block=block, floor=Floor(friction=0.5), walls=walls, duration=1.0)
+    b = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
+    for tilt in (0.0, 0.15):
+        family, tip = (Family.TILT, side) if tilt else (Family.FLAT, 1)
+        for which, floor, wall in (
+            (Guard.LANDING, Pivot.OFF, 0),
+            (Guard.TIP_GAP, Pivot.STICK, tip),
+            (Guard.TIP_GAP, Pivot.SLIPPING, tip),
+            (Guard.FAR_GAP, Pivot.SLIPPING, -tip),
+        ):
+            place = [0.0, math.cos(alpha - tilt), side * tilt, 0.0, 0.0, 0.0]
+            state = run_at(place, family=family, sense=tip, pivot=floor).state
+            z = state.motion
+            if wall:
+                z.x = -wall * (contacts.wall_gap(b, z, wall) - off)
+            else:
+                z.y += off
+            before = six(z)
+            strike.touch(b, state.mode, z, which)
+            gap = contacts.wall_gap(b, z, wall) if wall else contacts.floor_gap(b, z)
+            assert gap == pytest.approx(0.0, abs=1e-13)
+            assert np.max(np.abs(six(z) - before)) == pytest.approx(off, rel=1.0)
+            if wall and tilt and floor == Pivot.STICK:
+                pivots = [one[0] - side * math.sin(alpha - abs(one[2])) for one in (before, six(z))]
+                assert pivots[1] == pytest.approx(pivots[0], abs=1e-15)
+                assert contacts.floor_gap(b, z) == 0.0
+            else:
+                kept = [k for k in range(6) if k != (0 if wall else 1)]
+                np.testing.assert_array_equal(six(z)[kept], before[kept])
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_flush_landing_rebounds_as_the_wall_does_that_it_meets(side):
+    """The paper's pivot, closed branch: a block that tipped to one side lands against the other
+    one's wall, with that one's restitution."""
+    walls = (
+        Wall(side="left", gap=0.0, restitution=0.3),
+        Wall(side="right", gap=0.0, restitution=0.7),
+    )
+    block = Block(half_width=math.sin(0.4), half_height=math.cos(0.4))
+    scene = Scene(name="flush", block=block, floor=Floor(friction=0.5), walls=walls, duration=1.0)
+    b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
+    e, w = (0.7 if side > 0 else 0.3), -0.2 * side
+    start = [0.0, math.cos(0.4), 0.0, -math.cos(0.4) * w, 0.0, w]
+    state = run_at(start, **ROCKS, sense=side).state
+    assert not strike._floor_impact(b, state, 1e-9)
+    after = [-e * w, math.cos(0.4) * e * w, -side * math.sin(0.4) * e * w]
+    found = [state.motion.w, state.motion.vx, state.motion.vy]
+    assert found == pytest.approx(after, abs=1e-15)
+    assert state.floor_impulse == pytest.approx((1.0 + e) * math.sin(0.4) * abs(w))
+    assert state.wall_impulse == 0.0
+    assert (state.rules[Rule.FLUSH_LANDING], state.rules.sum()) == (1, 1)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_corner_rebounds_as_the_wall_does_that_it_strikes(side):
+    """The paper's pivot, held: a block that tips to one side meets that wall, and its corner leaves
+    with that one's restitution."""
+    walls = (
+        Wall(side="left", gap=0.5, restitution=0.3),
+        Wall(side="right", gap=0.5, restitution=0.7),
+    )
+    block = Block(half_width=math.sin(0.4), half_height=math.cos(0.4))
+    scene = Scene(name="corner", block=block, floor=Floor(friction=0.5), walls=walls, duration=1.0)
+    b = natural.setting_of(scene, unilateral=False, no_slip=True, energy_cap=False)
+    w = 0.3 * side
+    start = [0.0, math.cos(0.25), 0.15 * side, -math.cos(0.25) * w, math.sin(0.25) * abs(w), w]
+    state = run_at(start, **ROCKS, sense=side).state
+    assert strike._wall_impact(b, state, True, 1e-9)
+    e = 0.3 if side > 0 else 0.7
+    assert state.motion.w == pytest.approx(-e * w, abs=1e-15)
+    assert state.motion.vx == pytest.approx(math.cos(0.25) * e * w, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("slip", "kept"), [(0.1, True), (-3e-7, True), (1e-7, False), (-1e-7, False)]
+)
+def test_a_block_that_lands_with_less_spin_than_counts_slides_on(slip, kept):
+    """Its spin, and a bounce and a slip below the settling speed, are gone; a slip above it, and a
+    faster bounce, are not."""
+    block = Block(half_width=math.sin(0.4), half_height=math.cos(0.4))
+    scene = Scene(name="lands", block=block, floor=Floor(friction=0.5), duration=1.0)
+    b = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
+    for bounce, stays in ((0.1, False), (4e-8, True)):
+        state = run_at([0.2, math.cos(0.4), 0.0, slip, bounce, 3e-8]).state
+        v, z = contacts.slip_velocity(b, state.motion), state.motion
+        strike._settle_flat(b, state, settle.SETTLE)
+        assert six(z).tolist() == [
+            0.2,
+            math.cos(0.4),
+            0.0,
+            v if kept else 0.0,
+            0.0 if stays else bounce,
+            0.0,
+        ]
+        assert (state.rules[Rule.SETTLES], state.rules.sum()) == (1, 1)
+
+
+def struck_at(state, t: float) -> float:
+    """The settling speed as an impact at this time finds it."""
+    state.t = t
+    return settle.settling_speed(state)
+
+
+def test_the_settling_speed_rises_as_impacts_accumulate():
+    """Tenfold with every hundred impacts up to 2.5e-3, without a bound after five hundred times as
+    many; back after a quiet 0.025."""
+    state, t = run_at().state, 0.0
+    settle.no_impacts(state)
+    speeds = []
+    for _ in range(50_100):
+        t += 2.5e-7
+        speeds.append(struck_at(state, t))
+    rises = [k + 1 for k in range(1, len(speeds)) if speeds[k] != speeds[k - 1]]
+    assert rises == [100, 200, 300, 400, 500, 50_000]
+    np.testing.assert_allclose(
+        [speeds[0], *(speeds[k - 1] for k in rises)], [5e-8, 5e-7, 5e-6, 5e-5, 5e-4, 2.5e-3, np.inf]
+    )
+    assert state.rules[Rule.RATTLES] == 501
+    assert struck_at(state, t + 0.024) == np.inf
+    assert struck_at(state, t + 0.024 + 0.026) == 5e-8
+    settle.no_impacts(state)
+    for k in range(300):  # as many in a longer time are no rattle
+        assert struck_at(state, 3e-4 * k) == 5e-8
+
+
+def test_impacts_at_one_instant_end_plastic():
+    state = run_at().state
+    settle.no_impacts(state)
+    speeds = [struck_at(state, 1.0) for _ in range(21)]
+    assert speeds == [5e-8] * 20 + [np.inf]  # the first, and twenty more at its instant
+    assert state.rules[Rule.ENDLESS_STAGES] == 1
+    assert struck_at(state, 1.001) == 5e-8

@@ -1,0 +1,424 @@
+"""The paper's closed-form equations, integrated by scipy's DOP853 at 1e-13 (see
+test_another_method.py)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from rockcheck.scenes import Record, Scene
+
+State = NDArray[np.float64]  # x, theta, dx/dt, dtheta/dt
+
+
+def sign(value: float) -> int:
+    return 1 if value >= 0.0 else -1
+
+
+@dataclass(frozen=True)
+class Mode:
+    """Pivot S (+1 left corner), direction d of its slip (0: sticks), wall Sw that a corner rests on
+    (0: none), sign of G or P."""
+
+    S: int
+    d: int = 0
+    Sw: int = 0
+    sense: int = 1
+
+    @property
+    def name(self) -> str:
+        return ("ladder" if self.d else "lean") if self.Sw else ("slide-rock" if self.d else "rock")
+
+
+@dataclass
+class PaperModel:
+    """The event-based model of one scene, with a pivot that never leaves the floor and at most one
+    wall."""
+
+    scene: Scene
+    max_step: float = 5e-3
+    events: list[tuple[float, str]] = field(default_factory=list)
+    pieces: list[tuple[float, float, Callable[[float], State]]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.alpha, self.R, self.g = (
+            self.scene.block.alpha,
+            self.scene.block.radius,
+            self.scene.gravity,
+        )
+        self.mu_s, self.mu_k = self.scene.floor.mu_s, self.scene.floor.friction
+        self.wall = self.scene.walls[0] if self.scene.walls else None
+        self.side = {"left": 1, "right": -1}[self.wall.side] if self.wall else 0
+        self.delta = self.scene.block.half_width + self.wall.gap if self.wall else math.inf
+
+    def u(self, t: float) -> float:
+        return float(self.scene.excitation.acceleration(t))
+
+    def G0(self, t: float) -> float:
+        return self.g + float(self.scene.vertical.acceleration(t))
+
+    def geometry(self, theta: float) -> tuple[float, float, float, float]:
+        a = abs(theta)
+        return (
+            math.sin(self.alpha - a),
+            math.cos(self.alpha - a),
+            math.sin(self.alpha + a),
+            math.cos(self.alpha + a),
+        )
+
+    def motion(self, m: Mode, t: float, y: State) -> tuple[float, float, float, float, float]:
+        """x'', theta'', P, Q, N of a mode."""
+        _, theta, _, w = y
+        s, c, sp, cp = self.geometry(theta)
+        S, R, u, G0 = m.S, self.R, self.u(t), self.G0(t)
+        G = G0 - R * c * w * w
+        sigma = S * m.Sw
+        C = sigma * cp
+        if m.name == "rock":  # (3)
+            turn = 0.75 / R * (u * c - S * s * G0)
+            x2 = -R * c * turn - S * R * s * w * w
+            return x2, turn, S * R * s * turn + G, x2 + u, 0.0
+        if m.name == "slide-rock":  # (7), (8)
+            eta = self.mu_k * S * m.d * m.sense
+            P = G / (1.0 + 3.0 * s * s + 3.0 * eta * s * c)
+            Q = -self.mu_k * m.d * abs(P)
+            return Q - u, -3.0 / R * S * (s + eta * c) * P, P, Q, 0.0
+        if m.name == "lean":
+            N = m.Sw * (u * c - S * s * G0) / (c + C)
+            return 0.0, 0.0, G0, u - m.Sw * N, N
+        k = self.mu_k * m.d * m.sense
+        turn = -(k * (c + C) + S * s) * G - C * (u - sigma * S * R * sp * w * w)
+        turn /= R * (1.0 / 3.0 + s * s + cp * cp + k * S * s * (c + C))
+        P = S * R * s * turn + G
+        x2 = sigma * (R * cp * turn - S * R * sp * w * w)
+        return x2, turn, P, -k * P, m.Sw * (x2 + u + k * P)
+
+    def slip(self, y: State) -> float:
+        return y[2] + self.R * math.cos(self.alpha - abs(y[1])) * y[3]
+
+    def slip_rate_change(self, m: Mode, t: float, y: State) -> float:
+        x2, turn = self.motion(m, t, y)[:2]
+        s, c, _, _ = self.geometry(y[1])
+        return x2 + self.R * c * turn + m.S * self.R * s * y[3] ** 2
+
+    def gap(self, y: State) -> float:
+        return self.side * y[0] + self.delta - self.R * math.sin(self.alpha + abs(y[1]))
+
+    def gap_change(self, m: Mode, t: float, y: State) -> float:
+        """Second derivative of the gap, for a corner on the wall."""
+        x2, turn = self.motion(m, t, y)[:2]
+        _, _, sp, cp = self.geometry(y[1])
+        sigma = m.S * self.side
+        return self.side * (x2 - self.R * sigma * cp * turn + sigma * m.S * self.R * sp * y[3] ** 2)
+
+    def tilted(self, t: float, y: State, closed: bool) -> Mode:
+        """The tilt selector, with a corner on the wall or without."""
+        S = sign(y[1] if y[1] != 0.0 else y[3])
+        V, w, Sw = self.slip(y), y[3], self.side
+        if closed and abs(w) > 1e-12:
+            ladder = Mode(S, sign(w), Sw)
+            return ladder if self.motion(ladder, t, y)[4] >= 0.0 else Mode(S, sign(V))
+        if closed:
+            lean = Mode(S, 0, Sw)
+            _, _, P, Q, N = self.motion(lean, t, y)
+            if N >= 0.0 and abs(Q) <= self.mu_s * P:
+                return lean
+        elif abs(V) > 1e-12:
+            return self.with_sense(Mode(S, sign(V)), t, y)
+        rock = Mode(S)
+        _, _, P, Q, _ = self.motion(rock, t, y)
+        if abs(Q) <= self.mu_s * abs(P) and (not closed or self.gap_change(rock, t, y) >= 0.0):
+            return rock
+        if not closed:
+            return self.with_sense(Mode(S, -sign(Q)), t, y)
+        found = [
+            ladder
+            for ladder in (Mode(S, 1, Sw), Mode(S, -1, Sw))
+            if self.starts_down_the_wall(ladder, t, y)
+        ]
+        found += [
+            sliding
+            for sliding in (Mode(S, 1), Mode(S, -1))
+            if self.starts_off_the_wall(sliding, t, y)
+        ]
+        assert len(found) == 1, found
+        return found[0]
+
+    def C(self, S: int, y: State) -> float:
+        return S * self.side * math.cos(self.alpha + abs(y[1]))
+
+    def starts_down_the_wall(self, m: Mode, t: float, y: State) -> bool:
+        _, turn, _, _, N = self.motion(m, t, y)
+        return m.d * turn > 0.0 and N >= 0.0
+
+    def starts_off_the_wall(self, m: Mode, t: float, y: State) -> bool:
+        return m.d * self.slip_rate_change(m, t, y) > 0.0 and self.gap_change(m, t, y) > 0.0
+
+    def with_sense(self, m: Mode, t: float, y: State) -> Mode:
+        return Mode(
+            m.S, m.d, m.Sw, sign(self.G0(t) - self.R * math.cos(self.alpha - abs(y[1])) * y[3] ** 2)
+        )
+
+    def guards(self, m: Mode) -> dict[str, Callable[[float, State], float]]:
+        """Functions that fall through zero where the mode ends."""
+        out: dict[str, Callable[[float, State], float]] = {
+            "floor impact": lambda t, y: m.S * y[1],
+            "overturned": lambda t, y: math.pi / 2 - m.S * y[1],
+        }
+        if m.Sw:
+            out["release"] = lambda t, y: self.motion(m, t, y)[4]
+        elif self.wall:
+            out["wall impact"] = lambda t, y: self.gap(y)
+        if not m.d:
+            out["slip"] = lambda t, y: (
+                self.mu_s * abs(self.motion(m, t, y)[2]) - abs(self.motion(m, t, y)[3])
+            )
+        elif not m.Sw:
+            out["stick"] = lambda t, y: m.d * self.slip(y)
+            out["sense"] = lambda t, y: m.sense * self.motion(m, t, y)[2]
+        else:
+            out["stick"] = lambda t, y: m.d * self.slip(y)
+        return out
+
+    def impact(
+        self,
+        S: int,
+        y: State,
+        vertical: float,
+        *,
+        e: float | None = None,
+        slips: int = 0,
+        sense: int = 1,
+    ) -> list[float]:
+        """Momentum balance of one impact at a speed `vertical` of the centroid: dx/dt, w after it,
+        impulses P, Q, N.
+
+        The pivot sticks or, with `slips` its direction, slips under a P of sign `sense`; the corner
+        on the wall rebounds with e or, with None, receives nothing.
+        """
+        s, c, _, _ = self.geometry(y[1])
+        R, C, Sw = self.R, self.C(S, y) if self.wall else 0.0, self.side
+        v1, w1 = y[2], y[3]
+        a, b = np.zeros((5, 5)), np.zeros(5)  # unknowns: dx/dt, w, P, Q, N
+        a[0], b[0] = [1.0, 0.0, 0.0, -1.0, -Sw], v1
+        a[1], b[1] = [0.0, S * R * s, -1.0, 0.0, 0.0], vertical
+        a[2], b[2] = [0.0, R * R / 3.0, S * R * s, -R * c, R * C * Sw], R * R / 3.0 * w1
+        a[3] = (
+            [0.0, 0.0, self.mu_k * slips * sense, 1.0, 0.0]
+            if slips
+            else [1.0, R * c, 0.0, 0.0, 0.0]
+        )
+        if e is None:
+            a[4] = [0.0, 0.0, 0.0, 0.0, 1.0]
+        else:
+            a[4], b[4] = [1.0, -R * C, 0.0, 0.0, 0.0], -e * (v1 - R * C * w1)
+        return np.linalg.solve(a, b).tolist()
+
+    def hit_floor(self, m: Mode, y: State) -> State:
+        s, c, _, _ = self.geometry(0.0)
+        S2, vertical = -m.S, m.S * self.R * s * y[3]
+        y = np.array([y[0], 0.0, y[2], y[3]])
+        v, w, P, Q, _ = self.impact(S2, y, vertical)
+        if S2 * w < 0.0 or P < 0.0 or abs(Q) > self.mu_s * P:
+            slides = [(d, *self.impact(S2, y, vertical, slips=d)[:2]) for d in (1, -1)]
+            ((v, w),) = [
+                (v, w) for d, v, w in slides if S2 * w >= 0.0 and d * (v + self.R * c * w) >= 0.0
+            ]
+        return np.array([y[0], 0.0, v, w])
+
+    def hit_wall(self, m: Mode, y: State) -> tuple[State, bool]:
+        """The cascade of Fig. 3; also whether the corner stays on the wall."""
+        s, c, _, _ = self.geometry(y[1])
+        R, C, S, Sw, e = self.R, self.C(m.S, y), m.S, self.side, self.wall.restitution
+        vertical = S * R * s * y[3]
+        v, w, P, Q, N = self.impact(S, y, vertical, e=e)
+        if abs(Q) <= self.mu_s * abs(P):
+            if N >= 0.0:  # A
+                return np.array([y[0], y[1], v, w]), e == 0.0
+            v, w, *_ = self.impact(S, y, vertical)
+            if Sw * (v - R * C * w) >= 0.0:  # B
+                return np.array([y[0], y[1], v, w]), False
+            return np.array([y[0], y[1], 0.0, 0.0]), e == 0.0  # C
+        found = []
+        for Sr in (1, -1):
+            for sy in (1, -1):
+                v, w, P, Q, N = self.impact(S, y, vertical, e=e, slips=Sr, sense=sy)
+                if sign(P) == sy and sign(v + R * c * w) == Sr:
+                    found.append((v, w, N, -self.mu_k * Sr * sy))
+        ((v, w, N, k),) = found
+        if N >= 0.0:  # D
+            return np.array([y[0], y[1], v, w]), e == 0.0
+        # E: no impulse from the wall, whose corner neither rebounds nor enters; the moment is what
+        # is left over.
+        w = (k * vertical - y[2]) / (k * S * R * s - R * C)
+        return np.array([y[0], y[1], R * C * w, w]), False
+
+    def uplift(self, t: float, x: float) -> tuple[float, Mode | None, State]:
+        """From rest: when and how the block starts to move. Only blocks whose friction lets them
+        tilt."""
+        slope, end = math.tan(self.alpha), self.scene.duration
+        assert self.mu_s >= slope
+        y = np.array([x, 0.0, 0.0, 0.0])
+        held = self.side if self.gap(y) < 1e-10 else 0  # a flush block cannot tilt toward its wall
+
+        def excess(t: float) -> float:
+            return max(S * self.u(t) for S in (1, -1) if held != S) - slope * self.G0(t)
+
+        fine = np.append(np.arange(t, end, 1e-3), end)
+        first = next((k for k, s in enumerate(fine) if excess(s) > 0.0), None)
+        if first is None:
+            return end, None, y
+        t = brentq(excess, fine[first - 1], fine[first], xtol=1e-15, rtol=1e-15) if first else t
+        S = sign(self.u(t))
+        sticks = self.mu_s >= (slope * (1.0 + 4.0 * slope**2) + 3.0 * slope) / (
+            4.0 + slope**2 + 3.0 * slope**2
+        )
+        return t, (Mode(S) if sticks else Mode(S, -S)), y
+
+    def run(self) -> PaperModel:
+        scene = self.scene
+        x, _, theta, v, _, w = scene.initial_state
+        t, y = 0.0, np.array([x, theta, v, w])
+        mode = self.tilted(t, y, closed=False) if theta != 0.0 or w != 0.0 else None
+        while t < scene.duration:
+            if mode is None:
+                start = t
+                t, mode, y = self.uplift(t, y[0])
+                self.pieces.append((start, t, lambda _, y=y: y))
+                if mode is None:
+                    return self
+                self.events.append((t, "uplift"))
+                continue
+            if mode.name == "lean":
+                t, y, kind = self.lean_until(mode, t, y)
+            else:
+                t, y, kind = self.step(mode, t, y)
+            if kind == "end":
+                return self
+            if kind != "sense":
+                self.events.append((t, kind))
+            if kind == "overturned":
+                return self
+            mode, y = self.after(mode, kind, t, y)
+        return self
+
+    def after(self, mode: Mode, kind: str, t: float, y: State) -> tuple[Mode | None, State]:
+        """The mode after an event, and the state in it."""
+        if kind == "floor impact":
+            if mode.Sw:  # every contact plastic: flush rest
+                return None, np.array([y[0], 0.0, 0.0, 0.0])
+            y = self.hit_floor(mode, y)
+            if abs(y[3]) < 1e-7:
+                return None, np.array([y[0], 0.0, 0.0, 0.0])
+            return self.tilted(t, self.on_pivot(y), closed=False), self.on_pivot(y)
+        if kind == "wall impact":
+            y, stays = self.hit_wall(mode, y)
+            return self.tilted(t, y, closed=stays), y
+        if kind == "stick":
+            c = math.cos(self.alpha - abs(y[1]))
+            if mode.Sw:
+                y = np.array([y[0], y[1], 0.0, 0.0])
+            y = np.array([y[0], y[1], -self.R * c * y[3], y[3]])
+            return self.tilted(t, y, closed=mode.Sw != 0), y
+        if kind == "slip":
+            Q = self.motion(mode, t, y)[3]
+            return self.with_sense(Mode(mode.S, -sign(Q), mode.Sw), t, y), y
+        if kind == "sense":
+            return Mode(mode.S, mode.d, mode.Sw, -mode.sense), y
+        if mode.d:  # released while it slips down the wall
+            return self.with_sense(Mode(mode.S, mode.d), t, y), y
+        Q = self.motion(Mode(mode.S), t, y)[3]
+        P = self.motion(Mode(mode.S), t, y)[2]
+        return (
+            Mode(mode.S)
+            if abs(Q) <= self.mu_s * abs(P)
+            else self.with_sense(Mode(mode.S, -sign(Q)), t, y)
+        ), y
+
+    def on_pivot(self, y: State) -> State:
+        """Slip that is only rounding is taken out."""
+        V = self.slip(y)
+        return np.array([y[0], y[1], y[2] - V, y[3]]) if abs(V) < 1e-12 else y
+
+    def lean_until(self, m: Mode, t: float, y: State) -> tuple[float, State, str]:
+        def margin(which: str, t: float) -> float:
+            _, _, P, Q, N = self.motion(m, t, y)
+            return N if which == "release" else self.mu_s * P - abs(Q)
+
+        times = np.arange(t, self.scene.duration, 1e-3)
+        for a, b in pairwise(times):
+            for which in ("release", "slip"):
+                if margin(which, b) < 0.0:
+                    root = brentq(
+                        lambda s, which=which: margin(which, s), a, b, xtol=1e-15, rtol=1e-15
+                    )
+                    self.pieces.append((t, root, lambda _, y=y: y))
+                    return root, y, which
+        self.pieces.append((t, self.scene.duration, lambda _, y=y: y))
+        return self.scene.duration, y, "end"
+
+    def step(self, m: Mode, t: float, y: State) -> tuple[float, State, str]:
+        """Integrates one mode to its end."""
+
+        def rates(t: float, y: State) -> list[float]:
+            x2, turn, _, _, _ = self.motion(m, t, y)
+            return [y[2], y[3], x2, turn]
+
+        named = self.guards(m)
+        events = []
+        for function in named.values():
+
+            def falls(
+                t: float, y: State, function: Callable[[float, State], float] = function
+            ) -> float:
+                return function(t, y)
+
+            falls.terminal = True  # type: ignore[attr-defined]
+            falls.direction = -1.0  # type: ignore[attr-defined]
+            events.append(falls)
+        ends = [self.scene.duration]
+        excitation = self.scene.excitation
+        if isinstance(excitation, Record):  # stop at the samples, where the motion has kinks
+            ends = [
+                s
+                for s in excitation.time_step * np.arange(1, len(excitation.unscaled))
+                if s > t + 1e-12 and s < ends[0]
+            ] + ends
+        for end in ends:
+            run = solve_ivp(
+                rates,
+                (t, end),
+                y,
+                method="DOP853",
+                rtol=1e-13,
+                atol=1e-15,
+                max_step=self.max_step,
+                events=events,
+                dense_output=True,
+            )
+            self.pieces.append((t, run.t[-1], run.sol))
+            t, y = run.t[-1], run.y[:, -1]
+            if run.status == 1:
+                (kind,) = (
+                    name for name, found in zip(named, run.t_events, strict=True) if found.size
+                )
+                return t, y, kind
+        return t, y, "end"
+
+    def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """x, theta, dx/dt, dtheta/dt at the times, up to where the run ended."""
+        rows, k = [], 0
+        for t in times:
+            while k < len(self.pieces) - 1 and t > self.pieces[k][1]:
+                k += 1
+            if t > self.pieces[k][1] + 1e-9:
+                break
+            rows.append(self.pieces[k][2](t))
+        return np.array(rows)

@@ -1,0 +1,342 @@
+"""Blocks in a state under constant accelerations, as tests of the core's parts take them.
+
+`Core` is all that these tests know of how the core is called: a core of another shape is met there,
+and nowhere else.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+import numpy as np
+from stepping import TILTED, run_at
+
+from rockcheck.ebm import natural
+from rockcheck.ebm.core import (
+    guards,
+    modes,
+    motion,
+    series,
+)
+from rockcheck.ebm.core.names import Family, Guard, Kind, Pivot, Row
+from rockcheck.ebm.core.rules import Rule
+from rockcheck.scenes import Block, Floor, Record, Scene, Wall
+
+PIVOTS = ["bilateral", "unilateral"]
+#: Order of the series that guards are taken from.
+ORDER = 8
+
+
+class Mode(NamedTuple):
+    """Contacts of a mode in the frame of its pivot, in which a tilted block tips to the left."""
+
+    tilted: bool
+    side: int  # sign of theta
+    floor: str  # "off", "stick" or "slip"
+    slip: int  # direction
+    pull: int  # sign of the floor's force
+    tip: bool  # a corner rests on the wall that the block tips to
+    far: bool
+
+    @property
+    def contacts(self) -> int:
+        return (self.floor != "off") + self.tip + self.far
+
+    @property
+    def name(self) -> str:
+        if not self.tilted:
+            return {"off": "flight", "stick": "rest", "slip": "slide"}[self.floor]
+        return {"off": "flight", "stick": "rock", "slip": "slide-rock"}[self.floor]
+
+
+class Core:
+    """The core as these tests call it. Natural units: R, g, sqrt(R/g)."""
+
+    @staticmethod
+    def first_root(
+        coefficients, h: float, noise: float = series.NOISE[Kind.POSITION]
+    ) -> float | None:
+        """First time in [0, h] at which the polynomial (constant first) turns negative."""
+        row, stack = _row(coefficients), np.zeros((48, series.WIDTH))
+        found = series.first_root(row, 0, len(coefficients) - 1, h, h, noise, series.AHEAD, stack)
+        return None if found == series.NO_ROOT else found
+
+    @staticmethod
+    def leading(coefficients, noise: float = series.NOISE[Kind.POSITION]) -> int:
+        """Sign with which the polynomial leaves zero."""
+        return series.leading(_row(coefficients), 0, len(coefficients) - 1, noise, series.AHEAD)
+
+    def __init__(self, scene: Scene, pivot: str, friction: str = "coulomb") -> None:
+        assert scene.gravity == scene.block.radius == 1.0
+        self.setting = natural.setting_of(
+            scene, unilateral=pivot == "unilateral", no_slip=friction == "no-slip", energy_cap=False
+        )
+        self.base = natural.base_of(scene)
+
+    def select(self, state) -> Mode | None:
+        """The mode in which the state (x, y, theta and their rates) goes on."""
+        run = run_at(state)
+        found = run.state
+        if not modes.select(self.setting, self.base, run):
+            return None
+        if found.rules[Rule.LEAST_CONTRADICTION]:
+            return None
+        mode = found.mode
+        floor = {Pivot.OFF: "off", Pivot.STICK: "stick", Pivot.SLIPPING: "slip"}[mode.pivot]
+        at = (bool(mode.tip), bool(mode.far))
+        tilted = bool(mode.family == Family.TILT)
+        return Mode(tilted, int(mode.sense), floor, int(mode.slip), int(mode.pull), *at)
+
+    def guards(self, mode: Mode, state) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+        """Guards of a tilted mode as polynomials of time, and the motion (phi, xi, y) that they
+        follow."""
+        run = run_at(
+            state,
+            **TILTED | {"pull": mode.pull},
+            sense=mode.side,
+            slip=mode.slip,
+            pivot={"off": Pivot.OFF, "stick": Pivot.STICK, "slip": Pivot.SLIPPING}[mode.floor],
+            tip=mode.tip,
+            far=mode.far,
+        )
+        order = motion.tilt_series(self.setting, self.base, run, ORDER, 0.0, 0.0)
+        a = self.work = run.a
+        pivot = run.state.place = mode.side * state[0] - a[Row.SIN, 0]
+        names = {
+            "far gap": Guard.FAR_GAP,
+            "tip gap": Guard.TIP_GAP,
+            "landing": Guard.LANDING,
+        }
+        names |= {
+            "push": Guard.FLOOR_PUSH,
+            "tip push": Guard.TIP_PUSH,
+            "far push": Guard.FAR_PUSH,
+        }
+        names |= {
+            "cone +": Guard.CONE_PLUS,
+            "cone -": Guard.CONE_MINUS,
+            "slip": Guard.SLIP,
+        }
+        names |= {"topple": Guard.TOPPLE, "phi": Guard.PHI}
+        guards.fill_guards(self.setting, run.state, run.a)
+        found = {}
+        for name, which in names.items():
+            degree = guards.guard(which, order, a)
+            if degree >= 0:
+                found[name] = a[Row.GUARD, : degree + 1].copy()
+        rock = mode.floor == "stick" and not mode.tip and not mode.far
+        rows = {"phi": a[Row.PHI, : order + 1].copy()}
+        xi = a[Row.SIN if rock else Row.XI, : order + 1].copy()
+        xi[0] += pivot if rock else 0.0
+        return found, rows | {
+            "xi": xi,
+            "y": a[Row.COS if rock else Row.Y, : order + 1].copy(),
+        }
+
+
+def _row(coefficients) -> np.ndarray:
+    row = np.zeros((1, series.WIDTH))
+    row[0, : len(coefficients)] = coefficients
+    return row
+
+
+def value(coefficients, tau):
+    return np.polynomial.polynomial.polyval(tau, coefficients)
+
+
+@dataclasses.dataclass(frozen=True)
+class Situation:
+    """A block (R = 1, g = 1) under constant accelerations of its base, with walls that it may
+    touch, in a state."""
+
+    alpha: float
+    mu_s: float
+    mu_k: float
+    u: float
+    g: float
+    state: tuple[float, ...]
+    walls: tuple[Wall, ...] = ()
+
+    @property
+    def scene(self) -> Scene:
+        block = Block(half_width=math.sin(self.alpha), half_height=math.cos(self.alpha))
+        block = Block(
+            half_width=block.half_width / block.radius, half_height=block.half_height / block.radius
+        )
+        if block.radius != 1.0:  # of the last bit
+            block = block.model_copy(update={"half_height": math.sqrt(1.0 - block.half_width**2)})
+        horizontal, vertical = (
+            Record.from_samples([a, a, a], time_step=1.0) for a in (self.u, self.g - 1.0)
+        )
+        floor = Floor(friction=self.mu_k, static_friction=self.mu_s)
+        return Scene(
+            name="part",
+            block=block,
+            floor=floor,
+            walls=self.walls,
+            excitation=horizontal,
+            vertical=vertical,
+            duration=1.0,
+            gravity=1.0,
+        )
+
+
+def upright(u: float, g: float, alpha: float, mu_s: float, mu_k: float) -> Situation:
+    return Situation(alpha, mu_s, mu_k, u, g, (0.0, math.cos(alpha), 0.0, 0.0, 0.0, 0.0))
+
+
+class Found(NamedTuple):
+    """What a candidate mode asks for, by Newton and Euler: accelerations of xi, y, phi and the
+    contact forces."""
+
+    acceleration: np.ndarray
+    normal: float
+    friction: float
+    tip: float
+    far: float
+
+
+def answer(at: Situation, mode: Mode) -> Found:
+    """Solves the equations of motion of a tilted block with the contacts of a mode, in its pivot's
+    frame."""
+    phi, w = mode.side * at.state[2], mode.side * at.state[5]
+    rows, bias = contacts(at.alpha, phi, w)
+    unknowns = 7  # three accelerations; P, Q, N, M
+    matrix, right = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
+    matrix[:3, :3] = np.diag([1.0, 1.0, 1.0 / 3.0])
+    matrix[:3, 3:] = -rows.T
+    right[:3] = [-mode.side * at.u, -at.g, 0.0]
+    closed = [mode.floor != "off", mode.floor == "stick", mode.tip, mode.far]
+    for k in range(4):
+        if closed[k]:
+            matrix[3 + k, :3], right[3 + k] = rows[k], -bias[k]
+        else:
+            matrix[3 + k, 3 + k] = 1.0
+    if mode.floor == "slip":  # Q = -mu d |P|
+        matrix[4, 3] = at.mu_k * mode.slip * mode.pull
+    solved = np.linalg.solve(matrix, right)
+    return Found(solved[:3], *solved[3:])
+
+
+def contacts(alpha: float, phi: float, w: float) -> tuple[np.ndarray, np.ndarray]:
+    """Of floor (normal, tangent), tip wall and far wall: the gap's derivative by (xi, y, phi), and
+    what the rates alone give it."""
+    s, c, sp, cp = (
+        math.sin(alpha - phi),
+        math.cos(alpha - phi),
+        math.sin(alpha + phi),
+        math.cos(alpha + phi),
+    )
+    rows = np.array([[0.0, 1.0, -s], [1.0, 0.0, c], [1.0, 0.0, -cp], [-1.0, 0.0, -cp]])
+    return rows, np.array([c, s, sp, sp]) * w * w
+
+
+def margin(at: Situation, mode: Mode, touched: tuple[bool, bool], pivot: str) -> float:
+    """By how much a mode is consistent (positive) or not (negative): the least of all that must not
+    be negative."""
+    try:
+        found = answer(at, mode)
+    except np.linalg.LinAlgError:
+        return -math.inf
+    phi, w = mode.side * at.state[2], mode.side * at.state[5]
+    rows, bias = contacts(at.alpha, phi, w)
+    rates = rows @ np.array([mode.side * at.state[3], at.state[4], w])
+    opens = rows @ found.acceleration + bias
+    kept = [math.inf]
+    if mode.tip:
+        kept.append(found.tip)
+    elif touched[0]:
+        kept.append(opens[2])
+    if mode.far:
+        kept.append(found.far)
+    elif touched[1]:
+        kept.append(opens[3])
+    if mode.floor == "off":
+        kept.append(opens[0])
+    elif pivot == "unilateral" or mode.floor == "slip":
+        kept.append(mode.pull * found.normal)
+    if mode.floor == "stick":
+        kept += [at.mu_s * mode.pull * found.normal - sense * found.friction for sense in (1, -1)]
+        kept.append(-1.0 if abs(rates[1]) > 1e-9 else math.inf)
+    if mode.floor == "slip":
+        slips = rates[1] if abs(rates[1]) > 1e-9 else opens[1]
+        kept.append(mode.slip * slips)
+    return min(kept)
+
+
+def candidates(side: int, touched: tuple[bool, bool], pivot: str) -> list[Mode]:
+    found = []
+    for tip, far in ((True, False), (False, True), (False, False)):
+        if (tip and not touched[0]) or (far and not touched[1]):
+            continue
+        for pull in (1,) if pivot == "unilateral" else (1, -1):
+            found.append(Mode(True, side, "stick", 0, pull, tip, far))
+            found += [Mode(True, side, "slip", d, pull, tip, far) for d in (1, -1)]
+        if pivot == "unilateral":
+            found.append(Mode(True, side, "off", 0, 1, tip, far))
+    return found
+
+
+def random_tilt(rng: np.random.Generator, touch: str) -> tuple[Situation, int, tuple[bool, bool]]:
+    """A block tilted at random on the floor, perhaps with a corner on a wall, at rest or moving as
+    its contacts allow."""
+    alpha = rng.uniform(0.05, 0.7)
+    phi, side = alpha * rng.uniform(0.05, 0.9), int(rng.choice([-1, 1]))
+    s, c, sp, cp = (
+        math.sin(alpha - phi),
+        math.cos(alpha - phi),
+        math.sin(alpha + phi),
+        math.cos(alpha + phi),
+    )
+    mu_k = rng.uniform(0.0, 1.2)
+    mu_s = min(mu_k * float(rng.choice([1.0, rng.uniform(1.0, 1.4)])), 1.33)
+    w, v, xi = 0.0, 0.0, rng.uniform(-0.02, 0.02)
+    if touch == "none":
+        w, v = rng.choice([0.0, rng.normal(0.0, 0.5)]), rng.choice([0.0, rng.normal(0.0, 0.5)])
+        walls: tuple[Wall, ...] = ()
+    else:
+        w = rng.choice([0.0, 0.0, rng.normal(0.0, 0.3)])
+        wall = 1.0 if touch == "tip" else -1.0
+        # xi + delta = s' on the tip wall, delta - xi = s' on the far one
+        gap = sp - wall * xi - math.sin(alpha)
+        if gap < 0.0:
+            xi += wall * (gap - 0.01)
+            gap = 0.01
+        toward = side if touch == "tip" else -side
+        walls = (Wall(side="left" if toward > 0 else "right", gap=gap),)
+        v = (wall * cp + c) * w  # along the wall
+    state = (side * xi, c, side * phi, side * (v - c * w), s * w, side * w)
+    # 0.3 g to 2 g, seldom a floor that falls away
+    g = rng.uniform(0.3, 2.0) if rng.random() < 0.9 else rng.uniform(-1.0, -0.2)
+    at = Situation(alpha, mu_s, mu_k, rng.normal(0.0, 0.7), g, state, walls)
+    if rng.random() < 0.4 and (
+        touch == "none" or w == 0.0
+    ):  # at the limit of slip, where a pivot may stand or go on slipping
+        at = dataclasses.replace(at, state=standing(at))
+        stuck = answer(at, Mode(True, side, "stick", 0, 1, touch == "tip", touch == "far"))
+        mu_k = min(abs(stuck.friction / stuck.normal) * rng.uniform(0.75, 1.15), 1.2)
+        at = dataclasses.replace(at, mu_k=mu_k, mu_s=min(mu_k * rng.uniform(1.0, 1.5), 1.33))
+    return at, side, (touch == "tip", touch == "far")
+
+
+def standing(at: Situation) -> tuple[float, ...]:
+    """The state with the slip of its pivot taken away."""
+    x, y, theta, _, _, w = at.state
+    side = math.copysign(1.0, theta)
+    return (
+        x,
+        y,
+        theta,
+        -math.cos(at.alpha - abs(theta)) * w,
+        side * math.sin(at.alpha - abs(theta)) * w,
+        w,
+    )
+
+
+def at_wall(at: Situation, side: int) -> float | None:
+    """Distance of the wall on a side (+1 left) from the middle, or None."""
+    return next(
+        (math.sin(at.alpha) + w.gap for w in at.walls if (w.side == "left") == (side > 0)), None
+    )
