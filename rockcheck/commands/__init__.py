@@ -27,6 +27,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from rockcheck.reports.style import FORMATS
 from rockcheck.scenes import History, InputError, named_scenes
 from rockcheck.scenes.errors import inert, printable, unknown_name
 from rockcheck.scenes.progress import OnProgress, announcing
@@ -258,21 +259,35 @@ def _bar(title: str, screen: Console) -> Iterator[OnProgress]:
         yield on_progress
 
 
-def studied(study: Study, out: Path, *, report: bool = True, **how: Any) -> NoReturn:
-    """Run a study with progress, write its page, say what it found; ends with its exit code."""
+def studied(
+    study: Study,
+    out: Path,
+    *,
+    report: bool = True,
+    formats: Sequence[str] = FORMATS,
+    **how: Any,
+) -> NoReturn:
+    """Run a study with progress, write its page with figures in these formats, say what it found;
+    ends with its exit code."""
     from rockcheck.validation.study import run
 
     folder = usable_folder(out)
     with progress(study.name) as on_progress:
         found = run(study, folder, on_progress=on_progress, **how)
-    told(found, folder, report=report)
+    told(found, folder, report=report, formats=formats)
 
 
-def told(found: Finding, folder: Path | None = None, *, report: bool = True) -> NoReturn:
+def told(
+    found: Finding,
+    folder: Path | None = None,
+    *,
+    report: bool = True,
+    formats: Sequence[str] = FORMATS,
+) -> NoReturn:
     """Write a finding's page if it has a folder, say what it is, and end with its exit code."""
     from rockcheck.reports.document import publish, show
 
-    page = folder and (publish(found, folder) if report else folder / "run.json")
+    page = folder and (publish(found, folder, formats=formats) if report else folder / "run.json")
     show(found, console())
     if page:
         console().print(f"report: {page}", soft_wrap=True)
