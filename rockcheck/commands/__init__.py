@@ -13,6 +13,7 @@ import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar
 
@@ -67,6 +68,16 @@ AllowCodeOption = Annotated[
         help="A model of your own that may be run: its code is imported; repeatable.",
     ),
 ]
+
+
+@dataclass(frozen=True)
+class Played:
+    """The options of a study: the folder that it writes, and where it is played."""
+
+    out: OutOption = OUT
+    jobs: JobsOption = None
+    scheduler: SchedulerOption = None
+
 
 PlotOption = Annotated[Path | None, typer.Option("--plot", metavar="FILE.png", help="PNG to draw.")]
 
@@ -258,21 +269,28 @@ def _bar(title: str, screen: Console) -> Iterator[OnProgress]:
         yield on_progress
 
 
-def studied(study: Study, out: Path, *, report: bool = True, **how: Any) -> NoReturn:
+def studied(study: Study, options: Played, **how: Any) -> NoReturn:
     """Run a study with progress, write its page, say what it found; ends with its exit code."""
     from rockcheck.validation.study import run
 
-    folder = usable_folder(out)
+    folder = usable_folder(options.out)
     with progress(study.name) as on_progress:
-        found = run(study, folder, on_progress=on_progress, **how)
-    told(found, folder, report=report)
+        found = run(
+            study,
+            folder,
+            jobs=options.jobs,
+            scheduler=options.scheduler,
+            on_progress=on_progress,
+            **how,
+        )
+    told(found, folder)
 
 
-def told(found: Finding, folder: Path | None = None, *, report: bool = True) -> NoReturn:
+def told(found: Finding, folder: Path | None = None) -> NoReturn:
     """Write a finding's page if it has a folder, say what it is, and end with its exit code."""
     from rockcheck.reports.document import publish, show
 
-    page = folder and (publish(found, folder) if report else folder / "run.json")
+    page = folder and publish(found, folder)
     show(found, console())
     if page:
         console().print(f"report: {page}", soft_wrap=True)

@@ -12,10 +12,11 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, TextIO, cast
+from typing import Annotated, Any, TextIO, cast, get_type_hints
 
 import typer
 import typer.core
@@ -41,7 +42,7 @@ COMMANDS = {
     "assess": ("assess", "rockcheck assess shelf.toml records --gaps 0.02,0.05,0.1"),
     "spectrum": ("spectrum", "rockcheck spectrum fig8 --size 50 --refine"),
     "benchmark": ("benchmark", "rockcheck benchmark --quick"),
-    "conformance": ("conformance", "rockcheck conformance --engine mujoco --settings default"),
+    "conformance": ("conformance", "rockcheck conformance --engine mujoco --set settings=default"),
     "stress": ("stress", "rockcheck stress --quick"),
     "report": ("report", "rockcheck report rockcheck-report --scene fig4a -o fig4a.pdf"),
     "warm": ("warm", "rockcheck warm"),
@@ -87,27 +88,49 @@ JsonOption = Annotated[
 
 def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
     """A command with the options that all of them have, --quiet and --json; one that is `timed`
-    says how long it took."""
+    says how long it took.
+
+    A parameter that is a dataclass stands for a group of options, a field each; its default holds
+    theirs.
+    """
+    signature = inspect.signature(does, eval_str=True)
+    own = [*signature.parameters.values()]
+    groups: dict[str, Any] = {
+        one.name: one.annotation for one in own if is_dataclass(one.annotation)
+    }
 
     def command(*, quiet: bool, as_json: bool, **arguments: Any) -> None:
         with (
             speaking("json" if as_json else "quiet" if quiet else "tables"),
             total_told() if timed else contextlib.nullcontext(),
         ):
+            for name, group in groups.items():
+                given = {one.name: arguments.pop(one.name) for one in fields(group)}
+                arguments[name] = group(**given)
             does(**arguments)
 
-    signature = inspect.signature(does, eval_str=True)
     common = [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=option)
         for name, option in (("quiet", QuietOption), ("as_json", JsonOption))
     ]
     command.__doc__ = does.__doc__
-    command.__signature__ = signature.replace(parameters=[*signature.parameters.values(), *common])  # type: ignore[attr-defined]
-    command.__annotations__ = {
-        parameter.name: parameter.annotation
-        for parameter in (*signature.parameters.values(), *common)
-    }
+    every = [*itertools.chain.from_iterable(map(_options, own)), *common]
+    command.__signature__ = signature.replace(parameters=every)  # type: ignore[attr-defined]
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in every}
     return command
+
+
+def _options(given: inspect.Parameter) -> list[inspect.Parameter]:
+    """The parameter, or those of the fields of its group."""
+    if not is_dataclass(given.annotation):
+        return [given]
+    hints = get_type_hints(given.annotation, include_extras=True)
+    return [
+        given.replace(
+            name=one.name, annotation=hints[one.name], default=vars(given.default)[one.name]
+        )
+        for one in fields(given.annotation)
+    ]
 
 
 def _with_value(word: str, after: str) -> str:
