@@ -11,6 +11,7 @@ import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar
 
@@ -66,6 +67,16 @@ AllowCodeOption = Annotated[
         help="A model of your own that may be run: its code is imported; repeatable.",
     ),
 ]
+
+
+@dataclass(frozen=True)
+class Played:
+    """The options of a study: the folder that it writes, and where it is played."""
+
+    out: OutOption = OUT
+    jobs: JobsOption = None
+    scheduler: SchedulerOption = None
+
 
 PlotOption = Annotated[Path | None, typer.Option("--plot", metavar="FILE.png", help="PNG to draw.")]
 
@@ -189,13 +200,20 @@ def _tell_lines(title: str, task: ProgressTask, over: threading.Event) -> None:
         wait = EVERY
 
 
-def studied(study: Study, out: Path, **how: Any) -> NoReturn:
+def studied(study: Study, options: Played, **how: Any) -> NoReturn:
     """Run a study with progress, write its page, say what it found; ends with its exit code."""
     from rockcheck.validation.study import run
 
-    folder = usable_folder(out)
+    folder = usable_folder(options.out)
     with progress(study.name) as on_progress:
-        found = run(study, folder, on_progress=on_progress, **how)
+        found = run(
+            study,
+            folder,
+            jobs=options.jobs,
+            scheduler=options.scheduler,
+            on_progress=on_progress,
+            **how,
+        )
     told(found, folder)
 
 

@@ -42,7 +42,7 @@ COMMANDS = {
     "assess": ("assess", "rockcheck assess shelf.toml records --gaps 0.02,0.05,0.1"),
     "spectrum": ("spectrum", "rockcheck spectrum fig8 --size 50 --refine"),
     "benchmark": ("benchmark", "rockcheck benchmark --quick"),
-    "conformance": ("conformance", "rockcheck conformance --engine mujoco --settings default"),
+    "conformance": ("conformance", "rockcheck conformance --engine mujoco --set settings=default"),
     "stress": ("stress", "rockcheck stress --quick"),
     "report": ("report", "rockcheck report rockcheck-report --scene fig4a -o fig4a.pdf"),
     "warm": ("warm", "rockcheck warm"),
