@@ -11,9 +11,7 @@ import typer
 
 from rockcheck.commands import (
     OUT,
-    JobsOption,
-    OutOption,
-    SchedulerOption,
+    Played,
     model_names,
     scene_names,
     studied,
@@ -96,9 +94,7 @@ def run(
         ),
     ] = None,
     read: ReadOption = None,
-    out: OutOption = OUT / "assess",
-    jobs: JobsOption = None,
-    scheduler: SchedulerOption = None,
+    played: Played = Played(OUT / "assess"),
 ) -> None:
     """Does it fall, how far does it move, how sure is that?
 
@@ -149,7 +145,7 @@ def run(
         left_out=left_out,
     )
     tell_left_out(left_out, "--read vertical=true plays such a component with the horizontal ones")
-    studied(study, out, jobs=jobs, scheduler=scheduler)
+    studied(study, played)
 
 
 def check_moves(scene: Scene) -> None:
