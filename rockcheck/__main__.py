@@ -13,8 +13,7 @@ BEGAN = time.perf_counter()
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    from rockcheck.commands.cli import INTERRUPTED
-    from rockcheck.commands.cli import main as run
+    from rockcheck.commands.cli import INTERRUPTED, main as run
 
     code = run(arguments, began=BEGAN)
     if code == INTERRUPTED:  # compiled code may still run in threads, which Python would wait for

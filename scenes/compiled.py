@@ -27,8 +27,7 @@ from typing import Any, cast
 import numba
 import numpy as np
 from numba import types
-from numba.core import config as numba_config
-from numba.core import serialize
+from numba.core import config as numba_config, serialize
 from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler

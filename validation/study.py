@@ -29,7 +29,7 @@ from rockcheck.scenes.progress import OnProgress, announce, unheard
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.pool import THREADS, Call, Failure, Pool, guarded
-from rockcheck.validation.execute.remote import Cluster
+from rockcheck.validation.execute.remote import Cluster, check_scheduler
 from rockcheck.validation.execute.store import RECORDS, Store, name_of
 from rockcheck.validation.finding import Finding, Made
 
@@ -145,6 +145,8 @@ def run(
     has not begun after `minutes` is left out. Ctrl-C ends the tasks, and what was played is
     gathered. Raises `InputError` where the folder cannot be used or no cluster answers.
     """
+    if scheduler is not None:
+        check_scheduler(scheduler)
     return _Run(
         study, folder, os.cpu_count() or 1 if jobs is None else jobs, scheduler, force, on_progress
     ).finding(minutes)
@@ -183,7 +185,10 @@ class _Run:
                 self._play(stack, until)
             except KeyboardInterrupt:
                 complete = False
-        found = self.study.gather(self.done)
+        # Whatever ended first: a finding does not depend on it.
+        found = self.study.gather(
+            {task: self.done[task] for task in self.known if task in self.done}
+        )
         self.store.prune()
         failed = {
             task.label: one.reason for task, one in self.done.items() if isinstance(one, Failure)
@@ -252,7 +257,7 @@ class _Run:
     def _workers(self) -> Pool:
         return (
             Cluster(self.scheduler, self.study.memory_mb)
-            if self.scheduler
+            if self.scheduler is not None
             else Pool(self.jobs, self.study.memory_mb)
         )
 

@@ -11,9 +11,7 @@ import typer
 
 from rockcheck.commands import (
     OUT,
-    JobsOption,
-    OutOption,
-    SchedulerOption,
+    Played,
     model_names,
     scene_names,
     studied,
@@ -100,9 +98,7 @@ def run(
     paper: Annotated[
         bool, typer.Option("--paper", help="Write the figures as PNG and PDF, too.")
     ] = False,
-    out: OutOption = OUT / "assess",
-    jobs: JobsOption = None,
-    scheduler: SchedulerOption = None,
+    played: Played = Played(OUT / "assess"),
 ) -> None:
     """Does it fall, how far does it move, how sure is that?
 
@@ -153,7 +149,7 @@ def run(
         left_out=left_out,
     )
     tell_left_out(left_out, "--read vertical=true plays such a component with the horizontal ones")
-    studied(study, out, formats=FORMATS if paper else FORMATS[:1], jobs=jobs, scheduler=scheduler)
+    studied(study, played, formats=FORMATS if paper else FORMATS[:1])
 
 
 def check_moves(scene: Scene) -> None:

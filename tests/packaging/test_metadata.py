@@ -46,7 +46,7 @@ def test_every_package_is_in_the_wheel():
 
 
 def test_every_data_file_is_in_the_wheel():
-    """Files that are not code lie in data/, which package-data names."""
+    """Files that are not code lie in data/, or are those that package-data names."""
     for name, folder in FOLDERS.items():
         others = [
             path
@@ -57,7 +57,8 @@ def test_every_data_file_is_in_the_wheel():
         if named == ["data/**/*"]:
             assert all(path.relative_to(ROOT).parts[1] == "data" for path in others), others
         else:
-            assert [path.name for path in others if path.parent.name == folder] == named, others
+            beside = [path for path in others if path.parent.name == folder]
+            assert all(any(path.match(pattern) for pattern in named) for path in beside), others
 
 
 def test_nothing_but_rockcheck_is_installed():
@@ -222,7 +223,7 @@ def test_the_facade_has_every_public_name():
     for part in parts.values():
         assert all(getattr(rockcheck, name) is getattr(part, name) for name in part.__all__)
     assert rockcheck.__version__ == PROJECT["project"]["version"]
-    with pytest.raises(AttributeError, match="no attribute 'Blok'"):
+    with pytest.raises(AttributeError, match="Blok"):
         rockcheck.Blok  # noqa: B018
 
 

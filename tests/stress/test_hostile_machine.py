@@ -20,8 +20,7 @@ from rockcheck.commands.cli import main
 from rockcheck.reports.document import publish
 from rockcheck.scenes import Scene, load_scene
 from rockcheck.scenes.writing import write_whole
-from rockcheck.validation.execute import pool
-from rockcheck.validation.execute import store as stores
+from rockcheck.validation.execute import pool, store as stores
 from rockcheck.validation.execute.store import HISTORIES, Store
 from rockcheck.validation.studies.stress import runs, study
 from rockcheck.validation.studies.stress.invariants import CheckedRun

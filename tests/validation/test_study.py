@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from rockcheck.commands.cli import main
 from rockcheck.reports.document import block_markdown, csv, publish
 from rockcheck.scenes import InputError
 from rockcheck.scenes.progress import announcing
@@ -143,6 +144,31 @@ def test_on_a_dask_cluster_it_is_the_same(tmp_path: Path, log: Path) -> None:
     found = run(squares([2.0, 11.0, 13.0, 15.0], log), tmp_path / "out", scheduler="local:2")
     assert found.data == {"count": 4}
     assert len(found.failures) == 2
+
+
+@pytest.mark.parametrize("address", ["local:0", "local:two", "nonsense", ""])
+def test_a_wrong_scheduler_is_bad_input_before_anything_is_planned(
+    tmp_path: Path, log: Path, monkeypatch: pytest.MonkeyPatch, address: str
+) -> None:
+    study, asked = squares([2.0], log), []
+    monkeypatch.setattr(type(study), "tasks", lambda *_: asked.append(1))
+    with pytest.raises(InputError) as told:
+        run(study, tmp_path / "out", scheduler=address)
+    assert told.value.key == "--scheduler"
+    assert not asked
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "words", ["validate smoke", "assess fig5a", "spectrum", "conformance", "stress", "accept smoke"]
+)
+def test_every_study_says_so_in_one_line(
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main([*words.split(), "--scheduler", "local:0", "--quiet"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("rockcheck: --scheduler: 'local:0'")
 
 
 def test_a_folder_that_cannot_be_used_is_bad_input(log: Path) -> None:

@@ -16,6 +16,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
+from importlib.util import find_spec
 from multiprocessing.util import Finalize
 from typing import Any, Self
 
@@ -97,22 +98,13 @@ def connected(address: str) -> Iterator[Any]:
     Work of a worker that dies goes to the others. Raises `InputError` where there is no such
     scheduler, or no `distributed`.
     """
-    try:
-        from distributed import Client, LocalCluster
-    except ImportError:
-        raise InputError(
-            "needs the package distributed: pip install distributed", "--scheduler"
-        ) from None
-    if address.startswith("local:"):
-        count = address.removeprefix("local:")
-        if not count.isdecimal() or not 1 <= int(count) <= 256:
-            raise InputError(
-                f"{printable(address)!r} is not allowed: give local:N with 1 to 256 workers",
-                "--scheduler",
-            )
+    count = _local_workers(address)
+    from distributed import Client, LocalCluster
+
+    if count:
         with (
             LocalCluster(
-                n_workers=int(count), threads_per_worker=1, dashboard_address="127.0.0.1:0"
+                n_workers=count, threads_per_worker=1, dashboard_address="127.0.0.1:0"
             ) as cluster,
             Client(cluster) as client,
         ):
@@ -126,3 +118,23 @@ def connected(address: str) -> Iterator[Any]:
         ) from None
     with client:
         yield client
+
+
+def check_scheduler(address: str) -> None:
+    """Raises `InputError` for an address that `connected` cannot use; starts no workers."""
+    if not _local_workers(address):
+        with connected(address):
+            pass
+
+
+def _local_workers(address: str) -> int:
+    """N of "local:N", 0 for the address of a scheduler."""
+    if find_spec("distributed") is None:
+        raise InputError("needs the package distributed: pip install distributed", "--scheduler")
+    kind, _, count = address.partition(":")
+    if kind != "local":
+        return 0
+    if not count.isdecimal() or not 1 <= int(count) <= 256:
+        said = f"{printable(address)!r} is not allowed: give local:N with 1 to 256 workers"
+        raise InputError(said, "--scheduler")
+    return int(count)

@@ -17,8 +17,15 @@ import pytest
 from stepping import ROCKS, TILTED, run_at
 
 from rockcheck.ebm import EventBasedModel, natural
-from rockcheck.ebm.core import contacts as contacts_of_the_core
-from rockcheck.ebm.core import ground, guards, modes, motion, moving, series
+from rockcheck.ebm.core import (
+    contacts as contacts_of_the_core,
+    ground,
+    guards,
+    modes,
+    motion,
+    moving,
+    series,
+)
 from rockcheck.ebm.core.names import GUARDS, Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.rules import Rule
 from rockcheck.ebm.core.state import code_of, workspace

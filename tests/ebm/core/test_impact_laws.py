@@ -12,8 +12,7 @@ from stepping import ROCKS, run_at, six
 
 from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import contacts, settle
-from rockcheck.ebm.core.laws import contact_impacts as ci
-from rockcheck.ebm.core.laws import impacts, strike
+from rockcheck.ebm.core.laws import contact_impacts as ci, impacts, strike
 from rockcheck.ebm.core.names import CONTACTS, Branch, Contact, Family, Found, Guard, Pivot
 from rockcheck.ebm.core.rules import Rule
 from rockcheck.scenes import Block, Floor, Scene, Wall

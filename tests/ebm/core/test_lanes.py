@@ -10,8 +10,7 @@ import numba
 import numpy as np
 import pytest
 import stepping
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from stepping import TILTED, run_at
 
 from rockcheck.ebm import natural

@@ -276,7 +276,7 @@ def test_a_column_in_other_units_is_told(exported, histories, units):
         (["--set", "softness=2"], "mujoco.softness"),
         (["--histories", "nowhere"], "engine.toml: cannot be read"),
         (["--histories", "."], "engine.toml: colour"),
-        (["--tune", "0.5", "--settings", "best"], "--tune: goes with neither"),
+        (["--tune", "0.5", "--set", "settings=best"], "settings"),
         (
             ["--tune", "0.5", "--engine", "ebm"],
             "--engine: 'ebm' is not allowed: give one of mujoco",

@@ -308,7 +308,6 @@ def test_an_undecided_node_does_not_depend_on_the_law():
         (["still.toml"], "excitation.kind: 'rest' is not allowed"),
         (["--agreement", "0"], "--agreement: 0 is not allowed"),
         (["--agreement", "9", "--model", "cm"], "--agreement"),
-        (["--scheduler", "local:0", "--model", "cm", "--size", "2"], "--scheduler"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(words, said, capsys):

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from junitparser import Error, JUnitXml, Skipped, TestCase, TestSuite
-from junitparser import Failure as Failed
+from junitparser import Error, Failure as Failed, JUnitXml, Skipped, TestCase, TestSuite
 
 from rockcheck.scenes import History, InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable

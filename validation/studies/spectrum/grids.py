@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel, Spectrum, overturning_spectrum
 from rockcheck.ebm.horizon import may_fly, other_laws
-from rockcheck.ebm.spectrum import TOLERANCE, Floats
-from rockcheck.ebm.spectrum import Nodes as Outcomes
+from rockcheck.ebm.spectrum import TOLERANCE, Floats, Nodes as Outcomes
 from rockcheck.scenes import InputError, Scene
 from rockcheck.validation.execute.models import build
 from rockcheck.validation.execute.pool import Failure

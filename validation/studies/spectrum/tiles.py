@@ -10,8 +10,16 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, Floats, node_scene, play_motions, play_nodes
-from rockcheck.ebm.spectrum import Nodes as Outcomes
+from rockcheck.ebm.spectrum import (
+    LEFT,
+    RIGHT,
+    SAFE,
+    Floats,
+    Nodes as Outcomes,
+    node_scene,
+    play_motions,
+    play_nodes,
+)
 from rockcheck.scenes import Scene
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import Model, build
