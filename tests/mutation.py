@@ -96,6 +96,7 @@ TARGETS = {
         "tests/scenes/test_recordings.py",
     ],
     "scenes/recordings/intensity.py": ["tests/scenes/test_intensity.py"],
+    "scenes/recordings/oscillator.py": ["tests/scenes/test_intensity.py"],
     "validation/uncertainty/verdict.py": [UNCERTAINTY, "-k", "what_a_difference_says"],
     "validation/uncertainty/numerical.py": [
         UNCERTAINTY,
