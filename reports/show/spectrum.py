@@ -174,7 +174,7 @@ def _legend(figure: Figure, data: Any) -> None:
     handles: list[Any] = [Patch(facecolor=colour, label=words) for colour, words in key.items()]
     if any(panel.get("law") for panel in data["panels"]):
         handles.append(Line2D([], [], label="depends on the impact law", **LAW_MARK))
-    if (data["pulse"] or {}).get("own"):
+    if (data.get("pulse") or {}).get("own"):
         handles.append(Line2D([], [], **OWN_MARK | {"markersize": 7.0}))
     columns = 4 if "key" not in data else 1
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=7)
