@@ -28,8 +28,15 @@ from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import OnProgress, announce, unheard
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.pool import THREADS, Call, Failure, Pool, guarded
-from rockcheck.validation.execute.remote import Cluster, check_scheduler
+from rockcheck.validation.execute.pool import (
+    THREADS,
+    Call,
+    Cluster,
+    Failure,
+    Pool,
+    check_scheduler,
+    guarded,
+)
 from rockcheck.validation.execute.store import RECORDS, Store, name_of
 from rockcheck.validation.finding import Finding, Made
 

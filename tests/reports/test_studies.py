@@ -22,8 +22,8 @@ from rockcheck.validation.finding import (
     text,
 )
 from rockcheck.validation.studies.work_precision.runs import BenchmarkRun, Play
-from rockcheck.validation.studies.work_precision.savings import Saving
 from rockcheck.validation.studies.work_precision.study import Measure, Measured, WorkPrecision
+from rockcheck.validation.studies.work_precision.timings import Saving
 
 pytestmark = pytest.mark.browser
 

@@ -23,8 +23,9 @@ from rockcheck.validation.studies.stress.runs import (
     Chunk,
     RunTotals,
     parts,
+    scene_text,
+    shrink,
 )
-from rockcheck.validation.studies.stress.shrinking import scene_text, shrink
 from rockcheck.validation.studies.stress.stability import (
     CASES,
     SETUPS,

@@ -12,9 +12,8 @@ import numpy as np
 
 from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.spectrum import TOLERANCE, node_scene, play_nodes
-from rockcheck.validation.paper.measures import Paper, near_one_impact
-from rockcheck.validation.paper.panels import FIGURES, kept_spectra, paper_panels
-from rockcheck.validation.paper.sentences import claims_of, findings_of
+from rockcheck.validation.paper import FIGURES, kept_spectra, paper_panels
+from rockcheck.validation.paper.measures import Paper, claims_of, findings_of, near_one_impact
 from rockcheck.validation.studies.spectrum.tiles import nodes_of, play
 
 ROOT = Path(__file__).parents[3]

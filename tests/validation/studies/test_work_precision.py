@@ -12,15 +12,15 @@ from rockcheck.reports.style import power_of_ten
 from rockcheck.validation.execute.models import not_installed
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.studies.work_precision import runs, savings
-from rockcheck.validation.studies.work_precision.ebm import (
-    CASES,
-    LEVEL,
-    at_level,
-    batch_size,
-    batch_times,
-)
 from rockcheck.validation.studies.work_precision.runs import (
+    DURATION,
+    FAMILIES,
+    GAPS,
     LINES,
+    MEMBERS,
+    PULSES,
+    RESTITUTIONS,
+    WALLS,
     BenchmarkRun,
     Play,
     Point,
@@ -32,18 +32,16 @@ from rockcheck.validation.studies.work_precision.runs import (
     orders_of,
     play,
     points_of,
-)
-from rockcheck.validation.studies.work_precision.scenes import (
-    DURATION,
-    FAMILIES,
-    GAPS,
-    MEMBERS,
-    PULSES,
-    RESTITUTIONS,
-    WALLS,
     prepared,
 )
 from rockcheck.validation.studies.work_precision.study import Measure, Measured, WorkPrecision
+from rockcheck.validation.studies.work_precision.timings import (
+    CASES,
+    LEVEL,
+    at_level,
+    batch_size,
+    batch_times,
+)
 
 SOME = (1, 4, 7)
 TWO_WALLS = ("long 53 mm e 0.5", "short 3 mm e 0")

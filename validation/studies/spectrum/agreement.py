@@ -17,9 +17,8 @@ from rockcheck.engines.engine import Engine
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build, not_installed
 from rockcheck.validation.finding import Block, Column, Plot, Table, Text, text
-from rockcheck.validation.paper.panels import Panel
-from rockcheck.validation.studies.spectrum.grids import Book, Request
-from rockcheck.validation.studies.spectrum.tiles import letters_of
+from rockcheck.validation.paper import Panel
+from rockcheck.validation.studies.spectrum.tiles import Book, Request, letters_of
 from rockcheck.validation.uncertainty.population import SETTLE
 
 CANDIDATES = ("ebm-unilateral", "cm", "mujoco", "pybullet", "pymunk", "dart", "drake")

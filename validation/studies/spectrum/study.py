@@ -21,10 +21,16 @@ from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.finding import Block, Column, Finding, Mark, Plot, Table, Text, text
-from rockcheck.validation.paper import measures, sentences
-from rockcheck.validation.paper.panels import GAPS, KEPT, Panel, paper_panels, title_of
+from rockcheck.validation.paper import (
+    GAPS,
+    KEPT,
+    Panel,
+    measures,
+    paper_panels,
+    title_of,
+)
 from rockcheck.validation.studies.spectrum import agreement, tiles
-from rockcheck.validation.studies.spectrum.grids import Book, Request, differing
+from rockcheck.validation.studies.spectrum.tiles import Book, Request, differing
 from rockcheck.validation.study import Study
 from rockcheck.validation.uncertainty.population import compiled
 
@@ -85,13 +91,13 @@ class Spectra(Study):
         if any(one.depends_on_law is not None for one in spectra):
             blocks.append(Text(LAWS, on="page"))
         if found.paper:
-            claims = sentences.claims_of(found.paper)
+            claims = measures.claims_of(found.paper)
             tally = Counter(claim.verdict for claim in claims)
             answer = (
                 f"Of {tally.total()} sentences of the paper {tally['holds']} hold,"
                 f" {tally['holds in part']} hold in part, {tally['does not hold']} do not."
             )
-            blocks += sentences.blocks(found.paper, claims)
+            blocks += measures.blocks(found.paper, claims)
         compared = found.agreement
         if self._papers and not self.compared:
             compared = read_json(KEPT / "agreement.json")

@@ -25,21 +25,19 @@ from rockcheck.validation.finding import (
     table_of,
     text,
 )
-from rockcheck.validation.studies.work_precision import ebm, runs, savings
+from rockcheck.validation.studies.work_precision import runs, timings
 from rockcheck.validation.studies.work_precision.runs import (
+    FAMILIES,
     LEVEL,
     LINES,
-    REFERENCES,
-    BenchmarkRun,
-    Play,
-)
-from rockcheck.validation.studies.work_precision.scenes import (
-    FAMILIES,
     MEMBERS,
     QUICK,
     QUICK_MEMBERS,
     QUICK_WALLS,
+    REFERENCES,
     WALLS,
+    BenchmarkRun,
+    Play,
     prepared,
 )
 from rockcheck.validation.study import Study, Task
@@ -71,10 +69,10 @@ class Measured:
     """What a task gave: rows of one kind."""
 
     run: BenchmarkRun | None = None
-    times: tuple[ebm.BatchTime, ...] = ()
-    size: ebm.BatchSize | None = None
-    start: ebm.ColdStart | None = None
-    saved: tuple[savings.Saving, ...] = ()
+    times: tuple[timings.BatchTime, ...] = ()
+    size: timings.BatchSize | None = None
+    start: timings.ColdStart | None = None
+    saved: tuple[timings.Saving, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -99,10 +97,10 @@ class WorkPrecision(Study):
         ]
 
     def _batches(self) -> Iterator[Task]:
-        nodes = 20 if self.quick else ebm.NODES
-        for case in ebm.CASES:
+        nodes = 20 if self.quick else timings.NODES
+        for case in timings.CASES:
             yield Measure("batch", case.name, nodes, where="timed", expected=nodes**2 / 1000.0)
-        for size in ebm.QUICK_SIZES if self.quick else ebm.SIZES:
+        for size in timings.QUICK_SIZES if self.quick else timings.SIZES:
             for threads in sorted({1, os.cpu_count() or 1}):
                 yield Measure("size", f"{threads}", size, where="timed", expected=6e-5 * size)
         if not self.quick:
@@ -110,10 +108,10 @@ class WorkPrecision(Study):
         yield Measure("cold start", "filled", where="timed", expected=3.0)
 
     def _savings(self) -> Iterator[Task]:
-        for name in savings.KINDS:
+        for name in timings.KINDS:
             if name.startswith("batches") and name.endswith("quick") != self.quick:
                 continue
-            rounds = savings.QUICK_ROUNDS if self.quick else savings.ROUNDS
+            rounds = timings.QUICK_ROUNDS if self.quick else timings.SAVING_ROUNDS
             yield Measure("saving", name, rounds, where="timed", expected=0.6 * rounds)
 
     def _models(self) -> Iterator[Task]:
@@ -158,12 +156,12 @@ class WorkPrecision(Study):
         if isinstance(task, Play):
             return Measured(run=runs.play(task))
         if task.kind == "batch":
-            return Measured(times=tuple(ebm.batch_times(task.name, task.size)))
+            return Measured(times=tuple(timings.batch_times(task.name, task.size)))
         if task.kind == "size":
-            return Measured(size=ebm.batch_size(task.size, int(task.name)))
+            return Measured(size=timings.batch_size(task.size, int(task.name)))
         if task.kind == "cold start":
-            return Measured(start=ebm.cold_start(cached=task.name == "filled"))
-        return Measured(saved=tuple(savings.measured(task.name, task.size)))
+            return Measured(start=timings.cold_start(cached=task.name == "filled"))
+        return Measured(saved=tuple(timings.measured(task.name, task.size)))
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The tables and diagrams of what was measured."""
@@ -198,7 +196,7 @@ class WorkPrecision(Study):
 
 
 def _answer(
-    plain: Sequence[BenchmarkRun], walls: Sequence[BenchmarkRun], times: Sequence[ebm.BatchTime]
+    plain: Sequence[BenchmarkRun], walls: Sequence[BenchmarkRun], times: Sequence[timings.BatchTime]
 ) -> str:
     """The figures that a reader comes for."""
     said = [
@@ -207,7 +205,7 @@ def _answer(
         for line, cost, *_ in runs.league(runs.pooled(plain))[:1]
         if math.isfinite(cost)
     ]
-    best = [row for case in ebm.CASES if (row := ebm.at_level(times, case.name))]
+    best = [row for case in timings.CASES if (row := timings.at_level(times, case.name))]
     if best:
         costs = ", ".join(f"{row.case} {row.evaluations:.0f}" for row in best)
         said.append(f"A run of the event-based model costs, in right-hand sides: {costs}.")
@@ -484,10 +482,12 @@ def _over_step(samples: Sequence[BenchmarkRun], levels: Sequence[runs.Level], fo
 
 
 def _batches(
-    times: Sequence[ebm.BatchTime], sizes: Sequence[ebm.BatchSize], starts: Sequence[ebm.ColdStart]
+    times: Sequence[timings.BatchTime],
+    sizes: Sequence[timings.BatchSize],
+    starts: Sequence[timings.ColdStart],
 ) -> Iterator[Block]:
     if times:
-        best = [row for case in ebm.CASES if (row := ebm.at_level(times, case.name))]
+        best = [row for case in timings.CASES if (row := timings.at_level(times, case.name))]
         yield Table(
             "batches-at-level",
             [
@@ -510,12 +510,12 @@ def _batches(
                 for row in best
             ],
             "Compiled batches of the event-based model",
-            f"The cheapest tolerance with a p95 error of the peak of at most {ebm.LEVEL:g} rad."
+            f"The cheapest tolerance with a p95 error of the peak of at most {timings.LEVEL:g} rad."
             f" One right-hand side: {1e9 * median(row.right_hand_side for row in times):.1f} ns.",
         )
         lines = [
             (case, [row for row in times if row.case == case.name and row.error_95 > 0.0])
-            for case in ebm.CASES
+            for case in timings.CASES
         ]
         series = [
             Series(
@@ -532,7 +532,7 @@ def _batches(
             y=Axis("CPU μs a run, one core", log=True),
         )
         yield table_of(
-            "batch-times", ebm.BatchTime, times, title="All tolerances", on="page", folded=True
+            "batch-times", timings.BatchTime, times, title="All tolerances", on="page", folded=True
         )
     if starts:
         rows = [[start.cache, start.importing, start.first_simulation] for start in starts]
@@ -563,7 +563,7 @@ def _batches(
         )
 
 
-def _saved(found: Sequence[savings.Saving]) -> Iterator[Block]:
+def _saved(found: Sequence[timings.Saving]) -> Iterator[Block]:
     if not found:
         return
     yield Table(
@@ -592,5 +592,5 @@ def _saved(found: Sequence[savings.Saving]) -> Iterator[Block]:
             for one in found
         ],
         "What a scene does not need",
-        f"Not measured: {'; '.join(savings.NOT_MEASURED)}.",
+        f"Not measured: {'; '.join(timings.NOT_MEASURED)}.",
     )
