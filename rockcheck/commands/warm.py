@@ -20,7 +20,6 @@ from rockcheck.validation.execute.pool import Call, Pool
 
 
 def _played(name: str) -> tuple[Any, Scene]:
-    """A model that has played a short scene."""
     model, scene = build(name), load_scene("fig5a").replace(duration=0.1)
     model.simulate(scene)
     return model, scene

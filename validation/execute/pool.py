@@ -116,15 +116,6 @@ class Ended:
             return "out of memory"
         return printable(f"{type(self.error).__name__}: {self.error}", 300)
 
-    @property
-    def unexpected(self) -> bool:
-        """Whether the call raised an unexpected exception: a fault of rockcheck's own, unless the
-        call ran a user's code."""
-        from pebble import ProcessExpired
-
-        foreseen = (InputError, ModelFailure, OSError, TimeoutError, ProcessExpired, MemoryError)
-        return self.error is not None and not isinstance(self.error, foreseen)
-
 
 @dataclass(eq=False)
 class Pool:
@@ -218,7 +209,6 @@ class Pool:
         waiting.extendleft(reversed(held))
 
     def _room(self) -> int:
-        """How many calls may be under way."""
         return AHEAD * self.jobs
 
     def _schedule(self, call: Call, seconds: float, first: bool) -> list[Future[Any]]:
@@ -227,7 +217,6 @@ class Pool:
         return [self._pool.schedule(call.function, args=call.arguments, timeout=limit)]
 
     def _error(self, future: Future[Any]) -> BaseException | None:
-        """What a call ended with in place of a result."""
         return future.exception()
 
 
@@ -293,7 +282,6 @@ def _write(stream: int, text: str) -> None:
 
 
 def _follow(run: Any) -> None:
-    """End this process, whatever it is doing, once the run has ended in whatever way."""
     run.join()
     os._exit(1)
 

@@ -157,8 +157,6 @@ def _imports(
 
 @dataclass(frozen=True)
 class _Source:
-    """What a source file imports, and its syntax tree without docstrings, as text."""
-
     imports: tuple[ast.Import | ast.ImportFrom, ...]
     essence: str
 

@@ -147,7 +147,6 @@ def pairs(paper: Paper, axis: str, free: bool = False) -> Measured:
 
 
 def _pair(paper: Paper, what: str, safer: Mask, other: Mask) -> Row:
-    """Areas, and the nodes where the opposite holds."""
     i, j = np.nonzero(~safer & other)
     f, a = paper.frequencies[j], paper.amplitudes[i]
     opposite = "nowhere the opposite"
@@ -596,7 +595,6 @@ def _rows(name: str, title: str, of: Mapping[str, Sequence[Row]]) -> Table:
 
 
 def _areas(paper: Paper) -> Plot:
-    """Safe areas against the gap: what the claims about areas rest on."""
     gaps = AXES["gap"]
     areas, alone = (100.0 * safe.mean(axis=(-2, -1)) for safe in (paper.safe, paper.safe_alone))
     panels = []

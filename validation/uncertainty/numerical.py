@@ -162,7 +162,6 @@ def _changes(scene: Scene, one: History, other: History) -> dict[str, float]:
 
 
 def _order(changes: Sequence[float]) -> float | None:
-    """The order of changes from h to 2h, 3h, 4h by the outer two; None where they do not grow."""
     ratio = changes[-1] / changes[0] if changes[0] > 0.0 else 0.0
     return math.log2(ratio - 1.0) if ratio > 1.0 else None
 
@@ -226,7 +225,6 @@ def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float]]:
 
 
 def _units(scene: Scene) -> dict[str, float]:
-    """What a quantity is small against, by its unit."""
     return {
         "alpha": 1.0,
         "m": scene.block.alpha * scene.block.radius,
@@ -235,7 +233,6 @@ def _units(scene: Scene) -> dict[str, float]:
 
 
 def _side(history: History) -> str:
-    """The side it overturns to, empty where it stands."""
     return (
         history.outcome.removeprefix("overturned ")
         if history.outcome.startswith("overturned")
@@ -270,11 +267,6 @@ class Explanation(Stored):
     def u_val(self) -> float | None:
         """The uncertainty of the comparison; None where the run is not converged."""
         return None if self.u_num is None else math.hypot(self.u_num, self.u_input, self.u_data)
-
-    @property
-    def explained(self) -> bool:
-        """Whether the difference lies within its uncertainty."""
-        return self.verdict in (NUMERICAL, INPUTS, DATA)
 
 
 def explain(

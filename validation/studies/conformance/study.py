@@ -236,7 +236,6 @@ def _in_units(scene: Scene, history: History) -> None:
 
 
 def _card(player: Player, found: Mapping[str, Seen | Failure]) -> Card:
-    """The card of a player, as far as it was played."""
     faults = {one.reason for one in found.values() if isinstance(one, Failure) and one.refused}
     if len(faults) == 1 and all(one.reason in faults for one in found.values()):
         raise InputError(*faults)
@@ -396,7 +395,6 @@ def changes(before: Path, after: Path) -> Finding:
 
 
 def _read(path: Path) -> dict[tuple[str, str, str], dict[str, Any]]:
-    """The rows of a finished study; raises `InputError` naming file and fault."""
     path = path / "run.json" if path.is_dir() else path
     data = read_json(path)
     try:
@@ -439,7 +437,6 @@ def export(folder: Path) -> list[str]:
 
 
 def _motion(scene: Scene) -> Iterable[Any]:
-    """The base motion at the ends of its steps."""
     base = BaseMotion(scene)
     t = BASE_STEP * np.arange(round(scene.duration / BASE_STEP) + 1)
     velocity = np.array([base.velocity(time) for time in t.tolist()])
@@ -448,7 +445,6 @@ def _motion(scene: Scene) -> Iterable[Any]:
 
 
 def _row(scene: Scene) -> dict[str, Any]:
-    """A scene in plain columns."""
     walls = {wall.side: wall for wall in scene.walls}
     return {
         "scene": scene.name,

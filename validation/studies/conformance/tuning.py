@@ -207,7 +207,6 @@ def calibrate(
 
 
 def _played(model: Any, scene: Scene, parameters: Mapping[str, float], step: float) -> FloatArray:
-    """States after each step."""
     times: FloatArray = step * np.arange(math.ceil(scene.duration / step) + 1, dtype=np.float64)
     world = model.tuned_world(scene, parameters, step)
     try:

@@ -159,7 +159,6 @@ class Spectra(Study):
         return found
 
     def _paper(self, book: Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
-        """The 28 spectra and what the paper's sentences need beyond them."""
         request = self.request
         how = request.model, request.settings
         least, one_impact = {}, {}
@@ -204,7 +203,6 @@ class Spectra(Study):
         return Table("spectra", columns, rows, "Shares of outcomes")
 
     def _figures(self, found: _Found) -> Iterator[Plot]:
-        """The clickable spectra: a plot a figure of the paper, or one's own."""
         request = self.request
         by = "" if request.model == "ebm" else f", by {request.model}"
         for number in dict.fromkeys(panel.figure for panel in found.spectra):
@@ -282,8 +280,6 @@ class Spectra(Study):
 
 @dataclass
 class _Found:
-    """What is known: the spectra that are whole, motions at some of their nodes, and the rest."""
-
     spectra: dict[Panel, Spectrum] = field(default_factory=dict)
     motions: dict[Panel, tiles.Played] = field(default_factory=dict)
     paper: measures.Paper | None = None

@@ -147,7 +147,6 @@ def letters_of(sides: NDArray[np.int8], undecided: NDArray[np.int64]) -> NDArray
 
 
 def _impacts(player: Model, scene: Scene, amplitude: float, frequency: float) -> int:
-    """Floor impacts until the outcome at a node is decided."""
     node = node_scene(scene, amplitude, frequency)
     history = player.simulate(node.replace(output_step=node.duration))
     return sum(event.kind == "floor impact" for event in history.event_list)

@@ -226,7 +226,6 @@ def audited(scene: Scene) -> Scene:
 
 
 def _contradicts(scene: Scene, history: History) -> bool:
-    """Whether the run's end contradicts its outcome."""
     falls = [event for event in history.event_list if event.kind.startswith("overturned")]
     rows, theta = len(history.channels["t"]), history.channels["theta"]
     times = [event.t for event in history.event_list]
@@ -267,13 +266,11 @@ def _largest(values: Floats, rows: Mask) -> float:
 
 
 def _jumps(scene: Scene) -> list[float]:
-    """When the base acceleration may jump, s."""
     moving = (one for one in (scene.excitation, scene.vertical) if one.kind != "rest")
     return [time for one in moving for time in (0.0, one.quiet_after)]
 
 
 def _clear(motion: Motion) -> Mask:
-    """Rows that are neither at an event nor at a jump of the base acceleration."""
     t, events = motion.channels["t"], [event.t for event in motion.history.event_list]
     places = np.sort(np.array([*events, *_jumps(motion.scene), -math.inf, math.inf]))
     after = np.searchsorted(places, t)

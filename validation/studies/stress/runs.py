@@ -103,7 +103,6 @@ def _tables(scene: Scene) -> dict[str, Any]:
 
 
 def _places(part: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
-    """Where the values are, tables and lists among them."""
     if path:
         yield path, part
     if isinstance(part, dict):
@@ -115,7 +114,6 @@ def _places(part: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
 
 
 def _with(tables: dict[str, Any], path: Path, *value: Any) -> dict[str, Any]:
-    """The tables with another value at that place, or without it."""
     changed = deepcopy(tables)
     part: Any = changed
     for key in path[:-1]:
@@ -202,22 +200,27 @@ class RunTotals:
 
     def see(self, played: CheckedRun, seed: int, number: int) -> None:
         """Count one more run."""
-        for name, figure in played.figures.items():
-            found = math.inf if math.isnan(figure) else figure, number
-            self.worst[name] = max(found, self.worst.get(name, found))
-        self.failures += [
-            Broken(self.model, name, seed, number, played.figures[name], played.failure)
-            for name in played.broken
-        ]
-        self.counts["runs"] += 1
-        self.counts["events"] += played.events
-        self.counts["gaining"] += played.gains > 0
-        self.counts["horizons"] += played.horizons
-        self.largest_gain = max(self.largest_gain, played.largest_gain)
-        self.outcomes[played.outcome or "failed"] += 1
-        self.rules.update(played.rules)
-        self.looked_at.update(played.figures.keys())
-        self.unjudged.update(played.unjudged)
+        figures = played.figures
+        counts = {"runs": 1, "events": played.events, "gaining": int(played.gains > 0)}
+        self.add(
+            RunTotals(
+                model=self.model,
+                looked_at=Counter(figures.keys()),
+                unjudged=Counter(played.unjudged),
+                worst={
+                    name: (math.inf if math.isnan(figure) else figure, number)
+                    for name, figure in figures.items()
+                },
+                failures=[
+                    Broken(self.model, name, seed, number, figures[name], played.failure)
+                    for name in played.broken
+                ],
+                outcomes=Counter([played.outcome or "failed"]),
+                rules=Counter(played.rules),
+                counts=Counter(counts | {"horizons": played.horizons}),
+                largest_gain=played.largest_gain,
+            )
+        )
 
     def add(self, other: RunTotals) -> None:
         """Count what other runs showed."""

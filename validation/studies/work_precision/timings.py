@@ -134,7 +134,6 @@ def _pulses(scene: Scene) -> Callable[[EventBasedModel, int], Packed]:
 
 
 def _records(model: EventBasedModel, nodes: int) -> Packed:
-    """El Centro at `nodes` scales from 1.4 to 1.8, to the record's end."""
     scene = load_scene("fig4a")
     louder = (
         scene.excitation.scaled(scale / 1.6) for scale in np.linspace(1.4, 1.8, nodes).tolist()
@@ -588,7 +587,6 @@ def _found(root: ET.Element, path: str) -> ET.Element:
 
 
 def _solid(root: ET.Element) -> None:
-    """Free in space."""
     body = _found(root, "worldbody/body")
     for joint in body.findall("joint"):
         body.remove(joint)
@@ -623,7 +621,6 @@ def _all_collide(root: ET.Element) -> None:
 
 
 def _as_xml(world: Any) -> str:
-    """The model of a world as text."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "world.xml"
         world.mujoco.mj_saveLastXML(str(path), world.model)
