@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from statistics import median
@@ -306,6 +306,8 @@ KINDS = {
     "records": ("fig",),
     "all": ("",),
 }
+#: Kinds of scenes in each of which an engine has to meet `LEVEL`.
+LEAGUE = {"free": ("free",), "pulse": ("pulse",), "wall": ("wall",)}
 #: What is not measured, and why.
 LEFT_OUT = (
     "default settings at a step of 3e-5 s: at 1e-4 s they have stopped converging, or converge as"
@@ -433,28 +435,27 @@ def grouped(frame: pd.DataFrame, *names: str) -> list[tuple[Any, pd.DataFrame]]:
     return [*frame.groupby([*names], sort=False, observed=True)]
 
 
+#: Errors of a setting by their share of the sample, and medians, some of them a simulated second.
+SHARES = {"rms": 0.5, "rms_10": 0.1, "rms_90": 0.9}
+MEDIANS = ("largest", "peak", "first_impact", "cpu", "wall", "set_up", "steps")
+RATES = ("cpu", "wall", "steps")
+
+
 def points_of(frame: pd.DataFrame) -> pd.DataFrame:
     """The settings of all lines in all families: median error with its 10-90 % band and the worst,
     and median cost a simulated second. A run that failed counts as infinitely wrong."""
     names = "family", "line", "value"
-    return pd.DataFrame(
-        [dict(zip(names, at, strict=True)) | _point(some) for at, some in grouped(frame, *names)]
-    )
+    rows = [(*at, *_point(some)) for at, some in grouped(frame, *names)]
+    return pd.DataFrame(rows, columns=[*names, "runs", "failed", *SHARES, *MEDIANS, "rms_worst"])
 
 
-def _point(samples: pd.DataFrame) -> dict[str, Any]:
+def _point(samples: pd.DataFrame) -> tuple[float, ...]:
     good = samples[samples.failure == ""]
-    rates = good[["cpu", "wall", "steps"]].div(good.horizon, axis=0)
-    middling = good[["largest", "peak", "first_impact", "set_up"]].join(rates).median()
+    rates = good[[*RATES]].div(good.horizon, axis=0)
+    medians = good.drop(columns=[*RATES]).join(rates)[[*MEDIANS]].median()
     errors, failed = samples[REFERENCES[0]].tolist(), len(samples) - len(good)
-    shares = {"rms": 0.5, "rms_10": 0.1, "rms_90": 0.9}
-    return {
-        "runs": len(samples),
-        "failed": failed,
-        **{name: quantile(errors, part) for name, part in shares.items()},
-        **middling[["largest", "peak", "first_impact", "cpu", "wall", "set_up", "steps"]],
-        "rms_worst": math.inf if failed else good.rms.max(),
-    }
+    shares = [quantile(errors, share) for share in SHARES.values()]
+    return len(samples), failed, *shares, *medians, math.inf if failed else good.rms.max()
 
 
 def trends_of(points: pd.DataFrame) -> pd.DataFrame:
@@ -474,16 +475,14 @@ def trends_of(points: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["family", "line", "order", "cpu", "at_coarsest", "ratio"])
 
 
-def pooled(frame: pd.DataFrame) -> pd.DataFrame:
+def pooled(frame: pd.DataFrame, kinds: Mapping[str, tuple[str, ...]] = KINDS) -> pd.DataFrame:
     """Every setting of the engines' lines over all scenes of each kind, which is its `family`."""
-    engines = frame[[LINES[line].model in ENGINE_STEPS for line in frame.line]]
-    kinds = [
-        points_of(
-            _ordered(engines[engines.family.str.startswith(starts)], "line").assign(family=kind)
-        )
-        for kind, starts in KINDS.items()
+    engines = _ordered(frame[[LINES[line].model in ENGINE_STEPS for line in frame.line]], "line")
+    parts = [
+        engines[engines.family.str.startswith(starts)].assign(family=kind)
+        for kind, starts in kinds.items()
     ]
-    return pd.concat([one for one in kinds if len(one)] or kinds[:1])
+    return points_of(pd.concat(parts))
 
 
 def at_the_cost(point: Any, points: pd.DataFrame) -> float:
@@ -505,14 +504,25 @@ def league(found: pd.DataFrame) -> list[tuple[str, float, float, float, float]]:
     least error at any setting that was played, and its cost; NaN where it does not reach so far.
     """
     rows = []
-    for (label,), mine in (
-        grouped(_of(found, family=next(iter(KINDS))), "line") if len(found) else ()
-    ):
+    for (label,), mine in grouped(_of(found, family=next(iter(KINDS))), "line"):
         if (good := mine[np.isfinite(mine.rms)]).size:
             best = good.loc[good.rms.idxmin()]
             least = float(best.rms), float(best.cpu)
             rows.append((label, cost_at(mine)[0], error_at(mine, EQUAL_COST), *least))
     return sorted(rows, key=lambda row: (math.isnan(row[1]), row[3 if math.isnan(row[1]) else 1]))
+
+
+def first_steps(frame: pd.DataFrame) -> list[tuple[str, dict[str, float], float]]:
+    """The engines' lines: the largest step (s) whose median error is at most `LEVEL`, in each kind
+    of `LEAGUE` and in all of them, NaN where none is; and the smallest step that was played."""
+    rows = []
+    for (label,), line in grouped(pooled(frame, LEAGUE), "line"):
+        good = line[line.rms <= LEVEL]
+        met = {kind: set(good.value[good.family == kind]) for kind in LEAGUE}
+        met["all"] = set.intersection(*met.values())
+        largest = {kind: max(values, default=math.nan) for kind, values in met.items()}
+        rows.append((label, largest, line.value.min()))
+    return rows
 
 
 def error_at(line: pd.DataFrame, cpu: float) -> float:
