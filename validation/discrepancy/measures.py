@@ -12,12 +12,12 @@ import math
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.scenes import Scene, kinematics
 from rockcheck.scenes.block import Pivot
 from rockcheck.validation.discrepancy.figures import (
     TURNS,
+    Array,
     Measure,
     Pair,
     Unavailable,
@@ -26,7 +26,6 @@ from rockcheck.validation.discrepancy.figures import (
     by_name,
 )
 
-Array = NDArray[np.float64]
 ISO_MOST_SAMPLES = 4000
 
 

@@ -15,7 +15,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import (
@@ -32,14 +31,13 @@ from rockcheck.validation.studies.stress.mechanics import (
     BOOLE,
     GROUP,
     SLIPS,
+    Floats,
+    Mask,
     Motion,
     integrals,
     motion_of,
     not_finite,
 )
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -19,18 +19,17 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.batch import Packed, pack, pack_pulses, run_batch
 from rockcheck.ebm.core.ground import Ground, acceleration
+from rockcheck.ebm.spectrum import Floats
 from rockcheck.scenes import Floor, ModelFailure, Record, Ricker, Scene, Wall, load_scene
 from rockcheck.scenes.compiled import kernel
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import Model, build, not_installed
 from rockcheck.validation.studies.work_precision.runs import pulse
 
-Floats = NDArray[np.float64]
 #: The grid of Ricker pulses: omega_p/p, a_p/(g tan alpha), and its nodes along each axis.
 FREQUENCY_RATIOS, AMPLITUDE_RATIOS, NODES = (0.5, 8.0), (1.0, 12.0), 100
 TOLERANCES = (1e-6, 1e-7, 4e-8, 1e-8, 1e-9, 1e-10, 1e-12)
