@@ -50,24 +50,22 @@ def title_of(figure: int) -> str:
 def paper_panels(*figures: int) -> tuple[Panel, ...]:
     """The seven spectra of each of these figures, by default all: unobstructed, then gap by gap
     with e = 0 and e = 1."""
-    return tuple(_panel(n, wall) for n in figures or FIGURES for wall in (None, *_walls(n)))
+    places = [None, *itertools.product(GAPS, RESTITUTIONS)]
+    return tuple(_panel(n, place) for n in figures or FIGURES for place in places)
 
 
-def _walls(figure: int) -> list[Wall]:
-    walls = itertools.product(GAPS, RESTITUTIONS)
-    return [Wall(side=FIGURES[figure][0], gap=gap, restitution=e) for gap, e in walls]
-
-
-def _panel(figure: int, wall: Wall | None) -> Panel:
+def _panel(figure: int, place: tuple[float, float] | None) -> Panel:
     name, title = "unobstructed", "Unobstructed"
-    if wall:
-        millimetres, e = round(1000.0 * wall.gap), wall.restitution
+    (side, friction), walls = FIGURES[figure], []
+    if place:
+        (gap, e), millimetres = place, round(1000.0 * place[0])
         name, title = f"gap-{millimetres}-e-{e:g}", f"Gap {millimetres} mm, e = {e:g}"
+        walls = [Wall(side=side, gap=gap, restitution=e)]
     scene = Scene(
         name=f"figure-{figure}-{name}",
         block=PAPER_BLOCK,
-        floor=Floor(friction=FIGURES[figure][1]),
-        walls=(wall,) if wall else (),
+        floor=Floor(friction=friction),
+        walls=walls,
         excitation=Ricker(amplitude=1.0, period=1.0),
         duration=1.0,
     )

@@ -276,7 +276,12 @@ class Book:
         are undecided."""
         missing = [task for task in tasks if task not in self.done]
         self.wanted += missing
-        return None if missing else [_whole(task, self.done[task]) for task in tasks]
+        if missing:
+            return None
+        return [
+            Played(UNDECIDED * len(task.amplitudes)) if isinstance(one, Failure) else one
+            for task, one in ((task, self.done[task]) for task in tasks)
+        ]
 
     def outcomes(self, *nodes: Any) -> Outcomes | None:
         """Sides and failures of the nodes of `tiles.nodes_of`."""
@@ -298,11 +303,6 @@ class Book:
             return overturning_spectrum(panel.scene, *axes, refine=request.refine, play=known)
         except _Waiting:
             return None
-
-
-def _whole(task: Nodes, record: Any) -> Played:
-    failed = isinstance(record, Failure)
-    return Played(UNDECIDED * len(task.amplitudes)) if failed else record
 
 
 def differing(spectrum: Spectrum, others: Sequence[Spectrum]) -> NDArray[np.int64]:

@@ -263,14 +263,11 @@ def _largest(values: Floats, rows: Mask) -> float:
     return float(np.max(values[rows], initial=0.0))
 
 
-def _jumps(scene: Scene) -> list[float]:
-    moving = (one for one in (scene.excitation, scene.vertical) if one.kind != "rest")
-    return [time for one in moving for time in (0.0, one.quiet_after)]
-
-
 def _clear(motion: Motion) -> Mask:
     t, events = motion.channels["t"], [event.t for event in motion.history.event_list]
-    places = np.sort(np.array([*events, *_jumps(motion.scene), -math.inf, math.inf]))
+    bases = motion.scene.excitation, motion.scene.vertical
+    jumps = [time for one in bases if one.kind != "rest" for time in (0.0, one.quiet_after)]
+    places = np.sort(np.array([*events, *jumps, -math.inf, math.inf]))
     after = np.searchsorted(places, t)
     near = NEAR * motion.unit + 1e-12 * np.abs(t)
     return np.asarray((t - places[after - 1] > near) & (places[after] - t > near))

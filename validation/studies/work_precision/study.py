@@ -189,17 +189,14 @@ class WorkPrecision(Study):
         )
 
 
-def _league(samples: Sequence[BenchmarkRun]) -> list[tuple[str, float, float, float, float]]:
-    return runs.league(runs.pooled(runs.frame_of(samples))) if samples else []
-
-
 def _answer(
     plain: Sequence[BenchmarkRun], walls: Sequence[BenchmarkRun], times: Sequence[timings.BatchTime]
 ) -> str:
+    standings = runs.league(runs.pooled(runs.frame_of(plain))) if plain else []
     said = [
         f"The cheapest engine at an error of {LEVEL:g} alpha is {line}:"
         f" {1e3 * cost:.2g} ms of CPU a simulated second."
-        for line, cost, *_ in _league(plain)[:1]
+        for line, cost, *_ in standings[:1]
         if math.isfinite(cost)
     ]
     best = [row for case in timings.CASES if (row := timings.at_level(times, case.name))]
