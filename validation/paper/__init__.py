@@ -56,11 +56,11 @@ def paper_panels(*figures: int) -> tuple[Panel, ...]:
 
 def _panel(figure: int, place: tuple[float, float] | None) -> Panel:
     name, title = "unobstructed", "Unobstructed"
-    (side, friction), walls = FIGURES[figure], []
+    (side, friction), walls = FIGURES[figure], tuple[Wall, ...]()
     if place:
         (gap, e), millimetres = place, round(1000.0 * place[0])
         name, title = f"gap-{millimetres}-e-{e:g}", f"Gap {millimetres} mm, e = {e:g}"
-        walls = [Wall(side=side, gap=gap, restitution=e)]
+        walls = (Wall(side=side, gap=gap, restitution=e),)
     scene = Scene(
         name=f"figure-{figure}-{name}",
         block=PAPER_BLOCK,
