@@ -89,7 +89,7 @@ def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
 
 def _kept(module: str) -> Path:
     """The file for the digest of a module of ours, named after the content of all our sources."""
-    spec = importlib.util.find_spec(OWN_PACKAGE)
+    spec = find_spec(OWN_PACKAGE)
     content = hashlib.sha256(f"{module} {platform.python_version()}".encode())
     for root in (Path(root) for root in (spec and spec.submodule_search_locations) or ()):
         for folder in (root, *sorted(path for path in root.iterdir() if path.is_dir())):
