@@ -17,18 +17,16 @@ from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, OWN_MARK, draw
 from rockcheck.scenes import Sine, load_scene
 from rockcheck.scenes.reading import read_json
 from rockcheck.validation.finding import plain
-from rockcheck.validation.paper.measures import Paper
-from rockcheck.validation.paper.panels import KEPT, Panel, kept_spectra, paper_panels
-from rockcheck.validation.paper.sentences import beyond, findings_of
+from rockcheck.validation.paper import KEPT, Panel, kept_spectra, paper_panels
+from rockcheck.validation.paper.measures import Paper, beyond, findings_of
 from rockcheck.validation.studies.spectrum.agreement import (
     CANDIDATES,
     PLAYED_SHARE,
     blocks,
     mapped,
 )
-from rockcheck.validation.studies.spectrum.grids import Request
 from rockcheck.validation.studies.spectrum.study import Spectra, _pulse
-from rockcheck.validation.studies.spectrum.tiles import Played
+from rockcheck.validation.studies.spectrum.tiles import Played, Request
 
 SIZE = 12
 
