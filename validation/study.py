@@ -28,8 +28,15 @@ from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import OnProgress, announce, unheard
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.pool import THREADS, Call, Failure, Pool, guarded
-from rockcheck.validation.execute.remote import Cluster
+from rockcheck.validation.execute.pool import (
+    THREADS,
+    Call,
+    Cluster,
+    Failure,
+    Pool,
+    check_scheduler,
+    guarded,
+)
 from rockcheck.validation.execute.store import RECORDS, Store, name_of
 from rockcheck.validation.finding import Finding, Made
 
@@ -145,14 +152,14 @@ def run(
     has not begun after `minutes` is left out. Ctrl-C ends the tasks, and what was played is
     gathered. Raises `InputError` where the folder cannot be used or no cluster answers.
     """
+    if scheduler is not None:
+        check_scheduler(scheduler)
     return _Run(
         study, folder, os.cpu_count() or 1 if jobs is None else jobs, scheduler, force, on_progress
     ).finding(minutes)
 
 
 class _Run:
-    """A study that is being played."""
-
     def __init__(
         self,
         study: Study,
@@ -183,7 +190,10 @@ class _Run:
                 self._play(stack, until)
             except KeyboardInterrupt:
                 complete = False
-        found = self.study.gather(self.done)
+        # Whatever ended first: a finding does not depend on it.
+        found = self.study.gather(
+            {task: self.done[task] for task in self.known if task in self.done}
+        )
         self.store.prune()
         failed = {
             task.label: one.reason for task, one in self.done.items() if isinstance(one, Failure)
@@ -221,7 +231,6 @@ class _Run:
                 return
 
     def _next(self) -> list[Task]:
-        """The tasks of the next wave that have to be played; the others are read back."""
         while new := [
             task for task in dict.fromkeys(self.study.tasks(self.done)) if task not in self.known
         ]:
@@ -252,19 +261,14 @@ class _Run:
     def _workers(self) -> Pool:
         return (
             Cluster(self.scheduler, self.study.memory_mb)
-            if self.scheduler
+            if self.scheduler is not None
             else Pool(self.jobs, self.study.memory_mb)
         )
 
     def _estimate(self, waiting: Sequence[Task]) -> None:
-        """Says how long a wave will take where that is long."""
         seconds = sum(
             task.expected / (max(1, self.jobs) if task.where == "worker" else 1) for task in waiting
         )
         if seconds >= LONG:
-            announce(f"{self.study.name}: {len(waiting)} tasks, about {words_of(seconds)}")
-
-
-def words_of(seconds: float) -> str:
-    """A time as people say it: 40 s, 5 min."""
-    return f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
+            long = f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
+            announce(f"{self.study.name}: {len(waiting)} tasks, about {long}")

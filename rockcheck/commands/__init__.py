@@ -3,16 +3,15 @@ progress on stderr, JSON."""
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 import tempfile
 import threading
-import time
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar
 
@@ -21,12 +20,14 @@ from rich.console import Console
 from rich.progress import (
     BarColumn,
     Progress,
+    Task as ProgressTask,
     TaskProgressColumn,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
 
+from rockcheck.reports.style import FORMATS
 from rockcheck.scenes import History, InputError, named_scenes
 from rockcheck.scenes.errors import inert, printable, unknown_name
 from rockcheck.scenes.progress import OnProgress, announcing
@@ -68,6 +69,16 @@ AllowCodeOption = Annotated[
     ),
 ]
 
+
+@dataclass(frozen=True)
+class Played:
+    """The options of a study: the folder that it writes, and where it is played."""
+
+    out: OutOption = OUT
+    jobs: JobsOption = None
+    scheduler: SchedulerOption = None
+
+
 PlotOption = Annotated[Path | None, typer.Option("--plot", metavar="FILE.png", help="PNG to draw.")]
 
 #: What a command says: tables and progress, one JSON value instead, or nothing but errors.
@@ -87,37 +98,6 @@ def speaking(voice: Voice) -> Iterator[None]:
             yield
     finally:
         _voice.reset(token)
-
-
-#: When the command began, of `time.perf_counter`; None: nobody has said.
-_began: ContextVar[float | None] = ContextVar("began", default=None)
-
-
-@contextmanager
-def begun(when: float) -> Iterator[None]:
-    """Within this block `total_told` counts from then."""
-    token = _began.set(when)
-    try:
-        yield
-    finally:
-        _began.reset(token)
-
-
-@contextmanager
-def total_told() -> Iterator[None]:
-    """A last line says how long the command took in all, whatever its verdict: its user waits for
-    more than the simulations."""
-    began = _began.get() or time.perf_counter()
-    try:
-        yield
-    except typer.Exit:
-        _tell_total(began)
-        raise
-    _tell_total(began)
-
-
-def _tell_total(began: float) -> None:
-    console().print(f"total: {time.perf_counter() - began:.1f} s")
 
 
 class _Screen(Console):
@@ -166,74 +146,16 @@ def answer(value: Any) -> None:
         print(json_text(value))
 
 
-@contextmanager
-def progress(title: str) -> Iterator[OnProgress]:
-    """How far the work is and the time left, on stderr: a bar on a terminal, elsewhere lines;
-    nothing where a command is quiet."""
-    screen = Console(stderr=True)
-    if _voice.get() == "tables" and screen.is_terminal:
-        with _bar(title, screen) as on_progress:
-            yield on_progress
-        return
-    lines, over = _Lines(title), threading.Event()
-    if _voice.get() != "quiet":
-        threading.Thread(target=lines.watch, args=[over], daemon=True).start()
-    try:
-        yield lines.on_progress
-    finally:
-        over.set()
-
-
 #: Between two lines on a long work, s; and when the first one comes, if the work will then last
 #: longer than that.
 EVERY, EARLY = 10.0, 2.0
 
 
-class _Lines:
-    """Lines on how far the work is, for a log or whoever reads no terminal; none on a work of a few
-    seconds."""
-
-    def __init__(self, title: str) -> None:
-        self.title, self.began = title, time.monotonic()
-        self.first: tuple[float, float] | None = (
-            None  # when something was told for the first time, and how much was done then
-        )
-        self.done, self.total, self.what = 0.0, 0.0, ""
-
-    def on_progress(self, done: float, total: float, what: str = "") -> None:
-        """An `OnProgress`."""
-        self.first = self.first or (time.monotonic(), done)
-        self.done, self.total, self.what = done, total, what
-
-    def left(self) -> float:
-        """Expected time left, s; infinite where nothing is done yet."""
-        when, before = self.first or (0.0, self.done)
-        gone = self.done - before
-        return (
-            (time.monotonic() - when) * (self.total - self.done) / gone if gone > 0.0 else math.inf
-        )
-
-    def watch(self, over: threading.Event) -> None:
-        """Writes the lines until it is `over`."""
-        if not over.wait(EARLY) and EVERY < self.left() < math.inf:
-            self.say()
-        while not over.wait(EVERY):
-            self.say()
-
-    def say(self) -> None:
-        """Writes one line."""
-        left = self.left()
-        seconds, words = (
-            (left, "left") if left < math.inf else (time.monotonic() - self.began, "so far")
-        )
-        parts = f"{self.done:.0f} of {self.total:.0f}, " if self.total else ""
-        what = f" ({printable(self.what, 60)})" if self.what else ""
-        told = f"{self.title}: {parts}{int(seconds) // 60}:{int(seconds) % 60:02d} {words}{what}"
-        print(f"rockcheck: {told}", file=sys.stderr, flush=True)
-
-
 @contextmanager
-def _bar(title: str, screen: Console) -> Iterator[OnProgress]:
+def progress(title: str) -> Iterator[OnProgress]:
+    """How far the work is and the time left, on stderr: a bar on a terminal, elsewhere lines;
+    nothing where a command is quiet."""
+    screen = Console(stderr=True)
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(20),
@@ -243,36 +165,67 @@ def _bar(title: str, screen: Console) -> Iterator[OnProgress]:
         TextColumn("left"),
         console=screen,
         transient=True,
+        speed_estimate_period=600.0,
+        disable=_voice.get() != "tables" or not screen.is_terminal,
     )
+    bar.add_task(title, total=None, what="")
+    (task,) = bar.tasks
+
+    def on_progress(done: float, total: float, what: str = "") -> None:
+        words = f"{title}: {printable(what, 24)}" if what else title
+        bar.update(task.id, total=total, description=words, what=what)
+        bar.advance(task.id, done - task.completed)  # what is read back counts for no time
+
+    over = threading.Event()
+    if bar.disable and _voice.get() != "quiet":
+        threading.Thread(target=_tell_lines, args=[title, task, over], daemon=True).start()
     with bar:
-        task = bar.add_task(title, total=None)
-
-        def on_progress(done: float, total: float, what: str = "") -> None:
-            bar.update(
-                task,
-                completed=done,
-                total=total,
-                description=f"{title}: {printable(what, 24)}" if what else title,
-            )
-
-        yield on_progress
+        try:
+            yield on_progress
+        finally:
+            over.set()
 
 
-def studied(study: Study, out: Path, *, report: bool = True, **how: Any) -> NoReturn:
-    """Run a study with progress, write its page, say what it found; ends with its exit code."""
+def _tell_lines(title: str, task: ProgressTask, over: threading.Event) -> None:
+    """Lines for a log or whoever reads no terminal, until it is `over`; none on a work of a few
+    seconds."""
+    wait = EARLY
+    while not over.wait(wait):
+        left = task.time_remaining
+        if wait == EVERY or (left or 0.0) > EVERY:
+            parts = f"{task.completed:.0f} of {task.total:.0f}, " if task.total else ""
+            what = f" ({printable(task.fields['what'], 60)})" if task.fields["what"] else ""
+            minutes, seconds = divmod(int((task.elapsed or 0.0) if left is None else left), 60)
+            told = f"{parts}{minutes}:{seconds:02d} {'so far' if left is None else 'left'}{what}"
+            print(f"rockcheck: {title}: {told}", file=sys.stderr, flush=True)
+        wait = EVERY
+
+
+def studied(
+    study: Study, options: Played, formats: Sequence[str] = FORMATS, **how: Any
+) -> NoReturn:
+    """Run a study with progress, write its page with figures in these formats, say what it found;
+    ends with its exit code."""
     from rockcheck.validation.study import run
 
-    folder = usable_folder(out)
+    folder = usable_folder(options.out)
     with progress(study.name) as on_progress:
-        found = run(study, folder, on_progress=on_progress, **how)
-    told(found, folder, report=report)
+        found = run(
+            study,
+            folder,
+            jobs=options.jobs,
+            scheduler=options.scheduler,
+            on_progress=on_progress,
+            **how,
+        )
+    told(found, folder, formats)
 
 
-def told(found: Finding, folder: Path | None = None, *, report: bool = True) -> NoReturn:
+def told(found: Finding, folder: Path | None = None, formats: Sequence[str] = FORMATS) -> NoReturn:
     """Write a finding's page if it has a folder, say what it is, and end with its exit code."""
     from rockcheck.reports.document import publish, show
 
-    page = folder and (publish(found, folder) if report else folder / "run.json")
+    page = folder and publish(found, folder, formats=formats)
     show(found, console())
     if page:
         console().print(f"report: {page}", soft_wrap=True)

@@ -6,7 +6,7 @@ from typing import Annotated, get_args
 
 import typer
 
-from rockcheck.commands import OUT, JobsOption, OutOption, one_of, studied, tell_missing
+from rockcheck.commands import OUT, JobsOption, OutOption, Played, one_of, studied, tell_missing
 
 WhatArgument = Annotated[
     str,
@@ -34,4 +34,4 @@ def run(
 
     part: What = one_of("benchmark", what, get_args(What))
     tell_missing()
-    studied(WorkPrecision(part, quick), out, jobs=jobs, minutes=minutes)
+    studied(WorkPrecision(part, quick), Played(out, jobs), minutes=minutes)

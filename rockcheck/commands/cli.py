@@ -11,16 +11,17 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import fields, is_dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, TextIO, cast
+from typing import Annotated, Any, TextIO, cast, get_type_hints
 
 import typer
 import typer.core
 
-from rockcheck.commands import begun, report_file, speaking, total_told
+from rockcheck.commands import console, report_file, speaking
 from rockcheck.scenes import InputError, ModelFailure
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.suite.results import FAULT
@@ -41,7 +42,7 @@ COMMANDS = {
     "assess": ("assess", "rockcheck assess shelf.toml records --gaps 0.02,0.05,0.1"),
     "spectrum": ("spectrum", "rockcheck spectrum fig8 --size 50 --refine"),
     "benchmark": ("benchmark", "rockcheck benchmark --quick"),
-    "conformance": ("conformance", "rockcheck conformance --engine mujoco --settings default"),
+    "conformance": ("conformance", "rockcheck conformance --engine mujoco --set settings=default"),
     "stress": ("stress", "rockcheck stress --quick"),
     "report": ("report", "rockcheck report rockcheck-report --scene fig4a -o fig4a.pdf"),
     "warm": ("warm", "rockcheck warm"),
@@ -77,6 +78,7 @@ EXIT_CODES = {
     INTERRUPTED: "interrupted by Ctrl-C",
 }
 
+_NAMED = inspect.Parameter.KEYWORD_ONLY
 QuietOption = Annotated[
     bool, typer.Option("--quiet", "-q", help="Print errors only; the exit code is the answer.")
 ]
@@ -86,28 +88,48 @@ JsonOption = Annotated[
 
 
 def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
-    """A command with the options that all of them have, --quiet and --json; one that is `timed`
-    says how long it took."""
+    """A command with the options that all of them have, --quiet and --json. A parameter that is a
+    dataclass is a group of options, its fields. One that is `timed` says last how long it took in
+    all, whatever its verdict: its user waits for more than the simulations."""
+    own = inspect.signature(does, eval_str=True).parameters.values()
+    groups: dict[str, Any] = {
+        one.name: one.annotation for one in own if is_dataclass(one.annotation)
+    }
 
-    def command(*, quiet: bool, as_json: bool, **arguments: Any) -> None:
-        with (
-            speaking("json" if as_json else "quiet" if quiet else "tables"),
-            total_told() if timed else contextlib.nullcontext(),
-        ):
-            does(**arguments)
+    def command(context: typer.Context, *, quiet: bool, as_json: bool, **given: Any) -> None:
+        code = 0
+        for name, group in groups.items():
+            given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
+        with speaking("json" if as_json else "quiet" if quiet else "tables"):
+            try:
+                does(**given)
+            except typer.Exit as error:
+                code = error.exit_code
+            if timed:
+                console().print(f"total: {time.perf_counter() - context.obj:.1f} s")
+        raise typer.Exit(code)
 
-    signature = inspect.signature(does, eval_str=True)
-    common = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=option)
-        for name, option in (("quiet", QuietOption), ("as_json", JsonOption))
+    every = [option for one in own for option in _options(one)]
+    every += [
+        inspect.Parameter("context", _NAMED, annotation=typer.Context),
+        inspect.Parameter("quiet", _NAMED, default=False, annotation=QuietOption),
+        inspect.Parameter("as_json", _NAMED, default=False, annotation=JsonOption),
     ]
     command.__doc__ = does.__doc__
-    command.__signature__ = signature.replace(parameters=[*signature.parameters.values(), *common])  # type: ignore[attr-defined]
-    command.__annotations__ = {
-        parameter.name: parameter.annotation
-        for parameter in (*signature.parameters.values(), *common)
-    }
+    command.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
+    command.__annotations__ = {one.name: one.annotation for one in every}
     return command
+
+
+def _options(given: inspect.Parameter) -> list[inspect.Parameter]:
+    """The parameter, or those of the fields of its group."""
+    if not is_dataclass(given.annotation):
+        return [given.replace(kind=_NAMED)]
+    hints, values = get_type_hints(given.annotation, include_extras=True), vars(given.default)
+    return [
+        inspect.Parameter(name, _NAMED, default=values[name], annotation=hint)
+        for name, hint in hints.items()
+    ]
 
 
 def _with_value(word: str, after: str) -> str:
@@ -136,20 +158,6 @@ class _EachOnce(typer.core.TyperCommand):
         return super().parse_args(ctx, args)
 
 
-class _Loaded(Mapping[str, Any]):
-    """The commands by name. Only that which is asked for is imported: half of them need the
-    compiler, or what draws."""
-
-    def __getitem__(self, name: str) -> Any:
-        return _loaded(name)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(COMMANDS)
-
-    def __len__(self) -> int:
-        return len(COMMANDS)
-
-
 @cache
 def _loaded(name: str) -> Any:
     module, example = COMMANDS[name]
@@ -162,9 +170,12 @@ def _loaded(name: str) -> Any:
 
 
 class _Commands(typer.core.TyperGroup):
+    """The commands by name. Only that which is asked for is imported: half of them need the
+    compiler, or what draws."""
+
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
-        self.commands = cast(Any, _Loaded())
+        self.commands = cast(Any, COMMANDS)  # whose names are suggested
 
     def list_commands(self, ctx: Any) -> list[str]:
         return [name for name in COMMANDS if name not in HIDDEN]
@@ -172,7 +183,7 @@ class _Commands(typer.core.TyperGroup):
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         if cmd_name in GONE:
             raise InputError(f"the command {cmd_name} is gone: {GONE[cmd_name]}")
-        return super().get_command(ctx, cmd_name)
+        return _loaded(cmd_name) if cmd_name in COMMANDS else None
 
 
 app = typer.Typer(
@@ -207,12 +218,13 @@ def common(
 def main(arguments: Sequence[str] | None = None, *, began: float | None = None) -> int:
     """Run the command line; returns the exit code, one of `EXIT_CODES`. The program `began` then
     (of `time.perf_counter`; None: now)."""
-    with _readers_may_go(), begun(time.perf_counter() if began is None else began):
+    with _readers_may_go():
         try:
             code = app(
                 args=list(sys.argv[1:] if arguments is None else arguments),
                 prog_name="rockcheck",
                 standalone_mode=False,
+                obj=time.perf_counter() if began is None else began,
             )
         except (typer.TyperException, InputError) as error:
             return _told(

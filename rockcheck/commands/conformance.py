@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated
 
 import typer
 
 from rockcheck.commands import (
     OUT,
     AllowCodeOption,
-    JobsOption,
-    OutOption,
-    SchedulerOption,
+    Played,
     answer,
     console,
     model_names,
@@ -32,10 +31,6 @@ def run(
             help="A name or module:Class; repeatable (default: all installed).",
             autocompletion=model_names,
         ),
-    ] = None,
-    settings: Annotated[
-        Literal["best", "default", "both"] | None,
-        typer.Option("--settings", help="Set-up of the engines (default: best)."),
     ] = None,
     histories: Annotated[
         list[Path] | None,
@@ -57,14 +52,13 @@ def run(
         list[str] | None,
         typer.Option(
             "--set",
-            help="A setting of the engines, such as time_step=1e-3; repeatable."
-            " With --tune: time_step, friction, penetration (m).",
+            help="A setting of the engines, such as time_step=1e-3; repeatable. Their set-up:"
+            " settings=best (the default), default or both. With --tune: time_step, friction,"
+            " penetration (m).",
         ),
     ] = None,
     allow_code: AllowCodeOption = None,
-    out: OutOption = OUT / "conformance",
-    jobs: JobsOption = None,
-    scheduler: SchedulerOption = None,
+    played: Played = Played(OUT / "conformance"),
 ) -> None:
     """Hold engines against phenomena with a certain answer.
 
@@ -88,24 +82,24 @@ def run(
             raise InputError(f"{printable(name)!r} is not allowed: {allowed}", "--engine")
         if reason := models.not_installed(name):
             raise InputError(reason, f"--engine {name}")
-    how: dict[str, Any] = {"jobs": jobs, "scheduler": scheduler}
     if tune is not None:
-        if settings or histories:
-            raise InputError("goes with neither --settings nor --histories", "--tune")
+        if histories:
+            raise InputError("does not go with --histories", "--tune")
         if unknown := given.keys() - (WANTED.keys() - {"restitution"}):
             raise unknown_name("setting", min(unknown), WANTED.keys() - {"restitution"})
         wanted = tuple(Tune(name, tune, **given) for name in names)
-        studied(Tuning(wanted), out / "tuned", **how)
-    kinds = ("best", "default") if settings == "both" else (settings,)
+        studied(Tuning(wanted), replace(played, out=played.out / "tuned"))
+    setup = given.pop("settings", None)
+    kinds = ("best", "default") if setup == "both" else (setup,)
     players = [named(name, kind, given) for name in names for kind in kinds]
     players += [written(folder) for folder in histories or []]
-    studied(Conformance(tuple(players)), out, **how)
+    studied(Conformance(tuple(players)), played)
 
 
 def _export(folder: Path) -> None:
     from rockcheck.reports.scene_data import write_scene_file
-    from rockcheck.validation.studies.conformance.exchange import export
     from rockcheck.validation.studies.conformance.phenomena import SCENES
+    from rockcheck.validation.studies.conformance.study import export
 
     for name, scene in SCENES.items():
         write_scene_file(scene, folder, name)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated
 
 import typer
 
 from rockcheck.commands import (
     OUT,
-    JobsOption,
-    OutOption,
-    SchedulerOption,
+    Played,
     model_names,
     scene_names,
     setting_of,
@@ -19,7 +18,7 @@ from rockcheck.commands import (
 )
 from rockcheck.scenes import InputError, load_scene
 from rockcheck.validation.execute.store import name_of
-from rockcheck.validation.paper.panels import (
+from rockcheck.validation.paper import (
     AMPLITUDES,
     FIGURES,
     FREQUENCIES,
@@ -35,6 +34,29 @@ def names(incomplete: str) -> list[str]:
     return [*(name for name in PAPER if name.startswith(incomplete)), *scene_names(incomplete)]
 
 
+@dataclass(frozen=True)
+class Grid:
+    """The options of the nodes."""
+
+    size: Annotated[int, typer.Option("--size", help="Nodes an axis.")] = 100
+    frequencies: Annotated[
+        tuple[float, float],
+        typer.Option(
+            "--frequencies",
+            help="Range of omega_p/p; with a record, of the block's size relative to its own.",
+        ),
+    ] = FREQUENCIES
+    amplitudes: Annotated[
+        tuple[float, float],
+        typer.Option(
+            "--amplitudes", help="Range of a_p/(g tan alpha); with a record, of its scale."
+        ),
+    ] = AMPLITUDES
+    refine: Annotated[
+        bool, typer.Option("--refine", help="Run only what lies near a boundary.")
+    ] = False
+
+
 def run(
     what: Annotated[
         str,
@@ -45,20 +67,7 @@ def run(
             autocompletion=names,
         ),
     ] = "paper",
-    size: Annotated[int, typer.Option("--size", help="Nodes an axis.")] = 100,
-    frequencies: Annotated[
-        tuple[float, float],
-        typer.Option(
-            "--frequencies",
-            help="Range of omega_p/p; with a record, of the block's size relative to its own.",
-        ),
-    ] = FREQUENCIES,
-    amplitudes: Annotated[
-        tuple[float, float],
-        typer.Option(
-            "--amplitudes", help="Range of a_p/(g tan alpha); with a record, of its scale."
-        ),
-    ] = AMPLITUDES,
+    grid: Grid = Grid(),
     model: Annotated[
         str | None,
         typer.Option(
@@ -72,18 +81,13 @@ def run(
         list[str] | None,
         typer.Option("--set", help="A setting of the model, such as tolerance=1e-10; repeatable."),
     ] = None,
-    refine: Annotated[
-        bool, typer.Option("--refine", help="Run only what lies near a boundary.")
-    ] = False,
     agreement: Annotated[
         int | None,
         typer.Option(
             "--agreement", help="Nodes a spectrum at which the other models are compared."
         ),
     ] = None,
-    out: OutOption = OUT / "spectrum",
-    jobs: JobsOption = None,
-    scheduler: SchedulerOption = None,
+    played: Played = Played(OUT / "spectrum"),
     force: Annotated[
         bool, typer.Option("--force", help="Run everything again, also what is up to date.")
     ] = False,
@@ -97,8 +101,8 @@ def run(
     rockcheck spectrum paper --agreement 200               against the other models
     rockcheck spectrum shelf.toml --amplitudes 1 6 --refine    your own block and pulse
     """
-    from rockcheck.validation.studies.spectrum.grids import Request
     from rockcheck.validation.studies.spectrum.study import Spectra
+    from rockcheck.validation.studies.spectrum.tiles import Request
 
     if what in PAPER:
         panels = paper_panels(*PAPER[what])
@@ -109,15 +113,16 @@ def run(
     hops = what not in PAPER and panels[0].wall is not None
     given = dict(setting_of(one) for one in settings or [])
     name = model or ("ebm-unilateral" if hops and agreement is None else "ebm")
-    request = Request(size, frequencies, amplitudes, name, given, refine)
+    axes = grid.size, grid.frequencies, grid.amplitudes
+    request = Request(*axes, name, given, grid.refine)
     if agreement is not None:
         if name != "ebm":
             raise InputError(
                 "cannot be given together with --model: all are compared", "--agreement"
             )
-        if not 2 <= agreement <= size**2:
+        if not 2 <= agreement <= grid.size**2:
             said = f"{agreement} is not allowed: give 2 up to the number of the spectrum's nodes"
             raise InputError(said, "--agreement")
         tell_missing()
     study = Spectra(panels, request, agreement or 0)
-    studied(study, out, jobs=jobs, scheduler=scheduler, force=force)
+    studied(study, played, force=force)

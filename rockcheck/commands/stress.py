@@ -8,9 +8,7 @@ import typer
 
 from rockcheck.commands import (
     OUT,
-    JobsOption,
-    OutOption,
-    SchedulerOption,
+    Played,
     one_of,
     studied,
     tell_missing,
@@ -27,7 +25,7 @@ WhatArgument = Annotated[
 
 def run(
     what: WhatArgument = "all",
-    out: OutOption = OUT / "stress",
+    played: Played = Played(OUT / "stress"),
     quick: Annotated[
         bool, typer.Option("--quick", help="Some thousand runs, below a minute.")
     ] = False,
@@ -46,8 +44,6 @@ def run(
     model: Annotated[
         list[str] | None, typer.Option("--model", help="Only this model; repeatable.")
     ] = None,
-    jobs: JobsOption = None,
-    scheduler: SchedulerOption = None,
 ) -> None:
     """Numerical stability: where the models break.
 
@@ -66,4 +62,4 @@ def run(
             raise NotInstalled(missing, name)
     tell_missing()
     study = Stress(part, seed, quick, runs, tuple(model or ()))
-    studied(study, out, jobs=jobs, scheduler=scheduler)
+    studied(study, played)

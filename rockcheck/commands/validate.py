@@ -33,7 +33,7 @@ from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.recordings import Reading
 from rockcheck.scenes.recordings.sets import record_path
-from rockcheck.validation.execute.models import FAMILIES, family, is_own, not_installed
+from rockcheck.validation.execute.models import FAMILIES, compiles, family, not_installed
 from rockcheck.validation.suite.changes import Moment, moment_of, remember, trend_of, trends
 from rockcheck.validation.suite.record_sets import RecordSet
 from rockcheck.validation.suite.results import Run, Strict
@@ -248,12 +248,8 @@ def play(
     suite: Suite, folder: Path, jobs: int | None, force: bool, strict: Strict, scheduler: str | None
 ) -> Run:
     """Run a suite with a progress bar on stderr."""
-    compiles = (
-        ", a first run compiles"
-        if any(not is_own(one.family_name) and one.family.compiled for one in suite.models.values())
-        else ""
-    )
-    with progress(f"{suite.name}{compiles}") as on_progress:
+    slow = any(compiles(one.family_name, one.settings) for one in suite.models.values())
+    with progress(f"{suite.name}{', a first run compiles' if slow else ''}") as on_progress:
         return run_suite(
             suite,
             folder,

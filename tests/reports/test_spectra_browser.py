@@ -16,11 +16,10 @@ from playwright import sync_api as playwright
 from rockcheck.reports.document import publish
 from rockcheck.reports.show.spectrum import COLOURS
 from rockcheck.validation.finding import Block, Column, Finding, Made
-from rockcheck.validation.paper.panels import Panel, paper_panels
+from rockcheck.validation.paper import Panel, paper_panels
 from rockcheck.validation.studies.population.study import blocks_of, lines_of
-from rockcheck.validation.studies.spectrum.grids import Request
 from rockcheck.validation.studies.spectrum.study import Spectra
-from rockcheck.validation.studies.spectrum.tiles import Played
+from rockcheck.validation.studies.spectrum.tiles import Played, Request
 from rockcheck.validation.uncertainty.population import curve_of
 
 pytestmark = pytest.mark.browser
@@ -117,6 +116,7 @@ def test_ones_own_block_is_told_in_hertz_and_g(
         "safe",
         "overturned",
         "undecided",
+        "★ the scene's own pulse",
     ]  # it is beside a wall
     page.evaluate("Object.values(rockcheckFigures)[0].point([4, 7])")
     said = page.locator("output.node").inner_text()

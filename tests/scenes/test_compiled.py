@@ -7,6 +7,7 @@ import gc
 import json
 import os
 import pickle
+import runpy
 import signal
 import subprocess
 import sys
@@ -20,10 +21,10 @@ import pytest
 
 from rockcheck import ebm
 from rockcheck.commands.cli import main
+from rockcheck.commands.warm import PARTS
 from rockcheck.ebm.core import march
 from rockcheck.scenes import compiled
 from rockcheck.scenes.progress import announcing
-from rockcheck.validation.execute.warming import PARTS
 
 #: A package of one kernel, played in a process of its own; says how many functions were read from
 #: the cache and how many compiled.
@@ -52,20 +53,20 @@ f"{sum(stats.cache_hits.values())} read, {sum(stats.cache_misses.values())} comp
 
 
 @pytest.fixture
-def play(tmp_path):
+def tiny(tmp_path):
     (tmp_path / "tiny").mkdir()
-    (tmp_path / "tiny" / "kernels.py").write_text(_TINY)
+    path = tmp_path / "tiny" / "kernels.py"
+    path.write_text(_TINY)
+    return path
 
+
+@pytest.fixture
+def play(tmp_path, tiny):
     def play(said: str, **environment: str) -> str:
         """Play the kernel in a new process; returns its stderr."""
-        place = {
-            "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
-            "HOME": str(tmp_path),
-            "XDG_CACHE_HOME": "",
-        } | environment
-        command = [sys.executable, str(tmp_path / "tiny" / "kernels.py")]
+        place = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")} | environment
         done = subprocess.run(
-            command,
+            [sys.executable, str(tiny)],
             capture_output=True,
             text=True,
             env={**os.environ, **place},
@@ -77,6 +78,25 @@ def play(tmp_path):
         return done.stderr
 
     return play
+
+
+@pytest.fixture
+def replay(tmp_path, tiny, monkeypatch, capsys):
+    monkeypatch.setenv("HOME", str(tmp_path))
+
+    def replay(said: str, cache_dir: str | None = None, user_wide: str = "") -> str:
+        """Play the kernel as a new process would, its functions made anew; returns its stderr."""
+        monkeypatch.setenv("XDG_CACHE_HOME", user_wide)
+        folder = str(tmp_path / "cache") if cache_dir is None else cache_dir
+        monkeypatch.setattr(compiled.config, "CACHE_DIR", folder)
+        compiled._cache_folder.cache_clear()
+        runpy.run_path(str(tiny), run_name="__main__")
+        out, err = capsys.readouterr()
+        assert out == f"{said}\n"
+        return err
+
+    yield replay
+    compiled._cache_folder.cache_clear()
 
 
 @pytest.mark.skipif(compiled.config.DISABLE_JIT, reason="interpreted")
@@ -157,9 +177,9 @@ def test_the_key_is_of_all_that_lies_below_the_package(tmp_path, monkeypatch):
         "a link to nowhere",
     ],
 )
-def test_a_damaged_file_is_compiled_again(tmp_path, play, damage):
+def test_a_damaged_file_is_compiled_again(tmp_path, replay, damage):
     """And what the planted pickle would do is not done."""
-    play("0 read, 2 compiled")
+    replay("0 read, 2 compiled")
     for path in files(tmp_path):
         content = bytearray(path.read_bytes())
         path.unlink()
@@ -178,8 +198,8 @@ def test_a_damaged_file_is_compiled_again(tmp_path, play, damage):
             path.write_bytes(pickle.dumps(_Planted(str(tmp_path / "ran"))))
         else:
             path.symlink_to(tmp_path / "nowhere")
-    assert play("0 read, 2 compiled") == ""
-    assert play("2 read, 0 compiled") == ""
+    assert replay("0 read, 2 compiled") == ""
+    assert replay("2 read, 0 compiled") == ""
     assert not (tmp_path / "ran").exists()
 
 
@@ -194,8 +214,8 @@ class _Planted:
 
 
 @pytest.mark.needs("POSIX")
-def test_the_folder_is_closed_to_others(tmp_path, play):
-    play("0 read, 2 compiled")
+def test_the_folder_is_closed_to_others(tmp_path, replay):
+    replay("0 read, 2 compiled")
     (folder,) = (tmp_path / "cache").glob("tiny-kernels-*")
     assert folder.stat().st_mode & 0o777 == 0o700
 
@@ -204,9 +224,9 @@ def test_the_folder_is_closed_to_others(tmp_path, play):
 @pytest.mark.parametrize(
     "fault", ["open to others", "a link", "below a folder that all may change"]
 )
-def test_a_folder_that_others_may_change_is_not_used(tmp_path, play, fault):
+def test_a_folder_that_others_may_change_is_not_used(tmp_path, replay, fault):
     """The next place is taken, or none: then one line says so."""
-    play("0 read, 2 compiled")
+    replay("0 read, 2 compiled")
     (folder,) = (tmp_path / "cache").glob("tiny-kernels-*")
     if fault == "open to others":
         folder.chmod(0o777)
@@ -215,7 +235,7 @@ def test_a_folder_that_others_may_change_is_not_used(tmp_path, play, fault):
         folder.symlink_to(tmp_path / "elsewhere")
     else:
         folder.parent.chmod(0o777)
-    said = play("0 read, 2 compiled")
+    said = replay("0 read, 2 compiled")
     assert said == (
         "rockcheck: no private folder for compiled code, each run compiles anew:"
         " set NUMBA_CACHE_DIR to one of your own\n"
@@ -232,16 +252,14 @@ def test_a_folder_of_another_user_is_not_used(tmp_path, monkeypatch):
 
 
 @pytest.mark.needs("POSIX")
-def test_no_folder_that_could_be_foreseen(tmp_path, play):
+def test_no_folder_that_could_be_foreseen(tmp_path, replay):
     """Where the package's folder cannot be written, the user's own cache is taken, never a common
     one."""
     (tmp_path / "tiny" / "__pycache__").write_text("not a folder")
-    assert play("0 read, 2 compiled", NUMBA_CACHE_DIR="") == ""
+    assert replay("0 read, 2 compiled", cache_dir="") == ""
     assert len(list((tmp_path / ".cache" / "rockcheck").glob("tiny-kernels-*/*.nbc"))) == 2
-    assert play("2 read, 0 compiled", NUMBA_CACHE_DIR="") == ""
-    assert "no private folder" in play(
-        "0 read, 2 compiled", NUMBA_CACHE_DIR="", XDG_CACHE_HOME="/dev/null"
-    )
+    assert replay("2 read, 0 compiled", cache_dir="") == ""
+    assert "no private folder" in replay("0 read, 2 compiled", cache_dir="", user_wide="/dev/null")
 
 
 def test_without_the_compiler(play):
@@ -363,7 +381,7 @@ def test_what_is_compiled_ahead_is_not_compiled_again(capsys):
     assert list(json.loads(said.out)["seconds"]) == list(PARTS)
     assert said.err == ""
     code = (
-        "from rockcheck.validation.execute.warming import PARTS;"
+        "from rockcheck.commands.warm import PARTS;"
         "[run() for run in PARTS.values()];"
         "from rockcheck.ebm.core import march; print(sum(march.play.stats.cache_misses.values()),"
         " len(march.play.signatures) <= 1)"

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from rockcheck.commands.cli import main
 from rockcheck.reports.document import block_markdown, csv, publish
 from rockcheck.scenes import InputError
 from rockcheck.scenes.progress import announcing
@@ -145,6 +147,31 @@ def test_on_a_dask_cluster_it_is_the_same(tmp_path: Path, log: Path) -> None:
     assert len(found.failures) == 2
 
 
+@pytest.mark.parametrize("address", ["local:0", "local:two", "nonsense", ""])
+def test_a_wrong_scheduler_is_bad_input_before_anything_is_planned(
+    tmp_path: Path, log: Path, monkeypatch: pytest.MonkeyPatch, address: str
+) -> None:
+    study, asked = squares([2.0], log), []
+    monkeypatch.setattr(type(study), "tasks", lambda *_: asked.append(1))
+    with pytest.raises(InputError) as told:
+        run(study, tmp_path / "out", scheduler=address)
+    assert told.value.key == "--scheduler"
+    assert not asked
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "words", ["validate smoke", "assess fig5a", "spectrum", "conformance", "stress", "accept smoke"]
+)
+def test_every_study_says_so_in_one_line(
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main([*words.split(), "--scheduler", "local:0", "--quiet"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("rockcheck: --scheduler: 'local:0'")
+
+
 def test_a_folder_that_cannot_be_used_is_bad_input(log: Path) -> None:
     with pytest.raises(InputError, match="output folder"):
         run(squares([2.0], log), log)
@@ -184,6 +211,16 @@ FOUND = Finding(
     verdict="fail",
     exit_code=1,
 )
+
+
+def test_an_optional_column_without_a_value_is_in_files_only() -> None:
+    columns = [text("name"), Column("bias", optional=True), Column("x")]
+    table = Table("t", columns, [["a", None, 1.0], ["b", Mark(None), None]])
+    assert [column.name for column in table.shown.columns] == ["name", "x"]
+    assert table.shown.rows == [["a", 1.0], ["b", None]]
+    assert csv(table).splitlines()[0] == "name,bias,x"
+    known = replace(table, rows=[["a", 0.0, 1.0]])
+    assert known.shown.rows == known.rows
 
 
 def test_one_table_is_csv_markdown_and_page(tmp_path: Path) -> None:

@@ -4,25 +4,30 @@ machine was."""
 from __future__ import annotations
 
 import ast
+import contextlib
 import hashlib
-import importlib.util
 import json
 import os
 import platform
+import re
+import time
 from collections.abc import Container, Iterable, Mapping
-from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
 from importlib.machinery import PathFinder
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from rockcheck.scenes import Scene
+from rockcheck.scenes import InputError, Scene
+from rockcheck.scenes.reading import read_text
+from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.execute.models import FAMILIES, family, home
 
 #: The package whose code counts where it can be reached; the package of the model itself always
 #: does.
 OWN_PACKAGE = "rockcheck"
+_KEPT = 30 * 86400.0  # s
 
 
 def cell_key(
@@ -65,14 +70,52 @@ def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
     """Hash of the code of a module and of all project modules that it imports, at its top or inside
     functions.
 
-    Of the syntax trees without docstrings: comments, layout and documentation do not count.
+    Of the syntax trees without docstrings: comments, layout and documentation do not count. That of
+    our own modules is kept for the next process, under the content of all our sources.
     """
-    return digest(
+    kept = _kept(module) if module.split(".")[0] == OWN_PACKAGE else None
+    if kept is not None and (known := _text_of(kept)):
+        return known
+    found = digest(
         "".join(
-            f"{name}\n{_source_of(path).essence}\n"
+            f"{name}\n{_source_of(path)[1]}\n"
             for name, path in sorted(reachable(module, search_path).items())
         )
     )
+    if kept is not None:
+        _keep(kept, found)
+    return found
+
+
+def _kept(module: str) -> Path:
+    """The file for the digest of a module of ours, named after the content of all our sources."""
+    spec = find_spec(OWN_PACKAGE)
+    content = hashlib.sha256(f"{module} {platform.python_version()}".encode())
+    for root in (Path(root) for root in (spec and spec.submodule_search_locations) or ()):
+        for folder in (root, *sorted(path for path in root.iterdir() if path.is_dir())):
+            for source in sorted(folder.rglob("*.py")):
+                content.update(source.name.encode() + b"\0" + source.read_bytes())
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
+    return cache / "rockcheck" / "code" / f"{content.hexdigest()[:32]}.txt"
+
+
+def _text_of(path: Path) -> str:
+    """A digest that was kept, empty where there is none."""
+    try:
+        found = read_text(path).strip()
+    except InputError:
+        return ""
+    return found if re.fullmatch(r"[0-9a-f]{16}", found) else ""
+
+
+def _keep(path: Path, found: str) -> None:
+    """Keep a digest where that can be done, and forget those of a month ago."""
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        write_whole(path, found + "\n")
+        for old in path.parent.glob("*.txt"):
+            if time.time() - old.stat().st_mtime > _KEPT:
+                old.unlink(missing_ok=True)
 
 
 def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]:
@@ -109,7 +152,7 @@ def _source(name: str, search_path: tuple[str, ...]) -> Path | None:
     for depth in range(min(2, len(parts)), 0, -1):  # rockcheck's folders do not lie in each other
         try:
             spec = (
-                importlib.util.find_spec(".".join(parts[:depth]))
+                find_spec(".".join(parts[:depth]))
                 if depth == 1 or parts[0] == OWN_PACKAGE
                 else None
             )
@@ -134,18 +177,12 @@ def _imports(
 ) -> Iterable[str]:
     """Names of the modules that a file of `package` imports; of a package only where something that
     is no module is taken from it."""
-    for node in _source_of(path).imports:
+    for node in _source_of(path)[0]:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         else:
-            base = node.module or ""
-            if node.level:
-                base = ".".join(
-                    filter(
-                        None,
-                        [*package.split(".")[: len(package.split(".")) - node.level + 1], base],
-                    )
-                )
+            above = package.split(".")[: 1 - node.level or None] if node.level else []
+            base = ".".join(filter(None, [*above, node.module]))
             for alias in node.names:
                 inner = f"{base}.{alias.name}"
                 yield (
@@ -155,16 +192,9 @@ def _imports(
                 )
 
 
-@dataclass(frozen=True)
-class _Source:
-    """What a source file imports, and its syntax tree without docstrings, as text."""
-
-    imports: tuple[ast.Import | ast.ImportFrom, ...]
-    essence: str
-
-
 @cache
-def _source_of(path: Path) -> _Source:
+def _source_of(path: Path) -> tuple[list[ast.Import | ast.ImportFrom], str]:
+    """What a source file imports, and its syntax tree without docstrings, as text."""
     tree, imports = ast.parse(path.read_text(encoding="utf-8")), []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
@@ -173,7 +203,7 @@ def _source_of(path: Path) -> _Source:
             node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
         ) and ast.get_docstring(node, clean=False):
             node.body = node.body[1:] or [ast.Pass()]
-    return _Source(tuple(imports), ast.dump(tree))
+    return imports, ast.dump(tree)
 
 
 @cache

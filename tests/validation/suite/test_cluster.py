@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from rockcheck.scenes import InputError
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 
@@ -57,10 +56,3 @@ floor = {{ friction = 0.5 }}
     }
     at_home = run_suite(suite, tmp_path / "home", jobs=1)
     assert at_home.cell("short", "Still").figures == run.cell("short", "Still").figures
-
-
-@pytest.mark.parametrize("address", ["local:0", "local:two", "nonsense"])
-def test_an_unusable_address_is_bad_input(tmp_path, address):
-    suite = load_suite("smoke")
-    with pytest.raises(InputError, match="--scheduler"):
-        run_suite(suite, tmp_path / "out", scheduler=address)
