@@ -1,15 +1,13 @@
-"""Runs of the event-based model, one or many, compiled: many on all cores, with their outcomes and
-peaks, and their motion where it is asked for.
+"""Many runs of the event-based model at once, compiled and on all cores: outcomes and peaks, and
+their motion where it is asked for.
 
-Scenes are packed into arrays of records, one row a run, so that the loop over them never comes back
-to Python. Threads take chunks of rows; the result of a row does not depend on the others, nor on
+Threads take chunks of rows; the result of a row does not depend on the others, nor on
 the number of threads.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,47 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import natural
-from rockcheck.ebm.core import march
-from rockcheck.ebm.core.block import SETTING, filled
+from rockcheck.ebm.core.block import SETTING
 from rockcheck.ebm.core.ground import FORM
 from rockcheck.ebm.core.names import FAILURES, Ending, Family, Pivot, Shape
-from rockcheck.ebm.core.state import CONTROL, MOTION, STATE, Records, Rows, workspace
+from rockcheck.ebm.core.state import MOTION, Records, Rows
 from rockcheck.ebm.model import EventBasedModel
-from rockcheck.scenes.compiled import for_types_of
+from rockcheck.ebm.packed import Packed, pack, play, setting_for, starts_of
 from rockcheck.scenes.errors import InputError, ModelFailure
 from rockcheck.scenes.progress import OnProgress, threads, unheard
 from rockcheck.scenes.scene import Scene
 
+__all__ = ["Outcomes", "Packed", "pack", "pack_pulses", "refuse_bouc_wen", "run_batch"]
 Floats = NDArray[np.float64]
 _CHUNK = 256
-#: The event loops that are compiled, by whether friction is Bouc-Wen's.
-_READY: dict[bool, Callable[..., None]] = {}
 #: What a batch keeps of a run's state, by its field there.
 _KEPT = {"peak": "peak", "t_end": "t", "series": "steps", "ending": "ending", "written": "rows"}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Packed:
-    """Runs as arrays, one row each, natural units: what compiled code is given, the motion at the
-    start, and the duration."""
-
-    rows: Rows
-    starts: NDArray[np.void]
-    durations: Floats
-
-    def __len__(self) -> int:
-        return len(self.durations)
-
-    def part(self, part: slice) -> Packed:
-        """Some of the runs. The samples stay those of all."""
-        rows = self.rows
-        return Packed(
-            rows=Rows(
-                rows.settings[part], rows.horizontal[part], rows.vertical[part], rows.samples
-            ),
-            starts=self.starts[part],
-            durations=self.durations[part],
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,26 +60,6 @@ class Outcomes:
         return (self.ending != Ending.DONE) & (self.ending != Ending.OVERTURNED)
 
 
-def pack(scenes: Sequence[Scene], model: EventBasedModel) -> Packed:
-    """Packs a list of scenes; raises `InputError` where the model cannot play one of them."""
-    for scene in scenes:
-        model.check(scene)
-    bases = [natural.base_of(scene) for scene in scenes]
-    grounds = [ground for base in bases for ground in base]
-    forms = np.array([ground.form for ground in grounds], dtype=FORM)
-    forms["first"] = np.cumsum(forms["count"]) - forms["count"]
-    return Packed(
-        rows=Rows(
-            np.array([_setting(scene, model) for scene in scenes], dtype=SETTING),
-            forms[::2].copy(),
-            forms[1::2].copy(),
-            np.concatenate([np.empty(0), *(ground.samples for ground in grounds)]),
-        ),
-        starts=np.array([tuple(natural.state_of(scene)) for scene in scenes], dtype=MOTION),
-        durations=np.array([scene.duration / natural.time_unit(scene) for scene in scenes]),
-    )
-
-
 def pack_pulses(
     scene: Scene, model: EventBasedModel, amplitudes: Floats, periods: Floats
 ) -> Packed:
@@ -131,24 +83,13 @@ def pack_pulses(
     still = natural.base_of(scene).vertical
     return Packed(
         rows=Rows(
-            np.full(count, _setting(scene, model), dtype=SETTING),
+            np.full(count, setting_for(scene, model), dtype=SETTING),
             horizontal,
             np.full(count, still.form, dtype=FORM),
             still.samples,
         ),
         starts=np.full(count, np.array(tuple(natural.state_of(scene)), dtype=MOTION)),
         durations=np.full(count, scene.duration / unit),
-    )
-
-
-def _setting(scene: Scene, model: EventBasedModel) -> np.record:
-    return natural.setting_of(
-        scene,
-        unilateral=model.pivot == "unilateral",
-        no_slip=model.friction == "no-slip",
-        energy_cap=model.energy_cap,
-        impacts=model.impacts,
-        yields=model.yield_displacement / scene.block.radius,
     )
 
 
@@ -214,39 +155,3 @@ def _told(states: NDArray[np.void]) -> dict[str, NDArray[Any]]:
     mode = states["mode"]
     at_rest = (mode["family"] == Family.FLAT) & (mode["pivot"] == Pivot.STICK)
     return found | {"side": -np.sign(falls).astype(np.int8), "at_rest": at_rest}
-
-
-def starts_of(
-    packed: Packed,
-    model: EventBasedModel,
-    steps: Floats | float,
-    most_steps: int,
-    until_decided: bool = False,
-) -> NDArray[np.void]:
-    """The states of runs at their start, with rows of the motion `steps` apart."""
-    states = np.zeros(len(packed), STATE)
-    states["motion"], states["t_end"] = packed.starts, packed.durations
-    states["control"] = filled(
-        CONTROL,
-        tolerance=model.tolerance,
-        most_steps=most_steps,
-        most_events=model.most_events,
-        until_decided=until_decided,
-    )
-    states["control"]["output_step"] = steps
-    return states
-
-
-def play(model: EventBasedModel, rows: Rows, states: NDArray[np.void], records: Records) -> None:
-    """Plays runs with the model's friction, in `states`."""
-    given = rows, states, workspace(), records
-    loop_of(model, *given)(*given)
-
-
-def loop_of(model: EventBasedModel, *given: Any) -> Callable[..., None]:
-    """The machine code of the event loop with the model's friction, loaded or compiled, for what it
-    is given: always of the same types."""
-    bouc_wen = model.friction == "bouc-wen"
-    if bouc_wen not in _READY:
-        _READY[bouc_wen] = for_types_of(march.play_bouc_wen if bouc_wen else march.play, *given)
-    return _READY[bouc_wen]

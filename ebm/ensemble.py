@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import natural
-from rockcheck.ebm.batch import pack, play, refuse_bouc_wen, starts_of
+from rockcheck.ebm.batch import refuse_bouc_wen
 from rockcheck.ebm.core.names import FAILURES, Ending
 from rockcheck.ebm.core.state import Records
 from rockcheck.ebm.model import EventBasedModel
+from rockcheck.ebm.packed import pack, play, starts_of
 from rockcheck.scenes import kinematics
 from rockcheck.scenes.errors import ModelFailure
 from rockcheck.scenes.progress import threads

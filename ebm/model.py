@@ -127,31 +127,31 @@ class EventBasedModel(Frozen):
 
     def _simulate(self, scene: Scene) -> History:
         began = time.perf_counter()
-        from rockcheck.ebm import batch, natural
+        from rockcheck.ebm import natural, packed
         from rockcheck.ebm.core import names, state
         from rockcheck.scenes.progress import interruptible
 
-        packed, unit = batch.pack([scene], self), natural.time_unit(scene)
+        given, unit = packed.pack([scene], self), natural.time_unit(scene)
         shape = 1, len(scene.output_times)
         records = state.Records(
             out=np.empty((*shape, 6)),
             out_mode=np.zeros(shape, dtype=np.int8),
             log=np.empty((1, self.most_events, 5)),
         )
-        start = partial(batch.starts_of, packed, self, scene.output_step / unit)
+        start = partial(packed.starts_of, given, self, scene.output_step / unit)
         work = state.workspace()
         # Compiled or loaded here, so that no run's time holds it.
-        loop = batch.loop_of(self, packed.rows, start(0), work, records)
+        loop = packed.loop_of(self, given.rows, start(0), work, records)
 
         def play(most_steps: int) -> np.record:
             states = start(most_steps)
-            loop(packed.rows, states, work, records)
+            loop(given.rows, states, work, records)
             return states[0]
 
         ready, cpu = time.perf_counter(), time.process_time()
         # A run of few steps is played here: to hand it over takes longer. Each sample of a record
         # is a step.
-        few = min(self.most_steps, _AT_ONCE if len(packed.rows.samples) < _AT_ONCE else 0)
+        few = min(self.most_steps, _AT_ONCE if len(given.rows.samples) < _AT_ONCE else 0)
         found = play(few) if few else None
         if found is None or (found.ending == names.Ending.TOO_MANY_STEPS and few < self.most_steps):
             found = interruptible(partial(play, self.most_steps))

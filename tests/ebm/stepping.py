@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.ebm.batch import pack, starts_of
 from rockcheck.ebm.core import march, modes
 from rockcheck.ebm.core.names import Family, Pivot
 from rockcheck.ebm.core.state import STATE, Records, Run, workspace
+from rockcheck.ebm.packed import pack, starts_of
 from rockcheck.scenes import Block, Scene
 
 

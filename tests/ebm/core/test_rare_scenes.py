@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.ebm.batch import pack, run_batch, starts_of
+from rockcheck.ebm.batch import pack, run_batch
+from rockcheck.ebm.packed import starts_of
 from rockcheck.scenes import (
     Block,
     Floor,
@@ -215,12 +216,12 @@ def test_impulse_ahead_is_the_integral(symmetric):
 
     ground = ground_of(Ricker(amplitude=5.0, period=1.3, symmetric=symmetric), 9.81, 0.4)
     for share in (1.3, 1.6, 2.2):
-        t = ground.centre + share / math.sqrt(ground.rate)
+        t = ground.form.centre + share / math.sqrt(ground.form.rate)
         there, _ = quad(
-            lambda s: abs(acceleration(ground, s)), t, ground.quiet, epsabs=1e-15, epsrel=1e-12
+            lambda s: abs(acceleration(ground, s)), t, ground.form.quiet, epsabs=1e-15, epsrel=1e-12
         )
         assert impulse_ahead(ground, t) == pytest.approx(there, rel=1e-9)
-    assert impulse_ahead(ground, ground.centre) == math.inf
+    assert impulse_ahead(ground, ground.form.centre) == math.inf
 
 
 def test_inner_kernels_return_no_arrays(monkeypatch):
