@@ -21,6 +21,7 @@ from rockcheck.ebm.core.state import CONTROL, MOTION, STATE, Records, Rows, work
 from rockcheck.scenes.compiled import for_types_of
 from rockcheck.scenes.scene import Scene
 
+Floats = NDArray[np.float64]
 #: The event loops that are compiled, by whether friction is Bouc-Wen's.
 _READY: dict[bool, Callable[..., None]] = {}
 

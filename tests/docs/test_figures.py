@@ -142,7 +142,7 @@ def test_what_the_benchmark_says():
 
 def test_thresholds_that_the_limits_name():
     assert (series.AHEAD, series.NOISE[Kind.POSITION], series.INSTANT) == (0.02, 1e-13, 1e-9)
-    assert (contacts.CLOSED, contacts.SLOW, motion.LEAST_FRICTION) == (1e-10, 1e-9, 1e-9)
+    assert (contacts.CLOSED, contacts.SLOW, block.LEAST_FRICTION) == (1e-10, 1e-9, 1e-9)
     assert (settle.SETTLE, settle._QUIET, settle._FASTEST) == (5e-8, 0.025, 2.5e-3)
     assert (settle._AT_ONCE, settle._IMPACTS, settle._TIMES) == (20, 100, 500)
     assert (state.MODES, series.ORDER) == (128, 15)

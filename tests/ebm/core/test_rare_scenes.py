@@ -298,7 +298,7 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
     records = state.Records(*(part[None] for part in nothing()))
     monkeypatch.setattr(march, "_play_row", march.loop_with(coulomb).py_func)
     with np.errstate(all="ignore"):
-        march.play.py_func(packed.rows, states, work, records)
+        march.play(packed.rows, states, work, records)
     assert len(seen) > 30
 
 
