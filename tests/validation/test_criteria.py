@@ -155,8 +155,9 @@ def test_the_estimates_have_a_value_for_a_block_so_wide_that_it_does_not_rebound
 @pytest.mark.parametrize("factor", [0.6, 1.0, 1.4])
 def test_the_rocking_estimate_is_the_angle_whose_capacity_is_the_demand(shaken, factor):
     """Written out: frequency and damping by the formulas, the demand by the spectrum."""
-    scene = shaken[0].replace(excitation=shaken[0].excitation.scaled(factor))
-    base, block = criteria.base_of(scene), scene.block
+    motion, block = shaken[0].excitation.scaled(factor), Block(half_width=0.24, half_height=0.8)
+    scene = shaken[0].replace(excitation=motion, block=block)
+    base = criteria.base_of(scene)
     a, h = block.half_width / block.half_height, block.half_height
     inertia = 4.0 / 3.0 * (1.0 + a**2)
     loss = -2.0 * math.log(1.0 - 2.0 * a**2 / inertia)
