@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rockcheck import ContinuousModel, EventBasedModel, MuJoCo, compare, load_scene
-from rockcheck.ebm.core import contacts, motion, rules, series, settle, state
+from rockcheck.ebm.core import block, contacts, rules, series, settle, state
 from rockcheck.ebm.core.names import Kind
 from rockcheck.scenes.experience import Experience
 from rockcheck.scenes.kinematics import pivot_height
