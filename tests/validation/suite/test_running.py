@@ -318,9 +318,7 @@ def test_only_calls_that_compile_wait_for_each_other(tmp_path):
         ("box2d", "", ""),
     ],
 )
-def test_time_to_compile_does_not_count_for_a_cells_limit(
-    tmp_path, model, settings, compiled
-):
+def test_time_to_compile_does_not_count_for_a_cells_limit(tmp_path, model, settings, compiled):
     """Of the cells whose model compiles the same code the first has `COMPILING` s more."""
     path = write_suite(tmp_path, {"a": f'model = "{model}"\n{settings}'})
     study = SuiteStudy(load_suite(path, allow_code=OWN), tmp_path / "out")
