@@ -10,9 +10,8 @@ from typing import Any
 from rockcheck.scenes import Scene
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.execute import provenance
-from rockcheck.validation.uncertainty.numerical import Numerical
+from rockcheck.validation.uncertainty.numerical import INPUTS, Explanation, Numerical, explain
 from rockcheck.validation.uncertainty.population import Inputs
-from rockcheck.validation.uncertainty.verdict import INPUTS, Explanation, explain
 
 #: Quantities that are explained, with their units.
 QUANTITIES = {"theta_rms": "alpha", "peak_rotation": "alpha", "last_slip": "m"}
