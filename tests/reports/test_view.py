@@ -15,7 +15,7 @@ import pytest
 
 from rockcheck.reports.ensembles import EnsembleView
 from rockcheck.reports.figures import histories_figure
-from rockcheck.reports.overview import accuracy, entry, glance
+from rockcheck.reports.overview import Entry, accuracy, entry, glance
 from rockcheck.reports.scene_data import packed, packed_lines, write_scene_file
 from rockcheck.reports.show.words import number, ratio, readable
 from rockcheck.reports.site import PAGES, write_site
@@ -96,6 +96,21 @@ def test_a_run_that_ends_during_a_fall_says_so(finished: Run) -> None:
         found = entry(finished.model_copy(update={"cells": cells}), "Free", "ebm")
         assert found is not None
         assert (found.outcome, found.apart) == (outcome, apart)
+
+
+def test_an_outcome_unlike_the_references_within_tolerance_is_explained(finished: Run) -> None:
+    own = next(c for c in finished.cells if c.checks and c.verdict == "pass")
+    agrees = Figure(measure="outcome_agrees", label="outcome agrees", unit="1", value=0.0)
+    judged = own.checks[0].model_copy(update={"figure": agrees})
+    other = dict.fromkeys(("cell", "rms", "whole", "ratio", "u_num"))
+    for cell, apart, said in (
+        (own, False, ""),
+        (own, True, "not judged"),
+        (own.model_copy(update={"checks": (judged,)}), True, "accepted"),
+        (own.model_copy(update={"checks": ()}), True, ""),
+    ):
+        found = Entry(**{**other, "cell": cell}, outcome="overturned left", apart=apart).why_apart
+        assert found.rpartition("; ")[2] == said
 
 
 def test_data_are_the_histories(site: Path) -> None:
