@@ -119,6 +119,22 @@ def test_the_table_of_choices(names, least, most, ratios):
     assert sorted(rounded(found[line][1] / unit, 2) for line in lines) == ratios
 
 
+def test_the_step_that_an_engine_needs():
+    import whole_runs
+
+    of = {}
+    for run in ("league", "league-jolt"):
+        found = whole_runs.load(run)
+        of |= {row["line"]: row for row in found.table("first-steps").records()}
+    for engine in ("mujoco", "pybullet", "pymunk", "dart", "box2d"):
+        assert of[engine]["all"] == "0.0001 s"
+        assert of.get(f"{engine} adaptive", {"all": "0.008 s"})["all"] == "0.008 s"
+    assert [of[engine]["all"] for engine in ("drake", "physx", "jolt")] == [
+        f"never (down to {step} s)" for step in ("0.001", "0.0001", "0.0001")
+    ]
+    assert {of[f"{engine} default"]["all"] for engine in ("pymunk", "dart")} == {"0.0001 s"}
+
+
 def test_what_the_benchmark_says():
     found = settings()
     for model in ("ebm", "ebm-unilateral"):

@@ -97,7 +97,12 @@ DOORS = {
     }
     | {"reports/show/drawing.py"},
     r"\.open\(|\bopen\(": {"scenes/reading.py", "scenes/writing.py", "validation/suite/changes.py"},
-    r"\.mkdir\(": {"scenes/writing.py", "scenes/compiled.py"},
+    # Results go through `writing.made`; caches of the user's own lie in folders of mode 0700.
+    r"\.mkdir\(": {
+        "scenes/writing.py",
+        "scenes/compiled.py",
+        "validation/execute/provenance.py",
+    },
     r"\.read_text\(|\.read_bytes\(": {
         "scenes/compiled.py",
         "scenes/experience.py",

@@ -631,8 +631,6 @@ def _pybullet_steps() -> Iterator[Pair]:
         return
     from rockcheck.engines import PyBullet
 
-    start = np.array(_TILTED.initial_state)
-
     def steps(each: str = "", walls: tuple[Wall, ...] = (), count: int = _STEPS) -> Play:
         """What a step costs, us, with what is done after `each`, by the names of its calls."""
 
@@ -654,7 +652,7 @@ def _pybullet_steps() -> Iterator[Pair]:
                     after()
 
             try:
-                world.place(start)
+                world.place(*_TILTED.initial_state)
                 bullet.setTimeStep(1e-3, **options)
                 bullet.setGravity(0.0, 0.0, -9.81, **options)
                 return _timed(lambda: None, stepped, count)()
