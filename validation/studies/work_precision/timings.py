@@ -259,9 +259,9 @@ print(imported - began, time.perf_counter() - loaded)
 """
 
 
-def cold_start(*, cached: bool) -> ColdStart:
-    """Import and first simulation in fresh processes, without compile cache, or (median of three)
-    with it."""
+def cold_start(*, cached: bool, times: int = 1) -> ColdStart:
+    """Import and first simulation in a fresh process without compile cache, or with it: the median
+    of so many."""
     with tempfile.TemporaryDirectory() as folder:
         fresh = dict(os.environ) if cached else {**os.environ, "NUMBA_CACHE_DIR": folder}
         if not cached:
@@ -271,7 +271,7 @@ def cold_start(*, cached: bool) -> ColdStart:
             "filled",
             *(
                 median(column)
-                for column in zip(*(_cold_start(fresh) for _ in range(3)), strict=True)
+                for column in zip(*(_cold_start(fresh) for _ in range(times)), strict=True)
             ),
         )
 
