@@ -1,21 +1,32 @@
 """A finding as a terminal's tables, CSV, Markdown and a page: each block is rendered from one
-description."""
+description. All pages have one look, made of the templates in `data/templates`."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from rich.console import Console
 from rich.table import Table as Grid
 
 from rockcheck.reports.drawers import figure_of, live_data, scripts_of, side_by_side
-from rockcheck.reports.pages import Site
-from rockcheck.reports.show.words import number
-from rockcheck.reports.style import FORMATS, LOOKS, looks, save, stamp_of, undrawn
+from rockcheck.reports.show.words import (
+    dash_array,
+    duration,
+    moment,
+    number,
+    readable,
+    unit,
+    window,
+)
+from rockcheck.reports.style import FORMATS, LOOKS, SPARE, looks, save, stamp_of, undrawn
+from rockcheck.scenes.errors import inert
 from rockcheck.scenes.writing import json_text, made, markdown_table, table_text, write_whole
 from rockcheck.validation.execute.pool import Call
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Text, plain
@@ -196,3 +207,66 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
         row_cells=row_cells,
         figures=FIGURES,
     )
+
+
+DATA = Path(str(resources.files("rockcheck.reports"))) / "data"
+#: The folder beside `index.html` that holds everything else.
+PAGES = "pages"
+
+
+@dataclass(frozen=True)
+class Site:
+    """A folder of pages with one look; `links` are its parts for the navigation, (title, address
+    from the index)."""
+
+    folder: Path
+    name: str
+    links: tuple[tuple[str, str], ...] = ()
+
+    def page(self, address: str, template: str, **context: Any) -> Path:
+        """Write the page `address` (relative to the folder, with slashes) from a template of
+        `data/templates/`."""
+        root = "../" * address.count("/")
+        text = (
+            _environment()
+            .get_template(template)
+            .render(site=self, root=root, address=address, **context)
+        )
+        return write_whole(made(self.folder, *address.split("/")[:-1]) / Path(address).name, text)
+
+    def assets(self) -> None:
+        """Write style sheets, scripts and the plotting library, once for all pages."""
+        target = made(self.folder, PAGES, "assets")
+        for source in sorted((DATA / "assets").iterdir()):
+            write_whole(target / source.name, source.read_bytes())
+        for source in sorted((DATA / "vendor").glob("*/*")):
+            name = source.name if source.name != "LICENSE" else f"LICENSE.{source.parent.name}.txt"
+            write_whole(target / name, source.read_bytes())
+        write_whole(target / "models.css", model_styles())
+
+
+def model_styles() -> str:
+    """A style sheet with a class `look-<key>` for each look of a model that sets its colour, by day
+    and by night."""
+    rows = (
+        f".look-{look.key} {{ --look: light-dark({look.light}, {look.dark}); }}"
+        for look in (*LOOKS.values(), *SPARE)
+    )
+    return "\n".join(rows) + "\n"
+
+
+@cache
+def _environment() -> Environment:
+    """The templates with what they call. Kept, since compiling a page's templates takes longer than
+    drawing its figures."""
+    environment = Environment(
+        loader=FileSystemLoader(DATA / "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=lambda value: inert(value) if type(value) is str else value,
+    )
+    for filter in (number, unit, duration, moment, window, dash_array, readable):
+        environment.filters[filter.__name__] = filter
+    return environment

@@ -29,7 +29,7 @@ from rockcheck.validation.finding import (
     Text,
     text,
 )
-from rockcheck.validation.suite.ensembles import Distribution, Ensemble
+from rockcheck.validation.suite.motions import Distribution, Ensemble
 from rockcheck.validation.suite.results import Cell, EnsembleRecord, Run
 
 #: Ends of the axes of peaks, alpha, and where an overturned block is drawn beyond.

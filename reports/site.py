@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rockcheck.reports import tables
-from rockcheck.reports.document import FIGURES, csv, row_cells
+from rockcheck.reports.document import DATA, FIGURES, PAGES, Site, csv, row_cells
 from rockcheck.reports.drawers import figure_of, side_by_side
 from rockcheck.reports.ensembles import EnsembleView
 from rockcheck.reports.figures import (
@@ -22,11 +22,10 @@ from rockcheck.reports.figures import (
     thumbnail,
     write_figures,
 )
-from rockcheck.reports.overview import PEAKS, accuracy, entry, glance, matrix, outcome_of
-from rockcheck.reports.pages import DATA, PAGES, Site
 from rockcheck.reports.scene_data import script, write_scene_file
 from rockcheck.reports.show.words import scene_facts
 from rockcheck.reports.style import FORMATS, looks, save
+from rockcheck.reports.tables import PEAKS, accuracy, entry, glance, matrix, outcome_of
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable, unknown_name

@@ -26,11 +26,11 @@ from rockcheck.scenes import InputError, ModelFailure
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.suite.results import FAULT
 
-#: The commands, in the order of the help: where each has its function `run` below this package, and
-#: an example.
+#: The commands, in the order of the help: where each is below this package, a module with
+#: its function `run` or another function of one; and an example.
 COMMANDS = {
     "scenes": ("scenes", "rockcheck scenes"),
-    "new": ("new", "rockcheck new bookcase.toml"),
+    "new": ("scenes.new", "rockcheck new bookcase.toml"),
     "record": ("record", "rockcheck record station.V2 --read component=1 --plot station.png"),
     "simulate": (
         "simulate",
@@ -160,8 +160,9 @@ class _EachOnce(typer.core.TyperCommand):
 
 @cache
 def _loaded(name: str) -> Any:
-    module, example = COMMANDS[name]
-    does = importlib.import_module(f"rockcheck.commands.{module}").run
+    where, example = COMMANDS[name]
+    module, _, function = where.partition(".")
+    does = getattr(importlib.import_module(f"rockcheck.commands.{module}"), function or "run")
     alone = typer.Typer(rich_markup_mode=None, add_completion=False)
     alone.command(name=name, cls=_EachOnce, epilog=f"Example: {example}")(
         spoken(does, timed=name not in AT_ONCE)

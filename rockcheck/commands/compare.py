@@ -24,7 +24,7 @@ from rockcheck.validation.discrepancy.figures import value_words
 from rockcheck.validation.discrepancy.measured import read_measured, shifted, time_shift
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
 from rockcheck.validation.discrepancy.motion import motion_of
-from rockcheck.validation.suite.changes import difference
+from rockcheck.validation.suite.across import difference
 from rockcheck.validation.suite.results import Run
 
 #: So many figures that moved are listed without --all.

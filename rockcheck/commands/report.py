@@ -1,17 +1,27 @@
-"""`rockcheck report`: render a finished run again, or one figure of it for a paper."""
+"""`rockcheck report`: render a finished run again, or one figure of it for a paper; and how any
+command writes a finished run into its folder: run.json, tables, pages."""
 
 from __future__ import annotations
 
+import os
+import platform
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from filelock import FileLock, Timeout
 
 from rockcheck.commands import answer, console, progress
-from rockcheck.commands.publish import publish
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.progress import OnProgress, unheard
+from rockcheck.scenes.reading import read_text
+from rockcheck.scenes.writing import no_link, write_whole
 from rockcheck.validation.suite.results import Run
+from rockcheck.validation.suite.tables import checks_csv, figures_csv, junit, markdown
 
 
 def run(
@@ -66,3 +76,77 @@ def _draw(folder: Path, scenes: list[str], path: Path, against: str | None) -> N
     written = write_figure(folder, scenes[0], path, against)
     console().print(f"figure: {written}", soft_wrap=True)
     answer({"figure": written})
+
+
+LOCK, HOLDER = ".lock", ".lock.holder"
+#: How long a run waits for another one that writes the same folder: before it says so, and in all,
+#: s.
+SILENT, PATIENCE = 2.0, 600.0
+
+
+@contextmanager
+def _turn(folder: Path) -> Iterator[None]:
+    """Within this block no other run writes into `folder`. A run that waits says for which one, and
+    gives up after `PATIENCE` s."""
+    lock = FileLock(no_link(folder / LOCK))
+    try:
+        lock.acquire(timeout=SILENT)
+    except Timeout:
+        whom = f"{_holder(folder)}, which holds {printable(folder / LOCK)}"
+        print(f"rockcheck: waiting up to {PATIENCE:g} s for {whom}", file=sys.stderr)
+        try:
+            lock.acquire(timeout=PATIENCE)
+        except Timeout:
+            raise InputError(
+                f"{printable(folder)}: waited {PATIENCE:g} s for {whom}: end it, or give another"
+                " --out"
+            ) from None
+    try:
+        write_whole(folder / HOLDER, f"process {os.getpid()} on {platform.node()}")
+        yield
+    finally:
+        (folder / HOLDER).unlink(missing_ok=True)
+        lock.release()
+
+
+def _holder(folder: Path) -> str:
+    try:
+        return printable(read_text(folder / HOLDER, most=1000)) or "another run"
+    except InputError:
+        return "another run"
+
+
+def keep(run: Run, folder: Path) -> Path:
+    """Write run.json, its schema and the tables (the histories are there already); returns
+    run.json. Two runs take turns."""
+    with _turn(folder):
+        write_whole(folder / "checks.csv", checks_csv(run))
+        write_whole(folder / "figures.csv", figures_csv(run))
+        write_whole(folder / "junit.xml", junit(run))
+        write_whole(folder / "summary.md", markdown(run))
+        return run.save(folder)
+
+
+def publish(
+    folder: Path,
+    *,
+    jobs: int | None = None,
+    afresh: bool = False,
+    wanted: Sequence[str] = (),
+    on_progress: OnProgress = unheard,
+) -> Path:
+    """Write the pages of the run that was kept in `folder`; returns the page to open.
+
+    Unless `afresh`, only those that would show something else than they do. `jobs` processes draw,
+    by default one a core. Scenes that are `wanted` have a page in a large run, too.
+    """
+    from rockcheck.reports.site import write_site
+
+    with _turn(folder):
+        return write_site(
+            folder,
+            jobs=jobs or os.cpu_count() or 1,
+            afresh=afresh,
+            wanted=wanted,
+            on_progress=on_progress,
+        )

@@ -27,15 +27,15 @@ from rockcheck.commands import (
     tell_missing,
     usable_folder,
 )
-from rockcheck.commands.publish import keep, publish
 from rockcheck.commands.record import ReadOption
+from rockcheck.commands.report import keep, publish
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.recordings import Reading
 from rockcheck.scenes.recordings.sets import record_path
 from rockcheck.validation.execute.models import FAMILIES, family, is_own, not_installed
-from rockcheck.validation.suite.changes import Moment, moment_of, remember, trend_of, trends
-from rockcheck.validation.suite.record_sets import RecordSet
+from rockcheck.validation.suite.across import Moment, moment_of, remember, trend_of, trends
+from rockcheck.validation.suite.motions import RecordSet
 from rockcheck.validation.suite.results import Run, Strict
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import Suite, is_scene, load_suite, scene_suite

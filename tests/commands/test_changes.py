@@ -11,7 +11,7 @@ import pytest
 
 from rockcheck.commands.cli import main
 from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.suite.changes import changes, moment_of, read_history
+from rockcheck.validation.suite.across import changes, moment_of, read_history
 from rockcheck.validation.suite.results import Run
 
 SUITE = """

@@ -13,10 +13,9 @@ import pytest
 
 from rockcheck.commands.cli import main
 from rockcheck.reports.ensembles import EnsembleView
-from rockcheck.reports.overview import PEAKS, glance, matrix
 from rockcheck.reports.show.words import number
 from rockcheck.reports.site import PAGES, write_site
-from rockcheck.reports.tables import overrun, worst_first
+from rockcheck.reports.tables import PEAKS, glance, matrix, overrun, worst_first
 from rockcheck.reports.view import slugs_of
 from rockcheck.scenes import (
     History,

@@ -96,15 +96,15 @@ DOORS = {
         "reports/style.py",
     }
     | {"reports/show/drawing.py"},
-    r"\.open\(|\bopen\(": {"scenes/reading.py", "scenes/writing.py", "validation/suite/changes.py"},
+    r"\.open\(|\bopen\(": {"scenes/reading.py", "scenes/writing.py", "validation/suite/across.py"},
     r"\.mkdir\(": {"scenes/writing.py", "scenes/compiled.py"},
     r"\.read_text\(|\.read_bytes\(": {
         "scenes/compiled.py",
         "scenes/experience.py",
         "validation/execute/provenance.py",
     }
-    | {"commands/new.py", "validation/studies/work_precision/savings.py", "reports/site.py"}
-    | {"reports/style.py", "reports/pages.py", "validation/paper/sentences.py"}
+    | {"commands/scenes.py", "validation/studies/work_precision/savings.py", "reports/site.py"}
+    | {"reports/style.py", "reports/document.py", "validation/paper/sentences.py"}
     | {"validation/studies/conformance/exchange.py"},
 }
 

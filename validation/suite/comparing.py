@@ -1,11 +1,13 @@
 """A suite's cells as they are planned, their figures against references under any law of impacts,
-and what else is worked out once and kept: the horizon, the landing at which laws part, what a
-spread of inputs makes of figures."""
+what else is worked out once and kept (the horizon, the landing at which laws part, what a spread of
+inputs makes of figures), and how sure figures are: a cell's difference from each reference against
+u_num, u_input and u_D (ASME V&V 20)."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -24,10 +26,12 @@ from rockcheck.validation.execute import provenance, workers
 from rockcheck.validation.execute.models import build, is_own
 from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
 from rockcheck.validation.study import Task
-from rockcheck.validation.suite.ensembles import Ensemble
+from rockcheck.validation.suite.motions import Ensemble
 from rockcheck.validation.suite.suites import ModelVariant
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Windowed
+from rockcheck.validation.uncertainty.numerical import Numerical
 from rockcheck.validation.uncertainty.population import Inputs, propagate
+from rockcheck.validation.uncertainty.verdict import INPUTS, Explanation, explain
 
 #: What is judged by the nearest law. Histories are judged up to the horizon, which ends where the
 #: laws part.
@@ -298,3 +302,113 @@ def _compute(
         impact_law=law,
         overturned_at=None if yardstick else candidate.overturned_at,
     )
+
+
+#: Quantities that are explained, with their units.
+QUANTITIES = {"theta_rms": "alpha", "peak_rotation": "alpha", "last_slip": "m"}
+
+
+def key_of(uncertainty: bool) -> dict[str, str]:
+    """What a cell's key also depends on if its numerical uncertainty is asked for."""
+    return (
+        {"uncertainty": provenance.code_digest("rockcheck.validation.uncertainty.numerical")}
+        if uncertainty
+        else {}
+    )
+
+
+def numerical_of(record: Mapping[str, Any]) -> Numerical | None:
+    """The numerical uncertainty that a worker has found, None where it was not asked for or not to
+    be had."""
+    found = record.get("numerical")
+    return None if found is None else Numerical(**found)
+
+
+def explanations(
+    scene: Scene,
+    figures: Sequence[Figure],
+    references: Mapping[str, Sequence[Figure]],
+    records: Mapping[str, Mapping[str, Any]],
+    own: Mapping[str, Any],
+    inputs: Inputs | None,
+) -> Iterator[Explanation]:
+    """The verdict on each quantity against each reference, by name: its own figures and its record
+    (`records`).
+
+    `own` is the candidate's record. There is no verdict for a model whose numerical error is
+    unknown, nor for a block that falls.
+    """
+    numerical = numerical_of(own)
+    if numerical is None:
+        return
+    for against, yardstick in references.items():
+        other = numerical_of(records[against])
+        if _falls(own) != _falls(records[against]):
+            yield _other_outcome(against, numerical, other, inputs)
+            continue
+        for name, unit in QUANTITIES.items():
+            error = _error(name, figures, yardstick, against)
+            if error is None:
+                continue
+            u_num, reason = _both(name, numerical, other)
+            u_data = math.hypot(
+                *(_u_data(scene, record, name) for record in (own, records[against]))
+            )
+            u_input = (inputs.u_input(name) or 0.0) if inputs else 0.0
+            yield explain(name, unit, error, u_num, u_input, u_data, reason=reason, against=against)
+
+
+def _falls(record: Mapping[str, Any]) -> str:
+    """The outcome of a block that falls, empty where it stands."""
+    outcome = str(record["outcome"])
+    return outcome if outcome.startswith("overturned") else ""
+
+
+def _other_outcome(
+    against: str, mine: Numerical, other: Numerical | None, inputs: Inputs | None
+) -> Explanation:
+    """What two different outcomes say: the peaks and slips of a block that falls have nothing to be
+    compared with."""
+    reasons = [reason for found in (mine, other) if found for reason in found.reasons]
+    if reasons:
+        return explain("outcome", "", None, None, reason="; ".join(reasons), against=against)
+    both_occur = inputs is not None and 0.0 < inputs.overturns.value < 1.0  # among the draws
+    verdict = INPUTS if both_occur else "not explained: model form or set-up, another outcome"
+    return Explanation(
+        quantity="outcome", unit="", against=against, error=1.0, u_num=0.0, verdict=verdict
+    )
+
+
+def _error(
+    name: str, figures: Iterable[Figure], yardstick: Iterable[Figure], against: str
+) -> float | None:
+    if name == "theta_rms":
+        return _value(figures, name, against)
+    mine, theirs = _value(figures, name, ""), _value(yardstick, name, "")
+    return None if mine is None or theirs is None else abs(mine - theirs)
+
+
+def _value(figures: Iterable[Figure], name: str, against: str) -> float | None:
+    return next(
+        (f.value for f in figures if f.measure == name and f.against == against and not f.window),
+        None,
+    )
+
+
+def _both(name: str, mine: Numerical, other: Numerical | None) -> tuple[float | None, str]:
+    """The numerical uncertainties of both runs together, or why it is not known."""
+    total = 0.0
+    for found in (mine, other):
+        if found is None:
+            continue
+        u = found.u_num(name)
+        if u is None:
+            return None, found.reason(name)
+        total = math.hypot(total, u)
+    return total, ""
+
+
+def _u_data(scene: Scene, record: Mapping[str, Any], name: str) -> float:
+    """Of a measured history, the scatter of its repeats: rotations in alpha, slips in m."""
+    u = float(record.get("uncertainty", {}).get(name, 0.0))
+    return u if name == "last_slip" else u / scene.block.alpha

@@ -25,9 +25,16 @@ from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store
 from rockcheck.validation.finding import Finding
 from rockcheck.validation.study import FAULTS, Study, run
-from rockcheck.validation.suite.comparing import Asked, Planned, compared, inputs_of
-from rockcheck.validation.suite.confidence import explanations, key_of, numerical_of
-from rockcheck.validation.suite.ensembles import Ensemble
+from rockcheck.validation.suite.comparing import (
+    Asked,
+    Planned,
+    compared,
+    explanations,
+    inputs_of,
+    key_of,
+    numerical_of,
+)
+from rockcheck.validation.suite.motions import Ensemble
 from rockcheck.validation.suite.results import Cell, CostRecord, EnsembleRecord, Run, Strict
 from rockcheck.validation.suite.suites import ModelVariant, Suite
 from rockcheck.validation.suite.tolerances import (
@@ -148,7 +155,7 @@ class SuiteStudy(Study):
         looked up without drawing them."""
         drawing = {
             "ensemble": ensemble.model_dump(mode="json", exclude={"count", "batch", "description"}),
-            "code": provenance.code_digest("rockcheck.validation.suite.ensembles"),
+            "code": provenance.code_digest("rockcheck.validation.suite.motions"),
         }
         for start in range(0, ensemble.count, ensemble.batch):
             numbers = range(start, min(start + ensemble.batch, ensemble.count))

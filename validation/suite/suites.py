@@ -41,8 +41,8 @@ A suite is a TOML file that a user can write:
         [{ name = "weak", excitation = { kind = "ricker", amplitude = 4.0, period = 1.5 } }],
     ]
 
-Scenes under recorded motions are `[[records]]` tables (validation.suite.record_sets). Ensembles are
-`[[ensemble]]` tables (validation.suite.ensembles), judged by what `require.ensemble` names. Scenes
+Scenes under recorded motions are `[[records]]` tables (validation.suite.motions). Ensembles are
+`[[ensemble]]` tables (validation.suite.motions), judged by what `require.ensemble` names. Scenes
 can also be written out as `[[scene]]` tables. Tolerances (validation.suite.tolerances) are a table
 `[tolerances]` in the file or a file `<suite>.tolerances.toml` beside it. `include = ["smoke",
 "walls"]` joins other suites instead.
@@ -75,8 +75,7 @@ from rockcheck.scenes.files import (
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS
 from rockcheck.validation.execute.models import Family, build, check_allowed, family, is_own
-from rockcheck.validation.suite.ensembles import Ensemble
-from rockcheck.validation.suite.record_sets import RecordSet, under_records
+from rockcheck.validation.suite.motions import Ensemble, RecordSet, under_records
 from rockcheck.validation.suite.results import Kind
 from rockcheck.validation.suite.tolerances import (
     HORIZON,

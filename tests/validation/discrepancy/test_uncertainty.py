@@ -22,8 +22,8 @@ from rockcheck.commands.cli import main
 from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.scenes.experience import Experience, Range, Trust, axes_of, expected, outside
 from rockcheck.scenes.files import load_scene, load_uncertain_scene
-from rockcheck.validation.suite.confidence import explanations
-from rockcheck.validation.suite.experience import bias_and_scatter
+from rockcheck.validation.suite.across import bias_and_scatter
+from rockcheck.validation.suite.comparing import explanations
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 from rockcheck.validation.suite.tables import junit, markdown

@@ -14,7 +14,7 @@ from rockcheck.scenes import Block, Floor, Rest, Scene
 from rockcheck.validation.discrepancy.compare import compare
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.suite.acceptance import accept
-from rockcheck.validation.suite.changes import Trend
+from rockcheck.validation.suite.across import Trend
 from rockcheck.validation.suite.results import Cell, Check, Run
 from rockcheck.validation.suite.tables import improvements, junit, verdict_lines
 from rockcheck.validation.suite.tolerances import MEASURES, Tolerance, floor_of, judge
