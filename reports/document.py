@@ -14,6 +14,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from rich.console import Console
 from rich.table import Table as Grid
+from rich.text import Text as Line
 
 from rockcheck.reports.drawers import figure_of, live_data, scripts_of, side_by_side
 from rockcheck.reports.show.words import (
@@ -37,7 +38,13 @@ SIGNS = {"pass": "✓", "changed": "△", "incomplete": "–", "fail": "✕", "e
 FIGURES = "figures"
 #: The folder of the scenes that show a failure.
 FAILING = "failures"
-COLOURS = {"fail": "red", "error": "red", "changed": "yellow", "incomplete": "yellow"}
+COLOURS = {
+    "pass": "green",
+    "changed": "yellow",
+    "incomplete": "yellow",
+    "fail": "red",
+    "error": "red",
+}
 
 
 def words(cell: Any, column: Column, write: Callable[[float, int], str] = number) -> str:
@@ -106,7 +113,8 @@ def show(found: Finding, screen: Console) -> None:
         screen.print(f"failed: {where}: {reason}", style="red", soft_wrap=True)
     if not found.complete:
         screen.print("not complete: the same command goes on where it ended", style="yellow")
-    screen.print(found.answer, style="bold", soft_wrap=True)
+    if found.answer:
+        screen.print(found.answer, style="bold", soft_wrap=True)
 
 
 def _grid(table: Table) -> Grid:
@@ -116,8 +124,16 @@ def _grid(table: Table) -> Grid:
             left = column.kind in ("text", "model")
             grid.add_column(column.head, justify="left" if left else "right", overflow="fold")
     for row in table.rows[: table.most]:
-        cells = zip(row, table.columns, strict=True)
-        grid.add_row(*(words(cell, column, _typed) for cell, column in cells if column.brief))
+        grid.add_row(
+            *(
+                Line(
+                    inert(words(cell, column, _typed)),
+                    COLOURS.get(cell.verdict, "") if isinstance(cell, Mark) else "",
+                )
+                for cell, column in zip(row, table.columns, strict=True)
+                if column.brief
+            )
+        )
     return grid
 
 

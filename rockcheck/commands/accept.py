@@ -12,12 +12,12 @@ from rockcheck.commands import (
     JobsOption,
     OutOption,
     SchedulerOption,
-    answer,
-    console,
     tell_left_out,
+    told,
     usable_folder,
 )
 from rockcheck.commands.validate import SuiteArgument, play, tell_faults
+from rockcheck.validation.finding import Finding, Text
 from rockcheck.validation.suite.acceptance import accept
 from rockcheck.validation.suite.suites import load_suite
 
@@ -50,21 +50,24 @@ def run(
     tell_left_out(loaded.left_out)
     finished = play(loaded, folder, jobs, False, False, scheduler)
     changes, refused = accept(loaded, finished, reason, write=not dry_run)
-    screen = console()
-    for line in changes:
-        screen.print(line, soft_wrap=True)
-    done = "would be written to" if dry_run else "in"
-    screen.print(f"{len(changes)} changes {done} {finished.tolerances_file}", soft_wrap=True)
-    for line in refused:
-        screen.print(f"not accepted: {line}", style="red", soft_wrap=True)
-    answer(
-        {
-            "changes": changes,
-            "refused": refused,
-            "file": finished.tolerances_file,
-            "written": not dry_run,
-        }
-    )
     tell_faults(finished, folder)
     failed = finished.exit_code if finished.verdict == "error" else 0
-    raise typer.Exit(failed or int(bool(refused)))
+    done = "would be written to" if dry_run else "in"
+    told(
+        Finding(
+            "accept",
+            loaded.name,
+            f"{len(changes)} changes {done} {finished.tolerances_file}",
+            [
+                Text(items=changes),
+                Text(items=[f"not accepted: {line}" for line in refused], verdict="fail"),
+            ],
+            data={
+                "changes": changes,
+                "refused": refused,
+                "file": finished.tolerances_file,
+                "written": not dry_run,
+            },
+            exit_code=failed or int(bool(refused)),
+        )
+    )

@@ -7,7 +7,7 @@ import os
 import platform
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -21,7 +21,7 @@ from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.writing import no_link, write_whole
 from rockcheck.validation.suite.results import Run
-from rockcheck.validation.suite.tables import checks_csv, figures_csv, junit, markdown
+from rockcheck.validation.suite.tables import files_of, junit, markdown
 
 
 def run(
@@ -56,7 +56,15 @@ def run(
     """
     Run.load(folder)
     if output is not None:
-        _draw(folder, scene or [], output, against)
+        from rockcheck.reports.site import write_figure
+
+        if scene is None or len(scene) != 1:
+            raise InputError("needs one --scene NAME", "--output")
+        if not output.parent.is_dir():
+            raise InputError(f"{printable(output.parent)}: no such folder", "--output")
+        written = write_figure(folder, scene[0], output, against)
+        console().print(f"figure: {written}", soft_wrap=True)
+        answer({"figure": written})
         return
     if against is not None:
         raise InputError("needs -o FILE", "--against")
@@ -64,18 +72,6 @@ def run(
         index = publish(folder, afresh=not scene, wanted=scene or (), on_progress=on_progress)
     console().print(f"report: {index}", soft_wrap=True)
     answer({"report": index})
-
-
-def _draw(folder: Path, scenes: list[str], path: Path, against: str | None) -> None:
-    from rockcheck.reports.site import write_figure
-
-    if len(scenes) != 1:
-        raise InputError("needs one --scene NAME", "--output")
-    if not path.parent.is_dir():
-        raise InputError(f"{printable(path.parent)}: no such folder", "--output")
-    written = write_figure(folder, scenes[0], path, against)
-    console().print(f"figure: {written}", soft_wrap=True)
-    answer({"figure": written})
 
 
 LOCK, HOLDER = ".lock", ".lock.holder"
@@ -88,11 +84,14 @@ SILENT, PATIENCE = 2.0, 600.0
 def _turn(folder: Path) -> Iterator[None]:
     """Within this block no other run writes into `folder`. A run that waits says for which one, and
     gives up after `PATIENCE` s."""
-    lock = FileLock(no_link(folder / LOCK))
+    lock, holder = FileLock(no_link(folder / LOCK)), folder / HOLDER
     try:
         lock.acquire(timeout=SILENT)
     except Timeout:
-        whom = f"{_holder(folder)}, which holds {printable(folder / LOCK)}"
+        other = ""
+        with suppress(InputError):  # it has just gone, or has not said who it is
+            other = printable(read_text(holder, most=1000))
+        whom = f"{other or 'another run'}, which holds {printable(folder / LOCK)}"
         print(f"rockcheck: waiting up to {PATIENCE:g} s for {whom}", file=sys.stderr)
         try:
             lock.acquire(timeout=PATIENCE)
@@ -102,26 +101,21 @@ def _turn(folder: Path) -> Iterator[None]:
                 " --out"
             ) from None
     try:
-        write_whole(folder / HOLDER, f"process {os.getpid()} on {platform.node()}")
+        write_whole(holder, f"process {os.getpid()} on {platform.node()}")
         yield
     finally:
-        (folder / HOLDER).unlink(missing_ok=True)
+        holder.unlink(missing_ok=True)
         lock.release()
-
-
-def _holder(folder: Path) -> str:
-    try:
-        return printable(read_text(folder / HOLDER, most=1000)) or "another run"
-    except InputError:
-        return "another run"
 
 
 def keep(run: Run, folder: Path) -> Path:
     """Write run.json, its schema and the tables (the histories are there already); returns
     run.json. Two runs take turns."""
+    from rockcheck.reports.document import csv
+
     with _turn(folder):
-        write_whole(folder / "checks.csv", checks_csv(run))
-        write_whole(folder / "figures.csv", figures_csv(run))
+        for table in files_of(run):
+            write_whole(folder / f"{table.name}.csv", csv(table))
         write_whole(folder / "junit.xml", junit(run))
         write_whole(folder / "summary.md", markdown(run))
         return run.save(folder)

@@ -2,41 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from rockcheck.commands import answer, console
 from rockcheck.scenes import InputError, load_scene, named_scenes
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.writing import write_new
 from rockcheck.validation.execute.models import FAMILIES
+from rockcheck.validation.finding import Finding, Table, text
 from rockcheck.validation.suite.suites import describe_suite, named_suites
 
 
 def run() -> None:
     """List the named scenes, suites and models, with a line each."""
+    from rockcheck.reports.document import show
+
     listings = {
         "scene": {name: load_scene(name).description for name in named_scenes()},
         "suite": {name: describe_suite(path) for name, path in named_suites().items()},
         "model": {name: family.summary for name, family in FAMILIES.items()},
     }
-    for title, rows in listings.items():
-        console().print(_listing(title, rows.items()))
+    tables = [
+        Table(title, [text(title), text("about", " ")], list(rows.items()), most=len(rows))
+        for title, rows in listings.items()
+    ]
+    show(Finding("scenes", "", "", tables), console())
     answer({f"{title}s": rows for title, rows in listings.items()})
-
-
-def _listing(title: str, rows: Iterable[tuple[str, str]]) -> Table:
-    table = Table(box=None, pad_edge=False, title_justify="left")
-    table.add_column(title, no_wrap=True, style="bold")
-    table.add_column("")
-    for name, description in rows:
-        table.add_row(name, description)
-    return table
 
 
 def new(

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
-from rich.console import Console
 
 from rockcheck.commands import (
     OUT,
@@ -34,22 +33,15 @@ from rockcheck.scenes.errors import printable
 from rockcheck.scenes.recordings import Reading
 from rockcheck.scenes.recordings.sets import record_path
 from rockcheck.validation.execute.models import FAMILIES, family, is_own, not_installed
-from rockcheck.validation.suite.across import Moment, moment_of, remember, trend_of, trends
+from rockcheck.validation.suite.across import moment_of, remember, trend_of
 from rockcheck.validation.suite.motions import RecordSet
 from rockcheck.validation.suite.results import Run, Strict
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import Suite, is_scene, load_suite, scene_suite
-from rockcheck.validation.suite.tables import (
-    improvements,
-    not_shown,
-    outcome_tables,
-    summary,
-    verdict_lines,
-    verdict_table,
-)
+from rockcheck.validation.suite.tables import finding_of, summary
 
-#: The folder of the trend's page, and so many figures that moved are told.
-TREND, MOST_MOVED = "trend", 10
+#: The folder of the trend's page.
+TREND = "trend"
 Strictness = Literal["worse", "both"]
 ALL = "all"
 SuiteArgument = Annotated[
@@ -167,18 +159,19 @@ def run(
             "--read vertical=true plays such a component together with the horizontal ones",
         )
     how: Strict = "both" if strict == "both" else strict is not None
+    from rockcheck.reports import document
+
     finished = play(suite, folder, jobs, force, how, scheduler)
     page = keep(finished, folder)
-    show(finished, console())
+    document.show(finding_of(finished), console())
     tell_faults(finished, folder)
     if history is not None and suite.judged:
         moments = remember(history, moment_of(finished, Path(finished.tolerances_file).parent))
-        tell_trend(moments, history)
+        trend = trend_of(moments)
+        document.show(trend, console())
         if report:
-            from rockcheck.reports.document import publish as written
-
-            trend = written(trend_of(moments), usable_folder(folder, TREND))
-            console().print(f"trend: {trend}", soft_wrap=True)
+            where = document.publish(trend, usable_folder(folder, TREND))
+            console().print(f"trend: {where}", soft_wrap=True)
     if report:
         with progress("pages") as on_progress:
             page = publish(folder, jobs=jobs, on_progress=on_progress)
@@ -278,55 +271,3 @@ def tell_faults(finished: Run, folder: Path) -> None:
             else f"{where}: traceback in {path}"
         )
         print(printable(f"rockcheck: {said}", 1400), file=sys.stderr)
-
-
-def tell_trend(moments: Sequence[Moment], path: Path) -> None:
-    """How many runs a history has, and the figures that moved since the one before."""
-    moved = [trend for trend in trends(moments) if trend.moved]
-    since = (
-        f", {len(moved)} figures moved since {moments[-2].commit or moments[-2].created}"
-        if len(moments) > 1
-        else ""
-    )
-    console().print(f"{path}: {len(moments)} runs{since}", soft_wrap=True)
-    for trend in moved[:MOST_MOVED]:
-        was, now = ("-" if value is None else f"{value:.6g}" for value in trend.values[-2:])
-        console().print(f"  {trend.name}: {was} -> {now}", soft_wrap=True)
-
-
-def show(finished: Run, out: Console) -> None:
-    """The verdicts, or the outcomes where nothing is judged: a table, the reasons of what is not a
-    pass, and a last line."""
-    bad = "red" if finished.exit_code else "yellow"
-    if not finished.judged:
-        for name, table in outcome_tables(finished):
-            out.print(name, style="bold", soft_wrap=True)
-            out.print(table)
-        out.print(
-            "peak: largest rotation; apart: RMS difference from the reference, to the horizon of"
-            " predictability; in alpha",
-            soft_wrap=True,
-        )
-        for line in verdict_lines(finished):
-            out.print(line, style=bad, soft_wrap=True)
-        return
-    out.print(verdict_table(finished))
-    for line in not_shown(finished):
-        out.print(line)
-    for line in verdict_lines(finished):
-        out.print(line, style=bad)
-    better = list(improvements(finished))
-    if better:
-        out.print("better than expected; `rockcheck accept` makes today's the expected ones:")
-    for line in better:
-        out.print(line, style="red" if finished.strict == "both" else "green")
-    if finished.without_tolerance:
-        out.print(
-            f"{finished.without_tolerance} figures have no tolerance yet: `rockcheck accept` makes"
-            " today's the expected ones"
-        )
-    out.print(
-        f"{finished.up_to_date} of {len(finished.cells)} simulations were up to date;"
-        f" {finished.wall_seconds:.1f} s"
-    )
-    out.print(f"verdict: {finished.words}", style="bold")

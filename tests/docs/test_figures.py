@@ -65,6 +65,7 @@ def test_the_front_picture():
 
 
 def test_the_tutorials_bookcase(tmp_path):
+    from rockcheck.commands.scenes import new
 
     new(tmp_path / "bookcase.toml")
     scene = load_scene(tmp_path / "bookcase.toml")

@@ -299,13 +299,22 @@ def trends(moments: Sequence[Moment]) -> list[Trend]:
     return sorted(found, key=lambda trend: -trend.spread)
 
 
-#: So many figures are drawn, those that varied most; the table has all that varied.
-DRAWN = 12
+#: So many figures are drawn, those that varied most, and so many that moved are told; the table has
+#: all that varied.
+DRAWN, MOST_MOVED = 12, 10
 
 
 def trend_of(moments: Sequence[Moment]) -> Finding:
-    """The figures of a suite over its runs: those that varied, drawn and in a table; the runs."""
-    found, last = [trend for trend in trends(moments) if trend.spread > 0.0], moments[-1]
+    """The figures of a suite over its runs: those that moved since the one before, those that
+    varied, drawn and in a table; the runs."""
+    every, last = trends(moments), moments[-1]
+    found = [trend for trend in every if trend.spread > 0.0]
+    moved = [trend for trend in every if trend.moved]
+    before = f" since {moments[-2].commit or moments[-2].created}" if len(moments) > 1 else ""
+    told = [
+        f"{one.name}: {' -> '.join('-' if v is None else f'{v:.6g}' for v in one.values[-2:])}"
+        for one in moved[:MOST_MOVED]
+    ]
     numbers = list(range(1, len(moments) + 1))
     panels = []
     for one in found[:DRAWN]:
@@ -327,9 +336,10 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
     ]
     about = [*map(text, ("made", "commit", "rockcheck", "verdict")), Column("not_passed")]
     blocks: list[Block] = [
+        Text(f"{len(moments)} runs, {len(moved)} figures moved{before}", items=told),
         *([Plot("trend", panels=panels, x=Axis("run"), shared=False)] if panels else []),
-        Table("figures", [text("figure"), *columns], rows, "What varied"),
-        Table("runs", about, made, "Runs"),
+        Table("figures", [text("figure"), *columns], rows, "What varied", on="page"),
+        Table("runs", about, made, "Runs", on="page"),
     ]
     same = len(last.figures) - len(found)
     answer = f"{len(found)} figures varied, {same} stayed the same. The last run: {last.verdict}."

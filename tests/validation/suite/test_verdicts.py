@@ -213,7 +213,7 @@ def test_a_large_run_shows_its_worst_scenes_in_the_suites_order():
         ensembles=(drawn,),
     )
     assert shown(run) == ("drawn", *(one.scene for one in near), "out")
-    assert verdict_table(run).row_count == MOST_SHOWN + 1
+    assert len(verdict_table(run).rows) == MOST_SHOWN + 1
     text = markdown(run)
     assert "| out |" in text
     assert "| far 3 |" not in text
