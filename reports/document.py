@@ -4,7 +4,7 @@ description. All pages have one look, made of the templates in `data/templates`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib import resources
@@ -26,7 +26,7 @@ from rockcheck.reports.show.words import (
     unit,
     window,
 )
-from rockcheck.reports.style import FORMATS, LOOKS, SPARE, looks, save, stamp_of, undrawn
+from rockcheck.reports.style import BY_KEY, FORMATS, LOOKS, looks, save, stamp_of, undrawn
 from rockcheck.scenes.errors import inert
 from rockcheck.scenes.writing import json_text, made, markdown_table, table_text, write_whole
 from rockcheck.validation.execute.pool import Call
@@ -181,14 +181,6 @@ def block_markdown(block: Table | Plot | Text) -> str:
     return title + markdown_table([column.head for column in block.columns], rows) + note
 
 
-def _undrawn(plots: Sequence[Plot], folder: Path, formats: Sequence[str]) -> Iterator[Call]:
-    """What draws each plot that `folder` does not have as it is."""
-    for plot in plots:
-        stamp, stem = stamp_of(json_text(asdict(plot))), folder / plot.name
-        if missing := undrawn(stem, stamp, formats):
-            yield Call(_draw, (plot, stem, missing, stamp))
-
-
 def _draw(plot: Plot, stem: Path, formats: Sequence[str], stamp: str) -> None:
     save(figure_of(plot), stem, formats, stamp=stamp)
 
@@ -205,7 +197,12 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
         write_whole(made(folder, *parts) / last, content)
     plots = list(found.plots())
     figures = made(folder, FIGURES)
-    list(side_by_side(_undrawn(plots, figures, formats)))
+    calls = []
+    for plot in plots:
+        stamp, stem = stamp_of(json_text(asdict(plot))), figures / plot.name
+        if missing := undrawn(stem, stamp, formats):
+            calls.append(Call(_draw, (plot, stem, missing, stamp)))
+    list(side_by_side(calls))
     above = (("Report", "../index.html"),) if (folder.parent / "index.html").exists() else ()
     site = Site(folder, f"rockcheck: {found.title}", above)
     site.assets()
@@ -258,17 +255,11 @@ class Site:
         for source in sorted((DATA / "vendor").glob("*/*")):
             name = source.name if source.name != "LICENSE" else f"LICENSE.{source.parent.name}.txt"
             write_whole(target / name, source.read_bytes())
-        write_whole(target / "models.css", model_styles())
-
-
-def model_styles() -> str:
-    """A style sheet with a class `look-<key>` for each look of a model that sets its colour, by day
-    and by night."""
-    rows = (
-        f".look-{look.key} {{ --look: light-dark({look.light}, {look.dark}); }}"
-        for look in (*LOOKS.values(), *SPARE)
-    )
-    return "\n".join(rows) + "\n"
+        rows = (
+            f".look-{look.key} {{ --look: light-dark({look.light}, {look.dark}); }}\n"
+            for look in BY_KEY.values()
+        )
+        write_whole(target / "models.css", "".join(rows))
 
 
 @cache

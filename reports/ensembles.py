@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -73,6 +73,8 @@ class EnsembleView:
     run: Run
     record: EnsembleRecord
     slug: str
+    #: Its figures are for a paper, too.
+    printed: ClassVar[bool] = True
 
     @property
     def name(self) -> str:

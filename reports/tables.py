@@ -18,7 +18,7 @@ from rockcheck.scenes.history import events_path
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.finding import Axis, Block, Column, Mark, Panel, Plot, Series, Table, text
 from rockcheck.validation.suite.across import FEWEST, bias_and_scatter, pairs_of
-from rockcheck.validation.suite.results import Cell, Check, Run
+from rockcheck.validation.suite.results import Cell, Check, Run, value_of
 from rockcheck.validation.suite.tables import used
 from rockcheck.validation.suite.tolerances import MEASURES, apart
 
@@ -179,16 +179,15 @@ def measures_table(view: SceneView, against: str) -> Table:
     models = [cell.model for cell in view.cells if any(cell.model in row for row in found.values())]
     firsts = {key: next(iter(row.values()))[0] for key, row in found.items()}
     rows = [
-        [_measure(firsts[key]), *(_measured(*found[key].get(m, (None, None))) for m in models)]
+        [
+            Mark(firsts[key].label, words=formula(key[0]), more=window(firsts[key])),
+            *(_measured(*found[key].get(m, (None, None))) for m in models),
+        ]
         for key in sorted(found, key=lambda key: (key[0], firsts[key].until or math.inf))
     ]
     title = f"All measures against {_label(against)}"
     columns = [text("measure"), *map(Column, models)]
     return Table("measures", columns, rows, title, folded=True)
-
-
-def _measure(figure: Figure) -> Mark:
-    return Mark(figure.label, words=formula(figure.measure), more=window(figure))
 
 
 def _measured(figure: Figure | None, check: Check | None) -> Any:
@@ -329,19 +328,6 @@ class Row:
         """The largest share of a limit that any model uses, as a number that a page can sort by."""
         return min(max((entry.used for entry in self.entries if entry), default=0.0), 1e9)
 
-    @property
-    def verdicts(self) -> str:
-        """The verdicts in the row, each once; "not-converged" too where a cell is not."""
-        cells = [entry.cell for entry in self.entries if entry]
-        return " ".join(
-            dict.fromkeys(
-                [
-                    *(cell.verdict for cell in cells),
-                    *("not-converged" for cell in cells if cell.converged is False),
-                ]
-            )
-        )
-
 
 @dataclass(frozen=True)
 class Glance:
@@ -429,14 +415,7 @@ def _entry(cells: Mapping[str, Cell], model: str, against: str) -> Entry | None:
         cell=cell,
         rms=min(found, key=lambda figure: figure.until or math.inf, default=None),
         whole=whole,
-        ratio=next(
-            (
-                f.value
-                for f in figures
-                if f.measure == "peak_ratio" and f.against == against and not f.window
-            ),
-            None,
-        ),
+        ratio=value_of(figures, "peak_ratio", against),
         u_num=cell.numerical.u_num("theta_rms") if cell.numerical and whole else None,
         outcome=outcome_of(cell),
         apart=len(set(falls)) > 1,
@@ -447,14 +426,7 @@ def outcome_of(cell: Cell) -> str:
     """What became of the block; "falling left" or "falling right" where the run ends while it
     falls."""
     figures = (*(check.figure for check in cell.checks), *cell.figures)
-    last = next(
-        (
-            f.value
-            for f in figures
-            if f.measure == "last_rotation" and f.unit == "alpha" and not f.window
-        ),
-        None,
-    )
+    last = value_of((f for f in figures if f.unit == "alpha"), "last_rotation")
     if cell.outcome == "moving" and last is not None and abs(last) > FALL:
         return f"falling {'left' if last > 0.0 else 'right'}"
     return cell.fate
@@ -472,7 +444,7 @@ def accuracy(run: Run) -> list[Block]:
 
     Nothing where neither is known.
     """
-    pairs = {m: found for (m, name), found in pairs_of([run]).items() if name == QUANTITY}
+    pairs = pairs_of([run])
     everywhere = {m: of[QUANTITY] for m, of in known().trust.items() if QUANTITY in of}
     here = {
         m: Trust(bias=bias, scatter=scatter, count=len(pairs[m]))

@@ -22,14 +22,14 @@ import subprocess
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 from pydantic import Field, ValidationError
 
-from rockcheck.scenes import InputError, Scene
+from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import from_validation, printable
-from rockcheck.scenes.experience import Experience, Range, Trust
+from rockcheck.scenes.experience import Experience, Range, Trust, axes_of
 from rockcheck.scenes.reading import read_text
 from rockcheck.validation.discrepancy.figures import Figure, Stored
 from rockcheck.validation.finding import (
@@ -44,7 +44,7 @@ from rockcheck.validation.finding import (
     Text,
     text,
 )
-from rockcheck.validation.suite.results import Cell, Run
+from rockcheck.validation.suite.results import Cell, Run, value_of
 from rockcheck.validation.suite.tables import title
 from rockcheck.validation.suite.tolerances import MEASURES
 
@@ -346,75 +346,59 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
     return Finding("trend", f"{last.suite} over {len(moments)} runs", answer, blocks)
 
 
-#: Figures that have a bias, and the size (alpha) below which a ratio means nothing.
-QUANTITIES = {"peak_rotation": 1e-3}
-#: Fewest pairs from which a scatter is computed.
-FEWEST = 5
+#: The size (alpha) of a peak below which a ratio means nothing, and the fewest pairs from which a
+#: scatter is computed.
+LEAST, FEWEST = 1e-3, 5
 
 
-def pairs_of(runs: Iterable[Run]) -> dict[tuple[str, str], list[tuple[float, float]]]:
-    """(reference's, model's) figures of all cells by (model, quantity), where both are finite and
-    large enough for a ratio.
+def pairs_of(runs: Iterable[Run]) -> dict[str, list[tuple[float, float]]]:
+    """(reference's, model's) peak rotations of all scenes by model, where both are finite and large
+    enough for a ratio.
 
     Blocks that fall have no peak: they are left out, as are cells of the reference itself.
     """
-    found: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    found: dict[str, list[tuple[float, float]]] = {}
     for run in runs:
-        references = {cell.scene: cell for cell in run.cells if cell.model == run.reference}
-        for cell in run.cells:
-            yardstick = references.get(cell.scene)
-            if (
-                yardstick is None
-                or yardstick is cell
-                or "failed" in (cell.status, yardstick.status)
-            ):
-                continue
-            if cell.outcome.startswith("overturned") or yardstick.outcome.startswith("overturned"):
-                continue
-            for name, least in QUANTITIES.items():
-                values = [_value(one.figures, name) for one in (yardstick, cell)]
-                if all(value is not None and value > least for value in values):
-                    found.setdefault((cell.model, name), []).append(
-                        (values[0] or 0.0, values[1] or 0.0)
-                    )
-        for model, name, one_pair in _ensemble_pairs(run):
-            found.setdefault((model, name), []).append(one_pair)
+        for model, peaks, ends in _peaks(run):
+            known = [peak for peak in peaks if peak is not None and peak > LEAST]
+            if len(known) == 2 and not any(end.startswith("overturned") for end in ends):
+                found.setdefault(model, []).append((known[0], known[1]))
     return found
 
 
-def _ensemble_pairs(run: Run) -> Iterator[tuple[str, str, tuple[float, float]]]:
-    least = QUANTITIES["peak_rotation"]
-    for ensemble in run.ensembles:
-        reference = ensemble.peaks.get(run.reference)
-        for model, peaks in ensemble.peaks.items():
-            if reference is None or model == run.reference:
-                continue
-            outcomes = zip(ensemble.outcomes[run.reference], ensemble.outcomes[model], strict=True)
-            for e, m, ends in zip(reference, peaks, outcomes, strict=True):
-                stands = not any(outcome.startswith("overturned") for outcome in ends)
-                if e is not None and m is not None and min(e, m) > least and stands:
-                    yield model, "peak_rotation", (e, m)
-
-
-def _value(figures: Sequence[Any], name: str) -> float | None:
-    return next(
-        (f.value for f in figures if f.measure == name and not f.against and not f.window), None
-    )
+def _peaks(run: Run) -> Iterator[tuple[str, Sequence[float | None], Sequence[str]]]:
+    """By model, of each scene: peak rotation and outcome of the reference and of the model."""
+    cells = {(cell.scene, cell.model): cell for cell in run.cells if cell.status == "done"}
+    for (scene, model), cell in cells.items():
+        if (scene, run.reference) in cells and model != run.reference:
+            pair = cells[scene, run.reference], cell
+            peaks = [value_of(one.figures, "peak_rotation") for one in pair]
+            yield model, peaks, [one.outcome for one in pair]
+    for drawn in run.ensembles:
+        for model in drawn.peaks:
+            if run.reference in drawn.peaks and model != run.reference:
+                of = run.reference, model
+                each = zip(*(drawn.peaks[one] for one in of), strict=True)
+                ends = zip(*(drawn.outcomes[one] for one in of), strict=True)
+                yield from ((model, *both) for both in zip(each, ends, strict=True))
 
 
 def experience_of(runs: Sequence[Run]) -> Experience:
-    """Bias and scatter a model and figure, and the domain of the scenes, over some runs of
-    suites."""
+    """Bias and scatter a model and figure, and the domain of the scenes (the range of each axis,
+    `scenes.experience.axes_of`), over some runs of suites."""
     trust: dict[str, dict[str, Trust]] = {}
-    for (model, name), found in sorted(pairs_of(runs).items()):
-        if len(found) < FEWEST:
-            continue
-        bias, scatter = bias_and_scatter(found)
-        trust.setdefault(model, {})[name] = Trust(bias=bias, scatter=scatter, count=len(found))
-    scenes = [run.load_scene(name) for run in runs for name in run.scenes]
-    return Experience(
-        suites=tuple(run.suite for run in runs), trust=trust, domain=domain_of(scenes)
-    )
+    for model, found in sorted(pairs_of(runs).items()):
+        if len(found) >= FEWEST:
+            bias, scatter = bias_and_scatter(found)
+            one = Trust(bias=bias, scatter=scatter, count=len(found))
+            trust[model] = {"peak_rotation": one}
+    values: dict[str, list[float]] = {}
+    for run in runs:
+        for name in run.scenes:
+            for axis, numbers in axes_of(run.load_scene(name)).items():
+                values.setdefault(axis, []).extend(numbers)
+    domain = {axis: Range(low=min(numbers), high=max(numbers)) for axis, numbers in values.items()}
+    return Experience(suites=tuple(run.suite for run in runs), trust=trust, domain=domain)
 
 
 def bias_and_scatter(pairs: Sequence[tuple[float, float]]) -> tuple[float, float]:
@@ -422,14 +406,3 @@ def bias_and_scatter(pairs: Sequence[tuple[float, float]]) -> tuple[float, float
     ratios = np.log([m / e for e, m in pairs])
     scatter = float(np.std(ratios, ddof=1))
     return math.exp(float(np.mean(ratios)) + 0.5 * scatter**2), scatter
-
-
-def domain_of(scenes: Iterable[Scene]) -> Mapping[str, Range]:
-    """The range of each axis (`scenes.experience.axes_of`) over some scenes."""
-    values: dict[str, list[float]] = {}
-    from rockcheck.scenes.experience import axes_of
-
-    for scene in scenes:
-        for axis, numbers in axes_of(scene).items():
-            values.setdefault(axis, []).extend(numbers)
-    return {axis: Range(low=min(numbers), high=max(numbers)) for axis, numbers in values.items()}

@@ -27,6 +27,7 @@ from rockcheck.validation.execute.models import build, is_own
 from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
 from rockcheck.validation.study import Task
 from rockcheck.validation.suite.motions import Ensemble
+from rockcheck.validation.suite.results import value_of
 from rockcheck.validation.suite.suites import ModelVariant
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Windowed
 from rockcheck.validation.uncertainty.numerical import Numerical
@@ -347,7 +348,10 @@ def explanations(
             yield _other_outcome(against, numerical, other, inputs)
             continue
         for name, unit in QUANTITIES.items():
-            error = _error(name, figures, yardstick, against)
+            mine, theirs = value_of(figures, name), value_of(yardstick, name)
+            error = None if mine is None or theirs is None else abs(mine - theirs)
+            if name == "theta_rms":
+                error = value_of(figures, name, against)
             if error is None:
                 continue
             u_num, reason = _both(name, numerical, other)
@@ -376,22 +380,6 @@ def _other_outcome(
     verdict = INPUTS if both_occur else "not explained: model form or set-up, another outcome"
     return Explanation(
         quantity="outcome", unit="", against=against, error=1.0, u_num=0.0, verdict=verdict
-    )
-
-
-def _error(
-    name: str, figures: Iterable[Figure], yardstick: Iterable[Figure], against: str
-) -> float | None:
-    if name == "theta_rms":
-        return _value(figures, name, against)
-    mine, theirs = _value(figures, name, ""), _value(yardstick, name, "")
-    return None if mine is None or theirs is None else abs(mine - theirs)
-
-
-def _value(figures: Iterable[Figure], name: str, against: str) -> float | None:
-    return next(
-        (f.value for f in figures if f.measure == name and f.against == against and not f.window),
-        None,
     )
 
 

@@ -370,6 +370,14 @@ class Run(Stored):
         yield "cells.scene", (cell.scene for cell in self.cells), {*self.scenes, *ensembles}
 
 
+def value_of(
+    figures: Iterable[Figure], measure: str, against: str = "", window: str = ""
+) -> float | None:
+    """The value of a measure among some figures, None without one."""
+    wanted = measure, against, window
+    return next((f.value for f in figures if (f.measure, f.against, f.window) == wanted), None)
+
+
 def worst(verdicts: Iterator[Any] | list[Any]) -> Verdict:
     """The most severe verdict; "pass" if there is none."""
     return max(verdicts, key=SEVERITY.index, default="pass")

@@ -13,7 +13,16 @@ from rockcheck.scenes.errors import inert, printable
 from rockcheck.scenes.writing import markdown_table
 from rockcheck.validation.discrepancy.figures import Figure, value_words
 from rockcheck.validation.finding import Block, Column, Finding, Mark, Table, Text, text
-from rockcheck.validation.suite.results import MISSING, SEVERITY, Cell, Check, Run, Strict, worst
+from rockcheck.validation.suite.results import (
+    MISSING,
+    SEVERITY,
+    Cell,
+    Check,
+    Run,
+    Strict,
+    value_of,
+    worst,
+)
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, apart
 
 #: The most scenes that tables and pages show one by one.
@@ -124,7 +133,6 @@ def outcome_tables(run: Run) -> Iterator[Table]:
 
 def outcome_row(cell: Cell, reference: str) -> dict[str, Any]:
     """What a cell came to, in plain values; `peak_rotation_alpha` is None for a block that fell."""
-    figures = {(f.measure, f.against, f.window): f.value for f in cell.figures}
     fell = cell.outcome.startswith("overturned")
     return {
         "scene": cell.scene,
@@ -132,8 +140,8 @@ def outcome_row(cell: Cell, reference: str) -> dict[str, Any]:
         "status": cell.status,
         "outcome": cell.outcome or None,
         "overturned_at_s": cell.overturned_at,
-        "peak_rotation_alpha": None if fell else figures.get(("peak_rotation", "", "")),
-        "apart_alpha": figures.get(("theta_rms", reference, HORIZON)),
+        "peak_rotation_alpha": None if fell else value_of(cell.figures, "peak_rotation"),
+        "apart_alpha": value_of(cell.figures, "theta_rms", reference, HORIZON),
         "wall_seconds": cell.cost.wall_seconds,
     }
 
