@@ -27,7 +27,7 @@ from rockcheck.validation.execute.models import build, is_own
 from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
 from rockcheck.validation.study import Task
 from rockcheck.validation.suite.motions import Ensemble
-from rockcheck.validation.suite.results import value_of
+from rockcheck.validation.suite.results import CostRecord, value_of
 from rockcheck.validation.suite.suites import ModelVariant
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Windowed
 from rockcheck.validation.uncertainty.numerical import Numerical
@@ -89,6 +89,17 @@ class Planned(Task):
 Asked = tuple[Planned | None, list[Windowed]]
 #: A figure as it is kept: measure, unit, value, window, until, note. Its label is the measure's.
 FigureRow = tuple[str, str, float | None, str, float | None, str]
+
+
+class CellRecord(Stored):
+    """What is kept of a cell beside its history."""
+
+    outcome: str
+    notes: tuple[str, ...]
+    settings: dict[str, Any]
+    uncertainty: dict[str, float]
+    numerical: Numerical | None
+    cost: CostRecord
 
 
 class ComparisonRecord(Stored):
@@ -309,43 +320,23 @@ def _compute(
 QUANTITIES = {"theta_rms": "alpha", "peak_rotation": "alpha", "last_slip": "m"}
 
 
-def key_of(uncertainty: bool) -> dict[str, str]:
-    """What a cell's key also depends on if its numerical uncertainty is asked for."""
-    return (
-        {"uncertainty": provenance.code_digest("rockcheck.validation.uncertainty.numerical")}
-        if uncertainty
-        else {}
-    )
-
-
-def numerical_of(record: Mapping[str, Any]) -> Numerical | None:
-    """The numerical uncertainty that a worker has found, None where it was not asked for or not to
-    be had."""
-    found = record.get("numerical")
-    return None if found is None else Numerical(**found)
-
-
 def explanations(
     scene: Scene,
     figures: Sequence[Figure],
-    references: Mapping[str, Sequence[Figure]],
-    records: Mapping[str, Mapping[str, Any]],
-    own: Mapping[str, Any],
+    own: CellRecord,
+    references: Mapping[str, tuple[Sequence[Figure], CellRecord]],
     inputs: Inputs | None,
 ) -> Iterator[Explanation]:
-    """The verdict on each quantity against each reference, by name: its own figures and its record
-    (`records`).
+    """The verdict on each quantity of a cell (its figures and record) against each reference, by
+    name.
 
-    `own` is the candidate's record. There is no verdict for a model whose numerical error is
-    unknown, nor for a block that falls.
+    There is no verdict for a model whose numerical error is unknown, nor for a block that falls.
     """
-    numerical = numerical_of(own)
-    if numerical is None:
+    if own.numerical is None:
         return
-    for against, yardstick in references.items():
-        other = numerical_of(records[against])
-        if _falls(own) != _falls(records[against]):
-            yield _other_outcome(against, numerical, other, inputs)
+    for against, (yardstick, other) in references.items():
+        if own.outcome != other.outcome and "overturned" in own.outcome + other.outcome:
+            yield _other_outcome(against, own.numerical, other.numerical, inputs)
             continue
         for name, unit in QUANTITIES.items():
             mine, theirs = value_of(figures, name), value_of(yardstick, name)
@@ -354,18 +345,12 @@ def explanations(
                 error = value_of(figures, name, against)
             if error is None:
                 continue
-            u_num, reason = _both(name, numerical, other)
-            u_data = math.hypot(
-                *(_u_data(scene, record, name) for record in (own, records[against]))
-            )
+            u_num, reason = _both(name, own.numerical, other.numerical)
+            # of a measured history, the scatter of its repeats: rotations in rad, slips in m
+            size = 1.0 if name == "last_slip" else scene.block.alpha
+            u_data = math.hypot(*(one.uncertainty.get(name, 0.0) / size for one in (own, other)))
             u_input = (inputs.u_input(name) or 0.0) if inputs else 0.0
             yield explain(name, unit, error, u_num, u_input, u_data, reason=reason, against=against)
-
-
-def _falls(record: Mapping[str, Any]) -> str:
-    """The outcome of a block that falls, empty where it stands."""
-    outcome = str(record["outcome"])
-    return outcome if outcome.startswith("overturned") else ""
 
 
 def _other_outcome(
@@ -394,9 +379,3 @@ def _both(name: str, mine: Numerical, other: Numerical | None) -> tuple[float | 
             return None, found.reason(name)
         total = math.hypot(total, u)
     return total, ""
-
-
-def _u_data(scene: Scene, record: Mapping[str, Any], name: str) -> float:
-    """Of a measured history, the scatter of its repeats: rotations in alpha, slips in m."""
-    u = float(record.get("uncertainty", {}).get(name, 0.0))
-    return u if name == "last_slip" else u / scene.block.alpha
