@@ -219,6 +219,7 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
         looks=looks(LOOKS),
         row_cells=row_cells,
         figures=FIGURES,
+        formats=formats,
     )
 
 

@@ -26,10 +26,13 @@ from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
 
 #: Samples in one period of a pulse.
 _PER_PERIOD = 400
-#: Frequencies (Hz) at which the sliding estimate looks for its capacity, ends and count.
-_SLOWEST, _FASTEST, _COUNT = 0.05, 20.0, 25
+#: Frequencies (Hz) at which the sliding estimate looks for its capacity, ends and count; and how
+#: often it looks again between the two around it, which gives f_es within 2e-5.
+_SLOWEST, _FASTEST, _COUNT, _ROUNDS = 0.05, 20.0, 25, 3
 #: Angles, in parts of the last one, at which the rocking estimate compares capacity and demand.
 _ANGLES = 20
+#: The restitution of a block so wide that Housner's is none: its damping is nearly critical.
+_LEAST_RESTITUTION = 1e-6
 #: Damping of the spectrum that the sliding estimate uses.
 _SLIDING_DAMPING = 0.10
 
@@ -143,23 +146,19 @@ def reserve_sliding(scene: Scene, base: Base) -> float:
     damped spectrum reaches c_s, the slip is c_s/(2 pi f_es)^2; 0 where it never does. The last
     expression was derived, not read: check it against your copy.
     """
-    from scipy.optimize import brentq
-
     gravity = scene.gravity
     capacity = 2.0 * scene.floor.friction * (gravity - 0.4 * base.vertical)
     if capacity <= 0.0:
         return math.inf
-    slower = 0.0
-
-    def beyond(frequency: float) -> float:
-        return base.spectral(frequency, _SLIDING_DAMPING) - capacity
-
-    for frequency in np.geomspace(_SLOWEST, _FASTEST, _COUNT).tolist():
-        if beyond(frequency) >= 0.0:
-            found = brentq(beyond, slower, frequency, rtol=1e-4) if slower else frequency
-            return capacity / (2.0 * math.pi * found) ** 2
-        slower = frequency
-    return 0.0
+    slower, found = _SLOWEST, _FASTEST
+    for _ in range(_ROUNDS):
+        frequencies = np.geomspace(slower, found, _COUNT).tolist()
+        reached = (base.spectral(one, _SLIDING_DAMPING) >= capacity for one in frequencies)
+        first = next((k for k, above in enumerate(reached) if above), None)
+        if first is None:
+            return 0.0
+        slower, found = frequencies[max(first - 1, 0)], frequencies[first]
+    return capacity / (2.0 * math.pi * found) ** 2
 
 
 def reserve_rocking(scene: Scene, base: Base) -> float:
@@ -175,7 +174,7 @@ def reserve_rocking(scene: Scene, base: Base) -> float:
     pivot, gravity = scene.block.weaker_pivot, scene.gravity
     a, height = pivot.arm / pivot.height, pivot.height
     inertia = 4.0 / 3.0 * (1.0 + a * a)
-    gamma = -2.0 * math.log(1.0 - 2.0 * a * a / inertia)
+    gamma = -2.0 * math.log(max(1.0 - 2.0 * a * a / inertia, _LEAST_RESTITUTION))
     damping = gamma / math.hypot(2.0 * math.pi, gamma)
     angles: NDArray[np.float64] = pivot.alpha * np.arange(1, _ANGLES + 1) / _ANGLES
     for angle in angles.tolist():

@@ -7,11 +7,8 @@ from typing import Annotated
 import typer
 
 from rockcheck.commands import (
-    OUT,
     AllowCodeOption,
-    JobsOption,
-    OutOption,
-    SchedulerOption,
+    Played,
     tell_left_out,
     told,
     usable_folder,
@@ -31,9 +28,7 @@ def run(
             help="Why limits are loosened or figures moved; it is written into the file.",
         ),
     ] = None,
-    out: OutOption = OUT,
-    jobs: JobsOption = None,
-    scheduler: SchedulerOption = None,
+    played: Played = Played(),
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Show the changes, write none.")
     ] = False,
@@ -45,10 +40,10 @@ def run(
     moved, the last two only with --reason.
     """
     name = suite or "paper"
-    folder = usable_folder(out)
+    folder = usable_folder(played.out)
     loaded = load_suite(name, allow_code=allow_code or ())
     tell_left_out(loaded.left_out)
-    finished = play(loaded, folder, jobs, False, False, scheduler)
+    finished = play(loaded, folder, played)
     changes, refused = accept(loaded, finished, reason, write=not dry_run)
     tell_faults(finished, folder)
     failed = finished.exit_code if finished.verdict == "error" else 0

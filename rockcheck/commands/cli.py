@@ -8,6 +8,7 @@ import importlib
 import inspect
 import itertools
 import os
+import re
 import sys
 import time
 import traceback
@@ -64,8 +65,8 @@ HIDDEN = ("warm",)
 #: Commands that answer at once: nobody asks how long they took.
 AT_ONCE = ("scenes", "new", "record", "compare")
 
-#: Options whose value may be left out, with their values: it is then the first.
-BARE = {"--strict": ("worse", "both")}
+#: Options whose value may be left out: it is then the first; and what is a value (a pattern).
+BARE = {"--strict": ("worse", "worse|both"), "--align": ("best", r"best|[-+.0-9]+(e[-+]?\d+)?")}
 
 #: Exit code of a run that Ctrl-C ended.
 INTERRUPTED = 130
@@ -134,8 +135,8 @@ def _options(given: inspect.Parameter) -> list[inspect.Parameter]:
 
 def _with_value(word: str, after: str) -> str:
     """An argument, with the value of its option where that is left out."""
-    values = BARE.get(word)
-    return f"{word}={values[0]}" if values and after not in values else word
+    value, pattern = BARE.get(word, ("", ""))
+    return f"{word}={value}" if value and not re.fullmatch(pattern, after) else word
 
 
 class _EachOnce(typer.core.TyperCommand):

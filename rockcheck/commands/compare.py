@@ -14,7 +14,8 @@ from rockcheck.commands import (
     scene_names,
     told,
 )
-from rockcheck.scenes import load_scene
+from rockcheck.scenes import InputError, load_scene
+from rockcheck.scenes.errors import printable
 from rockcheck.validation.discrepancy.compare import Discrepancy, compare
 from rockcheck.validation.discrepancy.figures import value_words
 from rockcheck.validation.discrepancy.measured import read_measured, shifted, time_shift
@@ -26,6 +27,8 @@ from rockcheck.validation.suite.results import Run
 
 #: So many figures that moved are listed without --all.
 SHOWN = 20
+#: What --align asks for where no time is given.
+BEST = "best"
 
 
 def run(
@@ -39,18 +42,14 @@ def run(
         Path,
         typer.Argument(metavar="B", help="History of the candidate, CSV; or a later run's folder."),
     ],
-    offset: Annotated[
-        float,
-        typer.Option(
-            "--offset", help="Added to the candidate's times, s, to align a measured history."
-        ),
-    ] = 0.0,
     align: Annotated[
-        bool,
+        str | None,
         typer.Option(
-            "--align", help="Shift the candidate in time to where the rotations agree best."
+            "--align",
+            metavar="[SECONDS]",
+            help="Shift the candidate in time, by SECONDS, else to where the rotations agree best.",
         ),
-    ] = False,
+    ] = None,
     until: Annotated[
         float | None,
         typer.Option("--until", help="End of the window, s (default: the whole common time)."),
@@ -83,8 +82,12 @@ def run(
         told(difference(Run.load(reference), Run.load(candidate), None if everything else SHOWN))
     check_picture(plot)
     what = load_scene(scene) if scene else None
+    try:
+        offset = 0.0 if align in (None, BEST) else float(align or 0.0)
+    except ValueError:
+        raise InputError(f"{printable(align)!r}: give seconds, or nothing", "--align") from None
     given, other = read_measured(reference), read_measured(candidate, offset=offset)
-    shift = time_shift(given, other) if align else 0.0
+    shift = time_shift(given, other) if align == BEST else 0.0
     found = compare(given, shifted(other, shift), until=until, scene=what)
     histories = {"reference": given, "candidate": other}
     motions = {role: motion_of(history, what) for role, history in histories.items()}
@@ -105,7 +108,7 @@ def run(
         Text(facts=[(role, words) for role, words in said.items() if words]),
         Text(f"{models}, {found.start:g} to {found.end:g} s"),
         Table("comparison", columns, rows),
-        Text(f"the candidate is shifted by {shift:+.4g} s" if align else ""),
+        Text(f"the candidate is shifted by {shift:+.4g} s" if align == BEST else ""),
         Text(f"not the whole time: {found.gap}" if found.gap else ""),
         Text(items=notes, verdict="changed"),
     ]

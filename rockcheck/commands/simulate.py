@@ -29,7 +29,7 @@ from rockcheck.scenes.history import check_format
 from rockcheck.scenes.progress import listening
 from rockcheck.validation.discrepancy.motion import motion_of
 from rockcheck.validation.execute import workers
-from rockcheck.validation.execute.models import FAMILIES, build, check_allowed, family, is_own
+from rockcheck.validation.execute.models import FAMILIES, build, check_allowed, compiles, is_own
 from rockcheck.validation.execute.pool import Call, Failure, Pool, guarded
 from rockcheck.validation.execute.store import TABLE, name_of
 
@@ -74,8 +74,8 @@ def run(
         raise InputError(f"{printable(path.parent)}: no such folder", "--output")
     check_format(path)
     check_picture(plot)
-    compiles = ", a first run compiles" if family(model).compiled else ""
-    with progress(f"{what.name}, {model}{compiles}") as on_progress, listening(on_progress):
+    slow = ", a first run compiles" if compiles(model, given) else ""
+    with progress(f"{what.name}, {model}{slow}") as on_progress, listening(on_progress):
         history = player.simulate(what) if player else _played_apart(what, model, given)
     try:
         history.save(path)

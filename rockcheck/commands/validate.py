@@ -5,17 +5,15 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 
 from rockcheck.commands import (
-    OUT,
     AllowCodeOption,
-    JobsOption,
-    OutOption,
-    SchedulerOption,
+    Played,
     answer,
     console,
     model_names,
@@ -32,7 +30,7 @@ from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.recordings import Reading
 from rockcheck.scenes.recordings.sets import record_path
-from rockcheck.validation.execute.models import FAMILIES, family, is_own, not_installed
+from rockcheck.validation.execute.models import FAMILIES, compiles, family, not_installed
 from rockcheck.validation.suite.across import moment_of, remember, trend_of
 from rockcheck.validation.suite.motions import RecordSet
 from rockcheck.validation.suite.results import Run, Strict
@@ -62,8 +60,10 @@ WhatArgument = Annotated[
 ]
 
 
-def run(
-    what: WhatArgument = None,
+@dataclass(frozen=True)
+class OfScene:
+    """The options that are for a scene: a suite says which models play what."""
+
     models: Annotated[
         str,
         typer.Option(
@@ -71,14 +71,14 @@ def run(
             help="Of a scene: all that are installed, or names with commas between.",
             autocompletion=model_names,
         ),
-    ] = ALL,
-    settings: Annotated[
+    ] = ALL
+    set: Annotated[
         list[str] | None,
         typer.Option(
             "--set",
             help="Of a scene: a model's setting, such as mujoco.time_step=1e-3; repeatable.",
         ),
-    ] = None,
+    ] = None
     records: Annotated[
         list[str] | None,
         typer.Option(
@@ -86,10 +86,14 @@ def run(
             help="Of a scene: files, folders or patterns, each played in place of its excitation;"
             " repeatable.",
         ),
-    ] = None,
-    read: ReadOption = None,
-    out: OutOption = OUT,
-    jobs: JobsOption = None,
+    ] = None
+    read: ReadOption = None
+
+
+def run(
+    what: WhatArgument = None,
+    of_scene: OfScene = OfScene(),
+    played: Played = Played(),
     force: Annotated[
         bool,
         typer.Option("--force", help="Run every cell, also those whose results are up to date."),
@@ -102,7 +106,6 @@ def run(
             " better ones, too.",
         ),
     ] = None,
-    scheduler: SchedulerOption = None,
     allow_code: AllowCodeOption = None,
     history: Annotated[
         Path | None,
@@ -129,16 +132,12 @@ def run(
     rockcheck itself.
     """
     scene = what if what is not None and is_scene(what) else None
+    before: Run | None = None
     if scene is None:
-        for name, given in (
-            ("--models", models != ALL),
-            ("--set", settings),
-            ("--records", records),
-            ("--read", read),
-        ):
-            if given:
-                raise InputError("is for a scene: a suite says which models play what", name)
-        folder = usable_folder(out)
+        for name, given in vars(of_scene).items():
+            if given and given != ALL:
+                raise InputError("is for a scene: a suite says which models play what", f"--{name}")
+        folder = usable_folder(played.out)
         suite = load_suite(what or "paper", allow_code=allow_code or ())
         tell_left_out(suite.left_out)
     else:
@@ -147,13 +146,20 @@ def run(
                 f"{printable(scene)} is a scene, and nothing of it is judged: give a suite",
                 "--strict",
             )
-        sets = record_sets(records or (), read or ())
-        chosen = chosen_models(models, settings or ())
+        sets = record_sets(of_scene.records or (), of_scene.read or ())
+        chosen = chosen_models(of_scene.models, of_scene.set or ())
         suite = scene_suite(scene, chosen, records=sets, allow_code=allow_code or ())
-        folder = usable_folder(out)
-        if models == ALL:
+        folder = usable_folder(played.out)
+        if of_scene.models == ALL:
             tell_missing()
-        _overwrites_no_verdict(folder)
+        with suppress(InputError):  # no run there, or none that can be read
+            before = Run.load(folder)
+        if before is not None and before.judged:
+            raise InputError(
+                f"{printable(folder)} holds the judged run of suite {before.suite!r}: give another"
+                " folder",
+                "--out",
+            )
         tell_left_out(
             suite.left_out,
             "--read vertical=true plays such a component together with the horizontal ones",
@@ -161,7 +167,7 @@ def run(
     how: Strict = "both" if strict == "both" else strict is not None
     from rockcheck.reports import document
 
-    finished = play(suite, folder, jobs, force, how, scheduler)
+    finished = play(suite, folder, played, force=force, strict=how)
     page = keep(finished, folder)
     document.show(finding_of(finished), console())
     tell_faults(finished, folder)
@@ -174,7 +180,7 @@ def run(
             console().print(f"trend: {where}", soft_wrap=True)
     if report:
         with progress("pages") as on_progress:
-            page = publish(folder, jobs=jobs, on_progress=on_progress)
+            page = publish(folder, jobs=played.jobs, on_progress=on_progress)
     console().print(f"report: {page}", soft_wrap=True)
     more = {} if suite.judged else {"left_out": suite.left_out}
     answer(summary(finished) | more | {"report": page})
@@ -223,39 +229,13 @@ def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, d
     return found
 
 
-def _overwrites_no_verdict(folder: Path) -> None:
-    """Raises `InputError` where `folder` holds a judged run, whose pages and tables one that judges
-    nothing would overwrite."""
-    before = None
-    with suppress(InputError):  # no run there, or none that can be read
-        before = Run.load(folder)
-    if before is not None and before.judged:
-        raise InputError(
-            f"{printable(folder)} holds the judged run of suite {before.suite!r}: give another"
-            " folder",
-            "--out",
-        )
-
-
-def play(
-    suite: Suite, folder: Path, jobs: int | None, force: bool, strict: Strict, scheduler: str | None
-) -> Run:
+def play(suite: Suite, folder: Path, played: Played, **how: Any) -> Run:
     """Run a suite with a progress bar on stderr."""
-    compiles = (
-        ", a first run compiles"
-        if any(not is_own(one.family_name) and one.family.compiled for one in suite.models.values())
-        else ""
-    )
-    with progress(f"{suite.name}{compiles}") as on_progress:
-        return run_suite(
-            suite,
-            folder,
-            jobs=jobs,
-            force=force,
-            strict=strict,
-            scheduler=scheduler,
-            on_progress=on_progress,
-        )
+    models = [(one.family_name, one.settings) for one in suite.models.values()]
+    said = ", a first run compiles" if any(compiles(*one) for one in models) else ""
+    with progress(f"{suite.name}{said}") as told:
+        how |= {"jobs": played.jobs, "scheduler": played.scheduler, "on_progress": told}
+        return run_suite(suite, folder, **how)
 
 
 def tell_faults(finished: Run, folder: Path) -> None:

@@ -23,9 +23,8 @@ def peak_acceleration(record: Recording) -> float:
 def velocity(record: Recording) -> NDArray[np.float64]:
     """Ground velocity at the samples in m/s, from rest, exact for straight lines between samples;
     no baseline correction."""
-    from scipy.integrate import cumulative_trapezoid
-
-    return np.asarray(cumulative_trapezoid(record.samples, dx=record.time_step, initial=0.0))
+    means = (record.samples[1:] + record.samples[:-1]) / 2.0
+    return np.concatenate([[0.0], np.cumsum(record.time_step * means)])
 
 
 def peak_velocity(record: Recording) -> float:
@@ -43,25 +42,18 @@ def arias(record: Recording) -> float:
 
 
 def spectral_acceleration(record: Recording, period: float, damping: float = 0.05) -> float:
-    """Pseudo-spectral acceleration of an oscillator of `period` (s) and `damping` (of critical) in
-    g.
+    """Pseudo-spectral acceleration of an oscillator of `period` (s) and `damping` (of critical,
+    below 1) in g.
 
-    The oscillator is exact for straight lines between samples (first-order hold), and goes on for a
-    period after the last.
+    The oscillator is exact for straight lines between samples, and goes on for a period after the
+    last.
     """
-    from scipy.signal import cont2discrete, lfilter
+    from rockcheck.scenes.recordings.oscillator import largest_response
 
-    rate = 2.0 * math.pi / period
     parts = max(math.ceil(_STEPS * record.time_step / period), 1)
     parts = max(min(parts, _MOST_STEPS // len(record.samples)), 1)
     step = record.time_step / parts
-    count = (len(record.samples) - 1) * parts + 1
-    ground = np.interp(
-        step * np.arange(count), record.time_step * np.arange(len(record.samples)), record.samples
-    )
-    tail = np.zeros(min(math.ceil(period / step), _MOST_STEPS))
-    above, below, _ = cont2discrete(
-        ([rate * rate], [1.0, 2.0 * damping * rate, rate * rate]), step, method="foh"
-    )
-    response = lfilter(np.ravel(above), below, np.concatenate([ground, tail]))
-    return float(np.max(np.abs(response))) / GRAVITY_OF_RECORDS
+    tail = min(math.ceil(period / step), _MOST_STEPS)
+    samples = np.asarray(record.samples, dtype=float)
+    rate = 2.0 * math.pi / period
+    return float(largest_response(samples, parts, tail, step, rate, damping)) / GRAVITY_OF_RECORDS

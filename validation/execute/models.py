@@ -33,8 +33,7 @@ class Family:
     libraries: tuple[str, ...] = ()
     #: Whether the block can leave the floor; a model that cannot differs in form from one that can.
     flies: bool = True
-    #: Whether its first run on a machine compiles for longer than any cell takes; the engines'
-    #: steps compile in seconds.
+    #: Whether its loop is compiled: a run takes milliseconds.
     compiled: bool = False
 
 
@@ -42,6 +41,8 @@ ENGINES = "rockcheck.engines"
 COMPILED = ("numba", "llvmlite", "numpy", "scipy")
 #: What the engines that step adaptively depend on besides the engine.
 STEPPED = ("numba", "llvmlite", "numpy")
+#: The steps of an engine whose compiled code all such engines share.
+ADAPTIVE = "adaptive"
 FAMILIES: dict[str, Family] = {
     "ebm": Family(
         "rockcheck.ebm",
@@ -139,6 +140,18 @@ def not_installed(name: str) -> str:
 def has_wheel(name: str) -> bool:
     """Whether that model can be had on this Python without a compiler."""
     return family(name).module != ENGINES or bool(_class_of(name).has_wheel())
+
+
+def compiles(name: str, settings: Mapping[str, Any] | None = None) -> str:
+    """The code that a first run of that model on a machine has to compile, by a name; empty where
+    there is none.
+
+    It takes up to a minute, and does not count for the run's limit of time: see
+    `execute.pool.Call`. Engines share the code of their adaptive steps.
+    """
+    if family(name).module != ENGINES:
+        return name if family(name).compiled else ""
+    return ADAPTIVE if getattr(build(name, settings), "time_step", None) == ADAPTIVE else ""
 
 
 def is_own(name: str) -> bool:

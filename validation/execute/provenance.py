@@ -4,11 +4,14 @@ machine was."""
 from __future__ import annotations
 
 import ast
+import contextlib
 import hashlib
 import importlib.util
 import json
 import os
 import platform
+import re
+import time
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -17,12 +20,15 @@ from importlib.machinery import PathFinder
 from pathlib import Path
 from typing import Any
 
-from rockcheck.scenes import Scene
+from rockcheck.scenes import InputError, Scene
+from rockcheck.scenes.reading import read_text
+from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.execute.models import FAMILIES, family, home
 
 #: The package whose code counts where it can be reached; the package of the model itself always
 #: does.
 OWN_PACKAGE = "rockcheck"
+_KEPT = 30 * 86400.0  # s
 
 
 def cell_key(
@@ -65,14 +71,52 @@ def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
     """Hash of the code of a module and of all project modules that it imports, at its top or inside
     functions.
 
-    Of the syntax trees without docstrings: comments, layout and documentation do not count.
+    Of the syntax trees without docstrings: comments, layout and documentation do not count. That of
+    our own modules is kept for the next process, under the content of all our sources.
     """
-    return digest(
+    kept = _kept(module) if module.split(".")[0] == OWN_PACKAGE else None
+    if kept is not None and (known := _text_of(kept)):
+        return known
+    found = digest(
         "".join(
             f"{name}\n{_source_of(path).essence}\n"
             for name, path in sorted(reachable(module, search_path).items())
         )
     )
+    if kept is not None:
+        _keep(kept, found)
+    return found
+
+
+def _kept(module: str) -> Path:
+    """The file for the digest of a module of ours, named after the content of all our sources."""
+    spec = importlib.util.find_spec(OWN_PACKAGE)
+    content = hashlib.sha256(f"{module} {platform.python_version()}".encode())
+    for root in (Path(root) for root in (spec and spec.submodule_search_locations) or ()):
+        for folder in (root, *sorted(path for path in root.iterdir() if path.is_dir())):
+            for source in sorted(folder.rglob("*.py")):
+                content.update(source.name.encode() + b"\0" + source.read_bytes())
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
+    return cache / "rockcheck" / "code" / f"{content.hexdigest()[:32]}.txt"
+
+
+def _text_of(path: Path) -> str:
+    """A digest that was kept, empty where there is none."""
+    try:
+        found = read_text(path).strip()
+    except InputError:
+        return ""
+    return found if re.fullmatch(r"[0-9a-f]{16}", found) else ""
+
+
+def _keep(path: Path, found: str) -> None:
+    """Keep a digest where that can be done, and forget those of a month ago."""
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        write_whole(path, found + "\n")
+        for old in path.parent.glob("*.txt"):
+            if time.time() - old.stat().st_mtime > _KEPT:
+                old.unlink(missing_ok=True)
 
 
 def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]:

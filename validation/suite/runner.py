@@ -20,7 +20,7 @@ from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.execute import provenance, workers
-from rockcheck.validation.execute.models import family, has_wheel, is_own, not_installed
+from rockcheck.validation.execute.models import compiles, has_wheel, is_own, not_installed
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store
 from rockcheck.validation.finding import Finding
@@ -136,7 +136,7 @@ class SuiteStudy(Study):
             own.uncertainty,
             **of,
             seconds=own.limits.seconds,
-            compiles=kind if family(kind).compiled else "",
+            compiles=compiles(kind, variant.settings),
         )
 
     def _batches(self, ensemble: Ensemble, base: Scene, variant: ModelVariant) -> Iterator[Planned]:

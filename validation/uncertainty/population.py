@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
@@ -169,15 +170,13 @@ def share_of(hits: NDArray[np.int64], decided: NDArray[np.int64]) -> tuple[Float
     of the motions and at most that of the runs (Korn and Graubard 1998). NaN where no run was
     decided.
     """
-    from scipy.special import ndtri
-
     runs, motions = decided.sum(axis=0), (decided > 0).sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         share = hits.sum(axis=0) / runs
         variance = motions / (motions - 1) * ((hits - share * decided) ** 2).sum(axis=0) / runs**2
         effective = np.clip(share * (1.0 - share) / variance, motions, runs)
         count = np.where(variance > 0.0, effective, motions)
-        z2 = float(ndtri(0.5 + 0.5 * CONFIDENCE)) ** 2 / count
+        z2 = NormalDist().inv_cdf(0.5 + 0.5 * CONFIDENCE) ** 2 / count
         middle = (share + 0.5 * z2) / (1.0 + z2)
         half = np.sqrt(z2 * share * (1.0 - share) + 0.25 * z2 * z2) / (1.0 + z2)
     return share, middle - half, middle + half

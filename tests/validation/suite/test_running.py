@@ -21,7 +21,7 @@ from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.study import Task
 from rockcheck.validation.suite.results import Run
-from rockcheck.validation.suite.runner import in_order, run_suite
+from rockcheck.validation.suite.runner import SuiteStudy, in_order, run_suite
 from rockcheck.validation.suite.suites import load_suite
 from rockcheck.validation.suite.tables import junit, verdict_lines
 
@@ -305,6 +305,24 @@ def test_only_calls_that_compile_wait_for_each_other(tmp_path):
     with Pool(2) as pool:
         found = [ended.result for ended in pool.run(deque(calls))]
     assert [one.returncode for one in found if one != 2.0] == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("model", "settings", "compiled"),
+    [
+        ("ebm", "", "ebm"),
+        ("mujoco", "", "adaptive"),
+        ("pymunk", "largest_step = 1e-3", "adaptive"),
+        ("mujoco", 'settings = "default"', ""),
+        ("mujoco", "time_step = 1e-3", ""),
+        ("box2d", "", ""),
+    ],
+)
+def test_time_to_compile_does_not_count_for_a_cells_limit(tmp_path, model, settings, compiled):
+    """Of the cells whose model compiles the same code the first has `COMPILING` s more."""
+    path = write_suite(tmp_path, {"a": f'model = "{model}"\n{settings}'})
+    study = SuiteStudy(load_suite(path, allow_code=OWN), tmp_path / "out")
+    assert {cell.compiles for cell in study.cells if cell.variant.label == "a"} == {compiled}
 
 
 def test_what_takes_longest_begins_before_the_quick_rest():

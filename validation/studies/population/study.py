@@ -21,7 +21,7 @@ from rockcheck.scenes.errors import unknown_name
 from rockcheck.scenes.recordings import Recording, intensity
 from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
 from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.models import build, family
+from rockcheck.validation.execute.models import build, compiles
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.finding import (
     Axis,
@@ -133,7 +133,7 @@ class Population(Study):
                     self.model,
                     tuple(self.settings.items()),
                     expected=expected,
-                    compiles=self.model if family(self.model).compiled else "",
+                    compiles=compiles(self.model, self.settings),
                     where="here" if soon else "worker",
                 )
                 for name, motion, own in self.motions

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from statistics import median
@@ -139,6 +139,8 @@ KINDS = {
     "records": ("fig",),
     "all": ("",),
 }
+#: Kinds of scenes in each of which an engine has to meet `LEVEL`.
+LEAGUE = {"free": ("free",), "pulse": ("pulse",), "wall": ("wall",)}
 #: What is not measured, and why.
 LEFT_OUT = (
     "default settings at a step of 3e-5 s: at 1e-4 s they have stopped converging, or converge as"
@@ -346,10 +348,12 @@ def _point(samples: Sequence[BenchmarkRun]) -> Point:
     )
 
 
-def pooled(samples: Sequence[BenchmarkRun]) -> list[Point]:
+def pooled(
+    samples: Sequence[BenchmarkRun], kinds: Mapping[str, tuple[str, ...]] = KINDS
+) -> list[Point]:
     """Every setting of the engines' lines over all scenes of each kind, which is its `family`."""
     found = []
-    for kind, starts in KINDS.items():
+    for kind, starts in kinds.items():
         groups = grouped((s for s in samples if s.family.startswith(starts)), "line", "value")
         found += [
             replace(_point(groups[label, value]), family=kind)
@@ -382,6 +386,22 @@ def league(found: Sequence[Point]) -> list[tuple[str, float, float, float, float
             at_cost = error_at(mine, EQUAL_COST)
             rows.append((label, cost_at(mine)[0], at_cost, best.rms, best.cpu))
     return sorted(rows, key=lambda row: (math.isnan(row[1]), row[3 if math.isnan(row[1]) else 1]))
+
+
+def first_steps(samples: Sequence[BenchmarkRun]) -> list[tuple[str, dict[str, float], float]]:
+    """The engines' lines: the largest step (s) whose median error is at most `LEVEL`, in each kind
+    of `LEAGUE` and in all of them, NaN where none is; and the smallest step that was played."""
+    rows = []
+    for label, line in grouped(pooled(samples, LEAGUE), "line").items():
+        steps = {one.value for one in line}
+        met = {
+            kind: {one.value for one in line if one.family == kind and one.rms <= LEVEL}
+            for kind in LEAGUE
+        }
+        met["all"] = set.intersection(*met.values())
+        largest = {kind: max(values, default=math.nan) for kind, values in met.items()}
+        rows.append((label, largest, min(steps)))
+    return rows
 
 
 def error_at(line: Sequence[Point], cpu: float) -> float:

@@ -245,6 +245,26 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
             "Free rocking and pulses. Error: RMS of theta. Cost: CPU a simulated second. Empty:"
             " not reached.",
         )
+    if steps := runs.first_steps(samples):
+        kinds = {"free": "free rocking", "pulse": "pulse", "wall": "wall", "all": "all three"}
+        yield Table(
+            "first-steps",
+            [text("line", "engine"), *(text(kind, label) for kind, label in kinds.items())],
+            [
+                [
+                    line,
+                    *(
+                        f"never (down to {least:g} s)"
+                        if math.isnan(met[kind])
+                        else f"{met[kind]:g} s"
+                        for kind in kinds
+                    ),
+                ]
+                for line, met, least in steps
+            ],
+            f"The step at which an engine first meets {LEVEL:g} alpha",
+            "Median RMS error of theta over the scenes of a kind. Adaptive: the largest step.",
+        )
     for title, starts in SHEETS.items():
         shown = [family for family in families if family.startswith(starts)]
         if shown:
