@@ -105,6 +105,7 @@ def run(
     said = {role: ", ".join(motion.words()) for role, motion in motions.items()}
     notes = [f"note on the {role}: {note}" for role, one in histories.items() for note in one.notes]
     blocks: list[Block] = [
+        Text(headline(found)),
         Text(facts=[(role, words) for role, words in said.items() if words]),
         Text(f"{models}, {found.start:g} to {found.end:g} s"),
         Table("comparison", columns, rows),
@@ -129,7 +130,7 @@ def run(
             for f in found.figures
         ],
     }
-    told(Finding("comparison", models, headline(found), blocks, data))
+    told(Finding("comparison", models, "", blocks, data))
 
 
 def headline(found: Discrepancy) -> str:

@@ -20,6 +20,7 @@ from rockcheck.validation.suite.results import (
     Check,
     Run,
     Strict,
+    Verdict,
     value_of,
     worst,
 )
@@ -95,13 +96,14 @@ def verdict_table(run: Run) -> Table:
         near, unsure = nearest(cell), ", not converged" if cell.converged is False else ""
         judged = windowed(near) if near else "as it must be" if cell.checks else "nothing judged"
         idle = cell.status == "done" and not cell.checks
+        state: Verdict = "changed" if cell.words == "no tolerance yet" else cell.verdict
         rows.append(
             [
                 "" if cell.scene == before else cell.scene,
                 cell.model,
                 judged if cell.status == "done" else cell.reason or "failed",
                 percent(near) if near else "",
-                f"-{unsure}" if idle else Mark(f"{cell.words}{unsure}", cell.verdict),
+                f"-{unsure}" if idle else Mark(f"{cell.words}{unsure}", state),
             ]
         )
         before = cell.scene
