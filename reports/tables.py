@@ -237,12 +237,21 @@ def runs_table(
     time of all its scenes. `root` is the way to the run's folder."""
     of = "cpu_seconds" if histories is None else "wall_seconds"
     base = next((cell for cell in cells if cell.model == run.reference), None)
+    gains = {
+        cell.model: [
+            f"{cell.cost.energy_gains} impacts added energy,"
+            f" at most {number(100.0 * cell.cost.largest_energy_gain, 2)} %"
+        ]
+        if cell.cost.energy_gains
+        else []
+        for cell in cells
+    }
     rows = [
         [
             cell.model,
             ", ".join(f"{key} = {value}" for key, value in cell.settings.items()),
             *(_costs(cell, of, base) if cell.status == "done" else [""] * 5),
-            Mark(cell.fate or cell.reason, more="; ".join([*cell.notes, *_energy(cell)])),
+            Mark(cell.fate or cell.reason, more="; ".join([*cell.notes, *gains[cell.model]])),
             *(
                 Mark("CSV", link=f"{root}/{path}") if path and cell.model in histories else ""
                 for path in (cell.history, events_path(Path(cell.history or "-")).as_posix())
@@ -270,12 +279,6 @@ def _costs(cell: Cell, of: str, base: Cell | None) -> list[str]:
         duration(cost.set_up),
         *(f"{count:,}".replace(",", "\u202f") for count in (cost.steps, cost.evaluations)),
     ]
-
-
-def _energy(cell: Cell) -> list[str]:
-    most = f"at most {number(100.0 * cell.cost.largest_energy_gain, 2)} %"
-    gains = cell.cost.energy_gains
-    return [f"{gains} impacts added energy, {most}"] if gains else []
 
 
 QUANTITY = "peak_rotation"

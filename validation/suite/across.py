@@ -31,7 +31,7 @@ from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import from_validation, printable
 from rockcheck.scenes.experience import Experience, Range, Trust, axes_of
 from rockcheck.scenes.reading import read_text
-from rockcheck.validation.discrepancy.figures import Figure, Stored
+from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -45,7 +45,7 @@ from rockcheck.validation.finding import (
     text,
 )
 from rockcheck.validation.suite.results import Cell, Run, value_of
-from rockcheck.validation.suite.tables import title
+from rockcheck.validation.suite.tables import title, title_of
 from rockcheck.validation.suite.tolerances import MEASURES
 
 T = TypeVar("T")
@@ -153,7 +153,7 @@ def _of_cell(old: Cell, new: Cell) -> Iterator[Change]:
     for name, was, now in _pairs(*checks):
         if was != now:
             yield Change(**place, what="verdict", name=name, before=was, after=now)
-    figures = [{_key(figure): figure for figure in cell.figures} for cell in (old, new)]
+    figures = [{title_of(figure): figure for figure in cell.figures} for cell in (old, new)]
     for name, one, other in _pairs(*figures):
         if (
             one
@@ -166,11 +166,6 @@ def _of_cell(old: Cell, new: Cell) -> Iterator[Change]:
 
 def _pairs(old: Mapping[str, T], new: Mapping[str, T]) -> Iterator[tuple[str, T | None, T | None]]:
     yield from ((name, old.get(name), new.get(name)) for name in dict.fromkeys((*old, *new)))
-
-
-def _key(figure: Figure) -> str:
-    against = f" against {figure.against}" if figure.against else ""
-    return f"{figure.measure}{'@' if figure.window else ''}{figure.window}{against}"
 
 
 def _moved(name: str, was: float | None, now: float | None) -> bool:

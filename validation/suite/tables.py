@@ -224,13 +224,18 @@ def place(cell: Cell) -> str:
 
 def title(check: Check) -> str:
     """The check as tolerances name it: measure, window, and what it is held against."""
-    against = f" against {check.figure.against}" if check.figure.against else ""
-    return f"{windowed(check)}{against}"
+    return title_of(check.figure)
+
+
+def title_of(figure: Figure) -> str:
+    """The figure as tolerances name it."""
+    against = f" against {figure.against}" if figure.against else ""
+    return f"{figure.measure}{'@' if figure.window else ''}{figure.window}{against}"
 
 
 def windowed(check: Check) -> str:
     """What is checked, as tolerances name it: measure and window."""
-    return f"{check.figure.measure}{'@' if check.figure.window else ''}{check.figure.window}"
+    return title_of(check.figure).partition(" ")[0]
 
 
 def used(check: Check) -> float:
@@ -266,7 +271,11 @@ def nearest(cell: Cell) -> Check | None:
     """The check that failed, else the one nearest to its limit. A yes-or-no measure, or a limit of
     0, is never near its limit."""
     return max(
-        (check for check in cell.checks if check.verdict == "fail" or graded(check)),
+        (
+            check
+            for check in cell.checks
+            if check.verdict == "fail" or (check.limit and not asks(check))
+        ),
         key=used,
         default=None,
     )
@@ -276,11 +285,6 @@ def asks(check: Check) -> bool:
     """Whether the measure is a yes-or-no one."""
     measure = MEASURES.get(check.figure.measure)
     return measure is not None and measure.yes_no
-
-
-def graded(check: Check) -> bool:
-    """Whether a check has a limit that can be used up in part."""
-    return bool(check.limit) and not asks(check)
 
 
 def share(check: Check) -> str:
@@ -423,14 +427,9 @@ def _entry(cell: Cell | None, judged: bool) -> str:
     sure = " (not converged)" if cell.converged is False else ""
     if not judged and cell.status == "done":
         return _plain(cell.fate)
-    return f"{MARKS[cell.verdict]} {_plain(_worst(cell.checks))}{sure}".strip()
-
-
-def _worst(checks: tuple[Check, ...]) -> str:
-    against_others = [
-        check for check in checks if check.figure.against and check.kind == "numerical"
-    ]
-    return share(max(against_others, key=used)) if against_others else ""
+    numerical = [one for one in cell.checks if one.figure.against and one.kind == "numerical"]
+    worst_of = share(max(numerical, key=used)) if numerical else ""
+    return f"{MARKS[cell.verdict]} {_plain(worst_of)}{sure}".strip()
 
 
 def _plain(text: str) -> str:
