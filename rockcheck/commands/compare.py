@@ -9,7 +9,9 @@ import typer
 
 from rockcheck.commands import (
     PlotOption,
+    answer,
     check_picture,
+    console,
     save_picture,
     scene_names,
     told,
@@ -73,6 +75,8 @@ def run(
     Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg,
     time_ms, x_mm, ...). --plot draws both rotations and their difference.
     """
+    from rockcheck.reports import document
+
     if reference.is_dir() or reference.suffix == ".json":
         from rockcheck.validation.studies.conformance import study
 
@@ -113,8 +117,6 @@ def run(
         Text(f"not the whole time: {found.gap}" if found.gap else ""),
         Text(items=notes, verdict="changed"),
     ]
-    if plot is not None:
-        save_picture(found.plot(), plot)
     data = {
         "reference": found.reference,
         "candidate": found.candidate,
@@ -130,7 +132,11 @@ def run(
             for f in found.figures
         ],
     }
-    told(Finding("comparison", models, "", blocks, data))
+    finding = Finding("comparison", models, "", blocks, data)
+    document.show(finding, console())
+    if plot is not None:
+        save_picture(found.plot(), plot)
+    answer(finding.as_dict())
 
 
 def headline(found: Discrepancy) -> str:

@@ -230,7 +230,7 @@ def test_what_is_not_defined_neither_passes_nor_fails():
             check("theta_rms", 0.5, Tolerance(expected=0.1, limit=0.2, drift=0.01)),
             "so",
             "loosened",
-            None,
+            {"expected": 0.5, "limit": 1.0, "drift": 0.01, "why": "so"},
         ),
         (check("theta_rms", 0.5, None), None, "new", None),
         (

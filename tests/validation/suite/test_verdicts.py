@@ -190,6 +190,8 @@ def test_the_summary_names_what_is_not_a_pass():
         (0.5, "changed"),
         (0.5000001, "fail"),
         (-0.5, "changed"),
+        (0.0, "better"),
+        (-0.75, "fail"),
     ],
 )
 def test_limit_and_drift_themselves_are_inside(value, expected):
