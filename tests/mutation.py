@@ -4,9 +4,10 @@ and runs the tests that should fail.
 A sample of all faults that the operators below can make, drawn with a seed: comparisons that
 include their limit or do not, signs, products for quotients, `and` for `or`, negated conditions,
 changed numbers. Each is planted in a copy of the packages, which is interpreted
-(NUMBA_DISABLE_JIT=1), but for the files in COMPILED. Faults that survive are printed with file and
-line; those that nothing can notice are in EQUIVALENT. Arguments: `--sample N` faults a file,
-`--seed N`, `--file NAME` (repeatable), and after `--` what pytest is given, too.
+(NUMBA_DISABLE_JIT=1), but for the files that are `compiled`. Faults that survive are printed with
+file and line. Files, tests and the faults that nothing can notice are in data/mutation.toml.
+Arguments: `--sample N` faults a file, `--seed N`, `--file NAME` (repeatable), and after `--` what
+pytest is given, too.
 """
 
 from __future__ import annotations
@@ -21,215 +22,17 @@ import shutil
 import signal
 import sys
 import tempfile
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-CLOSED = "tests/ebm/test_closed_forms.py::test_"
-POPULATION = "tests/validation/studies/test_population.py"
-UNCERTAINTY = "tests/validation/discrepancy/test_uncertainty.py"
-#: Where faults are planted, and the tests that should notice them, the quickest first.
-TARGETS = {
-    "ebm/core/series.py": ["tests/ebm/core/test_core_parts.py"],
-    "ebm/core/laws/impacts.py": [
-        "tests/ebm/core/test_impact_laws.py",
-        f"{CLOSED}wall_impact_balances_momentum",
-        f"{CLOSED}floor_impact_balances_momentum",
-    ],
-    "ebm/core/laws/contact_impacts.py": [
-        "tests/ebm/core/test_impact_laws.py",
-        f"{CLOSED}contact_impact_leaves_no_approach",
-        "tests/ebm/test_edges.py",
-    ],
-    "ebm/core/guards.py": ["tests/ebm/core/test_core_parts.py", "tests/ebm/test_edges.py"],
-    "ebm/core/modes.py": ["tests/ebm/core/test_core_parts.py", "tests/ebm/test_edges.py"],
-    "validation/suite/tolerances.py": [
-        "tests/validation/suite/test_verdicts.py",
-        "tests/validation/suite/test_tolerances.py",
-    ],
-    "validation/suite/tables.py": [
-        "tests/validation/suite/test_verdicts.py",
-        "tests/validation/suite/test_impact_laws.py",
-        "tests/commands/test_cli.py",
-    ],
-    "validation/criteria.py": ["tests/validation/test_criteria.py"],
-    "validation/discrepancy/motion.py": ["tests/validation/studies/test_assess.py"],
-    "validation/studies/population/answers.py": ["tests/validation/studies/test_assess.py"],
-    "validation/discrepancy/statistics.py": [
-        "tests/validation/suite/test_statistics.py",
-        "tests/validation/suite/test_ensembles.py",
-    ],
-    "validation/discrepancy/compare.py": [
-        "tests/validation/discrepancy/test_measures.py",
-        "tests/validation/discrepancy/test_measured.py",
-    ],
-    "validation/discrepancy/measures.py": [
-        "tests/validation/discrepancy/test_measures.py",
-        "tests/validation/discrepancy/test_measured.py",
-    ],
-    "validation/suite/results.py": [
-        "tests/validation/suite/test_verdicts.py",
-        "tests/commands/test_cli.py",
-    ],
-    "ebm/core/settle.py": ["tests/ebm/core/test_impact_laws.py", "tests/ebm/test_edges.py"],
-    "ebm/core/laws/strike.py": [
-        "tests/ebm/core/test_impact_laws.py",
-        f"{CLOSED}wall_impact_balances_momentum",
-        f"{CLOSED}floor_impact_balances_momentum",
-        f"{CLOSED}contact_impact_leaves_no_approach",
-        "tests/ebm/test_edges.py",
-    ],
-    "ebm/core/march.py": ["tests/ebm/core/test_core_parts.py", "tests/ebm/test_edges.py"],
-    "scenes/block.py": [
-        "tests/scenes/test_scene.py",
-        "tests/ebm/test_loaded_blocks.py::test_pivots_of_a_block",
-    ],
-    "scenes/files.py": [
-        "tests/scenes/test_inputs.py",
-        "tests/scenes/test_files.py",
-        UNCERTAINTY,
-        "-k",
-        "inputs or files or scene_file or correlated or faults",
-    ],
-    "scenes/recordings/sets.py": [
-        "tests/scenes/test_record_sets.py",
-        "tests/scenes/test_recordings.py",
-    ],
-    "scenes/recordings/intensity.py": ["tests/scenes/test_intensity.py"],
-    "validation/uncertainty/verdict.py": [UNCERTAINTY, "-k", "what_a_difference_says"],
-    "validation/uncertainty/numerical.py": [
-        UNCERTAINTY,
-        "-k",
-        "index or order or step or tolerance or peak or small or interval_covers or own_error",
-    ],
-    "validation/uncertainty/population.py": [
-        "tests/validation/discrepancy/test_propagation.py",
-        POPULATION,
-        UNCERTAINTY,
-        "-k",
-        "propagation or sobol or refused or population",
-    ],
-    "validation/studies/population/study.py": [POPULATION],
-    "ebm/horizon.py": ["tests/ebm/test_horizon.py"],
-}
-#: Files that are never compiled, whose tests play more motions than an interpreter can: what they
-#: call is compiled.
-COMPILED = {
-    "validation/uncertainty/numerical.py",
-    "validation/uncertainty/population.py",
-    "validation/studies/population/study.py",
-    "ebm/horizon.py",
-}
+#: Where faults are planted, the tests that should notice them, and faults that nothing can notice.
+DATA = tomllib.loads((ROOT / "tests" / "data" / "mutation.toml").read_text(encoding="utf-8"))
+COMPILED = {target["file"] for target in DATA["target"] if "compiled" in target}
 #: What hangs is noticed: after so long in the processor, or in twenty times that by the clock,
 #: which a busy machine does not reach.
 SECONDS = 180
-#: Faults that change no result, by file, a part of the line (of a number: of the expression that it
-#: stands in), the text of the fault, and why.
-EQUIVALENT = {
-    (
-        "validation/uncertainty/numerical.py",
-        "(1.0, 2.0, ",
-        "1.0  ->  100.0",
-    ): (
-        "the finest run is the one at the model's own step: only the factors of the coarser ones"
-        " are used"
-    ),
-    (
-        "validation/uncertainty/numerical.py",
-        "largest <= ROUNDING",
-        "largest <= ROUNDING * scale  ->  largest < ROUNDING * scale",
-    ): "equal to the last bit",
-    (
-        "ebm/horizon.py",
-        "tolerance=1e-13",
-        "1e-13  ->  1.0000000000000001e-11",
-    ): "still far below the perturbation",
-    (
-        "validation/uncertainty/population.py",
-        "0.9 * draws",
-        "len(known) >= 0.9 * draws  ->  len(known) > 0.9 * draws",
-    ): "one more fit of 200",
-    (
-        "ebm/core/settle.py",
-        "[SETTLE, -1.0, -1.0",
-        "1.0  ->  100.0",
-    ): "any time long before the first impact",
-    (
-        "ebm/core/series.py",
-        "stack",
-        "top + 2  ->  top - 2",
-    ): "the narrowest interval ends the search before the stack is full",
-    (
-        "ebm/core/series.py",
-        "a[row, 0] + low",
-        "a[row, 0] > floor  ->  a[row, 0] >= floor",
-    ): "a bound that saves the search, met or not",
-    (
-        "ebm/core/laws/impacts.py",
-        "abs(q) <= mu_s * p",
-        "S2 * w2 >= 0.0  ->  S2 * w2 > 0.0",
-    ): "a block that an impact stops, by the last bit of its slenderness, lies flat either way",
-    (
-        "ebm/core/laws/impacts.py",
-        "-1.0 if q > 0.0",
-        "-1.0  ->  1.0",
-    ): (
-        "at most one of the two slips is consistent up to friction 4/3, so that it does not matter"
-        " which is tried first"
-    ),
-    (
-        "ebm/core/laws/contact_impacts.py",
-        "_MOST_STAGES = 40",
-        "40  ->  41",
-    ): "no impact that ends takes as many stages",
-    (
-        "ebm/core/laws/contact_impacts.py",
-        "1.0 if floor",
-        "1.0  ->  100.0",
-    ): "a unit of distance",
-    (
-        "ebm/core/guards.py",
-        "tau, -1",
-        "1  ->  2",
-    ): "any negative number says that there is no event",
-    (
-        "ebm/core/guards.py",
-        "_has(a, wall, 0)",
-        "0  ->  1",
-    ): "one term of the gap's series fewer, which is below the tolerance",
-    (
-        "ebm/core/guards.py",
-        "_has(a, G_LANDING, 0)",
-        "0  ->  1",
-    ): "one term of the gap's series fewer, which is below the tolerance",
-    (
-        "ebm/core/guards.py",
-        "gap < np.inf",
-        "TIP if wall == G_TIP_GAP else FAR  ->  TIP if not wall == G_TIP_GAP else FAR",
-    ): "on one wall the other's gap cannot close, and its own is zero throughout",
-    (
-        "ebm/core/modes.py",
-        "m[PULL] < 0 and (b.unilateral",
-        "m[PULL] < 0  ->  m[PULL] <= 0",
-    ): "a floor pushes or pulls: it is never 0",
-    ("ebm/core/modes.py", "m[PULL] < 0", "0  ->  1"): "a floor pushes or pulls, 1 or -1",
-    (
-        "ebm/core/modes.py",
-        "_touched(b, z, 1, True)",
-        "1  ->  2",
-    ): "of an upright block both sides are looked at, whatever the sense",
-    ("ebm/core/modes.py", "if flat else 0", "0  ->  1"): "only a flat block asks for it",
-    (
-        "ebm/core/guards.py",
-        "a[PHI, 0] > 0.5",
-        "a[PHI, 0] > 0.5  ->  a[PHI, 0] >= 0.5",
-    ): "a bound that saves the guards, met or not",
-    (
-        "ebm/core/guards.py",
-        "root < tau",
-        "root < tau - (INSTANT if closes else 0.0)  ->  root <= tau - (INSTANT if closes else 0.0)",
-    ): "equal to the last bit",
-}
 
 #: Names of numbers that are 1 or -1.
 SIGNS = {"S", "S1", "S2", "Sw", "Sr", "sy", "d", "sense", "side", "sign"}
@@ -387,7 +190,8 @@ def main() -> None:
         os.environ["PYTHONPATH"] = folder
         for library in ("numba", "pandas", "pydantic", "scipy.integrate", "scipy.stats"):
             importlib.import_module(library)  # once for all children
-        for name, tests in TARGETS.items():
+        for target in DATA["target"]:
+            name, tests = target["file"], target["tests"]
             if asked.file and not any(part in name for part in asked.file):
                 continue
             source = (ROOT / name).read_text(encoding="utf-8")
@@ -405,8 +209,9 @@ def main() -> None:
             for index in chosen:
                 line, text, around = listed.found[index]
                 if any(
-                    (file, fault) == (name, text) and part in (around or lines[line - 1])
-                    for file, part, fault in EQUIVALENT
+                    (one["file"], one["fault"]) == (name, text)
+                    and one["part"] in (around or lines[line - 1])
+                    for one in DATA["equivalent"]
                 ):
                     continue
                 fault = ast.unparse(

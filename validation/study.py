@@ -28,8 +28,15 @@ from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import OnProgress, announce, unheard
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.pool import THREADS, Call, Failure, Pool, guarded
-from rockcheck.validation.execute.remote import Cluster, check_scheduler
+from rockcheck.validation.execute.pool import (
+    THREADS,
+    Call,
+    Cluster,
+    Failure,
+    Pool,
+    check_scheduler,
+    guarded,
+)
 from rockcheck.validation.execute.store import RECORDS, Store, name_of
 from rockcheck.validation.finding import Finding, Made
 
@@ -153,8 +160,6 @@ def run(
 
 
 class _Run:
-    """A study that is being played."""
-
     def __init__(
         self,
         study: Study,
@@ -226,7 +231,6 @@ class _Run:
                 return
 
     def _next(self) -> list[Task]:
-        """The tasks of the next wave that have to be played; the others are read back."""
         while new := [
             task for task in dict.fromkeys(self.study.tasks(self.done)) if task not in self.known
         ]:
@@ -262,14 +266,9 @@ class _Run:
         )
 
     def _estimate(self, waiting: Sequence[Task]) -> None:
-        """Says how long a wave will take where that is long."""
         seconds = sum(
             task.expected / (max(1, self.jobs) if task.where == "worker" else 1) for task in waiting
         )
         if seconds >= LONG:
-            announce(f"{self.study.name}: {len(waiting)} tasks, about {words_of(seconds)}")
-
-
-def words_of(seconds: float) -> str:
-    """A time as people say it: 40 s, 5 min."""
-    return f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
+            long = f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
+            announce(f"{self.study.name}: {len(waiting)} tasks, about {long}")

@@ -14,7 +14,7 @@ from rockcheck.reports.style import SPARE, looks
 from rockcheck.scenes import History, InputError, Scene
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
 from rockcheck.validation.discrepancy import Discrepancy
-from rockcheck.validation.discrepancy.measures import Pair
+from rockcheck.validation.discrepancy.figures import Pair
 
 INK, SHADE, ACCENT = "#1b1b1b", "#d5d5d5", "#0072b2"
 #: Where the axis of rotation ends for a block that falls, alpha.

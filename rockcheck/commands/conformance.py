@@ -98,8 +98,8 @@ def run(
 
 def _export(folder: Path) -> None:
     from rockcheck.reports.scene_data import write_scene_file
-    from rockcheck.validation.studies.conformance.exchange import export
     from rockcheck.validation.studies.conformance.phenomena import SCENES
+    from rockcheck.validation.studies.conformance.study import export
 
     for name, scene in SCENES.items():
         write_scene_file(scene, folder, name)

@@ -18,7 +18,7 @@ from rockcheck.commands import (
 )
 from rockcheck.scenes import InputError, load_scene
 from rockcheck.validation.execute.store import name_of
-from rockcheck.validation.paper.panels import (
+from rockcheck.validation.paper import (
     AMPLITUDES,
     FIGURES,
     FREQUENCIES,
@@ -101,8 +101,8 @@ def run(
     rockcheck spectrum paper --agreement 200               against the other models
     rockcheck spectrum shelf.toml --amplitudes 1 6 --refine    your own block and pulse
     """
-    from rockcheck.validation.studies.spectrum.grids import Request
     from rockcheck.validation.studies.spectrum.study import Spectra
+    from rockcheck.validation.studies.spectrum.tiles import Request
 
     if what in PAPER:
         panels = paper_panels(*PAPER[what])

@@ -16,7 +16,7 @@ from rockcheck.ebm.core import contacts, motion, rules, series, settle, state
 from rockcheck.ebm.core.names import Kind
 from rockcheck.scenes.experience import Experience
 from rockcheck.scenes.kinematics import pivot_height
-from rockcheck.validation.paper.panels import KEPT, kept_spectra
+from rockcheck.validation.paper import KEPT, kept_spectra
 from rockcheck.validation.suite.suites import load_suite
 
 ROOT = Path(__file__).parents[2]

@@ -13,18 +13,16 @@ from rockcheck.reports.drawers import figure_of, scripts_of
 from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, draw
 from rockcheck.scenes.reading import read_json
 from rockcheck.validation.finding import plain
-from rockcheck.validation.paper.measures import Paper
-from rockcheck.validation.paper.panels import KEPT, kept_spectra, paper_panels
-from rockcheck.validation.paper.sentences import beyond, findings_of
+from rockcheck.validation.paper import KEPT, kept_spectra, paper_panels
+from rockcheck.validation.paper.measures import Paper, beyond, findings_of
 from rockcheck.validation.studies.spectrum.agreement import (
     CANDIDATES,
     PLAYED_SHARE,
     blocks,
     mapped,
 )
-from rockcheck.validation.studies.spectrum.grids import Request
 from rockcheck.validation.studies.spectrum.study import Spectra
-from rockcheck.validation.studies.spectrum.tiles import Played
+from rockcheck.validation.studies.spectrum.tiles import Played, Request
 
 SIZE = 12
 

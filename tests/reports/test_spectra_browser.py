@@ -16,11 +16,10 @@ from playwright import sync_api as playwright
 from rockcheck.reports.document import publish
 from rockcheck.reports.show.spectrum import COLOURS
 from rockcheck.validation.finding import Block, Column, Finding, Made
-from rockcheck.validation.paper.panels import Panel, paper_panels
+from rockcheck.validation.paper import Panel, paper_panels
 from rockcheck.validation.studies.population.study import blocks_of, lines_of
-from rockcheck.validation.studies.spectrum.grids import Request
 from rockcheck.validation.studies.spectrum.study import Spectra
-from rockcheck.validation.studies.spectrum.tiles import Played
+from rockcheck.validation.studies.spectrum.tiles import Played, Request
 from rockcheck.validation.uncertainty.population import curve_of
 
 pytestmark = pytest.mark.browser

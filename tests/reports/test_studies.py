@@ -22,8 +22,8 @@ from rockcheck.validation.finding import (
     text,
 )
 from rockcheck.validation.studies.work_precision.runs import BenchmarkRun, Play
-from rockcheck.validation.studies.work_precision.savings import Saving
-from rockcheck.validation.studies.work_precision.study import Measure, Measured, WorkPrecision
+from rockcheck.validation.studies.work_precision.study import Measure, WorkPrecision
+from rockcheck.validation.studies.work_precision.timings import Saving
 
 pytestmark = pytest.mark.browser
 
@@ -38,8 +38,8 @@ def benchmark_page(folder: Path) -> Path:
         ("cm", 1e-6, 1e-4, 3e-3),
     )
     done: dict[object, object] = {
-        Play(family, member, line, value): Measured(
-            run=BenchmarkRun(
+        Play(family, member, line, value): [
+            BenchmarkRun(
                 family,
                 member,
                 line,
@@ -56,14 +56,14 @@ def benchmark_page(folder: Path) -> Path:
                 0.1,
                 1000,
             )
-        )
+        ]
         for family in ("free", "wall 53 mm e 0", "long 53 mm e 0.5", "short 3 mm e 0")
         for member in range(3)
         for line, value, error, cpu in lines
         if line == "cm" or not family.startswith(("long", "short"))
     }
     done[Play("free", 0, "pybullet", 1e-2)] = Lost("it blew up")
-    done[Measure("saving", "made")] = Measured(saved=(Saving("cm", "wall", "ms", 2.0, 1.0),))
+    done[Measure("saving", "made")] = [Saving("cm", "wall", "ms", 2.0, 1.0)]
     return publish(WorkPrecision().gather(done), folder)
 
 

@@ -32,8 +32,8 @@ from rockcheck.scenes import (
     load_scene,
 )
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
-from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.discrepancy.measures import DIFFERENCES, Pair
+from rockcheck.validation.discrepancy.figures import Figure, Pair
+from rockcheck.validation.discrepancy.measures import DIFFERENCES
 from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.suite.results import Cell, Check, Run
 

@@ -21,10 +21,10 @@ import pytest
 
 from rockcheck import ebm
 from rockcheck.commands.cli import main
+from rockcheck.commands.warm import PARTS
 from rockcheck.ebm.core import march
 from rockcheck.scenes import compiled
 from rockcheck.scenes.progress import announcing
-from rockcheck.validation.execute.warming import PARTS
 
 #: A package of one kernel, played in a process of its own; says how many functions were read from
 #: the cache and how many compiled.
@@ -381,7 +381,7 @@ def test_what_is_compiled_ahead_is_not_compiled_again(capsys):
     assert list(json.loads(said.out)["seconds"]) == list(PARTS)
     assert said.err == ""
     code = (
-        "from rockcheck.validation.execute.warming import PARTS;"
+        "from rockcheck.commands.warm import PARTS;"
         "[run() for run in PARTS.values()];"
         "from rockcheck.ebm.core import march; print(sum(march.play.stats.cache_misses.values()),"
         " len(march.play.signatures) <= 1)"

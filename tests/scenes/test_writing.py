@@ -103,9 +103,9 @@ DOORS = {
         "scenes/experience.py",
         "validation/execute/provenance.py",
     }
-    | {"commands/scenes.py", "validation/studies/work_precision/savings.py", "reports/site.py"}
-    | {"reports/style.py", "reports/document.py", "validation/paper/sentences.py"}
-    | {"validation/studies/conformance/exchange.py"},
+    | {"commands/scenes.py", "validation/studies/work_precision/timings.py", "reports/site.py"}
+    | {"reports/style.py", "reports/document.py", "validation/paper/measures.py"}
+    | {"validation/studies/conformance/study.py"},
 }
 
 

@@ -23,20 +23,21 @@ from rockcheck.validation.studies.stress.runs import (
     Chunk,
     RunTotals,
     parts,
+    scene_text,
+    shrink,
 )
-from rockcheck.validation.studies.stress.shrinking import scene_text, shrink
-from rockcheck.validation.studies.stress.stability import (
+from rockcheck.validation.studies.stress.study import (
     CASES,
     SETUPS,
     Place,
     Stable,
     Still,
+    Stress,
     fault_of,
     places,
     scene_at,
     stand_still,
 )
-from rockcheck.validation.studies.stress.study import Stress
 from rockcheck.validation.study import run
 
 

@@ -13,17 +13,15 @@ import numpy as np
 from rockcheck.scenes import Block, History, InputError, Scene
 from rockcheck.scenes.base import Shown
 from rockcheck.scenes.errors import check_kind
-from rockcheck.validation.discrepancy import closed_forms as _closed_forms  # noqa: F401 - registers them
-from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.discrepancy.measures import (
-    DIFFERENCES,
-    FIGURES,
+from rockcheck.validation.discrepancy.figures import (
     TURNS,
+    Figure,
     Measure,
     Pair,
     Unavailable,
     WindowedHistory,
 )
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 
 if TYPE_CHECKING:
     import pandas as pd

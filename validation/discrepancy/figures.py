@@ -1,9 +1,22 @@
-"""A figure: the value of one measure, as it is stored."""
+"""What is measured, as it is stored, and how: a figure is the value of one measure.
+
+Measures see one history (`WindowedHistory`) or two on one time axis (`Pair`).
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from operator import attrgetter
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import ConfigDict
 
+from rockcheck.scenes import Block, Event, History, Scene, kinematics
 from rockcheck.scenes.base import Frozen
 
 #: How the note begins of a figure that asks nothing here, as a ratio to nothing does.
@@ -62,3 +75,312 @@ class Figure(Stored):
         """Whether it is the peak rotation of a block that has fallen, which is no peak: the
         measure's note says so."""
         return self.measure == "peak_rotation" and bool(self.note)
+
+
+Array = NDArray[np.float64]
+Value = float | tuple[float, str]
+STANDARD_GRAVITY = 9.81
+#: Impacts of two histories are the same impact if they lie within this time, s.
+SAME_IMPACT = 0.020
+#: Impacts weaker than this share of the history's strongest of their kind need no counterpart.
+WEAK_IMPACT = 0.01
+IMPACTS = ("floor impact", "wall impact")
+TURNS = ("overturned left", "overturned right")
+
+
+class Unavailable(Exception):
+    """The measure cannot be computed from these histories; the message says what is missing."""
+
+
+class Undefined(Unavailable):
+    """The measure asks nothing of these histories, as a ratio to nothing: no pass and no fail."""
+
+    def __init__(self, why: str) -> None:
+        super().__init__(f"{NOT_DEFINED}: {why}")
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A measure: its name in tolerances and tables, its label for people, its unit, definition and
+    source, and what a perfect candidate scores.
+
+    `unit` "angle" stands for alpha, or rad where the block is unknown. `sense` "at most": the
+    distance from `ideal` is limited (`ideal` None: from the expected value); "at least": the value
+    itself must reach the limit.
+    """
+
+    name: str
+    label: str
+    unit: str
+    formula: str
+    evaluate: Callable[[Any], Value]
+    ideal: float | None = 0.0
+    sense: Literal["at most", "at least"] = "at most"
+    #: Computed only where a tolerance or a suite asks for it by name.
+    on_request: bool = False
+    #: The distance from a closed form.
+    exact: bool = False
+    #: 1 for yes, 0 for no: neither near a limit nor far from it.
+    yes_no: bool = False
+    #: Changes below this mean nothing (in the measure's unit); 0 for what is counted. The least
+    #: floor.
+    resolution: float = 1e-6
+
+    @property
+    def role(self) -> Literal["error", "quantity", "count"]:
+        """What its values are: an error has a perfect value, and the nearer to it the better."""
+        if self.ideal is not None or self.sense == "at least":
+            return "error"
+        return "quantity" if self.resolution else "count"
+
+
+def by_name(*measures: Measure) -> dict[str, Measure]:
+    """A book of measures."""
+    return {measure.name: measure for measure in measures}
+
+
+def between_rows(unit: str, frequency_parameter: float, gravity: float, step: float) -> float:
+    """What rows `step` (s) apart cannot tell from nothing: how far a free block is from a chord.
+
+    Of an angle (p h)^2/8, in alpha; of a length g h^2/8, in m; of a time h, in s. Other units have
+    no such floor.
+    """
+    share = step**2 / 8.0
+    return {"angle": frequency_parameter**2 * share, "m": gravity * share, "s": step}.get(unit, 0.0)
+
+
+@dataclass(frozen=True)
+class WindowedHistory:
+    """One history as the figures see it: cut to a window, with the scene's gravity and walls where
+    they are known."""
+
+    history: History
+    scene: Scene | None = None
+    until: float = math.inf
+
+    @property
+    def block(self) -> Block:
+        """The block, from the scene or from the history."""
+        if self.scene is not None:
+            return self.scene.block
+        if self.history.block is None:
+            raise Unavailable("the block's size is not known")
+        return self.history.block
+
+    @property
+    def gravity(self) -> float:
+        """The scene's gravity, or 9.81 m/s^2."""
+        return STANDARD_GRAVITY if self.scene is None else self.scene.gravity
+
+    @cached_property
+    def inside(self) -> NDArray[np.bool_]:
+        """The rows within the window."""
+        return self.history.channels["t"] <= self.until + 1e-9
+
+    def channel(self, name: str) -> Array:
+        """One column within the window."""
+        if name not in self.history.channels:
+            raise Unavailable(f"{self.history.model} has no column {name}")
+        return np.asarray(self.history.channels[name][self.inside], dtype=float)
+
+    def events(self, *kinds: str, start: float = -math.inf) -> list[Event]:
+        """Events of these kinds within the window, from `start` (s) on. A landing that strikes is a
+        floor impact, whichever name the model has for it."""
+        return [
+            event
+            for event in map(_impact, self.history.event_list)
+            if event.kind in kinds and start - 1e-9 <= event.t <= self.until + 1e-9
+        ]
+
+    def strong(self, kind: str) -> float:
+        """The number of impacts that are not weak (`WEAK_IMPACT`)."""
+        impulses = [abs(event.impulse) for event in self.events(kind)]
+        return float(sum(impulse >= WEAK_IMPACT * max(impulses) for impulse in impulses))
+
+    def heights(self) -> Array:
+        """Height of the lowest corner above the floor, m."""
+        return kinematics.pivot_height(self.block, self.channel("y"), self.channel("theta"))
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Reference and candidate over their common time up to `until` (s), the candidate interpolated
+    linearly.
+
+    The time axis is the reference's; `start` and `end` bound the common time within the window.
+    """
+
+    reference: History
+    candidate: History
+    scene: Scene | None = None
+    until: float = math.inf
+    cache: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    @cached_property
+    def start(self) -> float:
+        """First common time, s."""
+        return max(float(self.reference.channels["t"][0]), float(self.candidate.channels["t"][0]))
+
+    @cached_property
+    def end(self) -> float:
+        """Last common time within the window, s."""
+        return min(
+            float(self.reference.channels["t"][-1]),
+            float(self.candidate.channels["t"][-1]),
+            self.until,
+        )
+
+    @cached_property
+    def time(self) -> Array:
+        """The reference's times within the common time."""
+        t = np.asarray(self.reference.channels["t"], dtype=float)
+        return t[(t >= self.start - 1e-9) & (t <= self.end + 1e-9)]
+
+    def channels(self, name: str) -> tuple[Array, Array]:
+        """One column of both on `time`: reference, candidate."""
+        if name not in self.cache:
+            for history in (self.reference, self.candidate):
+                if name not in history.channels:
+                    raise Unavailable(f"{history.model} has no column {name}")
+            if len(self.time) == 0:
+                raise Unavailable("the histories have no time in common")
+            self.cache[name] = tuple(
+                np.interp(
+                    self.time,
+                    np.asarray(h.channels["t"], dtype=float),
+                    np.asarray(h.channels[name], dtype=float),
+                )
+                for h in (self.reference, self.candidate)
+            )
+        return self.cache[name]
+
+    @cached_property
+    def alpha(self) -> float | None:
+        """Slenderness of the block, rad, wherever it is known from."""
+        if self.scene is not None:
+            return self.scene.block.alpha
+        return self.reference.alpha if self.reference.alpha is not None else self.candidate.alpha
+
+    @property
+    def theta(self) -> tuple[Array, Array]:
+        """theta of both, in alpha (in rad where the block is unknown)."""
+        scale = self.alpha or 1.0
+        reference, candidate = self.channels("theta")
+        return reference / scale, candidate / scale
+
+    @cached_property
+    def known(self) -> WindowedHistory:
+        """The one of the two whose block is known."""
+        return WindowedHistory(
+            self.reference if self.reference.alpha is not None else self.candidate, self.scene
+        )
+
+    @property
+    def rocking(self) -> tuple[Array, Array]:
+        """`theta` where there is something to have a ratio to: the reference's peak is no
+        nothing."""
+        floor = Measure.resolution
+        if self.alpha is not None and len(self.time) > 1:
+            g, step = self.known.gravity, float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
+            floor = max(
+                floor,
+                between_rows(
+                    "angle", self.known.block.weaker_pivot.frequency_parameter(g), g, step
+                ),
+            )
+        if np.max(np.abs(self.theta[0])) <= floor:
+            raise Undefined("the reference does not rotate")
+        return self.theta
+
+    @cached_property
+    def energies(self) -> tuple[Array, Array]:
+        """Energy per unit mass of both, J/kg."""
+        columns = [self.channels(name) for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")]
+        block, gravity = self.known.block, self.known.gravity
+        first, second = (
+            np.asarray(kinematics.energy(block, gravity, *(c[k] for c in columns))) for k in (0, 1)
+        )
+        return first, second
+
+    def mean(self, values: Array) -> float:
+        """Mean over time, by the trapezoidal rule."""
+        if len(values) == 1:
+            return float(values[0])
+        steps = np.diff(self.time)
+        return float(np.sum(steps * 0.5 * (values[1:] + values[:-1])) / np.sum(steps))
+
+    def rms(self, columns: tuple[Array, Array]) -> float:
+        """sqrt <d^2>."""
+        return math.sqrt(self.mean((columns[1] - columns[0]) ** 2))
+
+    @cached_property
+    def sprague_geers(self) -> tuple[float, float]:
+        """M and P of theta."""
+        reference, candidate = self.rocking
+        rr, cc, rc = (
+            self.mean(product) for product in (reference**2, candidate**2, reference * candidate)
+        )
+        if cc == 0.0:
+            raise Unavailable("only one of the two rotates")
+        cosine = rc / math.sqrt(rr * cc)
+        phase = math.acos(max(-1.0, min(1.0, cosine))) / math.pi
+        return math.sqrt(cc / rr) - 1.0, phase if math.isfinite(cosine) else math.nan
+
+    @cached_property
+    def impacts(self) -> MatchedImpacts:
+        """The impacts of both within the common time, matched; a history without any event, unlike
+        the other's, does not know them."""
+        both = [
+            WindowedHistory(one, until=self.end).events(*IMPACTS, *TURNS, start=self.start)
+            for one in (self.reference, self.candidate)
+        ]
+        for history, others in ((self.reference, both[1]), (self.candidate, both[0])):
+            if others and not history.event_list:
+                raise Unavailable(f"{history.model} has no events")
+        return match_impacts(*both)
+
+
+@dataclass(frozen=True)
+class MatchedImpacts:
+    """Impacts of two histories: pairs (reference, candidate), and those of either that have no
+    counterpart."""
+
+    pairs: Sequence[tuple[Event, Event]]
+    only_reference: Sequence[Event]
+    only_candidate: Sequence[Event]
+
+
+def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> MatchedImpacts:
+    """Match impacts of one kind within `SAME_IMPACT`, nearest first; weak ones (`WEAK_IMPACT`) need
+    no counterpart.
+
+    A falling block's end counts as an event of its own kind.
+    """
+    pairs: list[tuple[Event, Event]] = []
+    alone: tuple[list[Event], list[Event]] = ([], [])
+    for kind in IMPACTS + TURNS:
+        both = [[e for e in events if e.kind == kind] for events in (reference, candidate)]
+        times = np.array([e.t for e in both[1]])
+        near = [
+            (abs(times[j] - first.t), i, j)
+            for i, first in enumerate(both[0])
+            for j in range(*np.searchsorted(times, [first.t - SAME_IMPACT, first.t + SAME_IMPACT]))
+        ]
+        taken: tuple[set[int], set[int]] = (set(), set())
+        for _, i, j in sorted(near):
+            if i not in taken[0] and j not in taken[1]:
+                taken[0].add(i)
+                taken[1].add(j)
+                pairs.append((both[0][i], both[1][j]))
+        for left, events, matched in zip(alone, both, taken, strict=True):
+            weak = WEAK_IMPACT * max((abs(e.impulse) for e in events), default=0.0)
+            left += [e for n, e in enumerate(events) if n not in matched and abs(e.impulse) >= weak]
+    in_time = attrgetter("t")
+    return MatchedImpacts(
+        sorted(pairs, key=lambda two: two[0].t), *(sorted(some, key=in_time) for some in alone)
+    )
+
+
+def _impact(event: Event) -> Event:
+    strikes = event.kind == "landing" and event.impulse != 0.0
+    return replace(event, kind="floor impact") if strikes else event

@@ -110,7 +110,6 @@ def parting_landing(scene: Scene) -> Landing | None:
 
 
 def _parting(scene: Scene, laws: Sequence[ImpactLaw]) -> Landing | None:
-    """The first landing at which these laws part."""
     motions = {
         law: np.asarray(_played(scene, law).channels["theta"]) / scene.block.alpha for law in laws
     }
@@ -130,15 +129,7 @@ def _parting(scene: Scene, laws: Sequence[ImpactLaw]) -> Landing | None:
     )
 
 
-def law_followed(scene: Scene, history: History) -> LawFollowed | None:
-    """The law that a history of this scene followed; None where no landing tells laws apart, or the
-    history parted or ended before."""
-    landing = parting_landing(scene)
-    return None if landing is None else landing.followed_by(history, scene)
-
-
 def _played(scene: Scene, law: ImpactLaw) -> History:
-    """The scene under one law."""
     return EventBasedModel(pivot="unilateral", tolerance=1e-13, impacts=law).simulate(scene)
 
 

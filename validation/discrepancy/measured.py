@@ -42,6 +42,12 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     },
 }
 
+MEANINGS = {name: (name, 1.0) for name in UNITS} | {
+    f"{name}_{unit}": (name, factor)
+    for name, units in UNITS.items()
+    for unit, factor in units.items()
+}
+
 
 class Measured(Frozen):
     """Plays back the file of each scene it knows; `offset` (s) is added to the file's times, to
@@ -142,11 +148,8 @@ def _meaning(column: str, shown: str) -> tuple[str, float]:
         if column == "time" or column.startswith("time_")
         else column
     )
-    for name in sorted(UNITS, key=len, reverse=True):
-        if plain == name:
-            return name, 1.0
-        if plain.startswith(f"{name}_") and plain.removeprefix(f"{name}_") in UNITS[name]:
-            return name, UNITS[name][plain.removeprefix(f"{name}_")]
+    if plain in MEANINGS:
+        return MEANINGS[plain]
     for name in sorted(UNITS, key=len, reverse=True):
         if plain.startswith(f"{name}_"):
             units = ", ".join(UNITS[name])

@@ -11,9 +11,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.validation.discrepancy.measures import Measure, Undefined, by_name
+from rockcheck.validation.discrepancy.figures import Array, Measure, Undefined, by_name
 
-Array = NDArray[np.float64]
 #: Peaks below this (alpha) have no ratio worth a logarithm.
 SMALLEST_PEAK = 1e-3
 CONFIDENCE = 0.95

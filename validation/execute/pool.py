@@ -1,11 +1,14 @@
 """Calls in processes of their own, with limits of time and memory: for cells, spectra, studies and
-pages alike.
+pages alike, on this machine (`Pool`) or beside the workers of a Dask cluster (`Cluster`).
 
-A process that crashes, hangs or runs out of memory loses its current call, and nothing else.
+A process that crashes, hangs or runs out of memory loses its current call, and nothing else. So a
+Dask worker is kept out of harm's way: its child ends, and it does not. The child is kept for the
+next call of the same run, since starting one takes as long as many a call.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 import multiprocessing
 import os
@@ -13,13 +16,16 @@ import signal
 import threading
 import time
 import traceback
+import uuid
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from multiprocessing import resource_tracker
+from multiprocessing.util import Finalize
 from typing import Any, Self
 
 from rockcheck.scenes.errors import InputError, ModelFailure, printable
@@ -109,15 +115,6 @@ class Ended:
         if isinstance(self.error, MemoryError):
             return "out of memory"
         return printable(f"{type(self.error).__name__}: {self.error}", 300)
-
-    @property
-    def unexpected(self) -> bool:
-        """Whether the call raised an unexpected exception: a fault of rockcheck's own, unless the
-        call ran a user's code."""
-        from pebble import ProcessExpired
-
-        foreseen = (InputError, ModelFailure, OSError, TimeoutError, ProcessExpired, MemoryError)
-        return self.error is not None and not isinstance(self.error, foreseen)
 
 
 @dataclass(eq=False)
@@ -212,7 +209,6 @@ class Pool:
         waiting.extendleft(reversed(held))
 
     def _room(self) -> int:
-        """How many calls may be under way."""
         return AHEAD * self.jobs
 
     def _schedule(self, call: Call, seconds: float, first: bool) -> list[Future[Any]]:
@@ -221,7 +217,6 @@ class Pool:
         return [self._pool.schedule(call.function, args=call.arguments, timeout=limit)]
 
     def _error(self, future: Future[Any]) -> BaseException | None:
-        """What a call ended with in place of a result."""
         return future.exception()
 
 
@@ -287,7 +282,6 @@ def _write(stream: int, text: str) -> None:
 
 
 def _follow(run: Any) -> None:
-    """End this process, whatever it is doing, once the run has ended in whatever way."""
     run.join()
     os._exit(1)
 
@@ -300,3 +294,118 @@ def death(code: int) -> str:
         except ValueError:
             return f"crashed: signal {-code}"
     return f"the process ended with code {code}"
+
+
+class Cluster(Pool):
+    """The workers of a Dask cluster. Of the calls that may have to compile the same code, one goes
+    first on each machine."""
+
+    def __init__(self, address: str, memory_mb: float | None = None) -> None:
+        super().__init__(1, memory_mb)
+        self._address, self._run = address, uuid.uuid4().hex
+        self._stack = contextlib.ExitStack()
+
+    def __enter__(self) -> Self:
+        self._pool = self._stack.enter_context(connected(self._address))
+        return self
+
+    def __exit__(self, *fault: Any) -> None:
+        self._stack.__exit__(*fault)
+
+    def _workers(self) -> dict[str, Any]:
+        found: dict[str, Any] = self._pool.scheduler_info(n_workers=-1)["workers"]
+        return found
+
+    def _room(self) -> int:
+        return AHEAD * max(1, sum(about["nthreads"] for about in self._workers().values()))
+
+    def _schedule(self, call: Call, seconds: float, first: bool) -> list[Future[Any]]:
+        machines = {about["host"]: address for address, about in self._workers().items()}
+        # A worker that is lost must not hold its calls back: the machine is a wish, not an order.
+        wishes = [{"workers": [one], "allow_other_workers": True} for one in machines.values()]
+        given = call.function, call.arguments, seconds, self.memory_mb, self._run
+        return [
+            self._pool.get_executor(pure=False, retries=2, **where).submit(alone, *given)
+            for where in (wishes if first and wishes else [{}])
+        ]
+
+    def _error(self, future: Future[Any]) -> BaseException | None:
+        error = future.exception()
+        return error and ModelFailure(f"the cluster lost it: {error}")
+
+
+_mine = threading.local()
+
+
+def alone(
+    function: Callable[..., Any],
+    arguments: tuple[Any, ...],
+    seconds: float,
+    memory_mb: float | None,
+    run: str,
+) -> Any:
+    """Call a function in a process apart: that of this thread's last call where it was of the same
+    run, so of the same code.
+
+    Returns a `Failure` where the process ends without a result.
+    """
+    if getattr(_mine, "run", "") != run:
+        if hasattr(_mine, "pool"):
+            _mine.pool.__exit__(InterruptedError)
+        # Dask's workers end with their nanny, and so may have no children, says multiprocessing;
+        # this one ends with its worker (`pool.prepare`).
+        multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
+        _mine.run, _mine.pool = run, Pool(1, memory_mb).__enter__()
+        Finalize(None, _mine.pool.__exit__, (InterruptedError,), exitpriority=100)
+    (ended,) = _mine.pool.run(deque([Call(function, arguments, seconds)]))
+    return Failure(ended.fault) if ended.error else ended.result
+
+
+@contextmanager
+def connected(address: str) -> Iterator[Any]:
+    """A `distributed.Client` for a scheduler's address ("tcp://host:8786"), or for "local:N", N
+    workers of this machine.
+
+    Work of a worker that dies goes to the others. Raises `InputError` where there is no such
+    scheduler, or no `distributed`.
+    """
+    count = _local_workers(address)
+    from distributed import Client, LocalCluster
+
+    if count:
+        with (
+            LocalCluster(
+                n_workers=count, threads_per_worker=1, dashboard_address="127.0.0.1:0"
+            ) as cluster,
+            Client(cluster) as client,
+        ):
+            yield client
+        return
+    try:
+        client = Client(address, timeout=10)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise InputError(
+            f"{printable(address)!r}: no scheduler answers there: {printable(error)}", "--scheduler"
+        ) from None
+    with client:
+        yield client
+
+
+def check_scheduler(address: str) -> None:
+    """Raises `InputError` for an address that `connected` cannot use; starts no workers."""
+    if not _local_workers(address):
+        with connected(address):
+            pass
+
+
+def _local_workers(address: str) -> int:
+    """N of "local:N", 0 for the address of a scheduler."""
+    if find_spec("distributed") is None:
+        raise InputError("needs the package distributed: pip install distributed", "--scheduler")
+    kind, _, count = address.partition(":")
+    if kind != "local":
+        return 0
+    if not count.isdecimal() or not 1 <= int(count) <= 256:
+        said = f"{printable(address)!r} is not allowed: give local:N with 1 to 256 workers"
+        raise InputError(said, "--scheduler")
+    return int(count)

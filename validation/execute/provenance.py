@@ -6,17 +6,16 @@ from __future__ import annotations
 import ast
 import contextlib
 import hashlib
-import importlib.util
 import json
 import os
 import platform
 import re
 import time
 from collections.abc import Container, Iterable, Mapping
-from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
 from importlib.machinery import PathFinder
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +78,7 @@ def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
         return known
     found = digest(
         "".join(
-            f"{name}\n{_source_of(path).essence}\n"
+            f"{name}\n{_source_of(path)[1]}\n"
             for name, path in sorted(reachable(module, search_path).items())
         )
     )
@@ -90,7 +89,7 @@ def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
 
 def _kept(module: str) -> Path:
     """The file for the digest of a module of ours, named after the content of all our sources."""
-    spec = importlib.util.find_spec(OWN_PACKAGE)
+    spec = find_spec(OWN_PACKAGE)
     content = hashlib.sha256(f"{module} {platform.python_version()}".encode())
     for root in (Path(root) for root in (spec and spec.submodule_search_locations) or ()):
         for folder in (root, *sorted(path for path in root.iterdir() if path.is_dir())):
@@ -153,7 +152,7 @@ def _source(name: str, search_path: tuple[str, ...]) -> Path | None:
     for depth in range(min(2, len(parts)), 0, -1):  # rockcheck's folders do not lie in each other
         try:
             spec = (
-                importlib.util.find_spec(".".join(parts[:depth]))
+                find_spec(".".join(parts[:depth]))
                 if depth == 1 or parts[0] == OWN_PACKAGE
                 else None
             )
@@ -178,18 +177,12 @@ def _imports(
 ) -> Iterable[str]:
     """Names of the modules that a file of `package` imports; of a package only where something that
     is no module is taken from it."""
-    for node in _source_of(path).imports:
+    for node in _source_of(path)[0]:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         else:
-            base = node.module or ""
-            if node.level:
-                base = ".".join(
-                    filter(
-                        None,
-                        [*package.split(".")[: len(package.split(".")) - node.level + 1], base],
-                    )
-                )
+            above = package.split(".")[: 1 - node.level or None] if node.level else []
+            base = ".".join(filter(None, [*above, node.module]))
             for alias in node.names:
                 inner = f"{base}.{alias.name}"
                 yield (
@@ -199,16 +192,9 @@ def _imports(
                 )
 
 
-@dataclass(frozen=True)
-class _Source:
-    """What a source file imports, and its syntax tree without docstrings, as text."""
-
-    imports: tuple[ast.Import | ast.ImportFrom, ...]
-    essence: str
-
-
 @cache
-def _source_of(path: Path) -> _Source:
+def _source_of(path: Path) -> tuple[list[ast.Import | ast.ImportFrom], str]:
+    """What a source file imports, and its syntax tree without docstrings, as text."""
     tree, imports = ast.parse(path.read_text(encoding="utf-8")), []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
@@ -217,7 +203,7 @@ def _source_of(path: Path) -> _Source:
             node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
         ) and ast.get_docstring(node, clean=False):
             node.body = node.body[1:] or [ast.Pass()]
-    return _Source(tuple(imports), ast.dump(tree))
+    return imports, ast.dump(tree)
 
 
 @cache

@@ -162,7 +162,6 @@ class Store:
 
 
 def _sealed(name: str, content: Mapping[str, Any]) -> str:
-    """A record with the hash of its name and content."""
     return (
         json.dumps(
             {"content": content, "sha256": _seal(name, content)},

@@ -102,7 +102,6 @@ def _play_batch(task: BatchTask, began: float) -> Played:
 
 
 def _simulate(task: Work, scene: Scene) -> History:
-    """The history under the model's label in the suite."""
     returned: object = build_own(task.family, task.settings).simulate(scene)
     if not isinstance(returned, History):
         raise ModelFailure(

@@ -1,1 +1,89 @@
-"""The paper: its 28 spectra, what it says of them, and what it does not say."""
+"""The paper's 28 overturning spectra: its Figs. 6 to 9."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Literal
+
+from rockcheck.ebm import Spectrum
+from rockcheck.scenes import Floor, Ricker, Scene, Wall
+from rockcheck.scenes.reading import read_arrays
+from rockcheck.scenes.scene import PAPER_BLOCK
+
+FIGURES: dict[int, tuple[Literal["left", "right"], float]] = {
+    6: ("left", 0.3),
+    7: ("left", 0.6),
+    8: ("right", 0.3),
+    9: ("right", 0.6),
+}
+GAPS, RESTITUTIONS = (0.003, 0.053, 0.103), (0.0, 1.0)
+FREQUENCIES, AMPLITUDES = (0.5, 8.0), (1.0, 12.0)
+#: Results of long runs, as they come with the package.
+KEPT = Path(str(resources.files("rockcheck.validation"))) / "data" / "spectra"
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One spectrum to be played: its scene, and the paper's figure that shows it, None for one's
+    own."""
+
+    name: str
+    title: str
+    scene: Scene
+    figure: int | None = None
+
+    @property
+    def wall(self) -> Wall | None:
+        """The wall, or None."""
+        return self.scene.walls[0] if self.scene.walls else None
+
+
+def title_of(figure: int) -> str:
+    """What the paper's figure shows."""
+    side, friction = FIGURES[figure]
+    return f"Fig. {figure}: Wall on the {side}, μ = {friction:g}"
+
+
+def paper_panels(*figures: int) -> tuple[Panel, ...]:
+    """The seven spectra of each of these figures, by default all: unobstructed, then gap by gap
+    with e = 0 and e = 1."""
+    places = [None, *itertools.product(GAPS, RESTITUTIONS)]
+    return tuple(_panel(n, place) for n in figures or FIGURES for place in places)
+
+
+def _panel(figure: int, place: tuple[float, float] | None) -> Panel:
+    name, title = "unobstructed", "Unobstructed"
+    (side, friction), walls = FIGURES[figure], tuple[Wall, ...]()
+    if place:
+        (gap, e), millimetres = place, round(1000.0 * place[0])
+        name, title = f"gap-{millimetres}-e-{e:g}", f"Gap {millimetres} mm, e = {e:g}"
+        walls = (Wall(side=side, gap=gap, restitution=e),)
+    scene = Scene(
+        name=f"figure-{figure}-{name}",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=friction),
+        walls=walls,
+        excitation=Ricker(amplitude=1.0, period=1.0),
+        duration=1.0,
+    )
+    return Panel(scene.name, title, scene, figure)
+
+
+def kept_spectra() -> list[Spectrum]:
+    """The 28 spectra as they come with the package, 100 x 100 nodes each."""
+    data = read_arrays(KEPT / "grids.npz")
+    return [
+        Spectrum(
+            outcomes=data[panel.name],
+            frequency_ratios=data["frequency_ratios"],
+            amplitude_ratios=data["amplitude_ratios"],
+            evaluations=data[panel.name].size,
+            undecided=data[f"{panel.name}.undecided"],
+            scene=panel.scene,
+            model=None,
+        )
+        for panel in paper_panels()
+    ]

@@ -30,9 +30,8 @@ from rockcheck.validation.suite.motions import Ensemble
 from rockcheck.validation.suite.results import CostRecord, value_of
 from rockcheck.validation.suite.suites import ModelVariant
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Windowed
-from rockcheck.validation.uncertainty.numerical import Numerical
+from rockcheck.validation.uncertainty.numerical import INPUTS, Explanation, Numerical, explain
 from rockcheck.validation.uncertainty.population import Inputs, propagate
-from rockcheck.validation.uncertainty.verdict import INPUTS, Explanation, explain
 
 #: What is judged by the nearest law. Histories are judged up to the horizon, which ends where the
 #: laws part.

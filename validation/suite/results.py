@@ -29,9 +29,8 @@ from rockcheck.scenes.reading import read_json, within
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
 from rockcheck.validation.discrepancy.impact_laws import LawFollowed
-from rockcheck.validation.uncertainty.numerical import Numerical
+from rockcheck.validation.uncertainty.numerical import Explanation, Numerical
 from rockcheck.validation.uncertainty.population import Inputs
-from rockcheck.validation.uncertainty.verdict import Explanation
 
 RUN_FILE = "run.json"
 SCHEMA_FILE = "run.schema.json"

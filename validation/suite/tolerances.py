@@ -45,8 +45,8 @@ from typing import Any
 from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.base import Finite, Frozen, NonNegative
 from rockcheck.scenes.errors import printable, unknown_name
-from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, Measure, between_rows
+from rockcheck.validation.discrepancy.figures import Figure, Measure, between_rows
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS
 from rockcheck.validation.suite.results import Check, CheckVerdict, Kind
 from rockcheck.validation.uncertainty.numerical import Numerical

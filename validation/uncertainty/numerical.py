@@ -162,7 +162,6 @@ def _changes(scene: Scene, one: History, other: History) -> dict[str, float]:
 
 
 def _order(changes: Sequence[float]) -> float | None:
-    """The order of changes from h to 2h, 3h, 4h by the outer two; None where they do not grow."""
     ratio = changes[-1] / changes[0] if changes[0] > 0.0 else 0.0
     return math.log2(ratio - 1.0) if ratio > 1.0 else None
 
@@ -226,7 +225,6 @@ def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float]]:
 
 
 def _units(scene: Scene) -> dict[str, float]:
-    """What a quantity is small against, by its unit."""
     return {
         "alpha": 1.0,
         "m": scene.block.alpha * scene.block.radius,
@@ -235,9 +233,77 @@ def _units(scene: Scene) -> dict[str, float]:
 
 
 def _side(history: History) -> str:
-    """The side it overturns to, empty where it stands."""
     return (
         history.outcome.removeprefix("overturned ")
         if history.outcome.startswith("overturned")
         else ""
     )
+
+
+NUMERICAL = "explained by numerical error"
+INPUTS = "explained by what is not known about the inputs"
+DATA = "explained by the scatter of the tests"
+NOT_CONVERGED = "not converged"
+
+
+class Explanation(Stored):
+    """The difference of one quantity from the reference's, its uncertainties, and what they say.
+
+    `error` is |S - D| (for theta_rms the RMS difference itself); a `u_num` of None means that the
+    run is not converged.
+    """
+
+    quantity: str
+    unit: str
+    against: str = ""
+    error: float | None
+    u_num: float | None
+    u_input: float = 0.0
+    u_data: float = 0.0
+    verdict: str
+    reason: str = ""
+
+    @property
+    def u_val(self) -> float | None:
+        """The uncertainty of the comparison; None where the run is not converged."""
+        return None if self.u_num is None else math.hypot(self.u_num, self.u_input, self.u_data)
+
+
+def explain(
+    quantity: str,
+    unit: str,
+    error: float | None,
+    u_num: float | None,
+    u_input: float = 0.0,
+    u_data: float = 0.0,
+    *,
+    reason: str = "",
+    against: str = "",
+) -> Explanation:
+    """The verdict on a difference; `u_num` holds both runs' numerical uncertainties, `reason` why
+    it is None, `against` the reference."""
+    verdict = _verdict(unit, error, u_num, u_input, u_data)
+    return Explanation(
+        quantity=quantity,
+        unit=unit,
+        against=against,
+        error=error,
+        u_num=u_num,
+        u_input=u_input,
+        u_data=u_data,
+        verdict=verdict,
+        reason=reason,
+    )
+
+
+def _verdict(
+    unit: str, error: float | None, u_num: float | None, u_input: float, u_data: float
+) -> str:
+    if u_num is None or error is None:
+        return NOT_CONVERGED
+    if error <= u_num:
+        return NUMERICAL
+    u_val = math.hypot(u_num, u_input, u_data)
+    if error <= u_val:
+        return INPUTS if u_input >= u_data else DATA
+    return f"not explained: model form or set-up, at least {error - u_val:.2g} {unit}".rstrip()

@@ -8,9 +8,14 @@ from rockcheck import engines
 from rockcheck.cm import ContinuousModel
 from rockcheck.ebm import EventBasedModel
 from rockcheck.engines import stepping
-from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
+from rockcheck.scenes import Block, Floor, History, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
-from rockcheck.validation.discrepancy.impact_laws import law_followed, parting_landing
+from rockcheck.validation.discrepancy.impact_laws import LawFollowed, parting_landing
+
+
+def law_followed(scene: Scene, history: History) -> LawFollowed | None:
+    landing = parting_landing(scene)
+    return None if landing is None else landing.followed_by(history, scene)
 
 
 def flush_landing(restitution: float, side: str = "left") -> Scene:

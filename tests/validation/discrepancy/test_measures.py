@@ -12,7 +12,8 @@ from rockcheck.scenes import Event, Floor, InputError, Scene
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation import compare
 from rockcheck.validation.discrepancy.compare import describe
-from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, Pair, match_impacts
+from rockcheck.validation.discrepancy.figures import Pair, match_impacts
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 
 T = np.linspace(0.0, 10.0, 4001)
 WAVE = 0.3 * np.sin(2 * np.pi * T)

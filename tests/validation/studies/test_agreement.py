@@ -8,10 +8,9 @@ import numpy as np
 
 from rockcheck.commands.cli import main
 from rockcheck.ebm import Spectrum
-from rockcheck.validation.paper.panels import paper_panels
+from rockcheck.validation.paper import paper_panels
 from rockcheck.validation.studies.spectrum import agreement
-from rockcheck.validation.studies.spectrum.grids import Book, Request
-from rockcheck.validation.studies.spectrum.tiles import Played
+from rockcheck.validation.studies.spectrum.tiles import Book, Played, Request
 
 
 def panel_of(name):

@@ -21,7 +21,7 @@ from rockcheck.scenes import Floor, InputError, ModelFailure, Wall, load_scene
 from rockcheck.scenes.writing import json_text
 from rockcheck.validation.execute.models import engine_names, not_installed
 from rockcheck.validation.execute.pool import guarded
-from rockcheck.validation.studies.conformance import exchange, study
+from rockcheck.validation.studies.conformance import study
 from rockcheck.validation.studies.conformance.phenomena import PHENOMENA, SCENES
 from rockcheck.validation.studies.conformance.study import (
     Conformance,
@@ -218,7 +218,7 @@ def test_the_scenes_are_exported_as_plain_columns(exported):
     assert list(rows.index) == list(SCENES)
     for name, scene in SCENES.items():
         row = rows.loc[name]
-        np.testing.assert_allclose(row[list(exchange.STATE)].astype(float), scene.initial_state)
+        np.testing.assert_allclose(row[list(study.STATE)].astype(float), scene.initial_state)
         assert row["half_width_m"] == scene.block.half_width
         assert np.isnan(row["left_wall_gap_m"]) == (not scene.walls)
         assert load_scene(exported / f"{name}.toml").initial_state == scene.initial_state

@@ -17,11 +17,10 @@ from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import node_scene, overturning_spectrum
 from rockcheck.scenes import Block, Ricker, Scene, Wall
 from rockcheck.validation.execute.pool import Failure
-from rockcheck.validation.paper.panels import Panel, paper_panels
+from rockcheck.validation.paper import Panel, paper_panels
 from rockcheck.validation.studies.spectrum import tiles
-from rockcheck.validation.studies.spectrum.grids import Book, Request, differing
 from rockcheck.validation.studies.spectrum.study import KEPT_AN_AXIS, Spectra
-from rockcheck.validation.studies.spectrum.tiles import nodes_of, play
+from rockcheck.validation.studies.spectrum.tiles import Book, Request, differing, nodes_of, play
 from rockcheck.validation.study import run
 
 SCENE = """duration = 1.0

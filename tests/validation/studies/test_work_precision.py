@@ -4,6 +4,7 @@ times), and its arithmetic."""
 import math
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from rockcheck.commands.cli import main
@@ -11,39 +12,37 @@ from rockcheck.reports.document import publish
 from rockcheck.reports.style import power_of_ten
 from rockcheck.validation.execute.models import not_installed
 from rockcheck.validation.execute.pool import Failure
-from rockcheck.validation.studies.work_precision import runs, savings
-from rockcheck.validation.studies.work_precision.ebm import (
+from rockcheck.validation.studies.work_precision import runs, timings
+from rockcheck.validation.studies.work_precision.runs import (
+    DURATION,
+    FAMILIES,
+    GAPS,
+    LINES,
+    MEMBERS,
+    PULSES,
+    RESTITUTIONS,
+    WALLS,
+    BenchmarkRun,
+    Play,
+    cost_at,
+    error_at,
+    exceptions_of,
+    frame_of,
+    levels_of,
+    order_of,
+    orders_of,
+    play,
+    points_of,
+    prepared,
+)
+from rockcheck.validation.studies.work_precision.study import Measure, WorkPrecision
+from rockcheck.validation.studies.work_precision.timings import (
     CASES,
     LEVEL,
     at_level,
     batch_size,
     batch_times,
 )
-from rockcheck.validation.studies.work_precision.runs import (
-    LINES,
-    BenchmarkRun,
-    Play,
-    Point,
-    cost_at,
-    error_at,
-    exceptions_of,
-    levels_of,
-    order_of,
-    orders_of,
-    play,
-    points_of,
-)
-from rockcheck.validation.studies.work_precision.scenes import (
-    DURATION,
-    FAMILIES,
-    GAPS,
-    MEMBERS,
-    PULSES,
-    RESTITUTIONS,
-    WALLS,
-    prepared,
-)
-from rockcheck.validation.studies.work_precision.study import Measure, Measured, WorkPrecision
 
 SOME = (1, 4, 7)
 TWO_WALLS = ("long 53 mm e 0.5", "short 3 mm e 0")
@@ -57,8 +56,8 @@ def order_and_errors(
     family: str, line: str, coarse: float, fine: float
 ) -> tuple[float, float, float]:
     """Order between two settings and the median errors at them, alpha, of three members."""
-    found = points_of([measure(family, k, line, value) for k in SOME for value in (coarse, fine)])
-    first, second = (point.rms for point in found)
+    played = [measure(family, k, line, value) for k in SOME for value in (coarse, fine)]
+    first, second = points_of(frame_of(played)).rms
     return math.log(first / second) / math.log(coarse / fine), first, second
 
 
@@ -95,7 +94,7 @@ def test_every_model_converges_to_its_limit(
 def test_adaptive_engines_are_within_a_twenty_thousandth_of_alpha(engine: str, family: str) -> None:
     """At steps of at most 4 ms, which cost less than fixed ones of 1 ms."""
     samples = [measure(family, k, f"{engine} adaptive", 4e-3) for k in SOME]
-    assert points_of(samples)[0].rms < 5e-5
+    assert points_of(frame_of(samples)).rms[0] < 5e-5
     assert all(sample.steps < 450 * sample.horizon for sample in samples)
 
 
@@ -119,46 +118,39 @@ def test_members_stay_up_and_end_at_their_horizon(family: str) -> None:
         assert (ready.model_form > 1e-3) if ready.scene.walls else (ready.model_form < 1e-12)
 
 
-def point(value: float, rms: float, cpu: float) -> Point:
-    return Point("free", "mujoco", value, 10, 0, rms, rms, rms, rms, rms, 0.0, cpu, cpu, 0.0, 1.0)
+def line_of(*points: tuple[float, float, float]) -> pd.DataFrame:
+    """A line whose settings have these values, errors and costs."""
+    return pd.DataFrame(points, columns=["value", "rms", "cpu"])
 
 
 def test_the_order_is_the_slope_between_rounding_and_nonsense() -> None:
-    line = [
-        point(1e-1, 0.9, 1.0),
-        point(1e-2, 3e-2, 1.0),
-        point(1e-3, 3e-4, 1.0),
-        point(1e-4, 1e-14, 1.0),
-    ]
+    line = line_of((1e-1, 0.9, 1.0), (1e-2, 3e-2, 1.0), (1e-3, 3e-4, 1.0), (1e-4, 1e-14, 1.0))
     assert order_of(line) == pytest.approx(2.0)
     assert math.isnan(order_of(line[:2]))
 
 
 def test_the_cost_of_a_level_is_interpolated_between_logarithms() -> None:
-    line = [point(1e-2, 1e-2, 1.0), point(1e-3, 1e-4, 16.0)]
-    assert cost_at(line) == (pytest.approx(4.0), False)
-    assert cost_at(line[1:]) == (16.0, True)
+    line = line_of((1e-2, 1e-2, 1.0), (1e-3, 1e-4, 16.0), (1e-4, 1e-5, 3.0))
+    assert cost_at(line[:2]) == (pytest.approx(4.0), False)
+    assert cost_at(line[1:2]) == (16.0, True)
     assert math.isnan(cost_at(line[:1])[0])
-    worse = point(1e-4, 1e-5, 3.0)
-    assert cost_at([*line, worse]) == (3.0, False)
+    assert cost_at(line) == (3.0, False)
 
 
 def test_the_error_of_adaptive_steps_is_told_at_the_cost_of_fixed_ones() -> None:
-    line = [point(4e-3, 1e-2, 1.0), point(1e-3, 1e-4, 16.0)]
+    line = line_of((4e-3, 1e-2, 1.0), (1e-3, 1e-4, 16.0))
     assert error_at(line, 4.0) == pytest.approx(1e-3)
     assert math.isnan(error_at(line, 17.0))
     some = [sample(k, 5e-3) for k in range(10)]
-    for value, rms, cpu in ((2e-3, 1e-3, 0.15), (1e-3, 1e-5, 0.6)):
-        some += [
-            BenchmarkRun(
-                "pulse a", k, "mujoco adaptive", value, 3.0, rms=rms * (1 + k % 3), cpu=cpu
-            )
-            for k in range(3)
-        ]
-    pooled = runs.pooled(some)
-    everything = {row.line: row for row in pooled if (row.family, row.value) == ("all", 1e-3)}
-    assert runs.at_the_cost(everything["mujoco"], pooled) == pytest.approx(2e-4)
-    assert everything["mujoco adaptive"].rms_worst == pytest.approx(3e-5)
+    some += [
+        BenchmarkRun("pulse a", k, "mujoco adaptive", value, 3.0, rms=rms * (1 + k % 3), cpu=cpu)
+        for value, rms, cpu in ((2e-3, 1e-3, 0.15), (1e-3, 1e-5, 0.6))
+        for k in range(3)
+    ]
+    pooled = runs.pooled(frame_of(some))
+    fixed, adaptive = pooled[(pooled.family == "all") & (pooled.value == 1e-3)].itertuples()
+    assert runs.at_the_cost(fixed, pooled) == pytest.approx(2e-4)
+    assert adaptive.rms_worst == pytest.approx(3e-5)
 
 
 def sample(member: int, rms: float, **change: object) -> BenchmarkRun:
@@ -180,13 +172,13 @@ def sample(member: int, rms: float, **change: object) -> BenchmarkRun:
 def test_failed_runs_count_as_infinitely_wrong() -> None:
     good = [sample(k, 1e-3 * (k + 1)) for k in range(4)]
     bad = [BenchmarkRun("free", k, "mujoco", 1e-3, 3.0, failure="it blew up") for k in range(4, 10)]
-    (row,) = points_of([*good, *bad])
+    (row,) = points_of(frame_of([*good, *bad])).itertuples()
     assert (row.runs, row.failed, row.rms, row.rms_10) == (10, 6, math.inf, pytest.approx(1.5e-3))
     assert row.cpu == pytest.approx(0.1)
 
 
 def test_quantiles_are_those_of_the_sample() -> None:
-    (row,) = points_of([sample(k, 1e-3 * (k + 1)) for k in range(10)])
+    (row,) = points_of(frame_of([sample(k, 1e-3 * (k + 1)) for k in range(10)])).itertuples()
     assert (row.rms, row.rms_10, row.rms_90) == pytest.approx((5.5e-3, 1.5e-3, 9.5e-3))
 
 
@@ -252,22 +244,21 @@ def made(*errors: float, model: str = "mujoco", scene: str = TWO_WALLS[0]) -> li
 
 
 def test_levels_and_orders_of_known_errors() -> None:
-    found = [*made(1e-2, 1e-3, 1e-4), *made(4e-2, 4e-4, 4e-6, scene=TWO_WALLS[1])]
-    levels = [level for level in levels_of(found) if level.reference == "ebm-unilateral"]
-    orders = {
-        (order.reference, order.scene): order.order for order in orders_of(found, levels_of(found))
-    }
-    assert [level.median for level in levels] == pytest.approx([2.5e-2, 7e-4, 5.2e-5])
-    assert [level.within for level in levels] == [0, 2, 2]
-    assert orders["ebm-unilateral", TWO_WALLS[0]] == pytest.approx(1.0)
-    assert orders["ebm-unilateral", TWO_WALLS[1]] == pytest.approx(2.0)
-    assert orders["ebm", ""] == pytest.approx(0.0, abs=1e-12)
-    assert not list(exceptions_of(found, orders_of(found, levels_of(found))))
+    found = frame_of([*made(1e-2, 1e-3, 1e-4), *made(4e-2, 4e-4, 4e-6, scene=TWO_WALLS[1])])
+    both = levels_of(found)
+    levels, orders = both[both.reference == "ebm-unilateral"], orders_of(found, both)
+    order = orders.set_index(["reference", "scene"]).order
+    assert levels["median"].tolist() == pytest.approx([2.5e-2, 7e-4, 5.2e-5])
+    assert levels.within.tolist() == [0, 2, 2]
+    assert order["ebm-unilateral", TWO_WALLS[0]] == pytest.approx(1.0)
+    assert order["ebm-unilateral", TWO_WALLS[1]] == pytest.approx(2.0)
+    assert order["ebm", ""] == pytest.approx(0.0, abs=1e-12)
+    assert not list(exceptions_of(found, orders))
 
 
 def test_what_does_not_converge_is_named_not_dropped() -> None:
     stalled, far = made(5e-4, 4e-4, 4e-4), made(1.0, 1e-1, 1e-2, scene=TWO_WALLS[1])
-    found = [*stalled, *far, *made(1e-8, 1e-8, model="cm")]
+    found = frame_of([*stalled, *far, *made(1e-8, 1e-8, model="cm")])
     named = list(exceptions_of(found, orders_of(found, levels_of(found))))
     assert [line.partition(":")[0] for line in named] == [f"{scene}, mujoco" for scene in TWO_WALLS]
 
@@ -298,13 +289,11 @@ def test_the_finding_holds_every_table(tmp_path: Path) -> None:
         for one in settings
     ]
     tasks += [Play(scene, 0, "cm", value, 1) for scene in TWO_WALLS for value in (1e-6, 1e-8)]
-    done: dict[object, object] = {task: Measured(run=play(task)) for task in tasks}
+    done: dict[object, object] = {task: [play(task)] for task in tasks}
     done[Play("free", 0, "pybullet", 1e-2)] = Failure("it blew up <fast>")
-    done[Measure("batch", "friction")] = Measured(times=tuple(batch_times("friction", 6)))
-    done[Measure("size", "3", 20)] = Measured(size=batch_size(20, 3))
-    done[Measure("saving", "made")] = Measured(
-        saved=(savings.Saving("cm", "wall", "ms", 2.0, 1.0),)
-    )
+    done[Measure("batch", "friction")] = batch_times("friction", 6)
+    done[Measure("size", "3", 20)] = [batch_size(20, 3)]
+    done[Measure("saving", "made")] = [timings.Saving("cm", "wall", "ms", 2.0, 1.0)]
     found = WorkPrecision().gather(done)
     for name in (
         "runs",
@@ -343,7 +332,7 @@ def test_an_unknown_part_is_refused_in_one_line(capsys: pytest.CaptureFixture[st
 def test_nothing_that_is_skipped_changes_the_motion() -> None:
     """Every saving but those that a scene may need (a sliding pivot's cone, a strong pulse's
     slip)."""
-    found = [one for name in savings.KINDS if name != "batches" for one in savings.measured(name)]
+    found = [one for name in timings.KINDS if name != "batches" for one in timings.measured(name)]
     needed = {"cone correction", "friction limit"}
     for saving in found:
         reference = 2e-2 if saving.thing in needed or saving.model == "pybullet" else 1e-5

@@ -87,13 +87,11 @@ def _when(t: FloatArray, values: FloatArray, level: float) -> float:
 
 
 def _between(m: Motion, name: str, start: float, end: float) -> float:
-    """How much a channel changes from one time to another."""
     channel = getattr(m, name)
     return float(np.interp(end, m.t, channel) - np.interp(start, m.t, channel))
 
 
 def _apart(one: FloatArray, other: FloatArray) -> float:
-    """The largest difference of two channels, over their common rows."""
     rows = min(len(one), len(other))
     return float(np.max(np.abs(one[:rows] - other[:rows])))
 
@@ -168,7 +166,6 @@ DROPS, HITS = (tuple(make(e) for e in RESTITUTIONS) for make in (_drop, _hit))
 
 
 def _rebound(m: Motion) -> float:
-    """Root of the bounce's height over the drop's."""
     after = m.t > math.sqrt(2.0 * DROP / G) + 0.01
     return math.sqrt(max(float(np.max(m.y[after])) - 0.5, 0.0) / DROP)
 
@@ -179,7 +176,6 @@ def _speed_back(m: Motion) -> float:
 
 
 def _worst(seen: Callable[[Motion], float], *motions: Motion) -> float:
-    """The worst difference between the restitution that is seen and e."""
     return max((seen(m) - e for m, e in zip(motions, RESTITUTIONS, strict=True)), key=abs)
 
 
@@ -398,7 +394,6 @@ def _direct(m: Motion) -> float:
 
 
 def _wrong(must: Iterable[bool], seen: Callable[[Motion], float], *motions: Motion) -> float:
-    """How many blocks do not do what they must."""
     return float(sum(seen(m) != one for m, one in zip(motions, must, strict=True)))
 
 

@@ -1,12 +1,12 @@
 """`rockcheck conformance`: engines, models of the user's own and histories written elsewhere,
-each held against phenomena with a certain answer."""
+each held against phenomena with a certain answer; and the scenes for an engine elsewhere."""
 
 from __future__ import annotations
 
 import math
 import sys
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,12 @@ from typing import Any
 import numpy as np
 from junitparser import Error, Failure as Failed, JUnitXml, Skipped, TestCase, TestSuite
 
+from rockcheck.engines.base_motion import BaseMotion
 from rockcheck.scenes import History, InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.files import read_toml
 from rockcheck.scenes.reading import read_json
+from rockcheck.scenes.writing import table_text, write_whole
 from rockcheck.validation.execute.models import build, build_own, family, is_own
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.execute.provenance import cell_key, version_of
@@ -234,7 +236,6 @@ def _in_units(scene: Scene, history: History) -> None:
 
 
 def _card(player: Player, found: Mapping[str, Seen | Failure]) -> Card:
-    """The card of a player, as far as it was played."""
     faults = {one.reason for one in found.values() if isinstance(one, Failure) and one.refused}
     if len(faults) == 1 and all(one.reason in faults for one in found.values()):
         raise InputError(*faults)
@@ -394,7 +395,6 @@ def changes(before: Path, after: Path) -> Finding:
 
 
 def _read(path: Path) -> dict[tuple[str, str, str], dict[str, Any]]:
-    """The rows of a finished study; raises `InputError` naming file and fault."""
     path = path / "run.json" if path.is_dir() else path
     data = read_json(path)
     try:
@@ -406,3 +406,59 @@ def _read(path: Path) -> dict[tuple[str, str, str], dict[str, Any]]:
         }
     except (ValueError, KeyError, TypeError):
         raise InputError(f"{printable(path)}: not what `rockcheck conformance` wrote") from None
+
+
+TEXTS = Path(__file__).parents[2] / "data" / "export"
+#: Of the sampled base motion, s.
+BASE_STEP = 1e-3
+STATE = ("x_m", "y_m", "theta_rad", "x_dot_m_s", "y_dot_m_s", "theta_dot_rad_s")
+MOTION = ("t_s", "x_velocity_m_s", "y_velocity_m_s", "x_acceleration_m_s2", "y_acceleration_m_s2")
+
+
+def export(folder: Path) -> list[str]:
+    """Write all scenes as tables into a folder; returns their names. An `engine.toml` that is there
+    stays."""
+    for name, scene in SCENES.items():
+        if scene.excitation.kind != "rest" or scene.vertical.kind != "rest":
+            write_whole(folder / f"{name}-base.csv", table_text(MOTION, _motion(scene)))
+    rows = [_row(scene) for scene in SCENES.values()]
+    write_whole(
+        folder / "scenes.csv", table_text(tuple(rows[0]), (tuple(row.values()) for row in rows))
+    )
+    played = [
+        f"- {one.id} {one.name}: {', '.join(scene.name for scene in one.scenes)}"
+        for one in PHENOMENA.values()
+    ]
+    about = (TEXTS / "README.md").read_text(encoding="utf-8")
+    write_whole(folder / "README.md", "\n".join([about, *played, ""]))
+    if not (folder / ABOUT).exists():
+        write_whole(folder / ABOUT, (TEXTS / ABOUT).read_text(encoding="utf-8"))
+    return list(SCENES)
+
+
+def _motion(scene: Scene) -> Iterable[Any]:
+    base = BaseMotion(scene)
+    t = BASE_STEP * np.arange(round(scene.duration / BASE_STEP) + 1)
+    velocity = np.array([base.velocity(time) for time in t.tolist()])
+    accelerations = (one.acceleration(t) for one in (scene.excitation, scene.vertical))
+    return np.column_stack([t, velocity, *accelerations]).tolist()
+
+
+def _row(scene: Scene) -> dict[str, Any]:
+    walls = {wall.side: wall for wall in scene.walls}
+    return {
+        "scene": scene.name,
+        "duration_s": scene.duration,
+        "output_step_s": scene.output_step,
+        "gravity_m_s2": scene.gravity,
+        "half_width_m": scene.block.half_width,
+        "half_height_m": scene.block.half_height,
+        "friction": scene.floor.friction,
+        "floor_restitution": scene.floor.restitution,
+        **{
+            f"{side}_wall_{name}": getattr(walls.get(side), key, "")
+            for side in ("left", "right")
+            for name, key in (("gap_m", "gap"), ("restitution", "restitution"))
+        },
+        **dict(zip(STATE, map(float, scene.initial_state), strict=True)),
+    }

@@ -9,7 +9,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.engines.marching import march_fixed
 from rockcheck.scenes import Floor, InputError, ModelFailure, Scene
@@ -18,10 +17,9 @@ from rockcheck.validation.execute.models import build, home
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.execute.provenance import code_digest
 from rockcheck.validation.finding import Column, Finding, Mark, Table, text
-from rockcheck.validation.studies.conformance.phenomena import DROP, SQUAT, G
+from rockcheck.validation.studies.conformance.phenomena import DROP, SQUAT, FloatArray, G
 from rockcheck.validation.study import Study, Task
 
-FloatArray = NDArray[np.float64]
 #: How near the wanted restitution has to be, and a friction, of itself.
 NEAR = 2e-3
 SLIDING = 1.5  # m/s
@@ -207,7 +205,6 @@ def calibrate(
 
 
 def _played(model: Any, scene: Scene, parameters: Mapping[str, float], step: float) -> FloatArray:
-    """States after each step."""
     times: FloatArray = step * np.arange(math.ceil(scene.duration / step) + 1, dtype=np.float64)
     world = model.tuned_world(scene, parameters, step)
     try:

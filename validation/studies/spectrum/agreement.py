@@ -3,6 +3,7 @@ to the event-based models', and coarse maps of one figure."""
 
 from __future__ import annotations
 
+import itertools
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -17,9 +18,8 @@ from rockcheck.engines.engine import Engine
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build, not_installed
 from rockcheck.validation.finding import Block, Column, Plot, Table, Text, text
-from rockcheck.validation.paper.panels import Panel
-from rockcheck.validation.studies.spectrum.grids import Book, Request
-from rockcheck.validation.studies.spectrum.tiles import letters_of
+from rockcheck.validation.paper import Panel
+from rockcheck.validation.studies.spectrum.tiles import Book, Request, letters_of
 from rockcheck.validation.uncertainty.population import SETTLE
 
 CANDIDATES = ("ebm-unilateral", "cm", "mujoco", "pybullet", "pymunk", "dart", "drake")
@@ -214,44 +214,45 @@ def blocks(found: Agreement, panels: Sequence[Panel], came: bool) -> Iterator[Bl
     versions = ", ".join(f"{name} {found['versions'][name]}" for name in sorted(engines))
     about = f"{found['about']} {origin}. Settings: {settings}. {versions}."
     yield Text(about, "The same spectra by the other models", on="page")
-    models = list(dict.fromkeys(share["model"] for share in found["shares"]))
-    rows = [[model, *_row([s for s in found["shares"] if s["model"] == model])] for model in models]
-    yield Table("agreement", [Column("model", kind="model"), *_columns()], rows)
-    groups = dict.fromkeys((share["spectrum"], share["model"]) for share in found["shares"])
-    rows = [
-        [
-            name,
-            model,
-            *_row([s for s in found["shares"] if (s["spectrum"], s["model"]) == (name, model)]),
-        ]
-        for name, model in groups
-    ]
-    columns = [text("spectrum"), Column("model", kind="model"), *_columns()]
-    by = {"title": "Spectrum by spectrum", "on": "page", "folded": True}
-    yield Table("agreement-by-spectrum", columns, rows, **by)  # type: ignore[arg-type]
+    model, by = Column("model", kind="model"), "Spectrum by spectrum"
+    yield _table("agreement", found["shares"], [model])
+    more = _table("agreement-by-spectrum", found["shares"], [text("spectrum"), model])
+    yield replace(more, title=by, on="page", folded=True)
     if found["maps"]:
         yield _drawn(found, panels)
 
 
-def _columns() -> list[Column]:
-    shares = [
-        Column(f"{part}_{short}", f"{part}, {short}", kind="percent")
+def _table(name: str, shares: Sequence[Any], by: Sequence[Column]) -> Table:
+    """The shares of equal outcomes, summed up by some columns."""
+    parts = list(itertools.product(REFERENCES, (True, False)))
+    columns = [
+        Column(f"{side}_{short}", f"{side}, {short}", kind="percent")
         for short in REFERENCES.values()
-        for part in ("near", "away")
+        for side in ("near", "away")
     ]
-    return [*shares, Column("nodes"), Column("failed")]
+    groups: dict[tuple[str, ...], list[Any]] = {}
+    for one in shares:
+        groups.setdefault(tuple(one[column.name] for column in by), []).append(one)
+    rows = [
+        [
+            *at,
+            *(
+                _equal(
+                    [s for s in some if s["near"] == near and reference in s["equal"]], reference
+                )
+                for reference, near in parts
+            ),
+            *(sum(one[count] for one in some) for count in ("nodes", "failed")),
+        ]
+        for at, some in groups.items()
+    ]
+    return Table(name, [*by, *columns, Column("nodes"), Column("failed")], rows)
 
 
-def _row(shares: Sequence[Any]) -> list[Any]:
-    cells: list[Any] = []
-    for reference in REFERENCES:
-        for near in (True, False):
-            mine = [
-                share for share in shares if share["near"] == near and reference in share["equal"]
-            ]
-            nodes = sum(share["nodes"] for share in mine)
-            cells.append(sum(s["equal"][reference] for s in mine) / nodes if nodes else None)
-    return [*cells, sum(s["nodes"] for s in shares), sum(s["failed"] for s in shares)]
+def _equal(shares: Sequence[Any], reference: str) -> float | None:
+    mine = [share for share in shares if reference in share["equal"]]
+    nodes = sum(share["nodes"] for share in mine)
+    return sum(share["equal"][reference] for share in mine) / nodes if nodes else None
 
 
 def _drawn(found: Agreement, panels: Sequence[Panel]) -> Plot:

@@ -21,10 +21,16 @@ from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.finding import Block, Column, Finding, Mark, Plot, Table, Text, text
-from rockcheck.validation.paper import measures, sentences
-from rockcheck.validation.paper.panels import GAPS, KEPT, Panel, paper_panels, title_of
+from rockcheck.validation.paper import (
+    GAPS,
+    KEPT,
+    Panel,
+    measures,
+    paper_panels,
+    title_of,
+)
 from rockcheck.validation.studies.spectrum import agreement, tiles
-from rockcheck.validation.studies.spectrum.grids import Book, Request, differing
+from rockcheck.validation.studies.spectrum.tiles import Book, Request, differing
 from rockcheck.validation.study import Study
 from rockcheck.validation.uncertainty.population import compiled
 
@@ -85,13 +91,13 @@ class Spectra(Study):
         if any(one.depends_on_law is not None for one in spectra):
             blocks.append(Text(LAWS, on="page"))
         if found.paper:
-            claims = sentences.claims_of(found.paper)
+            claims = measures.claims_of(found.paper)
             tally = Counter(claim.verdict for claim in claims)
             answer = (
                 f"Of {tally.total()} sentences of the paper {tally['holds']} hold,"
                 f" {tally['holds in part']} hold in part, {tally['does not hold']} do not."
             )
-            blocks += sentences.blocks(found.paper, claims)
+            blocks += measures.blocks(found.paper, claims)
         compared = found.agreement
         if self._papers and not self.compared:
             compared = read_json(KEPT / "agreement.json")
@@ -153,7 +159,6 @@ class Spectra(Study):
         return found
 
     def _paper(self, book: Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
-        """The 28 spectra and what the paper's sentences need beyond them."""
         request = self.request
         how = request.model, request.settings
         least, one_impact = {}, {}
@@ -198,7 +203,6 @@ class Spectra(Study):
         return Table("spectra", columns, rows, "Shares of outcomes")
 
     def _figures(self, found: _Found) -> Iterator[Plot]:
-        """The clickable spectra: a plot a figure of the paper, or one's own."""
         request = self.request
         by = "" if request.model == "ebm" else f", by {request.model}"
         for number in dict.fromkeys(panel.figure for panel in found.spectra):
@@ -276,8 +280,6 @@ class Spectra(Study):
 
 @dataclass
 class _Found:
-    """What is known: the spectra that are whole, motions at some of their nodes, and the rest."""
-
     spectra: dict[Panel, Spectrum] = field(default_factory=dict)
     motions: dict[Panel, tiles.Played] = field(default_factory=dict)
     paper: measures.Paper | None = None

@@ -1,29 +1,35 @@
-"""The tasks of a spectrum: some nodes, and what is asked of them."""
+"""What a spectrum asks for: its request, the tasks that play its nodes, and what is whole of it by
+what has been played."""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.ebm import EventBasedModel, Spectrum, overturning_spectrum
+from rockcheck.ebm.horizon import may_fly, other_laws
 from rockcheck.ebm.spectrum import (
     LEFT,
     RIGHT,
     SAFE,
+    TOLERANCE,
     Floats,
     Nodes as Outcomes,
     node_scene,
     play_motions,
     play_nodes,
 )
-from rockcheck.scenes import Scene
+from rockcheck.scenes import InputError, Scene
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import Model, build
-from rockcheck.validation.execute.pool import cores
+from rockcheck.validation.execute.pool import Failure, cores
+from rockcheck.validation.paper import AMPLITUDES, FREQUENCIES, Panel
 from rockcheck.validation.study import Task
 from rockcheck.validation.uncertainty import population
 from rockcheck.validation.uncertainty.population import compiled
@@ -141,25 +147,171 @@ def letters_of(sides: NDArray[np.int8], undecided: NDArray[np.int64]) -> NDArray
 
 
 def _impacts(player: Model, scene: Scene, amplitude: float, frequency: float) -> int:
-    """Floor impacts until the outcome at a node is decided."""
     node = node_scene(scene, amplitude, frequency)
     history = player.simulate(node.replace(output_step=node.duration))
     return sum(event.kind == "floor impact" for event in history.event_list)
 
 
 def _motions(task: Nodes, player: Any) -> Played:
-    # Needs numba, which a page of what is kept does not.
-    from rockcheck.validation.studies.spectrum.thinning import enough
-
     where = task.scene, task.amplitudes, task.frequencies
     found = play_motions(*where, model=player, parts=PARTS, jobs=cores())
-    kept, played = [], []
-    for number, motion in enumerate(found):
-        if motion is not None:
-            block, rows = motion.block, motion.rows
-            size = np.array([block.alpha, block.half_width, block.half_width])
-            kept.append(rows[enough(rows[:, 0].copy(), rows[:, 1:] / size, COARSE)])
-            played.append(number)
-    ends = np.cumsum([len(rows) for rows in kept], dtype=int).tolist()
-    content = np.concatenate(kept).astype("<f4").tobytes() if kept else b""
-    return Played("", tuple(played), tuple(ends), base64.b64encode(content).decode("ascii"))
+    moved = [motion for motion in found if motion is not None]
+    ends = np.cumsum([len(motion.rows) for motion in moved], dtype=int)
+    kept, content = ends, b""
+    if moved:
+        rows = np.concatenate([motion.rows for motion in moved])
+        size = [[one.block.alpha, *[one.block.half_width] * 2] for one in moved]
+        values = rows[:, 1:] / np.repeat(size, np.diff(ends, prepend=0), axis=0)
+        chosen = enough(rows[:, 0], values, ends, COARSE)
+        kept, content = np.cumsum(chosen)[ends - 1], rows[chosen].astype("<f4").tobytes()
+    played = tuple(number for number, motion in enumerate(found) if motion is not None)
+    return Played("", played, tuple(kept.tolist()), base64.b64encode(content).decode("ascii"))
+
+
+def enough(t: Floats, values: Floats, ends: NDArray[np.int64], coarse: float) -> NDArray[np.bool_]:
+    """Which rows of some motions to keep, so that straight lines between them are within `coarse`
+    of all `values` (n, k) at the times `t` (n). A motion's rows end before each of `ends`.
+
+    From a motion's first and last row on, each part is split at the row farthest from its straight
+    line.
+    """
+    kept = np.zeros(len(t), dtype=np.bool_)
+    kept[[0, *ends[:-1], *(ends - 1)]] = True
+    waiting = np.flatnonzero(~kept)
+    while waiting.size:
+        nodes = np.flatnonzero(kept)
+        part = np.searchsorted(nodes, waiting) - 1
+        first, last = nodes[part], nodes[part + 1]
+        share = ((t[waiting] - t[first]) / (t[last] - t[first]))[:, None]
+        apart = np.abs(values[waiting] - ((1.0 - share) * values[first] + share * values[last]))
+        farthest, begins = apart.max(axis=1), np.flatnonzero(np.diff(part, prepend=-1))
+        most = np.maximum.reduceat(farthest, begins)
+        most = np.repeat(most, np.diff(begins, append=len(part)))
+        split = np.flatnonzero((farthest == most) & (most > coarse))
+        kept[waiting[split[np.diff(part[split], prepend=-1) > 0]]] = True
+        waiting = waiting[(most > coarse) & ~kept[waiting]]
+    return kept
+
+
+#: Settings of the models in spectra, where they are not their own: outcomes need no more, and take
+#: a tenth of the time.
+SETTINGS: dict[str, dict[str, Any]] = {
+    "ebm": {"tolerance": TOLERANCE},
+    "ebm-unilateral": {"tolerance": TOLERANCE},
+    **{
+        engine: {"time_step": "adaptive", "largest_step": 2e-3}
+        for engine in ("mujoco", "pybullet", "pymunk")
+    },
+    "dart": {"time_step": "adaptive", "largest_step": 4e-3},
+    "drake": {"time_step": 1e-3},
+}
+MOST_SIZE = 5000
+
+
+def axis(low: float, high: float, size: int, key: str) -> Floats:
+    """`size` equally spaced ratios from `low` to `high`. Raises `InputError` where they are not
+    finite, positive and in order."""
+    said = f"{low:g} to {high:g} is not allowed"
+    if not (np.isfinite(low) and np.isfinite(high) and low > 0.0):
+        raise InputError(f"{said}: give positive finite numbers", key)
+    if low >= high:
+        raise InputError(f"{said}: the lower end comes first", key)
+    return np.linspace(low, high, size)
+
+
+@dataclass(frozen=True)
+class Request:
+    """How spectra are to be played: grid, model and settings. Raises `InputError` where that
+    cannot be."""
+
+    size: int = 100
+    frequency_range: tuple[float, float] = FREQUENCIES
+    amplitude_range: tuple[float, float] = AMPLITUDES
+    model: str = "ebm"
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    refine: bool = False
+
+    def __post_init__(self) -> None:
+        if not 2 <= self.size <= MOST_SIZE:
+            said = f"{self.size} is not allowed: give 2 to {MOST_SIZE} nodes an axis"
+            raise InputError(said, "--size")
+        settings = {**SETTINGS.get(self.model, {}), **self.settings}
+        object.__setattr__(self, "settings", settings)
+        build(self.model, settings)
+        _ = self.frequencies, self.amplitudes
+
+    @cached_property
+    def frequencies(self) -> Floats:
+        """omega_p/p of the nodes."""
+        return axis(*self.frequency_range, self.size, "--frequencies")
+
+    @cached_property
+    def amplitudes(self) -> Floats:
+        """a_p/(g tan alpha) of the nodes."""
+        return axis(*self.amplitude_range, self.size, "--amplitudes")
+
+    def other_laws(self, scene: Scene) -> list[dict[str, Any]]:
+        """The settings with each other law of impacts on which outcomes may depend."""
+        player = build(self.model, self.settings)
+        if not isinstance(player, EventBasedModel):
+            return []
+        bounces = any(wall.restitution > 0.0 for wall in scene.walls)
+        laws = other_laws(player, walls=bounces, flat=may_fly(scene))
+        return [{**self.settings, "impacts": law} for law in laws]
+
+
+class _Waiting(Exception):
+    """Nodes are asked for that have not been played."""
+
+
+@dataclass
+class Book:
+    """What has been played, and what is asked for beyond that."""
+
+    done: Mapping[Any, Any]
+    wanted: list[Nodes] = field(default_factory=list)
+
+    def ask(self, tasks: Sequence[Nodes]) -> list[Played] | None:
+        """Their records, None where some are still to be played. All nodes of a task that failed
+        are undecided."""
+        missing = [task for task in tasks if task not in self.done]
+        self.wanted += missing
+        if missing:
+            return None
+        return [
+            Played(UNDECIDED * len(task.amplitudes)) if isinstance(one, Failure) else one
+            for task, one in ((task, self.done[task]) for task in tasks)
+        ]
+
+    def outcomes(self, *nodes: Any) -> Outcomes | None:
+        """Sides and failures of the nodes of `tiles.nodes_of`."""
+        found = self.ask(nodes_of(*nodes))
+        return None if found is None else outcomes_of("".join(one.letters for one in found))
+
+    def spectrum(self, panel: Panel, request: Request, settings: Any = None) -> Spectrum | None:
+        """A spectrum, None where nodes are still to be played: refinement then begins again with
+        all that is known."""
+
+        def known(scene: Scene, a: Floats, f: Floats) -> Outcomes:
+            found = self.outcomes(scene, a, f, request.model, settings or request.settings)
+            if found is None:
+                raise _Waiting
+            return found
+
+        axes = request.frequencies, request.amplitudes
+        try:
+            return overturning_spectrum(panel.scene, *axes, refine=request.refine, play=known)
+        except _Waiting:
+            return None
+
+
+def differing(spectrum: Spectrum, others: Sequence[Spectrum]) -> NDArray[np.int64]:
+    """The nodes (i, j), a row each, that are decided and differ in one of the others, decided,
+    too."""
+    differ = np.zeros(spectrum.outcomes.shape, dtype=bool)
+    for other in others:
+        own = spectrum.outcomes != other.outcomes
+        for one in (spectrum, other):
+            own[tuple(one.undecided.T)] = False
+        differ |= own
+    return np.argwhere(differ)

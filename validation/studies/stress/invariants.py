@@ -15,7 +15,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import (
@@ -32,14 +31,13 @@ from rockcheck.validation.studies.stress.mechanics import (
     BOOLE,
     GROUP,
     SLIPS,
+    Floats,
+    Mask,
     Motion,
     integrals,
     motion_of,
     not_finite,
 )
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -226,7 +224,6 @@ def audited(scene: Scene) -> Scene:
 
 
 def _contradicts(scene: Scene, history: History) -> bool:
-    """Whether the run's end contradicts its outcome."""
     falls = [event for event in history.event_list if event.kind.startswith("overturned")]
     rows, theta = len(history.channels["t"]), history.channels["theta"]
     times = [event.t for event in history.event_list]
@@ -266,16 +263,11 @@ def _largest(values: Floats, rows: Mask) -> float:
     return float(np.max(values[rows], initial=0.0))
 
 
-def _jumps(scene: Scene) -> list[float]:
-    """When the base acceleration may jump, s."""
-    moving = (one for one in (scene.excitation, scene.vertical) if one.kind != "rest")
-    return [time for one in moving for time in (0.0, one.quiet_after)]
-
-
 def _clear(motion: Motion) -> Mask:
-    """Rows that are neither at an event nor at a jump of the base acceleration."""
     t, events = motion.channels["t"], [event.t for event in motion.history.event_list]
-    places = np.sort(np.array([*events, *_jumps(motion.scene), -math.inf, math.inf]))
+    bases = motion.scene.excitation, motion.scene.vertical
+    jumps = [time for one in bases if one.kind != "rest" for time in (0.0, one.quiet_after)]
+    places = np.sort(np.array([*events, *jumps, -math.inf, math.inf]))
     after = np.searchsorted(places, t)
     near = NEAR * motion.unit + 1e-12 * np.abs(t)
     return np.asarray((t - places[after - 1] > near) & (places[after] - t > near))

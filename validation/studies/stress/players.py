@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.model import ImpactLaw
@@ -18,9 +17,7 @@ from rockcheck.scenes.excitations import Excitation
 from rockcheck.validation.execute.models import build
 from rockcheck.validation.studies.stress.generator import Kind, exact_scene, random_scene
 from rockcheck.validation.studies.stress.invariants import CheckedRun, check_run
-from rockcheck.validation.studies.stress.mechanics import Motion, motion_of, not_finite
-
-Floats = NDArray[np.float64]
+from rockcheck.validation.studies.stress.mechanics import Floats, Motion, motion_of, not_finite
 
 #: Caps of an event-based run: the Zeno rule ends what bounces without end after some 1e5 impacts,
 #: of up to 18 steps with Bouc-Wen.

@@ -1,20 +1,141 @@
 """Runs of one model under stress: chunks of them, what they showed, and smaller scenes of those
-that failed."""
+that failed: parts are dropped, shortened or rounded as long as the failure stays."""
 
 from __future__ import annotations
 
 import math
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
+from typing import Any
 
-from rockcheck.scenes import Scene
+import tomlkit
+
+from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.studies.stress.invariants import INVARIANTS, CheckedRun
 from rockcheck.validation.studies.stress.players import PLAYERS
-from rockcheck.validation.studies.stress.shrinking import MOST_TRIALS, scene_text, shrink
 from rockcheck.validation.study import Task
+
+Shows = Callable[[Scene], bool]
+Path = tuple[str | int, ...]
+#: Most scenes that are tried.
+MOST_TRIALS = 400
+#: In lists of at most so many values each is tried on its own.
+SHORT = 8
+#: What is dropped first, since a block that nothing moves is told soonest.
+FIRST: dict[str | int, int] = {"vertical": 0, "excitation": 1}
+#: What is never dropped or rounded.
+KEPT = ("name", "output_step")
+
+
+def shrink(
+    scene: Scene,
+    shows: Shows,
+    *,
+    trials: int = MOST_TRIALS,
+    seconds: float = math.inf,
+) -> tuple[Scene, bool]:
+    """A scene that `shows` the failure as `scene` does, and from which no single simplification can
+    be taken without losing it.
+
+    Ends after so many `trials` or `seconds` with what it has then; the second value is then false.
+    """
+    until = time.monotonic() + seconds
+    again = True
+    while again:
+        again = False
+        for simpler in simplifications(scene):
+            if trials == 0 or time.monotonic() > until:
+                return scene, False
+            trials -= 1
+            if shows(simpler):
+                scene, again = simpler, True
+                break
+    return scene, True
+
+
+def simplifications(scene: Scene) -> Iterator[Scene]:
+    """Valid scenes that are simpler in one respect, the greatest simplification first."""
+    for tables in _changes(scene):
+        try:
+            simpler = Scene(**tables)
+        except InputError:
+            continue
+        if simpler != scene:
+            yield simpler
+
+
+def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
+    """The scene's tables with a part left out, a shorter run or list, another scale, and at last
+    one number that is zero or has fewer digits."""
+    tables = _tables(scene)
+    places = sorted(_places(tables), key=lambda place: (len(place[0]), FIRST.get(place[0][0], 2)))
+    for path, _ in places:
+        yield _with(tables, path)
+    unit = math.sqrt(scene.block.radius / scene.gravity)
+    for factor in (0.25, 0.5, 0.9):
+        if factor * scene.duration > 0.01 * unit:
+            shorter = {key: factor * getattr(scene, key) for key in ("duration", "output_step")}
+            yield tables | shorter
+    for path, value in places:
+        if isinstance(value, list):
+            yield _with(tables, path, value[: len(value) // 2])
+            yield _with(tables, path, value[:-1])
+    if not 0.5 < scene.block.radius < 2.0:  # rounding would change it again
+        yield tables | {"block": scene.block.scaled(1.0 / scene.block.radius)}
+    numbers = [(path, value) for path, value in places if isinstance(value, float)]
+    for path, _ in numbers:
+        yield _with(tables, path, 0.0)
+    for digits in (1, 2, 4, 8):
+        for path, value in numbers:
+            yield _with(tables, path, float(f"{value:.{digits}g}"))
+
+
+def _tables(scene: Scene) -> dict[str, Any]:
+    """All that is not as it would be without a word, as a scene file has it."""
+    tables: dict[str, Any] = scene.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
+    for key in {"excitation", "vertical"} & tables.keys():
+        tables[key] = {"kind": getattr(scene, key).kind} | tables[key]
+    return tables
+
+
+def _places(part: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
+    if path:
+        yield path, part
+    if isinstance(part, dict):
+        inner: list[tuple[Any, Any]] = [(key, part[key]) for key in part if key not in KEPT]
+    else:
+        inner = list(enumerate(part)) if isinstance(part, list) and len(part) <= SHORT else []
+    for key, value in inner:
+        yield from _places(value, (*path, key))
+
+
+def _with(tables: dict[str, Any], path: Path, *value: Any) -> dict[str, Any]:
+    changed = deepcopy(tables)
+    part: Any = changed
+    for key in path[:-1]:
+        part = part[key]
+    if value:
+        part[path[-1]] = value[0]
+    else:
+        del part[path[-1]]
+    return changed
+
+
+def scene_text(scene: Scene, remarks: str) -> str:
+    """A scene file that `load_scene` reads back to the bit (samples stand in the file itself), with
+    remarks on top."""
+    tables = {
+        key: value for key, value in _tables(scene).items() if key != "name"
+    }  # the file's own
+    # Plain values come before tables.
+    ordered = sorted(tables.items(), key=lambda item: isinstance(item[1], dict | list))
+    lines = "".join(f"# {line}\n" for line in remarks.splitlines())
+    return lines + tomlkit.dumps(dict(ordered))
+
 
 #: Time (s) that a run may take on average, event-based or not: so many times what it takes; and a
 #: task in addition.
@@ -79,22 +200,27 @@ class RunTotals:
 
     def see(self, played: CheckedRun, seed: int, number: int) -> None:
         """Count one more run."""
-        for name, figure in played.figures.items():
-            found = math.inf if math.isnan(figure) else figure, number
-            self.worst[name] = max(found, self.worst.get(name, found))
-        self.failures += [
-            Broken(self.model, name, seed, number, played.figures[name], played.failure)
-            for name in played.broken
-        ]
-        self.counts["runs"] += 1
-        self.counts["events"] += played.events
-        self.counts["gaining"] += played.gains > 0
-        self.counts["horizons"] += played.horizons
-        self.largest_gain = max(self.largest_gain, played.largest_gain)
-        self.outcomes[played.outcome or "failed"] += 1
-        self.rules.update(played.rules)
-        self.looked_at.update(played.figures.keys())
-        self.unjudged.update(played.unjudged)
+        figures = played.figures
+        counts = {"runs": 1, "events": played.events, "gaining": int(played.gains > 0)}
+        self.add(
+            RunTotals(
+                model=self.model,
+                looked_at=Counter(figures.keys()),
+                unjudged=Counter(played.unjudged),
+                worst={
+                    name: (math.inf if math.isnan(figure) else figure, number)
+                    for name, figure in figures.items()
+                },
+                failures=[
+                    Broken(self.model, name, seed, number, figures[name], played.failure)
+                    for name in played.broken
+                ],
+                outcomes=Counter([played.outcome or "failed"]),
+                rules=Counter(played.rules),
+                counts=Counter(counts | {"horizons": played.horizons}),
+                largest_gain=played.largest_gain,
+            )
+        )
 
     def add(self, other: RunTotals) -> None:
         """Count what other runs showed."""

@@ -1,27 +1,194 @@
 """Work and precision: what an error costs with each model, scene by scene, and what it converges
-to."""
+to.
+
+The scenes come in families of ten members each, since one run can be lucky by a factor of five; for
+convergence there are 18 single ones beside a wall. The members of a family differ by a few per cent
+in tilt or amplitude, so that their uplifts and impacts fall on other phases of a step. Each is
+played up to its horizon of predictability and compared up to there.
+"""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from operator import attrgetter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
 from statistics import median
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from rockcheck.scenes import History
+from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.horizon import predictability_horizon
+from rockcheck.scenes import Floor, History, Rest, Ricker, Scene, Wall, load_scene
+from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.discrepancy.compare import compare
-from rockcheck.validation.discrepancy.measures import IMPACTS
+from rockcheck.validation.discrepancy.figures import IMPACTS
 from rockcheck.validation.execute.models import build
-from rockcheck.validation.studies.work_precision.scenes import FAMILIES, WALLS, prepared
 from rockcheck.validation.study import Task
 
-#: Errors at which each model's cost is given, alpha.
-LEVEL = 1e-3
+MEMBERS = 10
+#: How accurate the references are, and to what time a record is played at most, s.
+REFERENCE_TOLERANCE, RECORD_DURATION = 1e-13, 8.0
+
+
+@dataclass(frozen=True)
+class SceneFamily:
+    """A name, a few words, and its members by number, 0 to `MEMBERS` - 1."""
+
+    name: str
+    words: str
+    member: Callable[[int], Scene]
+
+
+def _spread(k: int) -> float:
+    """From 0.955 to 1.045."""
+    return 1.0 + 0.01 * (k - 4.5)
+
+
+def _free(k: int) -> Scene:
+    tilt = (0.30 + 0.05 * k) * PAPER_BLOCK.alpha
+    return Scene(
+        name=f"free {k}",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=1.0),
+        excitation=Rest(),
+        duration=3.0,
+        initial_rotation=tilt,
+    )
+
+
+def pulse(
+    frequency_ratio: float,
+    amplitude_ratio: float,
+    friction: float,
+    *,
+    walls: tuple[Wall, ...] = (),
+    name: str = "pulse",
+) -> Scene:
+    """A Ricker pulse of omega_p = ratio p and a_p = ratio g tan alpha, 3 s."""
+    still = Scene(
+        name=name,
+        block=PAPER_BLOCK,
+        floor=Floor(friction=friction),
+        walls=walls,
+        excitation=Rest(),
+        duration=3.0,
+    )
+    amplitude = amplitude_ratio * still.gravity * math.tan(still.block.alpha)
+    period = 2.0 * math.pi / (frequency_ratio * still.frequency_parameter)
+    return still.replace(excitation=Ricker(amplitude=amplitude, period=period))
+
+
+def _pulses(
+    name: str, frequency_ratio: float, amplitude_ratio: float, friction: float, *walls: Wall
+) -> SceneFamily:
+    beside = "".join(f", wall at {1e3 * wall.gap:g} mm, e {wall.restitution:g}" for wall in walls)
+    words = (
+        f"Ricker pulse, ω_p = {frequency_ratio:g} p, a_p = {amplitude_ratio:g} g tan α,"
+        f" μ {friction:g}{beside}"
+    )
+    return SceneFamily(
+        name,
+        words,
+        lambda k: pulse(
+            frequency_ratio, amplitude_ratio * _spread(k), friction, walls=walls, name=f"{name} {k}"
+        ),
+    )
+
+
+def _record(name: str, words: str) -> SceneFamily:
+    def member(k: int) -> Scene:
+        scene = load_scene(name)
+        louder = scene.excitation.scaled((1.5 + 0.02 * k) / 1.6)
+        return scene.replace(name=f"{name} {k}", excitation=louder, duration=RECORD_DURATION)
+
+    return SceneFamily(name, f"El Centro × 1.5 to 1.68, {words}", member)
+
+
+FAMILIES = {
+    family.name: family
+    for family in (
+        SceneFamily("free", "free rocking from 0.3 to 0.75 α, μ 1", _free),
+        _pulses("pulse a", 4.5, 4.0, 1.0),
+        _pulses("pulse b", 6.0, 6.0, 1.0),
+        _pulses("pulse c", 6.0, 8.0, 1.0),
+        _pulses("slip a", 4.5, 4.0, 0.3),
+        _pulses("slip b", 6.0, 6.0, 0.3),
+        *(
+            _pulses(
+                f"wall {1e3 * gap:g} mm e {e:g}",
+                6.0,
+                3.0,
+                0.6,
+                Wall(side="left", gap=gap, restitution=e),
+            )
+            for gap in (0.003, 0.053)
+            for e in (0.0, 0.5, 1.0)
+        ),
+        _record("fig4a", "μ 0.3, no wall"),
+        _record("fig5a", "μ 0.3, wall at 53 mm, e 0"),
+    )
+}
+QUICK, QUICK_MEMBERS = ("free", "pulse a", "slip a", "wall 53 mm e 0"), 2
+
+#: omega_p/p, a_p/(g tan alpha) and friction of pulses that hit a left wall at every gap, and leave
+#: the block standing.
+PULSES = {"long": (3.0, 2.5, 0.3), "medium": (4.5, 2.5, 0.3), "short": (6.0, 2.5, 0.6)}
+GAPS, RESTITUTIONS = (0.003, 0.053, 0.103), (0.0, 0.5)
+#: Longest run of a wall scene, s; the horizon of predictability may end it before.
+DURATION = 5.0
+
+
+def _beside_a_wall(name: str, gap: float, restitution: float) -> SceneFamily:
+    wall = Wall(side="left", gap=gap, restitution=restitution)
+    label = f"{name} {1e3 * gap:g} mm e {restitution:g}"
+    scene = pulse(*PULSES[name], walls=(wall,), name=label).replace(duration=DURATION)
+    return SceneFamily(label, "", lambda k: scene)
+
+
+WALLS = {
+    one.name: one
+    for one in itertools.starmap(_beside_a_wall, itertools.product(PULSES, GAPS, RESTITUTIONS))
+}
+QUICK_WALLS = ("long 53 mm e 0.5", "medium 53 mm e 0", "short 3 mm e 0")
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A member cut at its horizon (s), the reference of each kind of model, and how far these are
+    apart (RMS, alpha)."""
+
+    scene: Scene
+    horizon: float
+    references: dict[str, History]
+    model_form: float
+
+
+@cache
+def prepared(family: str, member: int) -> Prepared:
+    """Cuts a member at its horizon and plays its references; they take milliseconds."""
+    whole = (FAMILIES | WALLS)[family].member(member)
+    horizon = predictability_horizon(whole)
+    scene = whole.replace(duration=horizon)
+    references = {
+        model.name: model.simulate(scene)
+        for model in (
+            EventBasedModel(tolerance=REFERENCE_TOLERANCE, pivot="unilateral"),
+            EventBasedModel(tolerance=REFERENCE_TOLERANCE, pivot="bilateral"),
+        )
+    }
+    model_form = compare(
+        references["ebm"], references["ebm-unilateral"], scene=scene, measures=["theta_rms"]
+    )["theta_rms"]
+    return Prepared(scene, horizon, references, model_form)
+
+
+REFERENCES = ("ebm-unilateral", "ebm")
+#: Errors at which each model's cost is given, alpha; and what is known where it is not reached.
+LEVEL, NOTHING = 1e-3, (math.nan, False)
 #: The cost at which engines are compared in their league, CPU s a simulated second.
 EQUAL_COST = 0.02
 #: Runs at least this long (s) are timed once, shorter ones `REPEATS` times.
@@ -194,55 +361,6 @@ class BenchmarkRun:
     steps: int = 0
     failure: str = ""
 
-    def error(self, reference: str) -> float:
-        """The RMS error against one of the references; infinite where the run failed."""
-        error = self.rms if reference == "ebm-unilateral" else self.against_ebm
-        return math.inf if self.failure or math.isnan(error) else error
-
-
-@dataclass(frozen=True)
-class Point:
-    """A setting of a line in a family, or in a kind of scenes: median error with its 10-90 % band
-    and the worst, and median cost a simulated second.
-
-    A run that failed counts as infinitely wrong.
-    """
-
-    family: str
-    line: str
-    value: float
-    runs: int
-    failed: int
-    rms: float
-    rms_10: float
-    rms_90: float
-    largest: float
-    peak: float
-    first_impact: float
-    cpu: float
-    wall: float
-    set_up: float
-    steps: float
-    rms_worst: float = math.nan
-
-
-@dataclass(frozen=True)
-class Trend:
-    """A line in a family: its order of convergence in the swept setting, and what an error of
-    `LEVEL` costs.
-
-    `order` is NaN where fewer than two settings can be fitted. `cpu` is in s a simulated second,
-    NaN where the level is not reached; `at_coarsest` where already the coarsest setting reaches it.
-    `ratio` is to the `ebm` line's.
-    """
-
-    family: str
-    line: str
-    order: float
-    cpu: float
-    at_coarsest: bool
-    ratio: float
-
 
 def play(task: Play) -> BenchmarkRun:
     """Plays one member with one setting; short runs several times, for the median time."""
@@ -293,124 +411,126 @@ def errors_of(reference: History, history: History) -> dict[str, Any]:
     }
 
 
-def grouped(found: Iterable[Any], *names: str) -> dict[Any, list[Any]]:
-    """By the values of these fields, in the order in which they come."""
-    groups: dict[Any, list[Any]] = {}
-    for one in found:
-        groups.setdefault(attrgetter(*names)(one), []).append(one)
-    return groups
+def frame_of(samples: Sequence[BenchmarkRun]) -> pd.DataFrame:
+    """Runs, a row each with its number: family by family, line by line, coarse to fine.
+
+    Besides their fields the errors against each of `REFERENCES`, infinite where a run failed.
+    """
+    frame = pd.DataFrame([*samples])
+    for reference, error in zip(REFERENCES, ("rms", "against_ebm"), strict=True):
+        frame[reference] = frame[error].where(frame.failure == "").fillna(math.inf)
+    for name, order in (("family", [*FAMILIES, *WALLS]), ("line", [*LINES])):
+        frame[name] = pd.Categorical(frame[name], order)
+    return _ordered(frame, "family", "line")
 
 
-def points_of(samples: Sequence[BenchmarkRun]) -> list[Point]:
-    """The settings of all lines in all families, in their order."""
-    order = {name: n for n, name in enumerate([*FAMILIES, *LINES])}
-    ordered = sorted(samples, key=lambda one: (order[one.family], order[one.line], -one.value))
-    return [_point(some) for some in grouped(ordered, "family", "line", "value").values()]
+def _ordered(frame: pd.DataFrame, *names: str) -> pd.DataFrame:
+    order = [*names, "value"]
+    falling = [name != "value" for name in order]
+    return frame.sort_values(order, ascending=falling, kind="stable")
 
 
-def trends_of(points: Sequence[Point]) -> list[Trend]:
-    """Order and cost of each line in each family."""
-    lines, found = grouped(points, "family", "line"), []
-    for (family, label), line in lines.items():
-        cpu, at_coarsest = cost_at(line)
-        ratio = cpu / cost_at(lines.get((family, "ebm"), []))[0]
-        found.append(Trend(family, label, order_of(line), cpu, at_coarsest, ratio))
-    return found
+def grouped(frame: pd.DataFrame, *names: str) -> list[tuple[Any, pd.DataFrame]]:
+    """The rows by the values of these columns, in the order in which they come."""
+    return [*frame.groupby([*names], sort=False, observed=True)]
 
 
-def _point(samples: Sequence[BenchmarkRun]) -> Point:
-    good = [sample for sample in samples if not sample.failure]
-    errors = [sample.error("ebm-unilateral") for sample in samples]
-    failed = len(samples) - len(good)
-
-    def middling(name: str, *, a_second: bool = False) -> float:
-        values = [getattr(s, name) / (s.horizon if a_second else 1.0) for s in good]
-        known = [value for value in values if not math.isnan(value)]
-        return median(known) if known else math.nan
-
-    return Point(
-        family=samples[0].family,
-        line=samples[0].line,
-        value=samples[0].value,
-        runs=len(samples),
-        failed=failed,
-        rms=quantile(errors, 0.5),
-        rms_10=quantile(errors, 0.1),
-        rms_90=quantile(errors, 0.9),
-        largest=middling("largest"),
-        peak=middling("peak"),
-        first_impact=middling("first_impact"),
-        cpu=middling("cpu", a_second=True),
-        wall=middling("wall", a_second=True),
-        set_up=middling("set_up"),
-        steps=middling("steps", a_second=True),
-        rms_worst=math.inf if failed else max(one.rms for one in good),
-    )
+#: Errors of a setting by their share of the sample, and medians, some of them a simulated second.
+SHARES = {"rms": 0.5, "rms_10": 0.1, "rms_90": 0.9}
+MEDIANS = ("largest", "peak", "first_impact", "cpu", "wall", "set_up", "steps")
+RATES = ("cpu", "wall", "steps")
 
 
-def pooled(
-    samples: Sequence[BenchmarkRun], kinds: Mapping[str, tuple[str, ...]] = KINDS
-) -> list[Point]:
+def points_of(frame: pd.DataFrame) -> pd.DataFrame:
+    """The settings of all lines in all families: median error with its 10-90 % band and the worst,
+    and median cost a simulated second. A run that failed counts as infinitely wrong."""
+    names = "family", "line", "value"
+    rows = [(*at, *_point(some)) for at, some in grouped(frame, *names)]
+    return pd.DataFrame(rows, columns=[*names, "runs", "failed", *SHARES, *MEDIANS, "rms_worst"])
+
+
+def _point(samples: pd.DataFrame) -> tuple[float, ...]:
+    good = samples[samples.failure == ""]
+    rates = good[[*RATES]].div(good.horizon, axis=0)
+    medians = good.drop(columns=[*RATES]).join(rates)[[*MEDIANS]].median()
+    errors, failed = samples[REFERENCES[0]].tolist(), len(samples) - len(good)
+    shares = [quantile(errors, share) for share in SHARES.values()]
+    return len(samples), failed, *shares, *medians, math.inf if failed else good.rms.max()
+
+
+def trends_of(points: pd.DataFrame) -> pd.DataFrame:
+    """Order of convergence of each line in each family, in the swept setting, and what an error of
+    `LEVEL` costs.
+
+    `order` is NaN where fewer than two settings can be fitted. `cpu` is in s a simulated second,
+    NaN where the level is not reached; `at_coarsest` where already the coarsest setting reaches it.
+    `ratio` is to the `ebm` line's.
+    """
+    lines = dict(grouped(points, "family", "line"))
+    costs = {at: cost_at(line) for at, line in lines.items()}
+    rows = [
+        (*at, order_of(line), *costs[at], costs[at][0] / costs.get((at[0], "ebm"), NOTHING)[0])
+        for at, line in lines.items()
+    ]
+    return pd.DataFrame(rows, columns=["family", "line", "order", "cpu", "at_coarsest", "ratio"])
+
+
+def pooled(frame: pd.DataFrame, kinds: Mapping[str, tuple[str, ...]] = KINDS) -> pd.DataFrame:
     """Every setting of the engines' lines over all scenes of each kind, which is its `family`."""
-    found = []
-    for kind, starts in kinds.items():
-        groups = grouped((s for s in samples if s.family.startswith(starts)), "line", "value")
-        found += [
-            replace(_point(groups[label, value]), family=kind)
-            for label, line in LINES.items()
-            for value in line.values
-            if line.model in ENGINE_STEPS and (label, value) in groups
-        ]
-    return found
+    engines = _ordered(frame[[LINES[line].model in ENGINE_STEPS for line in frame.line]], "line")
+    parts = [
+        engines[engines.family.str.startswith(starts)].assign(family=kind)
+        for kind, starts in kinds.items()
+    ]
+    return points_of(pd.concat(parts))
 
 
-def at_the_cost(point: Point, points: Sequence[Point]) -> float:
+def at_the_cost(point: Any, points: pd.DataFrame) -> float:
     """The error of the engine's adaptive line at a point's CPU time, interpolated; NaN outside its
     range."""
     adaptive = f"{LINES[point.line].model} adaptive"
-    line = [p for p in points if (p.family, p.line) == (point.family, adaptive)]
-    return error_at(line, point.cpu)
+    return error_at(_of(points, family=point.family, line=adaptive), point.cpu)
 
 
-def league(found: Sequence[Point]) -> list[tuple[str, float, float, float, float]]:
+def _of(frame: pd.DataFrame, **values: Any) -> pd.DataFrame:
+    return frame[np.all([frame[name] == value for name, value in values.items()], axis=0)]
+
+
+def league(found: pd.DataFrame) -> list[tuple[str, float, float, float, float]]:
     """The engines' lines over pulses and free rocking, the cheapest at an error of `LEVEL` first;
     those that never reach it last, by their best error.
 
     Line, CPU time (s a simulated second) of an error of `LEVEL`, RMS error (alpha) at `EQUAL_COST`,
     least error at any setting that was played, and its cost; NaN where it does not reach so far.
     """
-    rows, kind = [], next(iter(KINDS))
-    for label, mine in grouped((one for one in found if one.family == kind), "line").items():
-        if good := [one for one in mine if math.isfinite(one.rms)]:
-            best = min(good, key=lambda one: one.rms)
-            at_cost = error_at(mine, EQUAL_COST)
-            rows.append((label, cost_at(mine)[0], at_cost, best.rms, best.cpu))
+    rows = []
+    for (label,), mine in grouped(_of(found, family=next(iter(KINDS))), "line"):
+        if (good := mine[np.isfinite(mine.rms)]).size:
+            best = good.loc[good.rms.idxmin()]
+            least = float(best.rms), float(best.cpu)
+            rows.append((label, cost_at(mine)[0], error_at(mine, EQUAL_COST), *least))
     return sorted(rows, key=lambda row: (math.isnan(row[1]), row[3 if math.isnan(row[1]) else 1]))
 
 
-def first_steps(samples: Sequence[BenchmarkRun]) -> list[tuple[str, dict[str, float], float]]:
+def first_steps(frame: pd.DataFrame) -> list[tuple[str, dict[str, float], float]]:
     """The engines' lines: the largest step (s) whose median error is at most `LEVEL`, in each kind
     of `LEAGUE` and in all of them, NaN where none is; and the smallest step that was played."""
     rows = []
-    for label, line in grouped(pooled(samples, LEAGUE), "line").items():
-        steps = {one.value for one in line}
-        met = {
-            kind: {one.value for one in line if one.family == kind and one.rms <= LEVEL}
-            for kind in LEAGUE
-        }
+    for (label,), line in grouped(pooled(frame, LEAGUE), "line"):
+        good = line[line.rms <= LEVEL]
+        met = {kind: set(good.value[good.family == kind]) for kind in LEAGUE}
         met["all"] = set.intersection(*met.values())
         largest = {kind: max(values, default=math.nan) for kind, values in met.items()}
-        rows.append((label, largest, min(steps)))
+        rows.append((label, largest, line.value.min()))
     return rows
 
 
-def error_at(line: Sequence[Point], cpu: float) -> float:
+def error_at(line: pd.DataFrame, cpu: float) -> float:
     """Median error of a line, coarse to fine, at a CPU time, both interpolated on logarithmic axes;
     NaN outside its range."""
-    for a, b in itertools.pairwise(line):
-        if a.cpu <= cpu <= b.cpu and a.cpu < b.cpu and b.rms > 0.0 and math.isfinite(a.rms):
-            share = math.log(cpu / a.cpu) / math.log(b.cpu / a.cpu)
-            return float(a.rms * (b.rms / a.rms) ** share)
+    for (e, a), (f, b) in itertools.pairwise(zip(line.rms, line.cpu, strict=True)):
+        if a <= cpu <= b and a < b and f > 0.0 and math.isfinite(e):
+            return float(e * (f / e) ** (math.log(cpu / a) / math.log(b / a)))
     return math.nan
 
 
@@ -423,32 +543,33 @@ def quantile(values: Sequence[float], share: float) -> float:
     return 0.5 * (below + above)
 
 
-def order_of(line: Sequence[Point]) -> float:
+def order_of(line: pd.DataFrame) -> float:
     """Slope of log median error over log of the swept setting, by least squares; NaN with fewer
     than two points."""
-    return slope((p.value, p.rms) for p in line if FITTED[0] < p.rms < FITTED[1])
+    fitted = line[(line.rms > FITTED[0]) & (line.rms < FITTED[1])]
+    return slope(fitted.value, fitted.rms)
 
 
-def cost_at(line: Sequence[Point], level: float = LEVEL) -> tuple[float, bool]:
+def cost_at(line: pd.DataFrame, level: float = LEVEL) -> tuple[float, bool]:
     """CPU s a simulated second at a median error of `level`, and whether the coarsest setting
     already reaches it.
 
     Between settings both logarithms are interpolated linearly; NaN where no setting reaches the
     level. The cheapest counts.
     """
-    costs = [(p.cpu, n == 0) for n, p in enumerate(line) if p.rms <= level]
-    for a, b in itertools.pairwise(line):
-        if a.rms > level >= b.rms > 0.0 and math.isfinite(a.rms):
-            share = math.log(a.rms / level) / math.log(a.rms / b.rms)
-            costs.append((a.cpu * (b.cpu / a.cpu) ** share, False))
-    return min(costs, default=(math.nan, False))
+    points = list(zip(line.rms, line.cpu, strict=True))
+    costs = [(cpu, n == 0) for n, (rms, cpu) in enumerate(points) if rms <= level]
+    for (e, a), (f, b) in itertools.pairwise(points):
+        if e > level >= f > 0.0 and math.isfinite(e):
+            costs.append((a * (b / a) ** (math.log(e / level) / math.log(e / f)), False))
+    return min(costs, default=NOTHING)
 
 
-def slope(points: Iterable[tuple[float, float]]) -> float:
+def slope(steps: Iterable[float], errors: Iterable[float]) -> float:
     """Slope of log error over log step by least squares; NaN with fewer than two usable steps."""
     usable = [
         (math.log(step), math.log(error))
-        for step, error in points
+        for step, error in zip(steps, errors, strict=True)
         if math.isfinite(step) and 0.0 < error < math.inf
     ]
     if len({step for step, _ in usable}) < 2:
@@ -460,72 +581,50 @@ def slope(points: Iterable[tuple[float, float]]) -> float:
 # Convergence: beside a wall engines and CM tend to the model whose floor can only push, not to the
 # paper's.
 
-REFERENCES = ("ebm-unilateral", "ebm")
 #: A run counts as converged if its order in the step is at least this, where the finest error is
 #: not already below `ROUNDED` (alpha).
 LEAST_ORDER, ROUNDED = 0.5, 1e-6
 
 
-@dataclass(frozen=True)
-class Level:
-    """All wall scenes by a model at one setting: errors (alpha) against a reference; `within`: how
-    many are at most `LEVEL`."""
-
-    model: str
-    reference: str
-    value: float
-    step: float
-    median: float
-    largest: float
-    runs: int
-    within: int
-
-
-@dataclass(frozen=True)
-class Order:
-    """Slope of log error over log step: of the median error, or in one `scene` where that is not
-    empty."""
-
-    model: str
-    reference: str
-    order: float
-    scene: str = ""
+def levels_of(frame: pd.DataFrame) -> pd.DataFrame:
+    """The wall scenes' errors (alpha) by reference, model and setting, coarse to fine; `within`:
+    how many are at most `LEVEL`."""
+    groups = [*grouped(_ordered(frame, "line"), "line", "value")]
+    return pd.DataFrame(
+        {
+            "model": model,
+            "reference": reference,
+            "value": value,
+            "step": runs.step[runs.failure == ""].median(),
+            "median": runs[reference].median(),
+            "largest": runs[reference].max(),
+            "runs": len(runs),
+            "within": int((runs[reference] <= LEVEL).sum()),
+        }
+        for reference, ((model, value), runs) in itertools.product(REFERENCES, groups)
+    )
 
 
-def levels_of(samples: Sequence[BenchmarkRun]) -> list[Level]:
-    """The wall scenes' errors by model, reference and setting, coarse to fine."""
-    ordered = sorted(samples, key=lambda one: (list(LINES).index(one.line), -one.value))
-    groups, found = grouped(ordered, "line", "value"), []
-    for reference, ((model, value), runs) in itertools.product(REFERENCES, groups.items()):
-        errors = [one.error(reference) for one in runs]
-        steps = [one.step for one in runs if not one.failure] or [math.nan]
-        within = sum(error <= LEVEL for error in errors)
-        sizes = median(errors), max(errors), len(runs), within
-        found.append(Level(model, reference, value, median(steps), *sizes))
-    return found
+def orders_of(frame: pd.DataFrame, levels: pd.DataFrame) -> pd.DataFrame:
+    """Slopes of log error over log step by model and reference: of the median error, and scene by
+    scene."""
+    lines, rows = dict(grouped(frame.sort_index(), "line", "family")), []
+    for model, reference in itertools.product(dict.fromkeys(levels.model), REFERENCES):
+        mine = _of(levels, model=model, reference=reference)
+        rows.append((model, reference, slope(mine.step, mine["median"]), ""))
+        rows += [
+            (model, reference, slope(one.step, one[reference]), scene)
+            for scene in WALLS
+            if (one := lines.get((model, scene))) is not None
+        ]
+    return pd.DataFrame(rows, columns=["model", "reference", "order", "scene"])
 
 
-def orders_of(samples: Sequence[BenchmarkRun], levels: Sequence[Level]) -> list[Order]:
-    """Observed orders by model and reference: of the medians, and scene by scene."""
-    lines, found = grouped(samples, "line", "family"), []
-    for (model, reference), mine in grouped(
-        sorted(levels, key=lambda level: list(LINES).index(level.model)), "model", "reference"
-    ).items():
-        medians = slope((level.step, level.median) for level in mine)
-        found.append(Order(model, reference, medians))
-        for scene in (scene for scene in WALLS if (model, scene) in lines):
-            steps = ((one.step, one.error(reference)) for one in lines[model, scene])
-            found.append(Order(model, reference, slope(steps), scene))
-    return found
-
-
-def exceptions_of(samples: Sequence[BenchmarkRun], orders: Sequence[Order]) -> Iterable[str]:
+def exceptions_of(frame: pd.DataFrame, orders: pd.DataFrame) -> Iterable[str]:
     """The wall scenes in which a model does not converge to the unilateral one, a line each."""
-    lines = grouped(sorted(samples, key=lambda one: -one.value), "line", "family")
-    for one in orders:
-        if not one.scene or one.reference != REFERENCES[0]:
-            continue
-        errors = [run.error(one.reference) for run in lines[one.model, one.scene]]
+    lines = dict(grouped(frame, "line", "family"))
+    for one in _of(orders, reference=REFERENCES[0]).itertuples():
+        errors = lines[one.model, one.scene][REFERENCES[0]].tolist() if one.scene else [math.inf]
         slow = errors[-1] > ROUNDED and not one.order >= LEAST_ORDER
         if math.isfinite(errors[-1]) and (errors[-1] > LEVEL or slow):
             said = " → ".join(f"{error:.1e}" for error in errors)

@@ -5,10 +5,13 @@ from __future__ import annotations
 import itertools
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from statistics import median
-from typing import Any, Literal
+from typing import Any, Literal, get_args
+
+import numpy as np
+import pandas as pd
 
 from rockcheck.validation.execute.models import not_installed
 from rockcheck.validation.execute.pool import Failure
@@ -25,21 +28,19 @@ from rockcheck.validation.finding import (
     table_of,
     text,
 )
-from rockcheck.validation.studies.work_precision import ebm, runs, savings
+from rockcheck.validation.studies.work_precision import runs, timings
 from rockcheck.validation.studies.work_precision.runs import (
+    FAMILIES,
     LEVEL,
     LINES,
-    REFERENCES,
-    BenchmarkRun,
-    Play,
-)
-from rockcheck.validation.studies.work_precision.scenes import (
-    FAMILIES,
     MEMBERS,
     QUICK,
     QUICK_MEMBERS,
     QUICK_WALLS,
+    REFERENCES,
     WALLS,
+    BenchmarkRun,
+    Play,
     prepared,
 )
 from rockcheck.validation.study import Study, Task
@@ -66,15 +67,14 @@ class Measure(Task):
     size: int = 0
 
 
-@dataclass(frozen=True)
-class Measured:
-    """What a task gave: rows of one kind."""
-
-    run: BenchmarkRun | None = None
-    times: tuple[ebm.BatchTime, ...] = ()
-    size: ebm.BatchSize | None = None
-    start: ebm.ColdStart | None = None
-    saved: tuple[savings.Saving, ...] = ()
+#: What is timed, by its kind: a name and a size give rows.
+TIMED: Mapping[str, Callable[[str, int], Sequence[Any]]] = {
+    "batch": timings.batch_times,
+    "size": lambda name, size: [timings.batch_size(size, int(name))],
+    "cold start": lambda name, _: [timings.cold_start(cached=name == "filled")],
+    "saving": timings.measured,
+}
+Row = BenchmarkRun | timings.BatchTime | timings.BatchSize | timings.ColdStart | timings.Saving
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class WorkPrecision(Study):
     what: What = "all"
     quick: bool = False
     name = "benchmark"
-    record = Measured
+    record = list[Row]
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Task]:
         """All at once; what is timed first."""
@@ -99,10 +99,10 @@ class WorkPrecision(Study):
         ]
 
     def _batches(self) -> Iterator[Task]:
-        nodes = 20 if self.quick else ebm.NODES
-        for case in ebm.CASES:
+        nodes = 20 if self.quick else timings.NODES
+        for case in timings.CASES:
             yield Measure("batch", case.name, nodes, where="timed", expected=nodes**2 / 1000.0)
-        for size in ebm.QUICK_SIZES if self.quick else ebm.SIZES:
+        for size in timings.QUICK_SIZES if self.quick else timings.SIZES:
             for threads in sorted({1, os.cpu_count() or 1}):
                 yield Measure("size", f"{threads}", size, where="timed", expected=6e-5 * size)
         if not self.quick:
@@ -110,10 +110,10 @@ class WorkPrecision(Study):
         yield Measure("cold start", "filled", where="timed", expected=3.0)
 
     def _savings(self) -> Iterator[Task]:
-        for name in savings.KINDS:
+        for name in timings.KINDS:
             if name.startswith("batches") and name.endswith("quick") != self.quick:
                 continue
-            rounds = savings.QUICK_ROUNDS if self.quick else savings.ROUNDS
+            rounds = timings.QUICK_ROUNDS if self.quick else timings.SAVING_ROUNDS
             yield Measure("saving", name, rounds, where="timed", expected=0.6 * rounds)
 
     def _models(self) -> Iterator[Task]:
@@ -153,41 +153,33 @@ class WorkPrecision(Study):
                 yield Play(name, 0, line.label, value, 1, expected=expected)
 
     @staticmethod
-    def play(task: Any) -> Measured:
+    def play(task: Any) -> Sequence[Row]:
         """The rows of a task."""
         if isinstance(task, Play):
-            return Measured(run=runs.play(task))
-        if task.kind == "batch":
-            return Measured(times=tuple(ebm.batch_times(task.name, task.size)))
-        if task.kind == "size":
-            return Measured(size=ebm.batch_size(task.size, int(task.name)))
-        if task.kind == "cold start":
-            return Measured(start=ebm.cold_start(cached=task.name == "filled"))
-        return Measured(saved=tuple(savings.measured(task.name, task.size)))
+            return [runs.play(task)]
+        return TIMED[task.kind](task.name, task.size)
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The tables and diagrams of what was measured."""
-        found = [one for one in done.values() if isinstance(one, Measured)]
-        samples = [one.run for one in found if one.run is not None]
-        samples += [
+        rows = [row for one in done.values() if not isinstance(one, Failure) for row in one]
+        rows += [
             runs.lost(task, one.reason)
             for task, one in done.items()
             if isinstance(task, Play) and isinstance(one, Failure)
         ]
+        samples, times, sizes, starts, saved = (
+            [row for row in rows if isinstance(row, kind)] for kind in get_args(Row)
+        )
         plain, walls = (
             [one for one in samples if (one.family in WALLS) == beside] for beside in (False, True)
         )
         blocks: list[Block] = [
             *(_models(plain) if plain else ()),
             *(_converged(walls) if walls else ()),
-            *_batches(
-                [row for one in found for row in one.times],
-                [one.size for one in found if one.size],
-                [one.start for one in found if one.start],
-            ),
-            *_saved([row for one in found for row in one.saved]),
+            *_batches(times, sizes, starts),
+            *_saved(saved),
         ]
-        answer = _answer(plain, walls, [row for one in found for row in one.times])
+        answer = _answer(plain, walls, times)
         return Finding(
             self.name,
             f"Benchmark{'' if self.what == 'all' else f': {self.what}'}"
@@ -198,23 +190,23 @@ class WorkPrecision(Study):
 
 
 def _answer(
-    plain: Sequence[BenchmarkRun], walls: Sequence[BenchmarkRun], times: Sequence[ebm.BatchTime]
+    plain: Sequence[BenchmarkRun], walls: Sequence[BenchmarkRun], times: Sequence[timings.BatchTime]
 ) -> str:
-    """The figures that a reader comes for."""
+    standings = runs.league(runs.pooled(runs.frame_of(plain))) if plain else []
     said = [
         f"The cheapest engine at an error of {LEVEL:g} alpha is {line}:"
         f" {1e3 * cost:.2g} ms of CPU a simulated second."
-        for line, cost, *_ in runs.league(runs.pooled(plain))[:1]
+        for line, cost, *_ in standings[:1]
         if math.isfinite(cost)
     ]
-    best = [row for case in ebm.CASES if (row := ebm.at_level(times, case.name))]
+    best = [row for case in timings.CASES if (row := timings.at_level(times, case.name))]
     if best:
         costs = ", ".join(f"{row.case} {row.evaluations:.0f}" for row in best)
         said.append(f"A run of the event-based model costs, in right-hand sides: {costs}.")
     if walls:
-        levels = runs.levels_of(walls)
-        finest = {level.model: level for level in levels if level.reference == REFERENCES[0]}
-        errors = ", ".join(f"{model} {level.median:.1e}" for model, level in finest.items())
+        levels = runs.levels_of(runs.frame_of(walls))
+        finest = levels[levels.reference == REFERENCES[0]].groupby("model", sort=False).last()
+        errors = ", ".join(f"{model} {error:.1e}" for model, error in finest["median"].items())
         said.append(
             f"Beside a wall, median errors against {REFERENCES[0]} at the finest setting, alpha:"
             f" {errors}."
@@ -223,11 +215,10 @@ def _answer(
 
 
 def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
-    points = runs.points_of(samples)
-    trends, pooled = runs.trends_of(points), runs.pooled(samples)
-    families = list(dict.fromkeys(point.family for point in points))
-    standings = runs.league(pooled)
-    if standings:
+    frame = runs.frame_of(samples)
+    points, pooled = runs.points_of(frame), runs.pooled(frame)
+    trends, families = runs.trends_of(points), list(dict.fromkeys(points.family))
+    if standings := runs.league(pooled):
         yield Table(
             "league",
             [
@@ -245,7 +236,7 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
             "Free rocking and pulses. Error: RMS of theta. Cost: CPU a simulated second. Empty:"
             " not reached.",
         )
-    if steps := runs.first_steps(samples):
+    if steps := runs.first_steps(frame):
         kinds = {"free": "free rocking", "pulse": "pulse", "wall": "wall", "all": "all three"}
         yield Table(
             "first-steps",
@@ -269,21 +260,12 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
         shown = [family for family in families if family.startswith(starts)]
         if shown:
             yield _diagram(title, shown, points)
-    of = {(trend.line, trend.family): trend for trend in trends}
-    labels = list(dict.fromkeys(point.line for point in points))
+    of = {(trend.line, trend.family): trend.ratio for trend in trends.itertuples()}
+    labels = list(dict.fromkeys(points.line))
     yield Table(
         "ratios",
         [text("line", "model"), *(Column(family, digits=2) for family in families)],
-        [
-            [
-                label,
-                *(
-                    of[label, family].ratio if (label, family) in of else None
-                    for family in families
-                ),
-            ]
-            for label in labels
-        ],
+        [[label, *(of.get((label, family)) for family in families)] for label in labels],
         f"Run time at an error of {LEVEL:g} alpha, over the EBM's",
         on="page",
     )
@@ -295,7 +277,7 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
             text("ratio", f"run time / ebm's at {LEVEL:g} alpha"),
             text("reached"),
         ],
-        [_spread(label, [trend for trend in trends if trend.line == label]) for label in labels],
+        [_spread(label, trends[trends.line == label]) for label in labels],
         "Order and run time",
         "Order: median slope of the error in the swept setting.",
     )
@@ -312,28 +294,14 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
         on="page",
         folded=True,
     )
-    kept = "line", "value", "runs", "failed", "cpu", "rms", "rms_worst"
-    yield Table(
-        "engines",
-        [Column("kind"), *map(Column, kept), Column("at_the_cost")],
-        [
-            [one.family, *(getattr(one, name) for name in kept), runs.at_the_cost(one, pooled)]
-            for one in pooled
-        ],
-        "Engines over whole kinds of scenes",
-        on="page",
-        folded=True,
-    )
-    every = table_of("work-precision", runs.Point, points)
-    yield replace(
-        every,
-        columns=every.columns[:-1],  # the worst is told of engines only
-        rows=[row[:-1] for row in every.rows],
-        title="All settings",
-        on="page",
-        folded=True,
-    )
-    yield table_of("orders-and-ratios", runs.Trend, trends)
+    kept = ["family", "line", "value", "runs", "failed", "cpu", "rms", "rms_worst"]
+    costs = [runs.at_the_cost(one, pooled) for one in pooled.itertuples()]
+    engines = pooled[kept].assign(at_the_cost=costs).rename(columns={"family": "kind"})
+    how: Any = {"on": "page", "folded": True}
+    yield _table("engines", engines, title="Engines over whole kinds of scenes", **how)
+    # The worst is told of engines only.
+    yield _table("work-precision", points.drop(columns="rms_worst"), title="All settings", **how)
+    yield _table("orders-and-ratios", trends)
     yield table_of("runs", BenchmarkRun, samples)
     yield Text(title="Left out", items=runs.LEFT_OUT, on="page")
 
@@ -343,9 +311,15 @@ def _about(family: str) -> tuple[float, float]:
     return median(one.horizon for one in members), median(one.model_form for one in members)
 
 
-def _spread(label: str, trends: Sequence[runs.Trend]) -> list[Any]:
-    orders = sorted(trend.order for trend in trends if math.isfinite(trend.order))
-    ratios = sorted(trend.ratio for trend in trends if math.isfinite(trend.ratio))
+def _table(name: str, frame: pd.DataFrame, **more: Any) -> Table:
+    rows = list(frame.itertuples(index=False, name=None))
+    return Table(name, [*map(Column, frame)], rows, **{"on": "file", **more})
+
+
+def _spread(label: str, trends: pd.DataFrame) -> list[Any]:
+    orders, ratios = (
+        sorted(trends[name][np.isfinite(trends[name])]) for name in ("order", "ratio")
+    )
     spread = f"{ratios[0]:.3g} to {ratios[-1]:.3g}" if ratios else "-"
     return [
         label,
@@ -355,40 +329,18 @@ def _spread(label: str, trends: Sequence[runs.Trend]) -> list[Any]:
     ]
 
 
-def _diagram(title: str, families: Sequence[str], points: Sequence[runs.Point]) -> Plot:
+def _diagram(title: str, families: Sequence[str], points: pd.DataFrame) -> Plot:
     """Median error with its 10-90 % band over CPU time: a panel a family, a line a model."""
     panels = []
     for family in families:
         series = []
-        for label, line in LINES.items():
-            mine = [
-                p
-                for p in points
-                if (p.family, p.line) == (family, label)
-                and math.isfinite(p.rms)
-                and math.isfinite(p.cpu)
-                and p.rms > 0.0
-            ]
-            style: Any = (
-                "dots"
-                if label.endswith("default")
-                else "marked"
-                if label.endswith("adaptive")
-                else "line"
-            )
-            if mine:
-                low, high = [max(p.rms_10, FLOOR) for p in mine], [min(p.rms_90, 3.0) for p in mine]
-                series.append(
-                    Series(
-                        label,
-                        [p.cpu for p in mine],
-                        [p.rms for p in mine],
-                        low,
-                        high,
-                        line.model,
-                        style,
-                    )
-                )
+        shown = points[(points.family == family) & (points.rms > 0.0)]
+        shown = shown[np.isfinite(shown.rms) & np.isfinite(shown.cpu)]
+        for (label,), mine in runs.grouped(shown, "line"):
+            style: Any = {"default": "dots", "adaptive": "marked"}.get(label.split()[-1], "line")
+            band = mine.rms_10.clip(lower=FLOOR).tolist(), mine.rms_90.clip(upper=3.0).tolist()
+            lines = mine.cpu.tolist(), mine.rms.tolist(), *band
+            series.append(Series(label, *lines, LINES[label].model, style))
         series.append(
             Series(
                 "model form: EBM against unilateral",
@@ -406,14 +358,14 @@ def _diagram(title: str, families: Sequence[str], points: Sequence[runs.Point]) 
 
 
 def _converged(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
-    levels = runs.levels_of(samples)
-    orders = runs.orders_of(samples, levels)
-    exceptions = list(runs.exceptions_of(samples, orders))
+    frame = runs.frame_of(samples)
+    levels = runs.levels_of(frame)
+    orders = runs.orders_of(frame, levels)
+    exceptions = list(runs.exceptions_of(frame, orders))
     form = median(
         prepared(name, 0).model_form for name in dict.fromkeys(one.family for one in samples)
     )
-    of = {(level.model, level.value, level.reference): level for level in levels}
-    slopes = {(order.model, order.reference): order.order for order in orders if not order.scene}
+    slopes = {(o.model, o.reference): o.order for o in orders.itertuples() if not o.scene}
     columns = [
         Column("model", kind="model"),
         Column("value", "setting", brief=False),
@@ -429,20 +381,12 @@ def _converged(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
             Column(f"order_{reference}", "order", digits=3),
         ]
     rows = []
-    for level in (level for level in levels if level.reference == REFERENCES[0]):
-        both = [of[level.model, level.value, reference] for reference in REFERENCES]
+    for (model, value), both in runs.grouped(levels, "model", "value"):
         cells = [
-            (
-                one.median,
-                one.largest,
-                f"{one.within} of {one.runs}",
-                slopes[one.model, one.reference],
-            )
-            for one in both
+            (one.median, one.largest, f"{one.within} of {one.runs}", slopes[model, one.reference])
+            for one in both.itertuples()
         ]
-        rows.append(
-            [level.model, level.value, level.step, *(cell for some in cells for cell in some)]
-        )
+        rows.append([model, value, both.step.iloc[0], *itertools.chain(*cells)])
     yield Table(
         "levels",
         columns,
@@ -451,47 +395,24 @@ def _converged(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
         "As the step falls they tend to the model whose floor can only push. Against the paper's"
         f" model the error ends at the difference in form, {form:.1e} alpha.",
     )
-    yield _over_step(samples, levels, form)
+    yield _over_step(frame, levels, form)
     yield Text(title="What does not converge", items=exceptions or ["Nothing."])
-    yield table_of("orders", runs.Order, orders)
+    yield _table("orders", orders)
     yield table_of("wall-runs", BenchmarkRun, samples)
 
 
-def _over_step(samples: Sequence[BenchmarkRun], levels: Sequence[runs.Level], form: float) -> Plot:
-    """The error of every run, thin, and of each model the median, over the step: a panel a
-    reference."""
+def _over_step(frame: pd.DataFrame, levels: pd.DataFrame, form: float) -> Plot:
     panels = []
     for reference in REFERENCES:
         series = []
-        for model in dict.fromkeys(level.model for level in levels):
+        good = dict(runs.grouped(frame[np.isfinite(frame[reference])], "line", "family"))
+        for (model,), mine in runs.grouped(levels[levels.reference == reference], "model"):
             for name in WALLS:
-                line = [
-                    one
-                    for one in samples
-                    if (one.line, one.family) == (model, name)
-                    and math.isfinite(one.error(reference))
-                ]
-                line.sort(key=lambda one: -one.value)
-                series.append(
-                    Series(
-                        model,
-                        [one.step for one in line],
-                        [one.error(reference) for one in line],
-                        look=model,
-                        style="thin",
-                    )
-                )
-            mine = [
-                level for level in levels if (level.model, level.reference) == (model, reference)
-            ]
-            series.append(
-                Series(
-                    model,
-                    [level.step for level in mine],
-                    [min(level.median, 3.0) for level in mine],
-                    look=model,
-                )
-            )
+                line = good.get((model, name), frame[:0])
+                points = line.step.tolist(), line[reference].tolist()
+                series.append(Series(model, *points, look=model, style="thin"))
+            medians = mine["median"].clip(upper=3.0).tolist()
+            series.append(Series(model, mine.step.tolist(), medians, look=model))
         if reference == "ebm":
             series.append(Series("model form: EBM against unilateral", y=[form], style="level"))
         panels.append(Panel(f"against {reference}", series))
@@ -504,10 +425,12 @@ def _over_step(samples: Sequence[BenchmarkRun], levels: Sequence[runs.Level], fo
 
 
 def _batches(
-    times: Sequence[ebm.BatchTime], sizes: Sequence[ebm.BatchSize], starts: Sequence[ebm.ColdStart]
+    times: Sequence[timings.BatchTime],
+    sizes: Sequence[timings.BatchSize],
+    starts: Sequence[timings.ColdStart],
 ) -> Iterator[Block]:
     if times:
-        best = [row for case in ebm.CASES if (row := ebm.at_level(times, case.name))]
+        best = [row for case in timings.CASES if (row := timings.at_level(times, case.name))]
         yield Table(
             "batches-at-level",
             [
@@ -530,12 +453,12 @@ def _batches(
                 for row in best
             ],
             "Compiled batches of the event-based model",
-            f"The cheapest tolerance with a p95 error of the peak of at most {ebm.LEVEL:g} rad."
+            f"The cheapest tolerance with a p95 error of the peak of at most {timings.LEVEL:g} rad."
             f" One right-hand side: {1e9 * median(row.right_hand_side for row in times):.1f} ns.",
         )
         lines = [
             (case, [row for row in times if row.case == case.name and row.error_95 > 0.0])
-            for case in ebm.CASES
+            for case in timings.CASES
         ]
         series = [
             Series(
@@ -552,7 +475,7 @@ def _batches(
             y=Axis("CPU μs a run, one core", log=True),
         )
         yield table_of(
-            "batch-times", ebm.BatchTime, times, title="All tolerances", on="page", folded=True
+            "batch-times", timings.BatchTime, times, title="All tolerances", on="page", folded=True
         )
     if starts:
         rows = [[start.cache, start.importing, start.first_simulation] for start in starts]
@@ -583,7 +506,7 @@ def _batches(
         )
 
 
-def _saved(found: Sequence[savings.Saving]) -> Iterator[Block]:
+def _saved(found: Sequence[timings.Saving]) -> Iterator[Block]:
     if not found:
         return
     yield Table(
@@ -612,5 +535,5 @@ def _saved(found: Sequence[savings.Saving]) -> Iterator[Block]:
             for one in found
         ],
         "What a scene does not need",
-        f"Not measured: {'; '.join(savings.NOT_MEASURED)}.",
+        f"Not measured: {'; '.join(timings.NOT_MEASURED)}.",
     )
