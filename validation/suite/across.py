@@ -22,7 +22,7 @@ import subprocess
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -145,14 +145,14 @@ def difference(before: Run, after: Run, most: int | None = None) -> Finding:
 
 def _of_cell(old: Cell, new: Cell) -> Iterator[Change]:
     place = {"scene": old.scene, "model": old.model}
-    if old.words != new.words:
-        yield Change(**place, what="verdict", before=old.words, after=new.words)
-    if old.fate != new.fate:
-        yield Change(**place, what="outcome", before=old.fate, after=new.fate)
-    checks = [{title(check): check.words for check in cell.checks} for cell in (old, new)]
-    for name, was, now in _pairs(*checks):
+    said = [
+        {("verdict", ""): cell.words, ("outcome", ""): cell.fate}
+        | {("verdict", title(check)): check.words for check in cell.checks}
+        for cell in (old, new)
+    ]
+    for (what, name), was, now in _pairs(*said):
         if was != now:
-            yield Change(**place, what="verdict", name=name, before=was, after=now)
+            yield Change(**place, what=what, name=name, before=was, after=now)
     figures = [{title_of(figure): figure for figure in cell.figures} for cell in (old, new)]
     for name, one, other in _pairs(*figures):
         if (
@@ -164,7 +164,7 @@ def _of_cell(old: Cell, new: Cell) -> Iterator[Change]:
             yield Change(**place, what="figure", name=name, before=one.value, after=other.value)
 
 
-def _pairs(old: Mapping[str, T], new: Mapping[str, T]) -> Iterator[tuple[str, T | None, T | None]]:
+def _pairs(old: Mapping[Any, T], new: Mapping[Any, T]) -> Iterator[tuple[Any, T | None, T | None]]:
     yield from ((name, old.get(name), new.get(name)) for name in dict.fromkeys((*old, *new)))
 
 

@@ -267,7 +267,6 @@ class SuiteStudy(Study):
         )
 
     def _cell(self, planned: Planned) -> Cell:
-        """The finished cell: its figures, compared with each reference, and their verdicts."""
         scene, label, suite = planned.scene, planned.variant.label, self.suite
         about: dict[str, Any] = {
             "scene": scene.name,
@@ -395,7 +394,6 @@ class SuiteStudy(Study):
     def _ensemble(
         self, ensemble: Ensemble, batches: Sequence[Planned]
     ) -> tuple[EnsembleRecord, list[Cell]]:
-        """An ensemble with all peaks and outcomes, and a cell for each model."""
         by_model = {
             label: list(found)
             for label, found in groupby(batches, key=lambda batch: batch.variant.label)
