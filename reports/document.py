@@ -102,7 +102,7 @@ def show(found: Finding, screen: Console) -> None:
     """The answer and the blocks that a terminal has room for."""
     for block in found.blocks:
         if isinstance(block, Table) and block.on == "all":
-            screen.print(_grid(block))
+            screen.print(_grid(block.shown))
             if len(block.rows) > block.most:
                 screen.print(f"and {len(block.rows) - block.most} more rows: {block.name}.csv")
         elif isinstance(block, Text) and block.on == "all":
@@ -173,6 +173,7 @@ def block_markdown(block: Table | Plot | Text) -> str:
         )
     if isinstance(block, Plot) or block.on == "file":
         return ""
+    block = block.shown
     rows = [
         [words(cell, column) for cell, column in zip(row, block.columns, strict=True)]
         for row in block.rows

@@ -157,7 +157,7 @@ def strips(plot: Plot) -> Figure:
             # points that would hide each other go up and down in turn
             beside = 0.25 * ((np.arange(len(values)) % 3) - 1)
             ax.barh(0.0, high - low, left=low, height=0.9, color=COLOURS[0][0], alpha=0.15)
-            ax.plot([median, median], [-0.45, 0.45], color=COLOURS[0][0], linewidth=1.6)
+            ax.plot([median, median], [-0.5, 0.5], color=COLOURS[0][0], linewidth=1.6, zorder=3)
             ax.plot(values, beside, "o", markersize=3.0, color=COLOURS[1][0], alpha=0.8)
             ax.set_xlim(0.0, max(float(values[-1]) * 1.06, 1e-3))
             ax.set_ylim(-0.6, 0.6)

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from rockcheck.reports.figures import fineness
 from rockcheck.reports.style import looks
-from rockcheck.reports.view import CHANNELS, SceneView
+from rockcheck.reports.view import CHANNELS, PAPER_CHANNELS, SceneView
 from rockcheck.scenes import Scene
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS, Record
 from rockcheck.scenes.writing import write_whole
@@ -79,6 +79,7 @@ def payload(view: SceneView) -> dict[str, Any]:
                 "label": c.label,
                 "unit": "" if c.unit == "1" else c.unit,
                 "fine": fineness(view, c, bands),
+                "folded": c not in PAPER_CHANNELS,
             }
             for c in CHANNELS
         ],

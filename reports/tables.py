@@ -314,6 +314,15 @@ class Entry:
         )
 
     @property
+    def why_apart(self) -> str:
+        """Why an outcome other than the reference's is within tolerance; "" where it is not, or
+        both are the same."""
+        if not self.apart or not self.cell.checks or self.cell.verdict != "pass":
+            return ""
+        judged = any(check.figure.measure == "outcome_agrees" for check in self.cell.checks)
+        return f"not as the reference; {'accepted' if judged else 'not judged'}"
+
+    @property
     def nearest(self) -> Check | None:
         """The check that uses most of its limit."""
         return max(self.cell.checks, key=overrun, default=None)
@@ -483,7 +492,12 @@ def accuracy(run: Run) -> list[Block]:
         Column("model", kind="model"),
         Column("scenes_here"),
         *(
-            Column(f"{what}_{where}", f"{what}, {where.replace('_', ' ')}", digits=digits)
+            Column(
+                f"{what}_{where}",
+                f"{what}, {where.replace('_', ' ')}",
+                digits=digits,
+                optional=True,
+            )
             for where in ("here", "all_suites")
             for what, digits in (("bias", 4), ("scatter", 2))
         ),

@@ -7,7 +7,7 @@ A table is described once. `rockcheck.reports.document` renders it; nothing here
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
 Verdict = Literal["", "pass", "changed", "incomplete", "fail", "error"]
@@ -36,7 +36,8 @@ class Column:
     `name` heads it in CSV and JSON, `label` and `unit` for readers. `kind` says how a value is
     shown: "number" with so many significant `digits`, "percent" (of a share), "used" (how much of a
     limit, 1 at the limit), "text", or "model" (a model's name, with its colour). Files keep all
-    digits. A terminal shows `brief` columns only.
+    digits. A terminal shows `brief` columns only. Readers do not see an `optional` column that has
+    no value.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Column:
     digits: int = 3
     help: str = ""
     brief: bool = True
+    optional: bool = False
 
     @property
     def head(self) -> str:
@@ -77,6 +79,17 @@ class Table:
     folded: bool = False
     most: int = 40
     block: ClassVar[str] = "table"
+
+    @property
+    def shown(self) -> Table:
+        """The table for readers: without optional columns that have no value."""
+        kept = [
+            k
+            for k, column in enumerate(self.columns)
+            if not column.optional or any(plain(row[k]) is not None for row in self.rows)
+        ]
+        rows = [[row[k] for k in kept] for row in self.rows]
+        return replace(self, columns=[self.columns[k] for k in kept], rows=rows)
 
     def records(self) -> list[dict[str, Any]]:
         """The rows by the names of the columns, without marks."""

@@ -39,6 +39,16 @@ LAW_MARK: dict[str, Any] = {
     "markeredgecolor": "black",
     "markeredgewidth": 0.8,
 }
+#: The mark of a scene's own pulse.
+OWN_MARK: dict[str, Any] = {
+    "linestyle": "none",
+    "marker": "*",
+    "markersize": 11.0,
+    "markerfacecolor": "white",
+    "markeredgecolor": "black",
+    "markeredgewidth": 0.9,
+    "label": "the scene's own pulse",
+}
 
 
 def spectrum_figure(spectrum: Spectrum) -> Figure:
@@ -122,6 +132,8 @@ def figure(plot: Plot) -> Figure:
             axes.set_xlabel(horizontal if below else "", fontsize=7.0)
             axes.set_ylabel(of if beside else "", fontsize=7.0)
         if len(panels) == 1 and data["pulse"]:
+            if own := data["pulse"].get("own"):
+                axes.plot(*own, **OWN_MARK)
             _units(axes, data)
         _legend(figure, data)
         figure.suptitle(plot.title, fontsize=9, x=0.01, ha="left")
@@ -162,6 +174,8 @@ def _legend(figure: Figure, data: Any) -> None:
     handles: list[Any] = [Patch(facecolor=colour, label=words) for colour, words in key.items()]
     if any(panel.get("law") for panel in data["panels"]):
         handles.append(Line2D([], [], label="depends on the impact law", **LAW_MARK))
+    if (data.get("pulse") or {}).get("own"):
+        handles.append(Line2D([], [], **OWN_MARK | {"markersize": 7.0}))
     columns = 4 if "key" not in data else 1
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=7)
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from matplotlib.colors import to_rgba
 
 from rockcheck.ebm import Spectrum
 from rockcheck.reports.drawers import figure_of, scripts_of
-from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, draw
+from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, OWN_MARK, draw
+from rockcheck.scenes import Sine, load_scene
 from rockcheck.scenes.reading import read_json
 from rockcheck.validation.finding import plain
-from rockcheck.validation.paper import KEPT, kept_spectra, paper_panels
+from rockcheck.validation.paper import KEPT, Panel, kept_spectra, paper_panels
 from rockcheck.validation.paper.measures import Paper, beyond, findings_of
 from rockcheck.validation.studies.spectrum.agreement import (
     CANDIDATES,
@@ -21,7 +25,7 @@ from rockcheck.validation.studies.spectrum.agreement import (
     blocks,
     mapped,
 )
-from rockcheck.validation.studies.spectrum.study import Spectra
+from rockcheck.validation.studies.spectrum.study import Spectra, _pulse
 from rockcheck.validation.studies.spectrum.tiles import Played, Request
 
 SIZE = 12
@@ -88,6 +92,25 @@ def test_what_is_undecided_or_depends_on_the_law_is_in_the_legend():
     (ring,) = figure.axes[1].lines
     assert ring.get_marker() == LAW_MARK["marker"]
     assert ring.get_xydata().tolist() == [[plot.data["frequencies"][3], plot.data["amplitudes"][2]]]
+
+
+def test_the_pulse_of_ones_own_scene_is_marked():
+    """At its ratios; none is marked in the paper's figures."""
+    scene = load_scene("rack").replace(excitation=Sine(amplitude=6.0, period=0.8))
+    panel, request = Panel("rack", "Rack", scene), Request(SIZE, (1.0, 8.0), (1.0, 4.0))
+    own = _pulse(panel, request)["own"]
+    slope = scene.gravity * scene.block.slope
+    omega = 2.0 * math.pi / 0.8
+    assert own == pytest.approx([omega / scene.frequency_parameter, 6.0 / slope])
+    assert _pulse(next(iter(paper_panels())), request)["own"] is None
+    plot = plot_of(8)
+    one = {**plot.data, "panels": plot.data["panels"][:1]}
+    one["panels"][0]["place"] = [0, 4, 0]
+    one["pulse"]["own"] = own
+    figure = figure_of(replace(plot, data=one))
+    (star,) = figure.axes[0].lines
+    assert star.get_xydata().tolist() == [own]
+    assert OWN_MARK["label"] in {text.get_text() for text in figure.legends[0].texts}
 
 
 def test_the_scripts_hold_every_node(tmp_path):

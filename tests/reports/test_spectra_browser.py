@@ -116,6 +116,7 @@ def test_ones_own_block_is_told_in_hertz_and_g(
         "safe",
         "overturned",
         "undecided",
+        "★ the scene's own pulse",
     ]  # it is beside a wall
     page.evaluate("Object.values(rockcheckFigures)[0].point([4, 7])")
     said = page.locator("output.node").inner_text()

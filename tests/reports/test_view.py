@@ -19,7 +19,7 @@ from rockcheck.reports.scene_data import packed, packed_lines, write_scene_file
 from rockcheck.reports.show.words import number, ratio, readable
 from rockcheck.reports.site import PAGES, write_site
 from rockcheck.reports.style import LOOKS, SPARE, looks, save
-from rockcheck.reports.tables import accuracy, entry, glance, overrun, times_table
+from rockcheck.reports.tables import Entry, accuracy, entry, glance, overrun, times_table
 from rockcheck.reports.view import FALL, scene_views, slugs_of
 from rockcheck.scenes import (
     Block,
@@ -95,6 +95,21 @@ def test_a_run_that_ends_during_a_fall_says_so(finished: Run) -> None:
         found = entry(finished.model_copy(update={"cells": cells}), "Free", "ebm")
         assert found is not None
         assert (found.outcome, found.apart) == (outcome, apart)
+
+
+def test_an_outcome_unlike_the_references_within_tolerance_is_explained(finished: Run) -> None:
+    own = next(c for c in finished.cells if c.checks and c.verdict == "pass")
+    agrees = Figure(measure="outcome_agrees", label="outcome agrees", unit="1", value=0.0)
+    judged = own.checks[0].model_copy(update={"figure": agrees})
+    other = dict.fromkeys(("cell", "rms", "whole", "ratio", "u_num"))
+    for cell, apart, said in (
+        (own, False, ""),
+        (own, True, "not judged"),
+        (own.model_copy(update={"checks": (judged,)}), True, "accepted"),
+        (own.model_copy(update={"checks": ()}), True, ""),
+    ):
+        found = Entry(**{**other, "cell": cell}, outcome="overturned left", apart=apart).why_apart
+        assert found.rpartition("; ")[2] == said
 
 
 def test_data_are_the_histories(site: Path) -> None:

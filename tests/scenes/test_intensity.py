@@ -51,6 +51,15 @@ def test_spectral_accelerations_are_those_of_the_straight_lines_between_samples(
     assert intensity.spectral_acceleration(last, 1.0) == pytest.approx(peak / G, rel=2e-3)
 
 
+@pytest.mark.parametrize("damping", [0.02, 0.05, 0.5])
+def test_a_base_that_is_set_in_motion_overshoots_as_its_damping_lets_it(damping):
+    """A step of acceleration: the peak is 1 + exp(-pi D/sqrt(1 - D^2)), half a period later."""
+    step = Recording(samples=np.ones(2000), time_step=1e-3, unit="m/s2", form="CSV")
+    peak = 1.0 + math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2))
+    found = intensity.spectral_acceleration(step, 0.5, damping)
+    assert found == pytest.approx(peak / G, rel=1e-4)
+
+
 def test_periods_of_a_spectrum_leave_no_wide_gap():
     steps = np.divide(intensity.PERIODS[1:], intensity.PERIODS[:-1])
     assert np.all((steps > 1.0) & (steps <= 2.0))

@@ -154,12 +154,15 @@ FAULTS = {
     "stick": {"slip_rate": lambda c: c + 1e-6},
     "coulomb": {"mode": lambda c: np.where(c == "slide-rock", "rock", c)},
     "energy": {"theta_dot": lambda c: c * (1.0 + 1e-5 * np.sin(np.arange(len(c))))},
+    "clearance": {"x": lambda c: 2.0 * c},
 }
 
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_each_invariant_notices_its_fault(name):
-    played = check_run(Spoilt(**FAULTS[name]), SLIDES_AND_HITS, audit=name == "energy")
+    played = check_run(
+        Spoilt(**FAULTS[name]), SLIDES_AND_HITS, audit=name in ("energy", "clearance")
+    )
     assert name in played.broken
 
 

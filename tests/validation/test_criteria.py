@@ -142,6 +142,17 @@ def test_the_rocking_estimate_grows_with_the_motion_until_it_overturns(shaken):
     assert math.isinf(found[-1])
 
 
+def test_the_estimates_have_a_value_for_a_block_so_wide_that_it_does_not_rebound():
+    """Housner's restitution is negative from b/h = sqrt(2) on."""
+    pulse = Sine(amplitude=30.0, period=1.0, cycles=2)
+    scene, _ = played(1.6, 1.0, pulse, friction=0.4, duration=4.0)
+    base = criteria.base_of(scene)
+    for criterion in criteria.CRITERIA:
+        happens, motion = criterion.says(scene, base)
+        assert happens in (True, False)
+        assert motion is None or motion >= 0.0
+
+
 def test_a_base_at_rest_moves_nothing():
     scene, _ = played(0.3, 1.0, Rest(), duration=1.0)
     base = criteria.base_of(scene)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -210,6 +211,16 @@ FOUND = Finding(
     verdict="fail",
     exit_code=1,
 )
+
+
+def test_an_optional_column_without_a_value_is_in_files_only() -> None:
+    columns = [text("name"), Column("bias", optional=True), Column("x")]
+    table = Table("t", columns, [["a", None, 1.0], ["b", Mark(None), None]])
+    assert [column.name for column in table.shown.columns] == ["name", "x"]
+    assert table.shown.rows == [["a", 1.0], ["b", None]]
+    assert csv(table).splitlines()[0] == "name,bias,x"
+    known = replace(table, rows=[["a", 0.0, 1.0]])
+    assert known.shown.rows == known.rows
 
 
 def test_one_table_is_csv_markdown_and_page(tmp_path: Path) -> None:

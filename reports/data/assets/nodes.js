@@ -36,6 +36,26 @@
     return found;
   }
 
+  // A star of five points at a place, where that is within the box.
+  function star(ctx, x, y, box) {
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(...box);
+    ctx.clip();
+    ctx.beginPath();
+    for (let k = 0; k < 10; k++) {
+      const r = k % 2 ? 3.6 : 9, turn = Math.PI * k / 5;
+      ctx.lineTo(x + r * Math.sin(turn), y - r * Math.cos(turn));
+    }
+    ctx.closePath();
+    ctx.fillStyle = "#fff";
+    ctx.strokeStyle = "#000";
+    ctx.lineWidth = 1;
+    ctx.fill();
+    ctx.stroke();
+    ctx.restore();
+  }
+
   function figure(host, data) {
     const { frequencies: xs, amplitudes: ys } = data, size = [xs.length, ys.length];
     const store = { node: null, chosen: null };
@@ -49,6 +69,7 @@
       make("i", { class: name }, entry);
       entry.append(said);
     }
+    if (data.pulse?.own) make("span", {}, key, "★ the scene's own pulse");
     const grid = make("div", { class: data.panels.length > 1 ? "panels" : "panels one" }, host);
     const output = make("output", { class: "node" }, host, "Point at a node to name it; click to play it. With a panel in focus: arrows move, enter plays.");
     const panels = data.panels.map(panel => {
@@ -114,6 +135,7 @@
         ctx.fillText("peak acceleration, g", 0, 0);
         ctx.restore();
       }
+      if (data.pulse?.own) star(ctx, x(along(xs, data.pulse.own[0])), y(along(ys, data.pulse.own[1])), [rim.left, rim.top, w, h]);
       ctx.lineWidth = 1;
       for (const [node, ring] of [[store.node, false], [store.chosen?.panel === panel ? store.chosen.node : null, true]]) {
         if (!node) continue;

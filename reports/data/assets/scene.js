@@ -90,10 +90,15 @@
   const plots = find("plots");
   const drawn = [Plots.ground(plots, store), Plots.tracks(plots, store)];
   const has = name => data.models.some(model => model.columns[name].some(v => v !== null));
-  data.channels.filter(channel => has(channel.name)).forEach((channel, k) => {
-    drawn.push(Plots.values(plots, store, channel, k === 0));
-    if (store.against) drawn.push(Plots.differences(plots, store, channel));
+  const shown = data.channels.filter(channel => has(channel.name)), folded = shown.filter(channel => channel.folded), more = find("more");
+  more.hidden = !folded.length;
+  more.querySelector("summary").textContent = folded.map(channel => channel.label).join(", ");
+  shown.forEach((channel, k) => {
+    const parent = channel.folded ? more : plots;
+    drawn.push(Plots.values(parent, store, channel, k === 0));
+    if (store.against) drawn.push(Plots.differences(parent, store, channel));
   });
+  plots.append(more);
 
   // --- controls ---------------------------------------------------------------------------------------------------------
 
@@ -149,7 +154,7 @@
       Home: () => store.change({ time: from }), End: () => store.change({ time: to }),
       " ": () => playing(!store.playing),
     };
-    if (event.ctrlKey || event.metaKey || event.altKey || !actions[event.key]) return;
+    if (event.target.closest("summary") || event.ctrlKey || event.metaKey || event.altKey || !actions[event.key]) return;
     actions[event.key]();
     event.preventDefault();
   });

@@ -168,6 +168,21 @@ def test_only_what_changed_runs_again(tmp_path, run):
     assert _reread(run, path).up_to_date == 0
 
 
+def test_the_digest_of_our_code_is_kept_and_a_damaged_one_is_not_believed(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    module, digest = "rockcheck.scenes.writing", provenance.code_digest.__wrapped__
+    expected = digest(module)
+    (kept,) = (tmp_path / "rockcheck" / "code").iterdir()
+    assert kept.read_text() == f"{expected}\n"
+    kept.write_text("0123456789abcdef\n")
+    assert digest(module) == "0123456789abcdef"
+    assert digest("rockcheck.scenes.reading") != expected
+    kept.write_text("no digest")
+    assert digest(module) == expected == kept.read_text().strip()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(kept))
+    assert digest(module) == expected
+
+
 def _reread(run, path):
     """Run as a new process would, which has not read the code before."""
     sys.modules.pop("faulty", None)

@@ -55,6 +55,15 @@ CONTRIBUTIONS = {
 }
 
 
+#: The questions whose answers lead, as one would write them in a report.
+LEADS = ("Does it fall?", "How far does it move?", "Which gap is safe?")
+#: The options that ask for an answer.
+ASKS = {
+    "Which gap is safe?": "--gaps 0,0.05,0.1",
+    "At which intensity does it fall?": "--levels pga:0.05:2:40",
+}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Found:
     """What was played, by the case: the scene under each of its motions.
@@ -111,19 +120,22 @@ def finding_of(found: Found) -> Finding:
         own.inputs if own else None,
         own.depends_on_law_from_s if own else None,
     )
-    answer = " ".join(
-        [
-            sentence_of(found, everything, overturning, quantities),
-            *gap_sentences(gaps),
-            *([found.levels.answer] if found.levels else []),
-            *hand_sentences(criteria),
+    answers = {
+        "Does it fall?": fall_sentences(found, everything, overturning),
+        "How far does it move?": move_sentences(quantities),
+        "Which gap is safe?": gap_sentences(gaps),
+        "At which intensity does it fall?": [found.levels.answer] if found.levels else [],
+        "How sure is that?": [
             *certainty_sentences(found, own),
             *change_sentences(found, contributions),
-        ]
-    )
+        ],
+        "What do hand methods say?": hand_sentences(criteria),
+    }
     blocks: list[Block] = [
+        answers_table(answers),
         outcomes_table(everything, overturning),
         quantities_table(quantities, found),
+        criteria_table(criteria),
         *strips(found),
         *gap_blocks(gaps),
         *(found.levels.blocks if found.levels else ()),
@@ -134,7 +146,6 @@ def finding_of(found: Found) -> Finding:
             for block in certainty
         ],
         *(inputs_blocks(own.inputs) if own and own.inputs else ()),
-        criteria_table(criteria),
         Table(
             "methods",
             [text("name", "method"), text("formula"), text("source"), text("holds", "range")],
@@ -172,7 +183,7 @@ def finding_of(found: Found) -> Finding:
     return Finding(
         "assess",
         f"Assessment: {found.own.scene.name}",
-        answer,
+        " ".join(said for question in LEADS for said in answers[question]),
         blocks,
         data,
         exit_code=3 if failed else 1 if unsure and found.levels is None else 0,
@@ -356,32 +367,32 @@ def _median(values: Sequence[float | None]) -> float | None:
 # The sentences.
 
 
-def sentence_of(
-    found: Found,
-    runs: Sequence[tuple[str, Ran]],
-    overturning: Mapping[str, Any],
-    quantities: Mapping[str, Any],
-) -> str:
+def fall_sentences(
+    found: Found, runs: Sequence[tuple[str, Ran]], overturning: Mapping[str, Any]
+) -> list[str]:
     """What happens."""
     name, count = found.own.scene.name, overturning["count"]
     if not runs:
-        return f"{name}: no run has a result."
+        return [f"{name}: no run has a result."]
     if len(runs) == 1:
-        begins = f"{name} {_fate(runs[0][1])}"
-    else:
-        under = f"{len(found.shown)} records" if found.recorded else "its own base motion"
-        draws = f", {len(runs)} runs," if len(runs) > len(found.shown) else ""
-        share, low, high = (overturning[key] for key in ("probability", "low", "high"))
-        begins = (
-            f"{name} under {under}{draws} overturns in {count} of {len(runs)}"
-            f" ({_percent(share)}; 95 %: {_percent(low)} to {_percent(high)})"
-        )
+        return [f"{name} {_fate(runs[0][1])}."]
+    under = f"{len(found.shown)} records" if found.recorded else "its own base motion"
+    draws = f", {len(runs)} runs," if len(runs) > len(found.shown) else ""
+    share, low, high = (overturning[key] for key in ("probability", "low", "high"))
+    return [
+        f"{name} under {under}{draws} overturns in {count} of {len(runs)}"
+        f" ({_percent(share)}; 95 %: {_percent(low)} to {_percent(high)})."
+    ]
+
+
+def move_sentences(quantities: Mapping[str, Any]) -> list[str]:
+    """How far it moves."""
     told = [
         f"{q.label} {quantities[q.name]['largest']:.3g} {_unit(q.unit)}"
         for q in QUANTITIES
         if quantities[q.name]["largest"] is not None
     ]
-    return f"{begins}. Where it stands, at most: {', '.join(told)}." if told else f"{begins}."
+    return [f"Where it stands, at most: {', '.join(told)}."] if told else []
 
 
 def _fate(run: Ran) -> str:
@@ -477,6 +488,15 @@ def input_shares(found: Found) -> dict[str, float]:
 # The blocks.
 
 
+def answers_table(answers: Mapping[str, Sequence[str]]) -> Table:
+    """The questions with their answers, or what asks for one."""
+    rows = [
+        [question, " ".join(said) or f"Not asked for: {ASKS.get(question, 'no run stands')}."]
+        for question, said in answers.items()
+    ]
+    return Table("answers", [text("question"), text("answer")], rows)
+
+
 def outcomes_table(runs: Sequence[tuple[str, Ran]], overturning: Mapping[str, Any]) -> Table:
     """How the runs end."""
     rows: list[list[Any]] = [
@@ -489,7 +509,7 @@ def outcomes_table(runs: Sequence[tuple[str, Ran]], overturning: Mapping[str, An
             text("outcome"),
             Column("runs"),
             *(
-                Column(name, label, kind="percent", digits=3)
+                Column(name, label, kind="percent", digits=4)
                 for name, label in (
                     ("probability", "probability"),
                     ("low", "95 % from"),
@@ -545,6 +565,7 @@ def strips(found: Found) -> list[Block]:
     return [
         Plot(
             "motion",
+            "How far each run moves",
             kind="strips",
             data=known_of,
             note="A point a run that stands; the bar goes from 16 to 84 %, its line is the median.",
@@ -656,8 +677,8 @@ def model_blocks(found: Found) -> list[Block]:
                 Column("overturned"),
                 Column("rms", "RMS difference", "α"),
                 Column("largest", "largest", "α"),
-                Column("bias", "bias in the suites"),
-                Column("scatter", "σ in the suites", kind="percent", digits=3),
+                Column("bias", "bias in the suites", optional=True),
+                Column("scatter", "σ in the suites", kind="percent", digits=3, optional=True),
             ],
             rows,
             "Other models",

@@ -291,18 +291,27 @@ def _spread(size: int) -> NDArray[np.int64]:
     return np.unique(np.round(spread).astype(np.int64))
 
 
-def _pulse(panel: Panel, request: Request) -> dict[str, list[float]] | None:
-    """Amplitude (m/s^2) and period (s) of the pulses along the axes; None for a record."""
-    if not isinstance(panel.scene.excitation, Ricker | Sine):
+def _pulse(panel: Panel, request: Request) -> dict[str, Any] | None:
+    """Amplitude (m/s^2) and period (s) of the pulses along the axes, and the frequency and
+    amplitude ratio of one's `own` (None: of the paper's); None for a record."""
+    pulse = panel.scene.excitation
+    if not isinstance(pulse, Ricker | Sine):
         return None
     f, a = request.frequencies, request.amplitudes
     along, across = (
         [node_scene(panel.scene, *node).excitation for node in nodes]
         for nodes in (((one, f[0]) for one in a), ((a[0], one) for one in f))
     )
+    amplitudes = [one.amplitude for one in along]  # type: ignore[union-attr]
+    periods = [one.period for one in across]  # type: ignore[union-attr]
+    own = [
+        float(f[0]) * periods[0] / pulse.period,
+        float(a[0]) * pulse.amplitude / amplitudes[0],
+    ]
     return {
-        "amplitude": [one.amplitude for one in along],  # type: ignore[union-attr]
-        "period": [one.period for one in across],  # type: ignore[union-attr]
+        "amplitude": amplitudes,
+        "period": periods,
+        "own": own if panel.figure is None else None,
     }
 
 

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -26,7 +27,10 @@ from rockcheck.scenes import (
     Ricker,
     Scene,
     Sine,
+    Wall,
+    kinematics,
 )
+from rockcheck.validation.discrepancy.motion import largest_reach
 from rockcheck.validation.studies.stress.mechanics import (
     BOOLE,
     GROUP,
@@ -81,6 +85,12 @@ INVARIANTS = {
         ("mirror", "bits that differ in the mirror image", 0.0),
         ("similarity", "rotation of the scene at another scale, within the horizon, rad", 1e-6),
         ("tolerance", "rotation at tolerance/100, within the horizon, rad", 1e-6),
+        (
+            "clearance",
+            "a wall just out of the reach of the block without walls is struck, or one just within"
+            " is not (1: so it is)",
+            0.0,
+        ),
         # of models that approximate contact
         (
             "depth",
@@ -105,6 +115,8 @@ DISTURBANCE, SEEN, DISTURBED, EXACT = 1e-7, 5e-7, 6, 1e-10
 FINE, MOST_ROWS = 64, 4000
 #: No condition is checked within this time (sqrt(R/g)) of an event or a jump.
 NEAR = 1e-9
+#: The reach of a block is known where it is so many times as large as what lies between two rows.
+RESOLVES = 4.0
 #: An integral is used where rules of order 6 and 10 agree to this, relatively: the error of order
 #: 10 is then far smaller.
 RESOLVED = 1e-10
@@ -147,7 +159,7 @@ def check_run(
     model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: bool = False, only: str = ""
 ) -> CheckedRun:
     """Plays a scene and checks every invariant, or only one. With `audit` also those that ask for
-    many rows: energy."""
+    many rows: energy, clearance."""
     played = audited(scene) if audit else scene
     try:
         history = model.simulate(played)
@@ -163,6 +175,8 @@ def check_run(
         with suppress(ModelFailure):
             energy = _energy(finer(model), played)
             figures |= {"energy": energy} if energy is not None else {}
+        with suppress(ModelFailure):
+            figures["clearance"] = float(_wrong_clearance(model, played, seed))
     bounces = max([scene.floor.restitution, *(wall.restitution for wall in scene.walls)]) > 0.0
     if model.pivot == "unilateral":
         counts = cost.energy_gains and (model.energy_cap or not bounces)
@@ -185,6 +199,27 @@ def check_run(
         failure=horizon.failure,
         unjudged=("energy",) if audit and "energy" not in figures else (),
     )
+
+
+def _wrong_clearance(model: EventBasedModel, scene: Scene, seed: int) -> bool:
+    """Whether a wall is struck that is out of reach by all that lies between two rows, or one is
+    not struck that is within; nothing is said of a block that falls, or hardly moves."""
+    side: Literal["left", "right"] = "left" if seed % 2 else "right"
+    free = scene.replace(walls=())
+    history = model.simulate(free)
+    if history.overturned_at is not None or len(history.channels["t"]) < 2:
+        return False
+    reach = largest_reach(history, free, side)
+    x, theta = history.channels["x"], history.channels["theta"]
+    gaps = kinematics.clearance(scene.block, side, 0.0, x, theta)
+    room = float(np.max(np.abs(np.diff(gaps)))) + NEAR * scene.block.radius
+    if reach - max(0.0, -float(gaps[0])) < RESOLVES * room:
+        return False
+    struck = []
+    for gap in (reach + room, reach - room):
+        walled = model.simulate(scene.replace(walls=(Wall(side=side, gap=gap),)))
+        struck.append(any(event.kind == "wall impact" for event in walled.event_list))
+    return struck != [False, True]
 
 
 def _energy(model: EventBasedModel, scene: Scene) -> float | None:

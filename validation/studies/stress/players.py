@@ -108,8 +108,8 @@ class EventBased(Player):
         return EventBasedModel(**fixed | self.settings(scene, number))
 
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
-        """Every invariant; energy in each tenth run."""
-        audit = only == "energy" or (not only and number % AUDIT == 0)
+        """Every invariant; energy and clearance in each tenth run."""
+        audit = only in ("energy", "clearance") or (not only and number % AUDIT == 0)
         return check_run(self.model(scene, number), scene, seed=seed, audit=audit, only=only)
 
 
