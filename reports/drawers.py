@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rockcheck.reports.style import BY_KEY, LOOKS, PAGE, figure_style, log_scales
 from rockcheck.validation.execute.pool import Call, Pool, cores
-from rockcheck.validation.finding import Axis, Panel, Plot, Series
+from rockcheck.validation.finding import Axis, Panel, Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -263,9 +263,6 @@ def _short(values: Any) -> list[float | None]:
         None if value is None or not math.isfinite(value) else float(f"{value:.5g}")
         for value in values
     ]
-
-
-__all__ = ["DRAWERS", "Series", "figure_of", "lines", "live_data", "scripts_of"]
 
 
 def side_by_side(calls: Iterable[Call], jobs: int | None = None, least: int = 4) -> Iterator[None]:

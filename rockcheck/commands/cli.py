@@ -8,6 +8,7 @@ import importlib
 import inspect
 import itertools
 import os
+import re
 import sys
 import time
 import traceback
@@ -26,11 +27,11 @@ from rockcheck.scenes import InputError, ModelFailure
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.suite.results import FAULT
 
-#: The commands, in the order of the help: where each has its function `run` below this package, and
-#: an example.
+#: The commands, in the order of the help: where each is below this package, a module with
+#: its function `run` or another function of one; and an example.
 COMMANDS = {
     "scenes": ("scenes", "rockcheck scenes"),
-    "new": ("new", "rockcheck new bookcase.toml"),
+    "new": ("scenes.new", "rockcheck new bookcase.toml"),
     "record": ("record", "rockcheck record station.V2 --read component=1 --plot station.png"),
     "simulate": (
         "simulate",
@@ -64,8 +65,8 @@ HIDDEN = ("warm",)
 #: Commands that answer at once: nobody asks how long they took.
 AT_ONCE = ("scenes", "new", "record", "compare")
 
-#: Options whose value may be left out, with their values: it is then the first.
-BARE = {"--strict": ("worse", "both")}
+#: Options whose value may be left out: it is then the first; and what is a value (a pattern).
+BARE = {"--strict": ("worse", "worse|both"), "--align": ("best", r"best|[-+.0-9]+(e[-+]?\d+)?")}
 
 #: Exit code of a run that Ctrl-C ended.
 INTERRUPTED = 130
@@ -134,8 +135,8 @@ def _options(given: inspect.Parameter) -> list[inspect.Parameter]:
 
 def _with_value(word: str, after: str) -> str:
     """An argument, with the value of its option where that is left out."""
-    values = BARE.get(word)
-    return f"{word}={values[0]}" if values and after not in values else word
+    value, pattern = BARE.get(word, ("", ""))
+    return f"{word}={value}" if value and not re.fullmatch(pattern, after) else word
 
 
 class _EachOnce(typer.core.TyperCommand):
@@ -160,8 +161,9 @@ class _EachOnce(typer.core.TyperCommand):
 
 @cache
 def _loaded(name: str) -> Any:
-    module, example = COMMANDS[name]
-    does = importlib.import_module(f"rockcheck.commands.{module}").run
+    where, example = COMMANDS[name]
+    module, _, function = where.partition(".")
+    does = getattr(importlib.import_module(f"rockcheck.commands.{module}"), function or "run")
     alone = typer.Typer(rich_markup_mode=None, add_completion=False)
     alone.command(name=name, cls=_EachOnce, epilog=f"Example: {example}")(
         spoken(does, timed=name not in AT_ONCE)

@@ -65,9 +65,9 @@ def test_the_front_picture():
 
 
 def test_the_tutorials_bookcase(tmp_path):
-    from rockcheck.commands.new import run
+    from rockcheck.commands.scenes import new
 
-    run(tmp_path / "bookcase.toml")
+    new(tmp_path / "bookcase.toml")
     scene = load_scene(tmp_path / "bookcase.toml")
     reference = UNILATERAL.simulate(scene)
     assert rounded(reference.peak_rotation / reference.alpha, 2) == 0.72

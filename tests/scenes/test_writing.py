@@ -96,7 +96,7 @@ DOORS = {
         "reports/style.py",
     }
     | {"reports/show/drawing.py"},
-    r"\.open\(|\bopen\(": {"scenes/reading.py", "scenes/writing.py", "validation/suite/changes.py"},
+    r"\.open\(|\bopen\(": {"scenes/reading.py", "scenes/writing.py", "validation/suite/across.py"},
     # Results go through `writing.made`; caches of the user's own lie in folders of mode 0700.
     r"\.mkdir\(": {
         "scenes/writing.py",
@@ -108,8 +108,8 @@ DOORS = {
         "scenes/experience.py",
         "validation/execute/provenance.py",
     }
-    | {"commands/new.py", "validation/studies/work_precision/timings.py", "reports/site.py"}
-    | {"reports/style.py", "reports/pages.py", "validation/paper/measures.py"}
+    | {"commands/scenes.py", "validation/studies/work_precision/timings.py", "reports/site.py"}
+    | {"reports/style.py", "reports/document.py", "validation/paper/measures.py"}
     | {"validation/studies/conformance/study.py"},
 }
 

@@ -28,8 +28,7 @@ from rockcheck.validation.finding import (
     text,
 )
 from rockcheck.validation.studies.population.runs import Played, Ran, Side, Sure
-from rockcheck.validation.uncertainty.population import share_of
-from rockcheck.validation.uncertainty.tables import inputs_blocks, quantities_of
+from rockcheck.validation.uncertainty.population import inputs_blocks, quantities_of, share_of
 
 #: What the other law of impacts is called among the models.
 LAW = "impact law"
