@@ -149,8 +149,17 @@ def strips(plot: Plot) -> Figure:
     from matplotlib.figure import Figure
 
     with figure_style():
-        figure = Figure(figsize=(PAGE, 0.5 * len(plot.data) + 0.1), layout="constrained")
+        # Margins in inches: a layout engine would need longer than the drawing.
+        height, row = 0.5 * len(plot.data) + 0.1, 0.5
+        figure = Figure(figsize=(PAGE, height))
         rows = figure.subplots(len(plot.data), 1, squeeze=False)[:, 0]
+        figure.subplots_adjust(
+            1.25 / PAGE,
+            0.24 / height,
+            1.0 - 0.12 / PAGE,
+            1.0 - 0.06 / height,
+            hspace=row / 0.26 - 1.0,
+        )
         for ax, one in zip(rows, plot.data, strict=True):
             values = np.sort(np.array(one["values"], dtype=float))
             low, median, high = np.quantile(values, (0.16, 0.5, 0.84))

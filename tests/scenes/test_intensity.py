@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rockcheck.scenes.recordings import intensity
+from rockcheck.scenes.recordings.oscillator import largest_response
 from rockcheck.scenes.recordings.recording import Recording
 
 G = 9.80665
@@ -58,6 +59,21 @@ def test_a_base_that_is_set_in_motion_overshoots_as_its_damping_lets_it(damping)
     peak = 1.0 + math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2))
     found = intensity.spectral_acceleration(step, 0.5, damping)
     assert found == pytest.approx(peak / G, rel=1e-4)
+
+
+@pytest.mark.parametrize("period", [0.05, 0.4, 3.0])
+def test_the_oscillator_is_that_of_scipys_first_order_hold(period):
+    from scipy.signal import cont2discrete, lfilter
+
+    samples, parts = np.random.default_rng(3).normal(size=40), 2
+    step, rate, damping, tail = 0.01, math.tau / period, 0.1, 30
+    above, below, _ = cont2discrete(
+        ([rate**2], [1.0, 2.0 * damping * rate, rate**2]), step, method="foh"
+    )
+    ground = np.interp(np.arange(39 * parts + 1) / parts, np.arange(40), samples)
+    response = lfilter(np.ravel(above), below, np.r_[ground, np.zeros(tail)])
+    found = largest_response(samples, parts, tail, step, rate, damping)
+    assert found == pytest.approx(np.max(np.abs(response)), rel=1e-9)
 
 
 def test_periods_of_a_spectrum_leave_no_wide_gap():

@@ -147,10 +147,28 @@ def test_the_estimates_have_a_value_for_a_block_so_wide_that_it_does_not_rebound
     pulse = Sine(amplitude=30.0, period=1.0, cycles=2)
     scene, _ = played(1.6, 1.0, pulse, friction=0.4, duration=4.0)
     base = criteria.base_of(scene)
-    for criterion in criteria.CRITERIA:
-        happens, motion = criterion.says(scene, base)
-        assert happens in (True, False)
-        assert motion is None or motion >= 0.0
+    assert criteria.reserve_rocking(scene, base) > 0.0
+    estimates = [criterion.says(scene, base)[1] for criterion in criteria.CRITERIA]
+    assert all(estimate is None or estimate >= 0.0 for estimate in estimates)
+
+
+@pytest.mark.parametrize("factor", [0.6, 1.0, 1.4])
+def test_the_rocking_estimate_is_the_angle_whose_capacity_is_the_demand(shaken, factor):
+    """Written out: frequency and damping by the formulas, the demand by the spectrum."""
+    scene = shaken[0].replace(excitation=shaken[0].excitation.scaled(factor))
+    base, block = criteria.base_of(scene), scene.block
+    a, h = block.half_width / block.half_height, block.half_height
+    inertia = 4.0 / 3.0 * (1.0 + a**2)
+    loss = -2.0 * math.log(1.0 - 2.0 * a**2 / inertia)
+    damping = loss / math.sqrt(4.0 * math.pi**2 + loss**2)
+
+    def holds(angle):
+        work = math.cos(angle) + a * math.sin(angle) - 1.0
+        hertz = math.sqrt(2.0 * scene.gravity * work / (inertia * angle**2 * h)) / math.tau
+        return 2.0 * scene.gravity * work / angle >= base.spectral(hertz, damping)
+
+    expected = next(filter(holds, block.alpha * np.arange(1, 21) / 20), math.inf)
+    assert criteria.reserve_rocking(scene, base) == pytest.approx(expected)
 
 
 def test_a_base_at_rest_moves_nothing():
