@@ -49,7 +49,7 @@ COMMANDS = {
     "warm": ("warm", "rockcheck warm"),
 }
 
-#: What to call in place of a command that is gone.
+#: What to call in place of a command or an option that is gone.
 GONE = {
     "run": "rockcheck validate SCENE",
     "diff": "rockcheck compare RUN_A RUN_B",
@@ -58,6 +58,8 @@ GONE = {
     "calibrate": "rockcheck conformance --tune E",
     "uncertainty": "rockcheck assess SCENE",
     "ida": "rockcheck assess SCENE RECORDS --levels pga:0.05:2:40",
+    "compare --offset": "--align SECONDS",
+    "conformance --settings": "--set settings=best, default or both",
 }
 #: Commands that are not listed.
 HIDDEN = ("warm",)
@@ -147,7 +149,11 @@ class _EachOnce(typer.core.TyperCommand):
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        if any(name in BARE for parameter in self.params for name in parameter.opts):
+        for word in args:
+            named = word.partition("=")[0]
+            if instead := GONE.get(f"{ctx.info_name} {named}"):
+                raise InputError(f"is gone: {instead}", named)
+        if any(name in BARE for one in self.params for name in one.opts):
             args = [_with_value(*pair) for pair in itertools.pairwise([*args, ""])]
         _, _, order = self.make_parser(ctx).parse_args(args=list(args))
         for option in order:

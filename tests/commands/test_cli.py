@@ -49,6 +49,8 @@ def write(name, text):
         ),
         (["compare", "gone.csv", "gone.csv"], "gone.csv: cannot be read"),
         (["compare", "scene.toml", "scene.toml"], "scene.toml"),
+        (["compare", "a.csv", "b.csv", "--offset=1"], "--offset: is gone: --align SECONDS"),
+        (["conformance", "--settings", "best"], "--settings: is gone: --set settings=best"),
         (["report", "."], "no finished run here"),
         ([], "Missing command"),
     ],
