@@ -280,15 +280,20 @@ def node_scene(
             block=scene.block.scaled(float(frequency_ratio)),
             duration=max(scene.excitation.quiet_after, scene.vertical.quiet_after) + settle,
         )
-    tan_alpha = scene.block.slope
-    amplitude = float(amplitude_ratio) * scene.gravity * tan_alpha
-    period = 2.0 * math.pi / (float(frequency_ratio) * scene.frequency_parameter)
+    amplitude, period = node_pulse(scene, amplitude_ratio, frequency_ratio)
     pulse = type(scene.excitation)(
         **scene.excitation.model_dump() | {"amplitude": amplitude, "period": period}
     )
     return scene.replace(
         excitation=pulse, duration=max(pulse.quiet_after, scene.vertical.quiet_after) + settle
     )
+
+
+def node_pulse(scene: Scene, amplitude_ratio: float, frequency_ratio: float) -> tuple[float, float]:
+    """Amplitude (m/s^2) and period (s) of the pulse of one node: a = A g tan(alpha), T = 2 pi/(F p)
+    with the frequency parameter p."""
+    amplitude = float(amplitude_ratio) * scene.gravity * scene.block.slope
+    return amplitude, 2.0 * math.pi / (float(frequency_ratio) * scene.frequency_parameter)
 
 
 def check_excitation(scene: Scene) -> None:

@@ -12,33 +12,24 @@ step to step, that change corrects the drift, which is then of third order.
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rockcheck.engines.base_motion import BaseMotion
+from rockcheck.engines.base_motion import BaseMotion, FloatArray
 from rockcheck.engines.contacts import contacts_of
 from rockcheck.scenes import ModelFailure, Scene, kinematics
 from rockcheck.scenes.progress import tell
 
-FloatArray = NDArray[np.float64]
 Vector = tuple[float, float, float]  # along x, y and theta
 #: Rows of the march for which there is room at first.
 _ROOM = 8192
 
 
-class Push(Protocol):
-    """An engine as a map of velocities."""
-
-    def __call__(
-        self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool
-    ) -> Vector:
-        """Velocity of the block after `dt` s with the felt acceleration in m/s^2 and the contacts
-        closed at `pose`.
-
-        Contacts take their restitution only where `bouncing`; otherwise they stop what approaches.
-        """
+#: An engine as a map of velocities: that of the block after a step, from pose and velocity before
+#: it, its length (s) and the felt acceleration (m/s^2), with the contacts closed at that pose. They
+#: take their restitution only where the last argument says so; otherwise they stop what approaches.
+Push = Callable[[Vector, Vector, float, tuple[float, float], bool], Vector]
 
 
 def march_adaptively(

@@ -7,12 +7,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.scenes import Record, Rest, Scene
-from rockcheck.scenes.excitations import Ricker, Sine
+from rockcheck.scenes.excitations import FloatArray, Ricker, Sine
 
-FloatArray = NDArray[np.float64]
 SAMPLES_A_PERIOD = 1000  # of a pulse: a cubic spline through them is good to 1e-11 of its amplitude
 
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from rockcheck.engines.contacts import surfaces_of
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.world import Placed, State, World
+from rockcheck.engines.world import State, World
 from rockcheck.scenes import Scene
 
 SLAB, REACH = 10.0, 50.0  # half the thickness and half the extent of floor and walls
@@ -48,9 +48,7 @@ class _Box2DWorld(World):
         material = self.box2d.surface_material(friction=friction, restitution=restitution)
         return self.box2d.shape_def(material=material)
 
-    def place(self, state: Placed) -> None:
-        """Put the block where `state` says, in single precision."""
-        x, y, theta, vx, vy, w = map(float, state)
+    def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
         self.turned.c, self.turned.s = math.cos(theta), math.sin(theta)
         self.body.set_transform((x, y), self.turned)
         self.body.linear_velocity, self.body.angular_velocity = (vx, vy), w
@@ -60,14 +58,13 @@ class _Box2DWorld(World):
         self.world.step(dt, SUBSTEPS)
 
     def state(self) -> State:
-        """Where the block is; its own angle is an approximation."""
         body = self.body
         (x, y), (vx, vy), turned = body.position, body.linear_velocity, body.rotation
+        # The body's own angle is an approximation.
         return x, y, math.atan2(turned.s, turned.c), vx, vy, body.angular_velocity
 
     def close(self) -> None:
-        """Give the world back, of which Box2D holds few."""
-        self.world.destroy()
+        self.world.destroy()  # Box2D holds few of them
 
 
 class _RigidBox2DWorld(_Box2DWorld):

@@ -1,7 +1,7 @@
 """Which corners of the block can touch which surface of a scene, and the kinematics of those
 contacts.
 
-All methods take scalars or arrays, SI units, relative to the base, counterclockwise positive.
+All functions take scalars or arrays, SI units, relative to the base, counterclockwise positive.
 """
 
 from __future__ import annotations
@@ -42,32 +42,21 @@ class Contact(Surface):
 
     corner: Point  # from the mass's centre, in the block's own frame, m
 
-    def arm(self, cos: Any, sin: Any) -> Arm:
-        """From the mass's centre to the corner of the block turned by theta, given its cosine and
-        sine: right, up, m."""
-        return arm_of(*self.corner, cos, sin)
-
-    def gap(self, x: Any, y: Any, arm: Arm) -> Any:
-        """Clear distance between corner and surface, m; negative is a penetration."""
-        return gap_of(*self.normal, self.distance, x, y, arm)
-
-    def rate(self, x_dot: Any, y_dot: Any, theta_dot: Any, arm: Arm) -> Any:
-        """The gap's rate, m/s."""
-        return rate_of(*self.normal, x_dot, y_dot, theta_dot, arm)
-
 
 def arm_of(bx: Any, bz: Any, cos: Any, sin: Any) -> Arm:
-    """`Contact.arm` of the corner (bx, bz)."""
+    """From the mass's centre to the corner (bx, bz) of the block turned by theta, given its cosine
+    and sine: right, up, m."""
     return bx * cos - bz * sin, bx * sin + bz * cos
 
 
 def gap_of(nx: Any, nz: Any, distance: Any, x: Any, y: Any, arm: Arm) -> Any:
-    """`Contact.gap` of a surface with the normal (nx, nz)."""
+    """Clear distance between a corner and a surface with the normal (nx, nz), m; negative is a
+    penetration."""
     return nx * (x + arm[0]) + nz * (y + arm[1]) + distance
 
 
 def rate_of(nx: Any, nz: Any, x_dot: Any, y_dot: Any, theta_dot: Any, arm: Arm) -> Any:
-    """`Contact.rate` of a surface with the normal (nx, nz)."""
+    """The rate of the gap to a surface with the normal (nx, nz), m/s."""
     return nx * (x_dot - theta_dot * arm[1]) + nz * (y_dot + theta_dot * arm[0])
 
 

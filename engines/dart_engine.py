@@ -10,7 +10,7 @@ import numpy as np
 from rockcheck.engines.contacts import Surface, surfaces_of
 from rockcheck.engines.engine import Engine
 from rockcheck.engines.steps import AdaptiveStep
-from rockcheck.engines.world import Placed, State, World
+from rockcheck.engines.world import State, World
 from rockcheck.scenes import Scene
 
 SLAB = 10.0  # half the thickness of floor and walls
@@ -61,7 +61,6 @@ class _DartWorld(World):
         return contact
 
     def _slab(self, surface: Surface, scale: float) -> None:
-        """A thick box behind a surface."""
         slab = self.dart.dynamics.Skeleton(surface.surface)
         joint, body = slab.createWeldJointAndBodyNodePair()
         x, z = surface.behind(SLAB)
@@ -72,9 +71,9 @@ class _DartWorld(World):
         self._box(body, size, surface.friction, surface.restitution)
         self.world.addSkeleton(slab)
 
-    def place(self, state: Placed) -> None:
-        self.block.setPositions(self.scale * state[:3])
-        self.block.setVelocities(self.scale * state[3:])
+    def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
+        self.block.setPositions(self.scale * (x, y, theta))
+        self.block.setVelocities(self.scale * (vx, vy, w))
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
         if dt != self.dt:

@@ -11,19 +11,16 @@ import numpy as np
 
 from rockcheck.engines.contacts import corners_of, surfaces_of
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.world import Placed, State, World
-from rockcheck.scenes import Floor, ModelFailure, Scene, kinematics
+from rockcheck.engines.world import State, World
+from rockcheck.scenes import Floor, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
 
 CORNER_RADIUS = 1e-5  # of the block's radius
 STIFFNESS = 2e8  # of each of two bodies in contact, N/m for a block of 1 kg and R = 1 m
-DISSIPATION = (
-    1e4  # of Hunt and Crossley, s/m: nothing bounces, and an impact is over within its step
-)
-STICTION, COARSEST_STICTION = (
-    1e-7,
-    1e-3,
-)  # m/s: slower slip counts as none; at 1e-8 the solver often fails
+#: Of Hunt and Crossley, s/m: nothing bounces, and an impact is over within its step.
+DISSIPATION = 1e4
+#: m/s: slower slip counts as none; at 1e-8 the solver often fails.
+STICTION, COARSEST_STICTION = 1e-7, 1e-3
 IMPACT_STEPS = 40  # in which an impact can bounce
 SLAB, REACH = 20.0, 600.0  # thickness and extent of floor and walls
 
@@ -33,15 +30,16 @@ class _DrakeWorld(World):
     the step is known."""
 
     def __init__(self, scene: Scene) -> None:
-        self.scene, self.dt = scene, 0.0
-        self.start: Placed = tuple(
-            kinematics.of_mass(scene.block, np.array(scene.initial_state)).tolist()
-        )
+        from pydrake import geometry, math
+        from pydrake.multibody import plant
 
-    def place(self, state: Placed) -> None:
-        self.start = state
+        self.scene, self.dt, self.start = scene, 0.0, np.zeros(6)
+        self.geometry, self.contacts, self.math = geometry, plant, math
+
+    def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
+        self.start = np.array([x, y, theta, vx, vy, w])
         if self.dt:
-            self.plant.SetPositionsAndVelocities(self.context, np.asarray(state))
+            self.plant.SetPositionsAndVelocities(self.context, self.start)
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
         if not self.dt:
@@ -54,7 +52,6 @@ class _DrakeWorld(World):
             self.step_unsolved(felt, dt, ModelFailure(f"Drake: {printable(error, 200)}"))
 
     def step_unsolved(self, felt: tuple[float, float], dt: float, failure: ModelFailure) -> None:
-        """What to do about a step that Drake's solver did not solve."""
         raise failure
 
     def state(self) -> State:
@@ -62,65 +59,52 @@ class _DrakeWorld(World):
         return state
 
     def _make(self, dt: float) -> None:
-        from pydrake.math import RigidTransform, RotationMatrix
-        from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
-        from pydrake.multibody.tree import (
-            FixedOffsetFrame,
-            PlanarJoint,
-            SpatialInertia,
-            UnitInertia,
-        )
-        from pydrake.systems.analysis import Simulator
-        from pydrake.systems.framework import DiagramBuilder
+        from pydrake.multibody import tree
+        from pydrake.systems import analysis, framework
 
         self.dt, self.steps = dt, 0
-        builder = DiagramBuilder()
-        self.plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=dt)
+        builder = framework.DiagramBuilder()
+        self.plant, _ = self.contacts.AddMultibodyPlantSceneGraph(builder, time_step=dt)
         self.plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
-        inertia = self.scene.block.gyration_squared
-        body = self.plant.AddRigidBody(
-            "block", SpatialInertia(1.0, np.zeros(3), UnitInertia(inertia, inertia, inertia))
-        )
+        inertia = tree.UnitInertia(*[self.scene.block.gyration_squared] * 3)
+        body = self.plant.AddRigidBody("block", tree.SpatialInertia(1.0, np.zeros(3), inertia))
         # The joint's plane is its frame's x and y: to the right and up.
-        upright = RigidTransform(
-            RotationMatrix([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-        )
-        ends = {
-            "plane of the world": self.plant.world_frame(),
-            "plane of the block": body.body_frame(),
-        }
+        turned = self.math.RotationMatrix([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
         frames = [
-            self.plant.AddFrame(FixedOffsetFrame(name, frame, upright))
-            for name, frame in ends.items()
+            self.plant.AddFrame(
+                tree.FixedOffsetFrame(name, frame, self.math.RigidTransform(turned))
+            )
+            for name, frame in (
+                ("plane of the world", self.plant.world_frame()),
+                ("plane of the block", body.body_frame()),
+            )
         ]
-        self.plant.AddJoint(PlanarJoint("plane", *frames, np.zeros(3)))
+        self.plant.AddJoint(tree.PlanarJoint("plane", *frames, np.zeros(3)))
         self.shape(body)
         self.plant.Finalize()
-        diagram = builder.Build()
-        self.simulator = Simulator(diagram)
+        self.simulator = analysis.Simulator(builder.Build())
         self.context = self.plant.GetMyMutableContextFromRoot(self.simulator.get_mutable_context())
-        port = self.plant.get_applied_generalized_force_input_port()
-        self.force = port.FixValue(self.context, np.zeros(3)).GetMutableData()
-        self.plant.SetPositionsAndVelocities(self.context, np.asarray(self.start))
+        self.force = (
+            self.plant.get_applied_generalized_force_input_port()
+            .FixValue(self.context, np.zeros(3))
+            .GetMutableData()
+        )
+        self.plant.SetPositionsAndVelocities(self.context, self.start)
         self.simulator.Initialize()
 
     def shape(self, body: Any) -> None:
-        from pydrake.geometry import Box, HalfSpace
-        from pydrake.math import RigidTransform
-        from pydrake.multibody.plant import CoulombFriction
-
-        b, h = self.scene.block.half_width, self.scene.block.half_height
+        block, (dx, dz) = self.scene.block, self.scene.block.offset
+        b, h, mu = block.half_width, block.half_height, self.scene.floor.friction
         add, world = self.plant.RegisterCollisionGeometry, self.plant.world_body()
-        (dx, dz), mu = self.scene.block.offset, self.scene.floor.friction
-        box, place = Box(2.0 * b, 2.0 * b, 2.0 * h), RigidTransform([-dx, 0.0, -dz])
-        add(body, place, box, "box", CoulombFriction(mu, mu))
+        friction, half_space = self.contacts.CoulombFriction, self.geometry.HalfSpace
+        box = self.geometry.Box(2.0 * b, 2.0 * b, 2.0 * h)
+        add(body, self.math.RigidTransform([-dx, 0.0, -dz]), box, "box", friction(mu, mu))
         # It would warn that half-spaces do not meet deformable bodies.
         logging.getLogger("drake").setLevel(logging.ERROR)
         for surface in surfaces_of(self.scene):
             (nx, nz), (x, z), rough = surface.normal, surface.behind(0.0), surface.friction
-            place = HalfSpace.MakePose([nx, 0.0, nz], [x, 0.0, z])
-            friction = CoulombFriction(rough, rough)
-            add(world, place, HalfSpace(), surface.surface, friction)
+            pose = half_space.MakePose([nx, 0.0, nz], [x, 0.0, z])
+            add(world, pose, half_space(), surface.surface, friction(rough, rough))
 
 
 class _RigidDrakeWorld(_DrakeWorld):
@@ -146,44 +130,37 @@ class _RigidDrakeWorld(_DrakeWorld):
             self.coarser = _RigidDrakeWorld(
                 self.scene, self.stiffness, self.dissipation, 10.0 * self.stiction
             )
-        self.coarser.place(self.state())
+        self.coarser.place(*self.state())
         self.coarser.step(felt, dt)
-        self.place(self.coarser.state())
+        self.place(*self.coarser.state())
         self.simulator.get_mutable_context().SetTime(self.steps * dt)
         self.simulator.Initialize()
 
     def shape(self, body: Any) -> None:
-        from pydrake.geometry import AddContactMaterial, Box, ProximityProperties, Sphere
-        from pydrake.math import RigidTransform
-        from pydrake.multibody.plant import CoulombFriction, DiscreteContactApproximation
-
-        plant, scene = self.plant, self.scene
+        plant, geometry, contacts = self.plant, self.geometry, self.contacts
         # SAP's and the lagged approximations' friction is convex: what slides lifts off, whatever
         # the step.
-        plant.set_discrete_contact_approximation(DiscreteContactApproximation.kTamsi)
-
+        plant.set_discrete_contact_approximation(contacts.DiscreteContactApproximation.kTamsi)
         plant.set_stiction_tolerance(self.stiction)
 
         def material(mu: float) -> Any:
-            properties = ProximityProperties()
-            friction = CoulombFriction(mu, mu)
-            AddContactMaterial(
+            properties = geometry.ProximityProperties()
+            geometry.AddContactMaterial(
                 dissipation=self.dissipation,
                 point_stiffness=self.stiffness,
-                friction=friction,
+                friction=contacts.CoulombFriction(mu, mu),
                 properties=properties,
             )
             return properties
 
         add, world = plant.RegisterCollisionGeometry, plant.world_body()
-        rough = material(scene.floor.friction)
-        for n, (bx, bz) in enumerate(corners_of(scene)):
-            place = RigidTransform([bx, 0.0, bz])
-            add(body, place, Sphere(CORNER_RADIUS), f"corner {n}", rough)
-        for surface in surfaces_of(scene):
+        rough, point = material(self.scene.floor.friction), geometry.Sphere(CORNER_RADIUS)
+        for n, (bx, bz) in enumerate(corners_of(self.scene)):
+            add(body, self.math.RigidTransform([bx, 0.0, bz]), point, f"corner {n}", rough)
+        for surface in surfaces_of(self.scene):
             x, z = surface.behind(CORNER_RADIUS + 0.5 * SLAB)
-            box, place = Box(*surface.extent(SLAB, REACH)), RigidTransform([x, 0.0, z])
-            add(world, place, box, surface.surface, material(surface.friction))
+            slab, rough = geometry.Box(*surface.extent(SLAB, REACH)), material(surface.friction)
+            add(world, self.math.RigidTransform([x, 0.0, z]), slab, surface.surface, rough)
 
 
 class Drake(Engine):
@@ -200,9 +177,8 @@ class Drake(Engine):
     def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
         """Corners on slabs, so soft that an impact lasts for some steps, with `restitution` as Hunt
         and Crossley's dissipation."""
-        floor = Floor(friction=parameters["friction"])
         return _RigidDrakeWorld(
-            scene.replace(floor=floor),
+            scene.replace(floor=Floor(friction=parameters["friction"])),
             self.tuned(step)["stiffness"],
             parameters["restitution"],
             stiction=1e-4,

@@ -9,12 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.engines.contacts import Contact
-from rockcheck.engines.marching import LYING
+from rockcheck.engines.contacts import Contact, arm_of, gap_of, rate_of
+from rockcheck.engines.marching import LYING, FloatArray
 from rockcheck.scenes import Event, Scene, kinematics
 from rockcheck.scenes.observation import STATE, modes_of
 
-FloatArray = NDArray[np.float64]
 # s: shorter openings of a contact are the engine's chatter, and an impulse is summed over this time
 HOLD = 2e-3
 REST = 20e-3  # s: a shorter rest is the dead centre of a last tiny rocking
@@ -121,8 +120,8 @@ class _Motion:
     def gap(self, contact: Contact, rows: slice = slice(None)) -> FloatArray:
         """Gaps of a contact at step ends, m."""
         x, y, theta = self.states[rows, :3].T
-        gap: FloatArray = contact.gap(x, y, contact.arm(np.cos(theta), np.sin(theta)))
-        return gap
+        arm = arm_of(*contact.corner, np.cos(theta), np.sin(theta))
+        return np.asarray(gap_of(*contact.normal, contact.distance, x, y, arm))
 
     def closed(self, contact: Contact) -> NDArray[np.bool_]:
         """Whether the contact is closed at each step end, openings of less than 2 ms left out."""
@@ -159,8 +158,8 @@ class _Motion:
         columns, owners = [], []
         for other in self.contacts:
             if other is contact or np.any(self.gap(other, slice(first, last + 1)) < self.near):
-                arm = other.arm(cos, sin)
-                normal = other.rate(along_x, along_y, turning, arm)
+                arm = arm_of(*other.corner, cos, sin)
+                normal = rate_of(*other.normal, along_x, along_y, turning, arm)
                 friction = (
                     self.scene.floor.friction * (along_x - arm[1] * turning)
                     if other.surface == "floor"
@@ -189,12 +188,10 @@ class _Motion:
 
 
 def _rises(flags: NDArray[np.bool_]) -> list[int]:
-    """Indices at which a flag is set that was not set one earlier."""
     return [int(i) for i in np.flatnonzero(flags[1:] & ~flags[:-1]) + 1]
 
 
 def _falls(flags: NDArray[np.bool_]) -> list[int]:
-    """Indices at which a flag is not set that was set one earlier."""
     return _rises(~flags)
 
 

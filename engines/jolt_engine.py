@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from rockcheck.engines.contacts import Point, surfaces_of
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.world import Placed, State, World
+from rockcheck.engines.world import State, World
 from rockcheck.scenes import InputError, Scene
 
 SLAB, REACH = 10.0, 50.0  # half the thickness and half the extent of floor and walls
@@ -48,8 +48,7 @@ class _JoltWorld(World):
         )
         return made
 
-    def place(self, state: Placed) -> None:
-        x, y, theta, vx, vy, w = map(float, state)
+    def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
         s = self.scale
         turn = (0.0, 0.0, math.sin(0.5 * theta), math.cos(0.5 * theta))
         self.world.set_transform(self.body, (s * x, s * y, 0.0), turn)
@@ -75,8 +74,7 @@ class _RigidJoltWorld(_JoltWorld):
         super().__init__(scene, SCALE, planar=True)
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
-        """One step. Jolt makes (v + g dt) (1 - c dt) of a velocity v."""
-        kept = 1.0 - DAMPING * dt
+        kept = 1.0 - DAMPING * dt  # Jolt makes (v + g dt) (1 - c dt) of a velocity v
         world, body = self.world, self.body
         (vx, vy, _), (_, _, w) = world.get_velocity(body), world.get_angular_velocity(body)
         world.set_linear_velocity(body, vx / kept, vy / kept, 0.0)

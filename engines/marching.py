@@ -6,23 +6,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rockcheck.engines.world import World
-from rockcheck.scenes import (
-    Block,
-    ModelFailure,
-    Record,
-    Rest,
-    Ricker,
-    Scene,
-    Sine,
-    Wall,
-    kinematics,
-)
+from rockcheck.engines.world import FloatArray, World
+from rockcheck.scenes import Block, ModelFailure, Scene, kinematics
 from rockcheck.scenes.progress import tell
 
-FloatArray = NDArray[np.float64]
 Marched = tuple[
     FloatArray, FloatArray, FloatArray
 ]  # times (n) and states (n, 6) at step ends, felt accelerations (n-1, 2)
@@ -35,32 +23,22 @@ BLOWN_UP = 1e6  # m, rad, m/s or rad/s: no scene comes near it
 def in_units_of(length: float, scene: Scene) -> Scene:
     """The scene with all lengths in units of `length` m, so that the absolute tolerances of an
     engine fit any block."""
-
-    def rescaled(excitation: Rest | Ricker | Sine | Record) -> Rest | Ricker | Sine | Record:
-        return excitation.scaled(1.0 / length)
-
+    block, (dx, dz) = scene.block, scene.block.offset
     return scene.replace(
-        block=_rescaled(scene.block, length),
-        walls=tuple(
-            Wall(side=wall.side, gap=wall.gap / length, restitution=wall.restitution)
-            for wall in scene.walls
+        block=Block(  # of 1 kg
+            half_width=block.half_width / length,
+            half_height=block.half_height / length,
+            centre_of_mass=(dx / length, dz / length),
+            moment_of_inertia=None
+            if block.moment_of_inertia is None
+            else block.gyration_squared / length**2,
         ),
-        excitation=rescaled(scene.excitation),
-        vertical=rescaled(scene.vertical),
+        walls=tuple(wall.replace(gap=wall.gap / length) for wall in scene.walls),
+        excitation=scene.excitation.scaled(1.0 / length),
+        vertical=scene.vertical.scaled(1.0 / length),
         initial_velocity=scene.initial_velocity / length,
         initial_height=scene.initial_height / length,
         gravity=scene.gravity / length,
-    )
-
-
-def _rescaled(block: Block, length: float) -> Block:
-    """The block of 1 kg with all lengths in units of `length` m."""
-    offset, inertia = block.centre_of_mass, block.moment_of_inertia
-    return Block(
-        half_width=block.half_width / length,
-        half_height=block.half_height / length,
-        centre_of_mass=None if offset is None else (offset[0] / length, offset[1] / length),
-        moment_of_inertia=None if inertia is None else block.gyration_squared / length**2,
     )
 
 
@@ -72,7 +50,7 @@ def march_fixed(world: World, scene: Scene, times: FloatArray, felt: FloatArray)
     """
     dt = float(times[1]) if len(times) > 1 else 0.0
     pieces = [kinematics.of_mass(scene.block, np.array(scene.initial_state))[None, :]]
-    world.place(pieces[0][0])
+    world.place(*pieces[0][0].tolist())
     for first in range(0, len(felt), STEPS_AT_ONCE):
         tell(first, len(felt))
         states = world.march(felt[first : first + STEPS_AT_ONCE], dt)

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.engines.adaptive import Vector
-from rockcheck.engines.contacts import Contact, Surface, contacts_of, corners_of, surfaces_of
+from rockcheck.engines.contacts import Contact, contacts_of, corners_of, surfaces_of
 from rockcheck.engines.engine import Engine
-from rockcheck.engines.world import Placed, State, World
-from rockcheck.scenes import ModelFailure, Scene
-from rockcheck.scenes.errors import printable
+from rockcheck.engines.mujoco_world import FloatArray, MuJoCoWorld, model_of, plane_of, stock_model
+from rockcheck.engines.world import World
+from rockcheck.scenes import Floor, Scene
 
-FloatArray = NDArray[np.float64]
 # of the block's radius; contacts are points, and MuJoCo has no contact of a point with a plane
 CORNER_RADIUS = 1e-8
 PUSHED_OUT = 0.01  # share of a penetration that one step removes
-IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 1.0)
+IMPEDANCE = 0.9999  # share of an impact that a contact takes up
+SOLIMP = f'solimp="{IMPEDANCE!r} {IMPEDANCE!r} 0.001 0.5 1.0"'
 # inverse regularisation of a contact, kg, where MuJoCo gives at most 1.5e4 to a block of 1 kg
 RIGID = 1e7
 # block radii per second: how well a slip rate has to be known for the correction of the cone
@@ -28,58 +27,7 @@ FLATTEST = -0.05  # slope that the secant method trusts
 MOST_CORRECTIONS = 20
 
 
-class _MuJoCoWorld(World):
-    """A compiled model with its data, stepped by Euler's method."""
-
-    def __init__(self, model_text: str) -> None:
-        import mujoco
-
-        self.mujoco: Any = mujoco
-        # MuJoCo would print its warnings and keep a log of them in the working directory.
-        self.warnings: list[str] = []
-        self.former_handler = mujoco.get_mju_user_warning()
-        mujoco.set_mju_user_warning(self.warnings.append)
-        self.model: Any = mujoco.MjModel.from_xml_string(model_text)
-        self.data: Any = mujoco.MjData(self.model)
-        # Views of the data, which are dear to make anew in each step.
-        self.qpos, self.qvel, self.qacc = self.data.qpos, self.data.qvel, self.data.qacc
-        self.force = self.data.qfrc_applied[:2]
-        self.dt = 0.0
-
-    def place(self, state: Placed) -> None:
-        self.qpos[:] = state[:3]
-        self.qvel[:] = state[3:]
-
-    def step(self, felt: tuple[float, float], dt: float) -> None:
-        self.force[:] = felt
-        if dt != self.dt:
-            self.model.opt.timestep = self.dt = dt
-        self.mujoco.mj_step(self.model, self.data)
-
-    def state(self) -> State:
-        return (*self.qpos.tolist(), *self.qvel.tolist())
-
-    def march(self, felt: FloatArray, dt: float) -> FloatArray:
-        states = super().march(felt, dt)
-        self.check()
-        return states
-
-    def check(self) -> None:
-        """Raise `ModelFailure` if MuJoCo met a state or an acceleration that is huge or not
-        finite."""
-        if self.warnings:
-            kinds = self.mujoco.mjtWarning
-            bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
-            if any(self.data.warning[kind].number for kind in bad):
-                raise ModelFailure(f"MuJoCo: {printable(self.warnings[-1], 200)}")
-            self.warnings.clear()
-
-    def close(self) -> None:
-        """Leave the library as it was."""
-        self.mujoco.set_mju_user_warning(self.former_handler)
-
-
-class _RigidMuJoCoWorld(_MuJoCoWorld):
+class _RigidMuJoCoWorld(MuJoCoWorld):
     """Contacts that end a step with -e times the normal velocity they began it with, and Coulomb's
     cone if corrected."""
 
@@ -111,7 +59,7 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
         return super().march(felt, dt)
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
-        """One step; where a contact slips, it is done again with the corrected cone."""
+        # Where a contact slips, the step is done again with the corrected cone.
         before = self.qpos.tolist(), self.qvel.tolist()
         super().step(felt, dt)
         if self.friction > 0.0 and (rows := self._slipping_rows()):
@@ -129,7 +77,7 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
         self.qvel[:] = velocity
         self.force[:] = felt
         if (dt, bouncing) != self.tuned:
-            self.damping[:] = (self.bouncing if bouncing else self.stopping) * (IMPEDANCE[0] / dt)
+            self.damping[:] = (self.bouncing if bouncing else self.stopping) * (IMPEDANCE / dt)
             self.tuned = dt, bouncing
         self.mujoco.mj_step1(model, data)
         data.efc_D.fill(
@@ -183,40 +131,6 @@ class _RigidMuJoCoWorld(_MuJoCoWorld):
             last = now
 
 
-def _planar_body(scene: Scene, geoms: str, raised: float = 0.0) -> str:
-    """A body of unit mass that moves in the plane x, z and turns counterclockwise, its origin
-    `raised` m above that of the floor."""
-    inertia = scene.block.gyration_squared
-    return f"""
-<body pos="0 0 {raised!r}">
-  <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>\
-<joint type="hinge" axis="0 -1 0"/>
-  <inertial pos="0 0 0" mass="1" diaginertia="{inertia!r} {inertia!r} {inertia!r}"/>
-  {geoms}
-</body>"""
-
-
-def _model(world: str, settings: str = "") -> str:
-    return f'<mujoco><option gravity="0 0 0"/>{settings}<worldbody>{world}</worldbody></mujoco>'
-
-
-def _kind(friction: float) -> str:
-    """The attributes of a pair with that friction."""
-    return f'condim="3" friction="{friction!r} {friction!r} 0 0 0"' if friction else 'condim="1"'
-
-
-def _plane(surface: Surface, inset: float, attributes: str) -> str:
-    """The floor, or a wall `inset` m behind its surface.
-
-    The floor stays where it is and the block is raised instead: a plane nearer to the origin than
-    1e-6 m MuJoCo takes to be in it.
-    """
-    place = "" if surface.surface == "floor" else f'pos="{surface.behind(inset)[0]!r} 0 0" '
-    (nx, nz), name = surface.normal, surface.surface
-    axis = f'zaxis="{nx!r} 0 {nz!r}"'
-    return f'<geom name="{name}" type="plane" size="0 0 1" {place}{axis} {attributes}/>'
-
-
 def _point_contact_model(scene: Scene) -> str:
     """Corners as tiny spheres, and one contact pair for each contact that the scene can use, in
     their order."""
@@ -226,13 +140,13 @@ def _point_contact_model(scene: Scene) -> str:
         f'<geom name="{name}" type="sphere" size="{CORNER_RADIUS!r}" pos="{bx!r} 0 {bz!r}" {off}/>'
         for (bx, bz), name in corners.items()
     )
-    planes = "".join(_plane(surface, CORNER_RADIUS, off) for surface in surfaces_of(scene))
-    impedance = " ".join(map(repr, IMPEDANCE))
+    planes = "".join(plane_of(surface, CORNER_RADIUS, off) for surface in surfaces_of(scene))
     # A frictionless surface is a frictionless contact: MuJoCo would raise a coefficient of zero to
     # 1e-5.
+    frictionless, rough = 'condim="1"', 'condim="3" friction="{0!r} {0!r} 0 0 0"'
     pairs = "".join(
-        f'<pair geom1="{contact.surface}" geom2="{corners[contact.corner]}"'
-        f' solimp="{impedance}" {_kind(contact.friction)}/>'
+        f'<pair geom1="{contact.surface}" geom2="{corners[contact.corner]}" {SOLIMP}'
+        f" {rough.format(contact.friction) if contact.friction else frictionless}/>"
         for contact in contacts_of(scene)
     )
     # Without warm start Newton's method needs fewer iterations, and it does not get stuck on the
@@ -243,28 +157,7 @@ def _point_contact_model(scene: Scene) -> str:
 iterations="100" tolerance="1e-15"
   ls_tolerance="1e-6" ls_iterations="200"><flag island="disable" warmstart="disable"/></option>
 <contact>{pairs}</contact>"""
-    return _model(planes + _planar_body(scene, spheres, CORNER_RADIUS), settings)
-
-
-def _stock_model(scene: Scene, mu: float, settings: str = "") -> str:
-    """A box on a plane, beside planes; without `settings` with MuJoCo's default contact parameters,
-    solver and cone."""
-    block = scene.block
-    planes = "".join(
-        _plane(
-            surface,
-            0.0,
-            f'condim="3" friction="{mu!r} 0 0"' if surface.surface == "floor" else 'condim="1"',
-        )
-        for surface in surfaces_of(scene)
-    )
-    (dx, dz), size = (
-        block.offset,
-        f"{block.half_width!r} {block.half_width!r} {block.half_height!r}",
-    )
-    place = "" if block.centre_of_mass is None else f'pos="{-dx!r} 0 {-dz!r}" '
-    box = f'<geom type="box" {place}size="{size}" condim="1" friction="0 0 0"/>'
-    return _model(planes + _planar_body(scene, box), settings)
+    return model_of(scene, planes, spheres, settings, CORNER_RADIUS)
 
 
 class MuJoCo(Engine):
@@ -288,19 +181,15 @@ class MuJoCo(Engine):
 
     def stock_world(self, scene: Scene) -> World:
         """The scene as MuJoCo holds it: a box among planes."""
-        return _MuJoCoWorld(_stock_model(scene, scene.floor.friction))
+        return MuJoCoWorld(stock_model(scene))
 
     def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
         """A box on a plane whose contacts stop within a step, with `restitution` in steps of
         damping."""
-        friction, damping = parameters["friction"], parameters["restitution"] / step
-        impedance = " ".join(map(repr, IMPEDANCE))
-        solref = f"{-PUSHED_OUT / step**2!r} {-damping!r}"
-        settings = (
-            '<option cone="elliptic"/>'
-            f'<default><geom solref="{solref}" solimp="{impedance}"/></default>'
-        )
-        return _MuJoCoWorld(_stock_model(scene, friction, settings))
+        sliding = scene.model_copy(update={"floor": Floor(friction=parameters["friction"])})
+        solref = f"{-PUSHED_OUT / step**2!r} {-parameters['restitution'] / step!r}"
+        stops = f'<default><geom solref="{solref}" {SOLIMP}/></default>'
+        return MuJoCoWorld(stock_model(sliding, f'<option cone="elliptic"/>{stops}'))
 
     def tuned(self, step: float) -> dict[str, float]:
         """The share of a penetration that one step removes."""

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 
 from rockcheck.engines.contacts import Surface, corners_of, surfaces_of
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.world import Placed, State, World
+from rockcheck.engines.world import State, World
 from rockcheck.scenes import Scene
 
 CORNER_RADIUS = 1e-4  # of the block's radius; contacts are points
@@ -36,8 +36,7 @@ class _PhysXWorld(World):
             import sapien
             from sapien import physx
 
-        self.sapien: Any = sapien
-        self.physx: Any = physx
+        self.sapien, self.physx = sapien, physx
         for made, values in self.config.items():
             getattr(physx, f"set_{made}_config")(**values)
         self.world = sapien.Scene([physx.PhysxCpuSystem()])
@@ -74,19 +73,16 @@ class _PhysXWorld(World):
         self._entity(plane)
 
     def shape(self, scene: Scene, material: Any) -> None:
-        """A box, as deep as it is wide."""
         b, h, (dx, dz) = scene.block.half_width, scene.block.half_height, scene.block.offset
         box = self.physx.PhysxCollisionShapeBox([b, b, h], material)
         box.set_local_pose(self.sapien.Pose([-dx, 0.0, -dz]))
         self.body.attach(box)
 
-    def place(self, state: Placed) -> None:
-        """Put the block where `state` says, in single precision. The y axis points into the plane:
-        its angles are clockwise."""
-        x, z, theta, vx, vz, w = map(float, state)
+    # The y axis points into the plane: its angles are clockwise.
+    def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
         turn = [math.cos(0.5 * theta), 0.0, -math.sin(0.5 * theta), 0.0]
-        self.block.set_pose(self.sapien.Pose([x, 0.0, z], turn))
-        self.body.set_linear_velocity([vx, 0.0, vz])
+        self.block.set_pose(self.sapien.Pose([x, 0.0, y], turn))
+        self.body.set_linear_velocity([vx, 0.0, vy])
         self.body.set_angular_velocity([0.0, -w, 0.0])
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
@@ -113,8 +109,7 @@ class _RigidPhysXWorld(_PhysXWorld):
     shares = (0.0, 2.0)
 
     def shape(self, scene: Scene, material: Any) -> None:
-        """Tiny spheres at the corners, before and behind the plane."""
-        depth = scene.block.half_width
+        depth = scene.block.half_width  # before and behind the plane
         for bx, bz in corners_of(scene):
             for by in (-depth, depth):
                 corner = self.physx.PhysxCollisionShapeSphere(CORNER_RADIUS, material)

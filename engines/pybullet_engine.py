@@ -7,22 +7,19 @@ import os
 from functools import cache
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rockcheck.engines.adaptive import Vector
 from rockcheck.engines.contacts import Surface, contacts_of, corners_of, surfaces_of
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.world import Placed, State, World
+from rockcheck.engines.world import FloatArray, State, World
 from rockcheck.scenes import Scene
 
-FloatArray = NDArray[np.float64]
 # of the block's radius; contacts are points, and Bullet has no contact of a point with a plane
 CORNER_RADIUS = 1e-9
 SLAB = 10.0  # half the thickness, in m, of floor and walls as the engine comes
 REACH = 300.0  # half their extent
 # share of a penetration that one step removes; none where it would add to a bounce or make one
 FLOOR_ERP = 0.02
+ALOFT = 10.0  # block radii above the floor: where a block is made, away from all contacts
 
 
 @cache
@@ -37,11 +34,6 @@ def _bullet() -> Any:
         os.close(kept)
         os.close(nowhere)
     return pybullet
-
-
-def _aloft(scene: Scene) -> tuple[float, float, float]:
-    """Where a block is made, away from all contacts."""
-    return 0.0, 0.0, 10.0 * scene.block.radius
 
 
 class _PyBulletWorld(World):
@@ -73,7 +65,7 @@ class _PyBulletWorld(World):
             self.bullet.GEOM_BOX, halfExtents=half, **placed, **self.options
         )
         body: int = self.bullet.createMultiBody(
-            1.0, shape, basePosition=_aloft(scene), **self.options
+            1.0, shape, basePosition=[0.0, 0.0, ALOFT * scene.block.radius], **self.options
         )
         self.bullet.changeDynamics(body, -1, lateralFriction=1.0, restitution=1.0, **self.options)
         if not scene.block.homogeneous:  # of a plain box Bullet finds the inertia itself
@@ -89,16 +81,14 @@ class _PyBulletWorld(World):
             self.bullet.GEOM_BOX, halfExtents=surface.extent(SLAB, REACH), **self.options
         ), SLAB
 
-    def place(self, state: Placed) -> None:
-        """Put the block where `state` says. Bullet's y axis points into the plane: its angles are
-        clockwise."""
-        x, z, theta, vx, vz, w = map(float, state)
+    # The y axis points into the plane: its angles are clockwise.
+    def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
         turn = (0.0, -math.sin(0.5 * theta), 0.0, math.cos(0.5 * theta))
         self.bullet.resetBasePositionAndOrientation(
-            self.body, (x, 0.0, z), turn, physicsClientId=self.client
+            self.body, (x, 0.0, y), turn, physicsClientId=self.client
         )
         self.bullet.resetBaseVelocity(
-            self.body, (vx, 0.0, vz), (0.0, -w, 0.0), physicsClientId=self.client
+            self.body, (vx, 0.0, vy), (0.0, -w, 0.0), physicsClientId=self.client
         )
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
@@ -119,7 +109,6 @@ class _PyBulletWorld(World):
         return vx, vz, -w
 
     def close(self) -> None:
-        """End the physics server."""
         self.bullet.disconnect(**self.options)
 
 
@@ -156,7 +145,11 @@ class _RigidPyBulletWorld(_PyBulletWorld):
             **self.options,
         )
         body: int = self.bullet.createMultiBody(
-            1.0, shape, basePosition=_aloft(scene), useMaximalCoordinates=1, **self.options
+            1.0,
+            shape,
+            basePosition=[0.0, 0.0, ALOFT * scene.block.radius],
+            useMaximalCoordinates=1,
+            **self.options,
         )
         inertia = scene.block.gyration_squared
         self.bullet.changeDynamics(

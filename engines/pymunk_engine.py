@@ -7,7 +7,7 @@ from typing import ClassVar
 from rockcheck.engines.adaptive import Vector
 from rockcheck.engines.contacts import surfaces_of
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.world import Placed, State, World
+from rockcheck.engines.world import State, World
 from rockcheck.scenes import Scene
 
 # half the thickness of floor and walls: Chipmunk's normals are exact where shapes do not cross each
@@ -44,8 +44,7 @@ class _PymunkWorld(World):
             segment.friction, segment.elasticity = surface.friction, surface.restitution
             self.space.add(segment)
 
-    def place(self, state: Placed) -> None:
-        x, y, theta, vx, vy, w = map(float, state)
+    def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
         self.body.position, self.body.angle = (x, y), theta
         self.body.velocity, self.body.angular_velocity = (vx, vy), w
 
@@ -85,7 +84,7 @@ class _RigidPymunkWorld(_PymunkWorld):
         Chipmunk begins with the impulses of the step before, which has to be as long: a step aloft
         makes it forget them. It moves a body before it looks for contacts.
         """
-        self.place(self.aloft)
+        self.place(*self.aloft)
         self.step((0.0, 0.0), dt)
         (x, y, theta), (vx, vy, w) = pose, velocity
         return super().push(

@@ -5,13 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rockcheck.engines.adaptive import Vector
+from rockcheck.engines.adaptive import FloatArray, Vector
 
-FloatArray = NDArray[np.float64]
 State = tuple[float, float, float, float, float, float]
-Placed = FloatArray | State
 
 
 class World(ABC):
@@ -22,8 +19,8 @@ class World(ABC):
     """
 
     @abstractmethod
-    def place(self, state: Placed) -> None:
-        """Put the block where `state` says."""
+    def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
+        """Put the block into this state."""
 
     @abstractmethod
     def step(self, felt: tuple[float, float], dt: float) -> None:
@@ -52,9 +49,9 @@ class World(ABC):
     def push(
         self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool
     ) -> Vector:
-        """The engine as a map of velocities, for adaptive steps: see `engines.adaptive.Push`."""
+        """The engine as a map of velocities, for adaptive steps: `engines.adaptive.Push`."""
         self.bounce(bouncing)
-        self.place((*pose, *velocity))
+        self.place(*pose, *velocity)
         self.step(felt, dt)
         return self.velocity()
 

@@ -1,21 +1,33 @@
 """A finding as a terminal's tables, CSV, Markdown and a page: each block is rendered from one
-description."""
+description. All pages have one look, made of the templates in `data/templates`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from rich.console import Console
 from rich.table import Table as Grid
+from rich.text import Text as Line
 
 from rockcheck.reports.drawers import figure_of, live_data, scripts_of, side_by_side
-from rockcheck.reports.pages import Site
-from rockcheck.reports.show.words import number
-from rockcheck.reports.style import FORMATS, LOOKS, looks, save, stamp_of, undrawn
+from rockcheck.reports.show.words import (
+    dash_array,
+    duration,
+    moment,
+    number,
+    readable,
+    unit,
+    window,
+)
+from rockcheck.reports.style import BY_KEY, FORMATS, LOOKS, looks, save, stamp_of, undrawn
+from rockcheck.scenes.errors import inert
 from rockcheck.scenes.writing import json_text, made, markdown_table, table_text, write_whole
 from rockcheck.validation.execute.pool import Call
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Text, plain
@@ -26,7 +38,13 @@ SIGNS = {"pass": "✓", "changed": "△", "incomplete": "–", "fail": "✕", "e
 FIGURES = "figures"
 #: The folder of the scenes that show a failure.
 FAILING = "failures"
-COLOURS = {"fail": "red", "error": "red", "changed": "yellow", "incomplete": "yellow"}
+COLOURS = {
+    "pass": "green",
+    "changed": "yellow",
+    "incomplete": "yellow",
+    "fail": "red",
+    "error": "red",
+}
 
 
 def words(cell: Any, column: Column, write: Callable[[float, int], str] = number) -> str:
@@ -95,7 +113,8 @@ def show(found: Finding, screen: Console) -> None:
         screen.print(f"failed: {where}: {reason}", style="red", soft_wrap=True)
     if not found.complete:
         screen.print("not complete: the same command goes on where it ended", style="yellow")
-    screen.print(found.answer, style="bold", soft_wrap=True)
+    if found.answer:
+        screen.print(found.answer, style="bold", soft_wrap=True)
 
 
 def _grid(table: Table) -> Grid:
@@ -105,8 +124,16 @@ def _grid(table: Table) -> Grid:
             left = column.kind in ("text", "model")
             grid.add_column(column.head, justify="left" if left else "right", overflow="fold")
     for row in table.rows[: table.most]:
-        cells = zip(row, table.columns, strict=True)
-        grid.add_row(*(words(cell, column, _typed) for cell, column in cells if column.brief))
+        grid.add_row(
+            *(
+                Line(
+                    inert(words(cell, column, _typed)),
+                    COLOURS.get(cell.verdict, "") if isinstance(cell, Mark) else "",
+                )
+                for cell, column in zip(row, table.columns, strict=True)
+                if column.brief
+            )
+        )
     return grid
 
 
@@ -155,14 +182,6 @@ def block_markdown(block: Table | Plot | Text) -> str:
     return title + markdown_table([column.head for column in block.columns], rows) + note
 
 
-def _undrawn(plots: Sequence[Plot], folder: Path, formats: Sequence[str]) -> Iterator[Call]:
-    """What draws each plot that `folder` does not have as it is."""
-    for plot in plots:
-        stamp, stem = stamp_of(json_text(asdict(plot))), folder / plot.name
-        if missing := undrawn(stem, stamp, formats):
-            yield Call(_draw, (plot, stem, missing, stamp))
-
-
 def _draw(plot: Plot, stem: Path, formats: Sequence[str], stamp: str) -> None:
     save(figure_of(plot), stem, formats, stamp=stamp)
 
@@ -179,7 +198,12 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
         write_whole(made(folder, *parts) / last, content)
     plots = list(found.plots())
     figures = made(folder, FIGURES)
-    list(side_by_side(_undrawn(plots, figures, formats)))
+    calls = []
+    for plot in plots:
+        stamp, stem = stamp_of(json_text(asdict(plot))), figures / plot.name
+        if missing := undrawn(stem, stamp, formats):
+            calls.append(Call(_draw, (plot, stem, missing, stamp)))
+    list(side_by_side(calls))
     above = (("Report", "../index.html"),) if (folder.parent / "index.html").exists() else ()
     site = Site(folder, f"rockcheck: {found.title}", above)
     site.assets()
@@ -198,3 +222,60 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
         figures=FIGURES,
         formats=formats,
     )
+
+
+DATA = Path(str(resources.files("rockcheck.reports"))) / "data"
+#: The folder beside `index.html` that holds everything else.
+PAGES = "pages"
+
+
+@dataclass(frozen=True)
+class Site:
+    """A folder of pages with one look; `links` are its parts for the navigation, (title, address
+    from the index)."""
+
+    folder: Path
+    name: str
+    links: tuple[tuple[str, str], ...] = ()
+
+    def page(self, address: str, template: str, **context: Any) -> Path:
+        """Write the page `address` (relative to the folder, with slashes) from a template of
+        `data/templates/`."""
+        root = "../" * address.count("/")
+        text = (
+            _environment()
+            .get_template(template)
+            .render(site=self, root=root, address=address, **context)
+        )
+        return write_whole(made(self.folder, *address.split("/")[:-1]) / Path(address).name, text)
+
+    def assets(self) -> None:
+        """Write style sheets, scripts and the plotting library, once for all pages."""
+        target = made(self.folder, PAGES, "assets")
+        for source in sorted((DATA / "assets").iterdir()):
+            write_whole(target / source.name, source.read_bytes())
+        for source in sorted((DATA / "vendor").glob("*/*")):
+            name = source.name if source.name != "LICENSE" else f"LICENSE.{source.parent.name}.txt"
+            write_whole(target / name, source.read_bytes())
+        rows = (
+            f".look-{look.key} {{ --look: light-dark({look.light}, {look.dark}); }}\n"
+            for look in BY_KEY.values()
+        )
+        write_whole(target / "models.css", "".join(rows))
+
+
+@cache
+def _environment() -> Environment:
+    """The templates with what they call. Kept, since compiling a page's templates takes longer than
+    drawing its figures."""
+    environment = Environment(
+        loader=FileSystemLoader(DATA / "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=lambda value: inert(value) if type(value) is str else value,
+    )
+    for filter in (number, unit, duration, moment, window, dash_array, readable):
+        environment.filters[filter.__name__] = filter
+    return environment

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rockcheck.reports.style import BY_KEY, LOOKS, PAGE, figure_style, log_scales
 from rockcheck.validation.execute.pool import Call, Pool, cores
-from rockcheck.validation.finding import Axis, Panel, Plot, Series
+from rockcheck.validation.finding import Axis, Panel, Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,6 +42,7 @@ STYLES: dict[str, dict[str, Any]] = {
     "line": {"marker": "o", "markersize": 3.0},
     "smooth": {},
     "dashed": {"linestyle": (0, (5, 2))},
+    "dotted": {"linestyle": (0, (1.5, 2))},
     "points": {"linestyle": "none", "marker": "o", "markersize": 3.0},
     "dots": {"linestyle": (0, (0.7, 1.7)), "linewidth": 0.8},
     "thin": {"linewidth": 0.5, "alpha": 0.6},
@@ -248,7 +249,7 @@ def live_data(plot: Plot) -> dict[str, Any]:
             "fit": _short(fits[series.label].y)
             if series.label in fits and series.style != "thin"
             else [],
-            "dash": [8, 4] if series.style == "dashed" else [],
+            "dash": {"dashed": [8, 4], "dotted": [2, 3]}.get(series.style, []),
             "width": 0.7 if series.style == "thin" else 2.0,
         }
         for series, colour in zip(panel.series, colours(panel), strict=True)
@@ -272,9 +273,6 @@ def _short(values: Any) -> list[float | None]:
         None if value is None or not math.isfinite(value) else float(f"{value:.5g}")
         for value in values
     ]
-
-
-__all__ = ["DRAWERS", "Series", "figure_of", "lines", "live_data", "scripts_of"]
 
 
 def side_by_side(calls: Iterable[Call], jobs: int | None = None, least: int = 4) -> Iterator[None]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from rockcheck.validation.finding import (
     Text,
     text,
 )
-from rockcheck.validation.suite.ensembles import Distribution, Ensemble
+from rockcheck.validation.suite.motions import Distribution, Ensemble
 from rockcheck.validation.suite.results import Cell, EnsembleRecord, Run
 
 #: Ends of the axes of peaks, alpha, and where an overturned block is drawn beyond.
@@ -73,6 +73,8 @@ class EnsembleView:
     run: Run
     record: EnsembleRecord
     slug: str
+    #: Its figures are for a paper, too.
+    printed: ClassVar[bool] = True
 
     @property
     def name(self) -> str:

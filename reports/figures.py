@@ -44,12 +44,14 @@ def histories_figure(
 
     if against is None:
         against = next(iter(view.references), None)
+    known = looks(view.run.models)
     with figure_style():
         heights = (
             [0.55]
             + [h for _ in channels for h in ([1.0, 0.62] if against else [1.0])]
             + [0.16 * len(view.histories) + 0.15]
         )
+        beyond = view.horizon is not None and view.horizon < view.t[-1]
         shades = _shades(view, against, channels)
         legend_rows = -(-(len(view.histories) + len(shades)) // LEGEND_COLUMNS)
         # Margins in inches: a layout engine would need several times the drawing's own time.
@@ -60,22 +62,25 @@ def histories_figure(
         figure.subplots_adjust(
             0.95 / PAGE, bottom / height, 1.0 - 0.08 / PAGE, 1.0 - top / height, hspace=space / 0.7
         )
-        _ground(axes[0], view)
-        below = iter(axes[1:])
+        axes[0].plot(view.t, view.ground / GRAVITY_OF_RECORDS, color="#666666", linewidth=0.5)
+        axes[0].set_ylabel("base\n(g)")
+        panels = iter(axes[1:])
         for channel in channels:
-            _values(next(below), view, channel)
+            _values(next(panels), view, channel)
             if against:
-                _differences(next(below), view, channel, against)
-        _tracks(next(below), view)
+                _differences(next(panels), view, channel, against)
+        _tracks(next(panels), view)
         for ax in axes:
-            _mark_horizon(ax, view)
+            if beyond:
+                ax.axvspan(view.horizon, view.t[-1], color="#000000", alpha=0.05, linewidth=0)
             ax.yaxis.set_label_coords(-0.6 / (PAGE - 1.03), 0.5)
         axes[-1].set_xlabel("time (s)")
         axes[-1].set_xlim(float(view.t[0]), float(view.t[-1]) or 1.0)
         edge = 0.08 / PAGE
-        figure.text(
-            edge, 1.0 - 0.06 / height, _title(view, against), va="top", weight="bold", fontsize=8.5
-        )
+        below = f"; below each the difference from {known[against].label}" if against else ""
+        title = f"{view.name}: all models{below}"
+        figure.text(edge, 1.0 - 0.06 / height, title, va="top", weight="bold", fontsize=8.5)
+        used, versions = ("rockcheck", *view.run.models), view.run.versions
         handles, labels = axes[1].get_legend_handles_labels()
         figure.legend(
             handles + shades,
@@ -88,7 +93,7 @@ def histories_figure(
         figure.text(
             1.0 - edge,
             0.03 / height,
-            _stamp(view),
+            ", ".join(f"{name} {versions[name]}" for name in used if name in versions),
             ha="right",
             va="bottom",
             fontsize=4.5,
@@ -167,11 +172,6 @@ def _largest(values: np.ndarray) -> float:
     return float(np.max(np.abs(known))) if len(known) else 0.0
 
 
-def _ground(ax: Axes, view: SceneView) -> None:
-    ax.plot(view.t, view.ground / GRAVITY_OF_RECORDS, color="#666666", linewidth=0.5)
-    ax.set_ylabel("base\n(g)")
-
-
 def _values(ax: Axes, view: SceneView, channel: Channel) -> None:
     """One channel of all models, the first reference drawn wide below the others; wall impacts on
     each model's own curve."""
@@ -199,7 +199,17 @@ def _values(ax: Axes, view: SceneView, channel: Channel) -> None:
                 | ({"linewidth": 1.6, "zorder": 1.9} if first else {"zorder": 2.0 + 0.01 * order}),
             )
         if channel.name == "theta":
-            _mark_fall(ax, view, model, look.light)
+            if model in view.falls:  # a cross where the block falls: nothing is drawn beyond
+                row = int(np.searchsorted(view.t, view.falls[model]))
+                ax.plot(
+                    view.t[row],
+                    values[row],
+                    marker="x",
+                    markersize=4.5,
+                    markeredgewidth=1.2,
+                    color=look.light,
+                    zorder=4.0,
+                )
             until = view.falls.get(model, math.inf)
             times = np.array(
                 [
@@ -220,21 +230,6 @@ def _values(ax: Axes, view: SceneView, channel: Channel) -> None:
                     linestyle="",
                 )
     ax.set_ylabel(channel.symbol)
-
-
-def _mark_fall(ax: Axes, view: SceneView, model: str, colour: str) -> None:
-    """A cross where the block falls: nothing is drawn beyond."""
-    if model in view.falls:
-        row = int(np.searchsorted(view.t, view.falls[model]))
-        ax.plot(
-            view.t[row],
-            view.drawn[model]["theta"][row],
-            marker="x",
-            markersize=4.5,
-            markeredgewidth=1.2,
-            color=colour,
-            zorder=4.0,
-        )
 
 
 def _differences(ax: Axes, view: SceneView, channel: Channel, against: str) -> None:
@@ -356,24 +351,3 @@ def _shades(
     if view.horizon is not None and view.horizon < view.t[-1]:
         found.append(Patch(color="#000000", alpha=0.08, label="beyond the horizon"))
     return found
-
-
-def _mark_horizon(ax: Axes, view: SceneView) -> None:
-    if view.horizon is not None and view.horizon < view.t[-1]:
-        ax.axvspan(view.horizon, float(view.t[-1]), color="#000000", alpha=0.05, linewidth=0)
-
-
-def _title(view: SceneView, against: str | None) -> str:
-    """What the figure shows, in one line."""
-    words = f"{view.name}: all models" + (
-        f"; below each the difference from {looks(view.run.models)[against].label}"
-        if against
-        else ""
-    )
-    return words
-
-
-def _stamp(view: SceneView) -> str:
-    versions = view.run.versions
-    used = [name for name in ("rockcheck", *view.run.models) if name in versions]
-    return ", ".join(f"{name} {versions[name]}" for name in used)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rockcheck.reports import tables
-from rockcheck.reports.document import FIGURES, csv, row_cells
+from rockcheck.reports.document import DATA, FIGURES, PAGES, Site, csv, row_cells
 from rockcheck.reports.drawers import figure_of, side_by_side
 from rockcheck.reports.ensembles import EnsembleView
 from rockcheck.reports.figures import (
@@ -22,11 +22,10 @@ from rockcheck.reports.figures import (
     thumbnail,
     write_figures,
 )
-from rockcheck.reports.overview import PEAKS, accuracy, entry, glance, matrix, outcome_of
-from rockcheck.reports.pages import DATA, PAGES, Site
 from rockcheck.reports.scene_data import script, write_scene_file
 from rockcheck.reports.show.words import scene_facts
 from rockcheck.reports.style import FORMATS, looks, save
+from rockcheck.reports.tables import PEAKS, accuracy, entry, glance, matrix, outcome_of
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable, unknown_name
@@ -132,15 +131,13 @@ def write_site(
 def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterator[None]:
     """Write these pages, each with its stamp, and last the index, in processes of their own where
     that is quicker."""
-    work = sum(PRINTED if printed(pages.views[name]) else 1 for name in stamps)
+    work = sum(PRINTED if pages.views[name].printed else 1 for name in stamps)
     if work < FEW:
-        yield from map(pages.write, stamps, stamps.values())
-        pages.write_index()
-        yield
+        yield from map(pages.write, [*stamps, INDEX], [*stamps.values(), ""])
         return
     of = pages.folder, pages.wanted
-    calls = [Call(_write_page, (*of, name, stamp)) for name, stamp in stamps.items()]
-    yield from side_by_side([*calls, Call(_write_index, of)], min(jobs, len(stamps)), least=2)
+    calls = [Call(_write_page, (*of, *one)) for one in (*stamps.items(), (INDEX, ""))]
+    yield from side_by_side(calls, min(jobs, len(stamps)), least=2)
 
 
 class _Pages:
@@ -166,13 +163,18 @@ class _Pages:
         self.site = Site(folder, f"rockcheck: {self.run.suite}", tuple(links))
 
     def write(self, name: str, stamp: str) -> None:
-        """Figures, data, and last the page, which names the stamp of what it shows (`stamp`)."""
+        """Figures, data, and last the page, which names the stamp of what it shows (`stamp`); or
+        the page to open, `INDEX`."""
+        if name == INDEX:
+            self._write_index()
+            return
         view = self.views[name]
         page = self.folder / _address(view)
         before = _belongings(page)
-        self._write_ensemble(view, stamp) if isinstance(view, EnsembleView) else self._write_scene(
-            view, stamp
-        )
+        if isinstance(view, EnsembleView):
+            self._write_ensemble(view, stamp)
+        else:
+            self._write_scene(view, stamp)
         for old in before - _belongings(page):
             (self.folder / PAGES / old).unlink(missing_ok=True)
 
@@ -205,8 +207,7 @@ class _Pages:
             _address(view), template, view=view, stamp=stamp, **context, **_common(self.run)
         )
 
-    def write_index(self) -> None:
-        """The page to open, which shows when the run was."""
+    def _write_index(self) -> None:
         figures = made(self.folder, PAGES, FIGURES)
         blocks = accuracy(self.run)
         (figures / f"{PEAKS}.svg").unlink(missing_ok=True)
@@ -257,11 +258,6 @@ class _Pages:
         return provenance.digest(json.dumps(shown, sort_keys=True))
 
 
-def printed(view: View) -> bool:
-    """Whether a view has figures for a paper: each ensemble's has, a scene's where the run asks."""
-    return isinstance(view, EnsembleView) or view.printed
-
-
 def _address(view: View) -> str:
     return f"{PAGES}/{view.slug}.html"
 
@@ -275,10 +271,6 @@ def _pages_of(folder: Path, wanted: Sequence[str]) -> _Pages:
 
 def _write_page(folder: Path, wanted: Sequence[str], name: str, stamp: str) -> None:
     _pages_of(folder, wanted).write(name, stamp)
-
-
-def _write_index(folder: Path, wanted: Sequence[str]) -> None:
-    _pages_of(folder, wanted).write_index()
 
 
 @cache

@@ -7,7 +7,6 @@ more for print without colour.
 
 from __future__ import annotations
 
-import hashlib
 import io
 import json
 import math
@@ -21,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from rockcheck.scenes.reading import head_of
 from rockcheck.scenes.writing import made, write_whole
+from rockcheck.validation.execute.provenance import digest
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -207,19 +207,13 @@ def undrawn(stem: Path, stamp: str, formats: Sequence[str]) -> list[str]:
 
 def stamp_of(shown: object) -> str:
     """Two short hashes: of what a figure shows, and of what draws it."""
-    return f"{_short_hash(json.dumps(shown, sort_keys=True).encode())} {_drawn_by()}"
+    return f"{digest(json.dumps(shown, sort_keys=True))} {_drawn_by()}"
 
 
 @cache
 def _drawn_by() -> str:
     sources = sorted(Path(__file__).parent.rglob("*.py"))
-    return _short_hash(
-        version("matplotlib").encode() + b"".join(source.read_bytes() for source in sources)
-    )
-
-
-def _short_hash(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()[:16]
+    return digest("\n".join([version("matplotlib"), *(one.read_text("utf-8") for one in sources)]))
 
 
 def stamp_in(path: Path) -> str:

@@ -2,7 +2,7 @@
 and for which scenes.
 
 The file is written by docs/site_tools/experience.py from finished runs
-(`validation.suite.experience`).
+(`validation.suite.across`).
 """
 
 from __future__ import annotations

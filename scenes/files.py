@@ -26,16 +26,15 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import model_validator
 
 from rockcheck.scenes.base import Finite, Frozen, Positive
 from rockcheck.scenes.errors import InputError, printable, suggestion, unknown_name
+from rockcheck.scenes.excitations import FloatArray
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.recordings.sets import record_path
 from rockcheck.scenes.scene import Scene
 
-FloatArray = NDArray[np.float64]
 Place = tuple[str | int, ...]
 Part = TypeVar("Part", bound=Frozen)
 #: Keys by which a table of a scene file is known as an uncertain number.
@@ -54,28 +53,18 @@ def load_scene(source: str | Path) -> Scene:
 
     Raises `InputError` naming the file, the key, the value and what is allowed.
     """
-    return _read(_path_of(source)).scene
+    return load_uncertain_scene(source).scene
 
 
 def load_uncertain_scene(source: str | Path) -> UncertainScene:
     """A scene with what its file says of the numbers that are not known exactly (see
     the module). Raises as `load_scene`."""
-    return _read(_path_of(source))
-
-
-def _path_of(source: str | Path) -> Path:
     known = named_scenes()
-    if str(source) in known:
-        return known[str(source)]
-    path = Path(source)
+    path = known.get(str(source), Path(source))
     if path.suffix.lower() != ".toml":
         raise InputError(
             f"{unknown_name('scene', str(source), known)}; or the path of a .toml file"
         )
-    return path
-
-
-def _read(path: Path) -> UncertainScene:
     data = read_toml(path)
     try:
         return uncertain_scene_from(data, folder=path.parent, default_name=path.stem)
@@ -299,9 +288,7 @@ def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
 
 def _changed(part: Part, name: str, value: float, place: str) -> Part:
     try:
-        return type(part)(
-            **{**{field: getattr(part, field) for field in type(part).model_fields}, name: value}
-        )
+        return part.replace(**{name: value})
     except InputError as error:
         raise InputError(error.reason, f"{place}.{error.key}") from None
 

@@ -244,7 +244,6 @@ class History(Shown):
         }
 
     def _tables(self, about: Mapping[str, Any]) -> tuple[str, str]:
-        """The motion and the events as CSV."""
         columns = {
             name: np.asarray(self.channels[name]).tolist()
             for name in COLUMNS
@@ -255,7 +254,6 @@ class History(Shown):
         return columns_text(columns), columns_text(self._event_columns())
 
     def _event_columns(self) -> dict[str, list[Any]]:
-        """The events, a list a column."""
         return {name: [getattr(event, name) for event in self.event_list] for name in EVENT_COLUMNS}
 
     @classmethod
@@ -327,11 +325,9 @@ def check_format(path: Path) -> None:
 
 
 def _parquet(table: pd.DataFrame, about: Mapping[str, Any]) -> bytes:
-    content = io.BytesIO()
     table = table.copy()
     table.attrs = dict(about)
-    table.to_parquet(content, engine="pyarrow", index=False)
-    return content.getvalue()
+    return bytes(table.to_parquet(engine="pyarrow", index=False))
 
 
 def _json(
@@ -449,9 +445,12 @@ class _About(Frozen):
 
 def block_fields(block: Block) -> dict[str, Any]:
     """What a history keeps of its block, as keywords of `History`."""
-    inertia = None if block.moment_of_inertia is None else block.gyration_squared
-    sizes = {"half_width": block.half_width, "half_height": block.half_height}
-    return sizes | {"centre_of_mass": block.centre_of_mass, "moment_of_inertia": inertia}
+    return {
+        "half_width": block.half_width,
+        "half_height": block.half_height,
+        "centre_of_mass": block.centre_of_mass,
+        "moment_of_inertia": block.moment_of_inertia and block.gyration_squared,
+    }
 
 
 def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]]:

@@ -105,9 +105,7 @@ def modes_of(scene: Scene, channels: Mapping[str, NDArray[Any]]) -> NDArray[Any]
 def _overturned(tipped: NDArray[np.intp], events: Sequence[Event]) -> str | None:
     """The side on which the block fell, from an `overturned left|right` event that the model
     reported."""
-    for event in events:
-        if event.kind.startswith("overturned"):
-            return event.kind
-    if tipped.size:
+    told = next((event.kind for event in events if event.kind.startswith("overturned")), None)
+    if tipped.size and told is None:
         raise ValueError("a model that lets the block overturn must report the event")
-    return None
+    return told

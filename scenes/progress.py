@@ -19,7 +19,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from queue import SimpleQueue
 from threading import Lock
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 Result = TypeVar("Result")
 
@@ -118,30 +118,18 @@ class _Runner:
 
     def __init__(self) -> None:
         self.process = os.getpid()
-        self.calls: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
+        #: What to call, and what awaits the result; None ends the thread.
+        self.calls: SimpleQueue[tuple[Callable[[], Any], Future[Any]] | None] = SimpleQueue()
         threading.Thread(target=self._serve, daemon=True).start()
 
     def _serve(self) -> None:
-        while (call := self.calls.get()) is not None:
-            call()
-            del call  # with the arrays that it was given
-
-    def begin(self, call: Callable[[], Result]) -> Future[Result]:
-        """What `call` returns or raises, once it has."""
-        ended: Future[Result] = Future()
-
-        def run() -> None:
+        while (work := self.calls.get()) is not None:
+            call, ended = work
             try:
                 ended.set_result(call())
             except BaseException as error:
                 ended.set_exception(error)
-
-        self.calls.put(run)
-        return ended
-
-    def end(self) -> None:
-        """After the call that it is in, nothing more is to come."""
-        self.calls.put(None)
+            del work, call, ended  # with the arrays that it was given
 
 
 #: The thread that waits for calls, if there is one.
@@ -161,12 +149,13 @@ def interruptible(call: Callable[[], Result]) -> Result:
     runner = _RUNNERS.pop() if _RUNNERS else None
     if runner is None or runner.process != os.getpid():
         runner = _Runner()
+    ended: Future[Result] = Future()
     try:
-        ended = runner.begin(call)
+        runner.calls.put((call, ended))
         while not ended.done():
             wait((ended,), timeout=1.0)  # Windows wakes no wait without end
     except BaseException:
-        runner.end()
+        runner.calls.put(None)
         raise
     _RUNNERS.append(runner)
     return ended.result()

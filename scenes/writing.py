@@ -98,7 +98,6 @@ def write_new(path: Path, content: str) -> Path:
 
 
 def _named(error: OSError, path: Path) -> OSError:
-    """The same error with the name of the file that was to be written."""
     return OSError(error.errno, error.strerror or str(error), str(path))
 
 

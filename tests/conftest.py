@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -36,6 +37,8 @@ MAY_BE_SKIPPED: dict[str, bool] = {
     "needs pyarrow": True,  # an extra of 50 MB, which `make nightly` installs
     "needs POSIX": sys.platform == "win32",
 }
+#: What a line of progress holds.
+HOW_FAR = re.compile(r"\d:\d\d (so far|left)")
 CHROMIUM = Path("/usr/bin/chromium")
 #: How a request ends that was under way as its page was left.
 ABORTED = "net::ERR_ABORTED"
@@ -98,6 +101,12 @@ def pytest_make_collect_report() -> Iterator[None]:
     report = yield
     _judged(report)
     return report
+
+
+@pytest.fixture
+def but_progress() -> Callable[[str], list[str]]:
+    """The lines on stderr that do not say how far a long work is: on a slow machine any is long."""
+    return lambda err: [line for line in err.splitlines() if not HOW_FAR.search(line)]
 
 
 @pytest.fixture(scope="module")

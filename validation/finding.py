@@ -109,13 +109,29 @@ def table_of(name: str, kind: type, records: Sequence[Any], **more: Any) -> Tabl
     return Table(name, [Column(key) for key in fields], rows, **{"on": "file", **more})
 
 
+#: How a line of a panel is drawn.
+Style = Literal[
+    "line",
+    "smooth",
+    "dashed",
+    "dotted",
+    "points",
+    "dots",
+    "thin",
+    "level",
+    "marked",
+    "step",
+    "cross",
+]
+
+
 @dataclass(frozen=True)
 class Series:
     """One line of a panel. `low` and `high` bound a band around it; `look` names a model's colour.
 
-    `style`: a line, "smooth" or "dashed" (without marks), points only, dots (a fit), "thin" (one of
-    many behind the others), "level", a horizontal line at the only `y`, for reference, "step" (each
-    value up to the next), or "cross" (points that stand out).
+    `style`: a line, "smooth", "dashed" or "dotted" (without marks), points only, dots (a fit),
+    "thin" (one of many behind the others), "level", a horizontal line at the only `y`, for
+    reference, "step" (each value up to the next), or "cross" (points that stand out).
     """
 
     label: str
@@ -124,9 +140,7 @@ class Series:
     low: Sequence[float | None] = ()
     high: Sequence[float | None] = ()
     look: str = ""
-    style: Literal[
-        "line", "smooth", "dashed", "points", "dots", "thin", "level", "marked", "step", "cross"
-    ] = "line"
+    style: Style = "line"
 
 
 @dataclass(frozen=True)

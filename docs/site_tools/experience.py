@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rockcheck.scenes.experience import Experience
 from rockcheck.scenes.writing import markdown_table, write_whole
-from rockcheck.validation.suite.experience import experience_of
+from rockcheck.validation.suite.across import experience_of
 from rockcheck.validation.suite.results import Run
 
 ROOT = Path(__file__).parents[2]

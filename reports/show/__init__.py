@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import importlib
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from rockcheck.ebm.spectrum import Spectrum
 from rockcheck.reports.show import words
@@ -14,35 +16,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-# matplotlib takes a second to import: only what is drawn asks for it.
-def _scene_figure(scene: Scene) -> Figure:
-    from rockcheck.reports.show.drawing import scene_figure
+def _later(module: str, name: str) -> Callable[[Any], Figure]:
+    """A function that draws. matplotlib takes a second to import: only what is drawn asks for
+    it."""
 
-    return scene_figure(scene)
+    def draw(what: Any) -> Figure:
+        drawn: Figure = getattr(importlib.import_module(f"{__name__}.{module}"), name)(what)
+        return drawn
 
-
-def _history_figure(history: History) -> Figure:
-    from rockcheck.reports.show.drawing import history_figure
-
-    return history_figure(history)
-
-
-def _discrepancy_figure(discrepancy: Discrepancy) -> Figure:
-    from rockcheck.reports.show.drawing import discrepancy_figure
-
-    return discrepancy_figure(discrepancy)
-
-
-def _spectrum_figure(spectrum: Spectrum) -> Figure:
-    from rockcheck.reports.show.spectrum import spectrum_figure
-
-    return spectrum_figure(spectrum)
+    return draw
 
 
 #: The views of this package's classes (entry point of the group `rockcheck.views`).
 VIEWS = {
-    Scene: View(html=words.scene_html, figure=_scene_figure),
-    History: View(html=words.history_html, figure=_history_figure),
-    Discrepancy: View(html=words.discrepancy_html, figure=_discrepancy_figure),
-    Spectrum: View(html=words.spectrum_html, figure=_spectrum_figure),
+    Scene: View(html=words.scene_html, figure=_later("drawing", "scene_figure")),
+    History: View(html=words.history_html, figure=_later("drawing", "history_figure")),
+    Discrepancy: View(html=words.discrepancy_html, figure=_later("drawing", "discrepancy_figure")),
+    Spectrum: View(html=words.spectrum_html, figure=_later("spectrum", "spectrum_figure")),
 }

@@ -7,17 +7,14 @@ from typing import Annotated
 import typer
 
 from rockcheck.commands import (
-    OUT,
     AllowCodeOption,
-    JobsOption,
-    OutOption,
-    SchedulerOption,
-    answer,
-    console,
+    Played,
     tell_left_out,
+    told,
     usable_folder,
 )
 from rockcheck.commands.validate import SuiteArgument, play, tell_faults
+from rockcheck.validation.finding import Finding, Text
 from rockcheck.validation.suite.acceptance import accept
 from rockcheck.validation.suite.suites import load_suite
 
@@ -31,9 +28,7 @@ def run(
             help="Why limits are loosened or figures moved; it is written into the file.",
         ),
     ] = None,
-    out: OutOption = OUT,
-    jobs: JobsOption = None,
-    scheduler: SchedulerOption = None,
+    played: Played = Played(),
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Show the changes, write none.")
     ] = False,
@@ -45,26 +40,29 @@ def run(
     moved, the last two only with --reason.
     """
     name = suite or "paper"
-    folder = usable_folder(out)
+    folder = usable_folder(played.out)
     loaded = load_suite(name, allow_code=allow_code or ())
     tell_left_out(loaded.left_out)
-    finished = play(loaded, folder, jobs, False, False, scheduler)
+    finished = play(loaded, folder, played)
     changes, refused = accept(loaded, finished, reason, write=not dry_run)
-    screen = console()
-    for line in changes:
-        screen.print(line, soft_wrap=True)
-    done = "would be written to" if dry_run else "in"
-    screen.print(f"{len(changes)} changes {done} {finished.tolerances_file}", soft_wrap=True)
-    for line in refused:
-        screen.print(f"not accepted: {line}", style="red", soft_wrap=True)
-    answer(
-        {
-            "changes": changes,
-            "refused": refused,
-            "file": finished.tolerances_file,
-            "written": not dry_run,
-        }
-    )
     tell_faults(finished, folder)
     failed = finished.exit_code if finished.verdict == "error" else 0
-    raise typer.Exit(failed or int(bool(refused)))
+    done = "would be written to" if dry_run else "in"
+    told(
+        Finding(
+            "accept",
+            loaded.name,
+            f"{len(changes)} changes {done} {finished.tolerances_file}",
+            [
+                Text(items=changes),
+                Text(items=[f"not accepted: {line}" for line in refused], verdict="fail"),
+            ],
+            data={
+                "changes": changes,
+                "refused": refused,
+                "file": finished.tolerances_file,
+                "written": not dry_run,
+            },
+            exit_code=failed or int(bool(refused)),
+        )
+    )

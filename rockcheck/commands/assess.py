@@ -27,7 +27,7 @@ from rockcheck.scenes.files import UncertainScene, load_uncertain_scene
 from rockcheck.validation.criteria import sampled
 from rockcheck.validation.studies.population.assess import Assessment, gaps_of
 from rockcheck.validation.studies.population.study import CAPACITIES, Population, fragility, ida
-from rockcheck.validation.suite.record_sets import under_records
+from rockcheck.validation.suite.motions import under_records
 
 MOST_LEVELS, MOST_SAMPLES = 1000, 1 << 16
 #: Of the pulses of a fragility curve, omega_p/p.

@@ -8,6 +8,7 @@ import importlib
 import inspect
 import itertools
 import os
+import re
 import sys
 import time
 import traceback
@@ -26,11 +27,11 @@ from rockcheck.scenes import InputError, ModelFailure
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.suite.results import FAULT
 
-#: The commands, in the order of the help: where each has its function `run` below this package, and
-#: an example.
+#: The commands, in the order of the help: where each is below this package, a module with
+#: its function `run` or another function of one; and an example.
 COMMANDS = {
     "scenes": ("scenes", "rockcheck scenes"),
-    "new": ("new", "rockcheck new bookcase.toml"),
+    "new": ("scenes.new", "rockcheck new bookcase.toml"),
     "record": ("record", "rockcheck record station.V2 --read component=1 --plot station.png"),
     "simulate": (
         "simulate",
@@ -48,7 +49,7 @@ COMMANDS = {
     "warm": ("warm", "rockcheck warm"),
 }
 
-#: What to call in place of a command that is gone.
+#: What to call in place of a command or an option that is gone.
 GONE = {
     "run": "rockcheck validate SCENE",
     "diff": "rockcheck compare RUN_A RUN_B",
@@ -57,6 +58,8 @@ GONE = {
     "calibrate": "rockcheck conformance --tune E",
     "uncertainty": "rockcheck assess SCENE",
     "ida": "rockcheck assess SCENE RECORDS --levels pga:0.05:2:40",
+    "compare --offset": "--align SECONDS",
+    "conformance --settings": "--set settings=best, default or both",
 }
 #: Commands that are not listed.
 HIDDEN = ("warm",)
@@ -64,8 +67,8 @@ HIDDEN = ("warm",)
 #: Commands that answer at once: nobody asks how long they took.
 AT_ONCE = ("scenes", "new", "record", "compare")
 
-#: Options whose value may be left out, with their values: it is then the first.
-BARE = {"--strict": ("worse", "both")}
+#: Options whose value may be left out: it is then the first; and what is a value (a pattern).
+BARE = {"--strict": ("worse", "worse|both"), "--align": ("best", r"best|[-+.0-9]+(e[-+]?\d+)?")}
 
 #: Exit code of a run that Ctrl-C ended.
 INTERRUPTED = 130
@@ -134,8 +137,8 @@ def _options(given: inspect.Parameter) -> list[inspect.Parameter]:
 
 def _with_value(word: str, after: str) -> str:
     """An argument, with the value of its option where that is left out."""
-    values = BARE.get(word)
-    return f"{word}={values[0]}" if values and after not in values else word
+    value, pattern = BARE.get(word, ("", ""))
+    return f"{word}={value}" if value and not re.fullmatch(pattern, after) else word
 
 
 class _EachOnce(typer.core.TyperCommand):
@@ -146,7 +149,11 @@ class _EachOnce(typer.core.TyperCommand):
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        if any(name in BARE for parameter in self.params for name in parameter.opts):
+        for word in args:
+            named = word.partition("=")[0]
+            if instead := GONE.get(f"{ctx.info_name} {named}"):
+                raise InputError(f"is gone: {instead}", named)
+        if any(name in BARE for one in self.params for name in one.opts):
             args = [_with_value(*pair) for pair in itertools.pairwise([*args, ""])]
         _, _, order = self.make_parser(ctx).parse_args(args=list(args))
         for option in order:
@@ -160,8 +167,9 @@ class _EachOnce(typer.core.TyperCommand):
 
 @cache
 def _loaded(name: str) -> Any:
-    module, example = COMMANDS[name]
-    does = importlib.import_module(f"rockcheck.commands.{module}").run
+    where, example = COMMANDS[name]
+    module, _, function = where.partition(".")
+    does = getattr(importlib.import_module(f"rockcheck.commands.{module}"), function or "run")
     alone = typer.Typer(rich_markup_mode=None, add_completion=False)
     alone.command(name=name, cls=_EachOnce, epilog=f"Example: {example}")(
         spoken(does, timed=name not in AT_ONCE)

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from rockcheck.commands import (
     PlotOption,
@@ -15,20 +14,23 @@ from rockcheck.commands import (
     console,
     save_picture,
     scene_names,
-    tell_notes,
     told,
 )
-from rockcheck.scenes import load_scene
+from rockcheck.scenes import InputError, load_scene
+from rockcheck.scenes.errors import printable
 from rockcheck.validation.discrepancy.compare import Discrepancy, compare
 from rockcheck.validation.discrepancy.figures import value_words
 from rockcheck.validation.discrepancy.measured import read_measured, shifted, time_shift
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
 from rockcheck.validation.discrepancy.motion import motion_of
-from rockcheck.validation.suite.changes import difference
+from rockcheck.validation.finding import Block, Column, Finding, Table, Text, text
+from rockcheck.validation.suite.across import difference
 from rockcheck.validation.suite.results import Run
 
 #: So many figures that moved are listed without --all.
 SHOWN = 20
+#: What --align asks for where no time is given.
+BEST = "best"
 
 
 def run(
@@ -42,18 +44,14 @@ def run(
         Path,
         typer.Argument(metavar="B", help="History of the candidate, CSV; or a later run's folder."),
     ],
-    offset: Annotated[
-        float,
-        typer.Option(
-            "--offset", help="Added to the candidate's times, s, to align a measured history."
-        ),
-    ] = 0.0,
     align: Annotated[
-        bool,
+        str | None,
         typer.Option(
-            "--align", help="Shift the candidate in time to where the rotations agree best."
+            "--align",
+            metavar="[SECONDS]",
+            help="Shift the candidate in time, by SECONDS, else to where the rotations agree best.",
         ),
-    ] = False,
+    ] = None,
     until: Annotated[
         float | None,
         typer.Option("--until", help="End of the window, s (default: the whole common time)."),
@@ -77,6 +75,8 @@ def run(
     Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg,
     time_ms, x_mm, ...). --plot draws both rotations and their difference.
     """
+    from rockcheck.reports import document
+
     if reference.is_dir() or reference.suffix == ".json":
         from rockcheck.validation.studies.conformance import study
 
@@ -86,56 +86,57 @@ def run(
         told(difference(Run.load(reference), Run.load(candidate), None if everything else SHOWN))
     check_picture(plot)
     what = load_scene(scene) if scene else None
+    try:
+        offset = 0.0 if align in (None, BEST) else float(align or 0.0)
+    except ValueError:
+        raise InputError(f"{printable(align)!r}: give seconds, or nothing", "--align") from None
     given, other = read_measured(reference), read_measured(candidate, offset=offset)
-    shift = time_shift(given, other) if align else 0.0
+    shift = time_shift(given, other) if align == BEST else 0.0
     found = compare(given, shifted(other, shift), until=until, scene=what)
-    out = console()
-    out.print(headline(found), style="bold")
-    motions = {
-        role: motion_of(history, what)
-        for role, history in (("reference", given), ("candidate", other))
-    }
-    for role, motion in motions.items():
-        if words := motion.words():
-            out.print(f"{role}: {', '.join(words)}")
-    table = Table(box=None, pad_edge=False)
-    for name in ("measure", "value", "unit", ""):
-        table.add_column(name, justify="right" if name == "value" else "left")
-    for figure in found.figures:
-        yes_no = DIFFERENCES[figure.measure].yes_no
-        table.add_row(
+    histories = {"reference": given, "candidate": other}
+    motions = {role: motion_of(history, what) for role, history in histories.items()}
+    rows = [
+        [
             figure.label,
-            value_words(figure.value, yes_no=yes_no),
-            "" if yes_no else figure.unit,
+            value_words(figure.value, yes_no=DIFFERENCES[figure.measure].yes_no),
+            "" if DIFFERENCES[figure.measure].yes_no else figure.unit,
             figure.note,
-        )
-    out.print(f"{found.candidate} against {found.reference}, {found.start:g} to {found.end:g} s")
-    out.print(table)
-    if align:
-        out.print(f"the candidate is shifted by {shift:+.4g} s")
-    if found.gap:
-        out.print(f"not the whole time: {found.gap}")
-    for role, history in (("the reference", given), ("the candidate", other)):
-        tell_notes(history, role)
+        ]
+        for figure in found.figures
+    ]
+    columns = [text("measure"), Column("value"), text("unit"), text("note", " ")]
+    models = f"{found.candidate} against {found.reference}"
+    said = {role: ", ".join(motion.words()) for role, motion in motions.items()}
+    notes = [f"note on the {role}: {note}" for role, one in histories.items() for note in one.notes]
+    blocks: list[Block] = [
+        Text(headline(found)),
+        Text(facts=[(role, words) for role, words in said.items() if words]),
+        Text(f"{models}, {found.start:g} to {found.end:g} s"),
+        Table("comparison", columns, rows),
+        Text(f"the candidate is shifted by {shift:+.4g} s" if align == BEST else ""),
+        Text(f"not the whole time: {found.gap}" if found.gap else ""),
+        Text(items=notes, verdict="changed"),
+    ]
+    data = {
+        "reference": found.reference,
+        "candidate": found.candidate,
+        "start": found.start,
+        "end": found.end,
+        "shift": shift,
+        "gap": found.gap,
+        "headline": headline(found),
+        "motion": {role: motion.model_dump() for role, motion in motions.items()},
+        "notes": {role: history.notes for role, history in histories.items()},
+        "figures": [
+            {"measure": f.measure, "value": f.value, "unit": f.unit, "note": f.note}
+            for f in found.figures
+        ],
+    }
+    finding = Finding("comparison", models, "", blocks, data)
+    document.show(finding, console())
     if plot is not None:
         save_picture(found.plot(), plot)
-    answer(
-        {
-            "reference": found.reference,
-            "candidate": found.candidate,
-            "start": found.start,
-            "end": found.end,
-            "shift": shift,
-            "gap": found.gap,
-            "headline": headline(found),
-            "motion": {role: motion.model_dump() for role, motion in motions.items()},
-            "notes": {"reference": given.notes, "candidate": other.notes},
-            "figures": [
-                {"measure": f.measure, "value": f.value, "unit": f.unit, "note": f.note}
-                for f in found.figures
-            ],
-        }
-    )
+    answer(finding.as_dict())
 
 
 def headline(found: Discrepancy) -> str:

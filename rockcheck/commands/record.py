@@ -76,7 +76,10 @@ def run(
     for (path, record), value in zip(found, values, strict=True):
         _show(path, record, value)
     if plot is not None and found:
-        _draw(found, plot)
+        from rockcheck.reports.show.drawing import recordings_figure
+
+        drawn = [(f"{path.name} {one.component}".strip(), one) for path, one in found[:12]]
+        save_picture(recordings_figure(drawn), plot)
     if found:
         answer(values[0] if len(values) == 1 else {"records": values})
     if faults:
@@ -147,14 +150,3 @@ def _picture(record: Recording) -> str:
         else np.zeros(len(peaks), dtype=int)
     )
     return "".join(_MARKS[level] for level in levels)
-
-
-def _draw(found: list[tuple[Path, Recording]], plot: Path) -> None:
-    from rockcheck.reports.show.drawing import recordings_figure
-
-    save_picture(
-        recordings_figure(
-            [(f"{path.name} {record.component}".strip(), record) for path, record in found[:12]]
-        ),
-        plot,
-    )

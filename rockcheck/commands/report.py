@@ -1,17 +1,27 @@
-"""`rockcheck report`: render a finished run again, or one figure of it for a paper."""
+"""`rockcheck report`: render a finished run again, or one figure of it for a paper; and how any
+command writes a finished run into its folder: run.json, tables, pages."""
 
 from __future__ import annotations
 
+import os
+import platform
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from filelock import FileLock, Timeout
 
 from rockcheck.commands import answer, console, progress
-from rockcheck.commands.publish import publish
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.progress import OnProgress, unheard
+from rockcheck.scenes.reading import read_text
+from rockcheck.scenes.writing import no_link, write_whole
 from rockcheck.validation.suite.results import Run
+from rockcheck.validation.suite.tables import files_of, junit, markdown
 
 
 def run(
@@ -46,7 +56,15 @@ def run(
     """
     Run.load(folder)
     if output is not None:
-        _draw(folder, scene or [], output, against)
+        from rockcheck.reports.site import write_figure
+
+        if scene is None or len(scene) != 1:
+            raise InputError("needs one --scene NAME", "--output")
+        if not output.parent.is_dir():
+            raise InputError(f"{printable(output.parent)}: no such folder", "--output")
+        written = write_figure(folder, scene[0], output, against)
+        console().print(f"figure: {written}", soft_wrap=True)
+        answer({"figure": written})
         return
     if against is not None:
         raise InputError("needs -o FILE", "--against")
@@ -56,13 +74,73 @@ def run(
     answer({"report": index})
 
 
-def _draw(folder: Path, scenes: list[str], path: Path, against: str | None) -> None:
-    from rockcheck.reports.site import write_figure
+LOCK, HOLDER = ".lock", ".lock.holder"
+#: How long a run waits for another one that writes the same folder: before it says so, and in all,
+#: s.
+SILENT, PATIENCE = 2.0, 600.0
 
-    if len(scenes) != 1:
-        raise InputError("needs one --scene NAME", "--output")
-    if not path.parent.is_dir():
-        raise InputError(f"{printable(path.parent)}: no such folder", "--output")
-    written = write_figure(folder, scenes[0], path, against)
-    console().print(f"figure: {written}", soft_wrap=True)
-    answer({"figure": written})
+
+@contextmanager
+def _turn(folder: Path) -> Iterator[None]:
+    """Within this block no other run writes into `folder`. A run that waits says for which one, and
+    gives up after `PATIENCE` s."""
+    lock, holder = FileLock(no_link(folder / LOCK)), folder / HOLDER
+    try:
+        lock.acquire(timeout=SILENT)
+    except Timeout:
+        other = ""
+        with suppress(InputError):  # it has just gone, or has not said who it is
+            other = printable(read_text(holder, most=1000))
+        whom = f"{other or 'another run'}, which holds {printable(folder / LOCK)}"
+        print(f"rockcheck: waiting up to {PATIENCE:g} s for {whom}", file=sys.stderr)
+        try:
+            lock.acquire(timeout=PATIENCE)
+        except Timeout:
+            raise InputError(
+                f"{printable(folder)}: waited {PATIENCE:g} s for {whom}: end it, or give another"
+                " --out"
+            ) from None
+    try:
+        write_whole(holder, f"process {os.getpid()} on {platform.node()}")
+        yield
+    finally:
+        holder.unlink(missing_ok=True)
+        lock.release()
+
+
+def keep(run: Run, folder: Path) -> Path:
+    """Write run.json, its schema and the tables (the histories are there already); returns
+    run.json. Two runs take turns."""
+    from rockcheck.reports.document import csv
+
+    with _turn(folder):
+        for table in files_of(run):
+            write_whole(folder / f"{table.name}.csv", csv(table))
+        write_whole(folder / "junit.xml", junit(run))
+        write_whole(folder / "summary.md", markdown(run))
+        return run.save(folder)
+
+
+def publish(
+    folder: Path,
+    *,
+    jobs: int | None = None,
+    afresh: bool = False,
+    wanted: Sequence[str] = (),
+    on_progress: OnProgress = unheard,
+) -> Path:
+    """Write the pages of the run that was kept in `folder`; returns the page to open.
+
+    Unless `afresh`, only those that would show something else than they do. `jobs` processes draw,
+    by default one a core. Scenes that are `wanted` have a page in a large run, too.
+    """
+    from rockcheck.reports.site import write_site
+
+    with _turn(folder):
+        return write_site(
+            folder,
+            jobs=jobs or os.cpu_count() or 1,
+            afresh=afresh,
+            wanted=wanted,
+            on_progress=on_progress,
+        )

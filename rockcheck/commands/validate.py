@@ -5,18 +5,15 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
-from rich.console import Console
 
 from rockcheck.commands import (
-    OUT,
     AllowCodeOption,
-    JobsOption,
-    OutOption,
-    SchedulerOption,
+    Played,
     answer,
     console,
     model_names,
@@ -27,29 +24,22 @@ from rockcheck.commands import (
     tell_missing,
     usable_folder,
 )
-from rockcheck.commands.publish import keep, publish
 from rockcheck.commands.record import ReadOption
+from rockcheck.commands.report import keep, publish
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.recordings import Reading
 from rockcheck.scenes.recordings.sets import record_path
 from rockcheck.validation.execute.models import FAMILIES, compiles, family, not_installed
-from rockcheck.validation.suite.changes import Moment, moment_of, remember, trend_of, trends
-from rockcheck.validation.suite.record_sets import RecordSet
+from rockcheck.validation.suite.across import moment_of, remember, trend_of
+from rockcheck.validation.suite.motions import RecordSet
 from rockcheck.validation.suite.results import Run, Strict
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import Suite, is_scene, load_suite, scene_suite
-from rockcheck.validation.suite.tables import (
-    improvements,
-    not_shown,
-    outcome_tables,
-    summary,
-    verdict_lines,
-    verdict_table,
-)
+from rockcheck.validation.suite.tables import finding_of, summary
 
-#: The folder of the trend's page, and so many figures that moved are told.
-TREND, MOST_MOVED = "trend", 10
+#: The folder of the trend's page.
+TREND = "trend"
 Strictness = Literal["worse", "both"]
 ALL = "all"
 SuiteArgument = Annotated[
@@ -70,8 +60,10 @@ WhatArgument = Annotated[
 ]
 
 
-def run(
-    what: WhatArgument = None,
+@dataclass(frozen=True)
+class OfScene:
+    """The options that are for a scene: a suite says which models play what."""
+
     models: Annotated[
         str,
         typer.Option(
@@ -79,14 +71,14 @@ def run(
             help="Of a scene: all that are installed, or names with commas between.",
             autocompletion=model_names,
         ),
-    ] = ALL,
-    settings: Annotated[
+    ] = ALL
+    set: Annotated[
         list[str] | None,
         typer.Option(
             "--set",
             help="Of a scene: a model's setting, such as mujoco.time_step=1e-3; repeatable.",
         ),
-    ] = None,
+    ] = None
     records: Annotated[
         list[str] | None,
         typer.Option(
@@ -94,10 +86,14 @@ def run(
             help="Of a scene: files, folders or patterns, each played in place of its excitation;"
             " repeatable.",
         ),
-    ] = None,
-    read: ReadOption = None,
-    out: OutOption = OUT,
-    jobs: JobsOption = None,
+    ] = None
+    read: ReadOption = None
+
+
+def run(
+    what: WhatArgument = None,
+    of_scene: OfScene = OfScene(),
+    played: Played = Played(),
     force: Annotated[
         bool,
         typer.Option("--force", help="Run every cell, also those whose results are up to date."),
@@ -110,7 +106,6 @@ def run(
             " better ones, too.",
         ),
     ] = None,
-    scheduler: SchedulerOption = None,
     allow_code: AllowCodeOption = None,
     history: Annotated[
         Path | None,
@@ -137,16 +132,12 @@ def run(
     rockcheck itself.
     """
     scene = what if what is not None and is_scene(what) else None
+    before: Run | None = None
     if scene is None:
-        for name, given in (
-            ("--models", models != ALL),
-            ("--set", settings),
-            ("--records", records),
-            ("--read", read),
-        ):
-            if given:
-                raise InputError("is for a scene: a suite says which models play what", name)
-        folder = usable_folder(out)
+        for name, given in vars(of_scene).items():
+            if given and given != ALL:
+                raise InputError("is for a scene: a suite says which models play what", f"--{name}")
+        folder = usable_folder(played.out)
         suite = load_suite(what or "paper", allow_code=allow_code or ())
         tell_left_out(suite.left_out)
     else:
@@ -155,33 +146,41 @@ def run(
                 f"{printable(scene)} is a scene, and nothing of it is judged: give a suite",
                 "--strict",
             )
-        sets = record_sets(records or (), read or ())
-        chosen = chosen_models(models, settings or ())
+        sets = record_sets(of_scene.records or (), of_scene.read or ())
+        chosen = chosen_models(of_scene.models, of_scene.set or ())
         suite = scene_suite(scene, chosen, records=sets, allow_code=allow_code or ())
-        folder = usable_folder(out)
-        if models == ALL:
+        folder = usable_folder(played.out)
+        if of_scene.models == ALL:
             tell_missing()
-        _overwrites_no_verdict(folder)
+        with suppress(InputError):  # no run there, or none that can be read
+            before = Run.load(folder)
+        if before is not None and before.judged:
+            raise InputError(
+                f"{printable(folder)} holds the judged run of suite {before.suite!r}: give another"
+                " folder",
+                "--out",
+            )
         tell_left_out(
             suite.left_out,
             "--read vertical=true plays such a component together with the horizontal ones",
         )
     how: Strict = "both" if strict == "both" else strict is not None
-    finished = play(suite, folder, jobs, force, how, scheduler)
+    from rockcheck.reports import document
+
+    finished = play(suite, folder, played, force=force, strict=how)
     page = keep(finished, folder)
-    show(finished, console())
+    document.show(finding_of(finished), console())
     tell_faults(finished, folder)
     if history is not None and suite.judged:
         moments = remember(history, moment_of(finished, Path(finished.tolerances_file).parent))
-        tell_trend(moments, history)
+        trend = trend_of(moments)
+        document.show(trend, console())
         if report:
-            from rockcheck.reports.document import publish as written
-
-            trend = written(trend_of(moments), usable_folder(folder, TREND))
-            console().print(f"trend: {trend}", soft_wrap=True)
+            where = document.publish(trend, usable_folder(folder, TREND))
+            console().print(f"trend: {where}", soft_wrap=True)
     if report:
         with progress("pages") as on_progress:
-            page = publish(folder, jobs=jobs, on_progress=on_progress)
+            page = publish(folder, jobs=played.jobs, on_progress=on_progress)
     console().print(f"report: {page}", soft_wrap=True)
     more = {} if suite.judged else {"left_out": suite.left_out}
     answer(summary(finished) | more | {"report": page})
@@ -230,35 +229,13 @@ def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, d
     return found
 
 
-def _overwrites_no_verdict(folder: Path) -> None:
-    """Raises `InputError` where `folder` holds a judged run, whose pages and tables one that judges
-    nothing would overwrite."""
-    before = None
-    with suppress(InputError):  # no run there, or none that can be read
-        before = Run.load(folder)
-    if before is not None and before.judged:
-        raise InputError(
-            f"{printable(folder)} holds the judged run of suite {before.suite!r}: give another"
-            " folder",
-            "--out",
-        )
-
-
-def play(
-    suite: Suite, folder: Path, jobs: int | None, force: bool, strict: Strict, scheduler: str | None
-) -> Run:
+def play(suite: Suite, folder: Path, played: Played, **how: Any) -> Run:
     """Run a suite with a progress bar on stderr."""
-    slow = any(compiles(one.family_name, one.settings) for one in suite.models.values())
-    with progress(f"{suite.name}{', a first run compiles' if slow else ''}") as on_progress:
-        return run_suite(
-            suite,
-            folder,
-            jobs=jobs,
-            force=force,
-            strict=strict,
-            scheduler=scheduler,
-            on_progress=on_progress,
-        )
+    models = [(one.family_name, one.settings) for one in suite.models.values()]
+    said = ", a first run compiles" if any(compiles(*one) for one in models) else ""
+    with progress(f"{suite.name}{said}") as told:
+        how |= {"jobs": played.jobs, "scheduler": played.scheduler, "on_progress": told}
+        return run_suite(suite, folder, **how)
 
 
 def tell_faults(finished: Run, folder: Path) -> None:
@@ -274,55 +251,3 @@ def tell_faults(finished: Run, folder: Path) -> None:
             else f"{where}: traceback in {path}"
         )
         print(printable(f"rockcheck: {said}", 1400), file=sys.stderr)
-
-
-def tell_trend(moments: Sequence[Moment], path: Path) -> None:
-    """How many runs a history has, and the figures that moved since the one before."""
-    moved = [trend for trend in trends(moments) if trend.moved]
-    since = (
-        f", {len(moved)} figures moved since {moments[-2].commit or moments[-2].created}"
-        if len(moments) > 1
-        else ""
-    )
-    console().print(f"{path}: {len(moments)} runs{since}", soft_wrap=True)
-    for trend in moved[:MOST_MOVED]:
-        was, now = ("-" if value is None else f"{value:.6g}" for value in trend.values[-2:])
-        console().print(f"  {trend.name}: {was} -> {now}", soft_wrap=True)
-
-
-def show(finished: Run, out: Console) -> None:
-    """The verdicts, or the outcomes where nothing is judged: a table, the reasons of what is not a
-    pass, and a last line."""
-    bad = "red" if finished.exit_code else "yellow"
-    if not finished.judged:
-        for name, table in outcome_tables(finished):
-            out.print(name, style="bold", soft_wrap=True)
-            out.print(table)
-        out.print(
-            "peak: largest rotation; apart: RMS difference from the reference, to the horizon of"
-            " predictability; in alpha",
-            soft_wrap=True,
-        )
-        for line in verdict_lines(finished):
-            out.print(line, style=bad, soft_wrap=True)
-        return
-    out.print(verdict_table(finished))
-    for line in not_shown(finished):
-        out.print(line)
-    for line in verdict_lines(finished):
-        out.print(line, style=bad)
-    better = list(improvements(finished))
-    if better:
-        out.print("better than expected; `rockcheck accept` makes today's the expected ones:")
-    for line in better:
-        out.print(line, style="red" if finished.strict == "both" else "green")
-    if finished.without_tolerance:
-        out.print(
-            f"{finished.without_tolerance} figures have no tolerance yet: `rockcheck accept` makes"
-            " today's the expected ones"
-        )
-    out.print(
-        f"{finished.up_to_date} of {len(finished.cells)} simulations were up to date;"
-        f" {finished.wall_seconds:.1f} s"
-    )
-    out.print(f"verdict: {finished.words}", style="bold")

@@ -15,6 +15,7 @@ proportion to the file. ObsPy reads K-NET among these, but neither PEER, V2, ESM
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from rockcheck.scenes.errors import printable
@@ -42,6 +43,9 @@ __all__ = ["GRAVITY_OF_RECORDS", "UNITS", "Reading", "Recording", "read_componen
 
 #: How far the beginning of a file is looked at to know its format.
 _LOOKED_AT = 100
+Reader = Callable[[Path, list[str], Reading], Recording | list[Recording]]
+#: Formats that the name tells.
+_BY_NAME: dict[str, Reader] = {".at2": read_at2, ".csv": read_table}
 
 
 def read_components(path: Path, reading: Reading | None = None) -> list[Recording]:
@@ -54,13 +58,8 @@ def read_components(path: Path, reading: Reading | None = None) -> list[Recordin
     """
     asked = reading or Reading()
     lines = read_text(path, latin=True).split("\n")
-    kind = _format_of(path, lines)
-    if kind == "table":
-        return [read_table(path, lines, asked)]
-    if kind == "v2":
-        found = read_volume(path, lines, asked)
-    else:
-        found = [{"at2": read_at2, "esm": read_esm, "knet": read_knet}[kind](path, lines, asked)]
+    read = _reader_of(path, lines)(path, lines, asked)
+    found = read if isinstance(read, list) else [read]
     return found if asked.component is None else [_chosen(path, found, asked.component)]
 
 
@@ -75,22 +74,16 @@ def read_record(path: Path, reading: Reading | None = None) -> Recording:
     return found[0]
 
 
-def _format_of(path: Path, lines: list[str]) -> str:
-    suffix = path.suffix.lower()
-    if suffix in (".at2", ".csv"):
-        return {".at2": "at2", ".csv": "table"}[suffix]
+def _reader_of(path: Path, lines: list[str]) -> Reader:
     head = [line[:200] for line in lines[:_LOOKED_AT]]
-    if head[0].startswith("Origin Time"):
-        return "knet"
-    if any(line.startswith("SAMPLING_INTERVAL_S:") for line in head):
-        return "esm"
-    if any(map(is_volume, head)):
-        return "v2"
-    return (
-        "at2"
-        if any(AT2_HEADER.search(line) or AT2_HEADER_PLAIN.search(line) for line in head[:20])
-        else "table"
-    )
+    found: dict[Reader, bool] = {
+        read_knet: head[0].startswith("Origin Time"),
+        read_esm: any(line.startswith("SAMPLING_INTERVAL_S:") for line in head),
+        read_volume: any(map(is_volume, head)),
+        read_at2: any(AT2_HEADER.search(one) or AT2_HEADER_PLAIN.search(one) for one in head[:20]),
+    }
+    fits = next((reader for reader, fit in found.items() if fit), read_table)
+    return _BY_NAME.get(path.suffix.lower(), fits)
 
 
 def _chosen(path: Path, found: list[Recording], component: int | str) -> Recording:

@@ -160,7 +160,8 @@ def _layout_of(path: Path, rows: NumberedLines, reading: Reading) -> _Layout:
             "." not in with_digits
             and len(words) == 1
             and reading.decimal is None
-            and _ambiguous(rows)
+            # no line names columns, and every one is two runs of digits with a comma between
+            and all(_DECIMAL_COMMA.fullmatch(line.strip()[:60]) for line in head)
         ):
             raise fault(
                 path,
@@ -175,11 +176,6 @@ def _layout_of(path: Path, rows: NumberedLines, reading: Reading) -> _Layout:
         reading.decimal is None and "." not in with_digits and "," in with_digits
     )
     return _Layout(separator, comma)
-
-
-def _ambiguous(rows: NumberedLines) -> bool:
-    """Whether no line names columns and every one is two runs of digits with a comma between."""
-    return all(_DECIMAL_COMMA.fullmatch(line.strip()[:60]) for _, line in rows[:_MOST_HEADER])
 
 
 def _names_of(
@@ -276,7 +272,6 @@ def _unit_of(name: str) -> str:
 
 
 def _decimals(word: str) -> int:
-    """Decimal places that a number is printed with."""
     mantissa, _, exponent = word.lower().replace("d", "e").partition("e")
     return len(mantissa.partition(".")[2]) - max(min(int(exponent[:5] or 0), 300), -300)
 
@@ -301,10 +296,6 @@ def _step_of(
     # A coarser digit could hide a sample that is missing or in the wrong place.
     tells = digit <= 0.5 * mean
     slack = digit * (1.0 + 1e-6) if tells or reading.time_step else 0.0
-
-    def off(step: float, most: float) -> NDArray[np.intp]:
-        return np.flatnonzero(np.abs(time - time[0] - step * np.arange(len(time))) > most)
-
     rounding = 1e-9 * max(1.0, float(np.max(np.abs(time))))
     printed = float(f"{round(mean / digit) * digit:.12g}") if digit > 1e-12 else mean
     rate = 1.0 / max(round(1.0 / mean), 1)
@@ -316,7 +307,7 @@ def _step_of(
     if reading.time_step is not None:
         candidates = [(reading.time_step, max(0.01 * reading.time_step, slack) + 1e-9)]
     for step, most in candidates:
-        uneven = off(step, most)
+        uneven = np.flatnonzero(np.abs(time - time[0] - step * np.arange(len(time))) > most)
         if step > 0.0 and not uneven.size:
             break
     else:

@@ -11,7 +11,7 @@ import pytest
 
 from rockcheck.commands.cli import main
 from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.suite.changes import changes, moment_of, read_history
+from rockcheck.validation.suite.across import changes, moment_of, read_history
 from rockcheck.validation.suite.results import Run
 
 SUITE = """
@@ -157,7 +157,7 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys):
     ran("a", 0.00105, "--history", "runs.jsonl")
     capsys.readouterr()
     assert main(["validate", "mine.toml", *CODE, "--out", "a", "--history", "runs.jsonl"]) == 0
-    assert "runs.jsonl: 3 runs, 0 figures moved since " in capsys.readouterr().out
+    assert "3 runs, 0 figures moved since " in capsys.readouterr().out
     moments = read_history(Path("runs.jsonl"))
     head = subprocess.run(
         ["git", "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True
@@ -173,7 +173,7 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys):
     assert head in page
     assert 'href="trend/index.html"' in Path("a/index.html").read_text(encoding="utf-8")
     ran("a", 0.001, "--history", "runs.jsonl")
-    assert f"  {name}: " in capsys.readouterr().out
+    assert f"{name}: " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from rockcheck.commands.cli import main
-from rockcheck.scenes import History
 
 STILL = "faulty:Still", "--allow-code", "faulty:Still"
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
@@ -50,6 +49,8 @@ def write(name, text):
         ),
         (["compare", "gone.csv", "gone.csv"], "gone.csv: cannot be read"),
         (["compare", "scene.toml", "scene.toml"], "scene.toml"),
+        (["compare", "a.csv", "b.csv", "--offset=1"], "--offset: is gone: --align SECONDS"),
+        (["conformance", "--settings", "best"], "--settings: is gone: --set settings=best"),
         (["report", "."], "no finished run here"),
         ([], "Missing command"),
     ],
@@ -69,28 +70,6 @@ def test_bad_input_is_one_line_and_exit_2(words, said, capsys):
     assert said in captured.err
     assert captured.err.count("\n") == 1
     assert captured.err.startswith("rockcheck: ")
-
-
-def test_simulate_writes_a_history(capsys):
-    write("scene.toml", SCENE)
-    assert (
-        main(
-            ["simulate", "scene.toml", "--model", *STILL, "--set", "offset=0.001", "-o", "out.csv"]
-        )
-        == 0
-    )
-    assert History.load("out.csv").channels["theta"][0] == 0.001
-    assert "out.csv" in capsys.readouterr().out
-
-
-def test_a_model_that_fails_is_exit_3(capsys):
-    write("scene.toml", SCENE)
-    assert (
-        main(["simulate", "scene.toml", "--model", "faulty:Fails", "--allow-code", "faulty:Fails"])
-        == 3
-    )
-    assert capsys.readouterr().err == "rockcheck: more than 10 events\n"
-    assert not Path("scene--faulty_Fails.csv").exists()
 
 
 def test_compare_two_histories(capsys):

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 
-from rockcheck.commands import cli, publish
+from rockcheck.commands import cli, report
 from rockcheck.commands.cli import EXIT_CODES, main
 from rockcheck.validation.suite.results import Run
 
@@ -32,12 +32,12 @@ def test_a_fault_inside_has_a_code_of_its_own(tmp_path, monkeypatch, capsys):
     assert line.startswith(
         "rockcheck: a fault of rockcheck itself, ZeroDivisionError: please report it with "
     )
-    report = Path(line.rpartition(" ")[2])
-    assert report.parent == tmp_path
-    assert "in broken" in report.read_text()
-    assert "a fault\nof two lines" in report.read_text()
+    told = Path(line.rpartition(" ")[2])
+    assert told.parent == tmp_path
+    assert "in broken" in told.read_text()
+    assert "a fault\nof two lines" in told.read_text()
     if os.name == "posix":
-        assert report.stat().st_mode & 0o777 == 0o600
+        assert told.stat().st_mode & 0o777 == 0o600
 
 
 def test_a_fault_that_cannot_be_written_down_is_told(monkeypatch, capsys):
@@ -108,25 +108,25 @@ def a_run() -> Run:
 
 
 def test_a_held_lock_says_for_whom_it_waits_and_for_how_long(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(publish, "SILENT", 0.0)
-    monkeypatch.setattr(publish, "PATIENCE", 0.1)
+    monkeypatch.setattr(report, "SILENT", 0.0)
+    monkeypatch.setattr(report, "PATIENCE", 0.1)
     with (
         FileLock(tmp_path / ".lock"),
         pytest.raises(
-            publish.InputError, match=r"waited 0\.1 s for another run, which holds .*lock"
+            report.InputError, match=r"waited 0\.1 s for another run, which holds .*lock"
         ),
     ):
-        publish.keep(a_run(), tmp_path)
+        report.keep(a_run(), tmp_path)
     assert re.fullmatch(
         r"rockcheck: waiting up to 0\.1 s for another run, which holds .*\.lock\n",
         capsys.readouterr().err,
     )
     with (
-        publish._turn(tmp_path),
-        pytest.raises(publish.InputError, match=rf"waited 0\.1 s for process {os.getpid()} on "),
+        report._turn(tmp_path),
+        pytest.raises(report.InputError, match=rf"waited 0\.1 s for process {os.getpid()} on "),
     ):
-        publish.keep(a_run(), tmp_path)
+        report.keep(a_run(), tmp_path)
     capsys.readouterr()
-    publish.keep(a_run(), tmp_path)
+    report.keep(a_run(), tmp_path)
     assert capsys.readouterr().err == ""
     assert not (tmp_path / ".lock.holder").exists()

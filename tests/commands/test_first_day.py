@@ -329,10 +329,3 @@ def test_a_model_of_ones_own_that_returns_no_history_is_told_so(type_, command):
     )
     out, err = type_(command, *words, *CODE, code=3)
     assert "faulty:Nothing returned NoneType" in out + err
-
-
-def test_a_model_of_ones_own_that_raises_shows_its_traceback(type_):
-    suite("faulty:Bug")
-    _, err = type_("validate", "mine.toml", "--no-report", "--jobs", "1", *CODE, code=3)
-    assert err.startswith("rockcheck: short, other: ZeroDivisionError: a bug")
-    assert "ZeroDivisionError" in Path(err.rpartition("traceback in ")[2].strip()).read_text()

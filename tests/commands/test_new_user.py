@@ -33,14 +33,13 @@ def makers() -> ModuleType:
 
 
 @pytest.fixture
-def type_(capsys):
+def type_(capsys, but_progress):
     """Types a command, which must end well; what it said on stdout."""
 
     def typed(line: str) -> str:
         assert main(line.split()) == 0
         heard = capsys.readouterr()
-        # Only how far a long work is, on a slow machine.
-        assert all(" left" in line or " so far" in line for line in heard.err.splitlines())
+        assert but_progress(heard.err) == []
         return str(heard.out)
 
     return typed

@@ -65,9 +65,9 @@ def test_the_front_picture():
 
 
 def test_the_tutorials_bookcase(tmp_path):
-    from rockcheck.commands.new import run
+    from rockcheck.commands.scenes import new
 
-    run(tmp_path / "bookcase.toml")
+    new(tmp_path / "bookcase.toml")
     scene = load_scene(tmp_path / "bookcase.toml")
     reference = UNILATERAL.simulate(scene)
     assert rounded(reference.peak_rotation / reference.alpha, 2) == 0.72
@@ -117,6 +117,22 @@ def test_the_table_of_choices(names, least, most, ratios):
     assert (rounded(min(errors)), rounded(max(errors))) == (least, most)
     unit = found["ebm tolerance 1e-10"][1]
     assert sorted(rounded(found[line][1] / unit, 2) for line in lines) == ratios
+
+
+def test_the_step_that_an_engine_needs():
+    import whole_runs
+
+    of = {}
+    for run in ("league", "league-jolt"):
+        found = whole_runs.load(run)
+        of |= {row["line"]: row for row in found.table("first-steps").records()}
+    for engine in ("mujoco", "pybullet", "pymunk", "dart", "box2d"):
+        assert of[engine]["all"] == "0.0001 s"
+        assert of.get(f"{engine} adaptive", {"all": "0.008 s"})["all"] == "0.008 s"
+    assert [of[engine]["all"] for engine in ("drake", "physx", "jolt")] == [
+        f"never (down to {step} s)" for step in ("0.001", "0.0001", "0.0001")
+    ]
+    assert {of[f"{engine} default"]["all"] for engine in ("pymunk", "dart")} == {"0.0001 s"}
 
 
 def test_what_the_benchmark_says():

@@ -243,3 +243,53 @@ def test_mirrored_scene_gives_mirrored_motion(model, block):
     assert [event.kind for event in history.event_list][:4] == [
         event.kind for event in mirrored.event_list
     ][:4]
+
+
+def test_events_of_a_pulse_beside_a_wall(varying_engine, pulse):
+    """Times from an event-driven implementation of the unilateral model."""
+    scene = pulse(
+        3.0, 6.0, friction=0.6, walls=[Wall(side="left", gap=0.053, restitution=1.0)], duration=1.9
+    )
+    history = varying_engine(time_step="adaptive").simulate(scene)
+    expected = [
+        ("uplift", 0.783060),
+        ("wall impact", 0.941125),
+        ("lift-off", 0.941125),
+        ("floor impact", 0.983946),
+        ("landing", 0.983946),
+        ("floor impact", 1.831316),
+        ("wall impact", 1.849009),
+    ]
+    found = [(event.kind, event.t) for event in history.event_list][: len(expected)]
+    assert [kind for kind, _ in found] == [kind for kind, _ in expected]
+    assert [t for _, t in found] == pytest.approx([t for _, t in expected], abs=2e-5)
+    hit = history.event_list[1]
+    assert (hit.mode_before, hit.mode_after) == ("rock", "flight")
+    assert hit.impulse == pytest.approx(0.407101, abs=1e-4)
+
+
+def test_slip_and_stick_events(varying_engine, pulse):
+    history = varying_engine(time_step="adaptive").simulate(
+        pulse(4.0, 4.5, friction=0.3, duration=1.6)
+    )
+    found = {event.kind: event.t for event in history.event_list if event.kind in ("slip", "stick")}
+    assert found["slip"] == pytest.approx(
+        1.057406, abs=1.1e-3
+    )  # of the unilateral model; known to one step
+    assert found["stick"] == pytest.approx(1.366917, abs=1e-4)
+
+
+def test_a_rocking_block_comes_to_rest_once(varying_engine, block):
+    scene = Scene(
+        name="decay",
+        block=block,
+        floor=Floor(friction=1.0),
+        initial_rotation=0.1 * block.alpha,
+        duration=8.0,
+    )
+    history = varying_engine(time_step="adaptive").simulate(scene)
+    kinds = [event.kind for event in history.event_list]
+    assert kinds.count("settled") == 1
+    assert kinds[-1] == "settled"
+    assert history.outcome == "at rest"
+    assert set(kinds) == {"floor impact", "settled"}

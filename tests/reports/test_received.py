@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from rockcheck.commands.cli import main
-from rockcheck.commands.publish import LOCK, keep
+from rockcheck.commands.report import LOCK, keep
 from rockcheck.reports.site import write_site
 from rockcheck.scenes import InputError
 from rockcheck.validation.execute.store import HISTORIES, Store

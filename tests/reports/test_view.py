@@ -15,23 +15,13 @@ import pytest
 
 from rockcheck.reports.ensembles import EnsembleView
 from rockcheck.reports.figures import histories_figure
-from rockcheck.reports.overview import Entry, accuracy, entry, glance
 from rockcheck.reports.scene_data import packed, packed_lines, write_scene_file
 from rockcheck.reports.show.words import number, ratio, readable
 from rockcheck.reports.site import PAGES, write_site
 from rockcheck.reports.style import LOOKS, SPARE, looks, save
-from rockcheck.reports.tables import overrun, times_table
+from rockcheck.reports.tables import Entry, accuracy, entry, glance, overrun, times_table
 from rockcheck.reports.view import FALL, scene_views, slugs_of
-from rockcheck.scenes import (
-    Block,
-    Floor,
-    InputError,
-    Record,
-    Scene,
-    Sine,
-    Wall,
-    load_scene,
-)
+from rockcheck.scenes import Block, Floor, InputError, Record, Scene, Sine, Wall, load_scene
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
 from rockcheck.validation.discrepancy.figures import Figure, Pair
 from rockcheck.validation.discrepancy.measures import DIFFERENCES

@@ -96,15 +96,20 @@ DOORS = {
         "reports/style.py",
     }
     | {"reports/show/drawing.py"},
-    r"\.open\(|\bopen\(": {"scenes/reading.py", "scenes/writing.py", "validation/suite/changes.py"},
-    r"\.mkdir\(": {"scenes/writing.py", "scenes/compiled.py"},
+    r"\.open\(|\bopen\(": {"scenes/reading.py", "scenes/writing.py", "validation/suite/across.py"},
+    # Results go through `writing.made`; caches of the user's own lie in folders of mode 0700.
+    r"\.mkdir\(": {
+        "scenes/writing.py",
+        "scenes/compiled.py",
+        "validation/execute/provenance.py",
+    },
     r"\.read_text\(|\.read_bytes\(": {
         "scenes/compiled.py",
         "scenes/experience.py",
         "validation/execute/provenance.py",
     }
-    | {"commands/new.py", "validation/studies/work_precision/timings.py", "reports/site.py"}
-    | {"reports/style.py", "reports/pages.py", "validation/paper/measures.py"}
+    | {"commands/scenes.py", "validation/studies/work_precision/timings.py", "reports/site.py"}
+    | {"reports/style.py", "reports/document.py", "validation/paper/measures.py"}
     | {"validation/studies/conformance/study.py"},
 }
 

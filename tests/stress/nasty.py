@@ -148,7 +148,7 @@ WORDS = (
     "pivot='x'",
     "most_steps=1",
     "--until",
-    "--offset",
+    "--align",
     "1",
     "nan",
     "-1",

@@ -403,9 +403,9 @@ def _local_workers(address: str) -> int:
     if find_spec("distributed") is None:
         raise InputError("needs the package distributed: pip install distributed", "--scheduler")
     kind, _, count = address.partition(":")
-    if kind != "local":
+    if kind not in ("local", ""):  # for an empty address Dask would start a cluster of its own
         return 0
-    if not count.isdecimal() or not 1 <= int(count) <= 256:
-        said = f"{printable(address)!r} is not allowed: give local:N with 1 to 256 workers"
-        raise InputError(said, "--scheduler")
+    if not kind or not count.isdecimal() or not 1 <= int(count) <= 256:
+        said = "is not allowed: give an address, or local:N with 1 to 256 workers"
+        raise InputError(f"{printable(address)!r} {said}", "--scheduler")
     return int(count)

@@ -145,7 +145,6 @@ def _room(check: Check, value: float) -> tuple[float, float]:
 
 
 def _named(check: Check, line: Mapping[str, Any]) -> str:
-    """What becomes of a check's line."""
     if check.limit is None:
         return "new"
     at_least = MEASURES[check.figure.measure].sense == "at least"

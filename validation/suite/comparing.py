@@ -1,11 +1,13 @@
 """A suite's cells as they are planned, their figures against references under any law of impacts,
-and what else is worked out once and kept: the horizon, the landing at which laws part, what a
-spread of inputs makes of figures."""
+what else is worked out once and kept (the horizon, the landing at which laws part, what a spread of
+inputs makes of figures), and how sure figures are: a cell's difference from each reference against
+u_num, u_input and u_D (ASME V&V 20)."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -24,9 +26,11 @@ from rockcheck.validation.execute import provenance, workers
 from rockcheck.validation.execute.models import build, is_own
 from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
 from rockcheck.validation.study import Task
-from rockcheck.validation.suite.ensembles import Ensemble
+from rockcheck.validation.suite.motions import Ensemble
+from rockcheck.validation.suite.results import CostRecord, value_of
 from rockcheck.validation.suite.suites import ModelVariant
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Windowed
+from rockcheck.validation.uncertainty.numerical import INPUTS, Explanation, Numerical, explain
 from rockcheck.validation.uncertainty.population import Inputs, propagate
 
 #: What is judged by the nearest law. Histories are judged up to the horizon, which ends where the
@@ -84,6 +88,17 @@ class Planned(Task):
 Asked = tuple[Planned | None, list[Windowed]]
 #: A figure as it is kept: measure, unit, value, window, until, note. Its label is the measure's.
 FigureRow = tuple[str, str, float | None, str, float | None, str]
+
+
+class CellRecord(Stored):
+    """What is kept of a cell beside its history."""
+
+    outcome: str
+    notes: tuple[str, ...]
+    settings: dict[str, Any]
+    uncertainty: dict[str, float]
+    numerical: Numerical | None
+    cost: CostRecord
 
 
 class ComparisonRecord(Stored):
@@ -298,3 +313,68 @@ def _compute(
         impact_law=law,
         overturned_at=None if yardstick else candidate.overturned_at,
     )
+
+
+#: Quantities that are explained, with their units.
+QUANTITIES = {"theta_rms": "alpha", "peak_rotation": "alpha", "last_slip": "m"}
+
+
+def explanations(
+    scene: Scene,
+    figures: Sequence[Figure],
+    own: CellRecord,
+    references: Mapping[str, tuple[Sequence[Figure], CellRecord]],
+    inputs: Inputs | None,
+) -> Iterator[Explanation]:
+    """The verdict on each quantity of a cell (its figures and record) against each reference, by
+    name.
+
+    There is no verdict for a model whose numerical error is unknown, nor for a block that falls.
+    """
+    if own.numerical is None:
+        return
+    for against, (yardstick, other) in references.items():
+        if own.outcome != other.outcome and "overturned" in own.outcome + other.outcome:
+            yield _other_outcome(against, own.numerical, other.numerical, inputs)
+            continue
+        for name, unit in QUANTITIES.items():
+            mine, theirs = value_of(figures, name), value_of(yardstick, name)
+            error = None if mine is None or theirs is None else abs(mine - theirs)
+            if name == "theta_rms":
+                error = value_of(figures, name, against)
+            if error is None:
+                continue
+            u_num, reason = _both(name, own.numerical, other.numerical)
+            # of a measured history, the scatter of its repeats: rotations in rad, slips in m
+            size = 1.0 if name == "last_slip" else scene.block.alpha
+            u_data = math.hypot(*(one.uncertainty.get(name, 0.0) / size for one in (own, other)))
+            u_input = (inputs.u_input(name) or 0.0) if inputs else 0.0
+            yield explain(name, unit, error, u_num, u_input, u_data, reason=reason, against=against)
+
+
+def _other_outcome(
+    against: str, mine: Numerical, other: Numerical | None, inputs: Inputs | None
+) -> Explanation:
+    """What two different outcomes say: the peaks and slips of a block that falls have nothing to be
+    compared with."""
+    reasons = [reason for found in (mine, other) if found for reason in found.reasons]
+    if reasons:
+        return explain("outcome", "", None, None, reason="; ".join(reasons), against=against)
+    both_occur = inputs is not None and 0.0 < inputs.overturns.value < 1.0  # among the draws
+    verdict = INPUTS if both_occur else "not explained: model form or set-up, another outcome"
+    return Explanation(
+        quantity="outcome", unit="", against=against, error=1.0, u_num=0.0, verdict=verdict
+    )
+
+
+def _both(name: str, mine: Numerical, other: Numerical | None) -> tuple[float | None, str]:
+    """The numerical uncertainties of both runs together, or why it is not known."""
+    total = 0.0
+    for found in (mine, other):
+        if found is None:
+            continue
+        u = found.u_num(name)
+        if u is None:
+            return None, found.reason(name)
+        total = math.hypot(total, u)
+    return total, ""

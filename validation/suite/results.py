@@ -17,7 +17,7 @@ Nothing here knows how a cell is simulated, compared or shown.
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePath
 from typing import Any, Literal
 
@@ -353,20 +353,26 @@ class Run(Stored):
             run = cls.model_validate(data)
         except ValidationError as error:
             raise InputError(f"{printable(path)}: {from_validation(error)}") from None
-        for key, names, allowed in run._named():
-            if unknown := sorted(set(names) - set(allowed)):
+        places = {*run.scenes, *(one.name for one in run.ensembles)}
+        for key, names, allowed in (
+            ("reference", {run.reference}, {*run.models}),
+            ("cells.model", {cell.model for cell in run.cells}, {*run.models}),
+            ("cells.scene", {cell.scene for cell in run.cells}, places),
+        ):
+            if unknown := sorted(names - allowed):
                 raise InputError(
                     f"{printable(path)}: {key}: {printable(unknown[0])!r} is not in the"
                     f" run{suggestion(unknown[0], allowed)}"
                 )
         return run
 
-    def _named(self) -> Iterator[tuple[str, Iterable[str], Collection[str]]]:
-        """What names a part of the run, by its key, and the names that there are."""
-        ensembles = {one.name for one in self.ensembles}
-        yield "reference", [self.reference], self.models
-        yield "cells.model", (cell.model for cell in self.cells), self.models
-        yield "cells.scene", (cell.scene for cell in self.cells), {*self.scenes, *ensembles}
+
+def value_of(
+    figures: Iterable[Figure], measure: str, against: str = "", window: str = ""
+) -> float | None:
+    """The value of a measure among some figures, None without one."""
+    wanted = measure, against, window
+    return next((f.value for f in figures if (f.measure, f.against, f.window) == wanted), None)
 
 
 def worst(verdicts: Iterator[Any] | list[Any]) -> Verdict:

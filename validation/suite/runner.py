@@ -9,7 +9,7 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -25,9 +25,15 @@ from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store
 from rockcheck.validation.finding import Finding
 from rockcheck.validation.study import FAULTS, Study, run
-from rockcheck.validation.suite.comparing import Asked, Planned, compared, inputs_of
-from rockcheck.validation.suite.confidence import explanations, key_of, numerical_of
-from rockcheck.validation.suite.ensembles import Ensemble
+from rockcheck.validation.suite.comparing import (
+    Asked,
+    CellRecord,
+    Planned,
+    compared,
+    explanations,
+    inputs_of,
+)
+from rockcheck.validation.suite.motions import Ensemble
 from rockcheck.validation.suite.results import Cell, CostRecord, EnsembleRecord, Run, Strict
 from rockcheck.validation.suite.suites import ModelVariant, Suite
 from rockcheck.validation.suite.tolerances import (
@@ -39,19 +45,8 @@ from rockcheck.validation.suite.tolerances import (
     judge,
     judged_beside,
 )
-from rockcheck.validation.uncertainty.numerical import Numerical
+from rockcheck.validation.uncertainty import numerical
 from rockcheck.validation.uncertainty.population import Inputs
-
-
-class CellRecord(Stored):
-    """What is kept of a cell beside its history."""
-
-    outcome: str
-    notes: tuple[str, ...]
-    settings: dict[str, Any]
-    uncertainty: dict[str, Any]
-    numerical: Numerical | None
-    cost: CostRecord
 
 
 class BatchRecord(Stored):
@@ -104,15 +99,16 @@ class SuiteStudy(Study):
             ) from None
         limits = [suite.suite_of(name).limits for name in (*suite.scenes, *suite.ensembles)]
         self.memory_mb = max((limit.memory_mb for limit in limits), default=None)
+        asked = {"uncertainty": provenance.code_digest(numerical.__name__)}
         self.cells = [
-            self._planned(scene, variant, key_of(suite.suite_of(scene.name).uncertainty))
+            self._planned(scene, variant, asked if suite.suite_of(scene.name).uncertainty else {})
             for scene, variant in suite.cells()
         ]
         self.batches = [
             batch for found in suite.ensemble_cells() for batch in self._batches(*found)
         ]
         self.read_back: set[Planned] = set()
-        self.records: dict[Planned, dict[str, Any]] = {}
+        self.records: dict[Planned, Any] = {}  # `CellRecord`, `BatchRecord`
         self.failures: dict[Planned, str] = {}
         self.traces: set[Planned] = set()
         self.compared: dict[Planned, Cell] = {}
@@ -148,7 +144,7 @@ class SuiteStudy(Study):
         looked up without drawing them."""
         drawing = {
             "ensemble": ensemble.model_dump(mode="json", exclude={"count", "batch", "description"}),
-            "code": provenance.code_digest("rockcheck.validation.suite.ensembles"),
+            "code": provenance.code_digest("rockcheck.validation.suite.motions"),
         }
         for start in range(0, ensemble.count, ensemble.batch):
             numbers = range(start, min(start + ensemble.batch, ensemble.count))
@@ -171,21 +167,20 @@ class SuiteStudy(Study):
 
     def find(self, store: Store, task: Any) -> workers.Played | None:
         """A cell's record where its history is whole, a batch's."""
-        cell = task.ensemble is None
-        found = self.store.get(task.name) if cell else self.store.get_record(COMPARISONS, task.name)
-        with suppress(
-            ValueError
-        ):  # what is kept is not trusted to have the fields that it must have
-            if found is not None and (CellRecord if cell else BatchRecord).model_validate(found):
+        whole = task.ensemble is None
+        found = store.get(task.name) if whole else store.get_record(COMPARISONS, task.name)
+        # what is kept is not trusted to have the fields that it must have
+        with suppress(ValueError):
+            if found is not None:
+                self.records[task] = _record_of(task).model_validate(found)
                 self.read_back.add(task)
-                self.records[task] = found
                 return workers.Played(found)
         return None
 
     def keep(self, store: Store, task: Any, record: workers.Played) -> None:
         """Keep a history or a batch, and compare its scene where that is the last of it: while
         others play."""
-        self.records[task] = record.record
+        self.records[task] = _record_of(task).model_validate(record.record)
         if record.traceback:  # some scenes of a batch: not to be read back
             self.traces.add(task)
             write_whole(made(self.store.folder, FAULTS) / f"{task.name}.txt", record.traceback)
@@ -227,7 +222,14 @@ class SuiteStudy(Study):
                 record, of_ensemble = self._ensemble(ensemble, list(batches))
                 ensembles.append(record)
                 cells += of_ensemble
-        faults = {(task.place, task.variant.label): _fault(task) for task in self.traces}
+        # in a user's own model an exception is that model's fault, not rockcheck's
+        faults = {
+            (task.place, task.variant.label): {
+                "traceback": f"{FAULTS}/{task.name}.txt",
+                "unexpected": not is_own(task.variant.family_name),
+            }
+            for task in self.traces
+        }
         cells = [cell.model_copy(update=faults.get((cell.scene, cell.model), {})) for cell in cells]
         there = {(cell.scene, cell.model) for cell in cells}
         finished = Run(
@@ -265,7 +267,6 @@ class SuiteStudy(Study):
         )
 
     def _cell(self, planned: Planned) -> Cell:
-        """The finished cell: its figures, compared with each reference, and their verdicts."""
         scene, label, suite = planned.scene, planned.variant.label, self.suite
         about: dict[str, Any] = {
             "scene": scene.name,
@@ -275,7 +276,8 @@ class SuiteStudy(Study):
         }
         if planned in self.failures:
             missing = not_installed(planned.variant.family_name)
-            about["status"] = _absence(planned.variant) if missing else "failed"
+            absent = "absent" if has_wheel(planned.variant.family_name) else "unavailable"
+            about["status"] = absent if missing else "failed"
             return Cell(
                 **about, reason=self.failures[planned], settings=dict(planned.variant.settings)
             )
@@ -297,7 +299,6 @@ class SuiteStudy(Study):
                 )
                 asked[name] = reference, extra
         found = compared(self.store, scene, planned, asked)
-        numerical = numerical_of(record)
         figures = [figure for name, one in found.items() for figure in one.figures_against(name)]
         gaps = {
             (name, window): gap for name, one in found.items() for window, gap in one.gaps.items()
@@ -314,7 +315,7 @@ class SuiteStudy(Study):
                     " a window such as theta_rms@8s ends sooner"
                 )
             measure = place.what.definition
-            floor = floor_of(measure, scene, numerical)
+            floor = floor_of(measure, scene, record.numerical)
             checks.append(
                 judge(
                     figure,
@@ -328,15 +329,15 @@ class SuiteStudy(Study):
         return Cell(
             **about,
             status="done",
-            settings=record["settings"],
+            settings=record.settings,
             history=f"{HISTORIES}/{planned.name}{TABLE}",
-            outcome=record["outcome"],
+            outcome=record.outcome,
             overturned_at=found[OWN_FIGURES].overturned_at,
-            notes=tuple(record["notes"]),
-            cost=CostRecord(**record["cost"]),
+            notes=record.notes,
+            cost=record.cost,
             figures=tuple(figures),
             checks=tuple(checks),
-            numerical=numerical,
+            numerical=record.numerical,
             impact_law=found[OWN_FIGURES].impact_law,
         )
 
@@ -380,42 +381,33 @@ class SuiteStudy(Study):
         own = self.suite.suite_of(cell.scene)
         if cell.numerical is None:
             return cell
-        others = {
-            other.model: other.figures
+        references = {
+            other.model: (other.figures, self.records[self.by_place[cell.scene, other.model]])
             for other in cells
             if other.model in {own.reference, own.model_form} - {cell.model}
             and other.status == "done"
         }
-        record = {name: self.records[self.by_place[cell.scene, name]] for name in others}
-        mine = self.records[self.by_place[cell.scene, cell.model]]
-        scene = own.scenes[cell.scene]
-        found = explanations(scene, cell.figures, others, record, mine, inputs)
+        mine, scene = self.records[self.by_place[cell.scene, cell.model]], own.scenes[cell.scene]
+        found = explanations(scene, cell.figures, mine, references, inputs)
         return cell.model_copy(update={"explanations": tuple(found)})
 
     def _ensemble(
         self, ensemble: Ensemble, batches: Sequence[Planned]
     ) -> tuple[EnsembleRecord, list[Cell]]:
-        """An ensemble with all peaks and outcomes, and a cell for each model."""
         by_model = {
             label: list(found)
             for label, found in groupby(batches, key=lambda batch: batch.variant.label)
         }
         samples: dict[str, Sample] = {}
         for label, parts in by_model.items():
-            got = [
-                self.records.get(b)
-                or {
-                    "peaks": [None] * len(b.numbers),
-                    "outcomes": [self.failures[b]] * len(b.numbers),
-                }
-                for b in parts
-            ]
-            peaks = [
-                math.nan if peak is None else peak for record in got for peak in record["peaks"]
-            ]
-            outcomes = tuple(outcome for record in got for outcome in record["outcomes"])
-            samples[label] = Sample(np.array(peaks), outcomes)
-        record = EnsembleRecord(
+            peaks: list[float | None] = []
+            outcomes: list[str] = []
+            for part in parts:
+                record, count = self.records.get(part), len(part.numbers)
+                peaks += record.peaks if record else [None] * count
+                outcomes += record.outcomes if record else [self.failures[part]] * count
+            samples[label] = Sample(np.array(peaks, dtype=float), tuple(outcomes))
+        whole = EnsembleRecord(
             name=ensemble.name,
             description=ensemble.description,
             definition=ensemble.model_dump(mode="json", exclude_none=True),
@@ -425,12 +417,13 @@ class SuiteStudy(Study):
             },
             outcomes={label: tuple(sample.outcomes) for label, sample in samples.items()},
         )
-        return record, [self._ensemble_cell(parts, samples) for parts in by_model.values()]
+        return whole, [self._ensemble_cell(parts, samples) for parts in by_model.values()]
 
     def _ensemble_cell(self, batches: Sequence[Planned], samples: Mapping[str, Sample]) -> Cell:
         variant, place = batches[0].variant, batches[0].place
         own, origin = samples[variant.label], self.suite.suite_of(place)
-        costs = [self.records[batch]["cost"] for batch in batches if batch in self.records]
+        played = (self.records[batch] for batch in batches if batch in self.records)
+        costs = [record.cost.model_dump(exclude_unset=True) for record in played]
         about: dict[str, Any] = {
             "scene": place,
             "model": variant.label,
@@ -442,7 +435,8 @@ class SuiteStudy(Study):
             ),
         }
         if missing := not_installed(variant.family_name):
-            return Cell(**about, status=_absence(variant), reason=missing)
+            about["status"] = "absent" if has_wheel(variant.family_name) else "unavailable"
+            return Cell(**about, reason=missing)
         if own.failures:
             reason = next(
                 outcome
@@ -492,18 +486,8 @@ def in_order(items: Sequence[Planned]) -> list[Planned]:
     return [items[n] for n in sorted(range(len(items)), key=turn.__getitem__)]
 
 
-def _fault(item: Any) -> dict[str, Any]:
-    """What a cell says of an exception that no model may raise. In a user's own model it is that
-    model's fault, not rockcheck's."""
-    return {
-        "traceback": f"{FAULTS}/{item.name}.txt",
-        "unexpected": not is_own(item.variant.family_name),
-    }
-
-
-def _absence(variant: ModelVariant) -> Literal["absent", "unavailable"]:
-    """What a cell's status is where its model's engine is not installed."""
-    return "absent" if has_wheel(variant.family_name) else "unavailable"
+def _record_of(task: Planned) -> type[CellRecord] | type[BatchRecord]:
+    return CellRecord if task.ensemble is None else BatchRecord
 
 
 def _figure(figures: Sequence[Figure], place: Place) -> Figure:

@@ -41,8 +41,8 @@ A suite is a TOML file that a user can write:
         [{ name = "weak", excitation = { kind = "ricker", amplitude = 4.0, period = 1.5 } }],
     ]
 
-Scenes under recorded motions are `[[records]]` tables (validation.suite.record_sets). Ensembles are
-`[[ensemble]]` tables (validation.suite.ensembles), judged by what `require.ensemble` names. Scenes
+Scenes under recorded motions are `[[records]]` tables (validation.suite.motions). Ensembles are
+`[[ensemble]]` tables (validation.suite.motions), judged by what `require.ensemble` names. Scenes
 can also be written out as `[[scene]]` tables. Tolerances (validation.suite.tolerances) are a table
 `[tolerances]` in the file or a file `<suite>.tolerances.toml` beside it. `include = ["smoke",
 "walls"]` joins other suites instead.
@@ -75,8 +75,7 @@ from rockcheck.scenes.files import (
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS
 from rockcheck.validation.execute.models import Family, build, check_allowed, family, is_own
-from rockcheck.validation.suite.ensembles import Ensemble
-from rockcheck.validation.suite.record_sets import RecordSet, under_records
+from rockcheck.validation.suite.motions import Ensemble, RecordSet, under_records
 from rockcheck.validation.suite.results import Kind
 from rockcheck.validation.suite.tolerances import (
     HORIZON,
@@ -332,7 +331,12 @@ def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[st
         for e in given.ensemble
     }
     _check_names(given, models, scenes, ensembles)
-    tolerances_path, tables = _tolerance_tables(given, path, shipped)
+    beside = path.with_name(f"{path.stem}.tolerances.toml")
+    if shipped:
+        beside = DATA / "tolerances" / path.name
+    tables, tolerances_path = given.tolerances, path
+    if tables is None:
+        tables, tolerances_path = read_toml(beside) if beside.exists() else {}, beside
     return Suite(
         name=path.stem,
         path=path,
@@ -417,8 +421,10 @@ def _check_names(
         if name in scenes:
             raise InputError(f"{name!r} is a scene, too", "ensemble.name")
     for key, texts in given.require:
+        book = {"figures": FIGURES, "ensemble": STATISTICS}.get(key, DIFFERENCES)
         for text in texts:
-            _required(key, text)
+            if Windowed.parse(text).measure not in book:
+                raise unknown_name(f"measure of require.{key}", text, book)
 
 
 def _tolerances(
@@ -562,22 +568,3 @@ def _merged(base: Any, change: Any) -> Any:
             _merged(a, b) if b is not None else a for a, b in itertools.zip_longest(base, change)
         ]
     return change
-
-
-def _required(key: str, text: str) -> None:
-    book = {"figures": FIGURES, "ensemble": STATISTICS}.get(key, DIFFERENCES)
-    if Windowed.parse(text).measure not in book:
-        raise unknown_name(f"measure of require.{key}", text, book)
-
-
-def _tolerance_tables(
-    given: SuiteFile, path: Path, shipped: bool
-) -> tuple[Path, Mapping[str, Any]]:
-    if given.tolerances is not None:
-        return path, given.tolerances
-    beside = (
-        DATA / "tolerances" / path.name
-        if shipped
-        else path.with_name(f"{path.stem}.tolerances.toml")
-    )
-    return beside, read_toml(beside) if beside.exists() else {}

@@ -1,5 +1,4 @@
-"""Verdicts as tables for the terminal and as CSV; for machines and job pages as JUnit XML and
-Markdown."""
+"""Verdicts as blocks of a finding; for machines and job pages as JUnit XML and Markdown."""
 
 from __future__ import annotations
 
@@ -9,24 +8,30 @@ from collections.abc import Container, Iterator
 from typing import Any
 
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
-from rich.table import Table
-from rich.text import Text
 
 from rockcheck.scenes.errors import inert, printable
-from rockcheck.scenes.writing import markdown_table, table_text
+from rockcheck.scenes.writing import markdown_table
 from rockcheck.validation.discrepancy.figures import Figure, value_words
-from rockcheck.validation.suite.results import MISSING, SEVERITY, Cell, Check, Run, Strict, worst
+from rockcheck.validation.finding import Block, Column, Finding, Mark, Table, Text, text
+from rockcheck.validation.suite.results import (
+    MISSING,
+    SEVERITY,
+    Cell,
+    Check,
+    Run,
+    Strict,
+    Verdict,
+    value_of,
+    worst,
+)
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, apart
 
 #: The most scenes that tables and pages show one by one.
 MOST_SHOWN = 200
-COLOURS = {
-    "pass": "green",
-    "incomplete": "yellow",
-    "changed": "yellow",
-    "fail": "red",
-    "error": "red",
-}
+OUTCOMES = (
+    "peak: largest rotation; apart: RMS difference from the reference, to the horizon of"
+    " predictability; in alpha"
+)
 
 
 def shown(run: Run, most: int = MOST_SHOWN) -> tuple[str, ...]:
@@ -51,76 +56,85 @@ def shown(run: Run, most: int = MOST_SHOWN) -> tuple[str, ...]:
     return tuple(place for place in cells if place in chosen)
 
 
-def not_shown(run: Run) -> Iterator[str]:
+def not_shown(run: Run) -> list[str]:
     """A line that says how many scenes are not `shown`, where some are not."""
-    if more := len(run.places) - len(shown(run)):
-        yield f"and {more} more scenes, none of them worse; their figures are in figures.csv"
+    more = len(run.places) - len(shown(run))
+    said = f"and {more} more scenes, none of them worse; their figures are in figures.csv"
+    return [said] if more else []
+
+
+def finding_of(run: Run) -> Finding:
+    """What a run says on a terminal: the verdicts, or the outcomes where nothing is judged, and the
+    reasons of what is no pass."""
+    wrong = Text(items=list(verdict_lines(run)), verdict="fail" if run.exit_code else "changed")
+    if not run.judged:
+        told = Text(OUTCOMES)
+        return Finding("run", run.suite, "nothing judged", [*outcome_tables(run), told, wrong])
+    better, waits = list(improvements(run)), run.without_tolerance
+    count = f"{run.up_to_date} of {len(run.cells)} simulations were up to date"
+    of_better = "better than expected; `rockcheck accept` makes today's the expected ones:"
+    of_waiting = f"{waits} figures have no tolerance yet: `rockcheck accept` makes today's the"
+    blocks: list[Block] = [
+        verdict_table(run),
+        Text(items=not_shown(run)),
+        wrong,
+        Text(of_better if better else ""),
+        Text(items=better, verdict="fail" if run.strict == "both" else "pass"),
+        Text(f"{of_waiting} expected ones" if waits else ""),
+        Text(f"{count}; {run.wall_seconds:.1f} s"),
+    ]
+    return Finding("run", run.suite, f"verdict: {run.words}", blocks)
 
 
 def verdict_table(run: Run) -> Table:
-    """A row a cell, within 80 columns: the check that is nearest to its limit, how much of that it
-    uses, and the verdict.
-
-    Of a large run, the scenes that are `shown`.
-    """
-    table = Table(box=None, pad_edge=False, expand=False)
-    table.add_column("scene", overflow="ellipsis", no_wrap=True, max_width=22)
-    table.add_column("model", overflow="ellipsis", no_wrap=True, max_width=14)
-    table.add_column("nearest to its limit", overflow="ellipsis", no_wrap=True, max_width=24)
-    table.add_column("used", justify="right", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
-    before = ""
-    places = set(shown(run))
+    """A row a cell: the check that is nearest to its limit, how much of that it uses, and the
+    verdict. Of a large run, the scenes that are `shown`."""
+    places, before, rows = set(shown(run)), "", []
     for cell in run.cells:
         if cell.scene not in places:
             continue
-        near = nearest(cell)
+        near, unsure = nearest(cell), ", not converged" if cell.converged is False else ""
         judged = windowed(near) if near else "as it must be" if cell.checks else "nothing judged"
-        words = judged if cell.status == "done" else cell.reason or "failed"
-        verdict = (
-            Text("-")
-            if cell.status == "done" and not cell.checks
-            else Text(cell.words, COLOURS[cell.verdict])
-        )
-        if cell.converged is False:
-            verdict.append(", not converged", "yellow")
-        table.add_row(
-            "" if cell.scene == before else cell.scene,
-            cell.model,
-            Text(words),
-            percent(near) if near else "",
-            verdict,
+        idle = cell.status == "done" and not cell.checks
+        state: Verdict = "changed" if cell.words == "no tolerance yet" else cell.verdict
+        rows.append(
+            [
+                "" if cell.scene == before else cell.scene,
+                cell.model,
+                judged if cell.status == "done" else cell.reason or "failed",
+                percent(near) if near else "",
+                f"-{unsure}" if idle else Mark(f"{cell.words}{unsure}", state),
+            ]
         )
         before = cell.scene
-    return table
+    heads = [*map(text, ("scene", "model", "nearest to its limit")), Column("used")]
+    return Table("verdicts", [*heads, text("verdict")], rows, most=len(rows))
 
 
-def outcome_tables(run: Run) -> Iterator[tuple[str, Table]]:
-    """Each scene with a row a model, within 80 columns: what becomes of the block, its peak
-    rotation, and how far from the reference."""
+def outcome_tables(run: Run) -> Iterator[Table]:
+    """Each scene with a row a model: what becomes of the block, its peak rotation, and how far from
+    the reference."""
+    names = ("peak_rotation_alpha", "apart_alpha")
+    columns = [*map(text, ("model", "outcome")), *map(Column, ("peak", "apart", "took"))]
     for scene, cells in run.by_scene().items():
-        table = Table(box=None, pad_edge=False, expand=False)
-        for name, width in (("", 0), ("model", 16), ("outcome", 26)):
-            table.add_column(name, overflow="fold", min_width=width)
-        for name in ("peak", "apart", "took"):
-            table.add_column(name, justify="right", no_wrap=True, min_width=8)
-        for cell in cells.values():
-            words = cell.fate if cell.status == "done" else cell.reason or "failed"
-            colour = {"failed": "red", "done": ""}.get(cell.status, "yellow")
-            row = outcome_row(cell, run.reference)
-            peak, apart = (
-                "" if row[name] is None else f"{row[name]:.3g}"
-                for name in ("peak_rotation_alpha", "apart_alpha")
+        rows = []
+        for model, cell in cells.items():
+            values, done = outcome_row(cell, run.reference), cell.status == "done"
+            peak, apart = (values[name] for name in names)
+            rows.append(
+                [
+                    model,
+                    cell.fate if done else Mark(cell.reason or "failed", cell.verdict),
+                    peak,
+                    "ref." if model == run.reference else apart,
+                    f"{cell.cost.wall_seconds:.1f} s" if done else "",
+                ]
             )
-            apart = "ref." if cell.model == run.reference else apart
-            took = f"{cell.cost.wall_seconds:.1f} s" if cell.status == "done" else ""
-            table.add_row("", cell.model, Text(words, colour), peak, apart, took)
-        yield scene, table
+        yield Table("outcomes", columns, rows, scene)
 
 
 def outcome_row(cell: Cell, reference: str) -> dict[str, Any]:
     """What a cell came to, in plain values; `peak_rotation_alpha` is None for a block that fell."""
-    figures = {(f.measure, f.against, f.window): f.value for f in cell.figures}
     fell = cell.outcome.startswith("overturned")
     return {
         "scene": cell.scene,
@@ -128,8 +142,8 @@ def outcome_row(cell: Cell, reference: str) -> dict[str, Any]:
         "status": cell.status,
         "outcome": cell.outcome or None,
         "overturned_at_s": cell.overturned_at,
-        "peak_rotation_alpha": None if fell else figures.get(("peak_rotation", "", "")),
-        "apart_alpha": figures.get(("theta_rms", reference, HORIZON)),
+        "peak_rotation_alpha": None if fell else value_of(cell.figures, "peak_rotation"),
+        "apart_alpha": value_of(cell.figures, "theta_rms", reference, HORIZON),
         "wall_seconds": cell.cost.wall_seconds,
     }
 
@@ -210,13 +224,18 @@ def place(cell: Cell) -> str:
 
 def title(check: Check) -> str:
     """The check as tolerances name it: measure, window, and what it is held against."""
-    against = f" against {check.figure.against}" if check.figure.against else ""
-    return f"{windowed(check)}{against}"
+    return title_of(check.figure)
+
+
+def title_of(figure: Figure) -> str:
+    """The figure as tolerances name it."""
+    against = f" against {figure.against}" if figure.against else ""
+    return f"{figure.measure}{'@' if figure.window else ''}{figure.window}{against}"
 
 
 def windowed(check: Check) -> str:
     """What is checked, as tolerances name it: measure and window."""
-    return f"{check.figure.measure}{'@' if check.figure.window else ''}{check.figure.window}"
+    return title_of(check.figure).partition(" ")[0]
 
 
 def used(check: Check) -> float:
@@ -252,7 +271,11 @@ def nearest(cell: Cell) -> Check | None:
     """The check that failed, else the one nearest to its limit. A yes-or-no measure, or a limit of
     0, is never near its limit."""
     return max(
-        (check for check in cell.checks if check.verdict == "fail" or graded(check)),
+        (
+            check
+            for check in cell.checks
+            if check.verdict == "fail" or (check.limit and not asks(check))
+        ),
         key=used,
         default=None,
     )
@@ -262,11 +285,6 @@ def asks(check: Check) -> bool:
     """Whether the measure is a yes-or-no one."""
     measure = MEASURES.get(check.figure.measure)
     return measure is not None and measure.yes_no
-
-
-def graded(check: Check) -> bool:
-    """Whether a check has a limit that can be used up in part."""
-    return bool(check.limit) and not asks(check)
 
 
 def share(check: Check) -> str:
@@ -285,37 +303,21 @@ def share(check: Check) -> str:
     return f"{windowed(check)} {value} / {limit}"
 
 
-def checks_csv(run: Run) -> str:
-    """All checks, a row each."""
+def files_of(run: Run) -> Iterator[Table]:
+    """All checks, a row each; and all figures, judged or not."""
+    place = ("scene", "model", "against", "measure", "window", "value", "unit")
     tolerance = ("expected", "limit", "drift", "verdict", "reason", "why")
-    rows = (
-        (*_row(cell, check.figure), check.kind, *(getattr(check, name) for name in tolerance))
+
+    def row(cell: Cell, figure: Figure) -> list[Any]:
+        return [cell.scene, cell.model, *(getattr(figure, name) for name in place[2:])]
+
+    checks = [
+        [*row(cell, check.figure), check.kind, *(getattr(check, name) for name in tolerance)]
         for cell, check in run.checks()
-    )
-    return table_text((*ROW, "kind", *tolerance), rows)
-
-
-def figures_csv(run: Run) -> str:
-    """All figures, judged or not, a row each."""
-    return table_text(
-        (*ROW, "note"),
-        ((*_row(cell, figure), figure.note) for cell in run.cells for figure in cell.figures),
-    )
-
-
-ROW = ("scene", "model", "against", "measure", "window", "value", "unit")
-
-
-def _row(cell: Cell, figure: Figure) -> tuple[object, ...]:
-    return (
-        cell.scene,
-        cell.model,
-        figure.against,
-        figure.measure,
-        figure.window,
-        figure.value,
-        figure.unit,
-    )
+    ]
+    yield Table("checks", list(map(Column, (*place, "kind", *tolerance))), checks)
+    figures = [[*row(cell, one), one.note] for cell in run.cells for one in cell.figures]
+    yield Table("figures", list(map(Column, (*place, "note"))), figures)
 
 
 MARKS = {"pass": "✅", "incomplete": "⚪", "changed": "🟡", "fail": "❌", "error": "💥"}
@@ -378,62 +380,45 @@ def _case(place: str, name: str, result: Failure | Error | Skipped | None) -> Te
 def markdown(run: Run) -> str:
     """A summary for a job's page: the verdict, what is not a pass and why, and a table of scenes by
     models."""
-    lines = [
+    count = f"{len(run.cells)} simulations, {run.up_to_date} up to date"
+    parts = [
         f"## {MARKS[run.verdict]} rockcheck {_plain(run.suite)}: {run.words}",
-        "",
-        f"{len(run.cells)} simulations, {run.up_to_date} up to date,"
-        f" {sum(1 for _ in run.checks())} checks, {run.wall_seconds:.1f} s.",
-        "",
+        f"{count}, {sum(1 for _ in run.checks())} checks, {run.wall_seconds:.1f} s.",
     ]
-    for heading, found in (
-        ("", list(verdict_lines(run))),
-        ("Better than expected:", list(improvements(run))),
+    for heading, lines in (
+        ([], list(verdict_lines(run))),
+        (["Better than expected:"], list(improvements(run))),
     ):
-        more = (
-            [f"- and {len(found) - MOST_SHOWN} more, in junit.xml"]
-            if len(found) > MOST_SHOWN
-            else []
-        )
-        lines += [heading, ""] if heading and found else []
-        lines += [*(f"- {_plain(one)}" for one in found[:MOST_SHOWN]), *more, ""] if found else []
+        more = len(lines) - MOST_SHOWN
+        rest = [f"- and {more} more, in junit.xml"] if more > 0 else []
+        items = [*(f"- {_plain(one)}" for one in lines[:MOST_SHOWN]), *rest]
+        parts += [*heading, "\n".join(items)] if lines else []
     cells, places = run.by_scene(), shown(run)
     rows = (
         (_plain(scene), *(_entry(cells[scene].get(model), run.judged) for model in run.models))
         for scene in places
     )
-    table = markdown_table(("scene", *map(_plain, run.models)), rows)
-    rest = [
-        line for one in not_shown(run) for line in ("", one)
-    ]  # a line right below would be a row of the table
-    return "\n".join([*lines, table, *rest, *_laws(run, places)]) + "\n"
+    parts += [markdown_table(("scene", *map(_plain, run.models)), rows), *not_shown(run)]
+    return "\n\n".join([*parts, *_laws(run, places)]) + "\n"
 
 
 def _laws(run: Run, places: Container[str]) -> Iterator[str]:
     """Which law of impacts each model followed, where these scenes have a landing that tells; it is
     no verdict."""
-    told = {
-        cell.scene: cell.impact_law.t
-        for cell in run.cells
-        if cell.impact_law and cell.scene in places
-    }
-    if not told:
-        return
-    models = [
-        model
-        for model in run.models
-        if any(cell.model == model and cell.impact_law for cell in run.cells)
-    ]
-    yield from (
-        "",
-        "The law of impacts followed at the first landing at which laws part (not judged):",
-        "",
-    )
-    found = {(cell.scene, cell.model): cell.impact_law.law for cell in run.cells if cell.impact_law}
+    found = {(cell.scene, cell.model): cell.impact_law for cell in run.cells if cell.impact_law}
+    told = {scene: law.t for (scene, _), law in found.items() if scene in places}
+    models = [model for model in run.models if any(model == of for _, of in found)]
     rows = (
-        (_plain(scene), f"{t:.3f} s", *(found.get((scene, model), "") for model in models))
+        (
+            _plain(scene),
+            f"{t:.3f} s",
+            *(found[scene, one].law if (scene, one) in found else "" for one in models),
+        )
         for scene, t in told.items()
     )
-    yield markdown_table(("scene", "landing", *map(_plain, models)), rows)
+    if told:
+        yield "The law of impacts followed at the first landing at which laws part (not judged):"
+        yield markdown_table(("scene", "landing", *map(_plain, models)), rows)
 
 
 def _entry(cell: Cell | None, judged: bool) -> str:
@@ -442,14 +427,9 @@ def _entry(cell: Cell | None, judged: bool) -> str:
     sure = " (not converged)" if cell.converged is False else ""
     if not judged and cell.status == "done":
         return _plain(cell.fate)
-    return f"{MARKS[cell.verdict]} {_plain(_worst(cell.checks))}{sure}".strip()
-
-
-def _worst(checks: tuple[Check, ...]) -> str:
-    against_others = [
-        check for check in checks if check.figure.against and check.kind == "numerical"
-    ]
-    return share(max(against_others, key=used)) if against_others else ""
+    numerical = [one for one in cell.checks if one.figure.against and one.kind == "numerical"]
+    worst_of = share(max(numerical, key=used)) if numerical else ""
+    return f"{MARKS[cell.verdict]} {_plain(worst_of)}{sure}".strip()
 
 
 def _plain(text: str) -> str:

@@ -139,7 +139,7 @@ def test_a_measured_history_is_judged_like_a_model(tmp_path, capsys):
                 "compare",
                 str(tmp_path / "truth.csv"),
                 str(tmp_path / "table.csv"),
-                "--offset",
+                "--align",
                 "-0.4",
             ]
         )

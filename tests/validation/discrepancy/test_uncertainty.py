@@ -22,8 +22,9 @@ from rockcheck.commands.cli import main
 from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.scenes.experience import Experience, Range, Trust, axes_of, expected, outside
 from rockcheck.scenes.files import load_scene, load_uncertain_scene
-from rockcheck.validation.suite.confidence import explanations
-from rockcheck.validation.suite.experience import bias_and_scatter
+from rockcheck.validation.suite.across import bias_and_scatter
+from rockcheck.validation.suite.comparing import CellRecord, explanations
+from rockcheck.validation.suite.results import CostRecord
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 from rockcheck.validation.suite.tables import junit, markdown
@@ -342,9 +343,18 @@ def test_two_outcomes_are_explained_by_inputs_that_decide_them():
     converged = Numerical(
         method="", quantities=(Quantity(name="outcome", unit="", value="", verdict="converged"),)
     )
-    records = {"ebm": {"outcome": "overturned left", "numerical": converged.model_dump()}}
-    own = {"outcome": "at rest", "numerical": converged.model_dump()}
-    (found,) = explanations(BOOKCASE, (), {"ebm": ()}, records, own, None)
+    own, other = (
+        CellRecord(
+            outcome=outcome,
+            notes=(),
+            settings={},
+            uncertainty={},
+            numerical=converged,
+            cost=CostRecord(),
+        )
+        for outcome in ("at rest", "overturned left")
+    )
+    (found,) = explanations(BOOKCASE, (), own, {"ebm": ((), other)}, None)
     assert found.verdict.startswith("not explained")
     shares = Interval(name="overturns", unit="1", value=0.3, low=0.2, high=0.4)
     inputs = Inputs(
@@ -355,7 +365,7 @@ def test_two_outcomes_are_explained_by_inputs_that_decide_them():
         overturns=shares,
         sensitivities=(),
     )
-    (found,) = explanations(BOOKCASE, (), {"ebm": ()}, records, own, inputs)
+    (found,) = explanations(BOOKCASE, (), own, {"ebm": ((), other)}, inputs)
     assert found.verdict == numerical.INPUTS
 
 

@@ -12,7 +12,7 @@ from dask.distributed import LocalCluster
 
 from rockcheck.commands.cli import main
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Record, load_scene
+from rockcheck.scenes import Event, Record, load_scene
 from rockcheck.validation.criteria import CRITERIA, base_of
 from rockcheck.validation.discrepancy.motion import motion_of, spread, wall_speeds
 
@@ -144,6 +144,18 @@ def test_the_speed_at_the_wall_is_that_of_the_outermost_corner_as_it_strikes(loo
         if wall_speeds(fine, scene):
             speeds = [motion_of(one, scene).wall_speed for one in (history, fine)]
             assert speeds[0] == pytest.approx(speeds[1], rel=5e-3)
+
+
+@pytest.mark.parametrize(("before", "speed"), [(None, 0.4), (0.15, 0.3)])
+def test_the_speed_at_the_wall_is_carried_on_over_no_other_event(made, before, speed):
+    """From rows 0.1 s apart to the event 0.1 s after the last, 0.1 m/s more a row; an event between
+    the rows has changed the speed, so the last one stands."""
+    events = [Event(t=t, kind=kind) for t, kind in ((before, "slip"), (0.3, "wall impact")) if t]
+    leftward = np.array([0.1, 0.2, 0.3, -0.2])
+    history = made([0.0] * 4, t=0.1 * np.arange(4), x_dot=-leftward, events=events)
+    scene = load_scene("fig5a")
+    assert {wall.side for wall in scene.walls} == {"left"}
+    assert wall_speeds(history, scene) == pytest.approx([speed])
 
 
 def test_hand_methods_stand_beside_the_simulation(assess, loop):

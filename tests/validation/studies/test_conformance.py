@@ -93,7 +93,7 @@ class SinglePrecision(MuJoCo):
 
         def step(felt, dt):
             whole(felt, dt)
-            world.place(np.array(world.state(), dtype=np.float32).astype(float))
+            world.place(*np.array(world.state(), dtype=np.float32).tolist())
 
         world.step = step
         return world

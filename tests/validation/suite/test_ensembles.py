@@ -14,7 +14,7 @@ import pytest
 from rockcheck.scenes import InputError
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.suite.acceptance import accept
-from rockcheck.validation.suite.ensembles import Distribution
+from rockcheck.validation.suite.motions import Distribution
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 

@@ -17,19 +17,16 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[3]
-PACKAGES = ("scenes", "ebm", "cm", "engines", "validation", "reports")
 
 
 class Copy:
-    """A copy of the project as it is installed, in which files can be changed and put back,
+    """A copy of the project as it is installed, folders in place of links, in which files can be changed and put back,
     compiled code and times kept."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         ignore = shutil.ignore_patterns("__pycache__")
         shutil.copytree(ROOT / "rockcheck", folder / "rockcheck", ignore=ignore)
-        for package in PACKAGES:
-            shutil.copytree(ROOT / package, folder / "rockcheck" / package, ignore=ignore)
 
     def start(self, *words: str) -> subprocess.Popen[str]:
         environment = {**os.environ, "PYTHONPATH": str(self.folder), "PYTHONDONTWRITEBYTECODE": "1"}

@@ -14,7 +14,7 @@ from rockcheck.scenes import Block, Floor, Rest, Scene
 from rockcheck.validation.discrepancy.compare import compare
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.suite.acceptance import accept
-from rockcheck.validation.suite.changes import Trend
+from rockcheck.validation.suite.across import Trend
 from rockcheck.validation.suite.results import Cell, Check, Run
 from rockcheck.validation.suite.tables import improvements, junit, verdict_lines
 from rockcheck.validation.suite.tolerances import MEASURES, Tolerance, floor_of, judge
@@ -230,7 +230,7 @@ def test_what_is_not_defined_neither_passes_nor_fails():
             check("theta_rms", 0.5, Tolerance(expected=0.1, limit=0.2, drift=0.01)),
             "so",
             "loosened",
-            None,
+            {"expected": 0.5, "limit": 1.0, "drift": 0.01, "why": "so"},
         ),
         (check("theta_rms", 0.5, None), None, "new", None),
         (

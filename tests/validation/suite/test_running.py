@@ -82,7 +82,7 @@ def test_figures_are_the_same_from_memory_and_from_files(tmp_path):
     first = run_suite(load_suite("smoke"), folder, jobs=2)
     shutil.rmtree(folder / "comparisons")
     again = run_suite(load_suite("smoke"), folder, jobs=2)
-    assert again.up_to_date == len(again.cells)
+    assert again.up_to_date == sum(cell.status == "done" for cell in again.cells) > 0
     assert [cell.figures for cell in again.cells] == [cell.figures for cell in first.cells]
 
 

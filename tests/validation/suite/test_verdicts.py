@@ -190,6 +190,8 @@ def test_the_summary_names_what_is_not_a_pass():
         (0.5, "changed"),
         (0.5000001, "fail"),
         (-0.5, "changed"),
+        (0.0, "better"),
+        (-0.75, "fail"),
     ],
 )
 def test_limit_and_drift_themselves_are_inside(value, expected):
@@ -213,7 +215,7 @@ def test_a_large_run_shows_its_worst_scenes_in_the_suites_order():
         ensembles=(drawn,),
     )
     assert shown(run) == ("drawn", *(one.scene for one in near), "out")
-    assert verdict_table(run).row_count == MOST_SHOWN + 1
+    assert len(verdict_table(run).rows) == MOST_SHOWN + 1
     text = markdown(run)
     assert "| out |" in text
     assert "| far 3 |" not in text

@@ -18,6 +18,7 @@ from rockcheck.engines.base_motion import BaseMotion
 from rockcheck.scenes import History, InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.files import read_toml
+from rockcheck.scenes.observation import scene_notes
 from rockcheck.scenes.reading import read_json
 from rockcheck.scenes.writing import table_text, write_whole
 from rockcheck.validation.execute.models import build, build_own, family, is_own
@@ -189,7 +190,9 @@ class Conformance(Study):
             value = float(what.value(*map(Motion, histories)))
         except (ValueError, IndexError) as error:  # what is asked for does not happen in the motion
             raise ModelFailure(printable(error, 200)) from None
-        notes = dict.fromkeys(note for history in histories for note in history.notes)
+        told = {note for scene in what.scenes for note in scene_notes(scene)}  # of our own scenes
+        said = (note for history in histories for note in history.notes)
+        notes = dict.fromkeys(note for note in said if note not in told)
         shown = value if math.isfinite(value) else None
         return Seen(shown, *what.judge(value), version, tuple(notes))
 
@@ -200,11 +203,14 @@ class Conformance(Study):
             for player in self.players
             if (found := {id: done[t] for id in PHENOMENA if (t := Trial(player, id)) in done})
         ]
-        failing = sum(card["counts"]["fail"] + card["counts"]["error"] > 0 for card in cards)
+        wrong = [card["counts"]["fail"] + card["counts"]["error"] for card in cards]
+        failing = sum(count > 0 for count in wrong)
+        asked = sum(card["counts"]["total"] for card in cards)
         return Finding(
             self.name,
             "Conformance: phenomena with a certain answer",
-            f"{len(cards) - failing} of {len(cards)} cards conform.",
+            f"{len(cards) - failing} of {len(cards)} cards conform; of {asked} phenomena"
+            f" {sum(wrong)} failed.",
             list(_blocks(cards)),
             {"cards": cards},
             "fail" if failing else "pass",

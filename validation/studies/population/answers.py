@@ -28,8 +28,7 @@ from rockcheck.validation.finding import (
     text,
 )
 from rockcheck.validation.studies.population.runs import Played, Ran, Side, Sure
-from rockcheck.validation.uncertainty.population import share_of
-from rockcheck.validation.uncertainty.tables import inputs_blocks, quantities_of
+from rockcheck.validation.uncertainty.population import inputs_blocks, quantities_of, share_of
 
 #: What the other law of impacts is called among the models.
 LAW = "impact law"
@@ -429,13 +428,13 @@ def gap_sentences(gaps: Mapping[str, Any]) -> list[str]:
 
 
 def hand_sentences(criteria: Sequence[Mapping[str, Any]]) -> list[str]:
-    """How often hand methods say that the block overturns."""
+    """In how many runs hand methods let the block overturn."""
     said = [
-        f"{row['name']} in {row['predicts']}"
+        f"{row['name']} in {row['predicts']} of {row['of']}"
         for row in criteria
         if row["event"] == "overturns" and row["of"]
     ]
-    return [f"By hand methods it overturns: {', '.join(said)}."] if said else []
+    return [f"Hand methods let it overturn: {', '.join(said)}."] if said else []
 
 
 def certainty_sentences(found: Found, own: Sure | None) -> list[str]:

@@ -31,6 +31,7 @@ from rockcheck.validation.finding import (
     Panel,
     Plot,
     Series,
+    Style,
     Table,
     text,
 )
@@ -52,7 +53,7 @@ CAPACITIES = (0.1, 0.5, 1.0)
 #: Above all peaks of blocks that stand (alpha).
 MOST = 1e300
 #: Shares of the motions whose peaks stay below the quantiles' curves.
-BAND = (0.16, 0.5, 0.84)
+BAND: dict[float, Style] = {0.16: "dotted", 0.5: "smooth", 0.84: "dashed"}
 #: The end of the axis of peaks (alpha).
 FALLEN = 1.25
 #: Sets of motions drawn anew for the interval of a fitted median.
@@ -236,7 +237,7 @@ def lines_of(motions: Sequence[str], peaks: Floats, levels: Floats, across: Colu
     """Peaks (motion, direction, intensity) as a line a motion, and their quantiles: the smallest
     peak that the share of the motions does not exceed. A line ends where the block falls."""
     x, signs = levels.tolist(), (1, -1)
-    quantiles = np.nanquantile(peaks.reshape(-1, len(x)), BAND, axis=0, method="inverted_cdf")
+    quantiles = np.nanquantile(peaks.reshape(-1, len(x)), list(BAND), axis=0, method="inverted_cdf")
     known, quantiles = (np.where(np.isinf(some), np.nan, some) for some in (peaks, quantiles))
     names = ("direction", "intensity", "peak_rotation_alpha", "overturned")
     lines = [
@@ -250,8 +251,8 @@ def lines_of(motions: Sequence[str], peaks: Floats, levels: Floats, across: Colu
             for name, sign, line in lines
         ),
         *(
-            Series(f"{100.0 * share:g} %", x, line, style="smooth" if share == 0.5 else "dashed")
-            for share, line in zip(BAND, quantiles.tolist(), strict=True)
+            Series(f"{100.0 * share:g} %", x, line, style=style)
+            for (share, style), line in zip(BAND.items(), quantiles.tolist(), strict=True)
         ),
     ]
     fell = iter(np.isinf(peaks).ravel().tolist())

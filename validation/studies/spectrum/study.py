@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import Spectrum
-from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, node_scene
+from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, node_pulse
 from rockcheck.scenes import Ricker, Sine
 from rockcheck.scenes.reading import read_json
 from rockcheck.scenes.writing import table_text
@@ -298,12 +298,8 @@ def _pulse(panel: Panel, request: Request) -> dict[str, Any] | None:
     if not isinstance(pulse, Ricker | Sine):
         return None
     f, a = request.frequencies, request.amplitudes
-    along, across = (
-        [node_scene(panel.scene, *node).excitation for node in nodes]
-        for nodes in (((one, f[0]) for one in a), ((a[0], one) for one in f))
-    )
-    amplitudes = [one.amplitude for one in along]  # type: ignore[union-attr]
-    periods = [one.period for one in across]  # type: ignore[union-attr]
+    amplitudes = [node_pulse(panel.scene, one, f[0])[0] for one in a]
+    periods = [node_pulse(panel.scene, a[0], one)[1] for one in f]
     own = [
         float(f[0]) * periods[0] / pulse.period,
         float(a[0]) * pulse.amplitude / amplitudes[0],

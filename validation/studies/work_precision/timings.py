@@ -259,9 +259,9 @@ print(imported - began, time.perf_counter() - loaded)
 """
 
 
-def cold_start(*, cached: bool) -> ColdStart:
-    """Import and first simulation in fresh processes, without compile cache, or (median of three)
-    with it."""
+def cold_start(*, cached: bool, times: int = 1) -> ColdStart:
+    """Import and first simulation in a fresh process without compile cache, or with it: the median
+    of so many."""
     with tempfile.TemporaryDirectory() as folder:
         fresh = dict(os.environ) if cached else {**os.environ, "NUMBA_CACHE_DIR": folder}
         if not cached:
@@ -271,7 +271,7 @@ def cold_start(*, cached: bool) -> ColdStart:
             "filled",
             *(
                 median(column)
-                for column in zip(*(_cold_start(fresh) for _ in range(3)), strict=True)
+                for column in zip(*(_cold_start(fresh) for _ in range(times)), strict=True)
             ),
         )
 
@@ -631,8 +631,6 @@ def _pybullet_steps() -> Iterator[Pair]:
         return
     from rockcheck.engines import PyBullet
 
-    start = np.array(_TILTED.initial_state)
-
     def steps(each: str = "", walls: tuple[Wall, ...] = (), count: int = _STEPS) -> Play:
         """What a step costs, us, with what is done after `each`, by the names of its calls."""
 
@@ -654,7 +652,7 @@ def _pybullet_steps() -> Iterator[Pair]:
                     after()
 
             try:
-                world.place(start)
+                world.place(*_TILTED.initial_state)
                 bullet.setTimeStep(1e-3, **options)
                 bullet.setGravity(0.0, 0.0, -9.81, **options)
                 return _timed(lambda: None, stepped, count)()

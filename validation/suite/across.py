@@ -1,7 +1,14 @@
-"""What changed: between two finished runs of a suite (`rockcheck compare`), and over many
-(`rockcheck validate --history FILE`).
+"""What runs of suites say beside each other: what changed between two (`rockcheck compare`) and
+over many (`rockcheck validate --history FILE`), and what they have found about each model: bias and
+scatter of its figures, and the domain that the scenes cover.
 
-A history of runs is a file of JSON lines, one a run: `Moment`.
+A history of runs is a file of JSON lines, one a run: `Moment`. Bias and scatter as in the FDS
+validation guide (McGrattan and Toman 2011). With M a model's figure and E the reference's,
+
+    sigma = standard deviation of ln(M/E),      delta = exp(mean of ln(M/E) + sigma^2 / 2).
+
+The reference's own numerical error is far below sigma and left out. A new prediction M is then
+expected at M/delta, with a relative standard deviation sigma: `History.expected`.
 """
 
 from __future__ import annotations
@@ -13,16 +20,18 @@ import re
 import shutil
 import subprocess
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
+import numpy as np
 from pydantic import Field, ValidationError
 
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import from_validation, printable
+from rockcheck.scenes.experience import Experience, Range, Trust, axes_of
 from rockcheck.scenes.reading import read_text
-from rockcheck.validation.discrepancy.figures import Figure, Stored
+from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -35,8 +44,8 @@ from rockcheck.validation.finding import (
     Text,
     text,
 )
-from rockcheck.validation.suite.results import Cell, Run
-from rockcheck.validation.suite.tables import title
+from rockcheck.validation.suite.results import Cell, Run, value_of
+from rockcheck.validation.suite.tables import title, title_of
 from rockcheck.validation.suite.tolerances import MEASURES
 
 T = TypeVar("T")
@@ -136,15 +145,15 @@ def difference(before: Run, after: Run, most: int | None = None) -> Finding:
 
 def _of_cell(old: Cell, new: Cell) -> Iterator[Change]:
     place = {"scene": old.scene, "model": old.model}
-    if old.words != new.words:
-        yield Change(**place, what="verdict", before=old.words, after=new.words)
-    if old.fate != new.fate:
-        yield Change(**place, what="outcome", before=old.fate, after=new.fate)
-    checks = [{title(check): check.words for check in cell.checks} for cell in (old, new)]
-    for name, was, now in _pairs(*checks):
+    said = [
+        {("verdict", ""): cell.words, ("outcome", ""): cell.fate}
+        | {("verdict", title(check)): check.words for check in cell.checks}
+        for cell in (old, new)
+    ]
+    for (what, name), was, now in _pairs(*said):
         if was != now:
-            yield Change(**place, what="verdict", name=name, before=was, after=now)
-    figures = [{_key(figure): figure for figure in cell.figures} for cell in (old, new)]
+            yield Change(**place, what=what, name=name, before=was, after=now)
+    figures = [{title_of(figure): figure for figure in cell.figures} for cell in (old, new)]
     for name, one, other in _pairs(*figures):
         if (
             one
@@ -155,13 +164,8 @@ def _of_cell(old: Cell, new: Cell) -> Iterator[Change]:
             yield Change(**place, what="figure", name=name, before=one.value, after=other.value)
 
 
-def _pairs(old: Mapping[str, T], new: Mapping[str, T]) -> Iterator[tuple[str, T | None, T | None]]:
+def _pairs(old: Mapping[Any, T], new: Mapping[Any, T]) -> Iterator[tuple[Any, T | None, T | None]]:
     yield from ((name, old.get(name), new.get(name)) for name in dict.fromkeys((*old, *new)))
-
-
-def _key(figure: Figure) -> str:
-    against = f" against {figure.against}" if figure.against else ""
-    return f"{figure.measure}{'@' if figure.window else ''}{figure.window}{against}"
 
 
 def _moved(name: str, was: float | None, now: float | None) -> bool:
@@ -290,13 +294,22 @@ def trends(moments: Sequence[Moment]) -> list[Trend]:
     return sorted(found, key=lambda trend: -trend.spread)
 
 
-#: So many figures are drawn, those that varied most; the table has all that varied.
-DRAWN = 12
+#: So many figures are drawn, those that varied most, and so many that moved are told; the table has
+#: all that varied.
+DRAWN, MOST_MOVED = 12, 10
 
 
 def trend_of(moments: Sequence[Moment]) -> Finding:
-    """The figures of a suite over its runs: those that varied, drawn and in a table; the runs."""
-    found, last = [trend for trend in trends(moments) if trend.spread > 0.0], moments[-1]
+    """The figures of a suite over its runs: those that moved since the one before, those that
+    varied, drawn and in a table; the runs."""
+    every, last = trends(moments), moments[-1]
+    found = [trend for trend in every if trend.spread > 0.0]
+    moved = [trend for trend in every if trend.moved]
+    before = f" since {moments[-2].commit or moments[-2].created}" if len(moments) > 1 else ""
+    told = [
+        f"{one.name}: {' -> '.join('-' if v is None else f'{v:.6g}' for v in one.values[-2:])}"
+        for one in moved[:MOST_MOVED]
+    ]
     numbers = list(range(1, len(moments) + 1))
     panels = []
     for one in found[:DRAWN]:
@@ -318,10 +331,73 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
     ]
     about = [*map(text, ("made", "commit", "rockcheck", "verdict")), Column("not_passed")]
     blocks: list[Block] = [
+        Text(f"{len(moments)} runs, {len(moved)} figures moved{before}", items=told),
         *([Plot("trend", panels=panels, x=Axis("run"), shared=False)] if panels else []),
-        Table("figures", [text("figure"), *columns], rows, "What varied"),
-        Table("runs", about, made, "Runs"),
+        Table("figures", [text("figure"), *columns], rows, "What varied", on="page"),
+        Table("runs", about, made, "Runs", on="page"),
     ]
     same = len(last.figures) - len(found)
     answer = f"{len(found)} figures varied, {same} stayed the same. The last run: {last.verdict}."
     return Finding("trend", f"{last.suite} over {len(moments)} runs", answer, blocks)
+
+
+#: The size (alpha) of a peak below which a ratio means nothing, and the fewest pairs from which a
+#: scatter is computed.
+LEAST, FEWEST = 1e-3, 5
+
+
+def pairs_of(runs: Iterable[Run]) -> dict[str, list[tuple[float, float]]]:
+    """(reference's, model's) peak rotations of all scenes by model, where both are finite and large
+    enough for a ratio.
+
+    Blocks that fall have no peak: they are left out, as are cells of the reference itself.
+    """
+    found: dict[str, list[tuple[float, float]]] = {}
+    for run in runs:
+        for model, peaks, ends in _peaks(run):
+            known = [peak for peak in peaks if peak is not None and peak > LEAST]
+            if len(known) == 2 and not any(end.startswith("overturned") for end in ends):
+                found.setdefault(model, []).append((known[0], known[1]))
+    return found
+
+
+def _peaks(run: Run) -> Iterator[tuple[str, Sequence[float | None], Sequence[str]]]:
+    """By model, of each scene: peak rotation and outcome of the reference and of the model."""
+    cells = {(cell.scene, cell.model): cell for cell in run.cells if cell.status == "done"}
+    for (scene, model), cell in cells.items():
+        if (scene, run.reference) in cells and model != run.reference:
+            pair = cells[scene, run.reference], cell
+            peaks = [value_of(one.figures, "peak_rotation") for one in pair]
+            yield model, peaks, [one.outcome for one in pair]
+    for drawn in run.ensembles:
+        for model in drawn.peaks:
+            if run.reference in drawn.peaks and model != run.reference:
+                of = run.reference, model
+                each = zip(*(drawn.peaks[one] for one in of), strict=True)
+                ends = zip(*(drawn.outcomes[one] for one in of), strict=True)
+                yield from ((model, *both) for both in zip(each, ends, strict=True))
+
+
+def experience_of(runs: Sequence[Run]) -> Experience:
+    """Bias and scatter a model and figure, and the domain of the scenes (the range of each axis,
+    `scenes.experience.axes_of`), over some runs of suites."""
+    trust: dict[str, dict[str, Trust]] = {}
+    for model, found in sorted(pairs_of(runs).items()):
+        if len(found) >= FEWEST:
+            bias, scatter = bias_and_scatter(found)
+            one = Trust(bias=bias, scatter=scatter, count=len(found))
+            trust[model] = {"peak_rotation": one}
+    values: dict[str, list[float]] = {}
+    for run in runs:
+        for name in run.scenes:
+            for axis, numbers in axes_of(run.load_scene(name)).items():
+                values.setdefault(axis, []).extend(numbers)
+    domain = {axis: Range(low=min(numbers), high=max(numbers)) for axis, numbers in values.items()}
+    return Experience(suites=tuple(run.suite for run in runs), trust=trust, domain=domain)
+
+
+def bias_and_scatter(pairs: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """delta and sigma of (E, M) pairs; see the module."""
+    ratios = np.log([m / e for e, m in pairs])
+    scatter = float(np.std(ratios, ddof=1))
+    return math.exp(float(np.mean(ratios)) + 0.5 * scatter**2), scatter

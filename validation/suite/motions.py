@@ -1,0 +1,265 @@
+"""Scenes that a suite makes of its scenes: under recorded motions, and drawn at random.
+
+`[[records]]` are sets of recorded motions, and what `rockcheck validate SCENE` plays:
+
+    [[records]]
+    files = ["records/RSN1_H*.AT2", "station.V2"]    # files, folders, patterns, beside the suite
+    # the rest is optional; so is what a file does not say, such as unit = "cm/s2"
+    scale = 1.6
+    vertical = true       # with the vertical component, of the same file or of one named alike
+    scenes = ["shelf"]    # the scenes that are meant; without it all
+
+Each horizontal component takes the place of the scene's own excitation. The scene lasts as long as
+its record, and at least as long as it says itself; its own vertical motion stays, unless `vertical`
+puts another in its place.
+
+Rocking is chaotic, so single histories are not predictable, but distributions are (Bachmann et al.
+2018). An ensemble is one table of a suite, drawn the same for every model:
+
+    [[ensemble]]
+    name = "pulses"
+    count = 500
+    seed = 1
+    scene = { duration = 10.0, block = { ... }, floor = { friction = 0.5 } }
+    # each optional: uniform, lognormal (median, sigma of the logarithm)
+    friction = { uniform = [0.2, 0.8] }
+    gap = { uniform = [0.01, 0.1] }                    # of every wall of the scene, m
+    pulse = { period = {...}, amplitude = {...} }      # a Ricker pulse of random phase, m/s^2 and s
+    noise = { amplitude = {...}, frequency = 2.5, damping = 0.6, strong = 8.0 }
+
+A pulse of phase phi is cos(phi) times the symmetric Ricker pulse plus sin(phi) times the
+antisymmetric one. Noise is white noise through the Kanai-Tajimi filter, of power spectrum (1 + 4
+z^2 r^2)/((1 - r^2)^2 + 4 z^2 r^2), r = f/`frequency`, z = `damping`, times a half-sine envelope of
+`strong` seconds; `amplitude` is its peak acceleration, m/s^2.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, StringConstraints, model_validator
+
+from rockcheck.scenes import InputError, Record, Ricker, Scene, Wall
+from rockcheck.scenes.base import Finite, Frozen, NonNegative, Positive
+from rockcheck.scenes.errors import unknown_name
+from rockcheck.scenes.files import UncertainScene, uncertain_scene
+from rockcheck.scenes.recordings import Reading, Recording
+from rockcheck.scenes.recordings.recording import Word
+from rockcheck.scenes.recordings.sets import files_of, motions_of, verticals_of
+
+#: Longest name of a scene, and of the part of it that is the record's.
+_LONGEST, _LONGEST_RECORD = 100, 60
+_Path = Annotated[str, StringConstraints(min_length=1, max_length=4096)]
+
+
+class RecordSet(Reading):
+    """A table `[[records]]`: files, the factor of their accelerations, the scenes that they shake,
+    and the options of a reader.
+
+    With `vertical` the base also moves up and down, as the same file says, or one of the set that
+    is named alike.
+    """
+
+    files: Annotated[tuple[_Path, ...], Field(min_length=1)]
+    scale: Finite = 1.0
+    vertical: bool = False
+    scenes: tuple[Word, ...] = ()
+
+    @property
+    def reading(self) -> Reading:
+        """What the files do not say of themselves."""
+        return Reading(**{name: getattr(self, name) for name in Reading.model_fields})
+
+
+def under_records(
+    scenes: Mapping[str, UncertainScene], sets: Sequence[RecordSet], folder: Path
+) -> tuple[dict[str, UncertainScene], list[str]]:
+    """The scenes, those that a set names once for each of its motions; and the vertical components
+    that are left out.
+
+    A scene is then named `<scene>, <record>`. Raises `InputError` for files that cannot be read,
+    and scenes that there are not.
+    """
+    found: dict[str, UncertainScene] = {}
+    left_out: list[str] = []
+    shaken: set[str] = set()
+    for given in sets:
+        for name in given.scenes:
+            if name not in scenes:
+                raise InputError(str(unknown_name("scene", name, scenes)), "records.scenes")
+        files = files_of(given.files, folder)
+        motions, vertical = motions_of(files, given.reading)
+        upward = verticals_of(files, given.reading) if given.vertical else {}
+        left_out += [] if given.vertical else vertical
+        chosen = given.scenes or tuple(scenes)
+        shaken.update(chosen)
+        for name in chosen:
+            for label, (motion, recording) in zip(
+                _labels([motion for motion, _ in motions]), motions, strict=True
+            ):
+                one = _shaken(scenes[name], label, (recording, upward.get(motion)), given.scale)
+                if one.scene.name in found:
+                    raise InputError(
+                        f"scene {one.scene.name!r} is named twice: two records have one name",
+                        "records.files",
+                    )
+                found[one.scene.name] = one
+    return {name: one for name, one in scenes.items() if name not in shaken} | found, left_out
+
+
+def _shaken(
+    base: UncertainScene, label: str, motion: tuple[Recording, Recording | None], scale: float
+) -> UncertainScene:
+    """A scene under one motion, horizontal and perhaps vertical; what is not known of the
+    excitation that it replaces goes with that."""
+    scene = base.scene
+    horizontal, vertical = motion
+    change: dict[str, Any] = {"excitation": _record(horizontal, label, scale)}
+    if vertical is not None:
+        change["vertical"] = _record(vertical, f"{label}, vertical", scale)
+    if base.spreads and not base.independent:
+        raise InputError(
+            "correlated numbers cannot be given together with [[records]]", "correlation"
+        )
+    spreads = {
+        place: spread
+        for place, spread in base.spreads.items()
+        if place.partition(".")[0] not in change
+    }
+    name = f"{scene.name[: _LONGEST - len(label) - 2]}, {label}"
+    duration = max(scene.duration, change["excitation"].quiet_after)
+    return uncertain_scene(scene.replace(name=name, duration=duration, **change), spreads, {})
+
+
+def _record(motion: Recording, label: str, scale: float) -> Record:
+    record = Record.from_samples(motion.samples, motion.time_step, scale)
+    return record.model_copy(update={"source": label, "notes": motion.notes})
+
+
+def _labels(names: Sequence[str]) -> list[str]:
+    """Names of records as names of scenes may have them: without their endings, where these do not
+    tell two apart."""
+    short = [re.sub(r"\.[A-Za-z0-9]{1,5}(?= |$)", "", name, count=1) for name in names]
+    return [
+        _allowed(one if short.count(one) == 1 else name)
+        for one, name in zip(short, names, strict=True)
+    ]
+
+
+def _allowed(name: str) -> str:
+    return re.sub(r"[^A-Za-z0-9 _.,+=()-]", "-", name)[-_LONGEST_RECORD:].strip() or "record"
+
+
+#: Of the generated records, s.
+RECORD_STEP = 0.002
+
+
+class Distribution(Frozen):
+    """`uniform` between two values, or `lognormal` with a median and the standard deviation of the
+    logarithm."""
+
+    uniform: tuple[Finite, Finite] | None = None
+    lognormal: tuple[Positive, NonNegative] | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Distribution:
+        if (self.uniform is None) == (self.lognormal is None):
+            raise InputError("give exactly one of uniform, lognormal")
+        return self
+
+    def draw(self, chance: np.random.Generator) -> float:
+        """One value."""
+        if self.uniform is not None:
+            return float(chance.uniform(*self.uniform))
+        assert self.lognormal is not None
+        return float(self.lognormal[0] * np.exp(self.lognormal[1] * chance.standard_normal()))
+
+
+class Pulse(Frozen):
+    """A Ricker pulse of random phase: `period` (s) and `amplitude` (m/s^2)."""
+
+    period: Distribution
+    amplitude: Distribution
+
+    def draw(self, chance: np.random.Generator) -> Record:
+        """One pulse, sampled."""
+        phase, period, amplitude = (
+            chance.uniform(0.0, 2.0 * math.pi),
+            self.period.draw(chance),
+            self.amplitude.draw(chance),
+        )
+        t = np.arange(0.0, 4.0 * period, RECORD_STEP)
+        parts = (
+            Ricker(amplitude=1.0, period=period, symmetric=symmetric).acceleration(t)
+            for symmetric in (True, False)
+        )
+        even, odd = parts
+        return Record.from_samples(
+            amplitude * (math.cos(phase) * even + math.sin(phase) * odd), RECORD_STEP
+        )
+
+
+class Noise(Frozen):
+    """Filtered noise; see the module."""
+
+    amplitude: Distribution
+    frequency: Positive
+    damping: Positive
+    strong: Positive
+
+    def draw(self, chance: np.random.Generator) -> Record:
+        """One ground motion, sampled."""
+        amplitude = self.amplitude.draw(chance)
+        count = math.ceil(self.strong / RECORD_STEP)
+        ratio = np.fft.rfftfreq(count, RECORD_STEP) / self.frequency
+        power = (1.0 + 4.0 * self.damping**2 * ratio**2) / (
+            (1.0 - ratio**2) ** 2 + 4.0 * self.damping**2 * ratio**2
+        )
+        shaped = np.fft.irfft(np.fft.rfft(chance.standard_normal(count)) * np.sqrt(power), count)
+        shaped *= np.sin(np.pi * np.arange(count) / count)
+        return Record.from_samples(amplitude * shaped / np.max(np.abs(shaped)), RECORD_STEP)
+
+
+class Ensemble(Frozen):
+    """One `[[ensemble]]` table of a suite; see the module."""
+
+    name: str
+    description: str = ""
+    count: Annotated[int, Field(ge=2, le=100_000)] = 500
+    seed: Annotated[int, Field(ge=0)] = 0
+    #: Scenes that one worker plays in one go.
+    batch: Annotated[int, Field(ge=1)] = 25
+    scene: dict[str, Any]
+    friction: Distribution | None = None
+    gap: Distribution | None = None
+    pulse: Pulse | None = None
+    noise: Noise | None = None
+
+    @model_validator(mode="after")
+    def _one_motion(self) -> Ensemble:
+        if self.pulse is not None and self.noise is not None:
+            raise InputError("cannot be given together with pulse", "noise")
+        return self
+
+    def drawn(self, base: Scene, number: int) -> Scene:
+        """Scene number 0, 1, ... of the ensemble, the same whatever `count` is and whoever asks."""
+        chance = np.random.default_rng([self.seed, number])
+        change: dict[str, Any] = {"name": f"{self.name} {number + 1}"}
+        motion = self.pulse or self.noise
+        if motion is not None:
+            change["excitation"] = motion.draw(chance)
+        if self.friction is not None:
+            change["floor"] = base.floor.model_copy(
+                update={"friction": self.friction.draw(chance), "static_friction": None}
+            )
+        if self.gap is not None:
+            change["walls"] = tuple(
+                Wall(side=w.side, gap=self.gap.draw(chance), restitution=w.restitution)
+                for w in base.walls
+            )
+        return base.replace(**change)
