@@ -8,8 +8,7 @@ the number of threads.
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +16,10 @@ from numpy.typing import NDArray
 from rockcheck.ebm import natural
 from rockcheck.ebm.core.block import SETTING
 from rockcheck.ebm.core.ground import FORM
-from rockcheck.ebm.core.names import FAILURES, Ending, Family, Pivot, Shape
-from rockcheck.ebm.core.state import MOTION, Records, Rows
+from rockcheck.ebm.core.names import FAILURES, Ending, Shape
+from rockcheck.ebm.core.state import FOUND, MOTION, Records, Rows
 from rockcheck.ebm.model import EventBasedModel
-from rockcheck.ebm.packed import Packed, pack, play, setting_for, starts_of
+from rockcheck.ebm.packed import Packed, pack, play, setting_for, sides_of, state_for
 from rockcheck.scenes.errors import InputError, ModelFailure
 from rockcheck.scenes.progress import OnProgress, threads, unheard
 from rockcheck.scenes.scene import Scene
@@ -28,8 +27,15 @@ from rockcheck.scenes.scene import Scene
 __all__ = ["Outcomes", "Packed", "pack", "pack_pulses", "refuse_bouc_wen", "run_batch"]
 Floats = NDArray[np.float64]
 _CHUNK = 256
-#: What a batch keeps of a run's state, by its field there.
-_KEPT = {"peak": "peak", "t_end": "t", "series": "steps", "ending": "ending", "written": "rows"}
+#: The fields of a FOUND, by their names in `Outcomes`.
+_KEPT = {
+    "peak": "peak",
+    "t_end": "t",
+    "series": "steps",
+    "ending": "ending",
+    "at_rest": "at_rest",
+    "written": "rows",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +56,7 @@ class Outcomes:
     ending: NDArray[np.int64]
     at_rest: NDArray[np.bool_]
     #: Of each run `written` rows, equally spaced from its start on: x, y, theta and their rates, as
-    #: in `Packed.starts`.
+    #: in `Rows.starts`.
     motion: Floats
     written: NDArray[np.int64]
 
@@ -83,13 +89,14 @@ def pack_pulses(
     still = natural.base_of(scene).vertical
     return Packed(
         rows=Rows(
-            np.full(count, setting_for(scene, model), dtype=SETTING),
-            horizontal,
-            np.full(count, still.form, dtype=FORM),
-            still.samples,
-        ),
-        starts=np.full(count, np.array(tuple(natural.state_of(scene)), dtype=MOTION)),
-        durations=np.full(count, scene.duration / unit),
+            settings=np.full(count, setting_for(scene, model), dtype=SETTING),
+            horizontal=horizontal,
+            vertical=np.full(count, still.form, dtype=FORM),
+            starts=np.full(count, np.array(tuple(natural.state_of(scene)), dtype=MOTION)),
+            durations=np.full(count, scene.duration / unit),
+            output_steps=np.full(count, scene.output_step / unit),
+            samples=still.samples,
+        )
     )
 
 
@@ -114,27 +121,28 @@ def run_batch(
     refuse_bouc_wen(model)
     count, kept = len(packed), parts + 1 if parts and not until_decided else 0
     motion, modes = np.zeros((count, kept, 6)), np.zeros((count, kept), dtype=np.int8)
-    most = min(model.most_steps, 2_000_000)
-    if until_decided:
-        packed = replace(packed, durations=np.full(count, 1e6))
+    log, found = np.empty((count, 0, 5)), np.empty(count, FOUND)
+    durations = np.full(count, 1e6) if until_decided else packed.rows.durations
+    steps = durations / max(kept - 1, 1)
+    packed = Packed(rows=packed.rows._replace(durations=durations, output_steps=steps))
 
-    def chunk(first: int) -> dict[str, NDArray[Any]]:
-        rows = slice(first, min(first + _CHUNK, count))
-        some = packed.part(rows)
-        states = starts_of(some, model, some.durations / max(kept - 1, 1), most, until_decided)
-        records = Records(motion[rows], modes[rows], np.empty((len(some), 0, 5)))
-        play(model, some.rows, states, records)
-        return _told(states)
+    def chunk(first: int) -> int:
+        part = slice(first, min(first + _CHUNK, count))
+        records = Records(motion[part], modes[part], log[part])
+        state = state_for(model, min(model.most_steps, 2_000_000), until_decided)
+        play(model, packed.part(part), state, records, found[part])
+        return part.stop - part.start
 
-    found: list[dict[str, NDArray[Any]]] = []
     with threads(jobs or os.cpu_count() or 1) as pool:
         done = 0
-        for told in pool.map(chunk, range(0, max(count, 1), _CHUNK)):
-            found.append(told)
-            done += len(told["side"])
+        for rows in pool.map(chunk, range(0, count, _CHUNK)):
+            done += rows
             on_progress(done, count)
-    columns = {name: np.concatenate([told[name] for told in found]) for name in found[0]}
-    outcomes = Outcomes(**columns, motion=motion)
+    outcomes = Outcomes(
+        side=sides_of(found),
+        motion=motion,
+        **{name: found[field].copy() for name, field in _KEPT.items()},
+    )
     if strict and outcomes.failed.any():
         first = int(np.argmax(outcomes.failed))
         why = FAILURES[int(outcomes.ending[first])]
@@ -146,12 +154,3 @@ def refuse_bouc_wen(model: EventBasedModel) -> None:
     """Raises `InputError`: a batch knows when a run is decided by Coulomb's friction or none."""
     if model.friction == "bouc-wen":
         raise InputError("a batch has Coulomb's friction or none", "friction")
-
-
-def _told(states: NDArray[np.void]) -> dict[str, NDArray[Any]]:
-    """What a batch keeps of runs that have ended."""
-    found = {name: states[field].copy() for name, field in _KEPT.items()}
-    falls = np.where(states["ending"] == Ending.OVERTURNED, states["motion"]["theta"], 0.0)
-    mode = states["mode"]
-    at_rest = (mode["family"] == Family.FLAT) & (mode["pivot"] == Pivot.STICK)
-    return found | {"side": -np.sign(falls).astype(np.int8), "at_rest": at_rest}

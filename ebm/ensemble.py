@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import natural
 from rockcheck.ebm.batch import refuse_bouc_wen
-from rockcheck.ebm.core.names import FAILURES, Ending
-from rockcheck.ebm.core.state import Records
+from rockcheck.ebm.core.names import FAILURES
+from rockcheck.ebm.core.state import FOUND, Records
 from rockcheck.ebm.model import EventBasedModel
-from rockcheck.ebm.packed import pack, play, starts_of
+from rockcheck.ebm.packed import Packed, pack, play, sides_of, state_for
 from rockcheck.scenes import kinematics
 from rockcheck.scenes.errors import ModelFailure
 from rockcheck.scenes.progress import threads
@@ -56,28 +56,27 @@ def play_ensemble(
     step = max(first.output_step, first.duration / rows) if rows else first.duration
     t = first.replace(output_step=step).output_times if rows else np.empty(0)
     steps = np.array([step / natural.time_unit(scene) for scene in scenes])
+    packed = Packed(rows=packed.rows._replace(output_steps=steps))
+    found = np.empty(count, FOUND)
 
-    def chunk(begin: int) -> tuple[NDArray[np.void], Floats]:
+    def chunk(begin: int) -> Floats:
         part = slice(begin, begin + _CHUNK)
-        some = packed.part(part)
-        states = starts_of(some, model, steps[part], model.most_steps)
+        some = found[part]
         shape = len(some), len(t)
         records = Records(
             np.empty((*shape, 6)), np.empty(shape, dtype=np.int8), np.empty((len(some), 0, 5))
         )
-        play(model, some.rows, states, records)
-        lasts = np.arange(len(t)) >= states["rows"][:, None]
-        return states, np.where(lasts, states["motion"]["theta"][:, None], records.out[:, :, 2])
+        play(model, packed.part(part), state_for(model, model.most_steps), records, some)
+        lasts = np.arange(len(t)) >= some["rows"][:, None]
+        return np.where(lasts, some["motion"]["theta"][:, None], records.out[:, :, 2])
 
     with threads(jobs or os.cpu_count() or 1) as pool:
-        played = list(pool.map(chunk, range(0, count, _CHUNK)))
-    states, theta = (np.concatenate(parts) for parts in zip(*played, strict=True))
-    motion, ending = np.array(states["motion"].tolist()), states["ending"]
+        theta = np.concatenate(list(pool.map(chunk, range(0, count, _CHUNK))))
+    motion, ending = np.array(found["motion"].tolist()), found["ending"]
     failed = np.isin(ending, tuple(FAILURES))
     if failed.any():
         i = int(np.argmax(failed))
         raise ModelFailure(f"{model.name}: scene {i} of the ensemble: {FAILURES[int(ending[i])]}")
-    side = np.where(ending == Ending.OVERTURNED, -np.sign(motion[:, 2]), 0.0).astype(np.int8)
     placed = [natural.to_si(scene, z[None, :])[0] for scene, z in zip(scenes, motion, strict=True)]
     slip = [
         float(kinematics.slip(scene.block, z[0], z[2]))
@@ -85,5 +84,10 @@ def play_ensemble(
     ]
     alpha = np.array([scene.block.alpha for scene in scenes])
     return Ensemble(
-        t=t, theta=theta, side=side, peak=states["peak"], last_slip=np.array(slip), alpha=alpha
+        t=t,
+        theta=theta,
+        side=sides_of(found),
+        peak=found["peak"].copy(),
+        last_slip=np.array(slip),
+        alpha=alpha,
     )

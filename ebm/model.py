@@ -138,15 +138,16 @@ class EventBasedModel(Frozen):
             out_mode=np.zeros(shape, dtype=np.int8),
             log=np.empty((1, self.most_events, 5)),
         )
-        start = partial(packed.starts_of, given, self, scene.output_step / unit)
-        work = state.workspace()
+        states, work = packed.state_for(self, 0), state.workspace()
+        kept = np.empty(1, state.FOUND)
         # Compiled or loaded here, so that no run's time holds it.
-        loop = packed.loop_of(self, given.rows, start(0), work, records)
+        loop = packed.loop_of(self, given.rows, states, work, records, kept)
 
         def play(most_steps: int) -> np.record:
-            states = start(most_steps)
-            loop(given.rows, states, work, records)
-            return states[0]
+            found: np.record = states[0]
+            found.control.most_steps = most_steps
+            loop(given.rows, states, work, records, kept)
+            return found
 
         ready, cpu = time.perf_counter(), time.process_time()
         # A run of few steps is played here: to hand it over takes longer. Each sample of a record

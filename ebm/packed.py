@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import natural
 from rockcheck.ebm.core import march
-from rockcheck.ebm.core.block import SETTING, filled
+from rockcheck.ebm.core.block import SETTING
 from rockcheck.ebm.core.ground import FORM
-from rockcheck.ebm.core.state import CONTROL, MOTION, STATE, Records, Rows, workspace
+from rockcheck.ebm.core.names import Ending
+from rockcheck.ebm.core.state import MOTION, STATE, Records, Rows, workspace
 from rockcheck.scenes.compiled import for_types_of
 from rockcheck.scenes.scene import Scene
 
@@ -28,26 +29,16 @@ _READY: dict[bool, Callable[..., None]] = {}
 
 @dataclass(frozen=True, kw_only=True)
 class Packed:
-    """Runs as arrays, one row each, natural units: what compiled code is given, the motion at the
-    start, and the duration."""
+    """Runs as compiled code is given them, one row each, natural units."""
 
     rows: Rows
-    starts: NDArray[np.void]
-    durations: Floats
 
     def __len__(self) -> int:
-        return len(self.durations)
+        return len(self.rows.durations)
 
-    def part(self, part: slice) -> Packed:
+    def part(self, part: slice) -> Rows:
         """Some of the runs. The samples stay those of all."""
-        rows = self.rows
-        return Packed(
-            rows=Rows(
-                rows.settings[part], rows.horizontal[part], rows.vertical[part], rows.samples
-            ),
-            starts=self.starts[part],
-            durations=self.durations[part],
-        )
+        return Rows(*(column[part] for column in self.rows[:-1]), self.rows.samples)
 
 
 def pack(scenes: Sequence[Scene], model: Any) -> Packed:
@@ -58,16 +49,17 @@ def pack(scenes: Sequence[Scene], model: Any) -> Packed:
     grounds = [ground for base in bases for ground in base]
     forms = np.array([ground.form for ground in grounds], dtype=FORM)
     forms["first"] = np.cumsum(forms["count"]) - forms["count"]
-    return Packed(
-        rows=Rows(
-            np.array([setting_for(scene, model) for scene in scenes], dtype=SETTING),
-            forms[::2].copy(),
-            forms[1::2].copy(),
-            np.concatenate([np.empty(0), *(ground.samples for ground in grounds)]),
-        ),
+    units = np.array([natural.time_unit(scene) for scene in scenes])
+    rows = Rows(
+        settings=np.array([setting_for(scene, model) for scene in scenes], dtype=SETTING),
+        horizontal=forms[::2].copy(),
+        vertical=forms[1::2].copy(),
         starts=np.array([tuple(natural.state_of(scene)) for scene in scenes], dtype=MOTION),
-        durations=np.array([scene.duration / natural.time_unit(scene) for scene in scenes]),
+        durations=np.array([scene.duration for scene in scenes]) / units,
+        output_steps=np.array([scene.output_step for scene in scenes]) / units,
+        samples=np.concatenate([np.empty(0), *(ground.samples for ground in grounds)]),
     )
+    return Packed(rows=rows)
 
 
 def setting_for(scene: Scene, model: Any) -> np.record:
@@ -82,31 +74,25 @@ def setting_for(scene: Scene, model: Any) -> np.record:
     )
 
 
-def starts_of(
-    packed: Packed,
-    model: Any,
-    steps: Floats | float,
-    most_steps: int,
-    until_decided: bool = False,
-) -> NDArray[np.void]:
-    """The states of runs at their start, with rows of the motion `steps` apart."""
-    states = np.zeros(len(packed), STATE)
-    states["motion"], states["t_end"] = packed.starts, packed.durations
-    states["control"] = filled(
-        CONTROL,
-        tolerance=model.tolerance,
-        most_steps=most_steps,
-        most_events=model.most_events,
-        until_decided=until_decided,
-    )
-    states["control"]["output_step"] = steps
+def state_for(model: Any, most_steps: int, until_decided: bool = False) -> NDArray[np.void]:
+    """An array of one state, with what the model's settings ask of a run."""
+    states = np.zeros(1, STATE)
+    states["control"] = model.tolerance, most_steps, model.most_events, until_decided, 0.0
     return states
 
 
-def play(model: Any, rows: Rows, states: NDArray[np.void], records: Records) -> None:
-    """Plays runs with the model's friction, in `states`."""
-    given = rows, states, workspace(), records
+def play(
+    model: Any, rows: Rows, states: NDArray[np.void], records: Records, found: NDArray[np.void]
+) -> None:
+    """Plays runs with the model's friction, one after the other in `states`."""
+    given = rows, states, workspace(), records, found
     loop_of(model, *given)(*given)
+
+
+def sides_of(found: NDArray[np.void]) -> NDArray[np.int8]:
+    """The side to which each run overturned, -1 left or +1 right, 0 if it did not."""
+    theta = found["motion"]["theta"]
+    return np.where(found["ending"] == Ending.OVERTURNED, -np.sign(theta), 0.0).astype(np.int8)
 
 
 def loop_of(model: Any, *given: Any) -> Callable[..., None]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm.core.block import filled, record
 from rockcheck.ebm.core.names import Shape
-from rockcheck.scenes.compiled import called_kernel, inner_kernel
+from rockcheck.scenes.compiled import inner_kernel
 from rockcheck.scenes.excitations import Record, Rest, Ricker, Sine
 
 NEVER = np.inf
@@ -144,7 +144,7 @@ def _fill_gaussian(g, t, sign, n, a, row):
         )  # two operations from one coefficient to the next
 
 
-@called_kernel
+@inner_kernel
 def fill_series(g, t, sign, n, a, row):
     """Taylor coefficients 0..n of sign * acceleration about t, to the right of t, into a[row]."""
     if g.form.kind == Shape.GAUSSIAN:

@@ -43,7 +43,7 @@ from rockcheck.ebm.core.series import (
     value,
 )
 from rockcheck.ebm.core.state import on_wall, rocks
-from rockcheck.scenes.compiled import called_kernel, inner_kernel
+from rockcheck.scenes.compiled import inner_kernel
 
 # What a guard is; a rate is the rate of its combination.
 KIND = np.array(
@@ -88,7 +88,7 @@ def drop(a, which):
     a[Row.TABLE + which, _SHORTER] = -1.0
 
 
-@called_kernel
+@inner_kernel
 def fill_guards(block, state, a):
     """Writes the guards of the mode into the table."""
     mode = state.mode

@@ -24,7 +24,7 @@ from rockcheck.ebm.core.names import Ending, Event, Guard, Row
 from rockcheck.ebm.core.rest import rest, sample_rest, waits
 from rockcheck.ebm.core.series import ORDER
 from rockcheck.ebm.core.settle import no_impacts, settling_speed
-from rockcheck.ebm.core.state import Base, Records, Run, mode_code
+from rockcheck.ebm.core.state import Base, Records, Run, mode_code, rests
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 
@@ -65,15 +65,20 @@ def loop_with(friction: ModuleType) -> object:
             resolve(block, base, run)
 
     @inner_kernel
-    def play_row(rows, i, states, work, records):
-        """Plays row i."""
+    def play_row(rows, i, state, work, records, found):
+        """Plays row i in the state, and notes what is kept of it."""
+        begin, motion = rows.starts[i], state.motion
+        motion.x, motion.y, motion.theta = begin.x, begin.y, begin.theta
+        motion.vx, motion.vy, motion.w = begin.vx, begin.vy, begin.w
+        state.t_end, state.control.output_step = rows.durations[i], rows.output_steps[i]
         sideways, upward, samples = rows.horizontal[i], rows.vertical[i], rows.samples
         base = Base(
             Ground(sideways, samples[sideways.first : sideways.first + sideways.count]),
             Ground(upward, samples[upward.first : upward.first + upward.count]),
         )
         written = Records(records.out[i], records.out_mode[i], records.log[i])
-        march(rows.settings[i], base, Run(states[i], work[0], work[1], written))
+        march(rows.settings[i], base, Run(state, work[0], work[1], written))
+        keep(state, found[i])
 
     return play_row
 
@@ -154,23 +159,33 @@ def end(run):
         sample_rest(run, np.inf)
 
 
+@inner_kernel
+def keep(state, found):
+    """Writes what is kept of a run."""
+    motion, last = state.motion, found.motion
+    last.x, last.y, last.theta = motion.x, motion.y, motion.theta
+    last.vx, last.vy, last.w = motion.vx, motion.vy, motion.w
+    found.t, found.peak, found.ending = state.t, state.peak, state.ending
+    found.steps, found.rows, found.at_rest = state.steps, state.rows, rests(state.mode)
+
+
 _play_row, _play_row_bouc_wen = loop_with(coulomb), loop_with(bouc_wen)
 
 
 @kernel
-def play(rows, states, work, records):
-    """Plays runs in `states`, a row each with its motion, t_end and control, with a
-    `workspace()` and Coulomb's friction.
+def play(rows, states, work, records, found):
+    """Plays runs one after the other in `states`, an array of one STATE with its control, with a
+    `workspace()` and Coulomb's friction; `found[i]`, a FOUND, is what is kept of row i.
 
-    Of row i `records.out[i]` (n x 6) has the motion at k * output_step, `out_mode[i]` its modes;
+    Of it `records.out[i]` (n x 6) has the motion at k * output_step, `out_mode[i]` its modes;
     `log[i]` (m x 5) takes one row an event: time, kind, mode before, mode after, impulse.
     """
-    for i in range(len(states)):
-        _play_row(rows, i, states, work, records)
+    for i in range(len(rows.durations)):
+        _play_row(rows, i, states[0], work, records, found)
 
 
 @kernel
-def play_bouc_wen(rows, states, work, records):
+def play_bouc_wen(rows, states, work, records, found):
     """As `play`, with Bouc-Wen friction."""
-    for i in range(len(states)):
-        _play_row_bouc_wen(rows, i, states, work, records)
+    for i in range(len(rows.durations)):
+        _play_row_bouc_wen(rows, i, states[0], work, records, found)

@@ -168,7 +168,7 @@ def _guard_wrong_by(mode, which, order, ahead, a, measured):
     return contradiction(a, Row.GUARD, degree, noise, ahead) / noise if sign < 0 else 1.0
 
 
-@called_kernel
+@inner_kernel
 def _favoured(block, base, state):
     """The side to which a flat block at rest would rather tip, +1 left or -1 right; 0 where the
     scene is its own mirror image.

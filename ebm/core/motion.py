@@ -546,7 +546,7 @@ def _flat_at(block, state, a, tau, motion):
     motion.theta = motion.w = 0.0
 
 
-@called_kernel
+@inner_kernel
 def motion_at(block, state, a, tau, motion):
     """Writes the motion at tau after the start of the series into `motion`."""
     if state.mode.family == Family.FLAT:

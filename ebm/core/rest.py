@@ -11,7 +11,7 @@ from rockcheck.ebm.core.modes import leave
 from rockcheck.ebm.core.names import Ending, Event, Guard, Kind, Shape
 from rockcheck.ebm.core.series import AHEAD, NOISE
 from rockcheck.ebm.core.state import mode_code, rests
-from rockcheck.scenes.compiled import called_kernel, inner_kernel
+from rockcheck.scenes.compiled import inner_kernel
 
 
 @inner_kernel
@@ -20,7 +20,7 @@ def waits(base, state):
     return rests(state.mode) and base.vertical.form.kind == Shape.STILL
 
 
-@called_kernel
+@inner_kernel
 def rest(block, base, run):
     """Straight to the next uplift or slip."""
     state, mode, control = run.state, run.state.mode, run.state.control

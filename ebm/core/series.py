@@ -179,7 +179,7 @@ def force_step(a, row, order, tolerance, reach):
     return min(reach, math.exp(longest))
 
 
-@called_kernel
+@inner_kernel
 def leading(a, row, n, floor, ahead):
     """The sign with which c leaves tau = 0: +1, -1, or 0 where it is zero throughout the time
     `ahead`, at most AHEAD."""

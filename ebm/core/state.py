@@ -129,6 +129,10 @@ STATE = record(
     sampled=MOTION,
 )
 
+#: What is kept of each of many runs: where and when it ended, its largest |theta|, why it ended (an
+#: Ending), counts of its steps and of the rows written, and whether it then stood at rest.
+FOUND = record(motion=MOTION, t="f8", peak="f8", ending="i8", steps="i8", rows="i8", at_rest="?")
+
 
 class Base(NamedTuple):
     """The motion of the base, sideways and upward."""
@@ -138,11 +142,15 @@ class Base(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """What runs are given, a row each: a SETTING, two FORMs, and the samples of all."""
+    """What runs are given, a row each: a SETTING, two FORMs, the MOTION at the start, how long they
+    last, and the spacing of their rows; and the samples of all."""
 
     settings: NDArray[np.void]
     horizontal: NDArray[np.void]
     vertical: NDArray[np.void]
+    starts: NDArray[np.void]
+    durations: Numbers
+    output_steps: Numbers
     samples: Numbers
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.core import march, modes
 from rockcheck.ebm.core.names import Family, Pivot
-from rockcheck.ebm.core.state import STATE, Records, Run, workspace
-from rockcheck.ebm.packed import pack, starts_of
+from rockcheck.ebm.core.state import FOUND, STATE, Records, Run, workspace
+from rockcheck.ebm.packed import pack, state_for
 from rockcheck.scenes import Block, Scene
 
 
@@ -56,9 +56,9 @@ def six(motion: Any) -> np.ndarray:
 def play(scene: Scene, model: EventBasedModel, work: Any = None) -> Any:
     """The state after the compiled loop has played the scene, without rows."""
     packed = pack([scene], model)
-    states = starts_of(packed, model, 1.0, model.most_steps)
+    states = state_for(model, model.most_steps)
     records = Records(*(part[None] for part in nothing()))
-    march.play(packed.rows, states, work or workspace(), records)
+    march.play(packed.rows, states, work or workspace(), records, np.empty(1, FOUND))
     return states[0]
 
 

@@ -47,7 +47,7 @@ from rockcheck.ebm.core.state import on_wall, place
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 
-@called_kernel
+@inner_kernel
 def strike(block, base, run, resting):
     """Resolves the impact at the gap that has closed: what it was, an Event, and whether the mode
     is already the one that follows. What is slower than `resting` comes to rest."""

@@ -10,7 +10,7 @@ import pytest
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.batch import pack, run_batch
-from rockcheck.ebm.packed import starts_of
+from rockcheck.ebm.packed import state_for
 from rockcheck.scenes import (
     Block,
     Floor,
@@ -293,12 +293,12 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
             )
     model = EventBasedModel(pivot="unilateral", tolerance=1e-8)
     packed = pack([scene], model)
-    states = starts_of(packed, model, 1.0, 200)
-    states["t_end"] = 3.0
+    states, found = state_for(model, 200), np.empty(1, state.FOUND)
+    packed.rows.durations[0] = 3.0
     records = state.Records(*(part[None] for part in nothing()))
     monkeypatch.setattr(march, "_play_row", march.loop_with(coulomb).py_func)
     with np.errstate(all="ignore"):
-        march.play(packed.rows, states, work, records)
+        march.play(packed.rows, states, work, records, found)
     assert len(seen) > 30
 
 
