@@ -143,58 +143,51 @@ class EventBasedModel(Frozen):
         # Compiled or loaded here, so that no run's time holds it.
         loop = packed.loop_of(self, given.rows, states, work, records, kept)
 
-        def play(most_steps: int) -> np.record:
-            found: np.record = states[0]
-            found.control.most_steps = most_steps
+        def play(most_steps: int) -> int:
+            states["control"]["most_steps"] = most_steps
             loop(given.rows, states, work, records, kept)
-            return found
+            return int(kept["ending"][0])
 
         ready, cpu = time.perf_counter(), time.process_time()
         # A run of few steps is played here: to hand it over takes longer. Each sample of a record
         # is a step.
         few = min(self.most_steps, _AT_ONCE if len(given.rows.samples) < _AT_ONCE else 0)
-        found = play(few) if few else None
-        if found is None or (found.ending == names.Ending.TOO_MANY_STEPS and few < self.most_steps):
-            found = interruptible(partial(play, self.most_steps))
+        ending = play(few) if few else names.Ending.TOO_MANY_STEPS
+        if ending == names.Ending.TOO_MANY_STEPS and few < self.most_steps:
+            ending = interruptible(partial(play, self.most_steps))
         seconds, cpu = time.perf_counter() - ready, time.process_time() - cpu
-        if found.ending in names.FAILURES:
-            raise ModelFailure(
-                f"{self.name}: {names.FAILURES[found.ending]} at t = {found.t * unit:.6g} s"
-            )
-        out, modes, log = (rows[0] for rows in records)
-        rows = max(int(found.rows), 1)
-        out[0] = natural.state_of(scene) if found.rows == 0 else out[0]
+        motion, t, _, _, steps, written, at_rest = kept.tolist()[0]
+        if ending in names.FAILURES:
+            raise ModelFailure(f"{self.name}: {names.FAILURES[ending]} at t = {t * unit:.6g} s")
+        found, (out, modes, log) = states[0], (rows[0] for rows in records)
+        rows = max(written, 1)
+        out[0] = natural.state_of(scene) if written == 0 else out[0]
         events = _events(log[: min(found.events, len(log))], unit, scene.block.radius)
         cost = Cost(
             wall_seconds=seconds,
             cpu_seconds=cpu,
             set_up=ready - began,
-            steps=int(found.steps),
-            evaluations=int(found.steps),
+            steps=steps,
+            evaluations=steps,
             energy_gains=int(found.gains),
             largest_energy_gain=float(found.largest_gain),
             rules={
                 name: int(count) for name, count in zip(NAMES, found.rules, strict=True) if count
             },
         )
+        outcome = "at rest" if at_rest else "moving"
+        if ending == names.Ending.OVERTURNED:
+            outcome = "overturned left" if motion[2] > 0 else "overturned right"
         return observe(
             scene,
             self.name,
             natural.to_si(scene, out[:rows]),
             mode=np.array(names.MODE_NAMES)[modes[:rows]],
             events=events,
-            outcome=_outcome(found),
+            outcome=outcome,
             cost=cost,
             settings=self.model_dump(),
         )
-
-
-def _outcome(found: np.record) -> str:
-    from rockcheck.ebm.core import names, state
-
-    if found.ending == names.Ending.OVERTURNED:
-        return "overturned left" if found.motion.theta > 0 else "overturned right"
-    return "at rest" if state.rests(found.mode) else "moving"
 
 
 def _events(log: np.ndarray, unit: float, radius: float) -> list[Event]:

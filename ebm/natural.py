@@ -38,10 +38,11 @@ def setting_of(
     """Block, floor and walls of a scene in natural units."""
     radius = scene.block.radius
     left, right = scene.wall("left"), scene.wall("right")
+    side = side_of(scene.block, "left")
     return filled(
         SETTING,
-        left=side_of(scene.block, "left"),
-        right=side_of(scene.block, "right"),
+        left=side,
+        right=side if scene.block.homogeneous else side_of(scene.block, "right"),
         height=math.cos(scene.block.alpha),
         spin=3.0 if scene.block.homogeneous else radius**2 / scene.block.gyration_squared,
         mu_s=max(scene.floor.mu_s, LEAST_FRICTION),

@@ -54,7 +54,7 @@ def pack(scenes: Sequence[Scene], model: Any) -> Packed:
         settings=np.array([setting_for(scene, model) for scene in scenes], dtype=SETTING),
         horizontal=forms[::2].copy(),
         vertical=forms[1::2].copy(),
-        starts=np.array([tuple(natural.state_of(scene)) for scene in scenes], dtype=MOTION),
+        starts=np.array([tuple(natural.state_of(scene).tolist()) for scene in scenes], MOTION),
         durations=np.array([scene.duration for scene in scenes]) / units,
         output_steps=np.array([scene.output_step for scene in scenes]) / units,
         samples=np.concatenate([np.empty(0), *(ground.samples for ground in grounds)]),

@@ -14,10 +14,8 @@ def record(**fields: object) -> np.dtype[np.void]:
 
 def filled(kind: np.dtype[np.void], /, **values: object) -> np.record:
     """A record with these values; a field that is not named is zero."""
-    rows = np.zeros(1, kind)
-    for name, value in values.items():
-        rows[name] = value
-    found: np.record = rows[0]
+    assert kind.names is not None
+    found: np.record = np.array([tuple([values.get(name, 0) for name in kind.names])], kind)[0]
     return found
 
 

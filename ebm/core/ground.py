@@ -76,9 +76,11 @@ def ground_of(
             "c0": excitation.amplitude / gravity,
             "rate": 2.0 * math.pi * time_unit / excitation.period,
         }
-    elif isinstance(excitation, Record) and excitation.samples.any():
-        samples = np.ascontiguousarray(excitation.samples / gravity)
-        given = {"kind": Shape.SAMPLED, "step": excitation.time_step / time_unit}
+    elif isinstance(excitation, Record):
+        taken = np.ascontiguousarray(excitation.samples / gravity)
+        if taken.any():
+            samples = taken
+            given = {"kind": Shape.SAMPLED, "step": excitation.time_step / time_unit}
     quiet = {"quiet": excitation.quiet_after / time_unit}
     return Ground(filled(FORM, **quiet | given, count=len(samples)), samples)
 
