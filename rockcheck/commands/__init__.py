@@ -82,6 +82,9 @@ class Played:
 
 PlotOption = Annotated[Path | None, typer.Option("--plot", metavar="FILE.png", help="PNG to draw.")]
 
+#: All models that are installed.
+ALL = "all"
+
 #: What a command says: tables and progress, one JSON value instead, or nothing but errors.
 Voice = Literal["tables", "json", "quiet"]
 _voice: ContextVar[Voice] = ContextVar("voice", default="tables")
@@ -252,6 +255,39 @@ def one_of(kind: str, given: str, choices: Iterable[Choice]) -> Choice:
         if choice == given:
             return choice
     raise unknown_name(kind, given, known)
+
+
+def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
+    """The models by name, each with its settings; of all, those that are installed.
+
+    Raises `InputError` for an unknown one.
+    """
+    from rockcheck.validation.execute.models import FAMILIES, family, not_installed
+
+    if names == ALL:
+        found: dict[str, dict[str, Any]] = {
+            name: {} for name in FAMILIES if name != "measured" and not not_installed(name)
+        }
+    else:
+        found = {name.strip(): {} for name in names.split(",") if name.strip()}
+        for name in found:
+            family(name)
+        if not found or "measured" in found:
+            raise InputError(
+                f"{printable(names)!r} is not allowed: models that play, with commas between, or"
+                " all",
+                "--models",
+            )
+    for text in settings:
+        model, dot, rest = text.partition(".")
+        if not dot or model not in found:
+            raise InputError(
+                f"{printable(text)!r}: write MODEL.key=value, with MODEL one of {', '.join(found)}",
+                "--set",
+            )
+        key, value = setting_of(rest)
+        found[model][key] = value
+    return found
 
 
 def setting_of(text: str, option: str = "--set") -> tuple[str, Any]:

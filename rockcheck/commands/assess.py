@@ -12,13 +12,13 @@ import typer
 from rockcheck.commands import (
     OUT,
     Played,
+    chosen_models,
     model_names,
     scene_names,
     studied,
     tell_left_out,
 )
-from rockcheck.commands.record import ReadOption, RecordsArgument
-from rockcheck.commands.validate import chosen_models, record_sets
+from rockcheck.commands.record import ReadOption, RecordsArgument, record_sets
 from rockcheck.ebm.spectrum import Floats
 from rockcheck.reports.style import FORMATS
 from rockcheck.scenes import InputError, Scene

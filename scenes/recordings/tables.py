@@ -51,6 +51,8 @@ class _Layout:
         """The fields of a line, numbers with a decimal point."""
         if self.separator is None:
             words = line.split()
+        elif '"' not in line:
+            words = [word.strip() for word in line.split(self.separator)]
         else:
             try:
                 words = [
@@ -95,11 +97,11 @@ def read_table(path: Path, lines: list[str], reading: Reading) -> Recording:
     if time is None and reading.time_step is None:
         raise fault(path, f"no column of times; give the time step: {option('time_step', 0.01)}")
     unit = settled_unit(path, stated, reading)
-    samples, words = cells.read(place, time)
+    samples, times, words = cells.read(place, time)
     notes: list[str] = []
     step = float(reading.time_step or 0.0)
     if time is not None:
-        step, notes = _step_of(path, words, [n for n, _ in rows], reading)
+        step, notes = _step_of(path, times, words, [n for n, _ in rows], reading)
         if not (names and names[time].lower() not in ("t", "time")):
             notes.append(f"column {time + 1} is taken as the time in s")
     form = "table" if layout.separator is None else "CSV"
@@ -124,9 +126,11 @@ class _Cells:
     names: list[str]
     width: int
 
-    def read(self, place: int, time: int | None) -> tuple[NDArray[np.float64], list[str]]:
-        """The numbers of one column, and the words of another."""
-        values, words = [], []
+    def read(
+        self, place: int, time: int | None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str]]:
+        """The numbers of two columns, accelerations and times, and the words of the times."""
+        values, times, words = [], [], []
         for n, line in self.rows:
             cells = self.layout.words(self.path, n, line)
             if len(cells) != self.width:
@@ -137,10 +141,10 @@ class _Cells:
                 )
                 raise fault(self.path, f"{len(cells)} fields where {said}", n)
             if time is not None:
-                number(self.path, n, cells[time])
+                times.append(number(self.path, n, cells[time]))
                 words.append(cells[time])
             values.append(number(self.path, n, cells[place]))
-        return np.array(values), words
+        return np.array(values), np.array(times), words
 
 
 def _layout_of(path: Path, rows: NumberedLines, reading: Reading) -> _Layout:
@@ -280,7 +284,11 @@ def _decimals(word: str) -> int:
 
 
 def _step_of(
-    path: Path, words: Sequence[str], lines: Sequence[int], reading: Reading
+    path: Path,
+    time: NDArray[np.float64],
+    words: Sequence[str],
+    lines: Sequence[int],
+    reading: Reading,
 ) -> tuple[float, list[str]]:
     """The time step of a column of times, judged by the digits that they are printed with; and what
     to know of it.
@@ -291,7 +299,6 @@ def _step_of(
     """
     if len(words) < 2:
         raise fault(path, f"{len(words)} sample(s); at least 2 are needed to know the time step")
-    time = np.array([number(path, n, word) for n, word in zip(lines, words, strict=True)])
     mean = float(time[-1] - time[0]) / (len(time) - 1)
     if not mean > LEAST:
         raise fault(path, "time_s does not increase")
