@@ -193,8 +193,8 @@ class Record(Motion):
 
         `reading` supplies what the file does not state, or selects a part of it: the options of
         `recordings.Reading`, such as `unit="cm/s2"`, `time_step=0.005`, `column=2` or
-        `component="360 Deg"`. Raises `InputError`, naming file and line, where the file contradicts
-        its header, or something is not known.
+        `component="360 Deg"`. Raises `InputError`, naming file and line, where the file is
+        malformed, or something is not known.
         """
         settings: dict[str, Any] = {"file": path, "scale": scale} | reading
         return cls(**settings)
