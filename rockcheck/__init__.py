@@ -1,10 +1,9 @@
-"""Validation harness for rocking-block models: simulate one scene with several models, compare
-them, judge them.
+"""Validation harness for rocking-block models: simulates, compares and judges them.
 
-All public names can be imported from here, as the stub `__init__.pyi` lists them; each is loaded
-when it is first used, so that `import rockcheck` costs next to nothing. The parts lie in
-`rockcheck.scenes`, `rockcheck.ebm`, `rockcheck.cm`, `rockcheck.engines`, `rockcheck.validation` and
-`rockcheck.reports`.
+Several models simulate one scene. All public names can be imported from here, as the stub
+`__init__.pyi` lists them; each is loaded when it is first used, so that `import rockcheck` costs
+next to nothing. The parts lie in `rockcheck.scenes`, `rockcheck.ebm`, `rockcheck.cm`,
+`rockcheck.engines`, `rockcheck.validation` and `rockcheck.reports`.
 """
 
 import os
@@ -13,7 +12,7 @@ import lazy_loader
 
 if os.path.isfile(
     os.path.join(os.path.dirname(__file__), "scenes")
-):  # what git writes where it may make no links
+):  # git writes a file where it may make no link
     raise ImportError(
         "rockcheck/scenes is no link to scenes/: git config core.symlinks true, then check out"
         " again"

@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Sequence
 
-#: When the program started, of `time.perf_counter`.
+#: Start of the program, by `time.perf_counter`.
 BEGAN = time.perf_counter()
 
 
