@@ -1,9 +1,9 @@
-"""Validation harness for rocking-block models: simulates, compares and judges them.
+"""Validation harness for rocking-block models: one scene, several models, compared and judged.
 
-Several models simulate one scene. All public names can be imported from here, as the stub
-`__init__.pyi` lists them; each is loaded when it is first used, so that `import rockcheck` costs
-next to nothing. The parts lie in `rockcheck.scenes`, `rockcheck.ebm`, `rockcheck.cm`,
-`rockcheck.engines`, `rockcheck.validation` and `rockcheck.reports`.
+All public names can be imported from here, as the stub `__init__.pyi` lists them; each is loaded
+when it is first used, so that `import rockcheck` costs next to nothing. The parts lie in
+`rockcheck.scenes`, `rockcheck.ebm`, `rockcheck.cm`, `rockcheck.engines`, `rockcheck.validation` and
+`rockcheck.reports`.
 """
 
 import os
