@@ -1,4 +1,4 @@
-"""`rockcheck record`: what a file of a recorded ground motion was understood to hold."""
+"""`rockcheck record`: how a file of a recorded ground motion was read."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ WhatArgument = Annotated[
 
 @dataclass(frozen=True)
 class OfScene:
-    """The options that are for a scene: a suite says which models play what."""
+    """Options for a scene; a suite says itself which models play which scene."""
 
     models: Annotated[
         str,
@@ -193,8 +193,9 @@ def play(suite: Suite, folder: Path, played: Played, **how: Any) -> Run:
 
 
 def tell_faults(finished: Run, folder: Path) -> None:
-    """A line on stderr for each exception that no model may raise: of rockcheck's own models to
-    report, of one's own to mend.
+    """Print a line on stderr for each exception that no model may raise.
+
+    One of rockcheck's own models is to be reported, one of the user's own models to be mended.
     """
     for cell in finished.cells:
         if not cell.traceback:
