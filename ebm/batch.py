@@ -124,7 +124,7 @@ def run_batch(
     log, found = np.empty((count, 0, 5)), np.empty(count, FOUND)
     durations = np.full(count, 1e6) if until_decided else packed.rows.durations
     steps = durations / max(kept - 1, 1)
-    packed = Packed(rows=packed.rows._replace(durations=durations, output_steps=steps))
+    packed = packed.changed(durations=durations, output_steps=steps)
 
     def chunk(first: int) -> int:
         part = slice(first, min(first + _CHUNK, count))

@@ -15,7 +15,7 @@ from rockcheck.ebm.batch import refuse_bouc_wen
 from rockcheck.ebm.core.names import FAILURES
 from rockcheck.ebm.core.state import FOUND, Records
 from rockcheck.ebm.model import EventBasedModel
-from rockcheck.ebm.packed import Packed, pack, play, sides_of, state_for
+from rockcheck.ebm.packed import pack, play, sides_of, state_for
 from rockcheck.scenes import kinematics
 from rockcheck.scenes.errors import ModelFailure
 from rockcheck.scenes.progress import threads
@@ -51,12 +51,11 @@ def play_ensemble(
     `ModelFailure`.
     """
     refuse_bouc_wen(model)
-    packed = pack(scenes, model)
     first, count = scenes[0], len(scenes)
     step = max(first.output_step, first.duration / rows) if rows else first.duration
     t = first.replace(output_step=step).output_times if rows else np.empty(0)
     steps = np.array([step / natural.time_unit(scene) for scene in scenes])
-    packed = Packed(rows=packed.rows._replace(output_steps=steps))
+    packed = pack(scenes, model).changed(output_steps=steps)
     found = np.empty(count, FOUND)
 
     def chunk(begin: int) -> Floats:

@@ -156,7 +156,8 @@ class EventBasedModel(Frozen):
         if ending == names.Ending.TOO_MANY_STEPS and few < self.most_steps:
             ending = interruptible(partial(play, self.most_steps))
         seconds, cpu = time.perf_counter() - ready, time.process_time() - cpu
-        motion, t, _, _, steps, written, at_rest = kept.tolist()[0]
+        last: Any = kept[0].tolist()
+        motion, t, _, _, steps, written, at_rest = last
         if ending in names.FAILURES:
             raise ModelFailure(f"{self.name}: {names.FAILURES[ending]} at t = {t * unit:.6g} s")
         found, (out, modes, log) = states[0], (rows[0] for rows in records)

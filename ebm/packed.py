@@ -38,7 +38,20 @@ class Packed:
 
     def part(self, part: slice) -> Rows:
         """Some of the runs. The samples stay those of all."""
-        return Rows(*(column[part] for column in self.rows[:-1]), self.rows.samples)
+        rows = self.rows
+        return Rows(
+            rows.settings[part],
+            rows.horizontal[part],
+            rows.vertical[part],
+            rows.starts[part],
+            rows.durations[part],
+            rows.output_steps[part],
+            rows.samples,
+        )
+
+    def changed(self, **columns: Any) -> Packed:
+        """The same runs with other `durations` or `output_steps`."""
+        return Packed(rows=self.rows._replace(**columns))
 
 
 def pack(scenes: Sequence[Scene], model: Any) -> Packed:

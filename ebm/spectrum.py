@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -246,7 +246,7 @@ def play_motions(
     }
     played = [scenes[a if changing else 1.0, f] for a, f in nodes]
     lengths = np.array([one.duration / natural.time_unit(one) for one in played])
-    packed = replace(_packed(scene, amplitude_ratios, frequency_ratios, model), durations=lengths)
+    packed = _packed(scene, amplitude_ratios, frequency_ratios, model).changed(durations=lengths)
     found = batch.run_batch(
         packed, model, until_decided=False, parts=parts, strict=False, jobs=jobs
     )
