@@ -37,7 +37,7 @@ from rockcheck.ebm.core.names import GUARDS, Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.rules import Rule
 from rockcheck.ebm.core.series import INSTANT, NOISE, WIDTH, contradiction, leading
 from rockcheck.ebm.core.state import MODES, code_of, on_wall, rests
-from rockcheck.scenes.compiled import called_kernel, inner_kernel
+from rockcheck.scenes.compiled import inner_kernel
 
 #: Order of the series that a selection looks at.
 _LOOK = 6
@@ -324,7 +324,7 @@ def _touching(block, base, state):
     return _Touching(favoured, first, floor, v, walls, near, away, _FLAT_TRIES)
 
 
-@called_kernel
+@inner_kernel
 def select(block, base, run):
     """Writes the consistent mode into the state, or the one that is wrong by least. False where the
     state is not finite."""
