@@ -30,7 +30,7 @@ from rockcheck.validation.finding import (
 from rockcheck.validation.studies.population.runs import Played, Ran, Side, Sure
 from rockcheck.validation.uncertainty.population import inputs_blocks, quantities_of, share_of
 
-#: What the other law of impacts is called among the models.
+#: Name of the runs by the other law of impacts, among the models.
 LAW = "impact law"
 OUTCOMES = ("at rest", "moving", "overturned left", "overturned right")
 #: A slip (m) or rotation (alpha) below this is none.
@@ -225,8 +225,11 @@ def quantity_of(name: str, runs: Sequence[tuple[str, Ran]]) -> dict[str, Any]:
 
 
 def gaps_of(found: Found) -> dict[str, Any]:
-    """What each gap does; the clear distance without which a block would strike; the largest gap up
-    to which no run overturns.
+    """Outcomes at each gap, the clearance that is needed, and the largest safe gap.
+
+    `clearance` (m) is the largest reach without the wall: nearer than that a block would strike.
+    `none_overturns_up_to` (m) is the largest gap up to which no run overturns. `monotonic` tells
+    whether a wider gap never lets fewer runs overturn.
     """
     rows: list[dict[str, Any]] = []
     for gap, runs in found.at_gaps.items():
@@ -262,8 +265,9 @@ def gaps_of(found: Found) -> dict[str, Any]:
 
 
 def contributions_of(found: Found) -> list[dict[str, Any]]:
-    """Shares of the variance of the peak rotation by source, the largest first; a block that falls
-    counts as 1 alpha.
+    """Shares of the variance of the peak rotation by source, the largest first.
+
+    A block that falls counts as 1 alpha.
     """
     nominal = found.nominal
     peaks = {case: [run.peak for run in runs] for case, runs in found.runs.items() if runs}
