@@ -46,7 +46,7 @@ from rockcheck.validation.studies.work_precision.runs import (
 from rockcheck.validation.study import Study, Task
 
 What = Literal["all", "ebm", "models", "skipping", "convergence"]
-#: CPU time of an engine's step as a rule, and of any other run, s: for the estimate.
+#: Usual CPU time of an engine's step, and of any other run, s: for the estimate.
 A_STEP, A_RUN = 4e-5, 0.02
 #: The diagrams: a title, and how the names of their scenes begin.
 SHEETS = {
@@ -306,7 +306,7 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
     engines = pooled[kept].assign(at_the_cost=costs).rename(columns={"family": "kind"})
     how: Any = {"on": "page", "folded": True}
     yield _table("engines", engines, title="Engines over whole kinds of scenes", **how)
-    # The worst is told of engines only.
+    # The worst error is shown for engines only.
     yield _table("work-precision", points.drop(columns="rms_worst"), title="All settings", **how)
     yield _table("orders-and-ratios", trends)
     yield table_of("runs", BenchmarkRun, samples)
