@@ -100,7 +100,7 @@ def decided(scene: Scene, player: Any) -> History:
     """
     quiet = max(scene.excitation.quiet_after, scene.vertical.quiet_after)
     needed = scene.gravity * (scene.block.radius - scene.block.weaker_pivot.height)
-    for settle in (0.0, SETTLE):  # few rows: only the outcome is asked
+    for settle in (0.0, SETTLE):  # few rows: only the outcome is needed
         history = player.simulate(scene.replace(duration=quiet + settle, output_step=0.02))
         names = ("theta", "y", "x_dot", "y_dot", "theta_dot")
         theta, y, *rates = (history.channels[name][-1] for name in names)
@@ -219,7 +219,7 @@ def fit_lognormal(
     return (float(np.exp(centre - level / slope)), float(1.0 / slope)) if slope > 0.0 else NO_FIT
 
 
-#: Draws unless more are asked for; Sobol's sequence is balanced for powers of two.
+#: Default number of draws; Sobol's sequence is balanced for powers of two.
 SAMPLES = 1024
 #: Rows of a band's history at the most: a picture has no more columns.
 MOST_ROWS = 2000

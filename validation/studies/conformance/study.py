@@ -149,7 +149,7 @@ class Trial(Task):
 
 @dataclass(frozen=True)
 class Seen:
-    """What a player showed: a value, or None where it lacks a part or nothing could be read off."""
+    """The result of a player: a value, or None where it lacks a part or no value could be read."""
 
     value: float | None
     verdict: str

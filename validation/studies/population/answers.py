@@ -1,4 +1,4 @@
-"""What the runs of an assessment say, as a finding, led by a sentence for an engineer's report."""
+"""Answers from the runs of an assessment, led by a sentence for an engineer's report."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ ASKS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Found:
-    """What was played, by the case: the scene under each of its motions.
+    """The runs of an assessment, by the case: the scene under each of its motions.
 
     `drawn` has the draws of each case (empty: none were asked for) with the numbers in `inputs`, by
     name; `at_gaps` the runs at each gap (m), `free` those without the wall on `sides`; `others` the
@@ -314,7 +314,7 @@ def contributions_of(found: Found) -> list[dict[str, Any]]:
 
 
 def criteria_of(found: Found) -> list[dict[str, Any]]:
-    """What hand methods say of the cases, and how often that agrees with the simulation."""
+    """Predictions of hand methods for the cases, and how often they agree with the simulation."""
     cases = [
         (played.runs[0], played.said)
         for played in found.shown.values()
@@ -376,7 +376,7 @@ def _median(values: Sequence[float | None]) -> float | None:
 def fall_sentences(
     found: Found, runs: Sequence[tuple[str, Ran]], overturning: Mapping[str, Any]
 ) -> list[str]:
-    """What happens."""
+    """How the runs end."""
     name, count = found.own.scene.name, overturning["count"]
     if not runs:
         return [f"{name}: no run has a result."]
@@ -580,7 +580,7 @@ def strips(found: Found) -> list[Block]:
 
 
 def gap_blocks(gaps: Mapping[str, Any]) -> list[Block]:
-    """What each gap does."""
+    """Outcomes at each gap."""
     rows = gaps["gaps"]
     if not rows:
         return []
@@ -695,7 +695,7 @@ def model_blocks(found: Found) -> list[Block]:
 
 
 def criteria_table(criteria: Sequence[Mapping[str, Any]]) -> Table:
-    """What hand methods say, beside the simulation."""
+    """Predictions of hand methods, beside the simulation."""
     columns = [
         text("name", "method"),
         text("event", "it"),

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall
 
-#: What a family of models can play: the bilateral pivot neither bounces nor hops, Bouc-Wen friction
-#: has one coefficient, and a pivot that never slips does not start with slip.
+#: Kinds of scenes by what models can play: the bilateral pivot neither bounces nor hops, Bouc-Wen
+#: friction has one coefficient, and a pivot that never slips does not start with slip.
 Kind = Literal["bilateral", "unilateral", "bouc-wen", "no-slip"]
 #: Ranges: slenderness (rad), half diagonal (m), friction, amplitude over uplift's, period over the
 #: block's, step of records (s).

@@ -1,9 +1,9 @@
-"""What must hold of every history, whatever the scene.
+"""Invariants: conditions that hold for every history, whatever the scene.
 
 Each invariant gives a figure, which must stay below its bound.
 
 Figures are in natural units (lengths in R, accelerations in g, times in sqrt(R/g)), energies
-relative to what was at play.
+relative to the energy at play.
 """
 
 from __future__ import annotations

@@ -147,7 +147,7 @@ class Approximate(Player):
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
         """Checks the run's end, finite numbers, depth and energy.
 
-        If an engine breaks one of the last two, says what half the step does.
+        If an engine breaks one of the last two, `failure` gives the figures with half the step.
         """
         played = self._check(scene)
         broken = [name for name in played.broken if name in ("depth", "source")]

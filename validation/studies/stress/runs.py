@@ -186,7 +186,7 @@ class Broken:
 
 @dataclass(kw_only=True)
 class RunTotals:
-    """What some runs of one model showed, one after the other."""
+    """Totals of some runs of one model."""
 
     model: str
     cpu_seconds: float = 0.0
@@ -230,7 +230,7 @@ class RunTotals:
         )
 
     def add(self, other: RunTotals) -> None:
-        """Count what other runs showed."""
+        """Add the totals of other runs."""
         for name, found in other.worst.items():
             self.worst[name] = max(found, self.worst.get(name, found))
         self.largest_gain = max(self.largest_gain, other.largest_gain)
@@ -260,7 +260,7 @@ class Chunk(Task):
         return self.model
 
     def play(self) -> RunTotals:
-        """What they show."""
+        """The totals of the runs."""
         began, player, totals = (
             time.process_time(),
             PLAYERS[self.model],
@@ -277,7 +277,7 @@ class Chunk(Task):
 
 
 def checked(label: str, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
-    """What a run shows; a fault of the program itself is a failure like any other."""
+    """One checked run; an exception of the program counts as a failure like any other."""
     try:
         return PLAYERS[label].check(scene, seed, number, only)
     except Exception as error:  # the other runs go on, and this one is reported with its message
@@ -342,7 +342,7 @@ def chunk(model: str, seed: int, first: int, count: int) -> Chunk:
 
 
 def parts(task: Task) -> Sequence[Task]:
-    """What is played instead where the process of a task hangs or dies: less of it."""
+    """Smaller tasks in place of one whose process hangs or dies."""
     if isinstance(task, Chunk) and task.count > 1:
         half = task.count // 2
         later = chunk(task.model, task.seed, task.first + half, task.count - half)

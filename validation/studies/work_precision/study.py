@@ -62,14 +62,14 @@ FLOOR = 1e-13
 
 @dataclass(frozen=True)
 class Measure(Task):
-    """A timing of something else than a model's run: a batch, its size, a cold start, a saving."""
+    """A timing other than a model's run: a batch, its size, a cold start, a saving."""
 
     kind: Literal["batch", "size", "cold start", "saving"]
     name: str
     size: int = 0
 
 
-#: What is timed, by its kind: a name and a size give rows.
+#: Timings by kind: a name and a size give rows.
 TIMED: Mapping[str, Callable[[str, int], Sequence[Any]]] = {
     "batch": timings.batch_times,
     "size": lambda name, size: [timings.batch_size(size, int(name))],
@@ -81,7 +81,7 @@ Row = BenchmarkRun | timings.BatchTime | timings.BatchSize | timings.ColdStart |
 
 @dataclass(frozen=True)
 class WorkPrecision(Study):
-    """What is measured: all, or a part; `quick` with fewer scenes and settings."""
+    """The measurements: all, or a part; `quick` with fewer scenes and settings."""
 
     what: What = "all"
     quick: bool = False
@@ -120,7 +120,7 @@ class WorkPrecision(Study):
             yield Measure("saving", name, rounds, where="timed", expected=0.6 * rounds)
 
     def _models(self) -> Iterator[Task]:
-        """Interleaved: whatever else the machine does touches all models alike.
+        """Interleaved, so that other load of the machine affects all models equally.
 
         An engine's smallest steps go to the workers; in a quick run one member plays those of 1e-4
         s, and the adaptive ones of DART, which cost as much.

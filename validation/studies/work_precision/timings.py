@@ -337,7 +337,7 @@ class Saving:
 
 
 Play = Callable[[], float]
-#: What is measured: model, thing and unit, the plays with it and without it, change and remark.
+#: A saving to measure: model, thing, unit, the plays with it and without it, change and remark.
 Pair = tuple[str, str, str, Play, Play, float, str]
 
 
@@ -363,7 +363,7 @@ def _batches(nodes: int) -> Iterator[Pair]:
     strengths, periods = grid(plain, nodes)
 
     def batch(scene: Scene, *, until_decided: bool = True, **settings: Any) -> tuple[Play, Any]:
-        """What a trajectory costs, us, and a run of the batch."""
+        """Cost of a trajectory, us, and a run of the batch."""
         model = EventBasedModel(tolerance=1e-8, **settings)
         packed = pack_pulses(scene, model, strengths, periods)
         run = partial(run_batch, packed, model, until_decided=until_decided, strict=False, jobs=1)
@@ -650,7 +650,7 @@ def _pybullet_steps() -> Iterator[Pair]:
     from rockcheck.engines import PyBullet
 
     def steps(each: str = "", walls: tuple[Wall, ...] = (), count: int = _STEPS) -> Play:
-        """What a step costs, us, with what is done after `each`, by the names of its calls."""
+        """Cost of a step, us, with the calls that `each` names after every step."""
 
         def play() -> float:
             world: Any = PyBullet().rigid_world(_TILTED.replace(walls=walls))
