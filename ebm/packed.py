@@ -1,5 +1,5 @@
 """Runs as compiled code takes them, one or many: scenes packed into arrays of records, a row a run,
-their states at the start, and the event loop that plays them.
+and the event loop that plays them.
 
 `EventBasedModel`, which plays a history by this, is known here by its settings only.
 """
