@@ -1,5 +1,4 @@
-"""Validation harness for rocking-block models: simulate one scene with several models, compare
-them, judge them.
+"""Validation harness for rocking-block models: one scene, several models, compared and judged.
 
 All public names can be imported from here, as the stub `__init__.pyi` lists them; each is loaded
 when it is first used, so that `import rockcheck` costs next to nothing. The parts lie in
@@ -13,7 +12,7 @@ import lazy_loader
 
 if os.path.isfile(
     os.path.join(os.path.dirname(__file__), "scenes")
-):  # what git writes where it may make no links
+):  # git writes a file where it may make no link
     raise ImportError(
         "rockcheck/scenes is no link to scenes/: git config core.symlinks true, then check out"
         " again"

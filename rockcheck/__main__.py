@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
 import sys
 import time
 from collections.abc import Sequence
 
-#: When the program started, of `time.perf_counter`.
+#: Start of the program, by `time.perf_counter`.
 BEGAN = time.perf_counter()
+# The memory goes back to the system as a whole: a last search for garbage would take 0.3 s.
+atexit.register(gc.freeze)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

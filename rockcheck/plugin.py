@@ -1,11 +1,10 @@
-"""A pytest plugin: `rockcheck_check("my-scene", model="mujoco")` in a test of your own holds a cell
-against its suite's tolerances.
+"""A pytest plugin: its fixture `rockcheck_check` checks a cell against its suite's tolerances.
 
-The suite is the ini option `rockcheck_suite` (a named suite or a .toml file, relative to pytest's
-root), by default `rockcheck.toml` in the root where there is one, else `paper`. Histories are kept
-in pytest's cache and read back while nothing that they depend on has changed. `check` is the
-fixture's old name, kept for one release where no other plugin (such as pytest-check) has a fixture
-of that name.
+Call `rockcheck_check("my-scene", model="mujoco")` in a test. The suite is the ini option
+`rockcheck_suite` (a named suite or a .toml file, relative to pytest's root), by default
+`rockcheck.toml` in the root where there is one, else `paper`. Histories are kept in pytest's cache
+and read back while nothing that they depend on has changed. `check` is the fixture's old name, kept
+for one release where no other plugin (such as pytest-check) has a fixture of that name.
 """
 
 from __future__ import annotations
@@ -23,7 +22,9 @@ if TYPE_CHECKING:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The ini options `rockcheck_suite` and `rockcheck_allow_code`, and the command line's own
+    """Add the ini options and the option of the command line.
+
+    The ini options are `rockcheck_suite` and `rockcheck_allow_code`; the command line has
     `--rockcheck-allow-code`.
     """
     parser.addini(
@@ -48,12 +49,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture
 def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., Cell]:
-    """`rockcheck_check(scene, model=..., suite=None, strict=False)`: runs that cell and its
-    references, fails the test out of tolerance.
+    """Run a cell and its references; the test fails if the cell is out of tolerance.
 
-    Returns the finished `validation.suite.results.Cell`, whose figures a test may look at. With
-    `strict` a figure that left its drift band for the worse fails too, with `strict="both"` a
-    better one. A model that is not installed fails.
+    `rockcheck_check(scene, model=..., suite=None, strict=False)` returns the finished
+    `validation.suite.results.Cell`, whose figures a test may look at. With `strict` a figure that
+    left its drift band for the worse fails too, with `strict="both"` a better one. A model that is
+    not installed fails.
     """
     config = request.config
 

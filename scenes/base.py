@@ -1,9 +1,8 @@
-"""What all scene objects share: frozen, strictly validated, faults told in one line; and how they
-ask to be shown.
+"""Base of all scene objects: frozen, strictly validated, with a registered display.
 
-The contract draws nothing. How a scene, a history, a spectrum or a comparison shows itself is said
-above: a package registers a `View` for a class by an entry point of the group `rockcheck.views`;
-rockcheck's own is `rockcheck.reports.show`.
+An invalid value raises `InputError` with a message of one line. The package draws nothing: another
+package registers a `View` for a class of scene, history, spectrum or comparison by an entry point
+of the group `rockcheck.views`; rockcheck's own is `rockcheck.reports.show`.
 """
 
 from __future__ import annotations
@@ -40,8 +39,9 @@ Restitution = Annotated[float, Strict(), Field(ge=0.0, le=1.0, allow_inf_nan=Fal
 
 
 class Frozen(BaseModel):
-    """A frozen value whose constructor raises `InputError` for whatever is missing, unknown or out
-    of range.
+    """An immutable value; its constructor raises `InputError` for invalid fields.
+
+    A field is invalid if it is missing, unknown or out of range.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -53,7 +53,7 @@ class Frozen(BaseModel):
             raise from_validation(error, type(self).model_fields) from None
 
     def replace(self, **change: object) -> Self:
-        """A copy with some fields changed, validated like any other; all other fields stay."""
+        """A copy with some fields changed, validated like any other."""
         return type(self)(
             **{name: getattr(self, name) for name in type(self).model_fields} | change
         )
@@ -61,14 +61,14 @@ class Frozen(BaseModel):
 
 @dataclass(frozen=True, kw_only=True)
 class View:
-    """How objects of one class show themselves: as HTML in a notebook, and as a figure."""
+    """Display of the objects of one class: HTML for a notebook, and a figure."""
 
     html: Callable[[Any], str]
     figure: Callable[[Any], Figure]
 
 
 class Shown:
-    """Something that a notebook can show, and that has a figure."""
+    """An object with a figure and an HTML representation, by the `View` of its class."""
 
     def plot(self) -> Figure:
         """The object as a matplotlib figure."""

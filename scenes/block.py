@@ -1,5 +1,6 @@
-"""The block: a rigid box, homogeneous or with its mass's centre and its moment of inertia given;
-its two pivots.
+"""The block: a rigid box with two pivots, homogeneous or with given mass properties.
+
+Mass properties are the centre of mass and the moment of inertia.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from pydantic import (
 from rockcheck.scenes.base import Finite, Frozen, Positive
 from rockcheck.scenes.errors import InputError
 
-#: The moment of inertia may exceed what the box allows by this share, for rounding.
+#: Relative excess of the moment of inertia over its bound that is put down to rounding.
 ROUNDING = 1e-12
 
 
@@ -26,31 +27,32 @@ ROUNDING = 1e-12
 class Pivot:
     """A lower corner as the pivot of rocking.
 
-    Lengths in m, from the corner to the mass's centre.
+    Lengths in m, from the corner to the centre of mass.
     """
 
     #: Horizontal and vertical distance.
     arm: float
     height: float
-    #: R^2/(R^2 + I/m): how much of a pendulum of length R the block is about this corner; 3/4 where
-    #: it is homogeneous.
+    #: R^2/(R^2 + I/m), the factor of g/R in p^2; 3/4 of a homogeneous block.
     share: float
 
     @property
     def alpha(self) -> float:
-        """Slenderness angle of this side, rad: tilted by as much, the mass's centre stands above
-        the corner.
+        """Slenderness angle of this side, rad.
+
+        Tilted by this angle, the block has its centre of mass right above the corner.
         """
         return math.atan2(self.arm, self.height)
 
     @property
     def radius(self) -> float:
-        """R, m."""
+        """Distance R from the corner to the centre of mass, m."""
         return math.hypot(self.arm, self.height)
 
     def frequency_parameter(self, gravity: float) -> float:
-        """P = sqrt(g R/(R^2 + I/m)) in rad/s under `gravity` in m/s^2; sqrt(3 g/(4 R)) where the
-        block is homogeneous.
+        """Frequency parameter p in rad/s under `gravity` in m/s^2.
+
+        p = sqrt(g R/(R^2 + I/m)); sqrt(3 g/(4 R)) of a homogeneous block.
         """
         return math.sqrt(self.share * gravity / self.radius)
 
@@ -58,19 +60,18 @@ class Pivot:
 class Block(Frozen):
     """A rigid rectangular block 2B x 2H; lengths in m.
 
-    It is homogeneous unless the last two fields say otherwise.
+    It is homogeneous unless `centre_of_mass` or `moment_of_inertia` is given.
 
     `mass` (kg) is optional: motion does not depend on it, forces and impulses are given per unit
-    mass. `centre_of_mass` is the place (x, z) of the mass's centre from the centre of the box as it
-    stands, x to the right, z up. `moment_of_inertia` (kg m^2) is about the mass's centre and goes
-    with `mass`; where no mass is given it is that of 1 kg. It may be left out: then it is that of
-    the homogeneous block, m (B^2 + H^2)/3. Raises `InputError` for a centre outside the box, and
-    for a moment of inertia that no mass inside the box can have: with that centre m (B^2 + H^2 -
-    x^2 - z^2) is the most.
+    mass. `centre_of_mass` is its position (x, z) relative to the centre of the upright box, x to
+    the right, z up. `moment_of_inertia` (kg m^2) is about the centre of mass and belongs to `mass`,
+    or to 1 kg where no mass is given. Its default is the homogeneous block's, m (B^2 + H^2)/3.
+    Raises `InputError` for a centre of mass outside the box, and for a moment of inertia that no
+    mass inside the box can have: the largest is m (B^2 + H^2 - x^2 - z^2).
 
-    A block whose centre lies to one side has two different pivots. `alpha`, `radius`, `slope` and
-    `frequency_parameter` are those of the corner over which it falls most easily, the one nearer to
-    its mass's centre; `pivot` gives either.
+    If x is not 0, the two pivots differ. `alpha`, `radius`, `slope` and `frequency_parameter`
+    belong to the weaker pivot: the corner nearer to the centre of mass, over which the block falls
+    most easily. `pivot` gives either.
     """
 
     half_width: Positive
@@ -111,8 +112,9 @@ class Block(Frozen):
 
     @model_serializer(mode="wrap")
     def _as_written(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """What is not given is left out: a homogeneous block is written, and known by its hash, as
-        ever.
+        """Serialised fields; None is left out, except for `mass`.
+
+        So a homogeneous block's text and hash do not depend on the optional mass properties.
         """
         return {
             name: value
@@ -127,14 +129,12 @@ class Block(Frozen):
 
     @property
     def offset(self) -> tuple[float, float]:
-        """Place of the mass's centre from the box's centre, m: to the right, up."""
+        """Centre of mass relative to the centre of the box (to the right, up), m."""
         return self.centre_of_mass or (0.0, 0.0)
 
     @property
     def half_diagonal(self) -> float:
-        """Distance of the corners from the box's centre, sqrt(B^2 + H^2), m: R of a homogeneous
-        block.
-        """
+        """Half the diagonal of the box, sqrt(B^2 + H^2), m: R of a homogeneous block."""
         return math.hypot(self.half_width, self.half_height)
 
     @property
@@ -144,7 +144,7 @@ class Block(Frozen):
 
     @property
     def gyration_squared(self) -> float:
-        """Moment of inertia about the mass's centre per unit mass, m^2."""
+        """Moment of inertia about the centre of mass per unit mass, m^2."""
         if self.moment_of_inertia is None:
             return self.half_diagonal**2 / 3.0
         return self.moment_of_inertia / (1.0 if self.mass is None else self.mass)
@@ -162,43 +162,46 @@ class Block(Frozen):
 
     @property
     def weaker_pivot(self) -> Pivot:
-        """The pivot nearer to the mass's centre, over which the block falls most easily; the left
-        one where neither is.
+        """The pivot nearer to the centre of mass, over which the block falls most easily.
+
+        The left one if both are at the same distance.
         """
         return self.pivot("right" if self.offset[0] > 0.0 else "left")
 
     @property
     def alpha(self) -> float:
-        """Slenderness angle atan(B/H), rad; of the weaker pivot."""
+        """Slenderness angle of the weaker pivot, rad; atan(B/H) of a homogeneous block."""
         return self.weaker_pivot.alpha
 
     @property
     def slope(self) -> float:
-        """Tan alpha: the base acceleration over g at which the block begins to rock, of the weaker
-        pivot.
-        """
+        """Base acceleration over g at which rocking begins: tan alpha of the weaker pivot."""
         pivot = self.weaker_pivot
         return pivot.arm / pivot.height
 
     @property
     def radius(self) -> float:
-        """Distance R of the pivot from the mass's centre, m: half the diagonal; of the weaker
-        pivot.
+        """Distance R from the weaker pivot to the centre of mass, m.
+
+        Half the diagonal of a homogeneous block.
         """
         return self.weaker_pivot.radius
 
     @property
     def frequency_parameter(self) -> float:
-        """P = sqrt(3 g / (4 R)), rad/s, on Earth: g = 9.81 m/s^2.
+        """Frequency parameter p of the weaker pivot on Earth, g = 9.81 m/s^2, rad/s.
 
-        `Scene.frequency_parameter` has the scene's own gravity.
+        p = sqrt(3 g/(4 R)) of a homogeneous block. `Scene.frequency_parameter` uses the scene's
+        gravity.
         """
         return self.weaker_pivot.frequency_parameter(9.81)
 
     @property
     def least_painleve_friction(self) -> float:
-        """2 sqrt(j (1 + j)), j = I/(m R^2): with more friction a slipping pivot can jam (Painleve);
-        4/3 where homogeneous.
+        """Friction coefficient above which a slipping pivot can jam (Painleve).
+
+        2 sqrt(j (1 + j)) with j = I/(m R^2) and the larger R of both pivots; 4/3 of a homogeneous
+        block.
         """
         if self.homogeneous:
             return 4.0 / 3.0

@@ -1,9 +1,9 @@
-"""Compiled functions whose cache can be trusted.
+"""Compiled functions with a safe cache on disk.
 
 numba's own cache looks at a function's own file only. After a change in a function that it calls,
 it would silently use the old machine code. Here the cache folder is named after the content of all
-source files of the function's package, such as rockcheck.ebm with all below it. numba also runs
-whatever lies in its cache. Here a file is read only if this user wrote it and it is complete.
+source files of the function's package, such as rockcheck.ebm with all below it. numba also runs any
+code in its cache. Here a file is read only if this user wrote it and it is complete.
 """
 
 from __future__ import annotations
@@ -42,11 +42,10 @@ from rockcheck.scenes.writing import write_whole
 
 
 def _import_array_functions() -> None:
-    """Import numba's array functions.
+    """Import numba's array functions without scipy.linalg (0.2 s).
 
-    They would import scipy.linalg (0.2 s) only to know that it is there.
-
-    It is, since rockcheck needs scipy; what calls BLAS looks for it again when it is compiled.
+    numba imports scipy.linalg only to check that BLAS is there. It is, since rockcheck needs scipy;
+    code that calls BLAS checks again when it is compiled.
     """
     look, linalg.ensure_blas = linalg.ensure_blas, lambda: None
     try:
@@ -59,10 +58,11 @@ def _import_array_functions() -> None:
 _import_array_functions()
 config: Any = numba_config
 
-_KEPT = 7 * 86400.0  # s
+#: Age up to which code compiled from other sources is kept, s.
+_KEPT = 7 * 86400.0
 #: A compilation that takes longer is announced, s.
 _SILENT = 2.0
-#: What the code of a package is for, in an announcement.
+#: Purpose of each package's compiled code, for the announcement.
 _PURPOSES = {
     "rockcheck.ebm": "the event-based models",
     "rockcheck.cm": "the continuous model",
@@ -72,11 +72,10 @@ _PURPOSES = {
 
 
 class _Compiling(Listener):
-    """Switches garbage collection off while numba compiles: searching the compiler's objects for
-    cycles takes a tenth of its time.
+    """Disables garbage collection while numba compiles, and announces long compilations.
 
-    A long compilation is announced once a package and process, so that a user knows what the wait
-    is for.
+    The search for cycles among the compiler's objects takes a tenth of the compile time. A
+    compilation longer than `_SILENT` is announced, once a package and process.
     """
 
     def __init__(self) -> None:
@@ -86,7 +85,7 @@ class _Compiling(Listener):
         self.timer: threading.Timer | None = None
 
     def on_start(self, event: Event) -> None:
-        """A compilation begins, perhaps inside another one; numba's lock admits one thread."""
+        """Start of a compilation, perhaps inside another one; numba's lock admits one thread."""
         if self.depth == 0:
             self.wanted = gc.isenabled()
             gc.disable()
@@ -100,7 +99,7 @@ class _Compiling(Listener):
         self.depth += 1
 
     def on_end(self, event: Event) -> None:
-        """A compilation ends."""
+        """End of a compilation."""
         self.depth -= 1
         if self.depth == 0:
             if self.timer is not None:
@@ -124,20 +123,18 @@ register("numba:compile", _Compiling())
 
 
 def _package(function: Callable[..., Any]) -> Path:
-    """The folder of the function's package: that of rockcheck.ebm for one of
-    rockcheck.ebm.core.march.
-    """
+    """Folder of the function's package: of rockcheck.ebm for rockcheck.ebm.core.march."""
     below = max(len(function.__module__.split(".")) - 3, 0)
     return Path(function.__code__.co_filename).parents[below]
 
 
 @cache
 def _cache_folder(package: Path) -> Path | None:
-    """The private folder for the compiled code of a package; None, with a line on stderr, where
-    there can be none.
+    """The private folder for a package's compiled code, or None if there can be none.
 
-    What lies there is unpickled and run. So it must be nobody else's: the user's own, closed to all
-    others, in a folder that only the user, the package's owner or root may change.
+    None comes with a line on stderr. The folder's content is unpickled and run, so nobody else may
+    write to it: it belongs to the user, is closed to all others, and lies in a folder that only the
+    user, the package's owner or root may change.
     """
     digest = hashlib.sha256()
     for source in [Path(__file__), *sorted(package.rglob("*.py"))]:
@@ -147,9 +144,7 @@ def _cache_folder(package: Path) -> Path | None:
     for base in (
         (Path(config.CACHE_DIR),) if config.CACHE_DIR else (package / "__pycache__", user_wide)
     ):
-        with contextlib.suppress(
-            OSError
-        ):  # such as a package that is installed where we may not write
+        with contextlib.suppress(OSError):  # such as a package in a folder that we may not write
             if base == user_wide:
                 base.mkdir(mode=0o700, parents=True, exist_ok=True)
             folder = base.absolute() / name
@@ -168,11 +163,12 @@ def _cache_folder(package: Path) -> Path | None:
 
 
 def _is_private(folder: Path, owner: int) -> bool:
-    """Whether nobody but the user can have written into `folder`, or put it there; `owner` is that
-    of the code itself.
+    """Whether only the user can have made `folder` and written into it.
+
+    `owner` is the user id of the code's owner. Always true on systems without user ids.
     """
     if not hasattr(os, "geteuid"):
-        return True  # no owners and modes that could be asked
+        return True  # no owners and modes to check
     me, own, above = os.geteuid(), folder.lstat(), folder.parent.stat()
     others_write = stat.S_IWGRP | stat.S_IWOTH
     return (
@@ -185,8 +181,9 @@ def _is_private(folder: Path, owner: int) -> bool:
 
 
 def _remove_old(folder: Path, package: str) -> None:
-    """Remove what was compiled from other sources, unless it is young: another process may be using
-    it.
+    """Remove folders of code compiled from other sources, once older than `_KEPT`.
+
+    Another process may be using a younger one.
     """
     for old in folder.parent.glob(f"{package}-kernels-*"):
         if old != folder and time.time() - old.stat().st_mtime > _KEPT:
@@ -194,11 +191,9 @@ def _remove_old(folder: Path, package: str) -> None:
 
 
 def _call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
-    """The types of a call of one of numba's own functions, `operator.add` too: for the same
-    arguments those of the call before.
+    """Signature of a call of a numba built-in (also `operator.add`), cached by argument types.
 
-    numba tries all that such a function may mean, some ten things, at each place where it stands: a
-    quarter of the time that the event loop takes to compile.
+    numba tries some ten candidates at each call site: a quarter of the event loop's compile time.
     """
     known, asked = self.__dict__.setdefault("_rockcheck_known", {}), (args, tuple(kws.items()))
     if asked not in known:
@@ -207,7 +202,7 @@ def _call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
 
 
 class _Compiler(Compiler):
-    """numba's own compiler, which looks up each kind of call once.
+    """numba's own compiler, which resolves each kind of call once (`_call_type`).
 
     Only one thread compiles: it holds numba's lock.
     """
@@ -224,12 +219,11 @@ class _Compiler(Compiler):
 
 
 class _Linked(JITCodeLibrary):
-    """The code of an inner kernel, which is linked into the kernels that call it: no machine code
-    is made of it alone.
+    """Code of an inner kernel, linked into its callers without machine code of its own.
 
-    numba would make some of each, and of all that it calls, though nothing runs it: a third of the
-    time that the event loop takes to compile. And it is optimised where it ends; here only its
-    loops and its arithmetic are put in order.
+    numba would make machine code of each inner kernel and of all that it calls, though nothing runs
+    it: a third of the event loop's compile time. Here only loops and arithmetic are simplified;
+    full optimisation follows in the calling kernel.
     """
 
     def _optimize_final_module(self) -> None:
@@ -247,24 +241,24 @@ class _Linked(JITCodeLibrary):
         self._finalized = True
 
     def get_pointer_to_function(self, name: str) -> int:
-        """None: nothing but kernels calls it."""
+        """0, no pointer: only kernels call an inner kernel."""
         self._ensure_finalized()
         return 0
 
     @property
     def codegen(self) -> Any:
-        """Where numba leaves the environment of a function: nowhere.
+        """The object itself, whose `set_env` drops the environment of a function.
 
-        It is for what needs Python, which no inner kernel does.
+        Only code that needs Python uses the environment; no inner kernel does.
         """
         return self
 
     def set_env(self, env_name: str, env: object) -> None:
-        """Nothing (see `codegen`)."""
+        """Do nothing (see `codegen`)."""
 
 
 class _InnerCompiler(_Compiler):
-    """A compiler whose result is linked only."""
+    """A compiler whose result is only linked (see `_Linked`)."""
 
     def __init__(self, typing: Any, target: Any, library: Any, *about: Any) -> None:
         super().__init__(
@@ -275,7 +269,7 @@ class _InnerCompiler(_Compiler):
 class _Cache(FunctionCache):
     """The compiled variants of one function, a file each that begins with the hash of the rest.
 
-    A damaged file is removed and the function compiled again. numba itself would unpickle it.
+    A damaged file is removed and the function compiled again; numba itself would unpickle it.
     """
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
@@ -290,14 +284,14 @@ class _Cache(FunctionCache):
         self._cache_file = self  # numba's own, with an index of many files, is not used
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled function for a signature, None where it is not there or not whole."""
+        """The compiled function for a signature, or None if it is absent or unusable."""
         try:
             return super().load_overload(sig, target_context)
         except Exception:
-            return None  # whole, but of no use to this numba: it is compiled and written again
+            return None  # whole, but unusable by this numba: it is compiled and written again
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a compiled function, where that can be done: it is compiled in any case."""
+        """Keep a compiled function; it is usable even if it cannot be written."""
         with contextlib.suppress(OSError):
             super().save_overload(sig, data)
 
@@ -309,7 +303,7 @@ class _Cache(FunctionCache):
         )
 
     def load(self, key: object) -> Any:
-        """What `save` kept."""
+        """The data that `save` wrote; None if there are none, or if they are damaged."""
         path = self._path(key)
         if not os.path.lexists(path):
             return None
@@ -321,7 +315,7 @@ class _Cache(FunctionCache):
         return None
 
     def save(self, key: object, data: object) -> None:
-        """Write what numba made of a function, whole or not at all."""
+        """Write numba's data of a compiled function, whole or not at all."""
         path = self._path(key)
         if path.is_dir():
             self._drop(path)
@@ -333,18 +327,18 @@ class _Cache(FunctionCache):
             shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
 
     def flush(self) -> None:
-        """Forget what was kept of this function."""
+        """Remove all cached variants of this function."""
         for path in self.folder.glob(f"{self.name[-100:]}-*.nbc"):
             self._drop(path)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compiles `function` with numba on its first call, cached on disk until any source of its
-    package changes.
+    """Compile `function` with numba on its first call, with a cache on disk.
 
-    The compiled code releases the interpreter's lock, so that batches run on threads, and divides
-    as IEEE 754 does (no exception for a zero divisor). Under NUMBA_DISABLE_JIT=1, as for a debugger
-    or to measure coverage, it is interpreted and divides likewise.
+    The cache holds until any source of the function's package changes. The compiled code releases
+    the interpreter's lock, so that batches run on threads, and divides as IEEE 754 does (no
+    exception for a zero divisor). Under NUMBA_DISABLE_JIT=1, as for a debugger or to measure
+    coverage, it is interpreted and divides likewise.
     """
     if config.DISABLE_JIT:
         return np.errstate(all="ignore")(function)
@@ -358,12 +352,10 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def for_types_of(compiled: Any, *args: Any) -> Callable[..., Any]:
-    """A kernel's machine code for arguments of just these types, compiled or read from the cache if
-    need be.
+    """A kernel's machine code for the types of these arguments, from the cache if it is there.
 
-    numba looks at the types of all arguments in each call, which takes longer than a short kernel:
-    3 us where there are some tuples of arrays. For a loop in Python that calls the same kernel many
-    times.
+    For a loop in Python that calls the same kernel many times: in each call numba inspects the
+    types of all arguments, which takes longer than a short kernel (3 us for some tuples of arrays).
     """
     if config.DISABLE_JIT:
         return cast(Callable[..., Any], compiled)
@@ -374,7 +366,7 @@ def for_types_of(compiled: Any, *args: Any) -> Callable[..., Any]:
 
 
 class _Inner(CPUDispatcher):
-    """A function that kernels call: compiled once for the types that it is given, whoever calls it.
+    """A function that kernels call: compiled once for each set of argument types.
 
     Python calls the plain function.
     """
@@ -383,9 +375,10 @@ class _Inner(CPUDispatcher):
         return self.py_func(*args, **named)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """For numba: a constant is compiled as a number, else each would be a copy of its own.
+        """Resolve a call from a kernel, with constants typed as plain numbers.
 
-        Where the code is placed it is one again.
+        Otherwise each constant would have a compiled copy. The value is a constant again once the
+        code is inlined.
         """
         return super().get_call_template(
             [_as_number(a) for a in args], {name: _as_number(a) for name, a in kws.items()}
@@ -393,13 +386,16 @@ class _Inner(CPUDispatcher):
 
 
 def _as_number(kind: Any) -> Any:
-    """The type of a constant, or of a member of an enumeration, as that of a number."""
+    """The number type of a constant, or of a member of an enumeration."""
     kind = types.unliteral(kind)
     return kind.dtype if isinstance(kind, types.IntEnumMember) else kind
 
 
 def _inner(function: Callable[..., Any], **options: bool) -> Any:
-    """All options are named: numba would take those of the first caller for the others."""
+    """Make an inner kernel, compiled with these options of numba.
+
+    All options are named: numba would take the first caller's for the others.
+    """
     if config.DISABLE_JIT:
         return function
     named = {"nopython": True, "error_model": "numpy", "_nrt": False, "forceinline": True} | options
@@ -411,19 +407,19 @@ def _inner(function: Callable[..., Any], **options: bool) -> Any:
 
 
 def inner_kernel(function: Callable[..., Any]) -> Any:
-    """A part of kernels that neither makes nor returns an array, but works on those that it is
-    given.
+    """A part of kernels, inlined into its callers, that neither makes nor returns an array.
 
-    Its code stands where it is called: most are given much, and a call would take longer than they
-    do. It has no reference counting, whose atomic operations cost as much as a short loop, and no
-    entry point for Python, which calls the plain function instead. numba refuses to compile one
-    that makes an array; one that returns an array would free it too early.
+    It works on arrays that it is given. Most take many arguments, and a call would take longer than
+    the work. It has no reference counting, whose atomic operations cost as much as a short loop,
+    and no entry point for Python, which calls the plain function instead. numba refuses to compile
+    one that makes an array; one that returns an array would free it too early.
     """
     return _inner(function)
 
 
 def called_kernel(function: Callable[..., Any]) -> Any:
-    """An inner kernel that is called: for what is long and stands in several places, each of which
-    would be compiled again.
+    """An inner kernel that is called, not inlined: for long code with several call sites.
+
+    Inlined, it would be compiled again at each of them.
     """
     return _inner(function, forceinline=False)

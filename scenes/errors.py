@@ -1,6 +1,4 @@
-"""The exceptions, each with a message of one line: what a user gave cannot be used, or a model
-could not finish.
-"""
+"""Exceptions with messages of one line: unusable input, or a model that cannot finish."""
 
 from __future__ import annotations
 
@@ -14,10 +12,9 @@ from pydantic import ValidationError
 
 
 class InputError(ValueError):
-    """What the user gave cannot be used; the message is one line saying where, what and what is
-    allowed.
+    """Unusable input; the message is one line: where, what, and what is allowed.
 
-    `key` is the dotted path of the offending setting within its object, empty where there is none.
+    `key` is the dotted path of the offending setting within its object, empty if there is none.
     """
 
     def __init__(self, message: str, key: str = "") -> None:
@@ -31,20 +28,21 @@ class NotInstalled(InputError):
 
 
 class ModelFailure(RuntimeError):
-    """A model could not finish a scene (blow-up, unsupported physics, a cap reached); its cell
-    fails, the run goes on.
+    """A model could not finish a scene: blow-up, unsupported physics, or a cap reached.
+
+    Its cell fails; the run continues.
     """
 
 
 def check_kind(value: object, kind: type, how: str, key: str) -> None:
-    """Raise `InputError` unless `value` is a `kind`; `how` says where one comes from."""
+    """Raise `InputError` unless `value` is a `kind`; `how` names a source of one."""
     if not isinstance(value, kind):
         raise InputError(
             f"{printable(repr(value))} is not allowed: give a {kind.__name__}, as from {how}", key
         )
 
 
-#: So many names a message lists.
+#: Most names that a message lists.
 MOST_NAMES = 100
 
 
@@ -54,8 +52,9 @@ def unknown_name(what: str, name: str, allowed: Iterable[str]) -> InputError:
 
 
 def suggestion(name: str, allowed: Iterable[str]) -> str:
-    """What to say after a name that is not among `allowed`: the nearest one, and all of them, or
-    some of very many.
+    """Hint after a name that is not among `allowed`: the nearest one, and all of them.
+
+    At most `MOST_NAMES` are listed; empty if none is allowed.
     """
     names = sorted(allowed)
     near = get_close_matches(name, names, n=1)
@@ -65,10 +64,10 @@ def suggestion(name: str, allowed: Iterable[str]) -> str:
 
 
 def inert(text: str) -> str:
-    """`text` without what steers a terminal or a page: control characters, and those that turn the
-    order of what follows (U+202E).
+    """`text` without characters that steer a terminal or a page: each becomes "?".
 
-    Lines and every kind of blank stay.
+    These are control characters, and those that turn the order of text (U+202E). Line breaks and
+    every kind of blank stay.
     """
     if text.isprintable():
         return text
@@ -76,8 +75,9 @@ def inert(text: str) -> str:
 
 
 def printable(value: object, limit: int = 80) -> str:
-    """`value` as one short line without control characters, safe to write to a terminal; a path is
-    never shortened.
+    """`value` as one line of at most `limit` characters, safe to write to a terminal.
+
+    Control characters become "?"; a path is never shortened.
     """
     text = "".join(c if c.isprintable() else "?" for c in str(value))
     return text if len(text) <= limit or isinstance(value, PurePath) else text[: limit - 3] + "..."
@@ -86,10 +86,10 @@ def printable(value: object, limit: int = 80) -> str:
 def from_validation(error: ValidationError, keys: Iterable[str] = ()) -> InputError:
     """The first fault that pydantic found, as one line: key, value, what is allowed.
 
-    `keys` are those that could be given.
+    An unknown key comes before a missing one. `keys` are the allowed ones.
     """
     faults = error.errors(include_url=False)
-    # A key that is misspelt is unknown, and the right one missing: the first says what to mend.
+    # A misspelt key is unknown, and the right one missing: the unknown one shows what to mend.
     fault = (
         next((one for one in faults if one["type"] == "extra_forbidden"), faults[0])
         if faults[0]["type"] == "missing"

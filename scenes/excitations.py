@@ -25,23 +25,24 @@ MOST_PGA = 1000.0
 
 
 class Motion(Frozen):
-    """What all excitations share: a base motion made larger or longer is one of the same kind.
+    """Base of all excitations: a scaled or stretched motion is of the same kind.
 
-    `_size` names the field that its acceleration is proportional to, `_length` the one that its
-    time is; "" where it has none.
+    `_size` names the field proportional to the acceleration, `_length` the field proportional to
+    time; "" where there is none.
     """
 
     _size: ClassVar[str] = "amplitude"
     _length: ClassVar[str] = "period"
 
     def scaled(self, factor: float) -> Self:
-        """The same motion with `factor` times the acceleration; a negative factor also exchanges
-        left and right.
+        """The same motion with `factor` times the acceleration.
+
+        A negative factor also exchanges left and right.
         """
         return self._times(self._size, factor)
 
     def stretched(self, factor: float) -> Self:
-        """The same motion `factor` (> 0) times as slow."""
+        """The same motion with all times multiplied by `factor` (> 0)."""
         return self._times(self._length, factor)
 
     def _times(self, name: str, factor: float) -> Self:
@@ -61,7 +62,7 @@ class Rest(Motion):
 
     @property
     def quiet_after(self) -> float:
-        """Time in s after which the base does not move any more."""
+        """Time after which the base is at rest, s."""
         return 0.0
 
 
@@ -86,7 +87,7 @@ class Ricker(Motion):
 
     @property
     def rate(self) -> float:
-        """B of the Gaussian factor exp(-b tau^2), 1/s^2; tau is the time from the centre."""
+        """Coefficient b of the Gaussian factor exp(-b tau^2), 1/s^2; tau counts from the centre."""
         return (
             2.0 * math.pi**2 / (3.0 * self.period**2)
             if not self.symmetric
@@ -142,10 +143,10 @@ class Sine(Motion):
 class Record(Motion):
     """A sampled ground motion: linear between its samples, zero after the last one.
 
-    Usually made by `Record.from_file` or `Record.from_samples`. `unscaled` holds the samples in
-    m/s^2 as recorded, and `scale` multiplies them; `pga` (g) in its place is the peak that they
-    then have. A scene longer than its record goes on with a base at rest. `notes` say what the
-    file's reader did, such as a first time that is not 0.
+    Usually made by `Record.from_file` or `Record.from_samples`. `unscaled` holds the recorded
+    samples in m/s^2, and `scale` multiplies them; `pga` (g), given in place of `scale`, sets the
+    peak of the scaled record. In a longer scene the base is at rest after the record. `notes` say
+    what the file's reader changed or assumed, such as a first time other than 0.
     """
 
     _size: ClassVar[str] = "scale"
@@ -190,10 +191,10 @@ class Record(Motion):
     def from_file(cls, path: str | Path, scale: float = 1.0, **reading: Any) -> Self:
         """The record in a file of one of the formats of `rockcheck.scenes.recordings`.
 
-        `reading` holds what the file does not say, or which part of it is wanted: the options of
+        `reading` supplies what the file does not state, or selects a part of it: the options of
         `recordings.Reading`, such as `unit="cm/s2"`, `time_step=0.005`, `column=2` or
-        `component="360 Deg"`. Raises `InputError`, naming file and line, where the file is not what
-        it says it is, or something is not known.
+        `component="360 Deg"`. Raises `InputError`, naming file and line, where the file is
+        malformed, or something is not known.
         """
         settings: dict[str, Any] = {"file": path, "scale": scale} | reading
         return cls(**settings)

@@ -1,7 +1,6 @@
-"""What is known of the models from the suites (data/experience.json): how far to trust a figure,
-and for which scenes.
+"""Bias and scatter of the models in the suites, and the scenes that the suites cover.
 
-The file is written by docs/site_tools/experience.py from finished runs
+The data, data/experience.json, are written by docs/site_tools/experience.py from finished runs
 (`validation.suite.across`).
 """
 
@@ -38,7 +37,7 @@ class Range(Frozen):
 
 
 class Experience(Frozen):
-    """Which suites were run, what was found by model and figure, and which scenes they cover."""
+    """The suites that were run, each model's `Trust` by figure, and the domain of the scenes."""
 
     suites: tuple[str, ...] = ()
     trust: Mapping[str, Mapping[str, Trust]] = {}
@@ -55,7 +54,7 @@ class Expected(NamedTuple):
 
 @cache
 def known() -> Experience:
-    """What comes with the package."""
+    """The experience that comes with the package; empty if its file is missing."""
     path = resources.files("rockcheck.scenes") / "data" / "experience.json"
     return (
         Experience.model_validate_json(path.read_text(encoding="utf-8"))
@@ -65,7 +64,7 @@ def known() -> Experience:
 
 
 def expected(trust: Trust, value: float) -> Expected:
-    """A model's figure M as its experience has it: M/delta, and 1.96 sigma to either side."""
+    """A model's figure M corrected by its bias delta: M/delta, and 1.96 sigma to either side."""
     best = value / trust.bias
     return Expected(
         best, best * (1.0 - WIDTH * trust.scatter), best * (1.0 + WIDTH * trust.scatter)
@@ -73,11 +72,10 @@ def expected(trust: Trust, value: float) -> Expected:
 
 
 def axes_of(scene: Scene) -> dict[str, list[float]]:
-    """A scene on the axes of the domain: one value an axis, none where it has no such part, one a
-    wall of its walls.
+    """The values of a scene on the axes of the domain.
 
-    alpha (rad), R (m), mu, e and gap/R of walls, and the intensity: peak base acceleration over g
-    tan alpha.
+    alpha (rad), R (m), mu, and for each wall e and gap/R; and the intensity, peak base acceleration
+    over g tan alpha. An axis without a value is left out.
     """
     block = scene.block
     found = {"alpha": [block.alpha], "R": [block.radius], "friction": [scene.floor.friction]}
@@ -92,8 +90,9 @@ def axes_of(scene: Scene) -> dict[str, list[float]]:
 
 
 def outside(scene: Scene, domain: Mapping[str, Range] | None = None) -> list[str]:
-    """The axes on which a scene lies outside of the domain that the suites cover, a line each;
-    empty where it lies inside.
+    """The axes on which a scene lies outside the domain of the suites, a line each.
+
+    Empty if it lies inside.
     """
     domain = known().domain if domain is None else domain
     lines = []

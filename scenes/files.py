@@ -1,6 +1,6 @@
-"""Scene files (TOML), the scenes of the package, and numbers that are not known exactly:
-`friction = { value = 0.3, sd = 0.03 }`.
+"""Scene files (TOML), the scenes of the package, and uncertain numbers.
 
+An uncertain number is a table, such as `friction = { value = 0.3, sd = 0.03 }`:
 
 | written | meaning |
 |---|---|
@@ -9,8 +9,8 @@
 | `{ value = 0.3, sd = 0.03, distribution = "uniform" }` | uniform of that mean and sd |
 | `{ low = 0.0, high = 0.1 }` | uniform between these; `value` is the middle unless it is given |
 
-Any number of a scene can be written so. `load_scene` takes the values; `load_uncertain_scene` also
-says what is not known. Numbers are independent unless a table `[correlation]` says otherwise:
+Any number of a scene may be uncertain. `load_scene` takes the values; `load_uncertain_scene` also
+returns the distributions. Numbers are independent unless a table `[correlation]` says otherwise:
 `"block.half_width, block.half_height" = 0.8`.
 """
 
@@ -37,7 +37,7 @@ from rockcheck.scenes.scene import Scene
 
 Place = tuple[str | int, ...]
 Part = TypeVar("Part", bound=Frozen)
-#: Keys by which a table of a scene file is known as an uncertain number.
+#: Keys that mark a table of a scene file as an uncertain number.
 _KEYS = {"sd", "low", "high"}
 CORRELATION = "correlation"
 DATA = Path(str(resources.files("rockcheck.scenes"))) / "data"
@@ -57,7 +57,7 @@ def load_scene(source: str | Path) -> Scene:
 
 
 def load_uncertain_scene(source: str | Path) -> UncertainScene:
-    """A scene with what its file says of the numbers that are not known exactly (see the module).
+    """A scene with the distributions of its uncertain numbers (see the module).
 
     Raises as `load_scene`.
     """
@@ -77,9 +77,7 @@ def load_uncertain_scene(source: str | Path) -> UncertainScene:
 def uncertain_scene_from(
     data: Mapping[str, Any], *, folder: Path, default_name: str
 ) -> UncertainScene:
-    """A scene from the tables of a scene file, with what they say of numbers that are not known
-    exactly.
-    """
+    """A scene with its uncertain numbers, from the tables of a scene file."""
     plain, spreads, correlations = split(data)
     return uncertain_scene(
         scene_from(plain, folder=folder, default_name=default_name), spreads, correlations
@@ -87,8 +85,9 @@ def uncertain_scene_from(
 
 
 def scene_from(data: dict[str, Any], *, folder: Path, default_name: str) -> Scene:
-    """A scene from the tables of a scene file; record files are looked up in `folder`, then among
-    the package's records.
+    """A scene from the tables of a scene file.
+
+    Record files are looked up in `folder`, then among the package's records.
     """
     data = {"name": default_name, **data}
     if isinstance(data.get("walls"), dict):
@@ -123,7 +122,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 class Spread(Frozen):
-    """What is known of a number: its value, and how it is distributed.
+    """An uncertain number: its value and its distribution.
 
     See the module for the forms.
     """
@@ -158,7 +157,7 @@ class Spread(Frozen):
 
     @property
     def nominal(self) -> float:
-        """The value that stands in the scene."""
+        """The value used in the scene: `value`, else the middle between `low` and `high`."""
         if self.value is not None:
             return self.value
         assert self.low is not None
@@ -167,7 +166,7 @@ class Spread(Frozen):
 
     @property
     def law(self) -> Any:
-        """The distribution, frozen, of scipy.stats."""
+        """The frozen distribution of scipy.stats."""
         from scipy import stats
 
         if self.sd is None:
@@ -188,13 +187,14 @@ class Spread(Frozen):
 
 @dataclass(frozen=True)
 class UncertainScene:
-    """A scene and what is not known of it: `spreads` by the place of the number, such as
-    "floor.friction" or "walls.left.gap".
+    """A scene and the distributions of its uncertain numbers.
+
+    `spreads` is keyed by the place of the number, such as "floor.friction" or "walls.left.gap".
     """
 
     scene: Scene
     spreads: Mapping[str, Spread]
-    #: Correlation of the numbers in the order of `spreads`; the unit matrix where nothing is said.
+    #: Correlation matrix in the order of `spreads`; the unit matrix if all are independent.
     correlation: FloatArray
 
     @property
@@ -208,8 +208,9 @@ class UncertainScene:
         return bool(np.array_equal(self.correlation, np.eye(len(self.spreads))))
 
     def values(self, uniform: FloatArray) -> FloatArray:
-        """Numbers for points of the unit cube (n x count), by a Gaussian copula with the
-        correlation.
+        """The uncertain numbers (n x count) at points of the unit cube (n x count).
+
+        The correlation enters by a Gaussian copula.
         """
         from scipy import stats
 
@@ -238,8 +239,10 @@ class UncertainScene:
 
 
 def split(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Spread], Mapping[str, Any]]:
-    """The tables of a scene file with plain numbers, the spread of each uncertain one, and the
-    table of correlations.
+    """Split the tables of a scene file into plain numbers, spreads and correlations.
+
+    The tables get the nominal value of each uncertain number. Spreads are keyed by the number's
+    place.
     """
     spreads: dict[str, Spread] = {}
     tables = {key: value for key, value in data.items() if key != CORRELATION}
@@ -250,8 +253,10 @@ def split(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Spread], M
 def uncertain_scene(
     scene: Scene, spreads: Mapping[str, Spread], correlations: Mapping[str, Any]
 ) -> UncertainScene:
-    """A scene with what is not known of it; `correlations` maps "a, b" to a number between -1 and
-    1. Raises `InputError`.
+    """A scene with its uncertain numbers and their correlation.
+
+    `correlations` maps "a, b" to a number between -1 and 1. Raises `InputError` for an unknown
+    place, a number out of range, or a matrix that is not positive definite.
     """
     names = list(spreads)
     matrix = np.eye(len(names))
@@ -328,6 +333,6 @@ def _plain(value: Any, place: Place, spreads: dict[str, Spread]) -> Any:
 
 
 def _labels(items: Sequence[Any]) -> Iterator[str | int]:
-    """What the tables of a list are called: a wall by its side."""
+    """Labels of a list's tables: the side of a wall, else the index."""
     for k, item in enumerate(items):
         yield str(item["side"]) if isinstance(item, Mapping) and "side" in item else k

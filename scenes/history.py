@@ -1,4 +1,4 @@
-"""A history: what any model returns, on the scene's own output grid."""
+"""A history: the motion that any model returns, on the scene's output grid."""
 
 from __future__ import annotations
 
@@ -30,16 +30,15 @@ if TYPE_CHECKING:
 COLUMNS = ("t", "x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate", "mode")
 EVENT_COLUMNS = ("t", "kind", "mode_before", "mode_after", "impulse")
 OUTCOMES = ("at rest", "moving", "overturned left", "overturned right")
-#: |theta| of a block that has fallen, rad.
+#: |theta| from which a block has fallen, rad.
 LYING = math.pi / 2 - 0.05
 #: Endings of files that a history can be written to, and the columns that hold words.
 FORMATS = ("", ".csv", ".gz", ".json", ".mat", ".parquet")
 WORDS = ("kind", "mode_before", "mode_after")
-#: The column of a CSV that says what the table does not, as JSON in its first row, so that any
-#: reader takes the file as a plain table; "-" in the others, since pandas warns of a column that
-#: holds words here and nothing there.
+#: The column of a CSV that holds the metadata, as JSON in its first row, so that any reader takes
+#: the file as a plain table; "-" in the other rows, since pandas warns of text beside empty cells.
 ABOUT = "rockcheck_history"
-#: What it says of a block that is not homogeneous.
+#: Metadata of the block; `_MASS` of one that is not homogeneous.
 _SIZES, _MASS = ("half_width", "half_height"), ("centre_of_mass", "moment_of_inertia")
 #: The modes of motion that a `mode` column may hold.
 MODES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight", "overturned")
@@ -47,8 +46,9 @@ MODES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight", "ove
 
 @dataclass(frozen=True, kw_only=True)
 class Event:
-    """One change of contact or mode at time `t` (s); `impulse` per unit mass in m/s, 0 where
-    nothing strikes.
+    """One change of contact or mode at time `t` (s).
+
+    `impulse` is per unit mass in m/s; 0 without an impact.
     """
 
     t: float
@@ -60,10 +60,9 @@ class Event:
 
 @dataclass(frozen=True, kw_only=True)
 class Cost:
-    """What a run took.
+    """Cost of a run.
 
-    `set_up` and `wall_seconds` in s (set-up, such as building an engine's scene, is not in the
-    latter).
+    `wall_seconds` (s) does not include `set_up` (s), such as building an engine's scene.
     """
 
     wall_seconds: float = 0.0
@@ -71,15 +70,12 @@ class Cost:
     set_up: float = 0.0
     steps: int = 0
     evaluations: int = 0
-    #: Impacts at which the impact law added kinetic energy, and the most that one of them added,
-    #: relative.
+    #: Impacts at which the impact law added kinetic energy, and the largest relative gain.
     energy_gains: int = 0
     largest_energy_gain: float = 0.0
-    #: How often each modelling choice of the event-based model was made, by its name; those that
-    #: never were are left out.
+    #: Uses of each modelling choice of the event-based model, by name; unused ones are left out.
     rules: Mapping[str, int] = field(default_factory=dict)
-    #: Largest change of theta/alpha against the same run at a tighter tolerance, where that was
-    #: asked for.
+    #: Largest change of theta/alpha against the same run at a tighter tolerance; None without one.
     error_estimate: float | None = None
 
 
@@ -88,9 +84,9 @@ class History(Shown):
     """The motion of a block as one model sees it. SI units, signs as in the scene.
 
     `channels` holds one 1-D array a name, all of one length: t, x, y, theta, x_dot, y_dot,
-    theta_dot, slip, slip_rate, mode. x and y are those of the box's centre, relative to the base
-    (of a homogeneous block its centroid); `slip` is how far the pivot corner stands from its first
-    place along the floor, `slip_rate` that corner's horizontal velocity. A history that ends in
+    theta_dot, slip, slip_rate, mode. x and y locate the centre of the box relative to the base (of
+    a homogeneous block its centroid). `slip` is the distance of the pivot corner along the floor
+    from its first place, `slip_rate` that corner's horizontal velocity. A history that ends in
     overturning stops there.
     """
 
@@ -101,18 +97,17 @@ class History(Shown):
     outcome: str
     cost: Cost = Cost()
     settings: Mapping[str, Any] = field(default_factory=dict)
-    #: Things a reader should know, one line each (for example that the record is shorter than the
-    #: scene).
+    #: Notes for the reader, one line each (for example that the record is shorter than the scene).
     notes: tuple[str, ...] = ()
     #: Of the block, m; None for a history read from a file that does not say.
     half_width: float | None = None
     half_height: float | None = None
-    #: Of a block that is not homogeneous: place of its mass's centre (m), moment of inertia per
-    #: unit mass (m^2); see `Block`.
+    #: Of a block that is not homogeneous (see `Block`): centre of mass (m), moment of inertia per
+    #: unit mass (m^2).
     centre_of_mass: tuple[float, float] | None = None
     moment_of_inertia: float | None = None
-    #: Half width of the 95 % interval by measure (SI), of figures that are uncertain at their
-    #: source, such as a mean of tests.
+    #: Half width of the 95 % interval by measure (SI), of figures with an uncertain source, such as
+    #: a mean of tests.
     uncertainty: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
@@ -156,8 +151,10 @@ class History(Shown):
 
     @property
     def overturned_at(self) -> float | None:
-        """When the block overturned, s: at |theta| = pi/2, or where a history of an overturned
-        block ends; None for one that stays.
+        """Time of overturning, s; None if the block does not overturn.
+
+        It is the time of the event of overturning (|theta| = pi/2). Without one it is the first
+        time with |theta| >= `LYING`, else the end of the history.
         """
         if not self.outcome.startswith("overturned"):
             return None
@@ -174,10 +171,10 @@ class History(Shown):
         return self.outcome if at is None else f"{self.outcome} at {at:.3g} s"
 
     def expected(self, quantity: str = "peak_rotation") -> Expected:
-        """A figure corrected by what the suites found about this model, with its 95 % interval
-        (rad): `scenes.experience`.
+        """A figure corrected by the model's bias in the suites, with its 95 % interval (rad).
 
-        Raises `InputError` where nothing is known of the model, or of the figure.
+        See `scenes.experience`. Raises `InputError` where nothing is known of the model, or of the
+        figure.
         """
         known_of = known().trust.get(self.model, {})
         if quantity not in known_of:
@@ -189,19 +186,18 @@ class History(Shown):
         return expected(known_of[quantity], float(getattr(self, quantity)))
 
     def save(self, path: str | Path) -> None:
-        """Write a file of the format that its name ends in; CSV where it has no ending, as
-        /dev/stdout.
+        """Write a file in the format of its ending; CSV without an ending, as /dev/stdout.
 
         | ending | what is written |
         |---|---|
-        | .csv | the table, the rest in the first row of its last column; and `<stem>.events.csv` |
+        | .csv | the table, metadata in the first row of its last column; and `<stem>.events.csv` |
         | .csv.gz | the same two files compressed; `pandas.read_csv` opens them as they are |
         | .json | {"outcome", "model", ..., "channels": {name: [...]}, "events": {column: [...]}} |
         | .mat | the same as a MATLAB file: structures `about`, `channels` and `events` |
-        | .parquet | the table, the rest in the frame's `attrs`; `<stem>.events.parquet` beside it |
+        | .parquet | the table, metadata in the frame's `attrs`; and `<stem>.events.parquet` |
 
-        The rest is outcome, model, block and settings. Parquet needs the package pyarrow. All is
-        written whole, or nothing is touched. `load` reads the CSV, compressed or not. Raises
+        The metadata are outcome, model, block and settings. Parquet needs the package pyarrow. All
+        files are written whole, or none is touched. `load` reads the CSV, compressed or not. Raises
         `InputError` for another ending, and `OSError` that names the file which cannot be written.
         """
         path = Path(path)
@@ -220,7 +216,7 @@ class History(Shown):
             return
         table, beside = self._tables(about)
         contents = {path: table}
-        if path.is_file() or not path.exists():  # beside /dev/stdout there is nothing to be written
+        if path.is_file() or not path.exists():  # nothing is written beside /dev/stdout
             contents = {events_path(path): beside, **contents}
         packed = path.suffix.lower() == ".gz"
         write_together(
@@ -228,14 +224,15 @@ class History(Shown):
         )
 
     def packed(self) -> dict[str, bytes]:
-        """The two files that `save` writes for a name ending in ".csv.gz", by their endings:
-        ".csv.gz", ".events.csv.gz".
+        """The two files that `save` writes for ".csv.gz", by their endings.
+
+        The endings are ".csv.gz" and ".events.csv.gz".
         """
         table, events = self._tables(self._about())
         return {".csv.gz": _packed(table), ".events.csv.gz": _packed(events)}
 
     def _about(self) -> dict[str, Any]:
-        """What a file says of a history beside its table."""
+        """Metadata of a history: all that a file holds beside its tables."""
         return {
             "name": self.name,
             "model": self.model,
@@ -264,12 +261,11 @@ class History(Shown):
 
     @classmethod
     def load(cls, path: str | Path, *, columns: Mapping[str, str] | None = None) -> History:
-        """Read what `save` wrote, or any CSV with columns `t` and `theta` (SI units) and perhaps
-        more of `COLUMNS`.
+        """Read a file that `save` wrote, or any CSV with columns `t` and `theta` (SI units).
 
-        `columns` maps the file's names of columns to those of a history, where they differ. Raises
-        `InputError` for a file that is missing, lacks those columns, is not numeric, not finite or
-        not ordered in time.
+        Other columns of `COLUMNS` are optional. `columns` maps the file's names of columns to those
+        of a history, where they differ. Raises `InputError` for a file that is missing, lacks those
+        columns, is not numeric, not finite or not ordered in time.
         """
         import pandas as pd
 
@@ -317,7 +313,7 @@ class History(Shown):
 
 
 def check_format(path: Path) -> None:
-    """Raises `InputError` where no history can be written into a file of that name."""
+    """Raise `InputError` if no history can be written into a file of that name."""
     kind = path.suffix.lower()
     if kind not in FORMATS or (kind == ".gz" and not path.name.lower().endswith(".csv.gz")):
         allowed = ".csv, .csv.gz, .json, .mat or .parquet"
@@ -373,8 +369,9 @@ def _mat(
 
 
 def outcome_of(channels: Mapping[str, NDArray[Any]], *, still: float = 1e-4) -> str:
-    """The outcome that a table of motion shows at its end; at rest is |theta| and |theta_dot| below
-    `still` (rad, rad/s).
+    """The outcome at the end of a table of motion.
+
+    "at rest" means |theta|, |theta_dot| and |x_dot| below `still` (rad, rad/s, m/s).
     """
     theta = channels["theta"]
     if abs(theta[-1]) >= LYING:
@@ -386,8 +383,9 @@ def outcome_of(channels: Mapping[str, NDArray[Any]], *, still: float = 1e-4) -> 
 
 
 def events_path(path: Path) -> Path:
-    """The file of the events beside a history's CSV, compressed where that is, or beside its
-    Parquet.
+    """The file of the events beside a history's CSV or Parquet.
+
+    It is compressed if the CSV is.
     """
     if path.suffix.lower() == ".parquet":
         return path.with_name(f"{path.stem}.events.parquet")
@@ -396,10 +394,10 @@ def events_path(path: Path) -> Path:
 
 
 def _packed(text: str) -> bytes:
-    """Compressed; the same text gives the same bytes.
+    """`text` compressed by gzip; the same text gives the same bytes.
 
     Digits of floats hardly repeat, so short matches cost more than they save: without them
-    (`Z_FILTERED`) it is 7 % smaller. A higher level saves 3 % in twice the time.
+    (`Z_FILTERED`) the result is 7 % smaller. A higher level saves 3 % in twice the time.
     """
     packer = zlib.compressobj(
         4, wbits=zlib.MAX_WBITS | 16, strategy=zlib.Z_FILTERED
@@ -412,8 +410,9 @@ def _text(value: object) -> str:
 
 
 class _About(Frozen):
-    """What `save` says of a history in the table's first row; all of it may be missing in a file of
-    another program.
+    """Metadata that `save` writes into the table's first row.
+
+    All of it may be missing in a file of another program.
     """
 
     model_config = ConfigDict(extra="ignore")
@@ -442,7 +441,7 @@ class _About(Frozen):
             raise InputError(f"{shown}: column {ABOUT!r}: not written by rockcheck") from None
 
     def block(self, shown: str) -> dict[str, Any]:
-        """What a history keeps of its block; a mass that is given is checked against the sizes."""
+        """The block's fields of a history; mass properties are checked against the sizes."""
         given = {name: getattr(self, name) for name in (*_SIZES, *_MASS)}
         if all(given[name] is None for name in _MASS):
             return given
@@ -453,7 +452,7 @@ class _About(Frozen):
 
 
 def block_fields(block: Block) -> dict[str, Any]:
-    """What a history keeps of its block, as keywords of `History`."""
+    """A block's fields as keywords of `History`."""
     return {
         "half_width": block.half_width,
         "half_height": block.half_height,

@@ -2,9 +2,9 @@
 
 Arrays or scalars, SI units, per unit mass.
 
-x and y are those of the *box's* centre: where the corners are does not depend on where the mass is.
-Models that need the mass's centre change over with `of_mass` and `of_box`; of a homogeneous block
-both are one.
+x and y locate the centre of the *box*: the corners do not depend on the centre of mass. Models that
+need the centre of mass convert by `of_mass` and `of_box`; the two centres of a homogeneous block
+are one.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ import numpy as np
 from rockcheck.scenes.block import Block
 from rockcheck.scenes.scene import Scene
 
-#: The sign of a side: x of the box's centre grows to the right.
+#: Sign of each side in `clearance`: x is positive to the right.
 OUTWARD = {"left": 1.0, "right": -1.0}
 
 
 def slip(block: Block, x: Any, theta: Any) -> Any:
-    """How far the pivot corner (the lower one) stands from its first place along the floor, m.
+    """Distance of the pivot corner (the lower one) along the floor from its first place, m.
 
     A function of the state: x - S (R sin(alpha - |theta|) - B), continuous through theta = 0.
     """
@@ -41,8 +41,9 @@ def pivot_height(block: Block, y: Any, theta: Any) -> Any:
 
 
 def clearance(block: Block, side: str, gap: float, x: Any, theta: Any) -> Any:
-    """Distance of the block from a place on `side`, `gap` (m) from it as it stands, m: negative is
-    beyond.
+    """Distance of the block from a vertical plane on `side`, m: negative is beyond.
+
+    `gap` (m) is the distance of the plane from the upright block at x = 0.
     """
     reach = block.half_diagonal * np.sin(block.box_angle + np.abs(theta))
     return OUTWARD[side] * x + block.half_width + gap - reach
@@ -69,18 +70,19 @@ def top_corners(block: Block, x: Any, theta: Any) -> Any:
 
 
 def of_mass(block: Block, states: Any) -> Any:
-    """States of the mass's centre, from the box's centre; (..., 6: x, y, theta and rates)."""
+    """States of the centre of mass, from the box's centre; (..., 6: x, y, theta and rates)."""
     return states if block.centre_of_mass is None else _moved(block, states, 1.0)
 
 
 def of_box(block: Block, states: Any) -> Any:
-    """States of the box's centre, from the mass's centre; (..., 6: x, y, theta and rates)."""
+    """States of the box's centre, from the centre of mass; (..., 6: x, y, theta and rates)."""
     return states if block.centre_of_mass is None else _moved(block, states, -1.0)
 
 
 def _moved(block: Block, states: Any, sense: float) -> Any:
-    """The states of a point that the block carries: by `sense` times the offset of the mass's
-    centre further.
+    """States of a point fixed to the block, at an offset from the given one.
+
+    The offset is `sense` times that from the box's centre to the centre of mass.
     """
     x, y, theta, x_dot, y_dot, w = np.moveaxis(np.asarray(states, dtype=float), -1, 0)
     (dx, dz), s, c = block.offset, np.sin(theta), np.cos(theta)
@@ -91,7 +93,7 @@ def _moved(block: Block, states: Any, sense: float) -> Any:
 def mass_motion(
     block: Block, y: Any, theta: Any, x_dot: Any, y_dot: Any, theta_dot: Any
 ) -> tuple[Any, Any, Any]:
-    """Height and velocity (up; right, up) of the mass's centre, from those of the box's centre."""
+    """Height and velocity (up; right, up) of the centre of mass, from the box's centre."""
     if block.centre_of_mass is None:
         return y, x_dot, y_dot
     state = np.stack(np.broadcast_arrays(0.0, y, theta, x_dot, y_dot, theta_dot), axis=-1)
@@ -102,8 +104,9 @@ def mass_motion(
 def energy(
     block: Block, gravity: float, y: Any, theta: Any, x_dot: Any, y_dot: Any, theta_dot: Any
 ) -> Any:
-    """Kinetic plus potential energy per unit mass in the base's frame, zero for the block standing
-    still, J/kg.
+    """Kinetic plus potential energy per unit mass in the base's frame, J/kg.
+
+    Zero for the block standing still.
     """
     y, x_dot, y_dot = mass_motion(block, y, theta, x_dot, y_dot, theta_dot)
     height = block.weaker_pivot.height

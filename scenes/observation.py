@@ -1,4 +1,4 @@
-"""Turns a model's states on the output grid into a History, the same way for every model."""
+"""Builds a History from any model's states on the output grid."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from rockcheck.scenes import kinematics
 from rockcheck.scenes.history import Cost, Event, History, block_fields, outcome_of
 from rockcheck.scenes.scene import Scene
 
-#: A block that is larger is told, m: as a rule a file gives mm.
+#: Size from which a note warns of lengths in mm, m.
 LARGE = 100.0
 STATE = ("x", "y", "theta", "x_dot", "y_dot", "theta_dot")
 
 
 class About(TypedDict, total=False):
-    """What a model says of a run beside the motion; see `History`."""
+    """Fields of `History` that a model reports beside the motion."""
 
     cost: Cost
     settings: Mapping[str, Any]
@@ -36,13 +36,12 @@ def observe(
     outcome: str | None = None,
     **about: Unpack[About],
 ) -> History:
-    """The History of a run whose `state` has one row per output time: x, y, theta, x_dot, y_dot,
-    theta_dot (SI).
+    """The History of a run, from its `state` at the output times.
 
-    Fewer rows than `scene.output_times` mean that the run ended early; rows from the first |theta|
-    >= pi/2 on are left out. `mode` and `outcome` are derived from the motion where the model does
-    not know them; `about` is what it says beside. Adds a note where the record is shorter than
-    the scene.
+    `state` has one row per output time: x, y, theta, x_dot, y_dot, theta_dot (SI). Fewer rows than
+    `scene.output_times` mean that the run ended early; rows from the first |theta| >= pi/2 on are
+    left out. `mode` and `outcome` are derived from the motion where the model does not know them;
+    `about` holds the fields of `About`. Adds a note where the record is shorter than the scene.
     """
     tipped = np.flatnonzero(np.abs(state[:, 2]) >= math.pi / 2)
     rows = max(int(tipped[0]) if tipped.size else len(state), 1)
@@ -70,7 +69,7 @@ def observe(
 
 
 def scene_notes(scene: Scene) -> tuple[str, ...]:
-    """What a reader of any history of this scene should know."""
+    """Notes for a reader of any history of this scene."""
     said: list[str] = []
     size = 2.0 * max(scene.block.half_width, scene.block.half_height)
     if size > LARGE:
@@ -86,8 +85,9 @@ def scene_notes(scene: Scene) -> tuple[str, ...]:
 
 
 def modes_of(scene: Scene, channels: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
-    """Modes of motion read off the kinematics, for models that have contacts instead of modes
-    (tolerances in SI units).
+    """Modes of motion from the kinematics, for models with contacts instead of modes.
+
+    Tolerances are in SI units.
     """
     block = scene.block
     theta, sliding = channels["theta"], np.abs(channels["slip_rate"]) > 1e-3
@@ -104,8 +104,9 @@ def modes_of(scene: Scene, channels: Mapping[str, NDArray[Any]]) -> NDArray[Any]
 
 
 def _overturned(tipped: NDArray[np.intp], events: Sequence[Event]) -> str | None:
-    """The side on which the block fell, from an `overturned left|right` event that the model
-    reported.
+    """The kind of the model's event `overturned left|right`, or None without one.
+
+    Raises `ValueError` where the block overturned and the model reported no event.
     """
     told = next((event.kind for event in events if event.kind.startswith("overturned")), None)
     if tipped.size and told is None:

@@ -1,9 +1,9 @@
-"""Long work: how far it has come, and the threads that it runs in.
+"""Progress of long work, and the threads that it runs in.
 
 One protocol of progress serves models, spectra, studies, suites and pages.
 
-Long work calls `on_progress(done, total, what)`. A model has no argument for it. It calls `tell`,
-which reaches the block that is `listening` in the same thread; without one the call costs nothing.
+Long work calls `on_progress(done, total, what)`. A model has no argument for it: it calls `tell`,
+which reaches the block that is `listening` in the same thread. Without one the call costs nothing.
 
 Threads run kernels (`scenes.compiled`); Ctrl-C ends the wait for them at once. Needs no compiler.
 """
@@ -25,8 +25,9 @@ Result = TypeVar("Result")
 
 
 class OnProgress(Protocol):
-    """Called now and then with the parts done, the parts in all (of any unit), and a few words on
-    what was last.
+    """Callback of long work, called now and then.
+
+    It takes the parts done, the parts in all (of any unit), and a few words on the latest part.
     """
 
     def __call__(self, done: float, total: float, what: str = "") -> None:
@@ -41,13 +42,13 @@ _listener: ContextVar[OnProgress] = ContextVar("listener", default=unheard)
 
 
 def tell(done: float, total: float, what: str = "") -> None:
-    """Passes the progress on to the listener of this thread, if there is one."""
+    """Pass the progress on to the listener of this thread, if there is one."""
     _listener.get()(done, total, what)
 
 
 @contextmanager
 def listening(on_progress: OnProgress) -> Iterator[None]:
-    """Within this block `on_progress` is called with what models `tell`, in this thread."""
+    """Within this block `on_progress` receives what models `tell` in this thread."""
     token = _listener.set(on_progress)
     try:
         yield
@@ -59,9 +60,9 @@ _announcer: Callable[[str], None] | None = None
 
 
 def announce(words: str) -> None:
-    """Says in one line what a user waits for, from any thread.
+    """Print in one line what a user waits for, from any thread.
 
-    It is silent where no block is `announcing`.
+    Silent where no block is `announcing`.
     """
     if _announcer is not None:
         _announcer(words)
@@ -73,14 +74,14 @@ def announced() -> bool:
 
 
 def announce_by(say: Callable[[str], None] | None) -> None:
-    """From now on `say` gets what is to be announced in this process; None: nobody."""
+    """From now on `say` receives this process's announcements; None: nobody does."""
     global _announcer
     _announcer = say
 
 
 @contextmanager
 def announcing(say: Callable[[str], None] | None) -> Iterator[None]:
-    """Within this block `say` gets what is to be announced in this process; None: nobody."""
+    """Within this block `say` receives this process's announcements; None: nobody does."""
     before = _announcer
     announce_by(say)
     try:
@@ -91,7 +92,7 @@ def announcing(say: Callable[[str], None] | None) -> Iterator[None]:
 
 @dataclass
 class Count:
-    """Adds up the parts that several threads finish, and tells `on_progress` the sum."""
+    """Adds up the parts that several threads finish, and reports the sum to `on_progress`."""
 
     on_progress: OnProgress = unheard
     total: float = 0.0
@@ -99,7 +100,7 @@ class Count:
     _lock: Lock = field(default_factory=Lock, init=False, repr=False)
 
     def add(self, parts: float) -> None:
-        """So many more parts are done."""
+        """Add finished parts, and report the sum."""
         with self._lock:
             self.done += parts
             self.on_progress(self.done, self.total)
@@ -121,7 +122,7 @@ class _Runner:
 
     def __init__(self) -> None:
         self.process = os.getpid()
-        #: What to call, and what awaits the result; None ends the thread.
+        #: The function to call and the future of its result; None ends the thread.
         self.calls: SimpleQueue[tuple[Callable[[], Any], Future[Any]] | None] = SimpleQueue()
         threading.Thread(target=self._serve, daemon=True).start()
 
@@ -132,7 +133,7 @@ class _Runner:
                 ended.set_result(call())
             except BaseException as error:
                 ended.set_exception(error)
-            del work, call, ended  # with the arrays that it was given
+            del work, call, ended  # and the arrays that the call holds
 
 
 #: The thread that waits for calls, if there is one.
@@ -142,10 +143,10 @@ _RUNNERS: list[_Runner] = []
 def interruptible(call: Callable[[], Result]) -> Result:
     """The result of `call`, which runs a kernel. Ctrl-C ends the wait at once.
 
-    Python handles a signal only between two of its own steps, and a kernel may run for minutes. The
-    main thread is the one that is interrupted; it has the kernel run in a second thread, which is
-    kept: to start one takes longer than a short run. After Ctrl-C that thread goes on unobserved,
-    and the next call has a new one. So has a forked process.
+    Python handles a signal only between two of its own steps, and a kernel may run for minutes. So
+    the main thread, which receives the signal, runs the kernel in a second thread. That thread is
+    kept: to start one takes longer than a short run. After Ctrl-C it runs on unobserved, and the
+    next call starts a new one; so does a forked process.
     """
     if threading.current_thread() is not threading.main_thread():
         return call()
@@ -156,7 +157,7 @@ def interruptible(call: Callable[[], Result]) -> Result:
     try:
         runner.calls.put((call, ended))
         while not ended.done():
-            wait((ended,), timeout=1.0)  # Windows wakes no wait without end
+            wait((ended,), timeout=1.0)  # Windows interrupts no wait without a timeout
     except BaseException:
         runner.calls.put(None)
         raise

@@ -1,6 +1,4 @@
-"""Reading files that somebody else may have written: only regular files, of bounded size, as UTF-8
-text.
-"""
+"""Reading foreign files safely: only regular files, of bounded size, as UTF-8 text."""
 
 from __future__ import annotations
 
@@ -32,7 +30,7 @@ MOST_COLUMNS, MOST_LINE = 1000, 1_000_000
 
 
 def within(folder: Path, *parts: str) -> Path:
-    """The path of what a folder holds that somebody may have sent.
+    """Path of a part of a folder that somebody may have sent.
 
     Raises `InputError` where it leads out of the folder, as by a link.
     """
@@ -147,7 +145,7 @@ def read_arrays(path: Path, most: int = MOST_BYTES) -> dict[str, np.ndarray]:
                 if sum(entry.file_size for entry in content.infolist()) > most:
                     raise InputError(f"{shown}: its arrays are larger than {most} bytes")
             stream.seek(0)
-            with np.load(stream) as data:  # numpy unpickles nothing unless it is told to
+            with np.load(stream) as data:  # numpy unpickles nothing by default
                 return {name: data[name] for name in data.files}
         except InputError:
             raise
@@ -155,7 +153,7 @@ def read_arrays(path: Path, most: int = MOST_BYTES) -> dict[str, np.ndarray]:
             raise InputError(f"{shown}: not a whole file of arrays: {printable(error)}") from None
 
 
-#: How a file begins that gzip has compressed.
+#: First bytes of a file that gzip has compressed.
 _GZIP = b"\x1f\x8b"
 #: The marks of UTF-16, and bytes that no text holds.
 _NOT_UTF8 = re.compile(rb"\xff\xfe|\xfe\xff")
@@ -164,8 +162,9 @@ _CONTROLS = re.compile(rb"[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")
 
 @contextmanager
 def open_table(path: Path) -> Iterator[IO[bytes]]:
-    """A table's content, open for reading; one that gzip has compressed is decompressed as it is
-    read. Raises `InputError`.
+    """A table's content, open for reading; gzip is decompressed as it is read.
+
+    Raises `InputError`.
     """
     with open_regular(path, MOST_TABLE_BYTES) as stream:
         packed = stream.read(len(_GZIP)) == _GZIP
@@ -188,7 +187,7 @@ def read_table(path: Path, **options: Any) -> pd.DataFrame:
     import pandas as pd
 
     shown = printable(path)
-    if pd.__version__ < "3":  # whose reader loses the last bit of a number unless it is told
+    if pd.__version__ < "3":  # its reader loses the last bit of a number by default
         options = {"float_precision": "round_trip", **options}
     try:
         with open_table(path) as stream:
@@ -210,8 +209,9 @@ def read_table(path: Path, **options: Any) -> pd.DataFrame:
 
 
 def _check_lines(stream: IO[bytes], shown: str) -> None:
-    """Every row stands on one line, of a bounded number of columns; all of them are no more than a
-    table may hold.
+    """Check that each row stands on one line, and that lines, columns and size are bounded.
+
+    Raises `InputError`.
     """
     number = size = 0
     while line := stream.readline(MOST_LINE + 1):

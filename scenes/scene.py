@@ -61,8 +61,9 @@ class Floor(Frozen):
 
 
 class Wall(Frozen):
-    """A rigid frictionless wall; `gap` is the clear distance in m to the block's side as it stands,
-    `restitution` is e.
+    """A rigid frictionless wall.
+
+    `gap` is the clear distance in m to the side of the upright block, `restitution` is e.
     """
 
     side: Literal["left", "right"]
@@ -75,7 +76,7 @@ class Scene(Shown, Frozen):
 
     The box stands with its centre above x = 0 unless it starts tilted: `initial_rotation` tilts it
     about the corner it would rock on, which keeps its place. `initial_angular_velocity` (rad/s) and
-    `initial_velocity` (m/s, the slip rate of that corner) complete its state, see `initial_state`;
+    `initial_velocity` (m/s, the slip rate of that corner) complete its state (see `initial_state`);
     `initial_height` (m) lifts it off the floor. `duration` counts from the excitation's start.
     `gravity` in m/s^2.
     """
@@ -132,7 +133,7 @@ class Scene(Shown, Frozen):
         return self
 
     def _reach(self, side: str) -> float:
-        """How far the initial block reaches to one side, m from the place of its upright centre."""
+        """Reach of the initial block to one side, m from the place of its upright centre."""
         tilt, radius, alpha = self.initial_rotation, self.block.half_diagonal, self.block.box_angle
         outward = 1.0 if side == "left" else -1.0
         centroid = math.copysign(1.0, tilt) * (
@@ -146,7 +147,10 @@ class Scene(Shown, Frozen):
 
     @property
     def frequency_parameter(self) -> float:
-        """P = sqrt(3 g / (4 R)) in rad/s with this scene's gravity; of the weaker pivot."""
+        """Frequency parameter p of the weaker pivot with this scene's gravity, rad/s.
+
+        p = sqrt(3 g/(4 R)) of a homogeneous block.
+        """
         return self.block.weaker_pivot.frequency_parameter(self.gravity)
 
     @property
@@ -157,8 +161,9 @@ class Scene(Shown, Frozen):
 
     @property
     def initial_state(self) -> tuple[float, float, float, float, float, float]:
-        """x, y, theta of the box's centre and their rates at t = 0 (SI, relative to the base),
-        turning about the lower corner.
+        """x, y, theta of the box's centre and their rates at t = 0 (SI, relative to the base).
+
+        The block turns about the lower corner.
         """
         tilt, spin, block = self.initial_rotation, self.initial_angular_velocity, self.block
         radius, alpha = block.half_diagonal, block.box_angle

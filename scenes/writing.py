@@ -31,8 +31,9 @@ def made(folder: Path, *parts: str) -> Path:
 
 
 def no_link(path: Path) -> Path:
-    """`path`; raises `InputError` where it is a link, through which something outside of a folder
-    of results would be written.
+    """`path`; raises `InputError` if it is a link.
+
+    Writing through a link would change a file outside the folder of results.
     """
     if path.is_symlink():
         raise InputError(
@@ -53,9 +54,9 @@ def write_whole(path: Path, content: str | bytes, *, named: bool = False) -> Pat
 def write_together(contents: Mapping[Path, str | bytes], *, named: bool = False) -> None:
     """Write files, text as UTF-8, so that all of them are new or all of them are as they were.
 
-    A link, a pipe or a device that stands in the way is replaced: whoever sent a folder may have
-    put it there. Only where the user `named` this very file is it written as it is, such as
-    /dev/stdout, and a link stays one. Raises `OSError` that names the file.
+    A link, a pipe or a device in the way is replaced: whoever sent a folder may have put it there.
+    If the user `named` this very file, a pipe or a device such as /dev/stdout is written into, and
+    a link stays one. Raises `OSError` that names the file.
     """
     finished: list[tuple[str, Path]] = []
     with ExitStack() as leavings:
@@ -108,15 +109,14 @@ def _named(error: OSError, path: Path) -> OSError:
     return OSError(error.errno, error.strerror or str(error), str(path))
 
 
-#: How a cell begins that a spreadsheet would take for a formula; a number, or a sign alone, is
-#: none.
+#: Start of a cell that a spreadsheet takes for a formula; a number or a lone sign is none.
 _FORMULA = re.compile(r"[=@＝＠](?!\Z)|[-+－＋](?!(?:inf|nan|\d*+\.?+\d*+(?:[eE][-+]?\d++)?)\Z)")
 
 
 def table_text(
     columns: Sequence[str], rows: Iterable[Sequence[object]], *, digits: int | None = None
 ) -> str:
-    """A table as CSV; floats with all their digits, or with so many significant ones.
+    """A table as CSV; floats with all digits, or with `digits` significant ones.
 
     None and NaN are empty cells.
     """
@@ -131,8 +131,7 @@ def columns_text(columns: Mapping[str, Sequence[object]]) -> str:
 def _cells(values: Sequence[object]) -> Sequence[object]:
     """A column's cells.
 
-    Numbers are looked at one by one only where there is a NaN, the one value that does not equal
-    itself.
+    Numbers are checked one by one only if there is a NaN, the one value that does not equal itself.
     """
     if len(values) and isinstance(values[0], str):
         shown = {value: _cell(value, None) for value in set(values)}
@@ -184,7 +183,8 @@ def finite(value: Any) -> Any:
 
 
 def json_text(value: Any) -> str:
-    """A value as indented JSON (see `finite`); what JSON does not know, such as a path, is written
-    as text.
+    """A value as indented JSON (see `finite`).
+
+    Other types, such as a path, are written as text.
     """
     return json.dumps(finite(value), indent=1, allow_nan=False, default=str)

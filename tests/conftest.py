@@ -38,7 +38,7 @@ MAY_BE_SKIPPED: dict[str, bool] = {
     "needs POSIX": sys.platform == "win32",
 }
 #: What a line of progress holds.
-HOW_FAR = re.compile(r"\d:\d\d (so far|left)")
+HOW_FAR = re.compile(r"\d:\d\d (so far|left)|^rockcheck: compiling ")
 CHROMIUM = Path("/usr/bin/chromium")
 #: How a request ends that was under way as its page was left.
 ABORTED = "net::ERR_ABORTED"

@@ -1,5 +1,6 @@
-"""The commands of `rockcheck`, a module each, and what they share: options, tables on stdout,
-progress on stderr, JSON.
+"""The commands of `rockcheck`, a module each, and their common options and output.
+
+Tables or JSON go to stdout, progress to stderr.
 """
 
 from __future__ import annotations
@@ -82,14 +83,17 @@ class Played:
 
 PlotOption = Annotated[Path | None, typer.Option("--plot", metavar="FILE.png", help="PNG to draw.")]
 
-#: What a command says: tables and progress, one JSON value instead, or nothing but errors.
+#: All models that are installed.
+ALL = "all"
+
+#: Output of a command: tables and progress, one JSON value instead, or errors only.
 Voice = Literal["tables", "json", "quiet"]
 _voice: ContextVar[Voice] = ContextVar("voice", default="tables")
 
 
 @contextmanager
 def speaking(voice: Voice) -> Iterator[None]:
-    """Within this block commands speak like that."""
+    """Within this block commands print in this voice."""
     token = _voice.set(voice)
     say = (
         (lambda words: print(f"rockcheck: {words}", file=sys.stderr)) if voice == "tables" else None
@@ -102,8 +106,9 @@ def speaking(voice: Voice) -> Iterator[None]:
 
 
 class _Screen(Console):
-    """A console whose text steers no terminal: paths, and names in files that somebody sent, may
-    hold any characters.
+    """A console that prints text without control characters (`inert`).
+
+    Paths, and names in files that somebody sent, may hold any characters.
     """
 
     def print(self, *objects: Any, **options: Any) -> None:
@@ -111,14 +116,15 @@ class _Screen(Console):
 
 
 def console() -> Console:
-    """Where tables go: stdout, at most as wide as the terminal, 80 columns where there is none;
-    coloured on a terminal only.
+    """The console for tables, on stdout; silent with --json and --quiet.
+
+    At most as wide as the terminal, 80 columns where there is none; coloured on a terminal only.
     """
     return _Screen(markup=False, highlight=False, quiet=_voice.get() != "tables")
 
 
 def tell_missing() -> None:
-    """Names the models that are left out of a study of all models, since they are not installed."""
+    """Print the models that a study of all models leaves out: those that are not installed."""
     from rockcheck.validation.execute.models import FAMILIES, not_installed
 
     for name in FAMILIES:
@@ -127,14 +133,15 @@ def tell_missing() -> None:
 
 
 def tell_notes(history: History, of: str = "") -> None:
-    """What a reader of a history should know, a line each; `of` says whose."""
+    """Print the notes of a history, a line each; `of` names the history."""
     for note in history.notes:
         console().print(f"note{f' on {of}' if of else ''}: {note}", style="yellow", soft_wrap=True)
 
 
 def tell_left_out(names: Sequence[str], hint: str = "") -> None:
-    """Names what of a set of records is not played: vertical components (`hint`: what plays them),
-    and files that are no records.
+    """Print the names in a set of records that are not played.
+
+    These are vertical components, with a `hint` how to play them, and files that are no records.
     """
     vertical = [name for name in names if not isinstance(name, Odd)]
     said = f"vertical; {hint}" if hint else "vertical"
@@ -144,22 +151,24 @@ def tell_left_out(names: Sequence[str], hint: str = "") -> None:
 
 
 def answer(value: Any) -> None:
-    """The command's result as JSON on stdout, where `--json` asks for it; numbers that are not
-    finite become null.
+    """Print the command's result as JSON on stdout, if `--json` asks for it.
+
+    Numbers that are not finite become null.
     """
     if _voice.get() == "json":
         print(json_text(value))
 
 
-#: Between two lines on a long work, s; and when the first one comes, if the work will then last
-#: longer than that.
+#: Time between two lines of progress, s; and before the first one, which is printed only if more
+#: than `EVERY` is left.
 EVERY, EARLY = 10.0, 2.0
 
 
 @contextmanager
 def progress(title: str) -> Iterator[OnProgress]:
-    """How far the work is and the time left, on stderr: a bar on a terminal, elsewhere lines;
-    nothing where a command is quiet.
+    """Show progress and the time left on stderr: a bar on a terminal, elsewhere lines.
+
+    Nothing is shown where a command is quiet.
     """
     screen = Console(stderr=True)
     bar = Progress(
@@ -193,8 +202,9 @@ def progress(title: str) -> Iterator[OnProgress]:
 
 
 def _tell_lines(title: str, task: ProgressTask, over: threading.Event) -> None:
-    """Lines for a log or whoever reads no terminal, until it is `over`; none on a work of a few
-    seconds.
+    """Print lines of progress for a log until the work is `over`.
+
+    None for a work of a few seconds.
     """
     wait = EARLY
     while not over.wait(wait):
@@ -211,8 +221,9 @@ def _tell_lines(title: str, task: ProgressTask, over: threading.Event) -> None:
 def studied(
     study: Study, options: Played, formats: Sequence[str] = FORMATS, **how: Any
 ) -> NoReturn:
-    """Run a study with progress, write its page with figures in these formats, say what it found;
-    ends with its exit code.
+    """Run a study with progress, write its page, print its finding; ends with its exit code.
+
+    `formats` are those of the page's figures.
     """
     from rockcheck.validation.study import run
 
@@ -230,7 +241,7 @@ def studied(
 
 
 def told(found: Finding, folder: Path | None = None, formats: Sequence[str] = FORMATS) -> NoReturn:
-    """Write a finding's page if it has a folder, say what it is, and end with its exit code."""
+    """Write a finding's page if it has a folder, print the finding, and end with its exit code."""
     from rockcheck.reports.document import publish, show
 
     page = folder and publish(found, folder, formats=formats)
@@ -244,8 +255,9 @@ def told(found: Finding, folder: Path | None = None, formats: Sequence[str] = FO
 
 
 def one_of(kind: str, given: str, choices: Iterable[Choice]) -> Choice:
-    """The choice that was `given`; raises `InputError` naming its `kind` and suggesting the
-    nearest.
+    """The choice that was `given`.
+
+    Raises `InputError` that names the `kind` and suggests the nearest choice.
     """
     known = tuple(choices)
     for choice in known:
@@ -254,8 +266,41 @@ def one_of(kind: str, given: str, choices: Iterable[Choice]) -> Choice:
     raise unknown_name(kind, given, known)
 
 
+def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
+    """The models by name, each with its settings; of all, those that are installed.
+
+    Raises `InputError` for an unknown one.
+    """
+    from rockcheck.validation.execute.models import FAMILIES, family, not_installed
+
+    if names == ALL:
+        found: dict[str, dict[str, Any]] = {
+            name: {} for name in FAMILIES if name != "measured" and not not_installed(name)
+        }
+    else:
+        found = {name.strip(): {} for name in names.split(",") if name.strip()}
+        for name in found:
+            family(name)
+        if not found or "measured" in found:
+            raise InputError(
+                f"{printable(names)!r} is not allowed: models that play, with commas between, or"
+                " all",
+                "--models",
+            )
+    for text in settings:
+        model, dot, rest = text.partition(".")
+        if not dot or model not in found:
+            raise InputError(
+                f"{printable(text)!r}: write MODEL.key=value, with MODEL one of {', '.join(found)}",
+                "--set",
+            )
+        key, value = setting_of(rest)
+        found[model][key] = value
+    return found
+
+
 def setting_of(text: str, option: str = "--set") -> tuple[str, Any]:
-    """key=value, the value as in TOML; a bare word is a string."""
+    """Key and value of `key=value`, the value as in TOML; a bare word is a string."""
     key, equals, value = text.partition("=")
     if not equals or not key.isidentifier():
         raise InputError(f"{printable(text)!r}: write key=value", option)
@@ -266,7 +311,7 @@ def setting_of(text: str, option: str = "--set") -> tuple[str, Any]:
 
 
 def check_picture(path: Path | None) -> None:
-    """Raises `InputError` where no picture can be written into a file of that name."""
+    """Raise `InputError` if no picture can be written into a file of that name."""
     if path is None:
         return
     if path.suffix.lower() != ".png":
@@ -284,8 +329,9 @@ def save_picture(figure: Figure, path: Path) -> None:
 
 
 def report_file(text: str) -> str:
-    """Write a traceback into a file that only the user can read; returns its path, "" where that
-    cannot be done.
+    """Write a traceback into a file that only the user can read.
+
+    Returns its path, "" where it cannot be written.
     """
     try:
         handle, path = tempfile.mkstemp(prefix="rockcheck-fault-", suffix=".txt")
@@ -297,8 +343,9 @@ def report_file(text: str) -> str:
 
 
 def usable_folder(folder: Path, *parts: str) -> Path:
-    """A folder, or one within it, made if need be; raises `InputError` where it cannot be written,
-    or lies behind a link in `folder`.
+    """A folder, or one within it, made if need be.
+
+    Raises `InputError` where it cannot be written, or lies behind a link in `folder`.
     """
     path = folder.joinpath(*parts)
     try:
@@ -325,7 +372,7 @@ def suite_names(incomplete: str) -> list[str]:
 
 
 def model_names(incomplete: str) -> list[str]:
-    """For the shell's completion."""
+    """For the shell's completion: families of models."""
     from rockcheck.validation.execute.models import FAMILIES
 
     return [name for name in FAMILIES if name.startswith(incomplete)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -12,13 +13,13 @@ import typer
 from rockcheck.commands import (
     OUT,
     Played,
+    chosen_models,
     model_names,
     scene_names,
     studied,
     tell_left_out,
 )
-from rockcheck.commands.record import ReadOption, RecordsArgument
-from rockcheck.commands.validate import chosen_models, record_sets
+from rockcheck.commands.record import ReadOption, RecordsArgument, record_sets
 from rockcheck.ebm.spectrum import Floats
 from rockcheck.reports.style import FORMATS
 from rockcheck.scenes import InputError, Scene
@@ -35,6 +36,48 @@ FREQUENCIES = (0.5, 8.0)
 #: Draws of the numbers of a single run.
 SAMPLES = 1024
 REFERENCE = "ebm-unilateral"
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What is varied about the scene, beside its records."""
+
+    samples: Annotated[
+        int | None,
+        typer.Option(
+            "--samples",
+            min=2,
+            max=MOST_SAMPLES,
+            help="Draws of the scene's uncertain numbers for each record (a power of two is taken;"
+            f" default without records: {SAMPLES}).",
+        ),
+    ] = None
+    gaps: Annotated[
+        str | None,
+        typer.Option(
+            "--gaps",
+            metavar="[SIDE:]GAP,GAP...",
+            help="Clear gaps (m) to try, such as 0,0.05,0.1 or left:0.05,0.1.",
+        ),
+    ] = None
+    levels: Annotated[
+        str | None,
+        typer.Option(
+            "--levels",
+            metavar="MEASURE:LOW:HIGH:COUNT",
+            help="Intensities to scale the records to: pga (g), pgv (m/s), pga-ratio, pgv-ratio or"
+            " sa:PERIOD (g), such as pga:0.05:2:40. Without records: pulses, over g tan(alpha).",
+        ),
+    ] = None
+    capacity: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--capacity",
+            help="Peak rotation (alpha) of a fragility curve; repeatable.",
+            min=1e-6,
+            max=1.0,
+        ),
+    ] = None
 
 
 def run(
@@ -58,42 +101,7 @@ def run(
             " repeatable.",
         ),
     ] = None,
-    samples: Annotated[
-        int | None,
-        typer.Option(
-            "--samples",
-            min=2,
-            max=MOST_SAMPLES,
-            help="Draws of the scene's uncertain numbers for each record (a power of two is taken;"
-            f" default without records: {SAMPLES}).",
-        ),
-    ] = None,
-    gaps: Annotated[
-        str | None,
-        typer.Option(
-            "--gaps",
-            metavar="[SIDE:]GAP,GAP...",
-            help="Clear gaps (m) to try, such as 0,0.05,0.1 or left:0.05,0.1.",
-        ),
-    ] = None,
-    levels: Annotated[
-        str | None,
-        typer.Option(
-            "--levels",
-            metavar="MEASURE:LOW:HIGH:COUNT",
-            help="Intensities to scale the records to: pga (g), pgv (m/s), pga-ratio, pgv-ratio or"
-            " sa:PERIOD (g), such as pga:0.05:2:40. Without records: pulses, over g tan(alpha).",
-        ),
-    ] = None,
-    capacity: Annotated[
-        list[float] | None,
-        typer.Option(
-            "--capacity",
-            help="Peak rotation (alpha) of a fragility curve; repeatable.",
-            min=1e-6,
-            max=1.0,
-        ),
-    ] = None,
+    tried: Tried = Tried(),
     read: ReadOption = None,
     paper: Annotated[
         bool, typer.Option("--paper", help="Write the figures as PNG and PDF, too.")
@@ -116,36 +124,36 @@ def run(
         for word in settings or ()
     ]
     chosen = chosen_models(models, words)
-    tried: tuple[float, ...] = ()
+    clear: tuple[float, ...] = ()
     sides = tuple(wall.side for wall in given.scene.walls)
-    if gaps is not None:
-        tried, sides, changed = gaps_of(gaps, given.scene)
+    if tried.gaps is not None:
+        clear, sides, changed = gaps_of(tried.gaps, given.scene)
         given = UncertainScene(changed, given.spreads, given.correlation)
     sets = record_sets(records or (), read or ())
     cases, left_out = under_records({given.scene.name: given}, sets, Path())
     if not records:
         check_moves(given.scene)
-    if samples is not None and not given.spreads:
+    if tried.samples is not None and not given.spreads:
         raise InputError(
             "no number of the scene is uncertain: write one as { value = 0.3, sd = 0.03 }",
             "--samples",
         )
-    draws = samples or (0 if records or not given.spreads else SAMPLES)
+    draws = tried.samples or (0 if records or not given.spreads else SAMPLES)
     named = {str(getattr(one.scene.excitation, "source", name)): one for name, one in cases.items()}
     study = Assessment(
         own=given,
         cases=named if records else cases,
         models=tuple(chosen),
         settings=chosen,
-        gaps=tried,
+        gaps=clear,
         sides=sides,
         samples=1 << max(1, (draws - 1).bit_length()) if draws else 0,
         recorded=bool(records),
         levels=None
-        if levels is None
-        else population_of(levels, given.scene, named, capacity)
+        if tried.levels is None
+        else population_of(tried.levels, given.scene, named, tried.capacity)
         if records
-        else pulses_of(levels, given.scene),
+        else pulses_of(tried.levels, given.scene),
         left_out=left_out,
     )
     tell_left_out(left_out, "--read vertical=true plays such a component with the horizontal ones")

@@ -1,5 +1,6 @@
-"""The command `rockcheck`: one module a command under rockcheck.commands; here they meet, and
-errors become one line.
+"""The command `rockcheck`: finds and runs the commands, and prints errors in one line.
+
+Each command is a module of rockcheck.commands.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ COMMANDS = {
     "warm": ("warm", "rockcheck warm"),
 }
 
-#: What to call in place of a command or an option that is gone.
+#: Replacements of removed commands and options.
 GONE = {
     "run": "rockcheck validate SCENE",
     "diff": "rockcheck compare RUN_A RUN_B",
@@ -65,10 +66,10 @@ GONE = {
 #: Commands that are not listed.
 HIDDEN = ("warm",)
 
-#: Commands that answer at once: nobody asks how long they took.
+#: Commands that take no time worth printing.
 AT_ONCE = ("scenes", "new", "record", "compare")
 
-#: Options whose value may be left out: it is then the first; and what is a value (a pattern).
+#: Options whose value may be left out: the default, and the pattern of a value.
 BARE = {"--strict": ("worse", "worse|both"), "--align": ("best", r"best|[-+.0-9]+(e[-+]?\d+)?")}
 
 #: Exit code of a run that Ctrl-C ended.
@@ -94,8 +95,8 @@ JsonOption = Annotated[
 def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
     """A command with the options that all of them have, --quiet and --json.
 
-    A parameter that is a dataclass is a group of options, its fields. One that is `timed` says last
-    how long it took in all, whatever its verdict: its user waits for more than the simulations.
+    A parameter that is a dataclass is a group of options, its fields. A `timed` command ends with
+    its total time, whatever its verdict: its user waits for more than the simulations.
     """
     own = inspect.signature(does, eval_str=True).parameters.values()
     groups: dict[str, Any] = {
@@ -128,7 +129,7 @@ def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
 
 
 def _options(given: inspect.Parameter) -> list[inspect.Parameter]:
-    """The parameter, or those of the fields of its group."""
+    """The parameter, or the fields of its group as parameters."""
     if not is_dataclass(given.annotation):
         return [given.replace(kind=_NAMED)]
     hints, values = get_type_hints(given.annotation, include_extras=True), vars(given.default)
@@ -139,16 +140,15 @@ def _options(given: inspect.Parameter) -> list[inspect.Parameter]:
 
 
 def _with_value(word: str, after: str) -> str:
-    """An argument, with the value of its option where that is left out."""
+    """An argument; an option of `BARE` without a value gets its default."""
     value, pattern = BARE.get(word, ("", ""))
     return f"{word}={value}" if value and not re.fullmatch(pattern, after) else word
 
 
 class _EachOnce(typer.core.TyperCommand):
-    """A command whose options may be given once, but for those that gather several values: the last
-    would silently win.
+    """A command that refuses an option given twice, unless the option gathers values.
 
-    An option of `BARE` may be given without its value.
+    Otherwise the last value would silently win. An option of `BARE` may be given without its value.
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -183,7 +183,8 @@ def _loaded(name: str) -> Any:
 class _Commands(typer.core.TyperGroup):
     """The commands by name.
 
-    Only that which is asked for is imported: half of them need the compiler, or what draws.
+    Only the command that is called is imported: half of them need the compiler, or the code that
+    draws.
     """
 
     def __init__(self, **settings: Any) -> None:
@@ -224,15 +225,16 @@ def common(
         ),
     ] = False,
 ) -> None:
-    """Simulate a rigid block on a shaking floor with several models, compare them, and judge them
-    against tolerances.
+    """Simulate a rigid block on a shaking floor with several models, and compare them.
+
+    Suites judge the models against tolerances.
     """
 
 
 def main(arguments: Sequence[str] | None = None, *, began: float | None = None) -> int:
     """Run the command line; returns the exit code, one of `EXIT_CODES`.
 
-    The program `began` then (of `time.perf_counter`; None: now).
+    `began` is the start of the program, by `time.perf_counter`; None: now.
     """
     with _readers_may_go():
         try:
@@ -279,8 +281,9 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
 
 
 class _Pipe:
-    """A text stream whose reader may go, as that of `rockcheck scenes | head -1` does: the rest is
-    then written to nobody.
+    """A text stream whose reader may close it, as in `rockcheck scenes | head -1`.
+
+    The rest of the text is dropped.
     """
 
     def __init__(self, stream: Any) -> None:
@@ -305,7 +308,7 @@ class _Pipe:
 
 @contextlib.contextmanager
 def _readers_may_go() -> Iterator[None]:
-    """Within this block nobody needs to read what is said: the exit code stays what it is."""
+    """Within this block a closed stdout or stderr does not change the exit code."""
     before = sys.stdout, sys.stderr
     sys.stdout, sys.stderr = cast(TextIO, _Pipe(sys.stdout)), cast(TextIO, _Pipe(sys.stderr))
     try:

@@ -27,9 +27,9 @@ from rockcheck.validation.finding import Block, Column, Finding, Table, Text, te
 from rockcheck.validation.suite.across import difference
 from rockcheck.validation.suite.results import Run
 
-#: So many figures that moved are listed without --all.
+#: Most moved figures that are listed without --all.
 SHOWN = 20
-#: What --align asks for where no time is given.
+#: Value of --align without a time.
 BEST = "best"
 
 
@@ -140,8 +140,9 @@ def run(
 
 
 def headline(found: Discrepancy) -> str:
-    """The comparison in one sentence: whether the outcomes agree, and how far the rotations are
-    apart.
+    """The comparison in one sentence: whether outcomes agree, and how far rotations differ.
+
+    The difference is an RMS value.
     """
     assert found.histories is not None
     reference, candidate = (history.fate for history in found.histories)

@@ -60,7 +60,7 @@ def run(
     allow_code: AllowCodeOption = None,
     played: Played = Played(OUT / "conformance"),
 ) -> None:
-    """Hold engines against phenomena with a certain answer.
+    """Check engines against phenomena with a known answer.
 
     Writes a card an engine: a page, JSON, JUnit and Markdown. Exit 1 where an engine fails one.
     With --tune, finds what an engine needs for a restitution: it drops a block, and slides it.

@@ -1,4 +1,4 @@
-"""`rockcheck record`: what a file of a recorded ground motion was understood to hold."""
+"""`rockcheck record`: how a file of a recorded ground motion was read."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ from rockcheck.commands import (
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.recordings import UNITS, Reading, Recording, intensity, read_components
-from rockcheck.scenes.recordings.sets import Odd, files_of
+from rockcheck.scenes.recordings.sets import Odd, files_of, record_path
 from rockcheck.validation.finding import Finding, Table, Text, text
+from rockcheck.validation.suite.motions import RecordSet
 
 ReadOption = Annotated[
     list[str] | None,
@@ -150,3 +151,16 @@ def _picture(record: Recording) -> str:
         else np.zeros(len(peaks), dtype=int)
     )
     return "".join(_MARKS[level] for level in levels)
+
+
+def record_sets(records: Sequence[str], read: Sequence[str]) -> list[RecordSet]:
+    """The records, and how they are read. Raises `InputError`."""
+    given = dict(setting_of(word, "--read") for word in read)
+    if not records:
+        if given:
+            raise InputError("needs --records", "--read")
+        return []
+    scale, vertical = given.pop("scale", 1.0), given.pop("vertical", False)
+    reading = {name: value for name, value in Reading(**given) if value is not None}
+    files = tuple(str(record_path(word, Path()).absolute()) for word in records)
+    return [RecordSet(files=files, scale=scale, vertical=vertical, **reading)]

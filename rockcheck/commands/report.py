@@ -1,5 +1,7 @@
-"""`rockcheck report`: render a finished run again, or one figure of it for a paper; and how any
-command writes a finished run into its folder: run.json, tables, pages.
+"""`rockcheck report`: render a finished run again, or one of its figures for a paper.
+
+Any command writes a finished run into its folder by `keep` (run.json, tables) and `publish`
+(pages).
 """
 
 from __future__ import annotations
@@ -76,8 +78,7 @@ def run(
 
 
 LOCK, HOLDER = ".lock", ".lock.holder"
-#: How long a run waits for another one that writes the same folder: before it says so, and in all,
-#: s.
+#: Time that a run waits for another one in the same folder: before it says so, and in all, s.
 SILENT, PATIENCE = 2.0, 600.0
 
 
@@ -112,8 +113,9 @@ def _turn(folder: Path) -> Iterator[None]:
 
 
 def keep(run: Run, folder: Path) -> Path:
-    """Write run.json, its schema and the tables (the histories are there already); returns
-    run.json. Two runs take turns.
+    """Write run.json, its schema and the tables; returns run.json.
+
+    The histories are there already. Two runs take turns.
     """
     from rockcheck.reports.document import csv
 
@@ -135,8 +137,8 @@ def publish(
 ) -> Path:
     """Write the pages of the run that was kept in `folder`; returns the page to open.
 
-    Unless `afresh`, only those that would show something else than they do. `jobs` processes draw,
-    by default one a core. Scenes that are `wanted` have a page in a large run, too.
+    Unless `afresh`, only pages whose content changed. `jobs` processes draw, by default one a core.
+    Scenes that are `wanted` have a page in a large run, too.
     """
     from rockcheck.reports.site import write_site
 

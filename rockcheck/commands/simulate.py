@@ -108,7 +108,7 @@ def run(
 
 
 def _played_apart(scene: Scene, model: str, settings: dict[str, Any]) -> History:
-    """The history by a model of the user's own, whose code is imported by a process of its own."""
+    """The history by a user-defined model, whose code is imported in a separate process."""
     task = workers.Task(
         label=model, family=model, settings=settings, search_path=(str(Path.cwd()),), scene=scene
     )

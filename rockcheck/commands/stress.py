@@ -47,9 +47,9 @@ def run(
 ) -> None:
     """Numerical stability: where the models break.
 
-    Random scenes over all that can be written, held against invariants, and the steps at which
+    Random scenes over all allowed settings, checked for invariants, and the steps at which
     engines break. Writes a page, tables, and of failures the smallest scene files that show them.
-    What was interrupted goes on where it ended.
+    An interrupted run resumes where it ended.
     Exit 1 where an event-based model breaks an invariant.
     """
     from rockcheck.validation.execute.models import not_installed

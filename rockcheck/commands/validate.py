@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,27 +11,25 @@ from typing import Annotated, Any, Literal
 import typer
 
 from rockcheck.commands import (
+    ALL,
     AllowCodeOption,
     Played,
     answer,
+    chosen_models,
     console,
     model_names,
     progress,
-    setting_of,
     suite_names,
     tell_left_out,
     tell_missing,
     usable_folder,
 )
-from rockcheck.commands.record import ReadOption
+from rockcheck.commands.record import ReadOption, record_sets
 from rockcheck.commands.report import keep, publish
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
-from rockcheck.scenes.recordings import Reading
-from rockcheck.scenes.recordings.sets import record_path
-from rockcheck.validation.execute.models import FAMILIES, compiles, family, not_installed
+from rockcheck.validation.execute.models import compiles
 from rockcheck.validation.suite.across import moment_of, remember, trend_of
-from rockcheck.validation.suite.motions import RecordSet
 from rockcheck.validation.suite.results import Run, Strict
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import Suite, is_scene, load_suite, scene_suite
@@ -41,7 +38,6 @@ from rockcheck.validation.suite.tables import finding_of, summary
 #: The folder of the trend's page.
 TREND = "trend"
 Strictness = Literal["worse", "both"]
-ALL = "all"
 SuiteArgument = Annotated[
     str | None,
     typer.Argument(
@@ -62,7 +58,7 @@ WhatArgument = Annotated[
 
 @dataclass(frozen=True)
 class OfScene:
-    """The options that are for a scene: a suite says which models play what."""
+    """Options for a scene; a suite says itself which models play which scene."""
 
     models: Annotated[
         str,
@@ -187,50 +183,6 @@ def run(
     raise typer.Exit(finished.exit_code)
 
 
-def record_sets(records: Sequence[str], read: Sequence[str]) -> list[RecordSet]:
-    """The records, and how they are read. Raises `InputError`."""
-    given = dict(setting_of(word, "--read") for word in read)
-    if not records:
-        if given:
-            raise InputError("needs --records", "--read")
-        return []
-    scale, vertical = given.pop("scale", 1.0), given.pop("vertical", False)
-    reading = {name: value for name, value in Reading(**given) if value is not None}
-    files = tuple(str(record_path(word, Path()).absolute()) for word in records)
-    return [RecordSet(files=files, scale=scale, vertical=vertical, **reading)]
-
-
-def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
-    """The models by name, each with its settings; of all, those that are installed.
-
-    Raises `InputError` for an unknown one.
-    """
-    if names == ALL:
-        found: dict[str, dict[str, Any]] = {
-            name: {} for name in FAMILIES if name != "measured" and not not_installed(name)
-        }
-    else:
-        found = {name.strip(): {} for name in names.split(",") if name.strip()}
-        for name in found:
-            family(name)
-        if not found or "measured" in found:
-            raise InputError(
-                f"{printable(names)!r} is not allowed: models that play, with commas between, or"
-                " all",
-                "--models",
-            )
-    for text in settings:
-        model, dot, rest = text.partition(".")
-        if not dot or model not in found:
-            raise InputError(
-                f"{printable(text)!r}: write MODEL.key=value, with MODEL one of {', '.join(found)}",
-                "--set",
-            )
-        key, value = setting_of(rest)
-        found[model][key] = value
-    return found
-
-
 def play(suite: Suite, folder: Path, played: Played, **how: Any) -> Run:
     """Run a suite with a progress bar on stderr."""
     models = [(one.family_name, one.settings) for one in suite.models.values()]
@@ -241,8 +193,9 @@ def play(suite: Suite, folder: Path, played: Played, **how: Any) -> Run:
 
 
 def tell_faults(finished: Run, folder: Path) -> None:
-    """A line on stderr for each exception that no model may raise: of rockcheck's own models to
-    report, of one's own to mend.
+    """Print a line on stderr for each exception that no model may raise.
+
+    One of rockcheck's own models is to be reported, one of the user's own models to be mended.
     """
     for cell in finished.cells:
         if not cell.traceback:

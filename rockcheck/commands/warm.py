@@ -1,5 +1,6 @@
-"""`rockcheck warm`: fills the cache of compiled code ahead, in processes side by side: a user then
-waits for no compiler.
+"""`rockcheck warm`: compiles the models' code ahead, in several processes.
+
+A user then waits for no compiler.
 """
 
 from __future__ import annotations
@@ -47,8 +48,8 @@ def _engine_steps() -> None:
     )
 
 
-#: What is compiled, the longest first. Batches share the loop of histories, so they come after it
-#: and in one process with it.
+#: The parts that are compiled, the longest first. Batches share the loop of histories, so they come
+#: after it and in one process with it.
 PARTS: Mapping[str, Callable[[], object]] = {
     "the event-based models with the unilateral pivot": partial(_batches, "ebm-unilateral"),
     "the event-based models: histories, batches, ensembles": partial(_batches, "ebm"),
@@ -59,10 +60,9 @@ PARTS: Mapping[str, Callable[[], object]] = {
 
 
 def warm(jobs: int, *, on_progress: OnProgress = unheard) -> dict[str, float]:
-    """Compile what is not in the cache, in up to `jobs` processes; returns the time of each part of
-    `PARTS`, s.
+    """Compile what is not in the cache, in up to `jobs` processes.
 
-    Raises what a part raises.
+    Returns the time of each part of `PARTS`, s. Raises the error of a part.
     """
     taken: dict[str, float] = {}
     on_progress(0, len(PARTS), "")

@@ -7,10 +7,10 @@
 | ESM (DYNA 1.2) | `.ASC` | NDATA, SAMPLING_INTERVAL_S, UNITS |
 | K-NET, KiK-net | `.NS`, `.EW1`, ... | Scale Factor, Sampling Freq(Hz), Duration Time(s) |
 | CSV | any | `time_s` and `acceleration_g`, `_m_s2`, `_cm_s2`, `_gal`, `_mm_s2` or `_ft_s2` |
-| columns of text | any | whatever is not there is an option of `Reading` |
+| columns of text | any | nothing: options of `Reading` supply the rest |
 
-A format is known by what the file holds; `.AT2` and `.csv` by the name. Every reader takes time in
-proportion to the file. ObsPy reads K-NET among these, but neither PEER, V2, ESM nor tables.
+A format is recognised by the file's content; `.AT2` and `.csv` by the name. Every reader takes time
+in proportion to the file. ObsPy reads K-NET among these, but neither PEER, V2, ESM nor tables.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ from rockcheck.scenes.recordings.tables import read_table
 
 __all__ = ["GRAVITY_OF_RECORDS", "UNITS", "Reading", "Recording", "read_components", "read_record"]
 
-#: How far the beginning of a file is looked at to know its format.
+#: Lines of a file that are searched for its format.
 _LOOKED_AT = 100
 Reader = Callable[[Path, list[str], Reading], Recording | list[Recording]]
-#: Formats that the name tells.
+#: Formats by the ending of the file's name.
 _BY_NAME: dict[str, Reader] = {".at2": read_at2, ".csv": read_table}
 
 
@@ -52,9 +52,9 @@ def read_components(path: Path, reading: Reading | None = None) -> list[Recordin
     """All components of a record file, or the one that `reading` names; at least one.
 
     Raises `InputError`, naming the file and the line, where the file is missing, is in no known
-    format, has another count than it says, a time step that is not positive or not uniform, a value
-    that is not finite, or where something is not known: then the message shows the option that says
-    it.
+    format, has another count than it states, a time step that is not positive or not uniform, or a
+    value that is not finite. Where something is not known, the message shows the option that
+    supplies it.
     """
     asked = reading or Reading()
     lines = read_text(path, latin=True).split("\n")

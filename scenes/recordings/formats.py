@@ -1,10 +1,10 @@
-"""Formats with a header of their own: PEER AT2, ESM (DYNA), K-NET/KiK-net ASCII, and V2 files of
-strong-motion networks, COSMOS 1.20 and the older one of CSMIP (CDMG), of one or several channels.
+"""Formats with a header: PEER AT2, ESM (DYNA), K-NET/KiK-net ASCII, and V2.
 
-In V2 files numbers stand in fields of the width that the file states, and may touch. Only the
-blocks of acceleration are read. Source: COSMOS Strong Motion Data Format, version 1.20 (2001):
-integer header 54 is the azimuth, real header 62 the time step of these samples in ms, and 34 that
-of the raw record in s, which counts only where 62 is not known.
+V2 files of strong-motion networks, of one or several channels, are COSMOS 1.20 and the older format
+of CSMIP (CDMG). Their numbers stand in fields of the width that the file states, and may touch.
+Only the blocks of acceleration are read. Source: COSMOS Strong Motion Data Format, version 1.20
+(2001): integer header 54 is the azimuth, real header 62 the time step of these samples in ms, and
+34 that of the raw record in s, which counts only where 62 is not known.
 """
 
 from __future__ import annotations
@@ -105,7 +105,10 @@ def read_at2(path: Path, lines: list[str], reading: Reading) -> Recording:
 
 
 def _at2_component(lines: list[str]) -> str:
-    """Event, date, station, component: the end of the second line; "" where it is another."""
+    """Component, from the end of the second line; "" if that line has another form.
+
+    The line holds event, date, station and component.
+    """
     fields = lines[1].split(",") if len(lines) > 1 else []
     name = fields[-1].strip()[:10] if len(fields) > 2 else ""
     return printable(name) if re.fullmatch(r"[0-9A-Za-z-]{1,6}", name) else ""
@@ -156,11 +159,10 @@ def read_esm(path: Path, lines: list[str], reading: Reading) -> Recording:
 
 
 def read_knet(path: Path, lines: list[str], reading: Reading) -> Recording:
-    """K-NET and KiK-net: 17 header lines with their names in the first 18 columns, then counts of
-    the digitiser.
+    """K-NET and KiK-net: 17 header lines, then counts of the digitiser.
 
-    The counts have an offset: their mean is taken out, as it is for the Max. Acc. that such a file
-    states.
+    Names of the header stand in the first 18 columns. The counts have an offset: their mean is
+    taken out, as it is for the Max. Acc. that the file states.
     """
     only_for_tables(path, reading, "a K-NET file")
     header: dict[str, tuple[int, str]] = {}
@@ -215,7 +217,10 @@ def _check_duration(path: Path, stated: tuple[int, str] | None, hertz: float, fo
 
 @dataclass
 class _Channel:
-    """What the headers have said so far of the next block of accelerations."""
+    """Header values of the next block of accelerations, as far as they are read.
+
+    `step` is the line of the time step, and its value (s).
+    """
 
     name: str = ""
     step: tuple[int, float] | None = None
@@ -223,8 +228,10 @@ class _Channel:
 
 @dataclass(frozen=True)
 class _Block:
-    """What the headers say of a block of accelerations: how many, the line and the value (s) of the
-    time step, the unit, and that numbers stand `across` on a line, each `width` wide.
+    """Header values of a block of accelerations.
+
+    `count` samples; `step` is the line of the time step, and its value (s); `across` numbers stand
+    on a line, each `width` characters wide.
     """
 
     count: str
@@ -235,12 +242,12 @@ class _Block:
 
     @property
     def height(self) -> int:
-        """Lines of so many numbers."""
+        """Number of lines of the block."""
         return -(-int(self.count[:12]) // max(self.across, 1))
 
 
 def is_volume(line: str) -> bool:
-    """Whether this line can only stand in a V2 file."""
+    """Whether this line occurs only in V2 files."""
     return bool(
         _HEADER.match(line[:_WIDE])
         or CSMIP_BLOCK.match(line[:_WIDE])
@@ -288,7 +295,7 @@ def read_volume(path: Path, lines: list[str], reading: Reading) -> list[Recordin
 def _heed(
     path: Path, lines: list[str], index: int, header: re.Match[str], channel: _Channel
 ) -> int:
-    """Takes direction and time step from a block of header values; returns the line after it."""
+    """Take direction and time step from a block of header values; returns the line after it."""
     across, width = int(header[4]), int(header[5])
     rows = min(int(header[3][:6]), len(lines) - index)
 
@@ -345,8 +352,9 @@ def _recording(
 
 
 def _check_seconds(path: Path, index: int, stated: str | None, record: Recording) -> None:
-    """The whole seconds that a block states must be those of its samples: a time step of another
-    record would be a silent fault.
+    """Raise `InputError` if the stated whole seconds do not match the samples.
+
+    A time step of another record would be a silent fault.
     """
     length = len(record.samples) * record.time_step
     if stated and abs(length - int(stated[:9])) > 1.0 + 0.01 * length:

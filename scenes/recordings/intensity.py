@@ -1,4 +1,4 @@
-"""How strong a recorded motion is, in the measures of earthquake engineering."""
+"""Intensity measures of recorded ground motions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS, Recording
 
 #: Periods at which spectral accelerations are given, s.
 PERIODS = (0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0)
-#: Steps a period, so that the largest sample is the peak within 0.1 %; and most steps in all.
+#: Steps per period, for the largest sample to be the peak within 0.1 %; and most steps in all.
 _STEPS, _MOST_STEPS = 80, 50_000_000
 
 
@@ -21,8 +21,9 @@ def peak_acceleration(record: Recording) -> float:
 
 
 def velocity(record: Recording) -> NDArray[np.float64]:
-    """Ground velocity at the samples in m/s, from rest, exact for straight lines between samples;
-    no baseline correction.
+    """Ground velocity at the samples in m/s, from rest, without baseline correction.
+
+    Exact for straight lines between samples.
     """
     means = (record.samples[1:] + record.samples[:-1]) / 2.0
     return np.concatenate([[0.0], np.cumsum(record.time_step * means)])
@@ -43,11 +44,10 @@ def arias(record: Recording) -> float:
 
 
 def spectral_acceleration(record: Recording, period: float, damping: float = 0.05) -> float:
-    """Pseudo-spectral acceleration of an oscillator of `period` (s) and `damping` (of critical,
-    below 1) in g.
+    """Pseudo-spectral acceleration in g of an oscillator of `period` (s).
 
-    The oscillator is exact for straight lines between samples, and goes on for a period after the
-    last.
+    `damping` is relative to critical, below 1. The response is exact for straight lines between
+    samples, and continues for one period after the last.
     """
     from rockcheck.scenes.recordings.oscillator import largest_response
 

@@ -1,4 +1,4 @@
-"""A recorded ground motion as read from a file, and what its reader may have to be told."""
+"""A recorded ground motion as read from a file, and the options of its reader."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ UNITS: dict[str, float] = {
     "ft/s2": 0.3048,
 }
 
-# Whatever repeats is possessive: what does not match ends after one pass, however long the line.
+# All repetitions are possessive: a failed match takes one pass, however long the line.
 NUMBER = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eEdD][-+]?\d++)?"
 _NUMBER = re.compile(NUMBER)
 _EXPONENT = str.maketrans("dD", "ee")
@@ -46,16 +46,17 @@ Place = Annotated[int, Strict(), Field(ge=1, le=1000)]
 
 
 class Reading(Frozen):
-    """What a record file does not say of itself, and which part of it is wanted; None: as the file
-    says.
+    """Options of a reader: values that a record file does not state, and the part to read.
+
+    None: as the file says.
 
     | option | meaning |
     |---|---|
     | `unit` | of the accelerations |
     | `time_step` | s, where neither a header nor a column of times gives it |
     | `column` | of a table: the column of accelerations, its number from 1 or its name |
-    | `header_lines` | of a table: so many first lines are no data |
-    | `decimal` | of a table: what stands before the decimals |
+    | `header_lines` | of a table: number of first lines without data |
+    | `decimal` | of a table: the decimal separator |
     | `component` | of a file with several: its number from 1 or its name |
     """
 
@@ -69,11 +70,11 @@ class Reading(Frozen):
 
 @dataclass(frozen=True, kw_only=True)
 class Recording:
-    """One component of a record: samples in m/s^2 every `time_step` s, the first at t = 0, none of
-    them scaled.
+    """One component of a record: unscaled samples in m/s^2, the first at t = 0.
 
-    `unit` is that of the file, `form` its format, `component` the direction or channel ("" where
-    the file names none), `notes` what was done to the samples or taken for granted.
+    `time_step` is in s. `unit` and `form` are the file's unit and format, `component` is the
+    direction or channel ("" where the file names none). `notes` say what was changed in the samples
+    or assumed.
     """
 
     samples: NDArray[np.float64]
@@ -89,22 +90,22 @@ class Recording:
 
 
 def fault(path: Path, said: str, line: int | None = None) -> InputError:
-    """What is wrong with a file, and in which line."""
+    """The `InputError` for a file, and for a line of it."""
     return InputError(
         f"{printable(path)}, line {line}: {said}" if line else f"{printable(path)}: {said}"
     )
 
 
 def option(name: str, value: str | float) -> str:
-    """How an option is given, on the command line and in a scene file."""
+    """Text that shows how to give an option, on the command line and in a scene file."""
     in_file = value if not isinstance(value, str) else f'"{value}"'
     return f"--read {name}={value} (in a scene file: {name} = {in_file})"
 
 
 def number(path: Path, line: int, word: str) -> float:
-    """The finite number that `word` is, in Fortran's notation or C's.
+    """The finite number in `word`, in Fortran's notation or C's.
 
-    Raises `InputError` where it is none.
+    Raises `InputError` if it is none, or larger than `MOST`.
     """
     if _NUMBER.fullmatch(word):
         value = float(word.translate(_EXPONENT))
@@ -116,13 +117,14 @@ def number(path: Path, line: int, word: str) -> float:
 
 
 def is_number(word: str) -> bool:
-    """Whether `number` would read it, apart from its size."""
+    """Whether `word` has the form of a number; its size is not checked."""
     return _NUMBER.fullmatch(word) is not None
 
 
 def numbers(path: Path, lines: Iterable[tuple[int, str]], count: int = 0) -> list[float]:
-    """All numbers of numbered lines, between blanks; where some have run together and there are
-    `count`, in columns of one width.
+    """All numbers of numbered lines, separated by blanks.
+
+    Where some have run together and there are `count`, the lines are cut into columns of one width.
     """
     rows = [(n, line.rstrip()) for n, line in lines if not line.isspace() and line]
     cells = [(n, word) for n, line in rows for word in line.split()]
@@ -132,8 +134,9 @@ def numbers(path: Path, lines: Iterable[tuple[int, str]], count: int = 0) -> lis
 
 
 def _columns(rows: list[tuple[int, str]], count: int) -> list[tuple[int, str]]:
-    """The cells of so many numbers in columns of one width, as Fortran writes them; [] where the
-    lines are not cut so.
+    """The cells of `count` numbers in columns of one width, as Fortran writes them.
+
+    [] if the lines do not divide into equal columns.
     """
     width, rest = divmod(sum(len(line) for _, line in rows), count)
     uneven = len({len(line) for _, line in rows[:-1]}) > 1 or any(
@@ -153,8 +156,9 @@ def known_unit(text: str) -> str:
 
 
 def settled_unit(path: Path, stated: str, reading: Reading) -> str:
-    """The unit that the file states or the reader was told; raises `InputError` where neither is,
-    or both and they differ.
+    """The unit of the file: stated in it, or given by `reading`.
+
+    Raises `InputError` where it is neither, and where the two differ.
     """
     if not stated and reading.unit is None:
         raise fault(
@@ -171,8 +175,9 @@ def settled_unit(path: Path, stated: str, reading: Reading) -> str:
 
 
 def settled_step(path: Path, stated: float, reading: Reading) -> float:
-    """The time step in s that a header states; raises `InputError` where the reader was told
-    another.
+    """The time step in s that a header states.
+
+    Raises `InputError` where `reading` gives another.
     """
     if reading.time_step is not None and abs(stated - reading.time_step) > 1e-6 * stated:
         raise fault(
@@ -184,8 +189,9 @@ def settled_step(path: Path, stated: float, reading: Reading) -> float:
 
 
 def only_for_tables(path: Path, reading: Reading, form: str) -> None:
-    """Raises `InputError` where an option is given that means nothing to a format with a header of
-    its own.
+    """Raise `InputError` if an option of tables is given for a format with a header.
+
+    `form` names the format in the message.
     """
     for name in ("column", "header_lines", "decimal"):
         if getattr(reading, name) is not None:
@@ -197,7 +203,7 @@ def only_for_tables(path: Path, reading: Reading, form: str) -> None:
 
 
 def checked_count(path: Path, line: int, name: str, count: str) -> int:
-    """A count of samples that a header states."""
+    """A number of samples from a header; raises `InputError` if it is out of range."""
     value = int(count[:12])
     if not 1 <= value <= MOST_SAMPLES:
         raise fault(path, f"{name} {count[:20]} is not in 1..{MOST_SAMPLES}", line)
@@ -205,7 +211,7 @@ def checked_count(path: Path, line: int, name: str, count: str) -> int:
 
 
 def checked_step(path: Path, line: int, name: str, word: str) -> float:
-    """A time step that a header states, s."""
+    """A time step from a header, s; raises `InputError` if it is below `LEAST`."""
     value = number(path, line, word)
     if value < LEAST:
         raise fault(

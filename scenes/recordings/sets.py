@@ -1,6 +1,4 @@
-"""Sets of recorded motions: which files are meant, and which of their components shake a block from
-side to side.
-"""
+"""Sets of recorded motions: their files, and their horizontal and vertical components."""
 
 from __future__ import annotations
 
@@ -20,7 +18,7 @@ _VERTICAL = re.compile(
     r"(?:.*[-_. ])?(?:up|dn|dwn|down|u-?d|ver|vrt|vert|vertical|[HBES][NLGH]Z)", re.IGNORECASE
 )
 _KIKNET = ("3", "6")
-#: The part of a file's name that says so, with its sign before it.
+#: The part of a file's name that marks a vertical component, with the separator before it.
 _UPWARD = re.compile(
     r"(?:^|[-_. ])(?:up|dn|dwn|down|u-?d|vertical|vert|vrt|ver|[HBES][NLGH]Z|[VZ])"
     r"(?=\d?(?:[-_. ]|$))",
@@ -29,18 +27,17 @@ _UPWARD = re.compile(
 
 
 class Odd(str):
-    """What a folder or a pattern holds beside records, and why it is none: named, and left out."""
+    """Fault of a file in a folder or pattern that is no record: it is reported and left out."""
 
     __slots__ = ()
 
 
 def files_of(words: Sequence[str | Path], folder: Path = Path()) -> dict[Path, bool]:
-    """The files that are meant, each once, and whether it was named itself: paths, folders (all
-    files in them), and patterns such as "RSN1_H*.AT2", all in `folder`. A name may also be that of
-    a record that comes with the package.
+    """The files that `words` select, each once, and whether it was named itself.
 
-    A pattern may stand in quotes, so that no shell has expanded it. Raises `InputError` where a
-    folder or a pattern holds no file.
+    A word is a path, a folder (all files in it) or a pattern such as "RSN1_H*.AT2", in `folder`; or
+    the name of a record that comes with the package. A pattern may stand in quotes, so that no
+    shell has expanded it. Raises `InputError` where a folder or a pattern holds no file.
     """
     found: dict[Path, bool] = {}
     for word in words:
@@ -76,12 +73,12 @@ def _files(paths: Iterable[Path]) -> list[Path]:
 def motions_of(
     paths: Iterable[Path], reading: Reading
 ) -> tuple[list[tuple[str, Recording]], list[str]]:
-    """The horizontal components of the files, each with a name, and what is left out: the names of
-    the vertical ones, and `Odd` files.
+    """The horizontal components of the files with their names, and the names left out.
 
-    The name is the file's, with the component's where the file has several. A component or column
-    that `reading` names is taken as it is. Raises as `read_components`, and where all components
-    are vertical.
+    Left out are vertical components, by name, and `Odd` files. A component's name is that of its
+    file, with its own name added where the file has several. A component or column that `reading`
+    names is taken as horizontal. Raises as `read_components`, and where all components are
+    vertical.
     """
     motions: list[tuple[str, Recording]] = []
     read, odd = _read(paths, reading)
@@ -99,9 +96,9 @@ def motions_of(
 
 
 def _read(paths: Iterable[Path], reading: Reading) -> tuple[dict[Path, list[Recording]], list[Odd]]:
-    """The components of each file, and why others have none.
+    """The components of each file that can be read, and the faults of the others.
 
-    Raises `InputError` where that is one that was named, or all of them.
+    Raises `InputError` for a file that was named itself, or where no file can be read.
     """
     read: dict[Path, list[Recording]] = {}
     faults: list[InputError] = []
@@ -118,7 +115,7 @@ def _read(paths: Iterable[Path], reading: Reading) -> tuple[dict[Path, list[Reco
 
 
 def verticals_of(paths: Iterable[Path], reading: Reading) -> dict[str, Recording]:
-    """By the name of each horizontal motion (see `motions_of`), its vertical component.
+    """The vertical component of each horizontal motion, by the motion's name (see `motions_of`).
 
     It is the one in the same file, else that of the file in the same folder whose name differs only
     in the component, as ELC-UP.AT2 does from ELC180.AT2. Raises `InputError` where there is not
@@ -155,8 +152,10 @@ def verticals_of(paths: Iterable[Path], reading: Reading) -> dict[str, Recording
 
 
 def _vertical_file(path: Path, alone: Iterable[Path]) -> Path | None:
-    """The file with the vertical component of `path`: the one whose name agrees in most letters
-    around the component.
+    """The file with the vertical component of `path`, or None.
+
+    Its name agrees with that of `path` in most letters around the component. None if several agree
+    equally.
     """
     fits: dict[int, list[Path]] = {}
     for other in alone:
@@ -170,7 +169,7 @@ def _vertical_file(path: Path, alone: Iterable[Path]) -> Path | None:
 
 
 def is_vertical(path: Path, recording: Recording) -> bool:
-    """Whether the component is the vertical one, or, of a table, which has none, the file."""
+    """Whether the component is vertical, by its name; of a table, by the file's name."""
     if recording.form.startswith("K-NET") and recording.component in _KIKNET:
         return True
     channel = "" if recording.form in ("CSV", "table") else recording.component

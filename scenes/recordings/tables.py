@@ -32,7 +32,7 @@ NAMED = {f"acceleration_{unit.replace('/', '_')}": unit for unit in UNITS}
 _TIMES = re.compile(r"(?:time|t)(?:_s|\s*+[\[(]\s*+s(?:ec)?\s*+[\])])?", re.IGNORECASE)
 _BRACKETS = re.compile(r"[\[(]([^\])]{1,20})[\])]")
 _DECIMAL_COMMA = re.compile(r"[-+]?\d*+,\d++(?:[eEdD][-+]?\d++)?")
-#: First lines of a table that may be words.
+#: Most lines of words at the start of a table.
 _MOST_HEADER = 200
 
 NumberedLines = list[tuple[int, str]]
@@ -40,17 +40,20 @@ NumberedLines = list[tuple[int, str]]
 
 @dataclass(frozen=True)
 class _Layout:
-    """How the lines of a table are cut: at `separator` (None: at blanks), with a comma before the
-    decimals or not.
+    """Separator of a table's fields, and whether a comma stands before the decimals.
+
+    `separator` None: fields are separated by blanks.
     """
 
     separator: str | None
     decimal_comma: bool
 
     def words(self, path: Path, n: int, line: str) -> list[str]:
-        """The fields of a line, numbers with a decimal point."""
+        """The fields of a line; decimal commas become points."""
         if self.separator is None:
             words = line.split()
+        elif '"' not in line:
+            words = [word.strip() for word in line.split(self.separator)]
         else:
             try:
                 words = [
@@ -69,8 +72,9 @@ class _Layout:
 
 
 def read_table(path: Path, lines: list[str], reading: Reading) -> Recording:
-    """A column of times and one of accelerations, or accelerations alone; lines that start with #
-    or % are remarks.
+    """Read a column of times and one of accelerations, or accelerations alone.
+
+    Lines that start with # or % are remarks.
     """
     if reading.component is not None:
         raise fault(path, "a table has columns; give the option column in place of component")
@@ -95,11 +99,11 @@ def read_table(path: Path, lines: list[str], reading: Reading) -> Recording:
     if time is None and reading.time_step is None:
         raise fault(path, f"no column of times; give the time step: {option('time_step', 0.01)}")
     unit = settled_unit(path, stated, reading)
-    samples, words = cells.read(place, time)
+    samples, times, words = cells.read(place, time)
     notes: list[str] = []
     step = float(reading.time_step or 0.0)
     if time is not None:
-        step, notes = _step_of(path, words, [n for n, _ in rows], reading)
+        step, notes = _step_of(path, times, words, [n for n, _ in rows], reading)
         if not (names and names[time].lower() not in ("t", "time")):
             notes.append(f"column {time + 1} is taken as the time in s")
     form = "table" if layout.separator is None else "CSV"
@@ -116,7 +120,7 @@ def read_table(path: Path, lines: list[str], reading: Reading) -> Recording:
 
 @dataclass(frozen=True)
 class _Cells:
-    """The lines of data and how they are cut; `names` is empty where no line names the columns."""
+    """The lines of data and their layout; `names` is empty where no line names the columns."""
 
     path: Path
     rows: NumberedLines
@@ -124,9 +128,11 @@ class _Cells:
     names: list[str]
     width: int
 
-    def read(self, place: int, time: int | None) -> tuple[NDArray[np.float64], list[str]]:
-        """The numbers of one column, and the words of another."""
-        values, words = [], []
+    def read(
+        self, place: int, time: int | None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str]]:
+        """Numbers of column `place` and of column `time`, and the words of the latter."""
+        values, times, words = [], [], []
         for n, line in self.rows:
             cells = self.layout.words(self.path, n, line)
             if len(cells) != self.width:
@@ -137,14 +143,14 @@ class _Cells:
                 )
                 raise fault(self.path, f"{len(cells)} fields where {said}", n)
             if time is not None:
-                number(self.path, n, cells[time])
+                times.append(number(self.path, n, cells[time]))
                 words.append(cells[time])
             values.append(number(self.path, n, cells[place]))
-        return np.array(values), words
+        return np.array(values), np.array(times), words
 
 
 def _layout_of(path: Path, rows: NumberedLines, reading: Reading) -> _Layout:
-    """How the table is cut, from its first line of numbers, else from its first line."""
+    """The layout of a table, from its first line of numbers, else from its first line."""
     head = [line for _, line in rows[:_MOST_HEADER]]
     with_digits = next(
         (line for line in head if re.match(r"[\s\"]*+[-+.]?[-+.\d]", line)), head[0]
@@ -155,7 +161,7 @@ def _layout_of(path: Path, rows: NumberedLines, reading: Reading) -> _Layout:
         separator = "\t"
     elif "," in with_digits and reading.decimal != ",":
         words = with_digits.split()
-        # Numbers between blanks, each with its comma, cannot be fields between commas.
+        # Where each word between blanks has one comma, the commas cannot separate fields.
         if len(words) > 1 and all(_DECIMAL_COMMA.fullmatch(word) for word in words):
             return _Layout(None, True)
         if (
@@ -215,8 +221,10 @@ def _names_of(
 
 
 def _columns(cells: _Cells, reading: Reading) -> tuple[int | None, tuple[int, str]]:
-    """The column of times, None where there is none, and that of accelerations with the unit that
-    its name states.
+    """The columns of times and of accelerations.
+
+    Times are None if there is no such column. Accelerations have the unit that the column's name
+    states, "" if none. Raises `InputError` where the columns are not clear.
     """
     names = cells.names
     times = [index for index, name in enumerate(names) if _TIMES.fullmatch(name)]
@@ -280,18 +288,21 @@ def _decimals(word: str) -> int:
 
 
 def _step_of(
-    path: Path, words: Sequence[str], lines: Sequence[int], reading: Reading
+    path: Path,
+    time: NDArray[np.float64],
+    words: Sequence[str],
+    lines: Sequence[int],
+    reading: Reading,
 ) -> tuple[float, list[str]]:
-    """The time step of a column of times, judged by the digits that they are printed with; and what
-    to know of it.
+    """The time step of a column of times, within the digits printed, and notes on it.
 
-    The step is, of these, the first that all times agree with: the mean step as printed; a whole
-    number of samples a second, where each time is that within its last digit; the mean step, where
-    each is that within its last digit or 1 % of a step.
+    It is the first of these that all times agree with: the mean step as printed; a whole number of
+    samples a second, each time within its last digit; the mean step, each time within its last
+    digit or 1 % of a step. If `reading` gives a time step, only that one is tried. Raises
+    `InputError` where none fits.
     """
     if len(words) < 2:
         raise fault(path, f"{len(words)} sample(s); at least 2 are needed to know the time step")
-    time = np.array([number(path, n, word) for n, word in zip(lines, words, strict=True)])
     mean = float(time[-1] - time[0]) / (len(time) - 1)
     if not mean > LEAST:
         raise fault(path, "time_s does not increase")

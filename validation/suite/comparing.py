@@ -275,7 +275,7 @@ def compared(
             for one, (reference, extra) in asked.items()
         },
     )
-    return found
+    return {one: found[one] for one in asked}  # what is kept is in order of the alphabet
 
 
 def _compute(

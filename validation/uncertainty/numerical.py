@@ -17,8 +17,8 @@ is no less than the error at h. So the second row needs no order, only a factor 
 Roache 1994; ASME V&V 20-2009, section 2). Where d does not grow with the step, impacts come in
 another order from run to run. Then any figure may be off by what any history is, with the larger
 factor (3: Eca and Hoekstra 2014; Oberkampf and Roy 2010, section 8.7). The run at 3h is for that:
-what those at 2h and 4h share with that at h by chance, it seldom shares. A peak and the time of a
-fall are those of rows; how far the true ones may lie from them is added in quadrature.
+figures that agree at h, 2h and 4h by chance seldom agree at 3h. A peak and the time of a fall are
+read off rows; how far the true ones may lie from the rows is added in quadrature.
 
 An event-based model has a tolerance instead of a step: u_num = 1.25 times the change at a hundredth
 of it. All uncertainties here are expanded ones: intervals that are meant to hold 95 % of the cases.
@@ -41,8 +41,8 @@ FACTORS = (1.0, 2.0, 3.0, 4.0)
 SAFETY, POOR_SAFETY = 1.25, 3.0
 #: From this order on the histories converge.
 LEAST_ORDER = 0.5
-#: Farther apart (rotations in alpha, slips in alpha R, times in 1/p) histories are not of one
-#: motion.
+#: Largest distance at which histories still show one motion (rotations in alpha, slips in alpha R,
+#: times in 1/p).
 LARGE = 0.1
 
 Verdict = Literal["converged", "not converged"]
@@ -73,7 +73,7 @@ class Numerical(Stored):
 
     @property
     def converged(self) -> bool:
-        """Whether every quantity is."""
+        """Whether every quantity is converged."""
         return all(quantity.verdict == "converged" for quantity in self.quantities)
 
     def u_num(self, name: str) -> float | None:
@@ -83,20 +83,19 @@ class Numerical(Stored):
         )
 
     def reason(self, name: str) -> str:
-        """Why a quantity is not converged; of one that the runs do not have, why nothing is."""
+        """Why a quantity is not converged; for a quantity that is missing, all `reasons`."""
         return next((q.reason for q in self.quantities if q.name == name), "; ".join(self.reasons))
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """Why what is not converged is not, each reason once."""
+        """Why quantities are not converged, each reason once."""
         return tuple(dict.fromkeys(q.reason for q in self.quantities if q.verdict != "converged"))
 
 
 def numerical_uncertainty(
     model: Any, scene: Scene, history: History | None = None
 ) -> Numerical | None:
-    """u_num of a model's run of a scene; None for a model that has neither a step nor a tolerance
-    to change.
+    """u_num of a model's run of a scene; None for a model with neither a step nor a tolerance.
 
     A model with a step has `coarser(factor)`, the same model with steps `factor` (> 1) times as
     long; one with a tolerance has `finer()`, the same at a hundredth of it.
@@ -118,7 +117,7 @@ def numerical_uncertainty(
 
 
 def failed(history: History, reason: str) -> Numerical:
-    """What is said of a run whose coarser or finer run failed."""
+    """No converged quantity: the coarser or finer run failed, for this reason."""
     return Numerical(method="", quantities=(_outcome(history, reason),))
 
 
@@ -148,7 +147,7 @@ def _from_steps(scene: Scene, runs: Sequence[History]) -> tuple[Quantity, ...]:
 
 
 def _changes(scene: Scene, one: History, other: History) -> dict[str, float]:
-    """What each figure of `one` changes by in another run, by name: by its history, at any time."""
+    """Largest change of each figure's history between two runs; of theta_rms the RMS over time."""
     rows = min(len(one.channels["theta"]), len(other.channels["theta"]))
     channels = [name for name in ("theta", "slip") if name in one.channels]
     change = {c: np.abs(other.channels[c][:rows] - one.channels[c][:rows]) for c in channels}
@@ -174,7 +173,7 @@ def _quantity(
     reason: str = "",
     order: float | None = None,
 ) -> Quantity:
-    """A quantity that is converged, unless there is a reason why it is not."""
+    """A quantity: not converged where a reason is given, otherwise converged."""
     return Quantity(
         name=name,
         unit=unit,
@@ -191,9 +190,7 @@ def _outcome(history: History, reason: str = "") -> Quantity:
 
 
 def _between_rows(history: History) -> float:
-    """How far the largest |theta| may lie above that of the rows, rad: by the parabola through the
-    highest three.
-    """
+    """Bound on how far the peak |theta| exceeds the rows, rad: parabola through the top three."""
     theta = np.abs(history.channels["theta"])
     top = int(np.argmax(theta))
     if not 0 < top < len(theta) - 1:
@@ -202,7 +199,7 @@ def _between_rows(history: History) -> float:
 
 
 def _from_tolerance(scene: Scene, given: History, finer: History) -> tuple[Quantity, ...]:
-    """The change times the factor of safety, as the finer run errs by a few hundredths of it."""
+    """u_num is `SAFETY` times the change: the finer run errs by a few hundredths of the change."""
     if _side(given) != _side(finer):
         return (_outcome(given, "the outcome changes with the tolerance"),)
     rms = _changes(scene, given, finer)["theta_rms"]
@@ -214,9 +211,7 @@ def _from_tolerance(scene: Scene, given: History, finer: History) -> tuple[Quant
 
 
 def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float]]:
-    """Name, unit and value of the scalar figures: peak rotation and last slip, or the time of the
-    fall.
-    """
+    """Scalar figures as (name, unit, value): peak rotation and last slip, or time of the fall."""
     if _side(history):
         return [("end_time", "s", float(history.channels["t"][-1]))]
     found = [("peak_rotation", "alpha", history.peak_rotation / scene.block.alpha)]
@@ -281,8 +276,10 @@ def explain(
     reason: str = "",
     against: str = "",
 ) -> Explanation:
-    """The verdict on a difference; `u_num` holds both runs' numerical uncertainties, `reason` why
-    it is None, `against` the reference.
+    """The difference of one quantity with its verdict.
+
+    `u_num` holds both runs' numerical uncertainties, `reason` says why it is None, `against` names
+    the reference.
     """
     verdict = _verdict(unit, error, u_num, u_input, u_data)
     return Explanation(

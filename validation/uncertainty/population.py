@@ -1,10 +1,10 @@
-"""A population: scenes, drawn or listed, that one model plays; what each run did, and what the runs
-together say.
+"""Populations: scenes that one model plays, the outcome of each run, and their statistics.
 
-Shares have an interval, and over the intensity of the base motion a lognormal curve. The numbers of
-a scene that have a spread (`scenes.files`) are drawn together, quasi-randomly: what comes
-out is u_input, how far a figure may lie from the scene's because the scene itself is not known
-exactly (ASME V&V 20-2009, section 4, by sampling), and Sobol indices: which number matters most.
+Scenes are drawn or listed. Shares have an interval, and over the intensity of the base motion a
+lognormal curve. The numbers of a scene that have a spread (`scenes.files`) are drawn together,
+quasi-randomly. They give u_input, how far a figure may lie from the scene's because the scene
+itself is not known exactly (ASME V&V 20-2009, section 4, by sampling), and Sobol indices: which
+number matters most.
 """
 
 from __future__ import annotations
@@ -33,17 +33,16 @@ from rockcheck.validation.uncertainty.numerical import Numerical
 Floats = NDArray[np.float64]
 #: Median and dispersion where no lognormal curve fits.
 NO_FIT = math.nan, math.nan
-#: Time (s) that a run goes on after the base's motion while its outcome is open; and the share of
-#: the energy of tipping over below which the outcome is decided: a hundredth is left to the model's
-#: own error.
+#: Time (s) added after the base's motion while the outcome is open; and the share of the energy of
+#: tipping over below which the outcome is decided: a hundredth is left for the model's own error.
 SETTLE, ENOUGH = 6.0, 0.99
 
 
 class Runs(Stored):
-    """What a model makes of scenes, one value a run.
+    """Runs of scenes by one model, one value a run.
 
-    `side` is -1 overturned left, +1 right, 0 neither. `failed` runs say nothing, whatever the other
-    fields hold of them. `figures` by name: peak_rotation (alpha).
+    `side` is -1 overturned left, +1 right, 0 neither. The other fields of a `failed` run mean
+    nothing. `figures` by name: peak_rotation (alpha).
     """
 
     side: tuple[int, ...]
@@ -96,12 +95,12 @@ def decided(scene: Scene, player: Any) -> History:
     """The history of a scene until its outcome is certain, whatever its duration.
 
     A block that has not tipped past its balance when the base comes to rest, and has too little
-    energy left to do so, is safe. Any other run is made again and goes on for `SETTLE` s; what then
+    energy left to do so, is safe. Any other run is made again, `SETTLE` s longer; a block that then
     stands is safe.
     """
     quiet = max(scene.excitation.quiet_after, scene.vertical.quiet_after)
     needed = scene.gravity * (scene.block.radius - scene.block.weaker_pivot.height)
-    for settle in (0.0, SETTLE):  # few rows: only the outcome is asked
+    for settle in (0.0, SETTLE):  # few rows: only the outcome is needed
         history = player.simulate(scene.replace(duration=quiet + settle, output_step=0.02))
         names = ("theta", "y", "x_dot", "y_dot", "theta_dot")
         theta, y, *rates = (history.channels[name][-1] for name in names)
@@ -161,14 +160,13 @@ def curve_of(
 
 
 def share_of(hits: NDArray[np.int64], decided: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
-    """Share and the ends of its `CONFIDENCE` interval at each intensity, from counts of runs
-    (motion, intensity).
+    """Share and the ends of its `CONFIDENCE` interval at each intensity, by Wilson (1927).
 
-    It is Wilson's interval (1927), which holds near 0 and 1, too, where motions drawn anew all say
-    the same. The directions of a motion tell of the same motion, so the number in it is the
-    effective one: share (1 - share) over the variance of the share between motions, at least that
-    of the motions and at most that of the runs (Korn and Graubard 1998). NaN where no run was
-    decided.
+    The counts of runs are (motion, intensity). Wilson's interval also holds near 0 and 1, where
+    motions drawn anew would all agree. Runs in the two directions of a motion are not independent,
+    so the interval uses an effective number of runs: share (1 - share) over the variance of the
+    share between motions, at least the number of motions and at most that of runs (Korn and
+    Graubard 1998). NaN where no run was decided.
     """
     runs, motions = decided.sum(axis=0), (decided > 0).sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -185,7 +183,7 @@ def share_of(hits: NDArray[np.int64], decided: NDArray[np.int64]) -> tuple[Float
 def _median_between(
     intensities: Floats, hits: NDArray[np.int64], decided: NDArray[np.int64], draws: int
 ) -> tuple[float, float]:
-    """The interval of the fitted median: of sets of motions drawn anew, where most have a fit."""
+    """Interval of the fitted median by redrawing motions; `NO_FIT` if under 90 % of draws fit."""
     sets = np.random.default_rng(2).integers(len(hits), size=(draws, len(hits)))
     medians = [
         fit_lognormal(intensities, hits[rows].sum(axis=0), decided[rows].sum(axis=0))[0]
@@ -200,8 +198,8 @@ def fit_lognormal(
 ) -> tuple[float, float]:
     """Median and dispersion of the lognormal curve of the greatest likelihood (Baker 2015).
 
-    `hits` counts the runs, of those that were decided, in which it happened at each intensity.
-    `NO_FIT` where that is all or none, or where the curve does not rise with the intensity.
+    `hits` counts the decided runs (`runs`) in which the event happened at each intensity. `NO_FIT`
+    where that is all or none of them, or where the curve does not rise with the intensity.
     """
     from scipy import optimize, special
 
@@ -221,7 +219,7 @@ def fit_lognormal(
     return (float(np.exp(centre - level / slope)), float(1.0 / slope)) if slope > 0.0 else NO_FIT
 
 
-#: Draws unless more are asked for; Sobol's sequence is balanced for powers of two.
+#: Default number of draws; Sobol's sequence is balanced for powers of two.
 SAMPLES = 1024
 #: Rows of a band's history at the most: a picture has no more columns.
 MOST_ROWS = 2000
@@ -246,8 +244,9 @@ class Interval(Stored):
 
 
 class Sensitivity(Stored):
-    """Sobol indices of one uncertain number: shares of a figure's variance, by itself and with all
-    others.
+    """Sobol indices of one uncertain number.
+
+    Shares of a figure's variance: `first` by the number alone, `total` with all others.
     """
 
     name: str
@@ -256,7 +255,7 @@ class Sensitivity(Stored):
 
 
 class Inputs(Stored):
-    """What the spread of the inputs makes of a scene's figures.
+    """A scene's figures with their intervals from the spread of its inputs.
 
     `figures`: peak rotation (alpha; a block that falls counts as 1, the balance point) and last
     slip (m; of the blocks that stand) at the scene's own numbers, between the 2.5 and 97.5 %
@@ -275,8 +274,7 @@ class Inputs(Stored):
     note: str = ""
 
     def u_input(self, name: str) -> float | None:
-        """Half the 95 % interval of a figure, on its longer side; None for a figure that is not
-        among them.
+        """Half the 95 % interval of a figure, on its longer side; None for an unknown figure.
 
         Of theta_rms the RMS over time of half the band's width, alpha.
         """
@@ -287,8 +285,11 @@ class Inputs(Stored):
 
 @dataclass(frozen=True)
 class Propagated:
-    """Draws of a scene, played: what they say, and the bands on theta (alpha) at times `t` (s), a
-    row a quantile of `BANDS`.
+    """Draws of a scene, played.
+
+    `bands` on theta (alpha) have a row for each quantile of `BANDS` and a column for each of the
+    times `t` (s). `values` are the numbers of each draw, `peaks` its peak rotation (alpha, at most
+    1), `fallen` whether it overturned.
     """
 
     inputs: Inputs
@@ -307,11 +308,10 @@ def propagate(
     seed: int = _SEED,
     indices: bool = True,
 ) -> Propagated:
-    """Play `samples` draws of an uncertain scene with an event-based model (default: the unilateral
-    one).
+    """Play draws of an uncertain scene with an event-based model (default: the unilateral one).
 
-    Deterministic in `seed`. Raises `InputError` where nothing of the scene is uncertain, or a draw
-    is not a scene.
+    `samples` is rounded up to a power of two. Deterministic in `seed`. Raises `InputError` where
+    nothing of the scene is uncertain, or a draw is not a scene.
     """
     from scipy.stats import binomtest, qmc
 
@@ -356,11 +356,10 @@ def propagate(
 def sensitivities(
     given: UncertainScene, model: EventBasedModel, *, samples: int = SAMPLES, seed: int = _SEED
 ) -> tuple[Sensitivity, ...]:
-    """First and total Sobol indices of the peak rotation (Saltelli et al. 2010, by scipy), largest
-    total first.
+    """First and total Sobol indices of the peak rotation, largest total first.
 
-    `samples` (a power of two) times the number of inputs and two more runs. Empty where the peak
-    does not vary.
+    By scipy, after Saltelli et al. (2010). The number of runs is `samples` (a power of two) times
+    the number of inputs plus two. Empty where the peak does not vary.
     """
     from scipy.stats import sobol_indices
 
@@ -388,7 +387,7 @@ def sensitivities(
 
 
 def _ends(values: Floats | list[float]) -> tuple[float, float]:
-    """Between them lie `CONFIDENCE` of the values."""
+    """The ends of the interval that holds `CONFIDENCE` of the values."""
     low, high = np.quantile(values, (0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE))
     return float(low), float(high)
 
@@ -408,7 +407,7 @@ def quantities_of(
     """The numerical uncertainty of each figure, for `--json` and as blocks.
 
     `parts` is the time (s) from which the motion depends on the law of impacts: from there on no
-    step makes a figure sure.
+    step is fine enough to make a figure sure.
     """
     converged = numerical is not None and numerical.converged and parts is None
     quantities: list[dict[str, Any]] = []
@@ -441,7 +440,7 @@ def quantities_of(
 
 
 def inputs_blocks(inputs: Inputs) -> list[Block]:
-    """What the spread of the inputs makes of the figures, and which input matters most."""
+    """Tables of the figures with their input intervals, and of the sensitivities of the peak."""
     about = f"{inputs.samples} draws of {', '.join(inputs.names)}, played by {inputs.model}"
     shares = [[s.name, max(s.first, 0.0), max(s.total, 0.0)] for s in inputs.sensitivities]
     return [

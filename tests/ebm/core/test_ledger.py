@@ -3,7 +3,6 @@ and a paragraph each; short functions."""
 
 from __future__ import annotations
 
-import ast
 import collections
 import enum
 import importlib
@@ -93,11 +92,3 @@ def test_a_name_has_one_value():
                     values[member.name].add(float(member))
     assert {key: found for key, found in values.items() if len(found) > 1} == {}
     assert len(values) > 100
-
-
-def test_functions_take_few_arguments():
-    """None more than eight."""
-    for name, tree in ledger.sources().items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.FunctionDef):
-                assert len(node.args.args) <= 8, f"{name} {node.name}"

@@ -1,3 +1,1 @@
-"""Canonical phenomena of rigid contact, each with a certain answer, and the card that an engine
-gets.
-"""
+"""Canonical phenomena of rigid contact, each with a certain answer, and the card of an engine."""

@@ -1,4 +1,4 @@
-"""The phenomena: tiny scenes, what is read off their histories, and what is certain about it.
+"""The phenomena: tiny scenes, the figure read off their histories, and its certain value.
 
 All figures are read off positions (t, x, y, theta), so that any simulator that writes those can be
 judged.
@@ -35,7 +35,7 @@ DROP = 0.2  # m
 
 @dataclass(frozen=True)
 class Motion:
-    """A history whose channels are attributes; raises `InputError` for one that it has not."""
+    """A history with its channels as attributes; raises `InputError` for a channel it lacks."""
 
     history: History
 
@@ -47,11 +47,11 @@ class Motion:
 
 @dataclass(frozen=True)
 class Phenomenon:
-    """One row of a card: `value` of the motions of its scenes, in their order, should be `target`,
-    and is allowed to be off by `limit`; one without limit is reported only.
+    """One row of a card: a value read off motions, its target and its limit.
 
-    `means` is what a failure means for a user of the engine, `cure` what to look at. `needs` names
-    what an engine may declare to lack.
+    `value` takes the motions of `scenes`, in their order. Its result should be `target` and may be
+    off by `limit`; without a limit it is reported only. `means` is what a failure means for a user
+    of the engine, `cure` what to look at. `needs` names what an engine may declare to lack.
     """
 
     id: str
@@ -128,8 +128,9 @@ CREEP = Scene(
 
 
 def cone(m: Motion) -> float:
-    """The coefficient at which slip begins over mu: the base's acceleration grows by j t, so a free
-    slip by j (t - t0)^3/6.
+    """Coefficient of friction at which slip begins, over mu.
+
+    The base's acceleration is j t, so a slip from t0 on is j (t - t0)^3/6.
     """
     rate, slipped = G / RAMP_TIME, 0.01
     # Once slipping, friction stays mu g: x = j (t - t0)^3 / 6.
@@ -227,8 +228,9 @@ def uplift(m: Motion) -> float:
 
 
 def housner(m: Motion) -> float:
-    """The ratio of angular velocities over the first impact, from the turning points, over
-    1 - 1.5 sin^2(alpha).
+    """Ratio of angular velocities over the first impact, over Housner's 1 - 1.5 sin^2(alpha).
+
+    The velocities follow from the turning points, by energy.
     """
     alpha = SLENDER.alpha
     swing = float(np.max(-m.theta[(m.t > _when(m.t, -m.theta, 0.0)) & (m.t < 2.2)]))
@@ -237,7 +239,7 @@ def housner(m: Motion) -> float:
 
 
 def period(m: Motion) -> float:
-    """The quarter period, up to the first impact, over Housner's, without his small angles."""
+    """The quarter period, up to the first impact, over Housner's without small angles."""
     alpha, p = SLENDER.alpha, SLENDER.frequency_parameter
     nodes, weights = np.polynomial.legendre.leggauss(60)
     # theta = tilt - root^2 takes the singularity at the start away.
@@ -252,7 +254,7 @@ def falls(m: Motion) -> float:
     return float(m.history.outcome.startswith("overturned"))
 
 
-# What no mechanics does.
+# Forbidden by mechanics.
 
 TUMBLE = Scene(
     name="tumble",
@@ -285,8 +287,9 @@ LANDS = math.sqrt(2.0 * 0.1 / G)
 
 
 def energy_gained(m: Motion) -> float:
-    """The largest rise of the energy above its lowest before, over its first, from differences of
-    positions.
+    """Largest rise of the energy above its lowest value before, over its first value.
+
+    Velocities are differences of positions.
     """
     rates = [np.diff(channel) / np.diff(m.t) for channel in (m.x, m.y, m.theta)]
     y, theta = (0.5 * (channel[1:] + channel[:-1]) for channel in (m.y, m.theta))
@@ -295,7 +298,7 @@ def energy_gained(m: Motion) -> float:
 
 
 def restlessness(m: Motion) -> float:
-    """How far any corner strays from its place, mm."""
+    """Largest displacement of any corner, mm."""
     strayed = np.abs(m.x) + np.abs(m.y - SLENDER.half_height) + SLENDER.radius * np.abs(m.theta)
     return 1e3 * float(np.max(strayed))
 
@@ -304,7 +307,7 @@ def moving_base(loose: Motion, light: Motion, falling: Motion) -> float:
     """The larger of two errors, both shares.
 
     How far a loose block leaves its place in space; how far the motion on a base that falls with
-    g/2 is from that under g/2.
+    g/2 differs from the motion under g/2.
     """
     t, x, pulse = loose.t, loose.x, 2.0 * math.pi / SHAKE.period
     base = SHAKE.amplitude / pulse * (t - np.sin(pulse * t) / pulse)
@@ -312,13 +315,13 @@ def moving_base(loose: Motion, light: Motion, falling: Motion) -> float:
     return max(strayed, _apart(light.theta, falling.theta) / SLENDER.alpha)
 
 
-# Hand methods that are exact. A base motion of 3 % less, and of 3 % more, than what decides.
+# Hand methods that are exact. Base motions 3 % below and 3 % above the threshold.
 
 MARGINS = (0.97, 1.03)
-KICK, RESTED = 1e-3, 2.0  # s: of a step of the base's velocity; before a base moves that had not
-#: Of all shapes the one whose corner slips least under a step of velocity: not at all from 4/3 on.
+KICK, RESTED = 1e-3, 2.0  # s: duration of a step of the base's velocity; rest before it
+#: The shape whose corner slips least under a step of velocity: not at all if friction is 4/3.
 STUBBY = Block(half_width=0.5, half_height=1.0)
-#: So slender that its motion is linear, and what it loses at an impact nothing.
+#: So slender that its motion is linear and its loss at an impact negligible.
 NEEDLE = Block(half_width=0.02, half_height=1.0)
 NEEDLE_P = NEEDLE.frequency_parameter
 PUSH, PUSHED = 6.0, 0.25  # a rectangular pulse, m/s^2 and s
@@ -349,7 +352,7 @@ RECTANGLES = tuple(
     )
     for part in MARGINS
 )
-#: Amplitudes of one sine of four times the block's frequency, in g alpha: just too small, and not.
+#: One sine of four times the block's frequency, just below the threshold amplitude and above.
 SINES = tuple(
     _pulsed(
         f"sine-{ratio:g}",
@@ -408,7 +411,7 @@ def _integral(scene: Scene) -> bool:
 
 
 def _lift(*motions: Motion) -> float:
-    """How far the block's centre rises above where it was released, mm."""
+    """Largest rise of the block's centre above its place of release, mm."""
     return 1e3 * max(float(np.max(m.y) - m.y[0]) for m in motions)
 
 

@@ -1,5 +1,7 @@
-"""`rockcheck conformance`: engines, models of the user's own and histories written elsewhere,
-each held against phenomena with a certain answer; and the scenes for an engine elsewhere.
+"""`rockcheck conformance`: engines, user-defined models and histories, judged by phenomena.
+
+Each phenomenon has a certain answer; histories may be written elsewhere. `export` writes the scenes
+for an engine elsewhere.
 """
 
 from __future__ import annotations
@@ -38,13 +40,13 @@ from rockcheck.validation.finding import (
 from rockcheck.validation.studies.conformance.phenomena import PHENOMENA, SCENES, Motion
 from rockcheck.validation.study import Study, Task
 
-#: What a folder of histories says of itself, and how settings are called that nobody named.
+#: The file that describes a folder of histories; the name of unnamed settings.
 ABOUT, AS_IT_COMES = "engine.toml", "as it comes"
-#: The time step where none is given, and CPU time of a step as a rule, s.
+#: Default time step, and usual CPU time of a step, s.
 STEP, A_STEP = 1e-3, 1e-4
 #: A value that moved by more than this share of its limit has changed.
 SHARE = 0.1
-#: Verdicts, their words, their colours, and what they are for JUnit.
+#: Verdicts, their words, their colours, and their JUnit results.
 VERDICTS: dict[str, tuple[str, Verdict, Any]] = {
     "pass": ("conforms", "pass", None),
     "fail": ("fails", "fail", Failed),
@@ -54,7 +56,7 @@ VERDICTS: dict[str, tuple[str, Verdict, Any]] = {
 }
 
 
-#: A card, as JSON has it; the columns that say whose it is, and those of its rows.
+#: A card, as in JSON; the columns that identify its player, and those of its rows.
 Card = dict[str, Any]
 HEAD = (
     Column("engine", kind="model"),
@@ -67,10 +69,10 @@ ROW = ("id", "name", "target", "value", "limit", "unit", "verdict", "reason")
 
 @dataclass(frozen=True)
 class Player:
-    """Who takes part: a model by the name and with the settings that it is built by.
+    """A participant: a model by name, with the settings that it is built with.
 
-    `engine`, `version`, `settings` and `step` (s) are the words of its card. `cost` is the CPU time
-    of a simulated second as a rule, `search` holds folders in which code of one's own may lie.
+    `engine`, `version`, `settings` and `step` (s) are the words of its card. `cost` is the usual
+    CPU time of a simulated second; `search` lists folders that may hold the user's code.
     """
 
     engine: str
@@ -90,7 +92,7 @@ def named(name: str, settings: str | None, given: Mapping[str, Any]) -> Player:
     kind = {"settings": settings or "best"} if settings or not own else {}
     built_by = {"time_step": STEP, **kind, **given}
     if not own:
-        build(name, built_by)  # what is not usable is told before anything runs
+        build(name, built_by)  # an unusable player is refused before anything runs
     more = (
         f"{key}={value}" for key, value in given.items() if key not in ("settings", "time_step")
     )
@@ -147,7 +149,7 @@ class Trial(Task):
 
 @dataclass(frozen=True)
 class Seen:
-    """What a player showed: a value, or None where it lacks a part or nothing could be read off."""
+    """The result of a player: a value, or None where it lacks a part or no value could be read."""
 
     value: float | None
     verdict: str
@@ -158,7 +160,7 @@ class Seen:
 
 @dataclass(frozen=True)
 class Conformance(Study):
-    """Who is held against the phenomena."""
+    """The players whose conformance is judged."""
 
     players: tuple[Player, ...]
     name = "conformance"
@@ -188,7 +190,7 @@ class Conformance(Study):
                 _in_units(scene, history)
         try:
             value = float(what.value(*map(Motion, histories)))
-        except (ValueError, IndexError) as error:  # what is asked for does not happen in the motion
+        except (ValueError, IndexError) as error:  # the motion lacks the wanted event
             raise ModelFailure(printable(error, 200)) from None
         told = {note for scene in what.scenes for note in scene_notes(scene)}  # of our own scenes
         said = (note for history in histories for note in history.notes)
@@ -220,8 +222,9 @@ class Conformance(Study):
 
 
 def _in_units(scene: Scene, history: History) -> None:
-    """Raises `ModelFailure` for a history that does not begin as its scene does, or does not last:
-    as a rule a column in other units than its name says.
+    """Raises `ModelFailure` for a history that does not begin and end as its scene does.
+
+    As a rule a column is then in other units than its name says.
     """
     t, size = history.channels["t"], scene.block.radius
     begins = dict(zip(("x", "y", "theta"), scene.initial_state, strict=False))
@@ -350,7 +353,7 @@ def junit(cards: Sequence[Card]) -> str:
 
 
 def wrote(path: Path) -> bool:
-    """Whether that is a finished study, a folder or its `run.json`."""
+    """Whether the path is a finished study: a folder or its `run.json`."""
     try:
         data = read_json(path / "run.json" if path.is_dir() else path)
     except InputError:
@@ -359,10 +362,11 @@ def wrote(path: Path) -> bool:
 
 
 def changes(before: Path, after: Path) -> Finding:
-    """What changed between two finished studies, each a folder or its `run.json`: every verdict,
-    and every value that moved by more than `SHARE` of its limit. Cards meet by engine and settings.
+    """Changes between two finished studies, each a folder or its `run.json`.
 
-    Exit code 1 where something conformed before and does not any more.
+    Listed are every changed verdict, and every value that moved by more than `SHARE` of its limit.
+    Cards are matched by engine and settings. Exit code 1 where a phenomenon conformed before and
+    does not any more.
     """
     old, new = _read(before), _read(after)
     rows: list[list[Any]] = []
@@ -416,7 +420,7 @@ def _read(path: Path) -> dict[tuple[str, str, str], dict[str, Any]]:
 
 
 TEXTS = Path(__file__).parents[2] / "data" / "export"
-#: Of the sampled base motion, s.
+#: Time step of the sampled base motion, s.
 BASE_STEP = 1e-3
 STATE = ("x_m", "y_m", "theta_rad", "x_dot_m_s", "y_dot_m_s", "theta_dot_rad_s")
 MOTION = ("t_s", "x_velocity_m_s", "y_velocity_m_s", "x_acceleration_m_s2", "y_acceleration_m_s2")
@@ -425,7 +429,7 @@ MOTION = ("t_s", "x_velocity_m_s", "y_velocity_m_s", "x_acceleration_m_s2", "y_a
 def export(folder: Path) -> list[str]:
     """Write all scenes as tables into a folder; returns their names.
 
-    An `engine.toml` that is there stays.
+    An existing `engine.toml` stays as it is.
     """
     for name, scene in SCENES.items():
         if scene.excitation.kind != "rest" or scene.vertical.kind != "rest":

@@ -1,5 +1,6 @@
-"""`rockcheck conformance --tune`: engines' own parameters for a wanted restitution and friction,
-found by dropping a block and sliding it.
+"""`rockcheck conformance --tune`: engines' parameters for a wanted restitution and friction.
+
+They are found by dropping a block and by sliding it.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ from rockcheck.validation.finding import Column, Finding, Mark, Table, text
 from rockcheck.validation.studies.conformance.phenomena import DROP, SQUAT, FloatArray, G
 from rockcheck.validation.study import Study, Task
 
-#: How near the wanted restitution has to be, and a friction, of itself.
+#: Tolerance of the restitution, absolute, and of the friction, relative.
 NEAR = 2e-3
 SLIDING = 1.5  # m/s
-#: What may be wanted: least and most.
+#: Allowed values: least and most.
 WANTED = {
     "restitution": (0.0, 1.0),
     "friction": (1e-6, 1.3),
@@ -35,8 +36,10 @@ WANTED = {
 
 @dataclass(frozen=True)
 class Knob:
-    """The parameter that sets an engine's restitution: its bounds, and all parameters in the
-    engine's own words, which `calibrate` fills in.
+    """The parameter that sets an engine's restitution.
+
+    `bounds` are its limits; `words` are all parameters in the engine's own words, in which
+    `calibrate` fills in the numbers.
     """
 
     bounds: tuple[float, float]
@@ -126,8 +129,10 @@ KNOBS: dict[str, Knob] = {
 
 @dataclass(frozen=True)
 class Calibration:
-    """What an engine needs, in its own words, and what was reached with it: restitution, friction,
-    penetration (m).
+    """Parameters in the engine's own words, and the contact reached with them.
+
+    Reached are `restitution`, `friction` and `penetration` (m) at a `step` (s); `reached` tells
+    whether they are near enough to the wanted ones.
     """
 
     engine: str
@@ -142,10 +147,11 @@ class Calibration:
 def calibrate(
     engine: str, *, restitution: float, friction: float, time_step: float, penetration: float
 ) -> Calibration:
-    """The parameters with which a block dropped from 0.2 m rebounds, and one at 1.5 m/s slides, as
-    wanted.
+    """Parameters with which an engine reaches a wanted restitution and friction.
 
-    Raises `InputError` where the engine cannot reach the restitution, naming what it can.
+    The rebound of a block dropped from 0.2 m gives the restitution, the way of one sliding at
+    1.5 m/s the friction. Raises `InputError` where the engine cannot reach the restitution, naming
+    what it can.
     """
     from scipy.optimize import brentq
 
@@ -163,7 +169,7 @@ def calibrate(
     )
 
     def dropped(setting: float) -> tuple[float, float]:
-        """The restitution seen, and the penetration, m."""
+        """Restitution of the rebound, and penetration, m."""
         parameters = {"restitution": setting, "friction": friction}
         heights = _played(model, drop, parameters, step)[:, 1] - SQUAT.half_height
         later = heights[int((math.sqrt(2.0 * DROP / G) + 0.02) / step) :]
@@ -222,9 +228,7 @@ def _played(model: Any, scene: Scene, parameters: Mapping[str, float], step: flo
 
 @dataclass(frozen=True)
 class Tune(Task):
-    """What is wanted of an engine: restitution, friction, and a penetration (m) that is not
-    exceeded, at a step (s).
-    """
+    """An engine's wanted restitution and friction, and largest penetration (m), at a step (s)."""
 
     engine: str
     restitution: float
@@ -246,7 +250,7 @@ class Tune(Task):
 
 @dataclass(frozen=True)
 class Tuning(Study):
-    """What is wanted, engine by engine."""
+    """The wanted restitution and friction of each engine."""
 
     wanted: tuple[Tune, ...]
     name = "tuning"
@@ -262,7 +266,7 @@ class Tuning(Study):
         return calibrate(**task.fields())
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
-        """Parameters, and what they reach. Raises `InputError` where no engine can."""
+        """Tables of parameters and contacts reached. Raises `InputError` where no engine can."""
         ended = [done[task] for task in self.wanted if task in done]
         found = [one for one in ended if isinstance(one, Calibration)]
         for one in ended:

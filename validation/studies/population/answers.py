@@ -1,4 +1,4 @@
-"""What the runs of an assessment say, as a finding, led by a sentence for an engineer's report."""
+"""Answers from the runs of an assessment, led by a sentence for an engineer's report."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from rockcheck.validation.finding import (
 from rockcheck.validation.studies.population.runs import Played, Ran, Side, Sure
 from rockcheck.validation.uncertainty.population import inputs_blocks, quantities_of, share_of
 
-#: What the other law of impacts is called among the models.
+#: Name of the runs by the other law of impacts, among the models.
 LAW = "impact law"
 OUTCOMES = ("at rest", "moving", "overturned left", "overturned right")
 #: A slip (m) or rotation (alpha) below this is none.
@@ -66,7 +66,7 @@ ASKS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Found:
-    """What was played, by the case: the scene under each of its motions.
+    """The runs of an assessment, by the case: the scene under each of its motions.
 
     `drawn` has the draws of each case (empty: none were asked for) with the numbers in `inputs`, by
     name; `at_gaps` the runs at each gap (m), `free` those without the wall on `sides`; `others` the
@@ -225,8 +225,11 @@ def quantity_of(name: str, runs: Sequence[tuple[str, Ran]]) -> dict[str, Any]:
 
 
 def gaps_of(found: Found) -> dict[str, Any]:
-    """What each gap does; the clear distance without which a block would strike; the largest gap up
-    to which no run overturns.
+    """Outcomes at each gap, the clearance that is needed, and the largest safe gap.
+
+    `clearance` (m) is the largest reach without the wall: nearer than that a block would strike.
+    `none_overturns_up_to` (m) is the largest gap up to which no run overturns. `monotonic` tells
+    whether a wider gap never lets fewer runs overturn.
     """
     rows: list[dict[str, Any]] = []
     for gap, runs in found.at_gaps.items():
@@ -262,8 +265,9 @@ def gaps_of(found: Found) -> dict[str, Any]:
 
 
 def contributions_of(found: Found) -> list[dict[str, Any]]:
-    """Shares of the variance of the peak rotation by source, the largest first; a block that falls
-    counts as 1 alpha.
+    """Shares of the variance of the peak rotation by source, the largest first.
+
+    A block that falls counts as 1 alpha.
     """
     nominal = found.nominal
     peaks = {case: [run.peak for run in runs] for case, runs in found.runs.items() if runs}
@@ -310,7 +314,7 @@ def contributions_of(found: Found) -> list[dict[str, Any]]:
 
 
 def criteria_of(found: Found) -> list[dict[str, Any]]:
-    """What hand methods say of the cases, and how often that agrees with the simulation."""
+    """Predictions of hand methods for the cases, and how often they agree with the simulation."""
     cases = [
         (played.runs[0], played.said)
         for played in found.shown.values()
@@ -372,7 +376,7 @@ def _median(values: Sequence[float | None]) -> float | None:
 def fall_sentences(
     found: Found, runs: Sequence[tuple[str, Ran]], overturning: Mapping[str, Any]
 ) -> list[str]:
-    """What happens."""
+    """How the runs end."""
     name, count = found.own.scene.name, overturning["count"]
     if not runs:
         return [f"{name}: no run has a result."]
@@ -576,7 +580,7 @@ def strips(found: Found) -> list[Block]:
 
 
 def gap_blocks(gaps: Mapping[str, Any]) -> list[Block]:
-    """What each gap does."""
+    """Outcomes at each gap."""
     rows = gaps["gaps"]
     if not rows:
         return []
@@ -691,7 +695,7 @@ def model_blocks(found: Found) -> list[Block]:
 
 
 def criteria_table(criteria: Sequence[Mapping[str, Any]]) -> Table:
-    """What hand methods say, beside the simulation."""
+    """Predictions of hand methods, beside the simulation."""
     columns = [
         text("name", "method"),
         text("event", "it"),

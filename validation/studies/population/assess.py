@@ -1,8 +1,8 @@
-"""The engineer's question: does the block fall, how far does it move, how sure is that, which gap
-is safe, at which intensity does it fall, and what would hand methods have said.
+"""The engineer's questions: does the block fall, how far does it move, and how sure is that.
 
-One scene under its own base motion or under records; each run again with its numbers drawn, with
-other gaps, by other models.
+Also: which gap is safe, at which intensity does it fall, and what would hand methods have said. One
+scene under its own base motion or under records; each run again with its numbers drawn, with other
+gaps, by other models.
 """
 
 from __future__ import annotations
@@ -75,8 +75,9 @@ class Assessment(Study):
 
     @cached_property
     def draws(self) -> tuple[Numbers, ...]:
-        """The numbers of each draw, the same for every case; none without records, since they are
-        then drawn about the single run.
+        """The numbers of each draw, the same for every case.
+
+        Empty without records: the numbers are then drawn about the single run.
         """
         first = next(iter(self.cases.values()))
         if not (self.samples and self.recorded):
@@ -244,8 +245,10 @@ class Assessment(Study):
 
 
 def gaps_of(text: str, scene: Scene) -> tuple[tuple[float, ...], tuple[Side, ...], Scene]:
-    """What --gaps says: `0.05,0.1` of the scene's walls, or `left:0.05,0.1` of that side, where a
-    wall without rebound is put if there is none. Raises `InputError`.
+    """Gaps (m), their sides, and the scene with the walls that `--gaps` asks for.
+
+    `0.05,0.1` are gaps of the scene's walls, `left:0.05,0.1` of that side, where a wall without
+    rebound is put if there is none. Raises `InputError`.
     """
     side, colon, numbers = text.rpartition(":")
     known_sides: tuple[Side, ...] = tuple(wall.side for wall in scene.walls)

@@ -29,8 +29,10 @@ MOST_ROWS = 2000
 
 
 class Ran(Stored):
-    """One run: its motion, how far it slid and reached to the left and to the right (m, also of a
-    block that falls), or why it has none.
+    """One run: its motion, or the reason why it has none.
+
+    How far the block slid and how far it reached to the left and to the right are in m, also of a
+    block that falls.
     """
 
     outcome: str
@@ -52,8 +54,10 @@ class Ran(Stored):
 
 
 class Played(Stored):
-    """The runs of a task, in the order of its variants; of the first perhaps the history as CSV,
-    and what hand methods say of it: by method, whether it happens, and how far.
+    """The runs of a task, in the order of its variants.
+
+    Of the first variant, where they were asked for: `history` as CSV, and `said`, by hand method
+    whether its event happens, and how far it goes.
     """
 
     runs: tuple[Ran, ...]
@@ -62,8 +66,10 @@ class Played(Stored):
 
 
 class Sure(Stored):
-    """How sure a run is: its numerical uncertainty, the time (s) from which it depends on the law
-    of impacts, and what its uncertain numbers make of it.
+    """How sure a run is: its numerical uncertainty, its law of impacts, its inputs.
+
+    `depends_on_law_from_s` is the time (s) from which the run depends on the law of impacts;
+    `inputs` is the effect of its uncertain numbers.
     """
 
     numerical: Numerical | None
@@ -73,8 +79,9 @@ class Sure(Stored):
 
 @dataclass(frozen=True)
 class Run(Task):
-    """Runs of one scene: as it is, or with numbers changed; a gap that is infinite takes the wall
-    away. `shown` asks for the history and for hand methods.
+    """Runs of one scene: as it is, or with numbers changed.
+
+    A gap that is infinite takes the wall away. `shown` asks for the history and for hand methods.
     """
 
     of: tuple[str, ...]
@@ -163,9 +170,7 @@ class Certainty(Task):
         return cell, drawn, provenance.code_digest(__name__)
 
     def play(self) -> Sure:
-        """The run at coarser steps or a finer tolerance, under other laws of impacts, and its
-        draws.
-        """
+        """Plays coarser steps or a finer tolerance, other laws of impacts, and the draws."""
         landing = parting_landing(self.scene)
         return Sure(
             numerical=numerical_uncertainty(build(self.model, dict(self.settings)), self.scene),

@@ -1,8 +1,7 @@
-"""A block under many motions at many intensities: incremental dynamic analysis (Vamvatsikos and
-Cornell 2002) and fragility.
+"""Incremental dynamic analysis (Vamvatsikos and Cornell 2002) and fragility.
 
-An intensity is in proportion to the size of its motion, so the factor of a motion is the wanted
-intensity over that of the motion as it is.
+A block is played under many motions at many intensities. An intensity is in proportion to the size
+of its motion, so the factor of a motion is the wanted intensity over the motion's own.
 """
 
 from __future__ import annotations
@@ -58,8 +57,8 @@ BAND: dict[float, Style] = {0.16: "dotted", 0.5: "smooth", 0.84: "dashed"}
 FALLEN = 1.25
 #: Sets of motions drawn anew for the interval of a fitted median.
 DRAWS = 200
-#: Time of a run as a rule, s, of compiled models and of others; and of all up to which no process
-#: of their own is worth while.
+#: Usual time of a run, s, of compiled models and of others; total time up to which separate
+#: processes are not worth while.
 A_RUN, A_SLOW_RUN, SOON = 1e-3, 1.0, 5.0
 
 
@@ -67,7 +66,7 @@ A_RUN, A_SLOW_RUN, SOON = 1e-3, 1.0, 5.0
 class Batch(Task):
     """Runs of a population that are played together: a scene at factors of its base motion.
 
-    `of` says of what in the population they are: a case, a motion.
+    `of` names their case and their motion.
     """
 
     of: tuple[str, ...]
@@ -78,7 +77,7 @@ class Batch(Task):
 
     @property
     def label(self) -> str:
-        """What it is of."""
+        """The case and the motion."""
         return ", ".join(filter(None, self.of))
 
     def depends(self) -> Any:
@@ -95,12 +94,11 @@ class Batch(Task):
 
 @dataclass(frozen=True, kw_only=True)
 class Population(Study):
-    """Scenes, by the names of the cases, each under all motions at all `levels` of intensity, in
-    both directions.
+    """Scenes, each under all motions at all `levels` of intensity, in both directions.
 
-    A motion has a name and its own intensity. `limits` are the events that have a curve: peaks
-    (alpha) by name. `across` is the intensity, `other` its axis in another unit; `data` is told
-    besides.
+    `cases` are the scenes by name. A motion has a name and its own intensity. `limits` are the
+    events that have a curve: peaks (alpha) by name. `across` is the intensity, `other` its axis in
+    another unit; `data` is added to the data of the finding.
     """
 
     name: str
@@ -181,8 +179,9 @@ class Population(Study):
 def blocks_of(
     curves: Sequence[Curve], across: Column, other: dict[str, Any] | None = None
 ) -> list[Block]:
-    """The curves, drawn and as tables, over the intensity `across`; `other`: its axis in another
-    unit, see `finding.Plot`.
+    """The curves, drawn and as tables, over the intensity `across`.
+
+    `other`: the axis of the intensity in another unit, see `finding.Plot`.
     """
     columns = [
         text("case", "event"),
@@ -235,8 +234,10 @@ def blocks_of(
 
 
 def lines_of(motions: Sequence[str], peaks: Floats, levels: Floats, across: Column) -> list[Block]:
-    """Peaks (motion, direction, intensity) as a line a motion, and their quantiles: the smallest
-    peak that the share of the motions does not exceed. A line ends where the block falls.
+    """Peaks (motion, direction, intensity) as a line a motion and direction, and their quantiles.
+
+    A quantile is the smallest peak that the share of the motions does not exceed. A line ends where
+    the block falls.
     """
     x, signs = levels.tolist(), (1, -1)
     quantiles = np.nanquantile(peaks.reshape(-1, len(x)), list(BAND), axis=0, method="inverted_cdf")
@@ -389,8 +390,10 @@ def fragility(
     settings: Mapping[str, Any] | None = None,
     left_out: Sequence[str] = (),
 ) -> Population:
-    """The probability of overturning, with the wall and without, for a set of records, or, without
-    any, for pulses of the scene's kind at `PULSES` frequencies, over p, between two.
+    """The probability of overturning over the intensity, with the wall and without.
+
+    The motions are a set of records or, without any, pulses of the scene's kind at `PULSES`
+    frequencies, over p, between the two of `frequencies`.
 
     The intensity is peak acceleration over g tan(alpha). Raises `InputError`.
     """

@@ -1,5 +1,7 @@
-"""The same spectra by the other models: at some nodes of each, the share of outcomes that are equal
-to the event-based models', and coarse maps of one figure.
+"""Overturning spectra by the other models: shares of equal outcomes, and coarse maps.
+
+At some nodes of each spectrum the outcomes are compared with those of the event-based models. The
+maps are of one figure.
 """
 
 from __future__ import annotations
@@ -24,9 +26,8 @@ from rockcheck.validation.studies.spectrum.tiles import Book, Request, letters_o
 from rockcheck.validation.uncertainty.population import SETTLE
 
 CANDIDATES = ("ebm-unilateral", "cm", "mujoco", "pybullet", "pymunk", "dart", "drake")
-#: The share of the nodes that a model plays, where it is not all. These engines draw no map:
-#: whether they, too, agree is told by fewer nodes, and a run of DART costs four times, one of Drake
-#: twice the others'.
+#: The share of the nodes that a model plays, where it is not all. These engines draw no map: fewer
+#: nodes show whether they agree; a run of DART costs four times, one of Drake twice the others'.
 PLAYED_SHARE = {"pymunk": 0.3, "dart": 0.1, "drake": 0.2}
 REFERENCES = {"ebm": "bilateral", "ebm-unilateral": "unilateral"}
 #: A node is near the boundary if a node of another outcome is among those at most this many nodes
@@ -43,11 +44,10 @@ Agreement = Mapping[str, Any]
 def choose_nodes(
     spectrum: Spectrum, count: int, name: str
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """`count` nodes (i, j) of a spectrum and whether each is near the boundary: half of them are,
-    where there are so many.
+    """`count` nodes (i, j) of a spectrum, and whether each is near the boundary.
 
-    The choice is random but depends only on `name`. Nodes that the reference could not decide are
-    left out.
+    Half of them are near it, where there are enough. The choice is random but depends only on
+    `name`. Nodes that the reference could not decide are left out.
     """
     near = near_boundary(spectrum.outcomes)
     random = np.random.default_rng(zlib.crc32(name.encode()))
@@ -62,8 +62,9 @@ def choose_nodes(
 
 
 def first_of(near: NDArray[np.bool_], count: int) -> NDArray[np.int64]:
-    """The indices of `count` of the chosen nodes, in the order chosen: the first half of each side,
-    or all nodes.
+    """The indices of `count` of the chosen nodes, or of all if there are no more.
+
+    They are the first ones chosen near the boundary and away from it, half of each.
     """
     if count >= len(near):
         return np.arange(len(near))
@@ -83,18 +84,19 @@ def near_boundary(outcomes: NDArray[np.int8]) -> NDArray[np.bool_]:
 
 
 def candidates() -> tuple[str, ...]:
-    """The models that are held against the event-based ones and are installed."""
+    """The installed models that are compared with the event-based ones."""
     return tuple(model for model in CANDIDATES if not not_installed(model))
 
 
 def nodes_played(model: str, count: int) -> int:
-    """At how many of `count` nodes of a spectrum a model plays; two at least, one on each side."""
+    """How many of `count` nodes of a spectrum a model plays: at least two, one on each side."""
     return max(2, round(PLAYED_SHARE.get(model, 1.0) * count))
 
 
 def plays(request: Request, panel: Panel) -> bool:
-    """Whether the model has what the panel asks of contacts; an engine without restitution does not
-    play walls that bounce.
+    """Whether the model can play the contacts of the panel.
+
+    An engine without restitution does not play walls that bounce.
     """
     model = build(request.model, request.settings)
     lacks = model.lacks() if isinstance(model, Engine) else ()
@@ -104,8 +106,10 @@ def plays(request: Request, panel: Panel) -> bool:
 def agree(
     book: Book, spectra: Mapping[Panel, Spectrum], request: Request, count: int
 ) -> Agreement | None:
-    """Up to `count` nodes of each spectrum by the other models, and how many outcomes are equal;
-    and a map of one figure by each model. None where nodes are still to be played.
+    """Equal outcomes of the other models at nodes of each spectrum, and their maps.
+
+    Up to `count` nodes of each spectrum are played; the maps are of one figure. None where nodes
+    are still to be played.
 
     `shares` are those of one model at the nodes of one spectrum, near the boundary or away from it:
     `equal` counts nodes against each of `REFERENCES`; `failed` are nodes that the model could not
@@ -176,7 +180,7 @@ def _coarse(request: Request) -> Request:
 
 
 def mapped(panels: Sequence[Panel]) -> list[Panel]:
-    """The panels of which every model draws a map: those of one figure."""
+    """The panels of the figure of which every model draws a map."""
     figures = [panel.figure for panel in panels]
     return [p for p in panels if p.figure == (MAPPED if MAPPED in figures else figures[0])]
 
@@ -202,7 +206,7 @@ def _maps(
 
 
 def blocks(found: Agreement, panels: Sequence[Panel], came: bool) -> Iterator[Block]:
-    """What a reader is told of it; `came`: it came with the package."""
+    """The agreement as text, tables and maps; `came`: whether it came with the package."""
     origin = f"Computed on {found['date']}"
     if came:
         origin = (

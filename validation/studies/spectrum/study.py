@@ -74,13 +74,13 @@ class Spectra(Study):
             check(panel.scene)  # type: ignore[misc]
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[tiles.Nodes]:
-        """What is asked for beyond what is done."""
+        """The nodes that are still to be played."""
         book = Book(done)
         self._found(book)
         return book.wanted
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
-        """The spectra that are whole, and what they say."""
+        """The complete spectra, and the findings from them."""
         found = self._found(Book(done))
         panels, spectra = list(found.spectra), list(found.spectra.values())
         nodes = sum(one.outcomes.size for one in spectra)
@@ -132,14 +132,12 @@ class Spectra(Study):
         return self.request.model == "ebm" and names >= {panel.name for panel in paper_panels()}
 
     def _stem(self, panel: Panel) -> str:
-        """The name of a spectrum's files: the panel's, and the model's where that is not the
-        paper's.
-        """
+        """The name of a spectrum's files: the panel's, and the model's unless it is the paper's."""
         model = self.request.model
         return panel.name if model == "ebm" else f"{panel.name}--{model}"
 
     def _found(self, book: Book) -> _Found:
-        """All that can be said by what is played; what is asked for beyond that is in the book."""
+        """All that follows from the nodes played; the book lists those still to be played."""
         request, found = self.request, _Found()
         how = request.model, request.settings
         i, j = (axis.ravel() for axis in np.meshgrid(*[_spread(request.size)] * 2, indexing="ij"))
@@ -263,8 +261,9 @@ class Spectra(Study):
         }
 
     def _about(self, panel: Panel, one: Spectrum) -> str:
-        """The settings of a spectrum's files, as JSON; a record's samples are left out: its name
-        says which it is.
+        """The settings of a spectrum's files, as JSON.
+
+        A record's samples are left out: its name identifies it.
         """
         scene = panel.scene.model_dump(mode="json")
         for part in ("excitation", "vertical"):
@@ -297,8 +296,9 @@ def _spread(size: int) -> NDArray[np.int64]:
 
 
 def _pulse(panel: Panel, request: Request) -> dict[str, Any] | None:
-    """Amplitude (m/s^2) and period (s) of the pulses along the axes, and the frequency and
-    amplitude ratio of one's `own` (None: of the paper's); None for a record.
+    """Amplitude (m/s^2) and period (s) of the pulses along the axes; None for a record.
+
+    `own` has the frequency and amplitude ratio of the user's own pulse; None for the paper's.
     """
     pulse = panel.scene.excitation
     if not isinstance(pulse, Ricker | Sine):
@@ -333,8 +333,9 @@ def _npz(spectrum: Spectrum, about: str) -> bytes:
 
 
 def _csv(spectrum: Spectrum, about: str) -> bytes:
-    """One row an amplitude ratio, one column a frequency ratio: -1 overturned left, 0 safe, 1
-    overturned right.
+    """Outcomes as CSV: one row an amplitude ratio, one column a frequency ratio.
+
+    -1 overturned left, 0 safe, 1 overturned right.
     """
     columns = ["amplitude_ratio\\frequency_ratio", *map(repr, spectrum.frequency_ratios.tolist())]
     rows = zip(spectrum.amplitude_ratios.tolist(), spectrum.outcomes.tolist(), strict=True)

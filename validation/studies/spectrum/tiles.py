@@ -1,6 +1,4 @@
-"""What a spectrum asks for: its request, the tasks that play its nodes, and what is whole of it by
-what has been played.
-"""
+"""A spectrum's request, the tasks that play its nodes, and the spectra that are complete."""
 
 from __future__ import annotations
 
@@ -38,18 +36,18 @@ from rockcheck.validation.uncertainty.population import compiled
 What = Literal["outcomes", "motions", "one impact"]
 #: Nodes of a tile of the compiled event-based models, and of a model that is simulated one by one.
 TILE, SLOW_TILE = 10_000, 20
-#: What a node takes as a rule, s: compiled, simulated, and its motion.
+#: Usual time of a node, s: compiled, simulated, and of its motion.
 A_NODE, A_SLOW_NODE, A_MOTION = 4e-5, 0.1, 2e-4
 #: Outcomes in text, by their code from `LEFT` on; and where the run failed.
 LETTERS, UNDECIDED = "LSR", "U"
-#: A history is played in so many equal parts, and thinned until straight lines between the rows
-#: that stay are within this much of it: of alpha in rotation, of the half width in position.
+#: Number of equal parts of a history; bound on its distance from straight lines between the rows
+#: that are kept: of alpha in rotation, of the half width in position.
 PARTS, COARSE = 400, 0.01
 
 
 @dataclass(frozen=True)
 class Nodes(Task):
-    """Nodes of one scene's spectrum by one model; `hash` of all that their record depends on."""
+    """Nodes of one scene's spectrum by one model; `hash` of all that the record depends on."""
 
     hash: str
     what: What
@@ -61,7 +59,7 @@ class Nodes(Task):
 
     @property
     def label(self) -> str:
-        """Whose nodes, and where they begin."""
+        """The scene, and the first of its nodes."""
         first = f"{self.frequencies[0]:.4g}, {self.amplitudes[0]:.4g}"
         return f"{self.scene.name} by {self.model}, {self.what} from {first}"
 
@@ -74,7 +72,7 @@ class Nodes(Task):
 class Played:
     """A letter a node: its outcome, or whether it overturned after one floor impact (Y or N).
 
-    Of motions the numbers of the nodes that could be played, in their order, and their rows t (s),
+    Of motions: the numbers of the nodes that could be played, in their order, and their rows t (s),
     theta (rad), x, y (m) below each other as base64 of float32; `ends` says where each ends.
     """
 
@@ -114,7 +112,7 @@ def nodes_of(
 
 
 def play(task: Nodes) -> Played:
-    """What is asked of the nodes."""
+    """Plays outcomes or motions of the nodes, or whether they overturn after one impact."""
     player = build(task.model, task.settings)
     if task.what == "motions":
         return _motions(task, player)
@@ -170,8 +168,10 @@ def _motions(task: Nodes, player: Any) -> Played:
 
 
 def enough(t: Floats, values: Floats, ends: NDArray[np.int64], coarse: float) -> NDArray[np.bool_]:
-    """Which rows of some motions to keep, so that straight lines between them are within `coarse`
-    of all `values` (n, k) at the times `t` (n). A motion's rows end before each of `ends`.
+    """Rows of some motions between which straight lines are accurate enough: the rows to keep.
+
+    The lines are within `coarse` of all `values` (n, k) at the times `t` (n). A motion's rows end
+    before each of `ends`.
 
     From a motion's first and last row on, each part is split at the row farthest from its straight
     line.
@@ -194,8 +194,8 @@ def enough(t: Floats, values: Floats, ends: NDArray[np.int64], coarse: float) ->
     return kept
 
 
-#: Settings of the models in spectra, where they are not their own: outcomes need no more, and take
-#: a tenth of the time.
+#: Settings of models in spectra that differ from their defaults: enough for outcomes, in a tenth
+#: of the time.
 SETTINGS: dict[str, dict[str, Any]] = {
     "ebm": {"tolerance": TOLERANCE},
     "ebm-unilateral": {"tolerance": TOLERANCE},
@@ -224,9 +224,9 @@ def axis(low: float, high: float, size: int, key: str) -> Floats:
 
 @dataclass(frozen=True)
 class Request:
-    """How spectra are to be played: grid, model and settings.
+    """Grid, model and settings with which spectra are played.
 
-    Raises `InputError` where that cannot be.
+    Raises `InputError` where the model cannot play them.
     """
 
     size: int = 100
@@ -266,12 +266,12 @@ class Request:
 
 
 class _Waiting(Exception):
-    """Nodes are asked for that have not been played."""
+    """Nodes that a spectrum needs have not been played."""
 
 
 @dataclass
 class Book:
-    """What has been played, and what is asked for beyond that."""
+    """The nodes that have been played, and those still to be played."""
 
     done: Mapping[Any, Any]
     wanted: list[Nodes] = field(default_factory=list)
@@ -296,8 +296,9 @@ class Book:
         return None if found is None else outcomes_of("".join(one.letters for one in found))
 
     def spectrum(self, panel: Panel, request: Request, settings: Any = None) -> Spectrum | None:
-        """A spectrum, None where nodes are still to be played: refinement then begins again with
-        all that is known.
+        """A spectrum; None where nodes are still to be played.
+
+        Refinement then begins again with all that is known.
         """
 
         def known(scene: Scene, a: Floats, f: Floats) -> Outcomes:

@@ -1,3 +1,1 @@
-"""Stress: random scenes against invariants, where engines break, and the smallest scenes that show
-a failure.
-"""
+"""Stress: random scenes against invariants, where engines break, and minimal failing scenes."""

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall
 
-#: What a family of models can play: the bilateral pivot neither bounces nor hops, Bouc-Wen friction
-#: has one coefficient, and a pivot that never slips does not start with slip.
+#: Kinds of scenes by what models can play: the bilateral pivot neither bounces nor hops, Bouc-Wen
+#: friction has one coefficient, and a pivot that never slips does not start with slip.
 Kind = Literal["bilateral", "unilateral", "bouc-wen", "no-slip"]
 #: Ranges: slenderness (rad), half diagonal (m), friction, amplitude over uplift's, period over the
 #: block's, step of records (s).
@@ -101,7 +101,7 @@ def _floor(mu: float, mu_s: float, bounce: float) -> Floor:
 
 
 def _scene(start: dict[str, Any], doubtful: Sequence[str], **settings: Any) -> Scene:
-    """A scene with as much of a start as it may have; what is `doubtful` of it goes first."""
+    """A scene with as much of its start as is valid; `doubtful` settings are dropped first."""
     settings["output_step"] = settings["duration"] / ROWS
     for key in doubtful:
         try:
@@ -136,7 +136,7 @@ def loaded(
 
 
 def most_friction(block: Block) -> float:
-    """As much as a scene may have, but for a little: with more a slipping pivot may jam."""
+    """Largest friction of a scene, but for a margin: with more a slipping pivot may jam."""
     return (
         FRICTION[1]
         if block.homogeneous
@@ -304,9 +304,7 @@ def _pick(r: np.random.Generator, values: tuple[float, ...]) -> float:
 
 
 def _exact_walls(r: np.random.Generator, block: Block) -> list[Wall]:
-    """No wall, one, or two: touching, at equal distances, or so that the block's diagonal just fits
-    between them.
-    """
+    """No wall, one, or two: touching, equidistant, or just wide enough for the block's diagonal."""
     gaps = (
         0.0,
         0.0,
@@ -327,8 +325,9 @@ def _exact_walls(r: np.random.Generator, block: Block) -> list[Wall]:
 
 
 def _exact_excitation(r: np.random.Generator, levels: tuple[float, ...]) -> Excitation:
-    """Rest, a pulse whose peak is one of the levels, or a record that jumps or ramps between few of
-    them.
+    """Rest, a pulse whose peak is one of the levels, or a record of few of them.
+
+    The record jumps, ramps or stays at a level.
     """
     kind = r.random()
     level = _sign(r) * _pick(r, levels[1:])

@@ -1,9 +1,9 @@
-"""What must hold of every history, whatever the scene.
+"""Invariants: conditions that hold for every history, whatever the scene.
 
 Each invariant gives a figure, which must stay below its bound.
 
 Figures are in natural units (lengths in R, accelerations in g, times in sqrt(R/g)), energies
-relative to what was at play.
+relative to the energy at play.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ DISTURBANCE, SEEN, DISTURBED, EXACT = 1e-7, 5e-7, 6, 1e-10
 FINE, MOST_ROWS = 64, 4000
 #: No condition is checked within this time (sqrt(R/g)) of an event or a jump.
 NEAR = 1e-9
-#: The reach of a block is known where it is so many times as large as what lies between two rows.
+#: The reach of a block is known where it is this many times the largest change between two rows.
 RESOLVES = 4.0
 #: An integral is used where rules of order 6 and 10 agree to this, relatively: the error of order
 #: 10 is then far smaller.
@@ -132,9 +132,7 @@ SWAPPED = {"overturned left": "overturned right", "overturned right": "overturne
 
 @dataclass(frozen=True, kw_only=True)
 class CheckedRun:
-    """What was found of one run: the figure of each invariant that was looked at, and how it failed
-    to end.
-    """
+    """One checked run: the figure of each invariant that was checked, and its failure, if any."""
 
     figures: dict[str, float]
     failure: str = ""
@@ -206,8 +204,10 @@ def check_run(
 
 
 def _wrong_clearance(model: EventBasedModel, scene: Scene, seed: int) -> bool:
-    """Whether a wall is struck that is out of reach by all that lies between two rows, or one is
-    not struck that is within; nothing is said of a block that falls, or hardly moves.
+    """Whether a wall just out of reach is struck, or one just within reach is not.
+
+    The distance to the reach is the largest change of the clearance between two rows. False for a
+    block that falls, or hardly moves.
     """
     side: Literal["left", "right"] = "left" if seed % 2 else "right"
     free = scene.replace(walls=())
@@ -242,13 +242,14 @@ def _energy(model: EventBasedModel, scene: Scene) -> float | None:
 
 
 def finer(model: EventBasedModel, times: float = 100.0) -> EventBasedModel:
-    """The same model at a tolerance so many times finer."""
+    """The same model at a tolerance that is finer by the factor `times`."""
     return model.model_copy(update={"tolerance": model.tolerance / times})
 
 
 def audited(scene: Scene) -> Scene:
-    """The scene with rows so dense that integrals over them are exact to 1e-10, and no longer than
-    can be afforded.
+    """The scene with rows so dense that integrals over them are exact to 1e-10.
+
+    It is cut after `MOST_ROWS` rows.
     """
     unit = math.sqrt(scene.block.radius / scene.gravity)
     step = 0.03 * unit
@@ -352,13 +353,12 @@ def _force_conditions(model: EventBasedModel, motion: Motion) -> tuple[float, fl
 
 
 def energy_error(model: EventBasedModel, motion: Motion) -> float | None:
-    """Largest change of energy, over eight rows without event or kink, that the work of base and
-    friction does not account for.
+    """Largest change of energy that the work of base and friction does not account for.
 
-    Relative to the energy and the work at play in the run, at least g R. Where friction is not
-    known (Bouc-Wen): what energy gains beyond the work of the base and what the friction spring can
-    hold. None where no eight rows can be judged: the history has fewer, events or kinks lie in all
-    of them, or the work is not resolved in any.
+    The change is over eight rows without event or kink, relative to the energy and the work at play
+    in the run, at least g R. Where friction is not known (Bouc-Wen): the gain of energy beyond the
+    work of the base and what the friction spring can hold. None where no eight rows can be judged:
+    the history has fewer, events or kinks lie in all of them, or the work is not resolved in any.
     """
     scene, radius, vg = motion.scene, motion.radius, motion.vertical
     if len(motion.channels["t"]) <= GROUP:
@@ -407,9 +407,7 @@ def _friction_power(motion: Motion) -> Floats:
 
 
 def _whole_groups(scene: Scene, history: History) -> tuple[Mask, Mask]:
-    """Which groups of eight steps have neither event nor kink inside, and in which the mode of
-    motion is the same in all rows.
-    """
+    """Which groups of eight steps have no event or kink inside; which have one mode in all rows."""
     t, mode = history.channels["t"], history.channels["mode"]
     groups = (len(t) - 1) // GROUP
     edges = t[: groups * GROUP + 1 : GROUP]
@@ -423,7 +421,7 @@ def _whole_groups(scene: Scene, history: History) -> tuple[Mask, Mask]:
     near = 1e-9 * scene.output_step
 
     def without(times: list[float], margin: float) -> Mask:
-        """Groups within whose edges, and such a margin, none of the times lies."""
+        """Groups, widened by `margin` on both sides, in which none of the times lies."""
         places = np.sort(np.array([*times, math.inf]))
         first, last = edges[:-1] - margin, edges[1:] + margin
         return np.asarray(np.searchsorted(places, first) == np.searchsorted(places, last))
@@ -440,8 +438,9 @@ def _whole_groups(scene: Scene, history: History) -> tuple[Mask, Mask]:
 
 
 def _mirror(model: EventBasedModel, motion: Motion) -> float:
-    """How many values differ from those of the mirror image, to the bit; infinitely many where it
-    is longer.
+    """Number of values that differ in any bit from those of the mirror image.
+
+    Infinite where the lengths differ, or the mirrored run fails.
     """
     history = motion.history
     try:
@@ -461,8 +460,9 @@ def _mirror(model: EventBasedModel, motion: Motion) -> float:
 
 
 def similar(scene: Scene, seed: int) -> Scene:
-    """The scene at another scale: lengths times k, times sqrt(k), accelerations the same; k is
-    random in 0.01 to 100.
+    """The scene at another scale, with the same accelerations.
+
+    Lengths are multiplied by k, times by sqrt(k); k is random in 0.01 to 100.
     """
     k = float(np.exp(np.random.default_rng([seed, 1]).uniform(math.log(1e-2), math.log(1e2))))
     root = math.sqrt(k)
@@ -480,8 +480,10 @@ def similar(scene: Scene, seed: int) -> Scene:
 
 
 class _Horizon:
-    """Compares histories of a scene up to the time at which a small disturbance of its data shows;
-    that time is computed only if needed.
+    """Compares histories of a scene within its horizon of predictability.
+
+    That is the time at which a small disturbance of the scene's data shows; it is computed only if
+    needed.
     """
 
     def __init__(self, model: EventBasedModel, motion: Motion, seed: int) -> None:
@@ -489,8 +491,9 @@ class _Horizon:
         self.found, self.failure = 0, ""
 
     def apart(self, scene: Scene, model: EventBasedModel | None = None) -> float:
-        """Largest |difference of theta| in rad within the horizon; infinite where the other run
-        fails within it.
+        """Largest |difference of theta| in rad within the horizon.
+
+        Infinite where the other run fails.
         """
         played, history = model or self.model, self.motion.history
         if played.friction == "bouc-wen" and scene.block.radius != self.motion.radius:
@@ -508,9 +511,7 @@ class _Horizon:
 
     @cached_property
     def row(self) -> int:
-        """The first row in which the scene and a disturbed one, or two finer tolerances, part (see
-        `SEEN`).
-        """
+        """The first row beyond the horizon of predictability (see `DISTURBANCE`)."""
         self.found, scene, history = 1, self.motion.scene, self.motion.history
         rows = [len(history.channels["t"])]
         # The horizon belongs to the scene, however coarse the model is. Rounding is a disturbance,
@@ -528,13 +529,13 @@ class _Horizon:
 
 
 def _amplified(motion: Motion) -> Floats:
-    """The logarithm, by each row, of how much sliding friction has amplified a small difference of
-    the rotation rate.
+    """Logarithm, by row, of how much sliding friction has amplified a small rate difference.
 
-    With P = N/D a slipping pivot has theta'' = -(s + k c)/I N/D, in which N falls with w^2: near
-    Painleve's limit, where D is small, a difference of w grows or decays faster than all else. A
-    disturbance of the scene's data may have decayed before, and then does not show this growth; a
-    rounding error of the moment grows all the same. So the sum starts anew wherever it is negative.
+    The rate is that of rotation, w. With P = N/D a slipping pivot has theta'' = -(s + k c)/I N/D,
+    in which N falls with w^2: near Painleve's limit, where D is small, a difference of w grows or
+    decays faster than all else. A disturbance of the scene's data may have decayed before, and then
+    does not show this growth; a rounding error of the moment grows all the same. So the sum starts
+    anew wherever it is negative.
     """
     theta, slip, step = motion.channels["theta"], motion.slip, 1e-4
     slides = motion.within("slide-rock") & (theta != 0.0) & (np.abs(slip) > SLIPS)
@@ -557,7 +558,7 @@ def _differences(a: History, b: History) -> Floats:
 
 
 def _agree(a: History, b: History, seen: float) -> int:
-    """In how many rows, from the first on, two histories differ by no more than `seen`, rad."""
+    """Number of rows, from the first on, in which theta differs by no more than `seen`, rad."""
     difference = _differences(a, b)
     apart = np.flatnonzero(difference > seen)
     return int(apart[0]) if apart.size else len(difference)

@@ -1,14 +1,13 @@
-"""Newton-Euler for a block with given contacts, solved by other means than in `ebm`: its histories
-are checked against it.
+"""Newton-Euler for a block with given contacts, against which the histories of `ebm` are checked.
 
-Natural units: lengths in R, accelerations in g, unit mass; xi and y are those of the mass's centre.
-As in `ebm.core.motion`, a tilted block is seen in the frame of its pivot, which is then the
-lower-left corner: with S = sign theta and phi = |theta|, that corner is s to the left of the mass's
-centre and c below it (`Arms`). The top corner is s' to the left and c' above, the lifted bottom
-corner s' to the right and c' below. Four contact forces can act: P and Q of the floor on the pivot,
-N of the wall that the top corner touches, M of the wall that the lifted bottom corner touches. The
-gap of each contact, its row J (xi, y, phi) and the part of its acceleration that the velocities
-alone give:
+It is solved by other means than in `ebm`. Natural units: lengths in R, accelerations in g, unit
+mass; xi and y are those of the mass's centre. As in `ebm.core.motion`, a tilted block is seen in
+the frame of its pivot, which is then the lower-left corner: with S = sign theta and phi = |theta|,
+that corner is s to the left of the mass's centre and c below it (`Arms`). The top corner is s' to
+the left and c' above, the lifted bottom corner s' to the right and c' below. Four contact forces
+can act: P and Q of the floor on the pivot, N of the wall that the top corner touches, M of the wall
+that the lifted bottom corner touches. The gap of each contact, its row J (xi, y, phi) and the part
+of its acceleration that the velocities alone give:
 
     P  y - c             (0, 1, -s)      c w^2
     Q  xi - s            (1, 0, c)       s w^2
@@ -139,8 +138,9 @@ BOOLE = np.array([7.0, 32.0, 12.0, 32.0, 14.0, 32.0, 12.0, 32.0, 7.0]) * 2.0 / 4
 
 
 def integrals(step: float, values: Floats, rule: Floats = NEWTON_COTES) -> Floats:
-    """Integrals of `values`, given at multiples of `step`, over each group of eight steps; what is
-    over is left out.
+    """Integrals of `values`, at multiples of `step`, over each group of eight steps.
+
+    Steps beyond the last whole group are left out.
     """
     groups = (len(values) - 1) // GROUP
     nodes = values[np.arange(groups)[:, None] * GROUP + np.arange(GROUP + 1)]
@@ -154,15 +154,15 @@ def not_finite(history: History) -> float:
 
 
 class Motion(NamedTuple):
-    """A history as the invariants see it, a value a row, in natural units but for `channels`, which
-    are those of the history.
+    """A history as the invariants see it, one value a row, in natural units.
 
-    `radius` (m) and `unit` (s) are the units of length and time. `u` and `vertical` accelerate the
-    base; `w` is the rate of rotation, `slip` that of slip. `sign` is theta's in each row; that of
-    the next row where it is zero, as a block that is about to tilt has its pivot already. `energy`
-    (J/kg) is kinetic plus potential; the mass's centre moves at `across` and `up`, m/s. `height` is
-    that of the lowest corner over the floor, `gaps` are those to the walls. `tip` tells where the
-    top corner touches the wall it tips to, `far` where the lifted bottom corner touches the other.
+    Only `channels`, those of the history, keep its units. `radius` (m) and `unit` (s) are the units
+    of length and time. `u` and `vertical` accelerate the base; `w` is the rate of rotation, `slip`
+    that of slip. `sign` is the sign of theta in each row; where theta is zero, the sign in the next
+    row, as a block that is about to tilt has its pivot already. `energy` (J/kg) is kinetic plus
+    potential; the mass's centre moves at `across` and `up`, m/s. `height` is the lowest corner's
+    over the floor, `gaps` are those to the walls. `tip` tells where the top corner touches the wall
+    it tips to, `far` where the lifted bottom corner touches the other.
     """
 
     scene: Scene
@@ -195,8 +195,10 @@ class Motion(NamedTuple):
     def forces(
         self, rows: Mask, slip: Floats, *, later: float = 0.0, faster: float = 0.0
     ) -> tuple[Arms, Forces]:
-        """The arms and forces in these rows, in which the block is tilted; `slip` as of
-        `tilted_forces`. `later` they turn on for that time, at a rate that is `faster`.
+        """The arms and forces in these rows, in which the block is tilted.
+
+        `slip` is as in `tilted_forces`. The block is turned on by its rate for the time `later`;
+        for the forces, `faster` is added to the rate.
         """
         sign, walls, on = self.sign, self.within("lean", "ladder"), np.ones(int(rows.sum()), bool)
         w = (sign * self.w)[rows]

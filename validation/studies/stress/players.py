@@ -1,6 +1,4 @@
-"""The models that are stressed: the settings and scenes of each, and the invariants that it must
-keep.
-"""
+"""The models under stress: settings and scenes of each, and the invariants that it must keep."""
 
 from __future__ import annotations
 
@@ -20,17 +18,18 @@ from rockcheck.validation.studies.stress.generator import Kind, exact_scene, ran
 from rockcheck.validation.studies.stress.invariants import CheckedRun, check_run
 from rockcheck.validation.studies.stress.mechanics import Floats, Motion, motion_of, not_finite
 
-#: Caps of an event-based run: the Zeno rule ends what bounces without end after some 1e5 impacts,
-#: of up to 18 steps with Bouc-Wen.
+#: Caps of an event-based run: the Zeno rule ends endless bouncing after some 1e5 impacts, each of
+#: up to 18 steps with Bouc-Wen.
 MOST_STEPS, MOST_EVENTS = 2_000_000, 400_000
-#: One in so many runs is audited: sampled so finely that its energy can be integrated.
+#: One run in this many is audited: sampled so finely that its energy can be integrated.
 AUDIT = 10
 
 
 @dataclass(frozen=True)
 class Player(ABC):
-    """A model under stress: its label, the kind of scenes that it can play, how many in a whole
-    run, and in a quick one.
+    """A model under stress: its label, and the kind of scenes that it can play.
+
+    `runs` is the number of scenes in a whole run, `quick` in a quick one.
     """
 
     label: str
@@ -46,7 +45,7 @@ class Player(ABC):
 
     @abstractmethod
     def settings(self, scene: Scene, number: int) -> dict[str, Any]:
-        """What the model is built with for this scene, beside what its name says."""
+        """The settings that the model is built with for this scene, besides those in its name."""
 
     @property
     def model_name(self) -> str:
@@ -67,7 +66,7 @@ class Player(ABC):
 
     @abstractmethod
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
-        """Plays the scene and checks what the model is held to."""
+        """Plays the scene and checks the invariants that the model must keep."""
 
 
 @dataclass(frozen=True)
@@ -117,11 +116,11 @@ class EventBased(Player):
 
 @dataclass(frozen=True)
 class Approximate(Player):
-    """The continuous model or an engine: it may sink no deeper than it states, and gain energy from
-    the base only.
+    """The continuous model or an engine.
 
-    Lengths and times of its settings are in R and sqrt(R/g), so that they mean the same for every
-    block; runs last at most `longest`.
+    It may sink no deeper than it states, and gain energy from the base only. Lengths and times of
+    its settings are in R and sqrt(R/g), so that they mean the same for every block; runs last at
+    most `longest`.
     """
 
     family: str = ""
@@ -129,8 +128,9 @@ class Approximate(Player):
     step: float = 2e-3
 
     def scene(self, seed: int, number: int) -> Scene:
-        """The scene of that number, no longer than affordable, with a row a step: between them the
-        base may do any work.
+        """The scene of that number, no longer than affordable, with a row a step.
+
+        Between two rows the base may do any work.
         """
         scene = random_scene(seed, number, self.kind)
         unit = math.sqrt(scene.block.radius / scene.gravity)
@@ -139,7 +139,7 @@ class Approximate(Player):
         )
 
     def settings(self, scene: Scene, number: int = 0) -> dict[str, Any]:
-        """What the model is built with for this scene."""
+        """The settings that the model is built with for this scene."""
         if self.family == "cm":
             return {"penetration": DEPTH * scene.block.radius}
         return {"time_step": self.step * math.sqrt(scene.block.radius / scene.gravity)}
@@ -147,7 +147,7 @@ class Approximate(Player):
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
         """Checks the run's end, finite numbers, depth and energy.
 
-        If an engine breaks one of the last two, says what half the step does.
+        If an engine breaks one of the last two, `failure` gives the figures with half the step.
         """
         played = self._check(scene)
         broken = [name for name in played.broken if name in ("depth", "source")]
@@ -175,8 +175,9 @@ class Approximate(Player):
         return CheckedRun(figures=figures, outcome=history.outcome, events=len(history.event_list))
 
     def depth(self, motion: Motion) -> float:
-        """Deepest penetration over what the model states: for an engine the way of a step, for the
-        CM that of a spring.
+        """Deepest penetration over what the model states.
+
+        An engine states the distance moved in a step, the CM the deflection of its spring.
         """
         spin = float(np.max(np.abs(motion.channels["theta_dot"])))
         ways = sum(np.max(np.abs(motion.channels[name])) for name in ("x_dot", "y_dot"))
@@ -192,13 +193,14 @@ class Approximate(Player):
 
 
 def energy_without_source(motion: Motion) -> float:
-    """Largest energy above the start's and the work of the base up to then, relative to all work
-    done, at least g R.
+    """Largest energy beyond the initial one and the work of the base, relative to that at play.
 
-    The base works on the block, which feels its acceleration as a force, by that impulse times the
-    mean of the velocities before and after. It is exact however the acceleration changes between
-    two rows (a record can be finer than they are) where the block stands, and where nothing but the
-    base changes its velocity.
+    At play are g R, the initial energy and all work done by then.
+
+    The base's acceleration acts on the block as a force. Its work between two rows is its impulse
+    times the mean of the velocities before and after. It is exact however the acceleration changes
+    between the rows (a record can be finer than they are) where the block stands, and where nothing
+    but the base changes its velocity.
     """
     scene, energy = motion.scene, motion.energy
     work, moved = np.zeros(len(energy)), np.zeros(len(energy))
@@ -213,8 +215,9 @@ def energy_without_source(motion: Motion) -> float:
 
 
 def _base_velocity(excitation: Excitation, t: Floats) -> Floats:
-    """Integral of the base acceleration from the first of the times `t` on; exact for a record,
-    which is linear between samples.
+    """Integral of the base acceleration from the first of the times `t` on.
+
+    Exact for a record, which is linear between samples.
     """
     times = t
     if isinstance(excitation, Record):

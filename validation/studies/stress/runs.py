@@ -1,5 +1,6 @@
-"""Runs of one model under stress: chunks of them, what they showed, and smaller scenes of those
-that failed: parts are dropped, shortened or rounded as long as the failure stays.
+"""Runs of one model under stress: chunks, totals, and smaller scenes that still fail.
+
+To find these, parts are dropped, shortened or rounded as long as the failure stays.
 """
 
 from __future__ import annotations
@@ -24,11 +25,11 @@ Shows = Callable[[Scene], bool]
 Path = tuple[str | int, ...]
 #: Most scenes that are tried.
 MOST_TRIALS = 400
-#: In lists of at most so many values each is tried on its own.
+#: Lists of at most this many values are simplified value by value.
 SHORT = 8
 #: What is dropped first, since a block that nothing moves is told soonest.
 FIRST: dict[str | int, int] = {"vertical": 0, "excitation": 1}
-#: What is never dropped or rounded.
+#: Never dropped or rounded.
 KEPT = ("name", "output_step")
 
 
@@ -39,10 +40,10 @@ def shrink(
     trials: int = MOST_TRIALS,
     seconds: float = math.inf,
 ) -> tuple[Scene, bool]:
-    """A scene that `shows` the failure as `scene` does, and from which no single simplification can
-    be taken without losing it.
+    """A minimal scene that `shows` the failure as `scene` does.
 
-    Ends after so many `trials` or `seconds` with what it has then; the second value is then false.
+    No single simplification can be made without losing the failure. Ends after this many `trials`
+    or `seconds` with the scene found by then; the second value is then false.
     """
     until = time.monotonic() + seconds
     again = True
@@ -70,8 +71,10 @@ def simplifications(scene: Scene) -> Iterator[Scene]:
 
 
 def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
-    """The scene's tables with a part left out, a shorter run or list, another scale, and at last
-    one number that is zero or has fewer digits.
+    """The scene's tables with one simplification each.
+
+    A part is left out, a run or list is shorter, the scale is another; at last one number is zero
+    or has fewer digits.
     """
     tables = _tables(scene)
     places = sorted(_places(tables), key=lambda place: (len(place[0]), FIRST.get(place[0][0], 2)))
@@ -97,7 +100,7 @@ def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
 
 
 def _tables(scene: Scene) -> dict[str, Any]:
-    """All that is not as it would be without a word, as a scene file has it."""
+    """All settings that differ from their defaults, as in a scene file."""
     tables: dict[str, Any] = scene.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
     for key in {"excitation", "vertical"} & tables.keys():
         tables[key] = {"kind": getattr(scene, key).kind} | tables[key]
@@ -128,8 +131,9 @@ def _with(tables: dict[str, Any], path: Path, *value: Any) -> dict[str, Any]:
 
 
 def scene_text(scene: Scene, remarks: str) -> str:
-    """A scene file that `load_scene` reads back to the bit (samples stand in the file itself), with
-    remarks on top.
+    """A scene file that `load_scene` reads back to the bit, with remarks on top.
+
+    Samples stand in the file itself.
     """
     tables = {
         key: value for key, value in _tables(scene).items() if key != "name"
@@ -140,8 +144,8 @@ def scene_text(scene: Scene, remarks: str) -> str:
     return lines + tomlkit.dumps(dict(ordered))
 
 
-#: Time (s) that a run may take on average, event-based or not: so many times what it takes; and a
-#: task in addition.
+#: Time limit (s) of a run on average, event-based or not, and its ratio to the usual time; then
+#: the time (s) that a task may take in addition.
 A_RUN, AN_APPROXIMATE_RUN, AMPLE = 0.2, 2.0, 50.0
 PATIENCE = 20.0
 #: Failures of a model and an invariant that are written as scenes.
@@ -161,12 +165,12 @@ class Broken:
 
     @property
     def scene(self) -> Scene:
-        """Its scene as it was played."""
+        """The run's scene as it was played."""
         return PLAYERS[self.model].scene(self.seed, self.number)
 
     @property
     def name(self) -> str:
-        """The name of its scene file."""
+        """The name of the run's scene file."""
         return f"{self.model.replace(' ', '-')}-{self.invariant}-{self.seed}-{self.number}.toml"
 
     def text(self, scene: Scene, remark: str) -> str:
@@ -182,7 +186,7 @@ class Broken:
 
 @dataclass(kw_only=True)
 class RunTotals:
-    """What some runs of one model showed, one after the other."""
+    """Totals of some runs of one model."""
 
     model: str
     cpu_seconds: float = 0.0
@@ -198,7 +202,7 @@ class RunTotals:
     #: "runs", "events", runs in which an impact added energy, as its law is known to do
     #: ("gaining"), and whose comparison ended at the horizon of predictability ("horizons").
     counts: Counter[str] = field(default_factory=Counter)
-    #: The most energy that an impact added, of what was there.
+    #: Largest energy that an impact added, as a share of the energy before it.
     largest_gain: float = 0.0
 
     def see(self, played: CheckedRun, seed: int, number: int) -> None:
@@ -226,7 +230,7 @@ class RunTotals:
         )
 
     def add(self, other: RunTotals) -> None:
-        """Count what other runs showed."""
+        """Add the totals of other runs."""
         for name, found in other.worst.items():
             self.worst[name] = max(found, self.worst.get(name, found))
         self.largest_gain = max(self.largest_gain, other.largest_gain)
@@ -256,7 +260,7 @@ class Chunk(Task):
         return self.model
 
     def play(self) -> RunTotals:
-        """What they show."""
+        """The totals of the runs."""
         began, player, totals = (
             time.process_time(),
             PLAYERS[self.model],
@@ -273,7 +277,7 @@ class Chunk(Task):
 
 
 def checked(label: str, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
-    """What a run shows; a fault of the program itself is a failure like any other."""
+    """One checked run; an exception of the program counts as a failure like any other."""
     try:
         return PLAYERS[label].check(scene, seed, number, only)
     except Exception as error:  # the other runs go on, and this one is reported with its message
@@ -283,7 +287,7 @@ def checked(label: str, scene: Scene, seed: int, number: int, only: str = "") ->
 
 @dataclass(frozen=True)
 class Shrinking(Task):
-    """The search for a smaller scene that fails in the same way: so many trials, so many s."""
+    """The search for a smaller scene that fails in the same way, limited in trials and s."""
 
     broken: Broken
     budget: float
@@ -321,8 +325,9 @@ class Shrinking(Task):
 
 
 def chunk(model: str, seed: int, first: int, count: int) -> Chunk:
-    """These runs as a task; what it may take is far more than it does, and little enough for a hang
-    to be found soon.
+    """These runs as a task.
+
+    Its time limit is far more than it takes, and short enough for a hang to be found soon.
     """
     a_run = A_RUN if PLAYERS[model].event_based else AN_APPROXIMATE_RUN
     return Chunk(
@@ -337,7 +342,7 @@ def chunk(model: str, seed: int, first: int, count: int) -> Chunk:
 
 
 def parts(task: Task) -> Sequence[Task]:
-    """What is played instead where the process of a task hangs or dies: less of it."""
+    """Smaller tasks in place of one whose process hangs or dies."""
     if isinstance(task, Chunk) and task.count > 1:
         half = task.count // 2
         later = chunk(task.model, task.seed, task.first + half, task.count - half)

@@ -1,9 +1,9 @@
-"""`rockcheck stress`: many random runs of every model, what they break, and the smallest scenes
-that show it; and where engines and the continuous model break: the largest stable step, and what a
-block does that should stand still.
+"""`rockcheck stress`: random runs of every model, what they break, and minimal failing scenes.
 
-In these maps lengths are in R, times in sqrt(R/g): the same step is asked of a domino and of a
-tower.
+Also where engines and the continuous model break: the largest stable step, and how a block moves
+that should stand still.
+
+In these maps lengths are in R, times in sqrt(R/g): a domino and a tower get the same step.
 """
 
 from __future__ import annotations
@@ -64,27 +64,26 @@ AXIS_WORDS: dict[str, str] = {
     "restitution": "restitution of the wall",
     "shaking": "peak acceleration, g tan α",
 }
-#: Steps that are tried, sqrt(R/g), coarse to fine, and what a stable run keeps to: depth in R,
+#: Steps that are tried, sqrt(R/g), coarse to fine; and the limits of a stable run: depth in R,
 #: energy without source.
 STEPS = (0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4)
 DEEPEST, MOST_ENERGY = 0.02, 0.1
-#: Adaptive steps are as fine as they need to be: what is tried is how large they may grow, from
-#: here on.
+#: Adaptive steps are as fine as they need to be: their largest step is varied, down to this.
 ADAPTIVE_FINEST = 3e-3
 #: Stand-still runs: a block left alone, one that is pushed or shaken (or left alone, where a step
 #: takes a millisecond), and in a quick run, s; and the step (s).
 HOUR, PUSHED, QUICK_REST, REST_STEP = 3600.0, 300.0, 10.0, 5e-3
 QUICK_STEPS, QUICK_VALUES = STEPS[1:-1:2], 2
-#: What a place may take, s: far more than it needs.
+#: Time limit of a place, s: far more than it needs.
 MOST_SECONDS = 600.0
 
 
 @dataclass(frozen=True)
 class ModelSetup:
-    """A model with settings as they come ("default") or at their best; `knob` is what the step is
-    called there.
+    """A model with its default settings ("default") or its best ones.
 
-    A block is left `alone` for so long, s. `finest` is the finest step that is tried, sqrt(R/g).
+    `knob` is its name for the step. A block is left alone for `alone` s. `finest` is the finest
+    step that is tried, sqrt(R/g).
     """
 
     label: str
@@ -123,8 +122,9 @@ SETUPS = {
 
 @dataclass(frozen=True)
 class Stable:
-    """The largest step (sqrt(R/g)) from which on a model is stable, 0 where none was; and what the
-    next coarser one does.
+    """The largest step (sqrt(R/g)) up to which a model is stable, 0 where none is.
+
+    `fault` is how the next coarser step breaks.
     """
 
     line: str
@@ -136,8 +136,10 @@ class Stable:
 
 @dataclass(frozen=True)
 class Still:
-    """What a block does that should stand still: the largest of each, R, alpha or sqrt(g R);
-    `fault` where the run did not end.
+    """How a block moves that should stand still.
+
+    `moves` are the largest of each kind, in R, alpha or sqrt(g R); `fault` says why the run did not
+    end.
     """
 
     line: str
@@ -149,7 +151,7 @@ class Still:
 
 
 def scene_at(axis: str, value: float) -> Scene:
-    """The paper's shape of block beside a wall under a pulse, with one thing changed."""
+    """A block of the paper's shape beside a wall under a pulse, with one parameter changed."""
     at = USUAL | {axis: value}
     radius, unit = at["size"], math.sqrt(at["size"] / 9.81)
     own = 2.0 * math.pi * unit / math.sqrt(0.75)
@@ -165,8 +167,9 @@ def scene_at(axis: str, value: float) -> Scene:
 
 
 def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
-    """How a run of that step (sqrt(R/g)) breaks: "blows up", "sinks", "gains energy"; empty where
-    it does not.
+    """How a run of that step (sqrt(R/g)) breaks, empty where it does not.
+
+    "blows up", "sinks", "gains energy", or why the model refuses the scene.
     """
     unit, radius = math.sqrt(scene.block.radius / scene.gravity), scene.block.radius
     scene = scene.replace(
@@ -188,7 +191,7 @@ def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
     speed = float(np.max(np.hypot(motion.channels["x_dot"], motion.channels["y_dot"])))
     if (
         motion.deepest > DEEPEST + 2.0 * step * speed * unit / radius
-    ):  # that of one step is no fault
+    ):  # the depth of one step is no fault
         return "sinks"
     return "gains energy" if energy_without_source(motion) > MOST_ENERGY else ""
 
@@ -199,7 +202,7 @@ CASES = {"left alone": 0.0, "pushed": 0.5, "shaken": 0.8}
 
 
 def stand_still(label: str, case: str, duration: float, step: float = REST_STEP) -> Still:
-    """Plays a block that should not move; the paper's."""
+    """Plays the paper's block in a case in which it should not move."""
     block, mu = PAPER_BLOCK, 0.3
     push = CASES[case] * 9.81 * min(SLOPE, mu)
     excitation: Rest | Record | Sine = (
@@ -252,8 +255,9 @@ def stand_still(label: str, case: str, duration: float, step: float = REST_STEP)
 
 @dataclass(frozen=True)
 class Place(Task):
-    """A place of a map: a model with settings at a value of an axis, or a block that should stand
-    so long (s).
+    """A place of a map.
+
+    It is a model with settings at a value of an axis, or a block that should stand for `value` s.
     """
 
     line: str
@@ -262,7 +266,7 @@ class Place(Task):
     quick: bool = False
 
     def play(self) -> Still | Stable:
-        """What is there: steps are tried from the finest up to the first one that breaks."""
+        """The largest stable step, from the finest up to the first that breaks; or movements."""
         if self.at in CASES:
             return stand_still(self.line, self.at, self.value)
         setup, scene, best, fault = SETUPS[self.line], scene_at(self.at, self.value), 0.0, ""
@@ -276,8 +280,9 @@ class Place(Task):
 
 
 def places(quick: bool = False) -> list[Place]:
-    """The maps of all `SETUPS` that are installed, the longest tasks first; `quick` has fewer
-    values, steps and seconds.
+    """The maps of all `SETUPS` that are installed, the longest tasks first.
+
+    `quick` has fewer values, steps and seconds.
     """
     lines = [label for label, setup in SETUPS.items() if not not_installed(setup.family)]
     how: dict[str, Any] = {"seconds": MOST_SECONDS, "expected": 0.5 if quick else 4.0}
@@ -306,14 +311,15 @@ CHUNK, APPROXIMATE_CHUNK = 250, 20
 #: How long (s) all failures may be shrunk, one process at work, in a whole run and in a quick one;
 #: the part of that for one of them; and how much later a process whose trial hangs is ended.
 SHRINKING, SHRINKING_QUICK, ONE_FAILURE, HANGING = 120.0, 10.0, 0.25, 5.0
-#: What is listed of a block that should stand still, and its unit.
+#: Listed movements of a block that should stand still, and their units.
 MOVES = {"creep": "R", "sinking": "R", "rotation": "α", "uplift": "R", "jitter": "√(gR)"}
 
 
 @dataclass(frozen=True)
 class Stress(Study):
-    """What is played: all, runs or maps; `runs` of each of the `models`, by default as many as
-    `PLAYERS` says of all that are installed.
+    """The parts that are played: all, runs or maps.
+
+    `runs` of each of the `models`; by default those of `PLAYERS`, of all that are installed.
     """
 
     what: What = "all"
@@ -360,7 +366,7 @@ class Stress(Study):
         return sorted(found, key=lambda one: PLAYERS[one.model].event_based)
 
     def _totals(self, done: Mapping[Any, Any]) -> list[RunTotals]:
-        """What the models showed; a run whose process was lost does not end."""
+        """Totals of the models; a run whose process was lost counts as one that does not end."""
         found = {label: RunTotals(model=label) for label in PLAYERS}
         for task, one in done.items():
             if isinstance(one, RunTotals):

@@ -1,3 +1,1 @@
-"""Run time against error: models by setting and scene, compiled batches, savings, orders of
-convergence.
-"""
+"""Run time against error: models, compiled batches, savings, orders of convergence."""

@@ -1,10 +1,9 @@
-"""Work and precision: what an error costs with each model, scene by scene, and what it converges
-to.
+"""Work and precision: what an error costs with each model, and what it converges to.
 
-The scenes come in families of ten members each, since one run can be lucky by a factor of five; for
-convergence there are 18 single ones beside a wall. The members of a family differ by a few per cent
-in tilt or amplitude, so that their uplifts and impacts fall on other phases of a step. Each is
-played up to its horizon of predictability and compared up to there.
+The scenes come in families of ten members each, since a single run can be lucky by a factor of
+five; for convergence there are 18 single ones beside a wall. The members of a family differ by a
+few per cent in tilt or amplitude, so that their uplifts and impacts fall on other phases of a step.
+Each is played up to its horizon of predictability and compared up to there.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from rockcheck.validation.execute.models import build
 from rockcheck.validation.study import Task
 
 MEMBERS = 10
-#: How accurate the references are, and to what time a record is played at most, s.
+#: Tolerance of the references, and the longest time to which a record is played, s.
 REFERENCE_TOLERANCE, RECORD_DURATION = 1e-13, 8.0
 
 
@@ -158,8 +157,9 @@ QUICK_WALLS = ("long 53 mm e 0.5", "medium 53 mm e 0", "short 3 mm e 0")
 
 @dataclass(frozen=True)
 class Prepared:
-    """A member cut at its horizon (s), the reference of each kind of model, and how far these are
-    apart (RMS, alpha).
+    """A member cut at its horizon (s), and the reference of each kind of model.
+
+    `model_form` is how far the references are apart (RMS, alpha).
     """
 
     scene: Scene
@@ -188,7 +188,7 @@ def prepared(family: str, member: int) -> Prepared:
 
 
 REFERENCES = ("ebm-unilateral", "ebm")
-#: Errors at which each model's cost is given, alpha; and what is known where it is not reached.
+#: Error at which each model's cost is given, alpha; and the result where it is not reached.
 LEVEL, NOTHING = 1e-3, (math.nan, False)
 #: The cost at which engines are compared in their league, CPU s a simulated second.
 EQUAL_COST = 0.02
@@ -204,8 +204,9 @@ FITTED = 3e-13, 0.2
 
 @dataclass(frozen=True)
 class DiagramLine:
-    """A line of the diagrams: a model, the setting that is swept, coarse to fine, and the model
-    that is its reference.
+    """A line of the diagrams: a model, and the setting that is swept, coarse to fine.
+
+    `reference` is the model that it is compared with.
     """
 
     label: str
@@ -242,7 +243,7 @@ ENGINE_STEPS = {
     "physx": _STEPS[:3],
     "jolt": _STEPS[:3],
 }
-#: Engines whose steps cannot vary. Those in single precision are not asked what they converge to.
+#: Engines whose steps cannot vary. Convergence is not measured for those in single precision.
 FIXED = ("drake", "box2d", "physx", "jolt")
 LINES = {
     line.label: line
@@ -310,7 +311,7 @@ KINDS = {
 }
 #: Kinds of scenes in each of which an engine has to meet `LEVEL`.
 LEAGUE = {"free": ("free",), "pulse": ("pulse",), "wall": ("wall",)}
-#: What is not measured, and why.
+#: Not measured, and why.
 LEFT_OUT = (
     "default settings at a step of 3e-5 s: at 1e-4 s they have stopped converging, or converge as"
     " at larger steps",
@@ -337,8 +338,7 @@ class Play(Task):
 
 @dataclass(frozen=True)
 class BenchmarkRun:
-    """One run: where, with what, its errors against the reference of its kind of model, and its
-    cost.
+    """One run: its scene and setting, its errors against its reference, and its cost.
 
     `rms` and `largest` are those of theta up to the horizon, `peak` the error of the largest
     |theta|, all in alpha; `against_ebm` the RMS error against the paper's model; `first_impact`
@@ -392,7 +392,7 @@ def play(task: Play) -> BenchmarkRun:
 
 
 def lost(task: Play, reason: str) -> BenchmarkRun:
-    """What stands in the place of a run that failed."""
+    """The record of a run that failed."""
     horizon = prepared(task.family, task.member).horizon
     return BenchmarkRun(task.family, task.member, task.line, task.value, horizon, failure=reason)
 
@@ -444,8 +444,10 @@ RATES = ("cpu", "wall", "steps")
 
 
 def points_of(frame: pd.DataFrame) -> pd.DataFrame:
-    """The settings of all lines in all families: median error with its 10-90 % band and the worst,
-    and median cost a simulated second. A run that failed counts as infinitely wrong.
+    """Median error and median cost of the settings of all lines in all families.
+
+    The errors come with their 10-90 % band and the worst; the cost is that of a simulated second. A
+    run that failed counts as infinitely wrong.
     """
     names = "family", "line", "value"
     rows = [(*at, *_point(some)) for at, some in grouped(frame, *names)]
@@ -462,12 +464,11 @@ def _point(samples: pd.DataFrame) -> tuple[float, ...]:
 
 
 def trends_of(points: pd.DataFrame) -> pd.DataFrame:
-    """Order of convergence of each line in each family, in the swept setting, and what an error of
-    `LEVEL` costs.
+    """Order of convergence, and cost of an error of `LEVEL`, of each line in each family.
 
-    `order` is NaN where fewer than two settings can be fitted. `cpu` is in s a simulated second,
-    NaN where the level is not reached; `at_coarsest` where already the coarsest setting reaches it.
-    `ratio` is to the `ebm` line's.
+    `order` in the swept setting is NaN where fewer than two settings can be fitted. `cpu` is in s a
+    simulated second, NaN where the level is not reached; `at_coarsest` where already the coarsest
+    setting reaches it. `ratio` is to the `ebm` line's cost.
     """
     lines = dict(grouped(points, "family", "line"))
     costs = {at: cost_at(line) for at, line in lines.items()}
@@ -479,7 +480,7 @@ def trends_of(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def pooled(frame: pd.DataFrame, kinds: Mapping[str, tuple[str, ...]] = KINDS) -> pd.DataFrame:
-    """Every setting of the engines' lines over all scenes of each kind, which is its `family`."""
+    """Every setting of the engines' lines over all scenes of each kind; `family` is the kind."""
     engines = _ordered(frame[[LINES[line].model in ENGINE_STEPS for line in frame.line]], "line")
     parts = [
         engines[engines.family.str.startswith(starts)].assign(family=kind)
@@ -489,8 +490,9 @@ def pooled(frame: pd.DataFrame, kinds: Mapping[str, tuple[str, ...]] = KINDS) ->
 
 
 def at_the_cost(point: Any, points: pd.DataFrame) -> float:
-    """The error of the engine's adaptive line at a point's CPU time, interpolated; NaN outside its
-    range.
+    """The error of the engine's adaptive line at a point's CPU time; NaN outside its range.
+
+    Interpolated as by `error_at`.
     """
     adaptive = f"{LINES[point.line].model} adaptive"
     return error_at(_of(points, family=point.family, line=adaptive), point.cpu)
@@ -501,11 +503,12 @@ def _of(frame: pd.DataFrame, **values: Any) -> pd.DataFrame:
 
 
 def league(found: pd.DataFrame) -> list[tuple[str, float, float, float, float]]:
-    """The engines' lines over pulses and free rocking, the cheapest at an error of `LEVEL` first;
-    those that never reach it last, by their best error.
+    """The engines' lines over pulses and free rocking, the cheapest at an error of `LEVEL` first.
+
+    Lines that never reach it come last, by their best error.
 
     Line, CPU time (s a simulated second) of an error of `LEVEL`, RMS error (alpha) at `EQUAL_COST`,
-    least error at any setting that was played, and its cost; NaN where it does not reach so far.
+    least error at any setting that was played, and its cost; NaN where the line does not reach it.
     """
     rows = []
     for (label,), mine in grouped(_of(found, family=next(iter(KINDS))), "line"):
@@ -517,8 +520,10 @@ def league(found: pd.DataFrame) -> list[tuple[str, float, float, float, float]]:
 
 
 def first_steps(frame: pd.DataFrame) -> list[tuple[str, dict[str, float], float]]:
-    """The engines' lines: the largest step (s) whose median error is at most `LEVEL`, in each kind
-    of `LEAGUE` and in all of them, NaN where none is; and the smallest step that was played.
+    """The largest step (s) of each engine's line whose median error is at most `LEVEL`.
+
+    The line; its step in each kind of `LEAGUE` and in all of them ("all"), NaN where there is none;
+    the smallest step that was played.
     """
     rows = []
     for (label,), line in grouped(pooled(frame, LEAGUE), "line"):
@@ -531,8 +536,9 @@ def first_steps(frame: pd.DataFrame) -> list[tuple[str, dict[str, float], float]
 
 
 def error_at(line: pd.DataFrame, cpu: float) -> float:
-    """Median error of a line, coarse to fine, at a CPU time, both interpolated on logarithmic axes;
-    NaN outside its range.
+    """Median error of a line, coarse to fine, at a CPU time; NaN outside its range.
+
+    Both are interpolated on logarithmic axes.
     """
     for (e, a), (f, b) in itertools.pairwise(zip(line.rms, line.cpu, strict=True)):
         if a <= cpu <= b and a < b and f > 0.0 and math.isfinite(e):
@@ -541,8 +547,9 @@ def error_at(line: pd.DataFrame, cpu: float) -> float:
 
 
 def quantile(values: Sequence[float], share: float) -> float:
-    """The value below which `share` of the sample lies, halfway between two where it lies between
-    them; values may be infinite.
+    """The value below which `share` of the sample lies; values may be infinite.
+
+    Halfway between two values where it lies between them.
     """
     ordered, place = sorted(values), share * len(values)
     below = ordered[max(math.ceil(place - 1e-9) - 1, 0)]
@@ -551,19 +558,20 @@ def quantile(values: Sequence[float], share: float) -> float:
 
 
 def order_of(line: pd.DataFrame) -> float:
-    """Slope of log median error over log of the swept setting, by least squares; NaN with fewer
-    than two points.
+    """Slope of log median error over log of the swept setting; NaN with fewer than two points.
+
+    By least squares over the errors between the limits of `FITTED`.
     """
     fitted = line[(line.rms > FITTED[0]) & (line.rms < FITTED[1])]
     return slope(fitted.value, fitted.rms)
 
 
 def cost_at(line: pd.DataFrame, level: float = LEVEL) -> tuple[float, bool]:
-    """CPU s a simulated second at a median error of `level`, and whether the coarsest setting
-    already reaches it.
+    """CPU s a simulated second at a median error of `level`.
 
-    Between settings both logarithms are interpolated linearly; NaN where no setting reaches the
-    level. The cheapest counts.
+    The second value is true where the coarsest setting already reaches the level. Between settings
+    both logarithms are interpolated linearly; NaN where no setting reaches the level. The cheapest
+    counts.
     """
     points = list(zip(line.rms, line.cpu, strict=True))
     costs = [(cpu, n == 0) for n, (rms, cpu) in enumerate(points) if rms <= level]
@@ -595,8 +603,9 @@ LEAST_ORDER, ROUNDED = 0.5, 1e-6
 
 
 def levels_of(frame: pd.DataFrame) -> pd.DataFrame:
-    """The wall scenes' errors (alpha) by reference, model and setting, coarse to fine; `within`:
-    how many are at most `LEVEL`.
+    """The wall scenes' errors (alpha) by reference, model and setting, coarse to fine.
+
+    `within` is the number of runs whose error is at most `LEVEL`.
     """
     groups = [*grouped(_ordered(frame, "line"), "line", "value")]
     return pd.DataFrame(
@@ -615,8 +624,9 @@ def levels_of(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def orders_of(frame: pd.DataFrame, levels: pd.DataFrame) -> pd.DataFrame:
-    """Slopes of log error over log step by model and reference: of the median error, and scene by
-    scene.
+    """Slopes of log error over log step by model and reference.
+
+    They are given for the median error (`scene` is empty), and scene by scene.
     """
     lines, rows = dict(grouped(frame.sort_index(), "line", "family")), []
     for model, reference in itertools.product(dict.fromkeys(levels.model), REFERENCES):

@@ -46,7 +46,7 @@ from rockcheck.validation.studies.work_precision.runs import (
 from rockcheck.validation.study import Study, Task
 
 What = Literal["all", "ebm", "models", "skipping", "convergence"]
-#: CPU time of an engine's step as a rule, and of any other run, s: for the estimate.
+#: Usual CPU time of an engine's step, and of any other run, s: for the estimate.
 A_STEP, A_RUN = 4e-5, 0.02
 #: The diagrams: a title, and how the names of their scenes begin.
 SHEETS = {
@@ -62,14 +62,14 @@ FLOOR = 1e-13
 
 @dataclass(frozen=True)
 class Measure(Task):
-    """A timing of something else than a model's run: a batch, its size, a cold start, a saving."""
+    """A timing other than a model's run: a batch, its size, a cold start, a saving."""
 
     kind: Literal["batch", "size", "cold start", "saving"]
     name: str
     size: int = 0
 
 
-#: What is timed, by its kind: a name and a size give rows.
+#: Timings by kind: a name and a size give rows.
 TIMED: Mapping[str, Callable[[str, int], Sequence[Any]]] = {
     "batch": timings.batch_times,
     "size": lambda name, size: [timings.batch_size(size, int(name))],
@@ -81,7 +81,7 @@ Row = BenchmarkRun | timings.BatchTime | timings.BatchSize | timings.ColdStart |
 
 @dataclass(frozen=True)
 class WorkPrecision(Study):
-    """What is measured: all, or a part; `quick` with fewer scenes and settings."""
+    """The measurements: all, or a part; `quick` with fewer scenes and settings."""
 
     what: What = "all"
     quick: bool = False
@@ -120,7 +120,7 @@ class WorkPrecision(Study):
             yield Measure("saving", name, rounds, where="timed", expected=0.6 * rounds)
 
     def _models(self) -> Iterator[Task]:
-        """Interleaved: whatever else the machine does touches all models alike.
+        """Interleaved, so that other load of the machine affects all models equally.
 
         An engine's smallest steps go to the workers; in a quick run one member plays those of 1e-4
         s, and the adaptive ones of DART, which cost as much.
@@ -306,7 +306,7 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
     engines = pooled[kept].assign(at_the_cost=costs).rename(columns={"family": "kind"})
     how: Any = {"on": "page", "folded": True}
     yield _table("engines", engines, title="Engines over whole kinds of scenes", **how)
-    # The worst is told of engines only.
+    # The worst error is shown for engines only.
     yield _table("work-precision", points.drop(columns="rms_worst"), title="All settings", **how)
     yield _table("orders-and-ratios", trends)
     yield table_of("runs", BenchmarkRun, samples)

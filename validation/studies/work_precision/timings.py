@@ -1,6 +1,8 @@
-"""Timings: compiled batches of the event-based model on one core, as microseconds and as
-right-hand-side evaluations; cold starts; and what each thing costs that a scene may not need, the
-same scene with it and without it.
+"""Timings: compiled batches, cold starts, and savings.
+
+Batches are of the event-based model on one core, in microseconds and in right-hand-side
+evaluations. A saving is the cost of one thing that a scene may not need: the same scene with it and
+without it.
 """
 
 from __future__ import annotations
@@ -54,13 +56,12 @@ class BatchCase:
 
 @dataclass(frozen=True)
 class BatchTime:
-    """A batch at one tolerance: cost of a trajectory, and what it is wrong by against
-    `REFERENCE_TOLERANCE`.
+    """A batch at one tolerance: cost of a trajectory, and its error.
 
-    `cpu` and `wall` in s (medians), `evaluations` the CPU time in right-hand-side evaluations,
-    `error_95` and `error_50` percentiles of the peak's error in rad, `wrong` outcomes that differ,
-    `failed` runs without outcome. `right_hand_side` is the time of one evaluation in the same
-    rounds, s.
+    Errors are against `REFERENCE_TOLERANCE`. `cpu` and `wall` in s (medians), `evaluations` the CPU
+    time in right-hand-side evaluations, `error_95` and `error_50` percentiles of the peak's error
+    in rad, `wrong` outcomes that differ, `failed` runs without outcome. `right_hand_side` is the
+    time of one evaluation in the same rounds, s.
     """
 
     case: str
@@ -78,8 +79,9 @@ class BatchTime:
 
 @dataclass(frozen=True)
 class ColdStart:
-    """Seconds in a fresh process: importing the package, and its first simulation (compiler's
-    import included).
+    """Seconds in a fresh process: importing the package, and its first simulation.
+
+    The import of the compiler is part of the simulation.
     """
 
     cache: str
@@ -89,8 +91,9 @@ class ColdStart:
 
 @dataclass(frozen=True)
 class BatchSize:
-    """What a batch of so many random pulses (μ 0.3, no wall) takes whole with so many threads,
-    packing included: s a run (median).
+    """Wall time of a run (s, median) in a batch of random pulses, packing included.
+
+    The batch has `runs` pulses (μ 0.3, no wall) on `threads` threads.
     """
 
     runs: int
@@ -125,8 +128,9 @@ def grid(scene: Scene, nodes: int) -> tuple[Floats, Floats]:
 
 
 def _pulse(scene: Scene, frequency: Floats, amplitude: Floats) -> tuple[Floats, Floats]:
-    """Amplitudes (m/s^2) and periods (s) of pulses whose frequency is given over p, whose amplitude
-    over g tan(alpha).
+    """Amplitudes (m/s^2) and periods (s) of pulses.
+
+    `frequency` is over p, `amplitude` over g tan(alpha).
     """
     strength = amplitude * scene.gravity * math.tan(scene.block.alpha)
     return strength, 2.0 * math.pi / (frequency * scene.frequency_parameter)
@@ -169,7 +173,7 @@ CASES = (
 
 
 def batch_size(runs: int, threads: int) -> BatchSize:
-    """Times a batch of so many random pulses on so many threads."""
+    """Times a batch of `runs` random pulses on `threads` threads."""
     scene, model = _scene(), EventBasedModel(tolerance=LEVEL)
     random = np.random.default_rng(1)
     pulses = _pulse(
@@ -184,8 +188,9 @@ def batch_size(runs: int, threads: int) -> BatchSize:
 
 
 def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
-    """A case's cost on one core, a row a tolerance, played in turn with the time of one right-hand
-    side.
+    """A case's cost on one core, a row a tolerance.
+
+    All tolerances are played in turn with the timing of one right-hand side.
     """
     case = next(case for case in CASES if case.name == name)
     reference_model = EventBasedModel(tolerance=REFERENCE_TOLERANCE, **case.settings)
@@ -237,8 +242,9 @@ def _right_hand_sides(ground: Ground, alpha: float, count: int) -> float:
 
 
 def right_hand_side_seconds(count: int = 400_000) -> float:
-    """CPU seconds of one evaluation of the rocking equation under a Ricker pulse: sin, cos, exp and
-    a polynomial.
+    """CPU seconds of one evaluation of the rocking equation under a Ricker pulse.
+
+    It has sin, cos, exp and a polynomial.
     """
     from rockcheck.ebm import natural
 
@@ -266,8 +272,9 @@ print(imported - began, time.perf_counter() - loaded)
 
 
 def cold_start(*, cached: bool, times: int = 1) -> ColdStart:
-    """Import and first simulation in a fresh process without compile cache, or with it: the median
-    of so many.
+    """Import and first simulation in a fresh process, with compile cache or without.
+
+    With a cache, the medians of `times` processes.
     """
     with tempfile.TemporaryDirectory() as folder:
         fresh = dict(os.environ) if cached else {**os.environ, "NUMBA_CACHE_DIR": folder}
@@ -310,8 +317,9 @@ NOT_MEASURED = (
 
 @dataclass(frozen=True)
 class Saving:
-    """Cost with and without a thing that the scene does not need, in `unit`; `change`: largest
-    change of theta, alpha.
+    """Cost with and without a thing that the scene does not need, in `unit`.
+
+    `change` is the largest change of theta, alpha.
     """
 
     model: str
@@ -329,13 +337,14 @@ class Saving:
 
 
 Play = Callable[[], float]
-#: What is measured: model, thing and unit, the plays with it and without it, change and remark.
+#: A saving to measure: model, thing, unit, the plays with it and without it, change and remark.
 Pair = tuple[str, str, str, Play, Play, float, str]
 
 
 def measured(name: str, rounds: int = SAVING_ROUNDS) -> list[Saving]:
-    """The savings of one of `KINDS`: median costs with and without, played in turn; a first round
-    warms up.
+    """The savings of one of `KINDS`: median costs with and without.
+
+    The two are played in turn, after a first round that warms up.
     """
     found = []
     for model, thing, unit, dear, cheap, change, remark in KINDS[name]():
@@ -354,7 +363,7 @@ def _batches(nodes: int) -> Iterator[Pair]:
     strengths, periods = grid(plain, nodes)
 
     def batch(scene: Scene, *, until_decided: bool = True, **settings: Any) -> tuple[Play, Any]:
-        """What a trajectory costs, us, and a run of the batch."""
+        """Cost of a trajectory, us, and a run of the batch."""
         model = EventBasedModel(tolerance=1e-8, **settings)
         packed = pack_pulses(scene, model, strengths, periods)
         run = partial(run_batch, packed, model, until_decided=until_decided, strict=False, jobs=1)
@@ -402,7 +411,7 @@ def _batches(nodes: int) -> Iterator[Pair]:
 
 
 def _timed(start: Callable[[], Any], play: Callable[[Any], object], count: int) -> Play:
-    """What one of `count` parts of a play costs, CPU us; `start` is not counted."""
+    """CPU time (us) of one of `count` parts of a play; `start` is not counted."""
 
     def cost() -> float:
         started = start()
@@ -641,7 +650,7 @@ def _pybullet_steps() -> Iterator[Pair]:
     from rockcheck.engines import PyBullet
 
     def steps(each: str = "", walls: tuple[Wall, ...] = (), count: int = _STEPS) -> Play:
-        """What a step costs, us, with what is done after `each`, by the names of its calls."""
+        """Cost of a step, us, with the calls that `each` names after every step."""
 
         def play() -> float:
             world: Any = PyBullet().rigid_world(_TILTED.replace(walls=walls))
@@ -679,7 +688,7 @@ def _pybullet_steps() -> Iterator[Pair]:
         yield "pybullet, bare steps", thing, "μs a step", dear, steps(), math.nan, remark
 
 
-#: What is measured, each on its own.
+#: The savings, measured kind by kind.
 KINDS: dict[str, Callable[[], Iterator[Pair]]] = {
     "batches": lambda: _batches(40),
     "batches, quick": lambda: _batches(10),
