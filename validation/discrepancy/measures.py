@@ -465,7 +465,7 @@ def _scene(motion: WindowedHistory) -> Scene:
 
 
 def _flat_start(motion: WindowedHistory, what: str, *, walls: int) -> Scene:
-    """The scene of the motion, if its block slides flat from the start; else raises."""
+    """The scene; raises `Unavailable` unless its block starts sliding flat with `walls` walls."""
     scene = _scene(motion)
     slides = scene.initial_velocity != 0.0 and scene.initial_rotation == 0.0
     _need(slides and len(scene.walls) == walls, what)
