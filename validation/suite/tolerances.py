@@ -27,9 +27,10 @@ The judgement of a figure depends on its measure's role:
 
 The move of a figure is its difference from `expected`, counting only the parts beyond their floor
 (`floor_of`): two values below it do not differ. The limit of an error is not changed by the floor.
-A figure that moved by more than `drift` is *better* if the last column holds, else *changed*; better
-passes, even for a quantity or count beyond its limit. A quantity is better only where the reference
-solves the same equations and is itself as expected (`runner`). A ratio to zero is *not defined*.
+A figure that moved by more than `drift` is *better* if the last column holds, else *changed*;
+better passes, even for a quantity or count beyond its limit. A quantity is better only where the
+reference solves the same equations and is itself as expected (`runner`). A ratio to zero is *not
+defined*.
 """
 
 from __future__ import annotations
